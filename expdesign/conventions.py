@@ -1,0 +1,49 @@
+"""Frames, signs, units and column names: what every number in the package means.
+
+- n-frame: north, east, down, fixed to the earth; its origin is the reference point of the sea area.
+- b-frame: x forward, y starboard, z down; origin at the centre of rotation.
+- Pose [north m, east m, heading rad]; heading clockwise from north. Velocity [u, v, r] = [surge m/s, sway m/s, yaw
+  rate rad/s], in the b-frame.
+- Currents and winds are velocities *to* which the medium moves, in the n-frame.
+- Inside the package: SI units and radians. Knots, degrees and latitudes live in `scenario`, `records` and `export`.
+
+Source: T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control (2011), chapter 2.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from expdesign.values import Array
+
+OUTPUTS = ("u", "v", "r")
+POSE_COLUMNS = ("north_m", "east_m", "heading_rad")
+VELOCITY_COLUMNS = ("u_mps", "v_mps", "r_radps")
+METRES_PER_NAUTICAL_MILE = 1852.0
+KNOTS_PER_MPS = 3600.0 / METRES_PER_NAUTICAL_MILE
+
+
+def wrap_angle(angle_rad: Array | float) -> Array:
+    """The same direction in [-pi, pi)."""
+    return np.asarray((np.asarray(angle_rad) + np.pi) % (2.0 * np.pi) - np.pi)
+
+
+def rotation(heading_rad: float) -> Array:
+    """R_nb of shape (2, 2): turns b-frame (forward, starboard) into n-frame (north, east)."""
+    c, s = np.cos(heading_rad), np.sin(heading_rad)
+    return np.array([[c, -s], [s, c]])
+
+
+def to_n_frame(points_b: Array, pose: Array) -> Array:
+    """Points (..., 2) given forward/starboard of a pose (3,), as (..., 2) north/east [m]."""
+    return np.asarray(points_b @ rotation(float(pose[2])).T + pose[:2])
+
+
+def to_b_frame(points_n: Array, pose: Array) -> Array:
+    """Points (..., 2) north/east as (..., 2) forward/starboard of a pose (3,) [m]."""
+    return np.asarray((points_n - pose[:2]) @ rotation(float(pose[2])))
+
+
+def compose(pose: Array, step: Array) -> Array:
+    """The pose (3,) reached from `pose` by a displacement `step` (3,) [forward m, starboard m, turn rad]."""
+    return np.array([*to_n_frame(step[:2], pose), pose[2] + step[2]])

@@ -1,0 +1,75 @@
+"""Time series: commands to the actuators, and the motion that answers them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from expdesign.errors import InputError, UnknownName
+from expdesign.values import Array, seal
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Commands:
+    """Actuator commands, each held from its sample to the next (zero-order hold).
+
+    Attributes:
+        sample_time_s: time between samples [s].
+        names: actuator signals, e.g. ("n1", "a1", "n2", "a2") or ("tau_x", "tau_y", "tau_psi").
+        values: (k, m) in SI units: rps, rad, or the model's own force unit.
+    """
+
+    sample_time_s: float
+    names: tuple[str, ...]
+    values: Array
+
+    def __post_init__(self) -> None:
+        seal(self, values="k m")
+        if self.values.shape[1] != len(self.names):
+            raise InputError(f"Commands has {self.values.shape[1]} columns for the names {self.names}")
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    @property
+    def duration_s(self) -> float:
+        """Time for which the commands last [s]."""
+        return len(self) * self.sample_time_s
+
+    def column(self, name: str) -> Array:
+        """One signal (k,)."""
+        if name not in self.names:
+            raise UnknownName("actuator signal", name, known=self.names)
+        return self.values[:, self.names.index(name)]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Trajectory:
+    """Motion sampled at the ends of every command: one sample more than the commands that made it.
+
+    Attributes:
+        sample_time_s: time between samples [s].
+        pose: (k, 3) n-frame [north m, east m, heading rad]; heading is continuous, not wrapped.
+        velocity: (k, 3) b-frame [u m/s, v m/s, r rad/s], over ground.
+    """
+
+    sample_time_s: float
+    pose: Array
+    velocity: Array
+
+    def __post_init__(self) -> None:
+        seal(self, pose="k 3", velocity="k 3")
+
+    def __len__(self) -> int:
+        return len(self.pose)
+
+    @property
+    def time_s(self) -> Array:
+        """(k,) from zero [s]."""
+        return np.arange(len(self)) * self.sample_time_s
+
+    @property
+    def distance_m(self) -> float:
+        """Distance sailed over ground [m]."""
+        return float(np.sum(np.hypot(*np.diff(self.pose[:, :2], axis=0).T)))

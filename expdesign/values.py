@@ -1,0 +1,52 @@
+"""Frozen values that hold arrays: shapes checked against shared letters, private read-only copies.
+
+A value with arrays is declared `@dataclass(frozen=True, kw_only=True, eq=False)` and calls `seal` once, at birth.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from expdesign.errors import ShapeError
+
+Array = NDArray[np.float64]
+
+
+def readonly(values: ArrayLike) -> Array:
+    """A private float copy that nobody can write to."""
+    array = np.array(values, dtype=float)
+    array.setflags(write=False)
+    return array
+
+
+def seal(value: object, **shapes: str) -> None:
+    """Replace the named fields by read-only float arrays and check their shapes.
+
+    Args:
+        value: a frozen dataclass instance, in its `__post_init__`.
+        shapes: field name to a shape in letters or digits, e.g. `prior="p p", pose="k 3"`; a letter has one size per
+            value.
+
+    Raises:
+        ShapeError: naming the class, the field, the shape found and the one expected.
+    """
+    sizes: dict[str, int] = {}
+    for name, letters in shapes.items():
+        array = readonly(getattr(value, name))
+        expected = letters.split()
+        if len(expected) != array.ndim or not all(
+            size == (int(letter) if letter.isdigit() else sizes.setdefault(letter, size))
+            for letter, size in zip(expected, array.shape, strict=True)
+        ):
+            raise ShapeError(
+                f"{type(value).__name__}.{name} has shape {array.shape}, expected ({letters}) with {sizes}"
+            )
+        object.__setattr__(value, name, array)
+
+
+def frozen_set(value: object, name: str, content: Any) -> None:
+    """Set a field of a frozen value inside its `__post_init__`."""
+    object.__setattr__(value, name, content)

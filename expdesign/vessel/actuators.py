@@ -1,0 +1,101 @@
+"""Actuators: the signals each one takes, its limits, and the generalised force it gives.
+
+`tau_x`, `tau_y` and `tau_psi` are in propeller speed units (rps, rps m), as in the thesis: the thrust gain belongs to
+the model's parameters X_mu, Y_mu, N_mu. Angles are 0 for thrust ahead and grow from bow towards starboard.
+
+Source: F. Ljungberg, doctoral thesis, Linköping University, (3.47)-(3.55).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from expdesign.errors import InputError
+from expdesign.vessel.expressions import Operators, Signals
+
+KINDS: dict[str, tuple[str, ...]] = {
+    "azimuth": ("n", "a"),
+    "tunnel": ("n",),
+    "propeller": ("n",),
+    "rudder": ("rudder",),
+    "force": ("tau_x", "tau_y", "tau_psi"),
+}
+"""Kind of actuator -> stems of its signals; all but `force` carry the actuator's number, e.g. n2, a2, rudder1."""
+
+UNITS = {"n": "rps", "a": "rad", "rudder": "rad"}
+"""Signal stem -> unit in column names; generalised forces carry none."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limit:
+    """Bounds of one actuator signal.
+
+    Attributes:
+        low, high: [unit of the signal], low < high; infinite where there is none.
+        rate: largest change per second, positive.
+    """
+
+    low: float = -math.inf
+    high: float = math.inf
+    rate: float = math.inf
+
+    def __post_init__(self) -> None:
+        if not self.low < self.high:
+            raise InputError(f"limits are [{self.low:g}, {self.high:g}], expected low below high")
+        if not self.rate > 0:
+            raise InputError(f"rate is {self.rate:g}, expected more than 0")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Actuator:
+    """One actuator.
+
+    Attributes:
+        kind: a key of `KINDS`.
+        number: distinguishes actuators of one kind in signal names, from 1.
+        forward_m, starboard_m: place in the b-frame [m].
+        limits: one `Limit` for each signal of the kind, in order.
+    """
+
+    kind: str
+    number: int
+    forward_m: float = 0.0
+    starboard_m: float = 0.0
+    limits: tuple[Limit, ...]
+
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """Names of its commands, e.g. ("n1", "a1")."""
+        stems = KINDS[self.kind]
+        return stems if self.kind == "force" else tuple(f"{stem}{self.number}" for stem in stems)
+
+    def force(self, signals: Signals, ops: Operators) -> tuple[Any, Any, Any]:
+        """Its share of (tau_x, tau_y, tau_psi); zero for rudders, whose force is a model term of its own."""
+        if self.kind == "force":
+            return signals["tau_x"], signals["tau_y"], signals["tau_psi"]
+        command = [signals[name] for name in self.signals]
+        if self.kind == "azimuth":
+            speed, angle = command
+            ahead, side = speed * ops.cos(angle), speed * ops.sin(angle)
+            return ahead, side, self.forward_m * side - self.starboard_m * ahead
+        if self.kind == "tunnel":
+            return 0.0, command[0], self.forward_m * command[0]
+        if self.kind == "propeller":
+            return command[0], 0.0, -self.starboard_m * command[0]
+        return 0.0, 0.0, 0.0
+
+
+def column_name(signal: str) -> str:
+    """File column of an actuator signal: n1 -> n1_rps, a1 -> a1_rad, tau_x -> tau_x."""
+    unit = UNITS.get(signal.rstrip("0123456789"))
+    return f"{signal}_{unit}" if unit else signal
+
+
+def generalised_force(actuators: tuple[Actuator, ...], signals: Signals, ops: Operators) -> tuple[Any, Any, Any]:
+    """(tau_x, tau_y, tau_psi) of all actuators together."""
+    totals: list[Any] = [0.0, 0.0, 0.0]
+    for actuator in actuators:
+        totals = [total + part for total, part in zip(totals, actuator.force(signals, ops), strict=True)]
+    return totals[0], totals[1], totals[2]

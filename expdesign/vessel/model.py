@@ -1,0 +1,123 @@
+"""The manoeuvring model: regressors and accelerations, written once for floats, NumPy arrays and CasADi symbols.
+
+    d/dt nu = (1/T) Phi(nu, inputs)^T theta        T = sample time in discrete form, 1 in continuous form
+
+so the explicit Euler map at the sample time is nu(k+1) = nu(k) + Phi^T theta with discrete parameters.
+
+Source: F. Ljungberg, doctoral thesis, Linköping University, (3.58)-(3.64).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from expdesign.conventions import OUTPUTS
+from expdesign.errors import InputError, UnknownName
+from expdesign.values import Array, readonly
+from expdesign.vessel.actuators import Actuator, generalised_force
+from expdesign.vessel.expressions import NUMPY, Expression, Operators, Signals, parse_expression
+from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS, Term
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class VesselModel:
+    """Model structure with parameter values.
+
+    Attributes:
+        terms: the rows of the regressor matrix, in parameter order.
+        parameters: (p,) parameter values in that order.
+        parameter_std: (p,) prior standard deviations, zero where the value counts as known.
+        form: "discrete" (parameters hold the sample time) or "continuous".
+        sample_time_s: of the discrete form [s].
+        actuators: they turn commands into generalised forces.
+    """
+
+    terms: tuple[Term, ...]
+    parameters: Array
+    parameter_std: Array
+    form: str
+    sample_time_s: float
+    actuators: tuple[Actuator, ...]
+    expressions: tuple[Expression, ...] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "parameters", readonly(self.parameters))
+        object.__setattr__(self, "parameter_std", readonly(self.parameter_std))
+        if not self.parameters.shape == self.parameter_std.shape == (len(self.terms),):
+            raise InputError(f"VesselModel has {len(self.terms)} terms but {self.parameters.shape} parameters")
+        names = self.names
+        if len(set(names)) < len(names):
+            raise InputError(f"model terms repeat the parameter names {sorted({n for n in names if names.count(n) > 1})}")
+        if self.form not in ("discrete", "continuous"):
+            raise UnknownName("model form", self.form, known=("discrete", "continuous"))
+        for term in self.terms:
+            if term.equation not in OUTPUTS:
+                raise UnknownName(f"equation of term {term.name}", term.equation, known=OUTPUTS)
+        known = (*MOTION_SIGNALS, *dict.fromkeys((*FORCE_SIGNALS, *self.inputs)))
+        parsed = tuple(parse_expression(term.expression, signals=known) for term in self.terms)
+        object.__setattr__(self, "expressions", parsed)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Parameter names in order."""
+        return tuple(term.name for term in self.terms)
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """The velocities that have an equation, in the order u, v, r; the others stay zero."""
+        return tuple(name for name in OUTPUTS if any(term.equation == name for term in self.terms))
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Actuator signals in command order."""
+        return tuple(name for actuator in self.actuators for name in actuator.signals)
+
+    @property
+    def time_scale_s(self) -> float:
+        """Divides Phi^T theta to give accelerations [s]."""
+        return self.sample_time_s if self.form == "discrete" else 1.0
+
+    def with_parameters(self, values: Mapping[str, float] | Array) -> VesselModel:
+        """The same structure with other parameter values, all (p,) or some by name."""
+        if not isinstance(values, Mapping):
+            return replace(self, parameters=values)
+        for name in values:
+            if name not in self.names:
+                raise UnknownName("parameter", name, known=self.names)
+        return replace(
+            self, parameters=readonly([values.get(n, old) for n, old in zip(self.names, self.parameters, strict=True)])
+        )
+
+    def regressors(self, velocity_r: Any, velocity_q: Any, inputs: Any, ops: Operators = NUMPY) -> tuple[Any, ...]:
+        """Value of every term, in parameter order.
+
+        Args:
+            velocity_r: (u, v, r) through water; each entry a number, an array or a symbol.
+            velocity_q: (u_q, v_q) through air.
+            inputs: actuator signals in the order of `inputs`.
+            ops: the functions for that kind of number.
+        """
+        signals = self.signals(velocity_r, velocity_q, inputs, ops)
+        return tuple(expression.evaluate(signals, ops) for expression in self.expressions)
+
+    def accelerations(
+        self, velocity_r: Any, velocity_q: Any, inputs: Any, ops: Operators = NUMPY, parameters: Any = None
+    ) -> tuple[Any, Any, Any]:
+        """d/dt (u, v, r) [m/s2, m/s2, rad/s2]; arguments as in `regressors`, other parameter values optional."""
+        theta = self.parameters if parameters is None else parameters
+        totals: dict[str, Any] = dict.fromkeys(OUTPUTS, 0.0)
+        values = self.regressors(velocity_r, velocity_q, inputs, ops)
+        for index, (term, value) in enumerate(zip(self.terms, values, strict=True)):
+            totals[term.equation] = totals[term.equation] + theta[index] * value
+        scale = 1.0 / self.time_scale_s
+        return totals["u"] * scale, totals["v"] * scale, totals["r"] * scale
+
+    def signals(self, velocity_r: Any, velocity_q: Any, inputs: Any, ops: Operators) -> Signals:
+        """The table of everything an expression may read."""
+        u, v, r = velocity_r
+        u_q, v_q = velocity_q
+        commands = dict(zip(self.inputs, inputs, strict=True))
+        forces = dict(zip(FORCE_SIGNALS, generalised_force(self.actuators, commands, ops), strict=True))
+        return {"u": u, "v": v, "r": r, "u_q": u_q, "v_q": v_q, **forces, **commands}

@@ -1,0 +1,75 @@
+"""The vessel: particulars, hull outline, sensors and model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from expdesign.errors import InputError
+from expdesign.values import Array
+from expdesign.vessel.actuators import Actuator, Limit
+from expdesign.vessel.model import VesselModel
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sensors:
+    """Standard deviations of the measurements, white noise per sample.
+
+    Attributes:
+        position_m, heading_rad, velocity_mps, yaw_rate_radps, wind_mps: standard deviations, not negative.
+    """
+
+    position_m: float = 0.0
+    heading_rad: float = 0.0
+    velocity_mps: float = 0.0
+    yaw_rate_radps: float = 0.0
+    wind_mps: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not 0 <= value < np.inf:
+                raise InputError(f"sensors.{name} is {value:g}, expected a standard deviation of 0 or more")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Vessel:
+    """What the planner knows of the ship.
+
+    Attributes:
+        name: for reports.
+        length_m, beam_m, draught_m: particulars [m]; the origin of the b-frame is amidships.
+        sample_time_s: time between commands and between measurements [s].
+        model: structure, parameters, actuators.
+        sensors: measurement noise.
+    """
+
+    name: str
+    length_m: float
+    beam_m: float
+    draught_m: float
+    sample_time_s: float
+    model: VesselModel
+    sensors: Sensors = Sensors()
+
+    def __post_init__(self) -> None:
+        for name in ("length_m", "beam_m", "draught_m", "sample_time_s"):
+            value = getattr(self, name)
+            if not 0 < value < np.inf:
+                raise InputError(f"vessel.{name} is {value:g}, expected more than 0")
+
+    @property
+    def actuators(self) -> tuple[Actuator, ...]:
+        """Actuators in command order."""
+        return self.model.actuators
+
+    @property
+    def limits(self) -> tuple[Limit, ...]:
+        """Limits of every actuator signal, in command order."""
+        return tuple(limit for actuator in self.actuators for limit in actuator.limits)
+
+    @property
+    def hull_b(self) -> Array:
+        """(4, 2) corners of the rectangle length x beam, forward/starboard [m]: contains every real waterline."""
+        half_length, half_beam = self.length_m / 2, self.beam_m / 2
+        return np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * (half_length, half_beam)
