@@ -42,11 +42,13 @@ class Expression:
         text: as written.
         signals: the signal names it reads, sorted.
         evaluate: (signals, operators) -> value.
+        moduli: what stands inside each `abs`, in the same form as `evaluate`.
     """
 
     text: str
     signals: tuple[str, ...]
     evaluate: Evaluate
+    moduli: tuple[Evaluate, ...] = ()
 
 
 def parse_expression(text: str, *, signals: tuple[str, ...]) -> Expression:
@@ -64,34 +66,48 @@ def parse_expression(text: str, *, signals: tuple[str, ...]) -> Expression:
         tree = ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise InputError(f"expression {text!r} cannot be read: expected signals, numbers, + - *, abs sin cos") from None
-    used: set[str] = set()
-    evaluate = _build(tree, text, frozenset(signals), used)
-    return Expression(text, tuple(sorted(used)), evaluate)
+    parser = _Parser(text, frozenset(signals))
+    evaluate = parser.build(tree)
+    return Expression(text, tuple(sorted(parser.used)), evaluate, tuple(parser.moduli))
 
 
-def _build(node: ast.expr, text: str, known: frozenset[str], used: set[str]) -> Evaluate:
-    match node:
-        case ast.Constant(value=bool()):
-            raise InputError(f"expression {text!r}: {node.value} is not a number")
-        case ast.Constant(value=int() | float() as number) if math.isfinite(number):
-            constant = float(number)
-            return lambda signals, ops: constant
-        case ast.Name(id=name):
-            if name not in known:
-                raise UnknownName(f"signal in expression {text!r}:", name, known=sorted(known))
-            used.add(name)
-            return lambda signals, ops: signals[name]
-        case ast.UnaryOp(op=ast.USub(), operand=operand):
-            inner = _build(operand, text, known, used)
-            return lambda signals, ops: -inner(signals, ops)
-        case ast.BinOp(left=left, op=ast.Add() | ast.Sub() | ast.Mult() as operator, right=right):
-            return _binary(operator, _build(left, text, known, used), _build(right, text, known, used))
-        case ast.Call(func=ast.Name(id=name), args=[argument], keywords=[]) if name in FUNCTIONS:
-            inner = _build(argument, text, known, used)
-            return lambda signals, ops: getattr(ops, name)(inner(signals, ops))
-    raise InputError(
-        f"expression {text!r}: {ast.unparse(node)!r} is not allowed, only signals, numbers, + - * and abs sin cos"
-    )
+class _Parser:
+    """Turns a syntax tree into closures, remembering the signals and moduli it meets."""
+
+    def __init__(self, text: str, known: frozenset[str]) -> None:
+        self.text, self.known = text, known
+        self.used: set[str] = set()
+        self.moduli: list[Evaluate] = []
+
+    def build(self, node: ast.expr) -> Evaluate:
+        match node:
+            case ast.Constant(value=int() | float() as number) if not isinstance(number, bool) and math.isfinite(number):
+                constant = float(number)
+                return lambda signals, ops: constant
+            case ast.Name(id=name):
+                return self._signal(name)
+            case ast.UnaryOp(op=ast.USub(), operand=operand):
+                inner = self.build(operand)
+                return lambda signals, ops: -inner(signals, ops)
+            case ast.BinOp(left=left, op=ast.Add() | ast.Sub() | ast.Mult() as operator, right=right):
+                return _binary(operator, self.build(left), self.build(right))
+            case ast.Call(func=ast.Name(id=name), args=[argument], keywords=[]) if name in FUNCTIONS:
+                return self._call(name, self.build(argument))
+        raise InputError(
+            f"expression {self.text!r}: {ast.unparse(node)!r} is not allowed, "
+            "only signals, finite numbers, + - * and abs sin cos"
+        )
+
+    def _signal(self, name: str) -> Evaluate:
+        if name not in self.known:
+            raise UnknownName(f"signal in expression {self.text!r}:", name, known=sorted(self.known))
+        self.used.add(name)
+        return lambda signals, ops: signals[name]
+
+    def _call(self, name: str, inner: Evaluate) -> Evaluate:
+        if name == "abs":
+            self.moduli.append(inner)
+        return lambda signals, ops: getattr(ops, name)(inner(signals, ops))
 
 
 def _binary(operator: ast.operator, left: Evaluate, right: Evaluate) -> Evaluate:

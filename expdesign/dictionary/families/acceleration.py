@@ -1,0 +1,30 @@
+"""Acceleration on a straight course."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from expdesign.dictionary.families.shapes import ramp
+from expdesign.dictionary.spec import Family, Setting
+from expdesign.values import Array
+
+
+def _reference(settings: Mapping[str, float], time_s: Array) -> Array:
+    low, high = settings["from_speed_mps"], settings["speed_mps"]
+    surge = low + (high - low) * ramp(time_s, length_s=settings["ramp_fraction"] * float(time_s[-1]))
+    return np.stack([surge, 0 * surge, 0 * surge], axis=1)
+
+
+ACCELERATION = Family(
+    name="acceleration",
+    summary="from a lower to a higher surge speed on a straight course",
+    settings=(
+        Setting(name="duration_s", meaning="length of one run", low=1e-3, high=1e5),
+        Setting(name="speed_mps", meaning="surge speed reached", low=-50, high=50),
+        Setting(name="from_speed_mps", meaning="surge speed at the start", default=0.0, low=-50, high=50),
+        Setting(name="ramp_fraction", meaning="share of the run that the change takes", default=0.7, low=0.01, high=1),
+    ),
+    reference=_reference,
+)

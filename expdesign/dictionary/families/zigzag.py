@@ -1,0 +1,32 @@
+"""Zig-zag: yaw rate to one side and the other at a steady surge speed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from expdesign.dictionary.families.shapes import faded, flat_wave
+from expdesign.dictionary.spec import Family, Setting
+from expdesign.values import Array
+
+
+def _reference(settings: Mapping[str, float], time_s: Array) -> Array:
+    period_s = settings["period_s"]
+    wave = faded(flat_wave(time_s, period_s=period_s), time_s, length_s=period_s / 12)
+    surge = np.full_like(time_s, settings["speed_mps"])
+    return np.stack([surge, -settings["sway_mps"] * wave, settings["yaw_rate_radps"] * wave], axis=1)
+
+
+ZIGZAG = Family(
+    name="zigzag",
+    summary="alternating turns at a steady surge speed, drifting outwards; the heading swings evenly and returns",
+    settings=(
+        Setting(name="duration_s", meaning="length of one run, best a whole number of periods", low=1e-3, high=1e5),
+        Setting(name="speed_mps", meaning="surge speed", low=-50, high=50),
+        Setting(name="yaw_rate_radps", meaning="largest yaw rate; the first turn is to starboard", low=-5, high=5),
+        Setting(name="period_s", meaning="time of one full swing", low=1e-2, high=1e5),
+        Setting(name="sway_mps", meaning="largest outward sway speed", default=0.0, low=-20, high=20),
+    ),
+    reference=_reference,
+)

@@ -1,0 +1,68 @@
+"""Equations of motion and their integrators, written once for floats, NumPy arrays and CasADi symbols.
+
+State (north, east, heading, u, v, r): pose in the n-frame, velocity over ground in the b-frame.
+
+Source: T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control (2011), (2.26); F. Ljungberg, doctoral
+thesis, Linköping University, (3.18) and (3.58).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from expdesign.vessel import NUMPY, Operators, VesselModel
+
+State = tuple[Any, ...]
+Rates = Callable[[State], State]
+
+
+def to_body(vector_n: Any, heading_rad: Any, ops: Operators) -> tuple[Any, Any]:
+    """A horizontal (north, east) vector in the b-frame of a heading."""
+    c, s = ops.cos(heading_rad), ops.sin(heading_rad)
+    return vector_n[0] * c + vector_n[1] * s, vector_n[1] * c - vector_n[0] * s
+
+
+def relative_velocity(state: State, current_to: Any, wind_to: Any, ops: Operators) -> tuple[State, State]:
+    """(u, v, r) through water and (u_q, v_q) through air, from the state and the n-frame current and wind."""
+    *_, heading, u, v, r = state
+    u_c, v_c = to_body(current_to, heading, ops)
+    u_w, v_w = to_body(wind_to, heading, ops)
+    return (u - u_c, v - v_c, r), (u - u_w, v - v_w)
+
+
+def motion_rates(
+    model: VesselModel,
+    state: State,
+    inputs: Any,
+    *,
+    current_to: Any = (0.0, 0.0),
+    wind_to: Any = (0.0, 0.0),
+    ops: Operators = NUMPY,
+    parameters: Any = None,
+) -> State:
+    """Time derivative of the state under held inputs and steady n-frame current and wind."""
+    _, _, heading, u, v, r = state
+    c, s = ops.cos(heading), ops.sin(heading)
+    water, air = relative_velocity(state, current_to, wind_to, ops)
+    return (u * c - v * s, u * s + v * c, r, *model.accelerations(water, air, inputs, ops, parameters))
+
+
+def euler_step(rates: Rates, state: State, step_s: Any) -> State:
+    """One explicit Euler step, the map the discrete parameters are defined by."""
+    return tuple(x + step_s * dx for x, dx in zip(state, rates(state), strict=True))
+
+
+def rk4_step(rates: Rates, state: State, step_s: Any) -> State:
+    """One classical Runge-Kutta step of order four."""
+
+    def ahead(slope: State, fraction: float) -> State:
+        return tuple(x + fraction * step_s * dx for x, dx in zip(state, slope, strict=True))
+
+    k1 = rates(state)
+    k2 = rates(ahead(k1, 0.5))
+    k3 = rates(ahead(k2, 0.5))
+    k4 = rates(ahead(k3, 1.0))
+    return tuple(
+        x + step_s / 6.0 * (a + 2.0 * b + 2.0 * c + d) for x, a, b, c, d in zip(state, k1, k2, k3, k4, strict=True)
+    )

@@ -1,0 +1,126 @@
+"""Runs: one with plain floats, many at once with arrays; inputs are held between samples."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from expdesign.errors import Diverged, InputError, UnknownName
+from expdesign.signals import Commands, Trajectory
+from expdesign.simulation.environment import CALM, Environment
+from expdesign.simulation.motion import State, euler_step, motion_rates, rk4_step
+from expdesign.values import Array
+from expdesign.vessel import NUMPY, SCALAR, Vessel
+
+STEPS = {"rk4": rk4_step, "euler": euler_step}
+SUBSTEPS = 2
+"""Runge-Kutta steps per sample; a sample of the reference vessels is at most a fifth of their fastest time constant."""
+LARGEST_SPEED = 1e3
+"""Speeds [m/s, rad/s] beyond this mean that the model is unstable."""
+
+
+def simulate(
+    vessel: Vessel,
+    commands: Commands,
+    *,
+    pose: Array | tuple[float, float, float] = (0.0, 0.0, 0.0),
+    velocity: Array | tuple[float, float, float] = (0.0, 0.0, 0.0),
+    environment: Environment = CALM,
+    substeps: int = SUBSTEPS,
+    integrator: str = "rk4",
+) -> Trajectory:
+    """Run the commands from a pose and a velocity over ground under the environment's mean current and wind.
+
+    Args:
+        vessel: whose model is integrated.
+        commands: k samples, held.
+        pose, velocity: (3,) at the first sample.
+        environment: its means act as steady n-frame current and wind.
+        substeps: integrator steps per sample.
+        integrator: "rk4", or "euler" for the map of the discrete parameters (with one substep).
+
+    Raises:
+        Diverged: a speed passed `LARGEST_SPEED`.
+        InputError: commands of another vessel.
+    """
+    _check_inputs(vessel, commands)
+    step = _step(integrator)
+    current, wind = environment.current_to.tolist(), environment.wind_to.tolist()
+    step_s = commands.sample_time_s / substeps
+    state: State = tuple(float(x) for x in (*pose, *velocity))
+    rows = [state]
+    for inputs in commands.values.tolist():
+
+        def rates(x: State, held: Any = inputs) -> State:
+            return motion_rates(vessel.model, x, held, current_to=current, wind_to=wind, ops=SCALAR)
+
+        for _ in range(substeps):
+            state = step(rates, state, step_s)
+        if not max(map(abs, state[3:])) < LARGEST_SPEED:
+            raise Diverged(
+                f"vessel {vessel.name!r}: the simulation diverges after {len(rows) * commands.sample_time_s:.1f} s"
+            )
+        rows.append(state)
+    table = np.array(rows)
+    return Trajectory(sample_time_s=commands.sample_time_s, pose=table[:, :3], velocity=table[:, 3:])
+
+
+def simulate_many(
+    vessel: Vessel,
+    commands: Commands,
+    *,
+    pose: Array,
+    velocity: Array,
+    current_to: Array,
+    wind_to: Array,
+    parameters: Array,
+    substeps: int = SUBSTEPS,
+) -> Array:
+    """The same commands for n truths at once.
+
+    Args:
+        vessel: gives structure and actuators.
+        commands: k samples, held.
+        pose, velocity: (n, 3) start states.
+        current_to, wind_to: (n, 2) steady n-frame velocities.
+        parameters: (n, p) in the model's own form.
+        substeps: Runge-Kutta steps per sample.
+
+    Returns:
+        (k + 1, n, 6) states; runs that diverge are nan instead of raising, for the caller to count.
+    """
+    _check_inputs(vessel, commands)
+    state: State = tuple(np.asarray(column, dtype=float) for column in (*pose.T, *velocity.T))
+    rows = [np.stack(state, axis=-1)]
+    theta, current, wind = parameters.T, current_to.T, wind_to.T
+    step_s = commands.sample_time_s / substeps
+    with np.errstate(over="ignore", invalid="ignore"):
+        for inputs in commands.values:
+
+            def rates(x: State, held: Array = inputs) -> State:
+                return motion_rates(
+                    vessel.model, x, held, current_to=current, wind_to=wind, ops=NUMPY, parameters=theta
+                )
+
+            for _ in range(substeps):
+                state = rk4_step(rates, state, step_s)
+            rows.append(np.stack(state, axis=-1))
+    result = np.array(rows)
+    settled = np.abs(result[..., 3:]).max(axis=(0, 2)) < LARGEST_SPEED
+    result[:, ~settled] = np.nan
+    return result
+
+
+def _check_inputs(vessel: Vessel, commands: Commands) -> None:
+    if commands.names != vessel.model.inputs:
+        raise InputError(
+            f"commands {', '.join(commands.names)} do not fit vessel {vessel.name!r}, "
+            f"which takes {', '.join(vessel.model.inputs)}"
+        )
+
+
+def _step(integrator: str) -> Any:
+    if integrator not in STEPS:
+        raise UnknownName("integrator", integrator, known=STEPS)
+    return STEPS[integrator]
