@@ -1,0 +1,187 @@
+"""The subcommands: each hands its arguments to the workflow of the same name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from expdesign import __version__
+from expdesign.cli.arguments import check_out, parse_seed
+from expdesign.cli.progress import shown_progress
+from expdesign.cli.summary import as_json, print_summary
+
+if TYPE_CHECKING:
+    from expdesign.workflows import Outcome, Progress
+
+app = typer.Typer(
+    add_completion=False,
+    rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog="Exit status: 0 done; 2 the input is wrong; 3 the input is fine but has no answer; 130 interrupted.",
+)
+
+ScenarioFile = Annotated[
+    Path,
+    typer.Argument(metavar="SCENARIO.toml", help="Vessel, manoeuvres, sea area, start, goal and wishes."),
+]
+PlanFile = Annotated[
+    Path,
+    typer.Argument(metavar="PLAN.json", help="A plan made before, with the track.csv and commands.csv beside it."),
+]
+Out = Annotated[
+    Path | None,
+    typer.Option("--out", "-o", metavar="FOLDER", help="Where to write; runs/<name of the scenario> when not given."),
+]
+OutBeside = Annotated[
+    Path | None,
+    typer.Option("--out", "-o", metavar="FOLDER", help="Where to write; the plan's folder when not given."),
+]
+Seed = Annotated[
+    int,
+    typer.Option("--seed", parser=parse_seed, metavar="N", help="Start of the random numbers: same seed, same result."),
+]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print no progress and no summary, only errors.")]
+Json = Annotated[bool, typer.Option("--json", help="Print the summary as JSON, and nothing else, on stdout.")]
+
+
+def _show_version(asked: bool) -> None:
+    if asked:
+        typer.echo(f"expdesign {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def expdesign(
+    version: Annotated[
+        bool, typer.Option("--version", is_eager=True, callback=_show_version, help="Print the version and stop.")
+    ] = False,
+) -> None:
+    """Plan a trial that tells most about how a ship moves, in the water it may use.
+
+    [bold]run[/bold] makes everything from one scenario file: what each manoeuvre tells,
+    how long to run each, one trajectory from start to goal, verified by
+    simulating it again, route files and a report. The other commands are its
+    steps, one at a time.
+
+    Begin with: expdesign run scenarios/helsinki.toml
+    """
+
+
+@app.command()
+def run(scenario: ScenarioFile, out: Out = None, seed: Seed = 0, quiet: Quiet = False, json: Json = False) -> None:
+    """Do everything: score, durations, plan, verify, export, report.
+
+    Example: expdesign run scenarios/helsinki.toml
+    """
+    _carry_out("run", lambda flow, tell: flow.run(scenario, check_out(out), seed=seed, progress=tell), quiet, json)
+
+
+@app.command()
+def score(scenario: ScenarioFile, out: Out = None, seed: Seed = 0, quiet: Quiet = False, json: Json = False) -> None:
+    """Simulate the dictionary of manoeuvres and compute what each one tells.
+
+    Writes dictionary.json.
+    """
+    _carry_out("score", lambda flow, tell: flow.score(scenario, check_out(out), seed=seed, progress=tell), quiet, json)
+
+
+@app.command()
+def durations(
+    scenario: ScenarioFile, out: Out = None, seed: Seed = 0, quiet: Quiet = False, json: Json = False
+) -> None:
+    """Choose how long to run each manoeuvre, and prove how close to the best that is.
+
+    Writes durations.json.
+    """
+    _carry_out(
+        "durations", lambda flow, tell: flow.durations(scenario, check_out(out), seed=seed, progress=tell), quiet, json
+    )
+
+
+@app.command()
+def plan(
+    scenario: ScenarioFile,
+    out: Out = None,
+    durations: Annotated[
+        Path | None,
+        typer.Option("--durations", metavar="FILE", help="A durations.json made before; computed when not given."),
+    ] = None,
+    seed: Seed = 0,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> None:
+    """Join the chosen manoeuvres into one trajectory in the sea area, and verify it.
+
+    Writes plan.json, track.csv and commands.csv.
+    """
+    _carry_out(
+        "plan",
+        lambda flow, tell: flow.plan(scenario, check_out(out), durations=durations, seed=seed, progress=tell),
+        quiet,
+        json,
+    )
+
+
+@app.command()
+def export(
+    plan: PlanFile,
+    formats: Annotated[
+        list[str], typer.Option("--format", "-f", metavar="F ...", help="One or more of: csv geojson gpx rtz.")
+    ],
+    out: OutBeside = None,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> None:
+    """Write a plan as route files for chart systems and autopilots.
+
+    Example: expdesign export runs/helsinki/plan.json --format rtz gpx
+    """
+    _carry_out(
+        "export",
+        lambda flow, tell: flow.export(plan, check_out(out), formats=tuple(formats), progress=tell),
+        quiet,
+        json,
+    )
+
+
+@app.command()
+def simulate(
+    plan: PlanFile,
+    truth: Annotated[
+        Path, typer.Option("--truth", metavar="VESSEL.toml", help="The vessel that runs the trial, with its sensors.")
+    ],
+    out: OutBeside = None,
+    seed: Seed = 0,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> None:
+    """Rehearse the trial: run the plan on another vessel and measure with noise.
+
+    Writes measured.csv.
+    """
+    _carry_out(
+        "simulate",
+        lambda flow, tell: flow.simulate(plan, check_out(out), truth=truth, seed=seed, progress=tell),
+        quiet,
+        json,
+    )
+
+
+def _carry_out(name: str, work: Callable[[ModuleType, Progress], Outcome], quiet: bool, json: bool) -> None:
+    """Do the work of one command and say what came of it.
+
+    The solvers behind the workflows take seconds to load, so they are loaded here and not for `--help` or a typing
+    mistake.
+    """
+    from expdesign import workflows
+
+    with shown_progress(quiet=quiet) as progress:
+        outcome = work(workflows, progress)
+    if json:
+        typer.echo(as_json(name, outcome))
+    elif not quiet:
+        print_summary(outcome)

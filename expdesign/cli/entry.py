@@ -1,0 +1,101 @@
+"""From arguments to an exit status: every error becomes one line on stderr."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+import traceback
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from types import FrameType
+
+import typer
+from typer.main import get_command
+
+from expdesign.cli.arguments import repeat_option
+from expdesign.cli.commands import app
+from expdesign.errors import InputError, NoAnswer
+
+DONE, BUG, WRONG_INPUT, NO_ANSWER, INTERRUPTED = 0, 1, 2, 3, 130
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command.
+
+    Args:
+        argv: arguments without the program's name; those of the process when None.
+
+    Returns:
+        Exit status: 0 done, 2 the input is wrong, 3 the input is fine but has no answer, 130 interrupted (Ctrl-C or
+        a termination signal), 1 a defect of this program or a reader of the output that went away.
+    """
+    arguments = repeat_option(sys.argv[1:] if argv is None else argv, "--format")
+    try:
+        with _termination_interrupts():
+            return _invoke(arguments)
+    except (InputError, NoAnswer) as error:
+        return _fail(str(error), WRONG_INPUT if isinstance(error, InputError) else NO_ANSWER)
+    except typer.TyperException as error:
+        return _fail(_usage(error), WRONG_INPUT)
+    except KeyboardInterrupt:
+        return _fail("interrupted, nothing half-written", INTERRUPTED)
+    except BrokenPipeError:
+        return _reader_left()
+    except OSError as error:
+        return _fail(f"{error.filename}: {error.strerror}" if error.filename else str(error), WRONG_INPUT)
+    except Exception as error:
+        return _defect(error)
+
+
+def _invoke(arguments: list[str]) -> int:
+    command = get_command(app)
+    try:
+        with command.make_context("expdesign", arguments) as context:
+            command.invoke(context)
+        sys.stdout.flush()
+    except typer.Exit as exit_request:
+        return exit_request.exit_code
+    return DONE
+
+
+@contextmanager
+def _termination_interrupts() -> Iterator[None]:
+    """Let a termination signal act like Ctrl-C, so that the same cleaning up runs."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    previous = signal.signal(signal.SIGTERM, _interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, previous)
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    raise KeyboardInterrupt
+
+
+def _usage(error: typer.TyperException) -> str:
+    context = getattr(error, "ctx", None)
+    return f"{error.format_message().rstrip('.')} (see {context.command_path if context else 'expdesign'} --help)"
+
+
+def _defect(error: Exception) -> int:
+    if os.environ.get("EXPDESIGN_DEBUG"):
+        traceback.print_exception(error)
+    what = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    return _fail(f"this is a defect in expdesign, {what} (EXPDESIGN_DEBUG=1 shows where)", BUG)
+
+
+def _reader_left() -> int:
+    """Nobody reads stdout any more, as after `| head`: say nothing, not even when the interpreter flushes it."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return BUG
+
+
+def _fail(message: str, status: int) -> int:
+    line = " ".join(part.strip() for part in message.splitlines() if part.strip())
+    typer.echo(f"expdesign: error: {line}", err=True)
+    return status

@@ -1,0 +1,72 @@
+"""What a finished command says on stdout: where the results are and the key numbers, or the same as JSON."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.table import Table
+
+if TYPE_CHECKING:
+    from expdesign.workflows import Outcome
+
+UNITS = {"s": "s", "m": "m", "mps": "m/s", "radps": "rad/s", "rad": "rad", "deg": "°", "kn": "kn", "rps": "1/s"}
+"""Last part of a name -> unit as people write it."""
+
+
+def as_json(command: str, outcome: Outcome) -> str:
+    """One JSON object: `command`, `files` written, and the workflow's `summary`."""
+    content = {"command": command, "files": [str(path) for path in outcome.files], "summary": outcome.summary}
+    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
+
+
+def print_summary(outcome: Outcome) -> None:
+    """Key numbers as a table, then the files and the page to open."""
+    console = Console(highlight=False, markup=False, soft_wrap=True)
+    table = Table(show_header=False, box=None, padding=(0, 3, 0, 0))
+    for row in _rows(outcome.summary):
+        table.add_row(*row)
+    if table.row_count:
+        console.print(table)
+        console.print()
+    for folder, names in _by_folder(outcome.files).items():
+        console.print(f"Written to {folder}: {', '.join(names)}")
+    for page in (path for path in outcome.files if path.suffix == ".html"):
+        console.print(f"Open {page} in a browser.")
+
+
+def _rows(summary: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, str]]:
+    """(label, value with unit) of every entry, nested ones after the name of what holds them."""
+    for key, value in summary.items():
+        stem, _, suffix = key.rpartition("_")
+        unit = UNITS.get(suffix, "") if stem else ""
+        label = f"{prefix}{(stem if unit else key).replace('_', ' ')}"
+        if isinstance(value, Mapping):
+            yield from _rows(value, f"{label}, ")
+        else:
+            yield label, f"{_text(value)} {unit}".rstrip()
+
+
+def _text(value: object) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.0f}" if 1e4 <= abs(value) < 1e9 else f"{value:.5g}"
+    if isinstance(value, Mapping):
+        return " ".join(_text(part) for part in value.values())
+    if isinstance(value, (list, tuple)):
+        return ", ".join(_text(part) for part in value)
+    return str(value)
+
+
+def _by_folder(files: tuple[Path, ...]) -> dict[str, list[str]]:
+    folders: dict[str, list[str]] = {}
+    for path in files:
+        folders.setdefault(f"{path.parent}{os.sep}", []).append(path.name)
+    return folders
