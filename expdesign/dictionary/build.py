@@ -49,7 +49,7 @@ def build_primitive(vessel: Vessel, spec: PrimitiveSpec) -> Primitive:
             f"primitive {spec.name!r}: duration_s is {spec.settings['duration_s']:g}, "
             f"expected at least two samples of {vessel.sample_time_s:g} s"
         )
-    time_s = np.arange(count + 1) * vessel.sample_time_s
+    time_s = np.arange(count + 1, dtype=float) * vessel.sample_time_s
     wished = family(spec.family).reference(spec.settings, time_s)
     if not np.isfinite(wished).all():
         raise InputError(f"primitive {spec.name!r}: its settings give velocities that are not numbers")

@@ -1,0 +1,23 @@
+"""Information: moments of regressors and instruments, identifiability."""
+
+from expdesign.information.moments import (
+    check_informative,
+    estimated_parameters,
+    excitation_condition,
+    log_det_or_none,
+    moments,
+    regressor_rows,
+    score_primitives,
+)
+from expdesign.information.primitive_information import PrimitiveInformation
+
+__all__ = [
+    "PrimitiveInformation",
+    "check_informative",
+    "estimated_parameters",
+    "excitation_condition",
+    "log_det_or_none",
+    "moments",
+    "regressor_rows",
+    "score_primitives",
+]

@@ -13,17 +13,19 @@ def ramp(time_s: Array, *, start_s: float = 0.0, length_s: float) -> Array:
     return np.asarray((1.0 - np.cos(np.pi * x)) / 2.0)
 
 
-def flat_wave(time_s: Array, *, period_s: float) -> Array:
-    """A rounded square wave between -1 and 1 that starts at 1 in the middle of a plateau.
+def envelope(time_s: Array, *, length_s: float) -> Array:
+    """1, brought in from zero at the start and taken back to zero at the end over `length_s`."""
+    return ramp(time_s, length_s=length_s) * ramp(float(time_s[-1]) - time_s, length_s=length_s)
 
-    Its integral over the first quarter is the peak, so a heading rate of this shape swings the heading evenly to
-    both sides and returns after every whole period.
+
+def flat_wave(time_s: Array, *, period_s: float) -> Array:
+    """A rounded square wave of amplitude about 1 that begins and ends at zero and has zero mean.
+
+    It starts in the middle of a plateau, so what it is the rate of (heading, sideways distance) swings evenly to both
+    sides and comes back.
     """
     sharpness = 3.0
-    return np.asarray(np.tanh(sharpness * np.cos(2.0 * np.pi * time_s / period_s)) / np.tanh(sharpness))
-
-
-def faded(signal: Array, time_s: Array, *, length_s: float) -> Array:
-    """The signal brought in from zero at the start and taken back to zero at the end."""
-    end_s = float(time_s[-1])
-    return signal * ramp(time_s, length_s=length_s) * ramp(end_s - time_s, length_s=length_s)
+    wave = np.tanh(sharpness * np.cos(2.0 * np.pi * time_s / period_s)) / np.tanh(sharpness)
+    fade = envelope(time_s, length_s=period_s / 12)
+    weights = np.r_[0.5, np.ones(len(time_s) - 2), 0.5]
+    return np.asarray(fade * (wave - weights @ (fade * wave) / (weights @ fade)))

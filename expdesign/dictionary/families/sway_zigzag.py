@@ -6,14 +6,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from expdesign.dictionary.families.shapes import faded, flat_wave
+from expdesign.dictionary.families.shapes import flat_wave
 from expdesign.dictionary.spec import Family, Setting
 from expdesign.values import Array
 
 
 def _reference(settings: Mapping[str, float], time_s: Array) -> Array:
-    period_s = settings["period_s"]
-    wave = faded(flat_wave(time_s, period_s=period_s), time_s, length_s=period_s / 12)
+    wave = flat_wave(time_s, period_s=settings["period_s"])
     surge = np.full_like(time_s, settings["speed_mps"])
     return np.stack([surge, settings["sway_mps"] * wave, 0 * wave], axis=1)
 

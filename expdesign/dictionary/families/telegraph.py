@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from expdesign.dictionary.families.shapes import faded
+from expdesign.dictionary.families.shapes import envelope
 from expdesign.dictionary.spec import Family, Setting
 from expdesign.values import Array
 
@@ -24,9 +24,9 @@ def _reference(settings: Mapping[str, float], time_s: Array) -> Array:
     rng = np.random.default_rng(int(settings["draw"]))
     hold_s, rise_s = settings["hold_s"], settings["rise_s"]
     swing, sway, yaw = (_switching(rng, time_s, hold_s=hold_s, rise_s=rise_s) for _ in range(3))
-    surge = settings["speed_mps"] + settings["speed_swing_mps"] * faded(swing, time_s, length_s=rise_s)
-    side = settings["sway_mps"] * faded(sway, time_s, length_s=rise_s)
-    turn = settings["yaw_rate_radps"] * faded(yaw, time_s, length_s=rise_s)
+    fade = envelope(time_s, length_s=rise_s)
+    surge = settings["speed_mps"] + settings["speed_swing_mps"] * fade * swing
+    side, turn = settings["sway_mps"] * fade * sway, settings["yaw_rate_radps"] * fade * yaw
     return np.stack([surge, side, turn], axis=1)
 
 

@@ -1,0 +1,88 @@
+"""Problem -> durations with a certificate."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from expdesign.durations._cvxpy import maximise_log_det
+from expdesign.durations.certificate import log_det, scaled, sensitivities
+from expdesign.durations.polish import polish
+from expdesign.durations.rounding import value, whole_runs
+from expdesign.durations.values import MEAN_SUBTRACTIONS, DurationDesign, DurationProblem
+from expdesign.errors import NoAnswer, UnknownName
+from expdesign.information import PrimitiveInformation, check_informative
+from expdesign.values import Array
+
+LARGEST_GAP = 1e-6
+"""Certificates above this, relative to the dimension, are not given out as optimal designs."""
+
+
+def build_durations(
+    information: Sequence[PrimitiveInformation],
+    parameters: Sequence[str],
+    *,
+    total_s: float,
+    mean_subtraction: str = "complete",
+) -> DurationProblem:
+    """The duration problem of a scored dictionary.
+
+    Raises:
+        UnknownName: no such mean subtraction.
+        NotInformative: no shares of these primitives inform about every parameter.
+    """
+    if mean_subtraction not in MEAN_SUBTRACTIONS:
+        raise UnknownName("mean subtraction", mean_subtraction, known=MEAN_SUBTRACTIONS)
+    check_informative(information, parameters, mean_subtraction)
+    return DurationProblem(
+        names=tuple(item.primitive.name for item in information),
+        parameters=tuple(parameters),
+        mean_subtraction=mean_subtraction,
+        matrices=np.array([bordered(item, mean_subtraction) for item in information]),
+        run_s=np.array([item.primitive.duration_s for item in information]),
+        total_s=total_s,
+    )
+
+
+def bordered(item: PrimitiveInformation, mean_subtraction: str) -> Array:
+    """B_q of one primitive, linear in time fractions: see `DurationProblem`."""
+    if mean_subtraction == "none":
+        return item.X
+    if mean_subtraction == "batch":
+        return item.X - item.Y @ item.Z.T
+    return np.block([[item.X, item.Y], [item.Z.T, np.eye(item.Y.shape[1])]])
+
+
+def solve_durations(problem: DurationProblem) -> DurationDesign:
+    """The D-optimal time fractions, whole runs, and the proof of both.
+
+    Raises:
+        NoAnswer: the certificate cannot be brought below `LARGEST_GAP`, or whole runs do not fit.
+    """
+    matrices, offset = scaled(problem.matrices)
+    count = len(problem.names)
+    start = maximise_log_det(matrices)
+    uniform = np.full(count, 1.0 / count)
+    if start is None or not np.isfinite(log_det(matrices, 0.999 * start + 0.001 * uniform)):
+        start = uniform
+    fractions = polish(matrices, start)
+    d = sensitivities(matrices, fractions)
+    gap = max(float(d.max()) - problem.dimension, 0.0)
+    if not gap < LARGEST_GAP * problem.dimension:
+        raise NoAnswer(
+            f"the durations could not be certified: the sensitivity of {problem.names[int(d.argmax())]!r} is "
+            f"{d.max():.9g}, an optimum needs at most {problem.dimension}"
+        )
+    best, p = log_det(matrices, fractions), len(problem.parameters)
+    runs = whole_runs(problem, matrices, fractions)
+    return DurationDesign(
+        problem=problem,
+        fractions=fractions,
+        sensitivities=d,
+        log_det=best + offset,
+        gap=gap,
+        repeats=runs,
+        efficiency_repeats=float(np.exp((value(problem, matrices, np.array(runs)) - best) / p)),
+        efficiency_uniform=float(np.exp((log_det(matrices, uniform) - best) / p)),
+    )
