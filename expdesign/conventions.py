@@ -13,8 +13,9 @@ Source: T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from expdesign.values import Array
+Array = NDArray[np.float64]
 
 OUTPUTS = ("u", "v", "r")
 POSE_COLUMNS = ("north_m", "east_m", "heading_rad")
