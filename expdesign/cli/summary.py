@@ -48,7 +48,7 @@ def _rows(summary: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str
         if isinstance(value, Mapping):
             yield from _rows(value, f"{label}, ")
         else:
-            yield label, f"{_text(value)} {unit}".rstrip()
+            yield label, _text(value) if value is None else f"{_text(value)} {unit}".rstrip()
 
 
 def _text(value: object) -> str:

@@ -1,0 +1,160 @@
+"""The command line hands over what was typed, and keeps results on stdout apart from progress on stderr."""
+
+import json
+import re
+import subprocess
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+import expdesign
+from expdesign.cli import main
+from expdesign.cli.arguments import repeat_option
+
+SUMMARY = {
+    "total_s": 3600.0,
+    "clearance_min_m": 21.25,
+    "efficiency": {"repeats": 0.98},
+    "reposition_bound_s": None,
+    "verified": True,
+    "parameters": ["X_u", "X_mu"],
+}
+COMMANDS = ("run", "score", "durations", "plan", "export", "simulate")
+
+
+@dataclass
+class Finished:
+    """What a workflow returns."""
+
+    files: tuple[Path, ...] = (Path("runs/a/plan.json"), Path("runs/a/report.html"))
+    summary: dict[str, object] = field(default_factory=lambda: dict(SUMMARY))
+
+
+@dataclass
+class Workflows:
+    """Stands in for the workflows: notes what it is asked for and reports progress."""
+
+    calls: list[tuple[str, tuple[object, ...], dict[str, object]]] = field(default_factory=list)
+
+    def __getattr__(self, name: str) -> object:
+        def workflow(*arguments: object, progress: object, **options: object) -> Finished:
+            self.calls.append((name, arguments, options))
+            for fraction in (0.0, 0.01, 0.5, 1.0):
+                progress("at work", fraction)  # type: ignore[operator]
+            return Finished()
+
+        return workflow
+
+
+@pytest.fixture
+def workflows(monkeypatch: pytest.MonkeyPatch) -> Workflows:
+    stand_in = Workflows()
+    monkeypatch.setattr(expdesign, "workflows", stand_in, raising=False)
+    return stand_in
+
+
+@pytest.mark.parametrize(
+    ("typed", "name", "arguments", "options"),
+    [
+        ("run a.toml", "run", (Path("a.toml"), None), {"seed": 0}),
+        ("run a.toml --out o --seed 7", "run", (Path("a.toml"), Path("o")), {"seed": 7}),
+        ("score --seed 1 a.toml", "score", (Path("a.toml"), None), {"seed": 1}),
+        ("durations a.toml", "durations", (Path("a.toml"), None), {"seed": 0}),
+        ("plan a.toml", "plan", (Path("a.toml"), None), {"seed": 0, "durations": None}),
+        ("plan a.toml --durations d.json", "plan", (Path("a.toml"), None), {"seed": 0, "durations": Path("d.json")}),
+        ("export p.json --format rtz gpx", "export", (Path("p.json"), None), {"formats": ("rtz", "gpx")}),
+        ("export --format rtz p.json --format csv", "export", (Path("p.json"), None), {"formats": ("rtz", "csv")}),
+        ("simulate p.json --truth v.toml", "simulate", (Path("p.json"), None), {"seed": 0, "truth": Path("v.toml")}),
+    ],
+)
+def test_what_was_typed_reaches_the_workflow(
+    workflows: Workflows, typed: str, name: str, arguments: tuple[object, ...], options: dict[str, object]
+) -> None:
+    assert main(typed.split()) == 0
+    assert workflows.calls == [(name, arguments, options)]
+
+
+@pytest.mark.parametrize(
+    ("typed", "spelled"),
+    [
+        ("p.json --format a b c", "p.json --format a --format b --format c"),
+        ("--format a b p.json --quiet", "--format a --format b p.json --quiet"),
+        ("--format a --quiet b", "--format a --quiet b"),
+        ("--format", "--format"),
+        ("run x y", "run x y"),
+    ],
+)
+def test_a_list_of_values_is_the_option_repeated(typed: str, spelled: str) -> None:
+    assert repeat_option(typed.split(), "--format") == spelled.split()
+    assert repeat_option(spelled.split(), "--format") == spelled.split()
+
+
+def test_json_is_alone_on_stdout_and_progress_on_stderr(
+    workflows: Workflows, capsys: pytest.CaptureFixture[str]
+) -> None:
+    main(["run", "a.toml", "--json"])
+    captured = capsys.readouterr()
+    assert json.loads(captured.out) == {
+        "command": "run",
+        "files": ["runs/a/plan.json", "runs/a/report.html"],
+        "summary": SUMMARY,
+    }
+    assert captured.err.splitlines() == ["[  0%] at work", "[ 50%] at work", "[100%] at work"]
+
+
+def test_numbers_come_with_their_units_and_files_with_their_folder(
+    workflows: Workflows, capsys: pytest.CaptureFixture[str]
+) -> None:
+    main(["run", "a.toml"])
+    lines = capsys.readouterr().out.splitlines()
+    said = {label: value for label, _, value in (re.split(r"( {2,}|$)", line.strip(), maxsplit=1) for line in lines)}
+    assert said["total"] == "3600 s"
+    assert said["clearance min"] == "21.25 m"
+    assert said["efficiency, repeats"] == "0.98"
+    assert said["reposition bound"] == "-"
+    assert said["verified"] == "yes"
+    assert said["parameters"] == "X_u, X_mu"
+    assert "Written to runs/a/: plan.json, report.html" in said
+    assert "Open runs/a/report.html in a browser." in said
+
+
+def test_quiet_says_nothing(workflows: Workflows, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "a.toml", "--quiet"]) == 0
+    assert capsys.readouterr() == ("", "")
+
+
+def test_quiet_with_json_says_only_json(workflows: Workflows, capsys: pytest.CaptureFixture[str]) -> None:
+    main(["run", "a.toml", "--quiet", "--json"])
+    captured = capsys.readouterr()
+    assert json.loads(captured.out)["summary"] == SUMMARY
+    assert captured.err == ""
+
+
+def test_help_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--help"]) == 0
+    told = capsys.readouterr().out
+    assert all(f" {name} " in told for name in COMMANDS)
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_explains_itself(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([name, "--help"]) == 0
+    told = capsys.readouterr().out
+    assert f"expdesign {name}" in told
+    assert "--out" in told
+    assert "--json" in told
+
+
+def test_help_loads_no_solver() -> None:
+    code = "import sys; from expdesign.cli import main; main(['--help']); print(*sys.modules, sep='\\n')"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = set(done.stdout.splitlines())
+    assert "typer" in loaded
+    assert not {"casadi", "cvxpy", "ompl", "matplotlib", "scipy"} & loaded
+
+
+def test_the_module_is_the_console_script() -> None:
+    done = subprocess.run([sys.executable, "-m", "expdesign", "--version"], capture_output=True, text=True, check=True)
+    assert done.stdout == f"expdesign {expdesign.__version__}\n"

@@ -1,0 +1,144 @@
+"""Every way a command can end has its exit status and its one line on stderr."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+import expdesign
+from expdesign.cli import main
+from expdesign.errors import FileError, InputError, NoAnswer, NoPlan
+
+ASLEEP = """
+import sys, time, types, expdesign
+from expdesign.cli import main
+def run(scenario, out, *, seed, progress):
+    progress("asleep", 0.5)
+    time.sleep(600)
+expdesign.workflows = types.SimpleNamespace(run=run)
+sys.exit(main(["run", "any.toml"]))
+"""
+
+
+def ends_with(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
+    """Let the `run` workflow raise."""
+
+    def run(*arguments: object, **options: object) -> None:
+        raise error
+
+    monkeypatch.setattr(expdesign, "workflows", SimpleNamespace(run=run), raising=False)
+
+
+def only_line(capsys: pytest.CaptureFixture[str]) -> str:
+    """The one line on stderr; nothing may be on stdout."""
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    (line,) = captured.err.splitlines()
+    assert line.startswith("expdesign: error: ")
+    return line.removeprefix("expdesign: error: ")
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "line"),
+    [
+        (InputError("vessel.length_m is -30, expected more than 0"), 2, "vessel.length_m is -30, expected more than 0"),
+        (FileError("a.toml", "design.total", "unknown key"), 2, "a.toml: design.total: unknown key"),
+        (NoPlan("the goal is on another lake"), 3, "the goal is on another lake"),
+        (NoAnswer("two\n  lines"), 3, "two lines"),
+        (PermissionError(13, "Permission denied", "runs/a/plan.json"), 2, "runs/a/plan.json: Permission denied"),
+        (OSError("no space"), 2, "no space"),
+        (KeyboardInterrupt(), 130, "interrupted, nothing half-written"),
+    ],
+)
+def test_what_a_workflow_raises_decides_the_status(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    error: BaseException,
+    status: int,
+    line: str,
+) -> None:
+    ends_with(monkeypatch, error)
+    assert main(["run", "any.toml"]) == status
+    assert only_line(capsys) == line
+
+
+@pytest.mark.parametrize("error", [ZeroDivisionError("division by zero"), KeyError("mass"), AssertionError()])
+def test_a_defect_is_one_line_that_says_how_to_see_more(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], error: Exception
+) -> None:
+    ends_with(monkeypatch, error)
+    monkeypatch.delenv("EXPDESIGN_DEBUG", raising=False)
+    assert main(["run", "any.toml"]) == 1
+    line = only_line(capsys)
+    assert type(error).__name__ in line
+    assert "EXPDESIGN_DEBUG=1" in line
+
+
+def test_debugging_shows_where_a_defect_is(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    ends_with(monkeypatch, ZeroDivisionError("division by zero"))
+    monkeypatch.setenv("EXPDESIGN_DEBUG", "1")
+    assert main(["run", "any.toml"]) == 1
+    assert "Traceback" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        ([], "Missing command"),
+        (["rum"], "'run'"),
+        (["run"], "SCENARIO.toml"),
+        (["run", "a.toml", "b.toml"], "b.toml"),
+        (["run", "a.toml", "--sed", "1"], "--seed"),
+        (["run", "a.toml", "--seed", "-1"], "--seed is -1, expected a whole number of 0 or more"),
+        (["run", "a.toml", "--seed", "1.5"], "--seed is 1.5, expected a whole number of 0 or more"),
+        (["run", "a.toml", "--seed"], "--seed"),
+        (["export", "plan.json"], "--format"),
+        (["simulate", "plan.json"], "--truth"),
+    ],
+)
+def test_a_typing_mistake_is_wrong_input(capsys: pytest.CaptureFixture[str], arguments: list[str], named: str) -> None:
+    assert main(arguments) == 2
+    assert named in only_line(capsys)
+
+
+@pytest.mark.parametrize("below", ["", "deeper/still"])
+def test_results_cannot_go_where_a_file_is(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], below: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ends_with(monkeypatch, AssertionError("the work must not begin"))
+    (tmp_path / "taken").write_text("mine")
+    assert main(["run", "a.toml", "--out", str(tmp_path / "taken" / below)]) == 2
+    assert "taken is a file, expected a folder" in only_line(capsys)
+    assert [path.name for path in tmp_path.rglob("*")] == ["taken"]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_interrupts_the_work(number: signal.Signals) -> None:
+    with subprocess.Popen([sys.executable, "-c", ASLEEP], stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        assert "asleep" in process.stderr.readline()
+        process.send_signal(number)
+        assert process.stderr.read() == "expdesign: error: interrupted, nothing half-written\n"
+    assert process.returncode == 130
+
+
+def test_the_termination_handler_is_given_back(capsys: pytest.CaptureFixture[str]) -> None:
+    before = signal.getsignal(signal.SIGTERM)
+    main(["--version"])
+    assert signal.getsignal(signal.SIGTERM) is before
+
+
+def test_a_reader_that_went_away_is_not_told_anything() -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    try:
+        done = subprocess.run(
+            [sys.executable, "-m", "expdesign", "--help"], stdout=writing, stderr=subprocess.PIPE, check=False
+        )
+    finally:
+        os.close(writing)
+    assert (done.returncode, done.stderr) == (1, b"")
