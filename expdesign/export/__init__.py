@@ -1,0 +1,27 @@
+"""Results leave the package here: JSON and CSV, route files, and the report (in `expdesign.export.report`)."""
+
+from expdesign.export.folder import write_files
+from expdesign.export.formats import FORMATS, Format, find_format, route_files
+from expdesign.export.planned import PlannedTrack, planned_track
+from expdesign.export.read_plan import read_plan
+from expdesign.export.results import commands_csv, dictionary_json, durations_json, plan_json, track_csv
+from expdesign.export.route import Route, Waypoint, build_route
+
+__all__ = [
+    "FORMATS",
+    "Format",
+    "PlannedTrack",
+    "Route",
+    "Waypoint",
+    "build_route",
+    "commands_csv",
+    "dictionary_json",
+    "durations_json",
+    "find_format",
+    "plan_json",
+    "planned_track",
+    "read_plan",
+    "route_files",
+    "track_csv",
+    "write_files",
+]

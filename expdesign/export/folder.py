@@ -1,0 +1,129 @@
+"""Files that appear whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import uuid
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from expdesign.errors import FileError
+
+
+@dataclass(frozen=True)
+class _Slot:
+    """One file on its way: written to `beside`, an older file of that name kept in `before` until all are in place."""
+
+    target: Path
+    beside: Path
+    before: Path
+
+    def write(self, content: bytes) -> None:
+        with self.beside.open("xb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+
+    def keep_older(self) -> None:
+        if not self.target.exists():
+            return
+        try:
+            os.link(self.target, self.before)
+        except OSError:  # a file system without hard links
+            shutil.copy2(self.target, self.before)
+
+    def undo(self) -> None:
+        """Back to how it was, wherever the placing stopped: decided by what is on the disk."""
+        renamed = not self.beside.exists()
+        if renamed and self.before.exists():
+            self.before.replace(self.target)
+        elif renamed:
+            self.target.unlink(missing_ok=True)
+        self.forget()
+
+    def forget(self) -> None:
+        """Remove what lies beside the target."""
+        for path in (self.beside, self.before):
+            with suppress(OSError):
+                path.unlink(missing_ok=True)
+
+
+def write_files(folder: Path, files: Mapping[str, str | bytes]) -> tuple[Path, ...]:
+    """Write all files, or none: each beside its final name, synchronised to disk, then all renamed.
+
+    After an error or an interruption the folder is as it was, and a folder made for the files is gone again.
+
+    Args:
+        folder: where to; made when missing.
+        files: plain file name -> content; text is written as UTF-8 with the line ends it has.
+
+    Returns:
+        The paths written, in the order given.
+
+    Raises:
+        FileError: the folder or a file cannot be written.
+    """
+    mark = uuid.uuid4().hex[:12]
+    slots = [_slot(folder, name, mark) for name in files]
+    contents = [content.encode() if isinstance(content, str) else content for content in files.values()]
+    with _made(folder):
+        try:
+            _write_beside(slots, contents)
+            _put_in_place(slots)
+        except OSError as error:
+            raise FileError(folder, "", f"cannot be written: {error.strerror or error}") from None
+    return tuple(slot.target for slot in slots)
+
+
+def _slot(folder: Path, name: str, mark: str) -> _Slot:
+    if not name or Path(name).name != name:
+        raise FileError(folder / name, "", "is not a plain file name")
+    if (folder / name).is_dir():
+        raise FileError(folder / name, "", "is a folder, expected a file or nothing")
+    return _Slot(folder / name, folder / f".{name}.{mark}.new", folder / f".{name}.{mark}.old")
+
+
+def _write_beside(slots: list[_Slot], contents: list[bytes]) -> None:
+    try:
+        for slot, content in zip(slots, contents, strict=True):
+            slot.write(content)
+    except BaseException:
+        for slot in slots:
+            slot.forget()
+        raise
+
+
+def _put_in_place(slots: list[_Slot]) -> None:
+    try:
+        for slot in slots:
+            slot.keep_older()
+        for slot in slots:
+            slot.beside.replace(slot.target)
+    except BaseException:
+        for slot in slots:
+            slot.undo()
+        raise
+    for slot in slots:
+        slot.forget()
+
+
+@contextmanager
+def _made(folder: Path) -> Iterator[None]:
+    """Make the folder and its parents; remove those that were made when the block fails."""
+    missing = [path for path in (folder, *folder.parents) if not path.exists()]
+    try:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except FileExistsError:
+            raise FileError(folder, "", "is a file, expected a folder") from None
+        except OSError as error:
+            raise FileError(folder, "", f"cannot be made: {error.strerror or error}") from None
+        yield
+    except BaseException:
+        for path in missing:
+            with suppress(OSError):
+                path.rmdir()
+        raise

@@ -1,0 +1,37 @@
+"""Route file formats: one file each, all in one visible tuple."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from expdesign.errors import UnknownName
+from expdesign.export.formats import geojson, gpx, route_csv, rtz
+from expdesign.export.formats.format import Format
+from expdesign.export.route import Route
+
+FORMATS: tuple[Format, ...] = (route_csv.FORMAT, geojson.FORMAT, gpx.FORMAT, rtz.FORMAT)
+
+
+def find_format(name: str) -> Format:
+    """The format of a name.
+
+    Raises:
+        UnknownName: there is none; the message lists those there are.
+    """
+    for known in FORMATS:
+        if known.name == name:
+            return known
+    raise UnknownName("route format", name, known=[known.name for known in FORMATS])
+
+
+def route_files(route: Route, formats: Sequence[str]) -> dict[str, bytes]:
+    """File name -> content of the route in the named formats, ready to be written.
+
+    Raises:
+        UnknownName: a format that does not exist; nothing is written then.
+    """
+    chosen = [find_format(name) for name in formats]
+    return {known.file_name: known.write(route) for known in chosen}
+
+
+__all__ = ["FORMATS", "Format", "find_format", "route_files"]

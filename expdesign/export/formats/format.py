@@ -1,0 +1,45 @@
+"""What every route format is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from expdesign.export.route import ROUTE_NAME, Route, Waypoint
+
+
+@dataclass(frozen=True, kw_only=True)
+class Format:
+    """A file format for routes.
+
+    Attributes:
+        name: as on the command line.
+        file_name: of the file it gives.
+        summary: one line for the user.
+        write: the file's content.
+    """
+
+    name: str
+    file_name: str
+    summary: str
+    write: Callable[[Route], bytes]
+
+
+def route_file(extension: str) -> str:
+    """File name of the route with an extension."""
+    return f"{ROUTE_NAME}.{extension}"
+
+
+def xml_text(text: str) -> str:
+    """Text without the characters that XML 1.0 cannot carry; each becomes a replacement sign."""
+    return "".join(sign if _in_xml(ord(sign)) else "\N{REPLACEMENT CHARACTER}" for sign in text)
+
+
+def _in_xml(code: int) -> bool:
+    return code in (0x9, 0xA, 0xD) or 0x20 <= code <= 0xD7FF or 0xE000 <= code <= 0xFFFD or code >= 0x10000
+
+
+def leg_sentence(waypoint: Waypoint) -> str:
+    """What the ship does on the way to the waypoint."""
+    what = f"primitive {waypoint.leg_name}" if waypoint.leg_kind == "primitive" else f"reposition: {waypoint.leg_name}"
+    return f"leg {waypoint.leg}, {what}"

@@ -1,0 +1,87 @@
+"""GeoJSON for maps and geographic information systems.
+
+Source: RFC 7946 (2016): WGS84, longitude first, lines cut at the antimeridian (section 3.1.9).
+"""
+
+from __future__ import annotations
+
+from itertools import groupby, pairwise
+from typing import Any
+
+from expdesign.export.formats.format import Format, route_file
+from expdesign.export.results import strict_json
+from expdesign.export.route import Route, Waypoint
+
+Position = tuple[float, float]
+
+
+def write(route: Route) -> bytes:
+    """A feature collection: one line for each leg that moves the ship, one point for each waypoint."""
+    collection = {
+        "type": "FeatureCollection",
+        "features": [*_lines(route), *(_point(route, waypoint) for waypoint in route.waypoints)],
+    }
+    return strict_json(collection).encode()
+
+
+def _lines(route: Route) -> list[dict[str, Any]]:
+    chords = groupby(pairwise(route.waypoints), key=lambda chord: chord[1].leg)
+    return [_line(leg, list(of_leg)) for leg, of_leg in chords]
+
+
+def _line(leg: int, chords: list[tuple[Waypoint, Waypoint]]) -> dict[str, Any]:
+    end = chords[-1][1]
+    positions = [_position(waypoint) for waypoint in (chords[0][0], *(chord[1] for chord in chords))]
+    properties = {
+        "leg": leg,
+        "kind": end.leg_kind,
+        "name": end.leg_name,
+        "start_time_s": chords[0][0].time_s + chords[0][0].stay_s,
+        "end_time_s": end.time_s,
+    }
+    return {"type": "Feature", "geometry": _geometry(positions), "properties": properties}
+
+
+def _point(route: Route, waypoint: Waypoint) -> dict[str, Any]:
+    properties = {
+        "waypoint": waypoint.name,
+        "time_s": waypoint.time_s,
+        "stay_s": waypoint.stay_s,
+        "speed_mps": waypoint.speed_mps,
+        "xtd_m": route.xtd_m,
+        "leg": waypoint.leg,
+    }
+    geometry = {"type": "Point", "coordinates": list(_position(waypoint))}
+    return {"type": "Feature", "geometry": geometry, "properties": properties}
+
+
+def _position(waypoint: Waypoint) -> Position:
+    return waypoint.lon_deg, waypoint.lat_deg
+
+
+def _geometry(positions: list[Position]) -> dict[str, Any]:
+    parts = cut_at_antimeridian(positions)
+    lines = [[list(position) for position in part] for part in parts]
+    if len(lines) == 1:
+        return {"type": "LineString", "coordinates": lines[0]}
+    return {"type": "MultiLineString", "coordinates": lines}
+
+
+def cut_at_antimeridian(positions: list[Position]) -> list[list[Position]]:
+    """Lines of (longitude, latitude) [deg], none of which crosses from 180 to -180."""
+    parts = [[positions[0]]]
+    for (lon_a, lat_a), (lon_b, lat_b) in pairwise(positions):
+        if abs(lon_b - lon_a) > 180.0:
+            side = 180.0 if lon_a > 0 else -180.0
+            share = (side - lon_a) / (lon_b + 2 * side - lon_a)
+            latitude = lat_a + share * (lat_b - lat_a)
+            if lon_a != side:
+                parts[-1].append((side, latitude))
+            parts.append([(-side, latitude)] if lon_b != -side else [])
+        parts[-1].append((lon_b, lat_b))
+    return [part for part in parts if len(part) > 1]
+
+
+FORMAT = Format(
+    name="geojson", file_name=route_file("geojson"), summary="lines and points for maps (RFC 7946)", write=write
+)

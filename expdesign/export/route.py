@@ -1,0 +1,186 @@
+"""The plan as a route: straight chords between waypoints, near enough to the track to stay in safe water.
+
+A route says where the ship goes and when. It cannot say how a zig-zag is steered: that is what the command file is for.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+import numpy as np
+import shapely
+
+from expdesign.conventions import METRES_PER_NAUTICAL_MILE
+from expdesign.errors import InputError
+from expdesign.export.chords import cut_into_chords, merge_standing
+from expdesign.export.planned import PlannedTrack
+from expdesign.plan.area import LocalFrame
+
+ROUTE_NAME = "route"
+"""Stem of the file names; ECDIS expect it as the name inside the file too."""
+DEGREE_DECIMALS = 9
+XTD_STEP_M = METRES_PER_NAUTICAL_MILE / 10_000
+LARGEST_XTD_M = 10 * METRES_PER_NAUTICAL_MILE
+
+
+@dataclass(frozen=True, kw_only=True)
+class Waypoint:
+    """A point of the route, with the chord that leads to it.
+
+    Attributes:
+        name: unique in the route.
+        lat_deg, lon_deg: WGS84; longitude in [-180, 180).
+        north_m, east_m: the same place in the plan's frame [m].
+        time_s: arrival, from the start of the plan [s].
+        stay_s: time spent here before going on [s].
+        speed_mps: over ground along the chord to here, its length by its time [m/s]; 0 at the first waypoint.
+        leg: index of the plan's leg that the chord belongs to; of the first leg at the first waypoint.
+        leg_kind: "primitive" or "reposition".
+        leg_name: of the primitive, or what the repositioning leads to.
+    """
+
+    name: str
+    lat_deg: float
+    lon_deg: float
+    north_m: float
+    east_m: float
+    time_s: float
+    stay_s: float
+    speed_mps: float
+    leg: int
+    leg_kind: str
+    leg_name: str
+
+    def __post_init__(self) -> None:
+        if not (-90 <= self.lat_deg <= 90 and -180 <= self.lon_deg < 180):
+            raise InputError(f"waypoint {self.name} is at {self.lat_deg}, {self.lon_deg}: not a latitude and longitude")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Route:
+    """Waypoints in time order.
+
+    Attributes:
+        name: stem of the file name.
+        scenario, vessel: names.
+        waypoints: two or more.
+        xtd_m: cross-track distance within which the track stays, to both sides [m].
+        frame: relates north/east metres to latitude and longitude.
+        departure: UTC time of the first waypoint, or None when not fixed.
+    """
+
+    name: str
+    scenario: str
+    vessel: str
+    waypoints: tuple[Waypoint, ...]
+    xtd_m: float
+    frame: LocalFrame
+    departure: datetime | None = None
+
+    def __post_init__(self) -> None:
+        if len(self.waypoints) < 2:
+            raise InputError(f"the route has {len(self.waypoints)} distinct waypoints, expected 2 or more")
+        names = [waypoint.name for waypoint in self.waypoints]
+        if len(set(names)) < len(names):
+            raise InputError("waypoint names of the route are not unique")
+        if not 0 < self.xtd_m < LARGEST_XTD_M:
+            raise InputError(f"cross-track distance is {self.xtd_m:g} m, expected more than 0 and less than 10 NM")
+        if self.departure is not None and self.departure.tzinfo is None:
+            raise InputError(f"departure {self.departure.isoformat()} has no time zone, expected e.g. Z for UTC")
+
+    @property
+    def length_m(self) -> float:
+        """Length of the chords together [m]."""
+        places = np.array([(point.north_m, point.east_m) for point in self.waypoints])
+        return float(np.hypot(*np.diff(places, axis=0).T).sum())
+
+    @property
+    def speed_mps(self) -> float:
+        """Mean speed while under way [m/s]."""
+        under_way = self.waypoints[-1].time_s - sum(point.stay_s for point in self.waypoints[:-1])
+        return self.length_m / under_way
+
+    def utc(self, time_s: float) -> str | None:
+        """Time of day in UTC as in XML, e.g. 2026-05-01T08:00:00Z, or None when the departure is not fixed."""
+        if self.departure is None:
+            return None
+        moment = datetime.fromtimestamp(round(self.departure.timestamp() + time_s), UTC)
+        return moment.strftime("%Y-%m-%dT%H:%M:%SZ")
+
+
+def build_route(
+    track: PlannedTrack,
+    *,
+    tolerance_m: float | None = None,
+    safe_water: shapely.MultiPolygon | None = None,
+    departure: datetime | None = None,
+) -> Route:
+    """Cut the track into chords; every leg of the plan begins at a waypoint unless the ship stands still.
+
+    Args:
+        track: the verified plan.
+        tolerance_m: largest distance of the track from the chords [m]; by default a third of the clearance, but no
+            more than half the beam.
+        safe_water: where the chords may go, in (east, north), or None when the chart is not at hand.
+        departure: time of the first waypoint, with its time zone.
+
+    Raises:
+        InputError: no positive tolerance, or the plan stays in one place.
+        NoPlan: the track itself leaves the safe water.
+    """
+    tolerance = _tolerance(track, tolerance_m)
+    if safe_water is not None:
+        shapely.prepare(safe_water)
+    points = track.trajectory.pose[:, :2]
+    standing_m = tolerance / 10
+    boundaries = [*(leg.first for leg in track.legs), track.legs[-1].last]
+    ends = cut_into_chords(points, boundaries=boundaries, tolerance_m=tolerance - standing_m, water=safe_water)
+    groups = merge_standing(points, ends, distance_m=standing_m, water=safe_water)
+    return Route(
+        name=ROUTE_NAME,
+        scenario=track.scenario,
+        vessel=track.vessel,
+        waypoints=_waypoints(track, groups),
+        xtd_m=math.ceil(tolerance / XTD_STEP_M - 1e-9) * XTD_STEP_M,
+        frame=track.frame,
+        departure=departure,
+    )
+
+
+def _tolerance(track: PlannedTrack, tolerance_m: float | None) -> float:
+    value = min(track.clearance_m / 3, track.beam_m / 2) if tolerance_m is None else tolerance_m
+    if not 0 < value < math.inf:
+        raise InputError(f"tolerance of the route is {value:g} m, expected more than 0: give one with the clearance 0")
+    return value
+
+
+def _waypoints(track: PlannedTrack, groups: list[tuple[int, int]]) -> tuple[Waypoint, ...]:
+    points = track.trajectory.pose[:, :2]
+    sample_time = track.commands.sample_time_s
+    leg_of = track.sample_leg
+    waypoints: list[Waypoint] = []
+    left = groups[0][0]
+    for number, (arrival, departure) in enumerate(groups):
+        index = int(leg_of[max(arrival - 1, 0)])
+        place = points[arrival]
+        lat, lon = track.frame.to_degrees(place).round(DEGREE_DECIMALS).tolist()
+        sailed = math.dist(place, points[groups[number - 1][0]]) if number else 0.0
+        waypoints.append(
+            Waypoint(
+                name=f"WP{number + 1:03d}",
+                lat_deg=lat,
+                lon_deg=(lon + 180.0) % 360.0 - 180.0 if abs(lon) >= 180.0 else lon,
+                north_m=float(place[0]),
+                east_m=float(place[1]),
+                time_s=round(arrival * sample_time, 9),
+                stay_s=round((departure - arrival) * sample_time, 9),
+                speed_mps=sailed / ((arrival - left) * sample_time) if number else 0.0,
+                leg=index,
+                leg_kind=track.legs[index].kind,
+                leg_name=track.legs[index].name,
+            )
+        )
+        left = departure
+    return tuple(waypoints)
