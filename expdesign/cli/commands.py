@@ -1,10 +1,13 @@
-"""The subcommands: each hands its arguments to the workflow of the same name."""
+"""The subcommands: each hands its arguments to the workflow of the same name.
+
+The solvers behind the workflows take seconds to load; each command loads them when it runs, so that `--help` and
+typing mistakes do not wait.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from types import ModuleType
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -77,7 +80,9 @@ def run(scenario: ScenarioFile, out: Out = None, seed: Seed = 0, quiet: Quiet = 
 
     Example: expdesign run scenarios/helsinki.toml
     """
-    _carry_out("run", lambda flow, tell: flow.run(scenario, check_out(out), seed=seed, progress=tell), quiet, json)
+    from expdesign import workflows
+
+    _carry_out("run", lambda tell: workflows.run(scenario, check_out(out), seed=seed, progress=tell), quiet, json)
 
 
 @app.command()
@@ -86,7 +91,9 @@ def score(scenario: ScenarioFile, out: Out = None, seed: Seed = 0, quiet: Quiet 
 
     Writes dictionary.json.
     """
-    _carry_out("score", lambda flow, tell: flow.score(scenario, check_out(out), seed=seed, progress=tell), quiet, json)
+    from expdesign import workflows
+
+    _carry_out("score", lambda tell: workflows.score(scenario, check_out(out), seed=seed, progress=tell), quiet, json)
 
 
 @app.command()
@@ -97,8 +104,10 @@ def durations(
 
     Writes durations.json.
     """
+    from expdesign import workflows
+
     _carry_out(
-        "durations", lambda flow, tell: flow.durations(scenario, check_out(out), seed=seed, progress=tell), quiet, json
+        "durations", lambda tell: workflows.durations(scenario, check_out(out), seed=seed, progress=tell), quiet, json
     )
 
 
@@ -118,9 +127,11 @@ def plan(
 
     Writes plan.json, track.csv and commands.csv.
     """
+    from expdesign import workflows
+
     _carry_out(
         "plan",
-        lambda flow, tell: flow.plan(scenario, check_out(out), durations=durations, seed=seed, progress=tell),
+        lambda tell: workflows.plan(scenario, check_out(out), durations=durations, seed=seed, progress=tell),
         quiet,
         json,
     )
@@ -140,9 +151,11 @@ def export(
 
     Example: expdesign export runs/helsinki/plan.json --format rtz gpx
     """
+    from expdesign import workflows
+
     _carry_out(
         "export",
-        lambda flow, tell: flow.export(plan, check_out(out), formats=tuple(formats), progress=tell),
+        lambda tell: workflows.export(plan, check_out(out), formats=tuple(formats), progress=tell),
         quiet,
         json,
     )
@@ -163,24 +176,20 @@ def simulate(
 
     Writes measured.csv.
     """
+    from expdesign import workflows
+
     _carry_out(
         "simulate",
-        lambda flow, tell: flow.simulate(plan, check_out(out), truth=truth, seed=seed, progress=tell),
+        lambda tell: workflows.simulate(plan, check_out(out), truth=truth, seed=seed, progress=tell),
         quiet,
         json,
     )
 
 
-def _carry_out(name: str, work: Callable[[ModuleType, Progress], Outcome], quiet: bool, json: bool) -> None:
-    """Do the work of one command and say what came of it.
-
-    The solvers behind the workflows take seconds to load, so they are loaded here and not for `--help` or a typing
-    mistake.
-    """
-    from expdesign import workflows
-
+def _carry_out(name: str, work: Callable[[Progress], Outcome], quiet: bool, json: bool) -> None:
+    """Do the work of one command and say what came of it."""
     with shown_progress(quiet=quiet) as progress:
-        outcome = work(workflows, progress)
+        outcome = work(progress)
     if json:
         typer.echo(as_json(name, outcome))
     elif not quiet:
