@@ -13,6 +13,7 @@ import numpy as np
 import pyproj
 import shapely
 
+from expdesign.errors import NoPlan
 from expdesign.values import Array
 
 
@@ -74,6 +75,56 @@ class SeaArea:
     def safe_water(self, clearance_m: float) -> shapely.MultiPolygon:
         """The water that a hull may touch when it must keep `clearance_m` from everything forbidden."""
         return as_multipolygon(self.water.buffer(-clearance_m))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Zones:
+    """What makes up a sea area, as valid polygons (east_m, north_m).
+
+    Attributes:
+        bounds: the trial stays inside.
+        land: the trial stays outside.
+        no_go: the trial stays outside, too.
+        deep: water known to be deep enough, or None when depth is not taken into account.
+    """
+
+    bounds: shapely.Geometry
+    land: shapely.Geometry
+    no_go: shapely.Geometry
+    deep: shapely.Geometry | None = None
+
+
+def build_sea_area(
+    name: str, *, frame: LocalFrame, zones: Zones, depth_rule: str, notes: tuple[str, ...] = (), source: str = ""
+) -> SeaArea:
+    """Allowed water: the bounds without land and no-go zones, where it is deep enough.
+
+    Args:
+        name: for reports.
+        frame: in which the zones are given.
+        zones: what is allowed and what is not.
+        depth_rule: as in `SeaArea`, like what follows.
+        notes: what was repaired or assumed.
+        source: chart file and licence notice.
+
+    Raises:
+        NoPlan: no water remains; the message says what took the last of it.
+    """
+    water = zones.bounds.difference(zones.land)
+    reason = "all of it is land" if _dry(water) else ""
+    water = water.difference(zones.no_go)
+    reason = reason or ("the no-go zones cover all its water" if _dry(water) else "")
+    water = water if zones.deep is None else water.intersection(zones.deep)
+    reason = reason or ("none of its water is deep enough" if _dry(water) else "")
+    if reason:
+        raise NoPlan(f"area {name!r} has no allowed water: {reason}")
+    land = as_multipolygon(zones.bounds.intersection(zones.land))
+    water = as_multipolygon(water)
+    return SeaArea(name=name, frame=frame, water=water, land=land, depth_rule=depth_rule, notes=notes, source=source)
+
+
+def _dry(water: shapely.Geometry) -> bool:
+    return bool(as_multipolygon(water).is_empty)
 
 
 def as_multipolygon(geometry: shapely.Geometry) -> shapely.MultiPolygon:

@@ -1,0 +1,200 @@
+"""Scenario files: vessel, dictionary, area, start, goal and wishes."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from expdesign.plan.area import SeaArea
+from expdesign.plan.values import PlanSettings
+from expdesign.scenario.area_file import Latitude, Longitude, load_area
+from expdesign.scenario.berth import berth_problem
+from expdesign.scenario.dictionary_file import NAME, NAME_RULE, load_dictionary
+from expdesign.scenario.tables import (
+    Entry,
+    NonNegative,
+    Positive,
+    Table,
+    Text,
+    check_table,
+    read_toml,
+    shown,
+)
+from expdesign.scenario.values import DesignSettings, Scenario
+from expdesign.scenario.vessel_file import load_vessel
+from expdesign.simulation.environment import Environment
+from expdesign.values import Array
+from expdesign.vessel import Vessel
+
+Degrees = Annotated[float, Field(ge=-360, le=360)]
+POSITION_KEYS = ("lat_deg", "lon_deg", "north_m", "east_m")
+WIND_LIMIT_MPS = 100.0
+CURRENT_LIMIT_MPS = 15.0
+
+
+class ScenarioTable(Table):
+    """`[scenario]`."""
+
+    name: Text | None = None
+    vessel: Text = Field(description="the path of a vessel file")
+    dictionary: Text = Field(description="the path of a dictionary file")
+    area: Text = Field(description="the path of an area file")
+
+
+class DesignTable(Table):
+    """`[design]`."""
+
+    total_s: Positive = Field(description="the informative time to share out [s]")
+    criterion: Literal["D"] = "D"
+    mean_subtraction: Literal["none", "batch", "complete"] = "complete"
+    fixed_parameters: list[Text] = Field(default=[])
+
+
+class PoseTable(Table):
+    """`[start]` or `[goal]`."""
+
+    lat_deg: Latitude | None = None
+    lon_deg: Longitude | None = None
+    north_m: float | None = None
+    east_m: float | None = None
+    heading_deg: Degrees = Field(description="the heading [deg], clockwise from north")
+
+
+class CurrentTable(Table):
+    """A velocity to which the water moves."""
+
+    north_mps: float = Field(description="the velocity to north [m/s]", ge=-CURRENT_LIMIT_MPS, le=CURRENT_LIMIT_MPS)
+    east_mps: float = Field(description="the velocity to east [m/s]", ge=-CURRENT_LIMIT_MPS, le=CURRENT_LIMIT_MPS)
+    std_mps: NonNegative = 0.0
+
+
+class WindTable(Table):
+    """A velocity to which the air moves."""
+
+    north_mps: float = Field(description="the velocity to north [m/s]", ge=-WIND_LIMIT_MPS, le=WIND_LIMIT_MPS)
+    east_mps: float = Field(description="the velocity to east [m/s]", ge=-WIND_LIMIT_MPS, le=WIND_LIMIT_MPS)
+    std_mps: NonNegative = 0.0
+
+
+class EnvironmentTable(Table):
+    """`[environment]`."""
+
+    current_to: CurrentTable = CurrentTable(north_mps=0.0, east_mps=0.0)
+    wind_to: WindTable = WindTable(north_mps=0.0, east_mps=0.0)
+
+
+class PlanTable(Table):
+    """`[plan]`; what is not given stays as in `PlanSettings`."""
+
+    clearance_m: NonNegative | None = None
+    confidence: Annotated[float, Field(gt=0, lt=1)] | None = None
+    time_budget_s: Positive | None = None
+    transit_speed_mps: Positive | None = None
+    turning_radius_m: Positive | None = None
+
+
+class ScenarioFile(Table):
+    """The whole file."""
+
+    scenario: ScenarioTable = Field(description="a table [scenario] with vessel, dictionary and area")
+    design: DesignTable = Field(description="a table [design] with total_s")
+    start: PoseTable = Field(description="a table [start] with a position and heading_deg")
+    goal: PoseTable = Field(description="a table [goal] with a position and heading_deg")
+    environment: EnvironmentTable = EnvironmentTable()
+    plan: PlanTable = PlanTable()
+
+
+def load_scenario(path: Path | str) -> Scenario:
+    """Read a scenario file and the vessel, dictionary, area and chart it names.
+
+    Args:
+        path: a TOML file with `[scenario]`, `[design]`, `[start]`, `[goal]` and optionally `[environment]`, `[plan]`.
+
+    Raises:
+        FileError: a file is unreadable, something is wrong, missing or unknown, or start or goal has no room.
+        NoPlan: the area holds no allowed water.
+    """
+    entry = Entry(Path(path))
+    file = check_table(ScenarioFile, read_toml(entry.path), entry)
+    places = {"start": file.start, "goal": file.goal}
+    for key, place in places.items():
+        _check_position(place, entry.at(key))
+    vessel = load_vessel(entry.at("scenario.vessel").file(file.scenario.vessel))
+    dictionary = load_dictionary(entry.at("scenario.dictionary").file(file.scenario.dictionary))
+    plan = PlanSettings(**file.plan.model_dump(exclude_none=True))
+    area = load_area(entry.at("scenario.area").file(file.scenario.area), draught_m=vessel.draught_m)
+    poses = {key: _pose(place, area) for key, place in places.items()}
+    for key, place in places.items():
+        problem = berth_problem(poses[key], vessel, area, plan.clearance_m, degrees=place.lat_deg is not None)
+        if problem:
+            raise entry.at(key).error(problem)
+    return Scenario(
+        name=_name(file.scenario.name, entry),
+        path=entry.path,
+        vessel=vessel,
+        dictionary=dictionary,
+        area=area,
+        design=_design(file.design, vessel, entry.at("design")),
+        plan=plan,
+        environment=_environment(file.environment),
+        **poses,
+    )
+
+
+def _name(given: str | None, entry: Entry) -> str:
+    """The given name or the file's; it must be able to name a folder."""
+    name = entry.path.stem if given is None else given
+    if not NAME.fullmatch(name):
+        raise entry.at("scenario.name").error(f"is {shown(name)}, expected {NAME_RULE}")
+    return name
+
+
+def _design(table: DesignTable, vessel: Vessel, entry: Entry) -> DesignSettings:
+    names, fixed = vessel.model.names, table.fixed_parameters
+    for index, name in enumerate(fixed, start=1):
+        place = entry.at("fixed_parameters").item(index)
+        if name not in names:
+            raise place.unknown(name, names)
+        if name in fixed[: index - 1]:
+            raise place.error(f"is {name!r} again, expected every parameter once")
+    if len(fixed) == len(names):
+        raise entry.at("fixed_parameters").error("names every parameter, expected at least one to be estimated")
+    if table.total_s < vessel.sample_time_s:
+        wish = f"at least the vessel's sample_time_s = {vessel.sample_time_s:g}"
+        raise entry.at("total_s").error(f"is {shown(table.total_s)}, expected {wish}")
+    return DesignSettings(
+        total_s=table.total_s,
+        criterion=table.criterion,
+        mean_subtraction=table.mean_subtraction,
+        fixed_parameters=tuple(fixed),
+    )
+
+
+def _check_position(place: PoseTable, entry: Entry) -> None:
+    """A position is latitude and longitude, or north and east, not both and not half."""
+    given = [name for name in POSITION_KEYS if getattr(place, name) is not None]
+    if given not in (["lat_deg", "lon_deg"], ["north_m", "east_m"]):
+        found = f"gives {' and '.join(given)}" if given else "gives no position"
+        raise entry.error(f"{found}, expected lat_deg and lon_deg, or north_m and east_m")
+
+
+def _pose(place: PoseTable, area: SeaArea) -> Array:
+    """(3,) north m, east m, heading rad in the area's frame."""
+    if place.lat_deg is None:
+        return np.array([place.north_m, place.east_m, math.radians(place.heading_deg)], dtype=float)
+    north_east = area.frame.to_metres(np.array([place.lat_deg, place.lon_deg], dtype=float))
+    return np.array([*north_east, math.radians(place.heading_deg)])
+
+
+def _environment(table: EnvironmentTable) -> Environment:
+    current, wind = table.current_to, table.wind_to
+    return Environment(
+        current_to=np.array([current.north_mps, current.east_mps]),
+        wind_to=np.array([wind.north_mps, wind.east_mps]),
+        current_std_mps=current.std_mps,
+        wind_std_mps=wind.std_mps,
+    )

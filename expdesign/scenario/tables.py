@@ -1,0 +1,246 @@
+"""TOML files to checked tables; whatever is wrong becomes one `FileError`.
+
+A table is a pydantic model that refuses unknown keys, other types, not-a-numbers and infinities; whole numbers may
+stand for decimal ones. A field's description says what is expected when the key is missing.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, TypeVar, get_args
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic_core import ErrorDetails
+
+from expdesign.errors import FileError, nearest
+
+Positive = Annotated[float, Field(gt=0)]
+NonNegative = Annotated[float, Field(ge=0)]
+Text = Annotated[str, Field(min_length=1)]
+
+
+class Table(BaseModel):
+    """Base of all file tables."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+
+
+T = TypeVar("T", bound=Table)
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A place in a file, for messages.
+
+    Attributes:
+        path: the file.
+        key: dotted key, "" for the whole file.
+    """
+
+    path: Path
+    key: str = ""
+
+    def at(self, key: str) -> Entry:
+        """A key inside this table."""
+        return Entry(self.path, f"{self.key}.{key}" if self.key else key)
+
+    def item(self, number: int) -> Entry:
+        """An entry of this list, counted from 1."""
+        return Entry(self.path, f"{self.key}[{number}]")
+
+    def error(self, problem: str) -> FileError:
+        """The error that says so."""
+        return FileError(self.path, self.key, problem)
+
+    def unknown(self, name: str, known: Iterable[str]) -> FileError:
+        """The error for a name that is not in the list it must come from."""
+        return self.error(f"is {shown(name)}, {offer(name, tuple(known))}")
+
+    def file(self, named: str) -> Path:
+        """The file that this entry names, relative to the file it stands in.
+
+        Raises:
+            FileError: it is not there.
+        """
+        target = self.path.parent / named
+        try:
+            found = target.exists()
+        except (OSError, ValueError):
+            found = False
+        if not found:
+            raise self.error(f"names {shown(named)}, but {_one_line(str(target))!r} does not exist")
+        return target
+
+
+def read_text(path: Path, kind: str) -> str:
+    """The text of a file.
+
+    Args:
+        path: the file.
+        kind: what it should be, for messages, e.g. "TOML".
+
+    Raises:
+        FileError: missing, a directory, unreadable or not UTF-8.
+    """
+    try:
+        return path.read_bytes().decode("utf-8-sig")
+    except FileNotFoundError:
+        problem = f"does not exist, expected a {kind} file"
+    except IsADirectoryError:
+        problem = f"is a directory, expected a {kind} file"
+    except UnicodeDecodeError as error:
+        problem = f"is not UTF-8 text (byte 0x{error.object[error.start]:02x} at offset {error.start})"
+    except (OSError, ValueError) as error:
+        problem = f"cannot be read: {getattr(error, 'strerror', None) or error}"
+    raise FileError(path, "", problem)
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The tables of a TOML file, unchecked.
+
+    Raises:
+        FileError: unreadable, or not TOML; the message gives the line.
+    """
+    text = read_text(path, "TOML")
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise FileError(path, "", f"is not valid TOML: {_one_line(str(error))}") from None
+    except (RecursionError, ValueError) as error:
+        raise FileError(path, "", f"is not readable TOML: {_one_line(str(error))}") from None
+
+
+def check_table(model: type[T], data: object, entry: Entry) -> T:
+    """One table as its model.
+
+    Args:
+        model: the table's model.
+        data: what the file says.
+        entry: where it says so.
+
+    Raises:
+        FileError: the first thing wrong; a mistyped key comes before the missing one it was meant to be.
+    """
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        problems = sorted(error.errors(), key=lambda problem: problem["type"] != "extra_forbidden")
+        key, text = _explain(model, problems[0])
+        raise (entry.at(key) if key else entry).error(text) from None
+
+
+def shown(value: object) -> str:
+    """A value as the user wrote it, on one line and not too long."""
+    match value:
+        case bool():
+            return "true" if value else "false"
+        case float():
+            return f"{value:.12g}"
+        case dict():
+            return "a table"
+        case list():
+            return "a list" if value else "an empty list"
+        case str():
+            return repr(value if len(value) <= 60 else value[:57] + "...")
+    return _one_line(str(value))
+
+
+def _explain(model: type[Table], problem: ErrorDetails) -> tuple[str, str]:
+    """Dotted key and text of one pydantic problem."""
+    place, kind, found = problem["loc"], problem["type"], problem.get("input")
+    key, limits = _dotted(place), problem.get("ctx", {})
+    if kind == "extra_forbidden":
+        return key, f"is not a known key, {offer(str(place[-1]), _keys_at(model, place[:-1]))}"
+    if kind == "missing":
+        return key, f"is missing{_description(model, place)}"
+    text = f"is {shown(found)}, expected {_expected(kind, limits, found)}"
+    return key, text
+
+
+def _expected(kind: str, limits: dict[str, Any], found: object) -> str:
+    if kind in BOUND_WORDS:
+        word, limit = BOUND_WORDS[kind]
+        return f"{word} {shown(float(limits[limit]))}"
+    if kind == "literal_error":
+        return str(limits["expected"])
+    if kind == "too_short":
+        return f"at least {limits['min_length']} {'entry' if limits['min_length'] == 1 else 'entries'}"
+    if kind == "too_long":
+        return f"at most {limits['max_length']} entries"
+    if kind == "float_type" and isinstance(found, str):
+        return "a number, without quotes"
+    return KIND_WORDS.get(kind, f"something else ({kind.replace('_', ' ')})")
+
+
+BOUND_WORDS = {
+    "greater_than": ("more than", "gt"),
+    "greater_than_equal": ("at least", "ge"),
+    "less_than": ("less than", "lt"),
+    "less_than_equal": ("at most", "le"),
+}
+KIND_WORDS = {
+    "float_type": "a number",
+    "finite_number": "a finite number",
+    "string_type": "text in quotes",
+    "string_too_short": "text that is not empty",
+    "bool_type": "true or false",
+    "list_type": "a list in [ ]",
+    "dict_type": "a table",
+    "model_type": "a table",
+}
+
+
+def _dotted(place: Iterable[str | int]) -> str:
+    """A place in a file, e.g. ("actuators", 1, "kind") -> "actuators[2].kind"."""
+    text = ""
+    for step in place:
+        part = f"[{step + 1}]" if isinstance(step, int) else _key_text(step)
+        text += part if isinstance(step, int) or not text else f".{part}"
+    return text
+
+
+def _key_text(key: str) -> str:
+    return key if re.fullmatch(r"[\w-]+", key) else repr(key[:60])
+
+
+def _model_at(model: type[Table], place: Iterable[str | int]) -> type[Table] | None:
+    found: type[Table] | None = model
+    for step in place:
+        if isinstance(step, str) and found is not None:
+            field = found.model_fields.get(step)
+            found = _model_in(field.annotation) if field else None
+    return found
+
+
+def _model_in(annotation: Any) -> type[Table] | None:
+    if isinstance(annotation, type) and issubclass(annotation, Table):
+        return annotation
+    return next((found for part in get_args(annotation) if (found := _model_in(part))), None)
+
+
+def _keys_at(model: type[Table], place: Iterable[str | int]) -> tuple[str, ...]:
+    table = _model_at(model, place)
+    return tuple(table.model_fields) if table else ()
+
+
+def _description(model: type[Table], place: tuple[str | int, ...]) -> str:
+    table, name = _model_at(model, place[:-1]), str(place[-1])
+    field = table.model_fields.get(name) if table else None
+    if field is None or not field.description:
+        return ""
+    return f", expected {field.description}"
+
+
+def offer(name: str, known: tuple[str, ...]) -> str:
+    """The nearest known name, if one is near, and all of them."""
+    near = nearest(name, known)
+    names = ", ".join(known)
+    return f"did you mean {near!r}? (known: {names})" if near else f"expected one of {names}"
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())

@@ -1,0 +1,127 @@
+"""The tables of a vessel file."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from expdesign.scenario.tables import NonNegative, Positive, Table, Text
+from expdesign.vessel import STRUCTURES
+
+TwoTurns = Annotated[float, Field(ge=-4 * math.pi, le=4 * math.pi)]
+HalfTurn = Annotated[float, Field(ge=-math.pi, le=math.pi)]
+
+
+class ParticularsTable(Table):
+    """`[vessel]`."""
+
+    name: Text = Field(description="a name for reports")
+    length_m: Positive = Field(description="the length of the hull [m]")
+    beam_m: Positive = Field(description="the beam of the hull [m]")
+    draught_m: Positive = Field(description="the draught [m]")
+    sample_time_s: Positive = Field(description="the time between commands [s]")
+
+
+class ActuatorTable(Table):
+    """What every entry of `[[actuators]]` has."""
+
+    kind: str
+    forward_m: float = 0.0
+    starboard_m: float = 0.0
+
+
+class PropellerTable(ActuatorTable):
+    """A tunnel thruster or a propeller on a fixed shaft."""
+
+    speed_min_rps: float = Field(description="the lowest propeller speed [rps], negative for astern")
+    speed_max_rps: float = Field(description="the highest propeller speed [rps]")
+    speed_rate_rps2: Positive | None = None
+
+
+class AzimuthTable(PropellerTable):
+    """An azimuth thruster; without angle limits it turns freely."""
+
+    angle_min_rad: TwoTurns | None = None
+    angle_max_rad: TwoTurns | None = None
+    angle_rate_radps: Positive | None = None
+
+
+class RudderTable(ActuatorTable):
+    """A rudder."""
+
+    angle_min_rad: HalfTurn = Field(description="the lowest rudder angle [rad]")
+    angle_max_rad: HalfTurn = Field(description="the highest rudder angle [rad]")
+    angle_rate_radps: Positive | None = None
+
+
+class ForceTable(ActuatorTable):
+    """Generalised forces, in the model's own unit."""
+
+    x_min: float = Field(description="the lowest tau_x")
+    x_max: float = Field(description="the highest tau_x")
+    x_rate: Positive | None = None
+    y_min: float = Field(description="the lowest tau_y")
+    y_max: float = Field(description="the highest tau_y")
+    y_rate: Positive | None = None
+    psi_min: float = Field(description="the lowest tau_psi")
+    psi_max: float = Field(description="the highest tau_psi")
+    psi_rate: Positive | None = None
+
+
+class TermTable(Table):
+    """One of `[[model.terms]]`."""
+
+    equation: Literal["u", "v", "r"] = Field(description="'u', 'v' or 'r'")
+    name: Text = Field(description="a parameter name")
+    expression: Text = Field(description="what the parameter multiplies, e.g. 'u*abs(u)'")
+
+
+class ModelTable(Table):
+    """`[model]`."""
+
+    structure: str = Field(description=f"one of {', '.join((*STRUCTURES, 'custom'))}")
+    form: Literal["discrete", "continuous"] = Field(description="'discrete' or 'continuous'")
+    parameters: dict[str, float] = Field(description="a table [model.parameters] with a value for each parameter")
+    parameter_std: dict[str, NonNegative] = Field(default={})
+    terms: list[TermTable] = Field(default=[])
+
+
+class SensorsTable(Table):
+    """`[sensors]`: standard deviations per sample."""
+
+    position_m: NonNegative = 0.0
+    heading_rad: NonNegative = 0.0
+    velocity_mps: NonNegative = 0.0
+    yaw_rate_radps: NonNegative = 0.0
+    wind_mps: NonNegative = 0.0
+
+
+class VesselTable(Table):
+    """The whole file."""
+
+    vessel: ParticularsTable = Field(description="a table [vessel] with the particulars")
+    actuators: list[dict[str, Any]] = Field(min_length=1, description="at least one table [[actuators]]")
+    model: ModelTable = Field(description="a table [model]")
+    sensors: SensorsTable = SensorsTable()
+
+
+ACTUATOR_TABLES: dict[str, type[ActuatorTable]] = {
+    "azimuth": AzimuthTable,
+    "tunnel": PropellerTable,
+    "propeller": PropellerTable,
+    "rudder": RudderTable,
+    "force": ForceTable,
+}
+"""Kind of actuator -> its table."""
+
+LIMIT_KEYS = {
+    "n": ("speed_min_rps", "speed_max_rps", "speed_rate_rps2"),
+    "a": ("angle_min_rad", "angle_max_rad", "angle_rate_radps"),
+    "rudder": ("angle_min_rad", "angle_max_rad", "angle_rate_radps"),
+    "tau_x": ("x_min", "x_max", "x_rate"),
+    "tau_y": ("y_min", "y_max", "y_rate"),
+    "tau_psi": ("psi_min", "psi_max", "psi_rate"),
+}
+"""Signal stem -> keys of its lower limit, upper limit and rate."""
