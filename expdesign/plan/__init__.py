@@ -1,0 +1,1 @@
+"""The plan: sea area, placement and order of runs, legs between them, verification."""

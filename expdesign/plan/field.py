@@ -1,0 +1,163 @@
+"""Grids over the allowed water: distance to danger, and distance to the goal round the islands."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from scipy.ndimage import distance_transform_edt, label
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import dijkstra
+
+from expdesign.plan.area import SeaArea
+from expdesign.values import Array
+
+FINEST_CELLS = 3_000_000
+ROUTING_CELLS = 400_000
+OCTILE_EXCESS = 1.0 / np.cos(np.pi / 8)
+"""Largest ratio of an eight-neighbour grid path to the straight line: 1.0824."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ClearanceField:
+    """Distance to forbidden water on a grid.
+
+    Attributes:
+        origin: (2,) north, east of the first cell's centre [m].
+        cell_m: grid spacing [m].
+        clearance_m: (rows north, columns east) distance from the cell's centre to anything forbidden [m].
+    """
+
+    origin: Array
+    cell_m: float
+    clearance_m: Array
+
+    @property
+    def error_m(self) -> float:
+        """A looked-up clearance differs from the true one by less than this [m]."""
+        return self.cell_m * np.sqrt(2.0)
+
+    def index(self, points: Array) -> tuple[np.ndarray, np.ndarray]:
+        """Nearest cell's row and column of (..., 2) north/east points; outside the grid they are clipped."""
+        cells = np.rint((points - self.origin) / self.cell_m).astype(int)
+        rows, columns = self.clearance_m.shape
+        return np.clip(cells[..., 0], 0, rows - 1), np.clip(cells[..., 1], 0, columns - 1)
+
+    def at(self, points: Array) -> Array:
+        """(...,) clearance of (..., 2) points; the grid's rim is forbidden, so points outside have none."""
+        rows, columns = self.index(points)
+        return np.asarray(self.clearance_m[rows, columns])
+
+    def thinned(self, cells: int) -> ClearanceField:
+        """Every n-th cell in both directions, so that at most `cells` are left."""
+        step = max(1, int(np.ceil(np.sqrt(self.clearance_m.size / cells))))
+        return ClearanceField(
+            origin=self.origin, cell_m=self.cell_m * step, clearance_m=self.clearance_m[::step, ::step]
+        )
+
+    def centre(self, flat: np.ndarray) -> Array:
+        """(..., 2) north/east of flat cell numbers."""
+        rows, columns = np.divmod(flat, self.clearance_m.shape[1])
+        return self.origin + self.cell_m * np.stack([rows, columns], axis=-1)
+
+
+def clearance_field(area: SeaArea, *, resolution_m: float) -> ClearanceField:
+    """Rasterise the allowed water and measure how far each cell is from anything forbidden.
+
+    Args:
+        area: allowed water.
+        resolution_m: wished spacing; coarser when the area would need more than `FINEST_CELLS`.
+    """
+    west, south, east, north = area.water.bounds
+    cell = max(resolution_m, float(np.sqrt((east - west) * (north - south) / FINEST_CELLS)))
+    norths = np.arange(south - cell, north + 2 * cell, cell)
+    easts = np.arange(west - cell, east + 2 * cell, cell)
+    shapely.prepare(area.water)
+    free = shapely.contains_xy(area.water, *np.meshgrid(easts, norths))
+    free[[0, -1], :] = free[:, [0, -1]] = False
+    distance = np.asarray(distance_transform_edt(free)) * cell - cell / 2
+    return ClearanceField(origin=np.array([norths[0], easts[0]]), cell_m=cell, clearance_m=distance.clip(0.0))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class GoalField:
+    """Shortest ways to the goal through water with a given clearance.
+
+    Attributes:
+        field: the grid.
+        distance_m: (cells,) length of the shortest eight-neighbour way to the goal, infinite where there is none.
+        following: (cells,) next cell on that way, the cell itself at the goal and where there is none.
+    """
+
+    field: ClearanceField
+    distance_m: Array
+    following: np.ndarray
+
+    def flat(self, points: Array) -> np.ndarray:
+        """Flat cell numbers of (..., 2) points."""
+        rows, columns = self.field.index(points)
+        return np.asarray(rows * self.field.clearance_m.shape[1] + columns)
+
+    def to_goal(self, points: Array) -> Array:
+        """(...,) distance to the goal in between the grid's over-estimate and a sure under-estimate [m]."""
+        return np.asarray(self.distance_m[self.flat(points)]) / np.sqrt(OCTILE_EXCESS)
+
+    def lower_bound(self, point: Array) -> float:
+        """A length that no way from the point to the goal falls below [m]."""
+        return max(0.0, float(self.distance_m[self.flat(point)]) / OCTILE_EXCESS - 2 * self.field.error_m)
+
+    def way(self, point: Array) -> Array:
+        """(k, 2) cell centres from the point's cell to the goal's; one row where there is no way."""
+        cells = [int(self.flat(point))]
+        while (after := int(self.following[cells[-1]])) != cells[-1]:
+            cells.append(after)
+        return self.field.centre(np.array(cells))
+
+
+def goal_field(fine: ClearanceField, goal: Array, *, clearance_m: float) -> GoalField:
+    """Distances to a goal (2,) over cells with at least `clearance_m`; the goal's own cell always counts."""
+    field = fine.thinned(ROUTING_CELLS)
+    rows, columns = field.clearance_m.shape
+    free = field.clearance_m >= clearance_m
+    goal_row, goal_column = field.index(goal)
+    free[goal_row, goal_column] = True
+    numbers = np.arange(rows * columns).reshape(rows, columns)
+    tails, heads, lengths = [], [], []
+    for step_row, step_column in ((0, 1), (1, 0), (1, 1), (1, -1)):
+        a, b = _neighbours(numbers, step_row, step_column)
+        both = free.ravel()[a] & free.ravel()[b]
+        tails.append(a[both])
+        heads.append(b[both])
+        lengths.append(np.full(int(both.sum()), field.cell_m * np.hypot(step_row, step_column)))
+    tail, head, length = np.concatenate(tails), np.concatenate(heads), np.concatenate(lengths)
+    graph = coo_matrix((length, (tail, head)), shape=(numbers.size, numbers.size)).tocsr()
+    goal_cell = int(numbers[goal_row, goal_column])
+    distance, before = dijkstra(graph, directed=False, indices=goal_cell, return_predecessors=True)
+    following = np.where(before < 0, np.arange(numbers.size), before)
+    return GoalField(field=field, distance_m=distance, following=following)
+
+
+def _neighbours(numbers: np.ndarray, step_row: int, step_column: int) -> tuple[np.ndarray, np.ndarray]:
+    rows, columns = numbers.shape
+    low, high = max(0, -step_column), columns - max(0, step_column)
+    a = numbers[: rows - step_row, low:high]
+    b = numbers[step_row:, low + step_column : high + step_column]
+    return a.ravel(), b.ravel()
+
+
+def narrowest_passage(field: ClearanceField, start: Array, goal: Array) -> tuple[float, Array]:
+    """The largest clearance with which start (2,) and goal (2,) are connected, and where the way is that narrow.
+
+    Returns:
+        Clearance [m] (zero when they are not connected at all), and the (2,) north/east place.
+    """
+    a, b = field.index(start), field.index(goal)
+    low, high = 0.0, float(min(field.clearance_m[a], field.clearance_m[b]))
+    eight = np.ones((3, 3))
+    while high - low > field.cell_m / 4:
+        middle = (low + high) / 2
+        regions, _ = label(field.clearance_m >= middle, structure=eight)
+        low, high = (middle, high) if regions[a] == regions[b] else (low, middle)
+    way = goal_field(field, goal, clearance_m=low - field.cell_m).way(start)
+    return low, way[int(np.argmin(field.at(way)))]

@@ -1,0 +1,79 @@
+"""The chance that a run leaves the allowed water when the vessel is not quite the nominal one.
+
+How the helm is taken to react: every run begins at its planned pose and entry velocity, because the leg before it is
+steered; during the run the commands are given open loop. Legs are steered along the plan and not part of this chance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+
+from expdesign.plan.area import SeaArea
+from expdesign.plan.footprint import hull_outlines
+from expdesign.plan.values import Leg
+from expdesign.signals import Commands, Trajectory
+from expdesign.simulation import Environment, draw_environment, simulate_many
+from expdesign.values import Array
+from expdesign.vessel import Vessel
+
+DRAWS = 300
+LOOK_EVERY_M = 0.25
+"""Hull lengths the ship moves, by its planned speed, between looks at the chart."""
+
+
+def leave_water_probability(
+    vessel: Vessel,
+    area: SeaArea,
+    environment: Environment,
+    *,
+    commands: Commands,
+    trajectory: Trajectory,
+    legs: Sequence[Leg],
+    rng: np.random.Generator,
+    draws: int = DRAWS,
+) -> float:
+    """Share of drawn vessels, currents and winds for which some run's hull leaves the allowed water.
+
+    One draw is one trial: the same parameters (normal, independent, standard deviations of the vessel file), current
+    and wind in all its runs. Its standard error is sqrt(p (1 - p) / draws). Runs that diverge count as leaving.
+    """
+    p = len(vessel.model.parameters)
+    parameters = vessel.model.parameters + vessel.model.parameter_std * rng.standard_normal((draws, p))
+    weather = [draw_environment(environment, rng) for _ in range(draws)]
+    current = np.array([drawn.current_to for drawn in weather])
+    wind = np.array([drawn.wind_to for drawn in weather])
+    shapely.prepare(area.water)
+    left = np.zeros(draws, dtype=bool)
+    for leg in legs:
+        if leg.kind != "primitive":
+            continue
+        run = Commands(
+            sample_time_s=commands.sample_time_s, names=commands.names, values=commands.values[leg.first : leg.last]
+        )
+        states = simulate_many(
+            vessel,
+            run,
+            pose=np.tile(trajectory.pose[leg.first], (draws, 1)),
+            velocity=np.tile(trajectory.velocity[leg.first], (draws, 1)),
+            current_to=current,
+            wind_to=wind,
+            parameters=parameters,
+        )
+        left |= _leaves(area, vessel, states)
+    return float(left.mean())
+
+
+def _leaves(area: SeaArea, vessel: Vessel, states: Array) -> np.ndarray:
+    """(n,) whether a hull corner is outside at any looked-at sample of states (k, n, 6)."""
+    speed = float(np.nanquantile(np.hypot(states[..., 3], states[..., 4]), 0.9)) + 1e-9
+    span = 2 * np.pi * vessel.length_m  # a turn on the spot sweeps this far
+    rate = speed + float(np.nanquantile(np.abs(states[..., 5]), 0.9)) * span / (2 * np.pi)
+    every = max(1, int(LOOK_EVERY_M * vessel.length_m / (rate * vessel.sample_time_s)))
+    pose = states[::every, :, :3]
+    lost = np.isnan(pose).any(axis=(0, 2))
+    corners = hull_outlines(np.nan_to_num(pose).reshape(-1, 3), vessel.hull_b)
+    inside = shapely.contains_xy(area.water, corners[..., 0], corners[..., 1]).all(axis=1)
+    return np.asarray(lost | ~inside.reshape(pose.shape[:2]).all(axis=0))
