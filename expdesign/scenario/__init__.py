@@ -8,8 +8,9 @@ a list count from 1, as in ``actuators[2].speed_max_rps``), the value found and 
 
 from expdesign.scenario.area_file import load_area
 from expdesign.scenario.dictionary_file import load_dictionary
+from expdesign.scenario.durations_file import load_repeats
 from expdesign.scenario.scenario_file import load_scenario
 from expdesign.scenario.values import DesignSettings, Scenario
 from expdesign.scenario.vessel_file import load_vessel
 
-__all__ = ["DesignSettings", "Scenario", "load_area", "load_dictionary", "load_scenario", "load_vessel"]
+__all__ = ["DesignSettings", "Scenario", "load_area", "load_dictionary", "load_repeats", "load_scenario", "load_vessel"]
