@@ -11,7 +11,7 @@ from expdesign.durations.certificate import log_det, scaled, sensitivities
 from expdesign.durations.polish import polish
 from expdesign.durations.rounding import value, whole_runs
 from expdesign.durations.values import MEAN_SUBTRACTIONS, DurationDesign, DurationProblem
-from expdesign.errors import NoAnswer, UnknownName
+from expdesign.errors import NoAnswer, NotInformative, UnknownName
 from expdesign.information import PrimitiveInformation, check_informative
 from expdesign.values import Array
 
@@ -60,7 +60,7 @@ def solve_durations(problem: DurationProblem) -> DurationDesign:
     Raises:
         NoAnswer: the certificate cannot be brought below `LARGEST_GAP`, or whole runs do not fit.
     """
-    matrices, offset = scaled(problem.matrices)
+    matrices, _ = scaled(problem.matrices)
     count = len(problem.names)
     start = maximise_log_det(matrices)
     uniform = np.full(count, 1.0 / count)
@@ -74,15 +74,36 @@ def solve_durations(problem: DurationProblem) -> DurationDesign:
             f"the durations could not be certified: the sensitivity of {problem.names[int(d.argmax())]!r} is "
             f"{d.max():.9g}, an optimum needs at most {problem.dimension}"
         )
+    return _rounded(problem, fractions, d, gap, whole_runs(problem, matrices, fractions))
+
+
+def with_repeats(design: DurationDesign, repeats: Sequence[int]) -> DurationDesign:
+    """The same optimum with other whole runs, their efficiency measured against it.
+
+    Raises:
+        NotInformative: the runs do not inform about every parameter.
+    """
+    changed = _rounded(design.problem, design.fractions, design.sensitivities, design.gap, tuple(repeats))
+    if not changed.efficiency_repeats > 0:
+        raise NotInformative(
+            "the given whole runs do not inform about every parameter", parameters=design.problem.parameters
+        )
+    return changed
+
+
+def _rounded(
+    problem: DurationProblem, fractions: Array, sensitivity: Array, gap: float, repeats: tuple[int, ...]
+) -> DurationDesign:
+    matrices, offset = scaled(problem.matrices)
     best, p = log_det(matrices, fractions), len(problem.parameters)
-    runs = whole_runs(problem, matrices, fractions)
+    uniform = np.full(len(problem.names), 1.0 / len(problem.names))
     return DurationDesign(
         problem=problem,
         fractions=fractions,
-        sensitivities=d,
+        sensitivities=sensitivity,
         log_det=best + offset,
         gap=gap,
-        repeats=runs,
-        efficiency_repeats=float(np.exp((value(problem, matrices, np.array(runs)) - best) / p)),
+        repeats=repeats,
+        efficiency_repeats=float(np.exp((value(problem, matrices, np.array(repeats)) - best) / p)),
         efficiency_uniform=float(np.exp((log_det(matrices, uniform) - best) / p)),
     )

@@ -17,6 +17,7 @@ from expdesign.scenario.geojson import Feature, read_features
 from expdesign.scenario.tables import (
     Entry,
     NonNegative,
+    Number,
     Table,
     Text,
     check_table,
@@ -48,7 +49,7 @@ class ChartTable(Table):
     geojson: Text | None = None
     s57: Any = None
     land_layers: list[Text] = Field(default=["land"])
-    depth_layers: dict[str, float] | None = None
+    depth_layers: dict[str, Number] | None = None
     notice: str = ""
 
 
@@ -71,7 +72,7 @@ class NoGoTable(Table):
     """One of `[[no_go]]`."""
 
     name: Text = Field(description="a name for the zone")
-    polygon: list[Annotated[list[float], Field(min_length=2, max_length=2)]] = Field(
+    polygon: list[Annotated[list[Number], Field(min_length=2, max_length=2)]] = Field(
         min_length=3, description="a list of [latitude, longitude]"
     )
 

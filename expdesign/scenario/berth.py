@@ -23,13 +23,15 @@ def berth_problem(pose: Array, vessel: Vessel, area: SeaArea, clearance_m: float
         degrees: whether the remedy is put in latitude and longitude or in metres.
     """
     if not np.isfinite(pose).all():
-        return f"is too far from the area {area.name!r} to have a place in its frame"
+        return f"is thousands of kilometres from the area {area.name!r}, expected a position in it"
     hull = shapely.Polygon(to_n_frame(vessel.hull_b, pose)[:, ::-1])
     centre = shapely.Point(pose[1], pose[0])
     if area.land.covers(centre):
         problem = f"is on land, {_metres(centre.distance(area.water))} from allowed water"
     elif not area.water.covers(centre):
-        problem = f"is outside the allowed water, {_metres(centre.distance(area.water))} from it"
+        problem = (
+            f"is outside the allowed water (bounds, depth, no-go zones), {_metres(centre.distance(area.water))} from it"
+        )
     elif not area.water.covers(hull):
         distance = centre.distance(area.water.boundary)
         problem = f"is {_metres(distance)} from forbidden water, less than the hull of {vessel.length_m:g} m needs"

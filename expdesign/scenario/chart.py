@@ -91,9 +91,9 @@ def place_text(lat_deg: float, lon_deg: float) -> str:
 def _ring(positions: Any, entry: Entry, repairs: Counter[str]) -> Array:
     """One closed ring (k, 2) of longitude, latitude without repeated points."""
     positions = positions if isinstance(positions, list) else [positions]
-    strange = next((position for position in positions if not _is_position(position)), None)
-    if strange is not None or not positions:
-        found = str(strange if positions else [])[:60]
+    strange = [position for position in positions or [[]] if not _is_position(position)]
+    if strange:
+        found = str(strange[0])[:60]
         raise entry.error(f"has {found} where a position [longitude, latitude] of numbers is expected")
     ring = np.array([position[:2] for position in positions], dtype=float)
     wrong = (np.abs(ring[:, 1]) > 90) | (ring[:, 0] < -180) | (ring[:, 0] > 360)

@@ -17,6 +17,7 @@ from expdesign.scenario.dictionary_file import NAME, NAME_RULE, load_dictionary
 from expdesign.scenario.tables import (
     Entry,
     NonNegative,
+    Number,
     Positive,
     Table,
     Text,
@@ -59,8 +60,8 @@ class PoseTable(Table):
 
     lat_deg: Latitude | None = None
     lon_deg: Longitude | None = None
-    north_m: float | None = None
-    east_m: float | None = None
+    north_m: Number | None = None
+    east_m: Number | None = None
     heading_deg: Degrees = Field(description="the heading [deg], clockwise from north")
 
 

@@ -18,8 +18,12 @@ from pydantic_core import ErrorDetails
 
 from expdesign.errors import FileError, nearest
 
-Positive = Annotated[float, Field(gt=0)]
-NonNegative = Annotated[float, Field(ge=0)]
+LARGEST = 1e12
+"""No length, time or speed of a trial is near it; what is larger would only overflow further on."""
+
+Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
+Positive = Annotated[float, Field(gt=0, le=LARGEST)]
+NonNegative = Annotated[float, Field(ge=0, le=LARGEST)]
 Text = Annotated[str, Field(min_length=1)]
 
 
@@ -146,7 +150,8 @@ def shown(value: object) -> str:
             return "a list" if value else "an empty list"
         case str():
             return repr(value if len(value) <= 60 else value[:57] + "...")
-    return _one_line(str(value))
+    text = _one_line(str(value))
+    return text if len(text) <= 60 else text[:57] + "..."
 
 
 def _explain(model: type[Table], problem: ErrorDetails) -> tuple[str, str]:
@@ -164,7 +169,7 @@ def _explain(model: type[Table], problem: ErrorDetails) -> tuple[str, str]:
 def _expected(kind: str, limits: dict[str, Any], found: object) -> str:
     if kind in BOUND_WORDS:
         word, limit = BOUND_WORDS[kind]
-        return f"{word} {shown(float(limits[limit]))}"
+        return f"{word} {float(limits[limit]):.6g}"
     if kind == "literal_error":
         return str(limits["expected"])
     if kind == "too_short":

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from expdesign.scenario.tables import NonNegative, Positive, Table, Text
+from expdesign.scenario.tables import NonNegative, Number, Positive, Table, Text
 from expdesign.vessel import STRUCTURES
 
 TwoTurns = Annotated[float, Field(ge=-4 * math.pi, le=4 * math.pi)]
@@ -28,15 +28,15 @@ class ActuatorTable(Table):
     """What every entry of `[[actuators]]` has."""
 
     kind: str
-    forward_m: float = 0.0
-    starboard_m: float = 0.0
+    forward_m: Number = 0.0
+    starboard_m: Number = 0.0
 
 
 class PropellerTable(ActuatorTable):
     """A tunnel thruster or a propeller on a fixed shaft."""
 
-    speed_min_rps: float = Field(description="the lowest propeller speed [rps], negative for astern")
-    speed_max_rps: float = Field(description="the highest propeller speed [rps]")
+    speed_min_rps: Number = Field(description="the lowest propeller speed [rps], negative for astern")
+    speed_max_rps: Number = Field(description="the highest propeller speed [rps]")
     speed_rate_rps2: Positive | None = None
 
 
@@ -59,14 +59,14 @@ class RudderTable(ActuatorTable):
 class ForceTable(ActuatorTable):
     """Generalised forces, in the model's own unit."""
 
-    x_min: float = Field(description="the lowest tau_x")
-    x_max: float = Field(description="the highest tau_x")
+    x_min: Number = Field(description="the lowest tau_x")
+    x_max: Number = Field(description="the highest tau_x")
     x_rate: Positive | None = None
-    y_min: float = Field(description="the lowest tau_y")
-    y_max: float = Field(description="the highest tau_y")
+    y_min: Number = Field(description="the lowest tau_y")
+    y_max: Number = Field(description="the highest tau_y")
     y_rate: Positive | None = None
-    psi_min: float = Field(description="the lowest tau_psi")
-    psi_max: float = Field(description="the highest tau_psi")
+    psi_min: Number = Field(description="the lowest tau_psi")
+    psi_max: Number = Field(description="the highest tau_psi")
     psi_rate: Positive | None = None
 
 
@@ -83,7 +83,7 @@ class ModelTable(Table):
 
     structure: str = Field(description=f"one of {', '.join((*STRUCTURES, 'custom'))}")
     form: Literal["discrete", "continuous"] = Field(description="'discrete' or 'continuous'")
-    parameters: dict[str, float] = Field(description="a table [model.parameters] with a value for each parameter")
+    parameters: dict[str, Number] = Field(description="a table [model.parameters] with a value for each parameter")
     parameter_std: dict[str, NonNegative] = Field(default={})
     terms: list[TermTable] = Field(default=[])
 

@@ -1,0 +1,112 @@
+"""What a report is made from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from expdesign.durations.values import DurationDesign
+from expdesign.information.primitive_information import PrimitiveInformation
+from expdesign.plan.values import Plan
+from expdesign.simulation.environment import Environment
+from expdesign.values import Array, readonly, seal
+from expdesign.vessel import Vessel
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ReportContent:
+    """Everything the report tells, as values.
+
+    Attributes:
+        scenario: name.
+        vessel: with its nominal model.
+        environment: the forecast.
+        start, goal: (3,) poses asked for [north m, east m, heading rad].
+        criterion: of the design, e.g. "D".
+        fixed_parameters: parameters that are not estimated.
+        clearance_m: least distance from the hull to forbidden water that was asked for [m].
+        confidence: share of sampled truths that must stay in safe water.
+        information: of every primitive in the dictionary, in the order of the design.
+        design: the durations with their certificate.
+        plan: the trial; a plan that failed its checks may be shown, and is called that.
+        command: the command line that reproduces the result.
+        version: of the program.
+    """
+
+    scenario: str
+    vessel: Vessel
+    environment: Environment
+    start: Array
+    goal: Array
+    criterion: str
+    fixed_parameters: tuple[str, ...]
+    clearance_m: float
+    confidence: float
+    information: tuple[PrimitiveInformation, ...]
+    design: DurationDesign
+    plan: Plan
+    command: str
+    version: str
+
+    def __post_init__(self) -> None:
+        seal(self, start="3", goal="3")
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of the parameters to be estimated."""
+        return self.design.problem.parameters
+
+    @property
+    def parameter_std(self) -> Array:
+        """(p,) prior standard deviations of the parameters to be estimated, zero where none was stated."""
+        model = self.vessel.model
+        known = dict(zip(model.names, model.parameter_std.tolist(), strict=True))
+        return np.array([known[name] for name in self.parameters])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """One run of a primitive in the plan.
+
+    Attributes:
+        number: as on the chart, from 1.
+        leg: index of its leg, from 0, as in the files.
+    """
+
+    number: int
+    leg: int
+
+
+def primitive_runs(plan: Plan) -> tuple[Run, ...]:
+    """The runs of primitives in time order, numbered from 1."""
+    legs = [index for index, leg in enumerate(plan.legs) if leg.kind == "primitive"]
+    return tuple(Run(number=number, leg=leg) for number, leg in enumerate(legs, start=1))
+
+
+def information_rate(content: ReportContent) -> Array:
+    """(q, p) information per sample of each primitive about each parameter alone.
+
+    With complete mean subtraction the design's means are taken off, so that the rows weighted by the time fractions
+    add up to the diagonal of the design's information matrix; with batchwise subtraction each run's own means.
+    """
+    X = np.array([item.X for item in content.information])
+    Y = np.array([item.Y for item in content.information])
+    Z = np.array([item.Z for item in content.information])
+    subtraction = content.design.problem.mean_subtraction
+    if subtraction == "none":
+        matrices = X
+    elif subtraction == "batch":
+        matrices = X - Y @ Z.transpose(0, 2, 1)
+    else:
+        weights = content.design.fractions
+        mean_y, mean_z = np.tensordot(weights, Y, axes=1), np.tensordot(weights, Z, axes=1)
+        matrices = X - Y @ mean_z.T - mean_y @ Z.transpose(0, 2, 1) + mean_y @ mean_z.T
+    return readonly(np.diagonal(matrices, axis1=1, axis2=2))
+
+
+def relative_information(content: ReportContent) -> Array:
+    """(q, p) information rate relative to the primitive that tells most about the parameter: 0 to 1."""
+    rate = information_rate(content)
+    best = rate.max(axis=0)
+    return readonly(np.divide(rate, best, out=np.zeros_like(rate), where=best > 0))

@@ -1,0 +1,93 @@
+"""Colours, sizes and the way from a figure to a piece of a web page.
+
+Colours: M. Okabe and K. Ito, Color Universal Design (2008), told apart by colour-blind readers.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, Literal
+
+import matplotlib
+from markupsafe import Markup, escape
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+
+from expdesign.export.formats.format import xml_text
+
+BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
+YELLOW, BLUE, VERMILION, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
+PRIMITIVE, REPOSITION = VERMILION, BLUE
+LINES = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK)
+GREY = "#6b6b6b"
+PIXELS_PER_INCH = 120.0
+"""Figures are shown no larger than this, so that their letters keep the size of the text around them."""
+LAND, WATER, FORBIDDEN = "#e9d8a6", "#e6f2fa", "#d4d4d4"
+
+SETTINGS: dict[Any, Any] = {
+    "svg.fonttype": "none",
+    "svg.hashsalt": "expdesign",
+    "font.family": "sans-serif",
+    "font.size": 10,
+    "axes.titlesize": 10,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.formatter.useoffset": False,
+    "legend.frameon": False,
+    "path.simplify": True,
+    "text.parse_math": False,
+}
+
+
+@contextmanager
+def report_style() -> Iterator[None]:
+    """Figures of the report are drawn inside this block; settings are as before after it."""
+    with matplotlib.rc_context(SETTINGS), warnings.catch_warnings():
+        # text stays text in the page, so the reader's fonts draw what matplotlib's font lacks
+        warnings.filterwarnings("ignore", message="Glyph .* missing from font")
+        yield
+
+
+def new_figure(width_in: float, height_in: float) -> Figure:
+    """An empty figure that owes nothing to any window system."""
+    figure = Figure(figsize=(width_in, height_in), layout="constrained")
+    FigureCanvasSVG(figure)
+    return figure
+
+
+def svg(figure: Figure, *, key: str, label: str) -> Markup:
+    """The figure as an SVG element for a page.
+
+    Args:
+        figure: drawn inside `report_style`.
+        key: makes the ids of this figure unique in the page.
+        label: what it shows, for those who cannot see it.
+    """
+    target = io.StringIO()
+    figure.savefig(target, format="svg", facecolor="none", metadata={"Date": None, "Creator": None})
+    text = target.getvalue()
+    text = text[text.index("<svg") :].strip()
+    text = re.sub(r'<metadata>.*?</metadata>', "", text, flags=re.DOTALL)
+    text = re.sub(r'(<[^<>]*?\sid=")', rf"\1{key}-", text)
+    text = re.sub(r'(\sxlink:href="#|url\(#)', rf"\1{key}-", text)
+    text = re.sub(r' d="[^"]*"', lambda found: re.sub(r"(\.\d\d)\d+", r"\1", found[0]), text)
+    head, body = text.split(">", 1)
+    head = re.sub(r'\s(?:width|height)="[^"]*"', "", head)
+    width = figure.get_figwidth() * PIXELS_PER_INCH
+    return Markup(f'{head} style="max-width: {width:.0f}px" role="img" aria-label="{escape(label)}">{body}')
+
+
+def plain(text: str) -> str:
+    """Text on one line, with a replacement sign for each character that no SVG may hold."""
+    return " ".join(xml_text(text).split())
+
+
+def light_grid(axes: Axes, axis: Literal["both", "x", "y"] = "both") -> None:
+    """Thin lines behind the data."""
+    axes.grid(visible=True, axis=axis, color="#dddddd", linewidth=0.6)
+    axes.set_axisbelow(True)

@@ -1,0 +1,200 @@
+"""The report as one self-contained page."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from expdesign.export.formats.format import xml_text
+from expdesign.export.report import tables, words
+from expdesign.export.report.content import ReportContent, primitive_runs
+from expdesign.export.report.figures.chart import chart
+from expdesign.export.report.figures.design import durations_figure, information_figure
+from expdesign.export.report.figures.gallery import primitive_figure
+from expdesign.export.report.figures.style import report_style
+from expdesign.export.report.figures.timeline import timeline_figure
+from expdesign.export.report.glossary import GLOSSARY
+
+SUBTRACTION = {
+    "none": "nothing is subtracted from the regressors before estimation",
+    "batch": "each run's own mean is subtracted from the regressors before estimation",
+    "complete": "the mean over the whole data is subtracted from the regressors before estimation, which takes out "
+    "constant disturbances",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fact:
+    """A key number with its name and one remark."""
+
+    name: str
+    value: str
+    remark: str
+
+
+def report_html(content: ReportContent) -> str:
+    """One HTML page without any outside reference: figures inside as SVG, readable on a phone and on paper."""
+    templates = Environment(
+        loader=PackageLoader("expdesign.export.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        finalize=_shown,
+    )
+    return templates.get_template("report.html").render(
+        content=content,
+        plan=content.plan,
+        design=content.design,
+        verified=content.plan.verification.verified,
+        runs=primitive_runs(content.plan),
+        summary=summary(content),
+        facts=facts(content),
+        certificate=certificate(content),
+        assumptions=assumptions(content),
+        agenda=tables.agenda(content),
+        primitives=tables.primitive_rows(content),
+        parameters=tables.parameter_rows(content),
+        checks=tables.checks(content),
+        glossary=GLOSSARY,
+        figures=_figures(content),
+        origin=_origin(content),
+        percent=words.percent,
+    )
+
+
+def _shown(value: object) -> object:
+    """Names may hold anything; what no page may hold becomes a replacement sign."""
+    return xml_text(value) if type(value) is str else value
+
+
+def _figures(content: ReportContent) -> dict[str, object]:
+    hull = content.vessel.hull_b
+    with report_style():
+        return {
+            "chart": chart(content),
+            "durations": durations_figure(content),
+            "information": information_figure(content),
+            "timeline": timeline_figure(content.plan),
+            "primitives": [
+                primitive_figure(item.primitive, hull, number=number) for number, item in enumerate(content.information)
+            ],
+        }
+
+
+def _origin(content: ReportContent) -> str:
+    frame = content.plan.area.frame
+    return f"{words.latitude(frame.lat_deg)}, {words.longitude(frame.lon_deg)}"
+
+
+def summary(content: ReportContent) -> list[str]:
+    """The trial in a few sentences, key numbers first."""
+    plan, check = content.plan, content.plan.verification
+    total, runs = plan.commands.duration_s, len(primitive_runs(plan))
+    bound = f", which no plan with these runs can bring below {words.duration(plan.reposition_bound_s)}"
+    verdict = (
+        f"The plan is verified: with its commands simulated again, the hull comes no nearer to forbidden water than "
+        f"{words.distance(check.clearance_min_m)} ({words.distance(content.clearance_m)} asked for)."
+        if check.verified
+        else f"The plan is NOT verified and must not be sailed: {'; '.join(check.problems)}."
+    )
+    return [
+        f"{words.duration(total)} and {words.distance(plan.trajectory.distance_m)} from start to goal: "
+        f"{words.counted(runs, 'informative run')} taking {words.duration(plan.seconds('primitive'))}, and "
+        f"{words.duration(plan.seconds('reposition'))} of repositioning{bound if plan.reposition_bound_s > 0 else ''}.",
+        verdict,
+        _design_sentence(content),
+    ]
+
+
+def _design_sentence(content: ReportContent) -> str:
+    design, realised = content.design, content.plan.design_efficiency_realised
+    text = (
+        f"The time is shared so that {words.counted(len(content.parameters), 'model parameter')} can be estimated "
+        f"best: whole runs reach {words.percent(design.efficiency_repeats)} of the certified optimum, equal time on "
+        f"every manoeuvre would reach {words.percent(design.efficiency_uniform)}"
+    )
+    if realised is None:
+        return f"{text}."
+    more = ", more than the optimum because repositioning informs too" if realised > 1 else ""
+    return f"{text}, and the track as planned, repositioning included, reaches {words.percent(realised)}{more}."
+
+
+def facts(content: ReportContent) -> list[Fact]:
+    """The key numbers, for a glance."""
+    plan, check, design = content.plan, content.plan.verification, content.design
+    realised = plan.design_efficiency_realised
+    return [
+        Fact(
+            name="Time",
+            value=words.duration(plan.commands.duration_s),
+            remark=f"{words.duration(plan.seconds('primitive'))} informative",
+        ),
+        Fact(
+            name="Distance",
+            value=words.distance(plan.trajectory.distance_m),
+            remark=f"{words.counted(len(plan.legs), 'leg')}, {words.counted(len(primitive_runs(plan)), 'run')}",
+        ),
+        Fact(
+            name="Least clearance",
+            value=words.distance(check.clearance_min_m),
+            remark=f"{words.distance(content.clearance_m)} asked for",
+        ),
+        Fact(
+            name="Optimal to within",
+            value=_short_of_optimum(content),
+            remark=f"certified; whole runs reach {words.percent(design.efficiency_repeats)}",
+        ),
+        Fact(
+            name="Information realised",
+            value="not computed" if realised is None else words.percent(realised),
+            remark="of the optimal design's, as D-efficiency",
+        ),
+    ]
+
+
+def _short_of_optimum(content: ReportContent) -> str:
+    """Upper bound on what any other design could gain in D-efficiency, rounded up to be true."""
+    gain = math.expm1(max(content.design.gap, 0.0) / len(content.parameters))
+    if gain < 1e-8:
+        return f"0.000001{words.NB}%"
+    power = 10.0 ** (math.floor(math.log10(gain)) - 1)
+    return f"{100 * math.ceil(gain / power) * power:.10f}".rstrip("0").rstrip(".") + f"{words.NB}%"
+
+
+def certificate(content: ReportContent) -> str:
+    """The equivalence theorem, with this design's numbers."""
+    design = content.design
+    best = max(range(len(design.sensitivities)), key=lambda index: design.sensitivities[index])
+    gap = words.significant(design.gap, 2) if design.gap > 1e-6 else "0.000001"
+    return (
+        f"A sharing of the time is optimal exactly when no sensitivity exceeds the bound {design.problem.dimension} "
+        f"and every manoeuvre that gets time touches it (Kiefer and Wolfowitz, 1960). The largest sensitivity here is "
+        f"{words.number(float(design.sensitivities[best]), 6)} ({design.problem.names[best]}), so the log determinant "
+        f"{words.number(design.log_det, 3)} cannot be raised by more than {gap}: no other "
+        f"sharing among these manoeuvres is better by more than {_short_of_optimum(content)} in D-efficiency."
+    )
+
+
+def assumptions(content: ReportContent) -> list[tuple[str, str]]:
+    """What the numbers rest on, as topic and sentence."""
+    area, environment, vessel, model = content.plan.area, content.environment, content.vessel, content.vessel.model
+    fixed = ", ".join(content.fixed_parameters)
+    return [
+        ("Chart", area.source or "source not stated"),
+        ("Depth", area.depth_rule),
+        *(("Chart", note) for note in area.notes),
+        ("Current", words.current(environment.current_to, environment.current_std_mps)),
+        ("Wind", words.wind(environment.wind_to, environment.wind_std_mps)),
+        (
+            "Vessel model",
+            f"{words.counted(len(model.terms), 'term')}, {model.form} parameters at their nominal values; "
+            "what the real ship does differently is not in the track, only in the stated uncertainties",
+        ),
+        ("Fixed parameters", f"{fixed}: held at the vessel file's values" if fixed else "none, all are estimated"),
+        ("Mean subtraction", SUBTRACTION[content.design.problem.mean_subtraction]),
+        ("Hull", f"a rectangle of {vessel.length_m:g} m by {vessel.beam_m:g} m, which contains the waterline"),
+        ("Start and goal", "the ship starts and ends at rest"),
+    ]

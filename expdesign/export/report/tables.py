@@ -1,0 +1,188 @@
+"""Tables of the report: rows of words and numbers, ready to be shown."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from expdesign.export.report import words
+from expdesign.export.report.content import ReportContent, primitive_runs
+from expdesign.information.primitive_information import PrimitiveInformation
+from expdesign.plan.values import Leg, Plan
+
+REST_MPS, REST_RADPS = 0.02, 0.0005
+
+
+@dataclass(frozen=True, kw_only=True)
+class AgendaRow:
+    """One leg as the bridge reads it."""
+
+    leg: int
+    run: int | None
+    starts: str
+    what: str
+    lasts: str
+    latitude: str
+    longitude: str
+    heading: str
+    speed: str
+
+
+def agenda(content: ReportContent) -> list[AgendaRow]:
+    """Leg by leg: when, what, for how long, from where, with which heading and speeds."""
+    plan = content.plan
+    numbers = {run.leg: run.number for run in primitive_runs(plan)}
+    return [_agenda_row(plan, index, leg, numbers.get(index)) for index, leg in enumerate(plan.legs)]
+
+
+def _agenda_row(plan: Plan, index: int, leg: Leg, run: int | None) -> AgendaRow:
+    pose = plan.trajectory.pose[leg.first]
+    lat, lon = plan.area.frame.to_degrees(pose[:2]).tolist()
+    before, after = (float(np.hypot(*plan.trajectory.velocity[sample, :2])) for sample in (leg.first, leg.last))
+    return AgendaRow(
+        leg=index,
+        run=run,
+        starts=words.clock(leg.first * plan.commands.sample_time_s),
+        what=leg.name,
+        lasts=words.duration((leg.last - leg.first) * plan.commands.sample_time_s),
+        latitude=words.latitude(lat),
+        longitude=words.longitude(lon),
+        heading=words.bearing(float(pose[2])),
+        speed=f"{words.number(before, 1)} \N{RIGHTWARDS ARROW} {words.number(after, 1)}",
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class PrimitiveRow:
+    """One primitive: what it is, what it tells, how often it is run."""
+
+    name: str
+    family: str
+    settings: str
+    lasts: str
+    entry: str
+    log_det: str
+    excites: bool
+    share: str
+    optimal: str
+    runs: int
+    sensitivity: str
+
+
+def primitive_rows(content: ReportContent) -> list[PrimitiveRow]:
+    """The dictionary in the order of the design."""
+    design = content.design
+    columns = zip(
+        content.information, design.fractions, design.durations_s, design.repeats, design.sensitivities, strict=True
+    )
+    return [
+        PrimitiveRow(
+            name=item.primitive.name,
+            family=item.primitive.family.replace("_", " "),
+            settings=settings_sentence(item),
+            lasts=words.duration(item.primitive.duration_s),
+            entry=_entry(item),
+            log_det="cannot alone" if item.log_det_alone is None else words.number(item.log_det_alone, 1),
+            excites=item.excitation_condition,
+            share=words.percent(float(fraction)),
+            optimal=words.duration(float(seconds)),
+            runs=runs,
+            sensitivity=words.number(float(sensitivity), 3),
+        )
+        for item, fraction, seconds, runs, sensitivity in columns
+    ]
+
+
+UNITS = {
+    "mps": ("m/s", 1.0),
+    "radps": ("\N{DEGREE SIGN}/s", 180.0 / np.pi),
+    "rad": ("\N{DEGREE SIGN}", 180.0 / np.pi),
+    "s": ("s", 1.0),
+    "m": ("m", 1.0),
+    "fraction": ("of the run", 1.0),
+}
+"""Ending of a setting's name -> unit shown and factor to it."""
+
+
+def settings_sentence(item: PrimitiveInformation) -> str:
+    """Settings of a primitive in friendly units, its duration left out."""
+    chosen = {name: value for name, value in item.primitive.settings.items() if name != "duration_s"}
+    return ", ".join(_setting(name, value) for name, value in chosen.items())
+
+
+def _setting(name: str, value: float) -> str:
+    stem, _, ending = name.rpartition("_")
+    unit, factor = UNITS.get(ending, ("", 1.0)) if stem else ("", 1.0)
+    title = (stem if unit else name).replace("_", " ")
+    return f"{title} {words.significant(value * factor)} {unit}".rstrip()
+
+
+def _entry(item: PrimitiveInformation) -> str:
+    u, v, r = item.primitive.entry_velocity.tolist()
+    if np.hypot(u, v) < REST_MPS and abs(r) < REST_RADPS:
+        return "at rest"
+    parts = [f"{words.number(u)} m/s ahead"]
+    if abs(v) >= REST_MPS:
+        parts.append(f"{words.number(abs(v))} m/s to {'starboard' if v > 0 else 'port'}")
+    if abs(r) >= REST_RADPS:
+        side = "starboard" if r > 0 else "port"
+        parts.append(f"turning {words.number(abs(np.degrees(r)))} \N{DEGREE SIGN}/s to {side}")
+    return ", ".join(parts)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Check:
+    """One line of the verification; `passed` is None where a number is only reported."""
+
+    what: str
+    found: str
+    required: str
+    passed: bool | None
+
+
+def checks(content: ReportContent) -> list[Check]:
+    """What the independent check found, beside what was required."""
+    plan, found = content.plan, content.plan.verification
+    rows = [
+        Check(
+            what="Least distance from the hull to forbidden water",
+            found=f"{words.distance(found.clearance_min_m)} at {words.clock(found.clearance_time_s)}",
+            required=f"at least {words.distance(content.clearance_m)}",
+            passed=found.clearance_min_m >= content.clearance_m,
+        ),
+        Check(
+            what="Largest distance between the planned track and the commands run again",
+            found="less than 1 mm" if found.reproduction_error_m < 1e-3 else words.distance(found.reproduction_error_m),
+            required="",
+            passed=None,
+        ),
+        Check(
+            what="Largest violation of an actuator limit or rate",
+            found=f"{words.percent(found.limit_excess)} of its range",
+            required="",
+            passed=None,
+        ),
+    ]
+    if plan.leave_water_probability is not None:
+        allowed = 1.0 - content.confidence
+        rows.append(
+            Check(
+                what="Chance that a run, flown open loop, leaves safe water",
+                found=words.percent(plan.leave_water_probability),
+                required=f"at most {words.percent(allowed)}",
+                passed=plan.leave_water_probability <= allowed + 1e-12,
+            )
+        )
+    return rows
+
+
+def parameter_rows(content: ReportContent) -> list[tuple[str, str, str, str]]:
+    """Name, regressor, nominal value and prior standard deviation of every parameter to be estimated."""
+    model = content.vessel.model
+    nominal = dict(zip(model.names, model.parameters.tolist(), strict=True))
+    terms = {term.name: f"d{term.equation}/dt = ... + {term.name} * {term.expression}" for term in model.terms}
+    return [
+        (name, terms[name], words.significant(nominal[name]), words.significant(std) if std > 0 else "not stated")
+        for name, std in zip(content.parameters, content.parameter_std.tolist(), strict=True)
+    ]

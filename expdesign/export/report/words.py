@@ -1,0 +1,114 @@
+"""Numbers in words that a reader can use: friendly units, compass names, positions."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from expdesign.conventions import KNOTS_PER_MPS
+from expdesign.values import Array
+
+COMPASS = ("north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west")
+MINUS, NB = "\N{MINUS SIGN}", "\N{NO-BREAK SPACE}"
+
+
+def duration(seconds: float) -> str:
+    """45 s, 3 min 20 s, 15 min, 1 h 05 min."""
+    if seconds < 59.5:
+        return f"{seconds:.3g}{NB}s"
+    minutes, rest = divmod(round(seconds), 60)
+    if minutes < 60:
+        return f"{minutes}{NB}min{NB}{rest:02d}{NB}s" if rest else f"{minutes}{NB}min"
+    hours, minutes = divmod(round(seconds / 60), 60)
+    return f"{hours}{NB}h{NB}{minutes:02d}{NB}min"
+
+
+def clock(seconds: float) -> str:
+    """Time from the start as h:mm:ss."""
+    whole = round(seconds)
+    return f"{whole // 3600}:{whole // 60 % 60:02d}:{whole % 60:02d}"
+
+
+def distance(metres: float) -> str:
+    """Metres with three digits, or kilometres from a thousand on."""
+    if abs(metres) < 999.5:
+        return f"{significant(metres)}{NB}m"
+    return f"{significant(metres / 1000)}{NB}km"
+
+
+def speed(mps: float) -> str:
+    """Metres per second, and knots."""
+    return f"{number(mps)}{NB}m/s ({number(mps * KNOTS_PER_MPS, 1)}{NB}kn)"
+
+
+def number(value: float, decimals: int = 2) -> str:
+    """Fixed decimals with a true minus sign, and no minus before zero."""
+    text = f"{value:.{decimals}f}"
+    return text.replace("-", "" if float(text) == 0 else MINUS)
+
+
+def significant(value: float, digits: int = 3) -> str:
+    """Significant digits with a true minus sign, written out unless that takes more than nine decimals."""
+    if value and not 1e-7 <= abs(value) < 1e9:
+        return f"{value:.{digits - 1}e}".replace("-", MINUS)
+    return np.format_float_positional(value, precision=digits, fractional=False, trim="-").replace("-", MINUS)
+
+
+def percent(share: float) -> str:
+    """A share as per cent: 97.2 %, 0.03 %, 264 %."""
+    value = 100 * share
+    if value == 0 or value >= 99.95:
+        return f"{value:.0f}{NB}%"
+    return f"{value:.1f}{NB}%" if value >= 1 else f"{significant(value, 1)}{NB}%"
+
+
+def bearing(radians: float) -> str:
+    """A direction as three-figure degrees clockwise from north."""
+    return f"{round(math.degrees(radians)) % 360:03d}\N{DEGREE SIGN}"
+
+
+def compass(radians: float) -> str:
+    """The nearest of the eight compass points."""
+    return COMPASS[round(math.degrees(radians) / 45) % 8]
+
+
+def current(velocity: Array, std_mps: float) -> str:
+    """A current in the sailor's way: where it sets to."""
+    spread = f", each component uncertain by {number(std_mps)}{NB}m/s (standard deviation)" if std_mps > 0 else ""
+    if not np.any(velocity):
+        return f"no mean current{spread}"
+    towards = math.atan2(velocity[1], velocity[0])
+    return f"{speed(float(np.hypot(*velocity)))} setting {bearing(towards)} ({compass(towards)}){spread}"
+
+
+def wind(velocity: Array, std_mps: float) -> str:
+    """A wind in the sailor's way: where it comes from."""
+    spread = f", each component uncertain by {number(std_mps)}{NB}m/s (standard deviation)" if std_mps > 0 else ""
+    if not np.any(velocity):
+        return f"no mean wind{spread}"
+    origin = math.atan2(-velocity[1], -velocity[0])
+    return f"{speed(float(np.hypot(*velocity)))} from {bearing(origin)} ({compass(origin)}){spread}"
+
+
+def latitude(degrees: float, decimals: int = 3) -> str:
+    """Degrees and decimal minutes, N or S."""
+    return _degrees_minutes(degrees, 2, decimals) + (f"{NB}N" if degrees >= 0 else f"{NB}S")
+
+
+def longitude(degrees: float, decimals: int = 3) -> str:
+    """Degrees and decimal minutes, E or W."""
+    wrapped = (degrees + 180.0) % 360.0 - 180.0
+    return _degrees_minutes(wrapped, 3, decimals) + (f"{NB}E" if wrapped >= 0 else f"{NB}W")
+
+
+def _degrees_minutes(degrees: float, width: int, decimals: int) -> str:
+    ticks = round(abs(degrees) * 60 * 10**decimals)
+    whole, rest = divmod(ticks, 60 * 10**decimals)
+    minutes = f"{rest / 10**decimals:0{3 + decimals if decimals else 2}.{decimals}f}"
+    return f"{whole:0{width}d}\N{DEGREE SIGN}{minutes}\N{PRIME}"
+
+
+def counted(count: int, one: str, many: str | None = None) -> str:
+    """1 run, 3 runs."""
+    return f"{count} {one if count == 1 else many or one + 's'}"
