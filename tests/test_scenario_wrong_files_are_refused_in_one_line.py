@@ -47,6 +47,7 @@ SCENARIO_CASES = [
     ("north_mps = 0.1", "north_mps = 20", "environment.current_to.north_mps", "is 20, expected at most 15"),
     ("wind_to", "wind_from", "environment.wind_from", "did you mean 'wind_to'?"),
     ("clearance_m = 20.0", "clearance_m = -1", "plan.clearance_m", "is -1, expected at least 0"),
+    ("clearance_m = 20.0", "clearance_m = 1e308", "plan.clearance_m", "is 1e+308, expected at most 1e+12"),
     ("confidence = 0.9", "confidence = 1", "plan.confidence", "is 1, expected less than 1"),
     ("confidence = 0.9", "transit_speed_mps = 0", "plan.transit_speed_mps", "is 0, expected more than 0"),
     ("[plan]", "[[plan]]", "plan", "is a list, expected a table"),
@@ -57,7 +58,7 @@ SCENARIO_CASES = [
     ("east_m = -400.0", "east_m = -830.0", "start", "is 4.9 m from forbidden water, less than the hull"),
     ("east_m = -400.0", "east_m = -810.0", "start", "leaves 9.9 m between the hull and forbidden water"),
     ("lon_deg = 0.0045", "lon_deg = 0.0090", "goal", "the nearest place with room is lat_deg = 0.0"),
-    ("lon_deg = 0.0045", "lon_deg = 90", "goal", "is too far from the area"),
+    ("lon_deg = 0.0045", "lon_deg = 90", "goal", "is thousands of kilometres from the area"),
     ("clearance_m = 20.0", "clearance_m = 2000.0", "start", "nowhere in the area"),
 ]
 
