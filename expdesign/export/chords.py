@@ -32,13 +32,13 @@ def cut_into_chords(
     Source: D. H. Douglas and T. K. Peucker (1973), with a test for reversals and one for water.
     """
     kept = set(boundaries)
-    waiting = list(pairwise(boundaries))
+    waiting = list(pairwise(boundaries))[::-1]
     while waiting:
         first, last = waiting.pop()
         split = _split(points, first, last, tolerance_m, water)
         if split is not None:
             kept.add(split)
-            waiting += [(first, split), (split, last)]
+            waiting += [(split, last), (first, split)]
     return sorted(kept)
 
 

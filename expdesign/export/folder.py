@@ -79,7 +79,7 @@ def write_files(folder: Path, files: Mapping[str, str | bytes]) -> tuple[Path, .
 
 
 def _slot(folder: Path, name: str, mark: str) -> _Slot:
-    if not name or Path(name).name != name:
+    if name in ("", "..") or Path(name).name != name:
         raise FileError(folder / name, "", "is not a plain file name")
     if (folder / name).is_dir():
         raise FileError(folder / name, "", "is a folder, expected a file or nothing")

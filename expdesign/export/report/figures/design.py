@@ -76,6 +76,7 @@ def information_figure(content: ReportContent) -> str:
     axes.spines[:].set_visible(False)
     bar = figure.colorbar(mesh, ax=axes, ticks=(0, 0.5, 1.0), format=lambda value, _: f"{100 * value:.0f} %")
     bar.outline.set_visible(False)
+    bar.solids.set(rasterized=False, edgecolor="face")  # type: ignore[union-attr]
     bar.set_label("of the manoeuvre that tells most", fontsize=9)
     label = "Heat map: information per minute of each primitive about each parameter, relative to the best primitive"
     return svg(figure, key="information", label=label)

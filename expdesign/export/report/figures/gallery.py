@@ -14,7 +14,6 @@ from expdesign.export.report.figures.style import (
     PRIMITIVE,
     light_grid,
     new_figure,
-    plain,
     svg,
 )
 from expdesign.values import Array
@@ -53,4 +52,4 @@ def primitive_figure(primitive: Primitive, hull_b: Array, *, number: int) -> str
         axes.locator_params(axis="y", nbins=4)
         light_grid(axes)
     rows[-1].set_xlabel("time [s]")
-    return svg(figure, key=f"primitive-{number}", label=f"Path and velocities of primitive {plain(primitive.name)}")
+    return svg(figure, key=f"primitive-{number}", label=f"Path and velocities of primitive {primitive.name}")

@@ -79,7 +79,7 @@ def svg(figure: Figure, *, key: str, label: str) -> Markup:
     head, body = text.split(">", 1)
     head = re.sub(r'\s(?:width|height)="[^"]*"', "", head)
     width = figure.get_figwidth() * PIXELS_PER_INCH
-    return Markup(f'{head} style="max-width: {width:.0f}px" role="img" aria-label="{escape(label)}">{body}')
+    return Markup(f'{head} style="max-width: {width:.0f}px" role="img" aria-label="{escape(plain(label))}">{body}')
 
 
 def plain(text: str) -> str:

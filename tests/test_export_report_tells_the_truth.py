@@ -1,0 +1,199 @@
+"""The report is one page that stands alone, says what the values say, and survives odd names."""
+
+import math
+import re
+from dataclasses import replace
+from functools import cache
+from html.parser import HTMLParser
+
+import export_case as case
+import numpy as np
+import pytest
+from lxml import etree
+
+from expdesign.durations import MEAN_SUBTRACTIONS, build_durations, solve_durations
+from expdesign.export.report import report_html, words
+from expdesign.export.report.content import information_rate, primitive_runs, relative_information
+from expdesign.export.report.figures.labels import place_labels
+from expdesign.export.report.figures.position_axes import nice_step
+
+ODD = 'x <script>alert(1)</script> & "$\\alpha$" $ \x07 \N{SNOWMAN}'
+
+
+class Page(HTMLParser):
+    """Text, ids, tags and references of a page."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.tags: list[str] = []
+        self.ids: list[str] = []
+        self.references: list[str] = []
+        self.words: list[str] = []
+        self.feed(html)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        for name, value in attrs:
+            if name == "id" and value:
+                self.ids.append(value)
+            if name in ("src", "href", "xlink:href") and value:
+                self.references.append(value)
+
+    def handle_data(self, data: str) -> None:
+        self.words.append(data)
+
+    @property
+    def text(self) -> str:
+        return " ".join(" ".join(self.words).split())
+
+
+@cache
+def page() -> str:
+    return report_html(case.report_content())
+
+
+def odd_page() -> str:
+    renamed = replace(case.scored()[0].primitive, name=ODD)
+    information = (replace(case.scored()[0], primitive=renamed), *case.scored()[1:])
+    problem = replace(case.design().problem, names=(ODD, *case.design().problem.names[1:]))
+    legs = (replace(case.plan().legs[0], name=ODD), *case.plan().legs[1:])
+    area = replace(case.plan().area, name=ODD, source=ODD, notes=(ODD,))
+    return report_html(
+        case.report_content(
+            scenario=ODD,
+            vessel=replace(case.tug(), name=ODD),
+            information=information,
+            design=replace(case.design(), problem=problem),
+            plan=replace(case.plan(), legs=legs, area=area),
+            command=ODD,
+        )
+    )
+
+
+def test_the_page_needs_nothing_from_outside() -> None:
+    read = Page(page())
+    assert all(reference.startswith("#") for reference in read.references)
+    assert not {"script", "link", "iframe", "img"} & set(read.tags)
+    assert not re.search(r"url\((?!#)|@import", page())
+
+
+def test_ids_are_unique_and_every_reference_finds_its_target() -> None:
+    read = Page(page())
+    assert len(set(read.ids)) == len(read.ids)
+    inside = {reference[1:] for reference in read.references} | set(re.findall(r"url\(#([^)]+)\)", page()))
+    assert inside <= set(read.ids)
+
+
+def test_every_figure_is_well_formed_and_has_a_label() -> None:
+    for html in (page(), odd_page()):
+        figures = re.findall(r"<svg.*?</svg>", html, flags=re.DOTALL)
+        assert len(figures) == 4 + len(case.scored())
+        assert all(etree.fromstring(figure).get("aria-label") for figure in figures)
+
+
+def test_odd_names_are_shown_and_never_run() -> None:
+    html = odd_page()
+    read = Page(html)
+    assert "script" not in read.tags
+    assert "\x07" not in html
+    assert 'x <script>alert(1)</script> & "$\\alpha$" $ \N{REPLACEMENT CHARACTER} \N{SNOWMAN}' in read.text
+
+
+def test_the_same_trial_gives_the_same_page() -> None:
+    assert report_html(case.report_content()) == page()
+
+
+def test_the_page_says_what_the_values_say() -> None:
+    text = Page(page()).text
+    plan, design = case.plan(), case.design()
+    for fact in (
+        words.duration(plan.commands.duration_s),
+        words.distance(plan.trajectory.distance_m),
+        words.distance(plan.verification.clearance_min_m),
+        words.percent(design.efficiency_repeats),
+        words.percent(design.efficiency_uniform),
+        f"bound {design.problem.dimension}",
+        plan.area.depth_rule,
+        plan.area.source,
+        "expdesign run test-sound.toml",
+        "expdesign 1.2.3",
+    ):
+        assert " ".join(fact.split()) in text
+    assert page().count('<tr class="run">') == len(primitive_runs(plan)) == sum(design.repeats)
+    assert all(name in text for name in (*design.problem.names, *design.problem.parameters))
+
+
+def test_a_plan_that_is_not_verified_is_called_that() -> None:
+    text = Page(report_html(case.report_content(plan=case.unverified()))).text
+    assert "not verified: do not sail" in text
+    assert "must not be sailed: the hull comes within 3.0 m of the rocks at 412 s" in text
+    assert "\N{CHECK MARK} verified" not in text
+
+
+@pytest.mark.parametrize("mean_subtraction", MEAN_SUBTRACTIONS)
+def test_information_of_the_primitives_adds_up_to_that_of_the_design(mean_subtraction: str) -> None:
+    names = case.tug().model.names
+    problem = build_durations(case.scored(), names, total_s=480.0, mean_subtraction=mean_subtraction)
+    design = solve_durations(problem)
+    whole = np.tensordot(design.fractions, problem.matrices, axes=1)
+    p = len(names)
+    if mean_subtraction == "complete":
+        whole = whole[:p, :p] - whole[:p, p:] @ whole[p:, :p]
+    content = case.report_content(design=design)
+    assert design.fractions @ information_rate(content) == pytest.approx(np.diag(whole), rel=1e-9)
+    share = relative_information(content)
+    assert share.max(axis=0) == pytest.approx(np.ones(p))
+    assert share.min() >= 0.0
+
+
+def test_labels_keep_apart_and_inside_when_there_is_room() -> None:
+    anchors = np.stack([np.linspace(45, 55, 12), np.full(12, 50.0)], axis=1)
+    placed = place_labels(anchors, anchors, size=4.0, bounds=((0.0, 100.0), (0.0, 100.0)))
+    apart = np.hypot(*(placed[:, None] - placed).transpose(2, 0, 1)) + 1e9 * np.eye(12)
+    assert apart.min() >= 4.0
+    assert placed.min() >= 2.0
+    assert placed.max() <= 98.0
+
+
+@pytest.mark.parametrize("span", [1e-4, 0.7, 1.0, 3.3, 47.0, 9.99e5])
+def test_steps_are_round_and_few(span: float) -> None:
+    step = nice_step(span, 6)
+    assert span / step <= 6 + 1e-9
+    assert round(step / 10 ** math.floor(math.log10(step) + 1e-9), 9) in (1.0, 2.0, 5.0)
+
+
+@pytest.mark.parametrize(
+    ("said", "wanted"),
+    [
+        (words.duration(45.25), "45.2 s"),
+        (words.duration(59.7), "1 min"),
+        (words.duration(200.0), "3 min 20 s"),
+        (words.duration(3599.7), "1 h 00 min"),
+        (words.duration(4500.0), "1 h 15 min"),
+        (words.clock(3661.4), "1:01:01"),
+        (words.distance(38.41), "38.4 m"),
+        (words.distance(999.6), "1 km"),
+        (words.distance(6512.0), "6.51 km"),
+        (words.speed(2.0), "2.00 m/s (3.9 kn)"),
+        (words.number(-0.001), "0.00"),
+        (words.number(-1.5, 1), "\N{MINUS SIGN}1.5"),
+        (words.significant(0.00006), "0.00006"),
+        (words.significant(0.0), "0"),
+        (words.percent(0.9718), "97.2 %"),
+        (words.percent(2.639), "264 %"),
+        (words.percent(0.0004), "0.04 %"),
+        (words.percent(0.0), "0 %"),
+        (words.bearing(2 * math.pi - 1e-9), "000\N{DEGREE SIGN}"),
+        (words.bearing(-math.pi / 2), "270\N{DEGREE SIGN}"),
+        (words.latitude(60.1), "60\N{DEGREE SIGN}06.000\N{PRIME} N"),
+        (words.latitude(-0.99999999), "01\N{DEGREE SIGN}00.000\N{PRIME} S"),
+        (words.longitude(24.955), "024\N{DEGREE SIGN}57.300\N{PRIME} E"),
+        (words.longitude(181.5), "178\N{DEGREE SIGN}30.000\N{PRIME} W"),
+        (words.longitude(-70.5, 0), "070\N{DEGREE SIGN}30\N{PRIME} W"),
+        (words.current(np.array([0.1, 0.0]), 0.0), "0.10 m/s (0.2 kn) setting 000\N{DEGREE SIGN} (north)"),
+        (words.wind(np.array([0.0, -5.0]), 0.0), "5.00 m/s (9.7 kn) from 090\N{DEGREE SIGN} (east)"),
+        (words.wind(np.zeros(2), 0.0), "no mean wind"),
+    ],
+)
+def test_numbers_are_said_as_people_say_them(said: str, wanted: str) -> None:
+    assert said.replace("\N{NO-BREAK SPACE}", " ") == wanted
