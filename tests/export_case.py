@@ -174,7 +174,8 @@ def _clearances(trajectory: Trajectory, area: SeaArea) -> np.ndarray:
 def _realised(commands: Commands, trajectory: Trajectory) -> float:
     names = tug().model.names
     X, Y = moments(tug().model, regressor_rows(tug().model, trajectory, commands, CALM), names)
-    return float(np.exp((np.linalg.slogdet(X - Y @ Y.T)[1] - design().log_det) / len(names)))
+    longer = commands.duration_s / design().problem.total_s
+    return longer * float(np.exp((np.linalg.slogdet(X - Y @ Y.T)[1] - design().log_det) / len(names)))
 
 
 def report_content(**changes: object) -> ReportContent:

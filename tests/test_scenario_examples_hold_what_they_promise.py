@@ -89,7 +89,7 @@ def test_start_and_goal_are_joined_only_through_narrows(name, gate_m):
 def test_the_pond_is_the_size_of_its_description():
     area = load_scenario(SCENARIOS / "model-ship.toml").area
     west, south, east, north = area.water.bounds
-    assert (east - west, north - south) == pytest.approx((160, 100), rel=0.06)
+    assert (east - west, north - south) == pytest.approx((320, 200), rel=0.06)
     assert len(area.water.geoms) == 1
     assert len(area.water.geoms[0].interiors) == 1
 

@@ -15,6 +15,9 @@ from expdesign.vessel import Vessel
 USABLE = 0.9
 """Share of the largest steady speed, and of the largest steady yaw rate, that repositioning counts on."""
 
+LATERAL_MPS2 = 0.03 * 9.81
+"""Lateral acceleration of turns on legs: small enough not to heel the ship."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Capability:
@@ -50,6 +53,7 @@ def capability(vessel: Vessel, settings: PlanSettings) -> Capability:
     yaw = _largest(lambda r: _holds(vessel, (transit, 0.0, r)), start=1e-4 * transit / vessel.length_m)
     if yaw is None:
         raise NoPlan(f"vessel {vessel.name!r} cannot turn at {transit:.3g} m/s with its actuators and nominal model")
+    yaw = min(yaw, LATERAL_MPS2 / transit / USABLE)
     radius = settings.turning_radius_m or max(transit / (USABLE * yaw), 1.5 * vessel.length_m)
     return Capability(
         top_speed_mps=top,

@@ -110,7 +110,7 @@ def find_path(task: LegTask, water: LegWater) -> Array | None:
 
     def clear(x: float, y: float) -> bool:
         row, column = round((x - north) / field.cell_m), round((y - east) / field.cell_m)
-        return 0 <= row < rows and 0 <= column < columns and grid[row, column] >= margin + slack
+        return 0 <= row < rows and 0 <= column < columns and bool(grid[row, column] >= margin + slack)
 
     west, south, right, top = water.safe.bounds
     for attempt in range(2):

@@ -16,6 +16,7 @@ import numpy as np
 from expdesign.conventions import wrap_angle
 from expdesign.dictionary import Primitive
 from expdesign.errors import NoPlan
+from expdesign.plan.area import LocalFrame
 from expdesign.plan.capability import Capability
 from expdesign.plan.field import ClearanceField, GoalField
 from expdesign.plan.footprint import covering_discs, disc_points, thinned_poses
@@ -39,6 +40,7 @@ class Stamp:
         name: of the primitive.
         discs: (n, 2) forward/starboard centres of the discs that cover its swept hull [m].
         times_s: (n,) when the hull is there [s].
+        room_m: (n,) clearance that each disc centre needs [m].
         displacement: (3,) forward m, starboard m, turn rad through water.
         duration_s: of one run [s].
         entry_mps, exit_mps: surge speed at its ends.
@@ -47,6 +49,7 @@ class Stamp:
     name: str
     discs: Array
     times_s: Array
+    room_m: Array
     displacement: Array
     duration_s: float
     entry_mps: float
@@ -59,23 +62,24 @@ class SearchSpace:
 
     Attributes:
         stamps: the primitives to place.
+        frame: for messages.
         field, goal_way: clearance and the way to the goal.
         goal: (3,) pose.
         ship: speeds and turns on legs.
         hull_m: hull length [m].
-        run_margin_m, leg_margin_m: clearance that disc centres of runs, and leg centre lines, need on the grid [m].
+        leg_margin_m: clearance that leg centre lines need on the grid [m].
         current_to: (2,) mean current [m/s].
         run_up: extra straight before a run, by (name before, name) in hull lengths; grows where a leg failed.
         refused: (b, 3) start poses that turned out unreachable or unsafe; none is tried near them again.
     """
 
     stamps: tuple[Stamp, ...]
+    frame: LocalFrame
     field: ClearanceField
     goal_way: GoalField
     goal: Array
     ship: Capability
     hull_m: float
-    run_margin_m: float
     leg_margin_m: float
     current_to: Array
     run_up: Mapping[tuple[str, str], float] = field(default_factory=dict)
@@ -101,16 +105,16 @@ class _Beam:
     history: tuple[tuple[tuple[int, Array], ...], ...]
 
 
-def stamp(primitive: Primitive, *, length_m: float, beam_m: float) -> Stamp:
-    """Reduce a primitive to what the search needs."""
+def stamp(primitive: Primitive, room_m: Array, *, length_m: float, beam_m: float) -> Stamp:
+    """Reduce a primitive to what the search needs; `room_m` (k + 1,) is the clearance for discs at each sample."""
     centres, _ = covering_discs(length_m, beam_m)
     pose = primitive.trajectory.pose
     kept = thinned_poses(pose, reach_m=length_m / 2, spacing_m=length_m / 4)
-    points = disc_points(pose[kept], centres)
     return Stamp(
         name=primitive.name,
-        discs=points.reshape(-1, 2),
+        discs=disc_points(pose[kept], centres).reshape(-1, 2),
         times_s=np.repeat(kept * primitive.trajectory.sample_time_s, len(centres)),
+        room_m=np.repeat(room_m[kept], len(centres)),
         displacement=primitive.displacement,
         duration_s=primitive.duration_s,
         entry_mps=float(primitive.entry_velocity[0]),
@@ -297,8 +301,7 @@ def _clear(space: SearchSpace, pose: Array, primitive: np.ndarray, start: Array,
         c, s = np.cos(start[some, 2])[:, None], np.sin(start[some, 2])[:, None]
         north = start[some, :1] + c * item.discs[:, 0] - s * item.discs[:, 1] + space.current_to[0] * item.times_s
         east = start[some, 1:2] + s * item.discs[:, 0] + c * item.discs[:, 1] + space.current_to[1] * item.times_s
-        room = space.field.at(np.stack([north, east], axis=-1)).min(axis=1)
-        clear[some] = room >= space.run_margin_m
+        clear[some] = (space.field.at(np.stack([north, east], axis=-1)) >= item.room_m).all(axis=1)
     return clear
 
 
@@ -326,12 +329,14 @@ def _leg_to_goal_s(space: SearchSpace, pose: Array) -> Array:
 def _what_blocks(space: SearchSpace, beam: _Beam) -> str:
     """The largest run that is still to do, and where the search came to a halt."""
     waiting = [item for q, item in enumerate(space.stamps) if beam.left[:, q].any()]
-    largest = max(waiting, key=lambda item: float(np.hypot(*item.discs.T).max()))
+    largest = max(waiting, key=lambda item: float((np.hypot(*item.discs.T) + item.room_m).max()))
     north, east = beam.pose[0, :2]
+    lat, lon = space.frame.to_degrees(np.array([north, east]))
     return (
-        f"no room for {largest.name!r}: it sweeps up to {np.hypot(*largest.discs.T).max():.0f} m from its start and "
-        f"needs {space.run_margin_m:.0f} m round the hull's centre line; the search stopped near "
-        f"north {north:.0f} m, east {east:.0f} m with {int(beam.left[0].sum())} runs to go"
+        f"no room for {largest.name!r}: it goes up to {np.hypot(*largest.discs.T).max():.4g} m from its start and needs "
+        f"up to {largest.room_m.max():.4g} m round its centre line (hull, plan.clearance_m, and what the vessel's "
+        f"parameter_std and the forecast add at plan.confidence); the search stopped near {lat:.5f}, {lon:.5f} with "
+        f"{int(beam.left[0].sum())} runs to go"
     )
 
 

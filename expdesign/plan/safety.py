@@ -13,9 +13,10 @@ import shapely
 
 from expdesign.plan.area import SeaArea
 from expdesign.plan.footprint import hull_outlines
+from expdesign.plan.uncertainty import draw_truths
 from expdesign.plan.values import Leg
 from expdesign.signals import Commands, Trajectory
-from expdesign.simulation import Environment, draw_environment, simulate_many
+from expdesign.simulation import Environment, simulate_many
 from expdesign.values import Array
 from expdesign.vessel import Vessel
 
@@ -40,11 +41,7 @@ def leave_water_probability(
     One draw is one trial: the same parameters (normal, independent, standard deviations of the vessel file), current
     and wind in all its runs. Its standard error is sqrt(p (1 - p) / draws). Runs that diverge count as leaving.
     """
-    p = len(vessel.model.parameters)
-    parameters = vessel.model.parameters + vessel.model.parameter_std * rng.standard_normal((draws, p))
-    weather = [draw_environment(environment, rng) for _ in range(draws)]
-    current = np.array([drawn.current_to for drawn in weather])
-    wind = np.array([drawn.wind_to for drawn in weather])
+    parameters, current, wind = draw_truths(vessel, environment, draws, rng)
     shapely.prepare(area.water)
     left = np.zeros(draws, dtype=bool)
     for leg in legs:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 import shapely
@@ -18,9 +18,10 @@ from expdesign.plan.checks import verify_plan
 from expdesign.plan.field import ClearanceField, clearance_field, goal_field, narrowest_passage
 from expdesign.plan.footprint import covering_discs, swept_area
 from expdesign.plan.legs import LegTask, LegWater, find_leg, leg_trajectory
-from expdesign.plan.placement import SearchSpace, place_runs, refusing, stamp
+from expdesign.plan.placement import SearchSpace, Stamp, place_runs, refusing, stamp
 from expdesign.plan.realised import realised_efficiency
 from expdesign.plan.safety import leave_water_probability
+from expdesign.plan.uncertainty import stray_m
 from expdesign.plan.values import Leg, Placement, Plan, PlanSettings
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import Environment, to_body
@@ -147,21 +148,35 @@ def _search_space(problem: PlanProblem, water: LegWater) -> SearchSpace:
     way = goal_field(grid, problem.goal[:2], clearance_m=margin)
     if not np.isfinite(way.to_goal(problem.start[:2])):
         raise NoPlan(_no_way(problem, grid, margin))
-    _, disc_m = covering_discs(vessel.length_m, vessel.beam_m)
-    used = _repeats(problem)
     return SearchSpace(
-        stamps=tuple(
-            stamp(item, length_m=vessel.length_m, beam_m=vessel.beam_m) for item in problem.primitives if used[item.name]
-        ),
+        stamps=_stamps(problem, grid),
+        frame=problem.area.frame,
         field=grid,
         goal_way=way,
         goal=problem.goal,
         ship=water.ship,
         hull_m=vessel.length_m,
-        run_margin_m=problem.settings.clearance_m + disc_m + grid.cell_m / 2,
         leg_margin_m=margin,
         current_to=problem.environment.current_to,
     )
+
+
+def _stamps(problem: PlanProblem, grid: ClearanceField) -> tuple[Stamp, ...]:
+    """The runs with the room they need: the promised clearance, or where truths may stray farther, that far.
+
+    The chance of straying is shared out evenly over all runs, so that together they keep the wished confidence.
+    """
+    vessel, used = problem.vessel, _repeats(problem)
+    centres, disc_m = covering_discs(vessel.length_m, vessel.beam_m)
+    confidence = 1.0 - (1.0 - problem.settings.confidence) / max(1, sum(used.values()))
+    rng = np.random.default_rng(problem.seed)
+    stamps = []
+    for item in problem.primitives:
+        if used[item.name]:
+            stray = stray_m(vessel, item, problem.environment, centres_m=centres, confidence=confidence, rng=rng)
+            room = disc_m + grid.cell_m / 2 + np.maximum(problem.settings.clearance_m, stray)
+            stamps.append(stamp(item, room, length_m=vessel.length_m, beam_m=vessel.beam_m))
+    return tuple(stamps)
 
 
 def _no_way(problem: PlanProblem, grid: ClearanceField, needed_m: float) -> str:
@@ -275,7 +290,3 @@ def _reposition_bound_s(problem: PlanProblem, water: LegWater) -> float:
     ship: Capability = water.ship
     return max(0.0, way.lower_bound(problem.start[:2]) - carried) / (ship.top_speed_mps + current)
 
-
-def with_seed(problem: PlanProblem, seed: int) -> PlanProblem:
-    """The same problem with another seed."""
-    return replace(problem, seed=seed)

@@ -118,8 +118,12 @@ def _design_sentence(content: ReportContent) -> str:
     )
     if realised is None:
         return f"{text}."
-    more = ", more than the optimum because repositioning informs too" if realised > 1 else ""
-    return f"{text}, and the track as planned, repositioning included, reaches {words.percent(realised)}{more}."
+    optimal = words.duration(design.problem.total_s)
+    more = ", because repositioning takes time of its own and informs too" if realised > 1 else ""
+    return (
+        f"{text}. The whole track, repositioning included, collects {words.percent(realised)} of the information of an "
+        f"optimal {optimal}{more}."
+    )
 
 
 def facts(content: ReportContent) -> list[Fact]:
@@ -150,7 +154,7 @@ def facts(content: ReportContent) -> list[Fact]:
         Fact(
             name="Information realised",
             value="not computed" if realised is None else words.percent(realised),
-            remark="of the optimal design's, as D-efficiency",
+            remark=f"of an optimal {words.duration(design.problem.total_s)}, repositioning included",
         ),
     ]
 

@@ -1,0 +1,89 @@
+"""How far a run may stray from its footprint when the vessel is not quite the nominal one."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from expdesign.dictionary import Primitive
+from expdesign.errors import NoPlan
+from expdesign.plan.footprint import disc_points
+from expdesign.simulation import Environment, draw_environment, simulate_many
+from expdesign.values import Array
+from expdesign.vessel import Vessel
+
+DRAWS = 200
+
+
+def draw_truths(
+    vessel: Vessel, environment: Environment, draws: int, rng: np.random.Generator
+) -> tuple[Array, Array, Array]:
+    """Parameters (n, p), currents (n, 2) and winds (n, 2) drawn from the prior and the forecast.
+
+    Parameters are normal and independent with the vessel file's standard deviations.
+    """
+    p = len(vessel.model.parameters)
+    parameters = vessel.model.parameters + vessel.model.parameter_std * rng.standard_normal((draws, p))
+    weather = [draw_environment(environment, rng) for _ in range(draws)]
+    return parameters, np.array([x.current_to for x in weather]), np.array([x.wind_to for x in weather])
+
+
+def stray_m(
+    vessel: Vessel,
+    primitive: Primitive,
+    environment: Environment,
+    *,
+    centres_m: Array,
+    confidence: float,
+    rng: np.random.Generator,
+    draws: int = DRAWS,
+) -> Array:
+    """(k + 1,) radius round the nominal disc centres that a share `confidence` of drawn runs keeps to all the time.
+
+    Each draw has its own vessel, weather and heading, begins at the entry velocity and runs open loop. The radius
+    grows with time like the draws' root mean square distance, scaled so that the wished share stays inside throughout.
+
+    Args:
+        vessel, primitive, environment: the nominal run and what is uncertain about it.
+        centres_m: (c,) forward positions of the discs that cover the hull.
+        confidence: between 0 and 1.
+        rng: draws.
+        draws: how many.
+
+    Raises:
+        NoPlan: so many drawn vessels are unstable that the share cannot be met.
+    """
+    parameters, current, wind = draw_truths(vessel, environment, draws, rng)
+    heading = rng.uniform(-np.pi, np.pi, draws)
+    c, s = np.cos(heading), np.sin(heading)
+    drift = environment.current_to
+    along = np.stack([drift[0] * c + drift[1] * s, drift[1] * c - drift[0] * s, 0 * c], axis=1)
+    states = simulate_many(
+        vessel,
+        primitive.commands,
+        pose=np.stack([0 * c, 0 * c, heading], axis=1),
+        velocity=primitive.entry_velocity + along,
+        current_to=current,
+        wind_to=wind,
+        parameters=parameters,
+    )
+    time_s = primitive.trajectory.time_s[:, None, None]
+    moved = states[..., :2] - drift * time_s
+    back = np.stack([moved[..., 0] * c + moved[..., 1] * s, moved[..., 1] * c - moved[..., 0] * s], axis=-1)
+    pose_b = np.concatenate([back, states[..., 2:3] - heading[:, None]], axis=-1)  # (k + 1, n, 3)
+    nominal = disc_points(primitive.trajectory.pose, centres_m)
+    drawn = disc_points(pose_b.reshape(-1, 3), centres_m).reshape(*pose_b.shape[:2], -1, 2)
+    apart = np.hypot(*np.moveaxis(drawn - nominal[:, None], -1, 0)).max(axis=-1)  # (k + 1, n)
+    return _radius(apart, confidence, primitive.name)
+
+
+def _radius(apart: Array, confidence: float, name: str) -> Array:
+    stable = ~np.isnan(apart).any(axis=0)
+    shape = np.sqrt(np.mean(apart[:, stable] ** 2, axis=1)) + 1e-9 if stable.any() else np.ones(len(apart))
+    ratio = np.where(stable, np.nan_to_num(apart / shape[:, None]).max(axis=0), np.inf)
+    factor = float(np.quantile(ratio, confidence, method="higher"))
+    if not np.isfinite(factor):
+        raise NoPlan(
+            f"{name!r} is unstable for {np.mean(~stable):.0%} of the vessels drawn from model.parameter_std, more than "
+            f"plan.confidence = {confidence:g} allows"
+        )
+    return np.asarray(factor * shape)
