@@ -119,7 +119,7 @@ def _commands_and_legs() -> tuple[Commands, tuple[Leg, ...]]:
         entry = by_name[name].entry_velocity if name in by_name else np.zeros(3)
         turn = 0.0 if name in ("ahead", "rest") else np.radians((60, 75, -50, 90, 40)[(number - 1) % 5])
         values = _joint(vessel, velocity, entry, turn=turn, before=inputs)
-        add("reposition", f"to {name}" if name in by_name else "to goal", values)
+        add("reposition", name if name in by_name else "goal", values)
         if name in by_name:
             add("primitive", name, by_name[name].commands.values)
             velocity = by_name[name].exit_velocity

@@ -119,6 +119,7 @@ def test_the_page_says_what_the_values_say() -> None:
         "expdesign 1.2.3",
     ):
         assert " ".join(fact.split()) in text
+    assert text.count("reposition to ") == sum(leg.kind == "reposition" for leg in plan.legs)
     assert page().count('<tr class="run">') == len(primitive_runs(plan)) == sum(design.repeats)
     assert all(name in text for name in (*design.problem.names, *design.problem.parameters))
 
@@ -168,7 +169,8 @@ def test_steps_are_round_and_few(span: float) -> None:
         (words.duration(45.25), "45.2 s"),
         (words.duration(59.7), "1 min"),
         (words.duration(200.0), "3 min 20 s"),
-        (words.duration(3599.7), "1 h 00 min"),
+        (words.duration(3599.7), "1 h"),
+        (words.duration(3899.0), "1 h 05 min"),
         (words.duration(4500.0), "1 h 15 min"),
         (words.clock(3661.4), "1:01:01"),
         (words.distance(38.41), "38.4 m"),

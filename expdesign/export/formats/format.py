@@ -41,5 +41,5 @@ def _in_xml(code: int) -> bool:
 
 def leg_sentence(waypoint: Waypoint) -> str:
     """What the ship does on the way to the waypoint."""
-    what = f"primitive {waypoint.leg_name}" if waypoint.leg_kind == "primitive" else f"reposition: {waypoint.leg_name}"
-    return f"leg {waypoint.leg}, {what}"
+    what = "primitive" if waypoint.leg_kind == "primitive" else "reposition to"
+    return f"leg {waypoint.leg}, {what} {waypoint.leg_name}"

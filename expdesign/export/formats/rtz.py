@@ -27,7 +27,8 @@ def write(route: Route) -> bytes:
         InputError: the file is larger than an ECDIS must accept.
     """
     root = etree.Element(f"{{{RTZ}}}route", nsmap={None: RTZ}, version="1.2")
-    _add(root, "routeInfo", routeName=xml_text(route.name), routeAuthor="expdesign", vesselName=xml_text(route.vessel))
+    names = {"routeName": xml_text(route.name), "vesselName": xml_text(route.vessel)}
+    _add(root, "routeInfo", **names, routeAuthor="expdesign", routeStatus="trial plan, to be checked on board")
     waypoints = _add(root, "waypoints")
     for number, waypoint in enumerate(route.waypoints, start=1):
         _add_waypoint(waypoints, number, waypoint, route)

@@ -44,7 +44,7 @@ def _agenda_row(plan: Plan, index: int, leg: Leg, run: int | None) -> AgendaRow:
         leg=index,
         run=run,
         starts=words.clock(leg.first * plan.commands.sample_time_s),
-        what=leg.name,
+        what=leg.name if run else f"reposition to {leg.name}",
         lasts=words.duration((leg.last - leg.first) * plan.commands.sample_time_s),
         latitude=words.latitude(lat),
         longitude=words.longitude(lon),
@@ -159,7 +159,7 @@ def checks(content: ReportContent) -> list[Check]:
         ),
         Check(
             what="Largest violation of an actuator limit or rate",
-            found=f"{words.percent(found.limit_excess)} of its range",
+            found="none" if found.limit_excess < 1e-6 else f"{words.percent(found.limit_excess)} of its range",
             required="",
             passed=None,
         ),

@@ -14,14 +14,14 @@ MINUS, NB = "\N{MINUS SIGN}", "\N{NO-BREAK SPACE}"
 
 
 def duration(seconds: float) -> str:
-    """45 s, 3 min 20 s, 15 min, 1 h 05 min."""
+    """45 s, 3 min 20 s, 15 min, 1 h 05 min, 2 h."""
     if seconds < 59.5:
         return f"{seconds:.3g}{NB}s"
     minutes, rest = divmod(round(seconds), 60)
     if minutes < 60:
         return f"{minutes}{NB}min{NB}{rest:02d}{NB}s" if rest else f"{minutes}{NB}min"
     hours, minutes = divmod(round(seconds / 60), 60)
-    return f"{hours}{NB}h{NB}{minutes:02d}{NB}min"
+    return f"{hours}{NB}h{NB}{minutes:02d}{NB}min" if minutes else f"{hours}{NB}h"
 
 
 def clock(seconds: float) -> str:

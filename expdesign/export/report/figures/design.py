@@ -31,13 +31,14 @@ def _draw_times(axes: Axes, design: DurationDesign) -> None:
     rows = np.arange(len(design.problem.names))
     whole = np.array(design.repeats) * design.problem.run_s / 60
     axes.barh(rows, whole, height=0.62, color=PRIMITIVE, alpha=0.75, label="in whole runs")
-    axes.plot(design.durations_s / 60, rows, "D", color="white", markeredgecolor="black", label="optimal", markersize=6)
+    used, optimal = design.fractions > USED, design.durations_s / 60
+    axes.plot(optimal[used], rows[used], "D", color="white", markeredgecolor="black", label="optimal", markersize=6)
     for row, (length, count) in enumerate(zip(whole, design.repeats, strict=True)):
-        beyond = max(length, design.durations_s[row] / 60)
+        beyond = max(length, optimal[row])
         text = f"{count} \N{MULTIPLICATION SIGN}"
         axes.annotate(text, (beyond, row), (8, 0), textcoords="offset points", va="center", fontsize=9)
     axes.set_xlabel("time [min]")
-    axes.set_xlim(0, 1.14 * max(whole.max(), design.durations_s.max() / 60))
+    axes.set_xlim(0, 1.14 * max(whole.max(), optimal.max()))
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, fontsize=9)
     light_grid(axes, "x")
 

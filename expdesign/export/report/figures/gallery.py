@@ -52,4 +52,5 @@ def primitive_figure(primitive: Primitive, hull_b: Array, *, number: int) -> str
         axes.locator_params(axis="y", nbins=4)
         light_grid(axes)
     rows[-1].set_xlabel("time [s]")
+    figure.draw_without_rendering()  # equal aspect widens the limits, and with them the labels to make room for
     return svg(figure, key=f"primitive-{number}", label=f"Path and velocities of primitive {primitive.name}")
