@@ -16,6 +16,9 @@ from expdesign.values import Array
 
 ou.setLogLevel(ou.LogLevel.LOG_NONE)
 
+SLICE = 300
+"""Iterations between looks for a solution."""
+
 Clear = Callable[[float, float], bool]
 """(north, east) -> whether the centre line may pass there."""
 
@@ -43,8 +46,8 @@ def search_dubins(
     high: Array,
     clear: Clear,
     seed: int,
-    iterations: int = 400,
-    most_iterations: int = 20_000,
+    slices: int = 12,
+    improving: int = 2,
 ) -> Array | None:
     """(k, 3) poses along a short Dubins path that the checker accepts, or None when none is found.
 
@@ -57,8 +60,8 @@ def search_dubins(
         low, high: (2,) north/east box to search.
         clear: point check; it is also asked about points outside the box.
         seed: of the sampler.
-        iterations: to improve the first solution.
-        most_iterations: without one.
+        slices: of `SLICE` iterations, at most.
+        improving: slices spent after the first solution.
     """
     ou.RNG.setSeed(seed)
     space = ob.DubinsStateSpace(radius_m)
@@ -73,18 +76,24 @@ def search_dubins(
     information.setStateValidityCheckingResolution(spacing_m / space.getMaximumExtent())
     setup.setStartAndGoalStates(_state(space, start), _state(space, end))
     setup.setPlanner(og.SORRTstar(information))
-    definition, count = setup.getProblemDefinition(), [0]
-
-    def enough() -> bool:
-        count[0] += 1
-        return count[0] > (iterations if definition.hasExactSolution() else most_iterations)
-
-    setup.solve(ob.PlannerTerminationCondition(enough))
-    if not setup.haveExactSolutionPath():
+    # the planner reports a solution only between calls of solve, so it is called in slices and goes on where it was
+    solved = 0
+    for _ in range(slices):
+        setup.solve(ob.PlannerTerminationCondition(_after(SLICE)))
+        solved += bool(setup.haveExactSolutionPath())
+        if solved > improving:
+            break
+    if not solved:
         return None
     path = setup.getSolutionPath()
     path.interpolate(max(2, int(np.ceil(path.length() / spacing_m)) + 1))
     return _continuous([(s.getX(), s.getY(), s.getYaw()) for s in path.getStates()], start[2])
+
+
+def _after(iterations: int) -> Callable[[], bool]:
+    """A condition that becomes true after being asked a number of times."""
+    count = iter(range(iterations))
+    return lambda: next(count, None) is None
 
 
 def _state(space: ob.DubinsStateSpace, pose: Array) -> ob.State:

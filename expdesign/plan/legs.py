@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -9,7 +10,7 @@ import numpy as np
 import shapely
 
 from expdesign.plan._casadi import LegProblem, solve_leg
-from expdesign.plan._ompl import dubins_curve, search_dubins
+from expdesign.plan._ompl import Clear, dubins_curve, search_dubins
 from expdesign.plan.area import SeaArea
 from expdesign.plan.capability import Capability
 from expdesign.plan.field import ClearanceField
@@ -103,31 +104,41 @@ def find_path(task: LegTask, water: LegWater) -> Array | None:
     direct = dubins_curve(task.start[:3], task.end[:3], radius_m=radius, spacing_m=spacing)
     if _inside(direct, water):
         return direct
-    field, margin = water.field, water.path_margin_m
-    grid, (north, east) = field.clearance_m, field.origin
-    rows, columns = grid.shape
-    slack = field.cell_m / 2
-
-    def clear(x: float, y: float) -> bool:
-        row, column = round((x - north) / field.cell_m), round((y - east) / field.cell_m)
-        return 0 <= row < rows and 0 <= column < columns and bool(grid[row, column] >= margin + slack)
-
-    west, south, right, top = water.safe.bounds
-    for attempt in range(2):
+    for attempt, (reach, slack) in enumerate(((4.0, 0.5), (4.0, 1.5), (40.0, 1.0))):
+        box = reach * (radius + water.vessel.length_m)
         path = search_dubins(
             task.start[:3],
             task.end[:3],
             radius_m=radius,
-            spacing_m=spacing,
-            low=np.array([south, west]),
-            high=np.array([top, right]),
-            clear=clear,
+            spacing_m=2 * spacing,
+            low=np.minimum(task.start, task.end)[:2] - box,
+            high=np.maximum(task.start, task.end)[:2] + box,
+            clear=_checker(task, water, slack * water.field.cell_m),
             seed=task.seed + 7919 * attempt,
         )
         if path is not None and _inside(path, water):
             return path
-        slack += field.cell_m
     return None
+
+
+def _checker(task: LegTask, water: LegWater, slack_m: float) -> Clear:
+    """Point check on the clearance grid; near the leg's ends no more is asked than the ends themselves have."""
+    field, margin = water.field, water.path_margin_m + slack_m
+    grid, (north, east), cell = field.clearance_m, field.origin.tolist(), field.cell_m
+    rows, columns = grid.shape
+    near = 2 * water.vessel.length_m
+    ends = [(*end[:2].tolist(), float(field.at(end[:2])) - cell) for end in (task.start, task.end)]
+
+    def clear(x: float, y: float) -> bool:
+        row, column = round((x - north) / cell), round((y - east) / cell)
+        if not (0 <= row < rows and 0 <= column < columns):
+            return False
+        found = float(grid[row, column])
+        if found >= margin:
+            return True
+        return any(found >= least and math.hypot(x - a, y - b) < near for a, b, least in ends)
+
+    return clear
 
 
 def _inside(pose: Array, water: LegWater) -> bool:

@@ -276,6 +276,7 @@ def _select(
     for first in range(0, len(order), CHUNK):
         chunk = order[first : first + CHUNK]
         clear = _clear(space, beam.pose[parent[chunk]], primitive[chunk], start[chunk], turn[chunk])
+        clear &= space.field.at(end[chunk, :2]) >= space.leg_margin_m
         for index in chunk[clear]:
             place = np.rint(end[index, :2] / (2 * space.hull_m)).astype(int)
             key = (*place, int(np.rint(wrap_angle(end[index, 2]) / 0.4)), *left[index])
