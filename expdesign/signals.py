@@ -67,7 +67,7 @@ class Trajectory:
     @property
     def time_s(self) -> Array:
         """(k,) from zero [s]."""
-        return np.arange(len(self)) * self.sample_time_s
+        return np.asarray(np.arange(len(self)) * self.sample_time_s, dtype=float)
 
     @property
     def distance_m(self) -> float:

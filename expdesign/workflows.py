@@ -125,9 +125,7 @@ def export(plan: Path, out: Path | None, *, formats: Sequence[str], progress: Pr
     return Outcome(files=files, summary={"waypoints": len(route.waypoints), "length_m": route.length_m})
 
 
-def simulate(
-    plan: Path, out: Path | None, *, truth: Path, seed: int = 0, progress: Progress = silent
-) -> Outcome:
+def simulate(plan: Path, out: Path | None, *, truth: Path, seed: int = 0, progress: Progress = silent) -> Outcome:
     """The commands of a plan run open loop on another vessel in drawn weather, and what its sensors record."""
     progress("reading the plan", 0.05)
     track, vessel = read_plan(plan), load_vessel(truth)
@@ -142,9 +140,7 @@ def simulate(
     weather = draw_environment(track.environment, rng)
     progress("simulating the trial", 0.2)
     begin = track.trajectory
-    sailed = simulate_run(
-        vessel, track.commands, pose=begin.pose[0], velocity=begin.velocity[0], environment=weather
-    )
+    sailed = simulate_run(vessel, track.commands, pose=begin.pose[0], velocity=begin.velocity[0], environment=weather)
     columns = measure(vessel, track.commands, sailed, environment=weather, rng=rng)
     apart = np.hypot(*(sailed.pose - begin.pose)[:, :2].T)
     files = write_files(out or plan.parent, {"measured.csv": _csv(columns)})
@@ -223,7 +219,11 @@ def _within(progress: Progress, low: float, high: float) -> Progress:
 
 
 def _written(
-    case: Scenario, out: Path | None, files: Mapping[str, str | bytes], summary: Mapping[str, object], progress: Progress
+    case: Scenario,
+    out: Path | None,
+    files: Mapping[str, str | bytes],
+    summary: Mapping[str, object],
+    progress: Progress,
 ) -> Outcome:
     written = write_files(out or Path("runs") / case.name, files)
     progress("done", 1.0)
@@ -235,9 +235,14 @@ def _dictionary_files(case: Scenario, information: Sequence[PrimitiveInformation
 
 
 def _plan_files(case: Scenario, plan: Plan) -> dict[str, str | bytes]:
-    facts = {"scenario": case.name, "environment": case.environment, "clearance_m": case.plan.clearance_m}
     return {
-        "plan.json": plan_json(plan, vessel=case.vessel, **facts),
+        "plan.json": plan_json(
+            plan,
+            scenario=case.name,
+            vessel=case.vessel,
+            environment=case.environment,
+            clearance_m=case.plan.clearance_m,
+        ),
         "track.csv": track_csv(plan),
         "commands.csv": commands_csv(plan),
     }

@@ -41,9 +41,7 @@ def tug(*, sample_time_s: float = 1.0) -> Vessel:
         sample_time_s=1.0,
         actuators=(Actuator(kind="force", number=1, limits=limits),),
     )
-    return Vessel(
-        name="Test tug", length_m=30.0, beam_m=10.0, draught_m=3.0, sample_time_s=sample_time_s, model=model
-    )
+    return Vessel(name="Test tug", length_m=30.0, beam_m=10.0, draught_m=3.0, sample_time_s=sample_time_s, model=model)
 
 
 def request(name: str, family_name: str, **settings: float) -> PrimitiveSpec:
@@ -204,6 +202,4 @@ def plan_files() -> dict[str, str]:
 
 
 def planned() -> PlannedTrack:
-    return planned_track(
-        plan(), scenario="test-sound", vessel=tug(), environment=ENVIRONMENT, clearance_m=CLEARANCE_M
-    )
+    return planned_track(plan(), scenario="test-sound", vessel=tug(), environment=ENVIRONMENT, clearance_m=CLEARANCE_M)

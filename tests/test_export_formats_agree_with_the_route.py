@@ -147,9 +147,7 @@ def test_lines_are_cut_at_the_antimeridian(line: list[tuple[float, float]], part
 
 def test_a_route_too_long_for_an_ecdis_is_refused_with_a_way_out() -> None:
     route = routes()["plain"]
-    many = tuple(
-        replace(route.waypoints[1], name=f"WP{k:05d}", time_s=float(k), north_m=float(k)) for k in range(2000)
-    )
+    many = tuple(replace(route.waypoints[1], name=f"WP{k:05d}", time_s=float(k), north_m=float(k)) for k in range(2000))
     with pytest.raises(InputError, match=r"a larger tolerance than 5\.0 m gives fewer waypoints"):
         find_format("rtz").write(replace(route, waypoints=many))
 

@@ -43,12 +43,12 @@ class Primitive:
     @property
     def entry_velocity(self) -> Array:
         """(3,) u, v, r through water at the start."""
-        return self.trajectory.velocity[0]
+        return np.asarray(self.trajectory.velocity[0])
 
     @property
     def exit_velocity(self) -> Array:
         """(3,) u, v, r through water at the end."""
-        return self.trajectory.velocity[-1]
+        return np.asarray(self.trajectory.velocity[-1])
 
     @property
     def displacement(self) -> Array:

@@ -42,9 +42,7 @@ def cut_into_chords(
     return sorted(kept)
 
 
-def _split(
-    points: Array, first: int, last: int, tolerance_m: float, water: shapely.MultiPolygon | None
-) -> int | None:
+def _split(points: Array, first: int, last: int, tolerance_m: float, water: shapely.MultiPolygon | None) -> int | None:
     """Where the chord must be broken, or None when it serves."""
     off, back = _off_and_back(points[first : last + 1])
     if last - first > 1 and off.max() > tolerance_m:

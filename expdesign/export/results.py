@@ -31,9 +31,7 @@ FRAME_SENTENCE = (
 METRE_DECIMALS, MOTION_DECIMALS, DEGREE_DECIMALS, TIME_DECIMALS = 6, 9, 9, 9
 
 
-def dictionary_json(
-    information: Sequence[PrimitiveInformation], parameters: Sequence[str], *, vessel: Vessel
-) -> str:
+def dictionary_json(information: Sequence[PrimitiveInformation], parameters: Sequence[str], *, vessel: Vessel) -> str:
     """The dictionary with what each primitive tells, as dictionary.json.
 
     Args:

@@ -98,10 +98,8 @@ def _score(
 
 def _run_rows(vessel: Vessel, primitive: Primitive, heading: float, environment: Environment) -> tuple[Array, bool]:
     current_b = np.array(to_body(environment.current_to, heading, NUMPY))
-    start = primitive.entry_velocity + [*current_b, 0.0]
-    trajectory = simulate(
-        vessel, primitive.commands, pose=(0.0, 0.0, heading), velocity=start, environment=environment
-    )
+    start = primitive.entry_velocity + np.append(current_b, 0.0)
+    trajectory = simulate(vessel, primitive.commands, pose=(0.0, 0.0, heading), velocity=start, environment=environment)
     rows = regressor_rows(vessel.model, trajectory, primitive.commands, environment)
     return rows, excitation_condition(vessel, trajectory, primitive.commands, environment)
 
@@ -155,8 +153,8 @@ def check_informative(information: Sequence[PrimitiveInformation], names: Sequen
         return
     blind = _null_parameters(X, names)
     raise NotInformative(
-        f"the dictionary cannot tell these parameters apart: {', '.join(blind)}; add primitives that excite them, state "
-        "a mean wind if they are W terms, or list some in design.fixed_parameters",
+        f"the dictionary cannot tell these parameters apart: {', '.join(blind)}; add primitives that excite them, "
+        "state a mean wind if they are W terms, or list some in design.fixed_parameters",
         parameters=blind,
     )
 

@@ -139,13 +139,16 @@ class _Transcription:
         defects = (ends - states[:, 1:]) / ca.DM(self.state_scale)
         constraints, low, high = [ca.vec(defects)], [np.zeros(6 * j)], [np.zeros(6 * j)]
         for row, lower, upper in self._corridor(states):
-            constraints.append(row), low.append(lower), high.append(upper)
+            constraints.append(row)
+            low.append(lower)
+            high.append(upper)
         reach = np.array([limit.rate for limit in self.limits]) * self.block
         for index in np.flatnonzero(np.isfinite(reach)):
             change = (inputs[int(index), 1:] - inputs[int(index), :-1]).T - reach[index] * h
             fall = (inputs[int(index), :-1] - inputs[int(index), 1:]).T - reach[index] * h
             constraints += [ca.vertcat(change, fall) / self.input_scale[index]]
-            low.append(np.full(2 * j, -np.inf)), high.append(np.zeros(2 * j))
+            low.append(np.full(2 * j, -np.inf))
+            high.append(np.zeros(2 * j))
         steps, sample = ca.diff(u, 1, 1), p.vessel.sample_time_s
         cost = SMOOTHNESS * ca.sumsqr(steps) + SMALLNESS * ca.sumsqr(u) / j
         if free_time:
@@ -153,9 +156,14 @@ class _Transcription:
         self.variables = ca.vertcat(ca.vec(x), ca.vec(u), h)
         self.constraint_low, self.constraint_high = np.concatenate(low), np.concatenate(high)
         self.time_low, self.time_high = (0.2 * sample, 3.0 * sample) if free_time else (sample, sample)
-        options = {"ipopt.print_level": 0, "print_time": False, "ipopt.sb": "yes", "ipopt.max_iter": 400}
+        options: dict[str, Any] = {
+            "ipopt.print_level": 0,
+            "print_time": False,
+            "ipopt.sb": "yes",
+            "ipopt.max_iter": 400,
+        }
         options |= {"ipopt.tol": 1e-7, "ipopt.constr_viol_tol": 1e-9, "ipopt.acceptable_iter": 0}
-        nlp = {"x": self.variables, "f": cost, "g": ca.vertcat(*constraints)}
+        nlp: Any = {"x": self.variables, "f": cost, "g": ca.vertcat(*constraints)}
         self.solver = ca.nlpsol("leg", "ipopt", nlp, options)
 
     def _block_map(self) -> ca.Function:

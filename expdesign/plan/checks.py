@@ -97,7 +97,7 @@ def hull_clearance(area: SeaArea, trajectory: Trajectory, hull_b: Array) -> Arra
     pieces = np.concatenate([_pieces(line) for line in shore])
     tree = shapely.STRtree(pieces)
     (which, _), distances = tree.query_nearest(spans, return_distance=True, all_matches=False)
-    clearance = np.empty(len(spans))
+    clearance: Array = np.empty(len(spans))
     clearance[which] = distances
     outside = ~inside
     clearance[outside] = -np.sqrt(shapely.area(shapely.difference(spans[outside], water)))
@@ -111,7 +111,7 @@ def _pieces(line: shapely.Geometry) -> np.ndarray:
 
 
 def _sailed(trajectory: Trajectory) -> Array:
-    return np.r_[0.0, np.cumsum(np.hypot(*np.diff(trajectory.pose[:, :2], axis=0).T))]
+    return np.asarray(np.r_[0.0, np.cumsum(np.hypot(*np.diff(trajectory.pose[:, :2], axis=0).T))])
 
 
 def _limit_excess(vessel: Vessel, commands: Commands) -> tuple[float, str]:
@@ -156,7 +156,8 @@ def _entry_problems(
             u_c, v_c = to_body(environment.current_to, trajectory.pose[leg.first, 2], NUMPY)
             off = trajectory.velocity[leg.first] - [u_c, v_c, 0.0] - primitives[leg.name].entry_velocity
             if (np.abs(off) > ENTRY_TOLERANCE * scale).any():
-                problems.append(f"{leg.name!r} at sample {leg.first} begins {np.abs(off / scale).max():.1%} off its entry")
+                share = np.abs(off / scale).max()
+                problems.append(f"{leg.name!r} at sample {leg.first} begins {share:.1%} off its entry")
     return problems
 
 

@@ -15,7 +15,7 @@ from expdesign.values import Array
 
 FINEST_CELLS = 3_000_000
 ROUTING_CELLS = 400_000
-OCTILE_EXCESS = 1.0 / np.cos(np.pi / 8)
+OCTILE_EXCESS = float(1.0 / np.cos(np.pi / 8))
 """Largest ratio of an eight-neighbour grid path to the straight line: 1.0824."""
 
 
@@ -36,7 +36,7 @@ class ClearanceField:
     @property
     def error_m(self) -> float:
         """A looked-up clearance differs from the true one by less than this [m]."""
-        return self.cell_m * np.sqrt(2.0)
+        return float(self.cell_m * np.sqrt(2.0))
 
     def index(self, points: Array) -> tuple[np.ndarray, np.ndarray]:
         """Nearest cell's row and column of (..., 2) north/east points; outside the grid they are clipped."""
@@ -101,7 +101,7 @@ class GoalField:
 
     def to_goal(self, points: Array) -> Array:
         """(...,) distance to the goal in between the grid's over-estimate and a sure under-estimate [m]."""
-        return np.asarray(self.distance_m[self.flat(points)]) / np.sqrt(OCTILE_EXCESS)
+        return np.asarray(self.distance_m[self.flat(points)]) / float(np.sqrt(OCTILE_EXCESS))
 
     def lower_bound(self, point: Array) -> float:
         """A length that no way from the point to the goal falls below [m]."""

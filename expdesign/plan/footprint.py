@@ -39,7 +39,7 @@ def covering_discs(length_m: float, beam_m: float, *, count: int = 3) -> tuple[A
     """Forward positions (count,) and the radius of equal discs on the centre line that cover the hull [m]."""
     piece = length_m / count
     centres = (np.arange(count) - (count - 1) / 2) * piece
-    return centres, float(np.hypot(piece / 2, beam_m / 2))
+    return np.asarray(centres, dtype=float), float(np.hypot(piece / 2, beam_m / 2))
 
 
 def thinned_poses(pose: Array, *, reach_m: float, spacing_m: float) -> np.ndarray:

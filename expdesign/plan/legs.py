@@ -229,4 +229,3 @@ def _room(water: LegWater, centre: Array, side: Array, margin_m: float, narrowin
     free = water.field.at(points) >= margin_m
     free[:, 0] = True
     return np.asarray(narrowing * steps[np.cumprod(free, axis=1).sum(axis=1).astype(int) - 1])
-

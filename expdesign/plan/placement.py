@@ -8,8 +8,9 @@ speed. Clearances are looked up on a grid here; every leg and run is checked exa
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -82,8 +83,8 @@ class SearchSpace:
     hull_m: float
     leg_margin_m: float
     current_to: Array
-    run_up: Mapping[tuple[str, str], float] = field(default_factory=dict)
-    refused: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    run_up: Mapping[tuple[str, str], float] = dataclasses.field(default_factory=dict)
+    refused: Array = dataclasses.field(default_factory=lambda: np.zeros((0, 3)))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -334,10 +335,10 @@ def _what_blocks(space: SearchSpace, beam: _Beam) -> str:
     north, east = beam.pose[0, :2]
     lat, lon = space.frame.to_degrees(np.array([north, east]))
     return (
-        f"no room for {largest.name!r}: it goes up to {np.hypot(*largest.discs.T).max():.4g} m from its start and needs "
-        f"up to {largest.room_m.max():.4g} m round its centre line (hull, plan.clearance_m, and what the vessel's "
-        f"parameter_std and the forecast add at plan.confidence); the search stopped near {lat:.5f}, {lon:.5f} with "
-        f"{int(beam.left[0].sum())} runs to go"
+        f"no room for {largest.name!r}: it goes up to {np.hypot(*largest.discs.T).max():.4g} m from its start and "
+        f"needs up to {largest.room_m.max():.4g} m round its centre line (hull, plan.clearance_m, and what the "
+        "vessel's parameter_std and the forecast add at plan.confidence); the search stopped near "
+        f"{lat:.5f}, {lon:.5f} with {int(beam.left[0].sum())} runs to go"
     )
 
 

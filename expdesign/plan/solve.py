@@ -186,8 +186,8 @@ def _no_way(problem: PlanProblem, grid: ClearanceField, needed_m: float) -> str:
         return "the goal cannot be reached from the start: forbidden water lies between them on every way"
     return (
         f"the goal cannot be reached from the start: the widest way leaves {widest:.1f} m on each side near "
-        f"{lat:.5f}, {lon:.5f}, while {needed_m:.1f} m are needed (plan.clearance_m {problem.settings.clearance_m:g} m, "
-        "the hull in a turn, and the chart grid)"
+        f"{lat:.5f}, {lon:.5f}, while {needed_m:.1f} m are needed (plan.clearance_m = "
+        f"{problem.settings.clearance_m:g}, the hull in a turn, and the chart grid)"
     )
 
 
@@ -267,7 +267,7 @@ def _whole_turns(difference: Array) -> Array:
 def _through_water(problem: PlanProblem, pose: Array, velocity: Array) -> Array:
     """(6,) state at a pose with a velocity (3,) through the forecast's mean current."""
     u_c, v_c = to_body(problem.environment.current_to, pose[2], NUMPY)
-    return np.r_[pose, velocity + [u_c, v_c, 0.0]]
+    return np.asarray(np.r_[pose, velocity + np.array([u_c, v_c, 0.0])])
 
 
 def _at_rest(problem: PlanProblem, pose: Array) -> Array:
@@ -289,4 +289,3 @@ def _reposition_bound_s(problem: PlanProblem, water: LegWater) -> float:
     )
     ship: Capability = water.ship
     return max(0.0, way.lower_bound(problem.start[:2]) - carried) / (ship.top_speed_mps + current)
-

@@ -62,7 +62,7 @@ def simulate(
                 f"vessel {vessel.name!r}: the simulation diverges after {len(rows) * commands.sample_time_s:.1f} s"
             )
         rows.append(state)
-    table = np.array(rows)
+    table: Array = np.array(rows)
     return Trajectory(sample_time_s=commands.sample_time_s, pose=table[:, :3], velocity=table[:, 3:])
 
 

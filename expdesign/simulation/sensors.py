@@ -44,7 +44,7 @@ def measure(
 
     u_w, v_w = to_body(environment.wind_to, pose[:, 2], NUMPY)
     columns = {
-        "time_s": np.arange(count) * commands.sample_time_s,
+        "time_s": trajectory.time_s[:count],
         "north_m": noisy(pose[:, 0], noise.position_m),
         "east_m": noisy(pose[:, 1], noise.position_m),
         "heading_rad": wrap_angle(noisy(pose[:, 2], noise.heading_rad)),

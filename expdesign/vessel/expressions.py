@@ -81,7 +81,7 @@ class _Parser:
 
     def build(self, node: ast.expr) -> Evaluate:
         match node:
-            case ast.Constant(value=int() | float() as number) if not isinstance(number, bool) and math.isfinite(number):
+            case ast.Constant(value=int() | float() as number) if _is_finite(number):
                 constant = float(number)
                 return lambda signals, ops: constant
             case ast.Name(id=name):
@@ -108,6 +108,10 @@ class _Parser:
         if name == "abs":
             self.moduli.append(inner)
         return lambda signals, ops: getattr(ops, name)(inner(signals, ops))
+
+
+def _is_finite(number: float) -> bool:
+    return not isinstance(number, bool) and math.isfinite(number)
 
 
 def _binary(operator: ast.operator, left: Evaluate, right: Evaluate) -> Evaluate:

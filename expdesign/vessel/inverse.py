@@ -41,13 +41,13 @@ def required_force(model: VesselModel, velocity: Array, acceleration: Array) -> 
 
     free = response(np.zeros(3))
     gain = np.stack([response(unit) - free for unit in np.eye(3)], axis=1)  # (3 outputs, 3 forces)
-    return np.linalg.lstsq(gain, acceleration - free, rcond=None)[0]
+    return np.asarray(np.linalg.lstsq(gain, acceleration - free, rcond=None)[0], dtype=float)
 
 
 def force_matrix(actuators: tuple[Actuator, ...]) -> Array:
-    """(3, c) generalised force of unit commands: two columns (ahead, starboard) per azimuth, one per tunnel or propeller.
+    """(3, c) generalised force of unit commands.
 
-    Plain forces have the identity.
+    Two columns (ahead, starboard) per azimuth, one per tunnel or propeller, the identity for plain forces.
     """
     columns: list[tuple[float, float, float]] = []
     for actuator in actuators:

@@ -49,7 +49,8 @@ class VesselModel:
             raise InputError(f"VesselModel has {len(self.terms)} terms but {self.parameters.shape} parameters")
         names = self.names
         if len(set(names)) < len(names):
-            raise InputError(f"model terms repeat the parameter names {sorted({n for n in names if names.count(n) > 1})}")
+            repeated = sorted({name for name in names if names.count(name) > 1})
+            raise InputError(f"model terms repeat the parameter names {', '.join(repeated)}")
         if self.form not in ("discrete", "continuous"):
             raise UnknownName("model form", self.form, known=("discrete", "continuous"))
         for term in self.terms:

@@ -63,9 +63,7 @@ def _terms(*names: str) -> tuple[Term, ...]:
 
 STRUCTURES: dict[str, tuple[Term, ...]] = {
     "surge": _terms("X_u", "X_abs_u_u", "W_abs_u_u", "X_mu"),
-    "manoeuvring-10": _terms(
-        "X_u", "X_abs_u_u", "X_vr", "X_mu", "Y_v", "Y_ur", "Y_mu", "N_r", "N_uv", "N_mu"
-    ),
+    "manoeuvring-10": _terms("X_u", "X_abs_u_u", "X_vr", "X_mu", "Y_v", "Y_ur", "Y_mu", "N_r", "N_uv", "N_mu"),
     "manoeuvring-18": tuple(TERMS.values()),
 }
 

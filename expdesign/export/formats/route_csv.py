@@ -9,7 +9,17 @@ from expdesign.export.formats.format import Format, route_file
 from expdesign.export.route import Route
 
 COLUMNS = (
-    "waypoint", "lat_deg", "lon_deg", "north_m", "east_m", "time_s", "stay_s", "speed_mps", "xtd_m", "leg", "leg_kind",
+    "waypoint",
+    "lat_deg",
+    "lon_deg",
+    "north_m",
+    "east_m",
+    "time_s",
+    "stay_s",
+    "speed_mps",
+    "xtd_m",
+    "leg",
+    "leg_kind",
     "leg_name",
 )
 

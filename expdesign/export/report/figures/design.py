@@ -49,9 +49,7 @@ def _draw_sensitivities(axes: Axes, design: DurationDesign) -> None:
     axes.axvline(bound, color="black", linewidth=1.2, label=f"bound {bound}")
     axes.hlines(rows, 0, design.sensitivities, color=GREY, linewidth=0.8)
     axes.plot(design.sensitivities[used], rows[used], "o", color=BLUE, label="used")
-    axes.plot(
-        design.sensitivities[~used], rows[~used], "o", color="white", markeredgecolor=BLUE, label="not used"
-    )
+    axes.plot(design.sensitivities[~used], rows[~used], "o", color="white", markeredgecolor=BLUE, label="not used")
     axes.set_xlim(0, 1.12 * max(bound, float(design.sensitivities.max())))
     axes.set_xlabel("sensitivity")
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=9, columnspacing=1.0)

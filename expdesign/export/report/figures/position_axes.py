@@ -49,9 +49,7 @@ def draw_scale_and_north(axes: Axes, box: tuple[float, float, float, float]) -> 
     x, y = west + 0.03 * (east - west), south + 0.04 * (north - south)
     halo = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none", "alpha": 0.8}
     axes.plot([x, x + length], [y, y], color=BLACK, linewidth=3, solid_capstyle="butt", zorder=7)
-    axes.annotate(
-        words.distance(length), (x, y), (0, 7), textcoords="offset points", fontsize=9, zorder=7, bbox=halo
-    )
+    axes.annotate(words.distance(length), (x, y), (0, 7), textcoords="offset points", fontsize=9, zorder=7, bbox=halo)
     axes.annotate(
         "N", (0.965, 0.985), (0.965, 0.90), xycoords="axes fraction", ha="center", va="top", fontsize=11,
         fontweight="bold", zorder=7, arrowprops={"arrowstyle": "-|>", "color": BLACK, "linewidth": 1.8}, bbox=halo,

@@ -72,7 +72,7 @@ def svg(figure: Figure, *, key: str, label: str) -> Markup:
     figure.savefig(target, format="svg", facecolor="none", metadata={"Date": None, "Creator": None})
     text = target.getvalue()
     text = text[text.index("<svg") :].strip()
-    text = re.sub(r'<metadata>.*?</metadata>', "", text, flags=re.DOTALL)
+    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
     text = re.sub(r'(<[^<>]*?\sid=")', rf"\1{key}-", text)
     text = re.sub(r'(\sxlink:href="#|url\(#)', rf"\1{key}-", text)
     text = re.sub(r' d="[^"]*"', lambda found: re.sub(r"(\.\d\d)\d+", r"\1", found[0]), text)
