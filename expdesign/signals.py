@@ -73,3 +73,58 @@ class Trajectory:
     def distance_m(self) -> float:
         """Distance sailed over ground [m]."""
         return float(np.sum(np.hypot(*np.diff(self.pose[:, :2], axis=0).T)))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Batch:
+    """One uninterrupted stretch of measured data; a difference or a lag never reaches into another batch.
+
+    Attributes:
+        name: for reports, e.g. "trial.csv, batch 2".
+        sample_time_s: time between samples [s].
+        input_names: actuator signals, e.g. ("n1", "a1"), or ("tau_x", "tau_y", "tau_psi").
+        inputs: (k, m) commands, held from their sample to the next.
+        velocity: (k, 3) b-frame u, v, r over ground, measured or derived from pose.
+        pose: (k, 3) n-frame, heading continuous, or None when not measured; nan where a part is not measured.
+        wind: (k, 2) relative wind in the b-frame, the air's velocity past the ship as (u_q, v_q) = velocity - wind,
+            or None when not measured.
+        depth_m: (k,) water depth, or None.
+        first_row: row of the file (header is row 1) that the first sample comes from, 0 when not from a file.
+    """
+
+    name: str
+    sample_time_s: float
+    input_names: tuple[str, ...]
+    inputs: Array
+    velocity: Array
+    pose: Array | None = None
+    wind: Array | None = None
+    depth_m: Array | None = None
+    first_row: int = 0
+
+    def __post_init__(self) -> None:
+        shapes = {"inputs": "k m", "velocity": "k 3", "pose": "k 3", "wind": "k 2", "depth_m": "k"}
+        seal(self, **{name: shape for name, shape in shapes.items() if getattr(self, name) is not None})
+        if self.inputs.shape[1] != len(self.input_names):
+            raise InputError(f"Batch has {self.inputs.shape[1]} input columns for the names {self.input_names}")
+
+    def __len__(self) -> int:
+        return len(self.velocity)
+
+    @property
+    def time_s(self) -> Array:
+        """(k,) from zero [s]."""
+        return np.asarray(np.arange(len(self)) * self.sample_time_s, dtype=float)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Record:
+    """Measured data, ready for estimation.
+
+    Attributes:
+        batches: with the same inputs and the same sample time.
+        notes: what was found in the files and how it was dealt with, one sentence each.
+    """
+
+    batches: tuple[Batch, ...]
+    notes: tuple[str, ...] = ()

@@ -77,7 +77,7 @@ def _parts_with_both_ends(scenario, clearance_m):
     return [part for part in scenario.area.safe_water(clearance_m).geoms if part.covers(start) and part.covers(goal)]
 
 
-@pytest.mark.parametrize(("name", "gate_m"), [("helsinki", (60.0, 150.0)), ("model-ship", (8.0, 30.0))])
+@pytest.mark.parametrize(("name", "gate_m"), [("helsinki", (60.0, 150.0)), ("model-ship", (16.0, 60.0))])
 def test_start_and_goal_are_joined_only_through_narrows(name, gate_m):
     scenario = load_scenario(SCENARIOS / f"{name}.toml")
     assert _parts_with_both_ends(scenario, scenario.plan.clearance_m + scenario.vessel.beam_m / 2)
