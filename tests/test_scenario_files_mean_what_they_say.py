@@ -118,7 +118,7 @@ def test_lists_make_every_combination_with_unique_deterministic_names(tmp_path):
     wished = [(60.0, -1.0), (60.0, 0.001), (60.0, 2.0), (90.5, -1.0), (90.5, 0.001), (90.5, 2.0)]
     assert [(spec.settings["duration_s"], spec.settings["speed_mps"]) for spec in specs] == wished
     assert all(spec.settings["lean"] == 0.5 and spec.family == "box" for spec in specs)
-    assert specs[1].name == "box-duration_s-60-speed_mps-0.001"
+    assert specs[1].name == "box-duration-60-speed-0.001"
     assert len({spec.name for spec in specs}) == 6
     assert specs == _dictionary(tmp_path, body)
     assert all(re.fullmatch(r"[\w.-]+", spec.name) for spec in specs)
@@ -137,7 +137,7 @@ def test_unnamed_entries_of_one_family_are_counted(tmp_path):
         "speed_mps = 1", "speed_mps = [1]"
     )
     names = [spec.name for spec in _dictionary(tmp_path, entry + entry + named)]
-    assert names == ["box", "box-2", "mine-speed_mps-1"]
+    assert names == ["box", "box-2", "mine-speed-1"]
 
 
 def test_a_grid_too_large_to_be_meant_is_refused(tmp_path):

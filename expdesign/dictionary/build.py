@@ -53,10 +53,10 @@ def build_primitive(vessel: Vessel, spec: PrimitiveSpec) -> Primitive:
     wished = family(spec.family).reference(spec.settings, time_s)
     if not np.isfinite(wished).all():
         raise InputError(f"primitive {spec.name!r}: its settings give velocities that are not numbers")
-    entry = _entry_inputs(vessel, spec.name, wished[0])
     slopes = np.diff(wished, axis=0) / vessel.sample_time_s
     middles = (wished[:-1] + wished[1:]) / 2
     force = np.array([required_force(vessel.model, nu, rate) for nu, rate in zip(middles, slopes, strict=True)])
+    entry = _ready(vessel, _entry_inputs(vessel, spec.name, wished[0]), force)
     values = allocate(vessel.actuators, force, sample_time_s=vessel.sample_time_s, before=entry)
     commands = Commands(sample_time_s=vessel.sample_time_s, names=vessel.model.inputs, values=values)
     return Primitive(
@@ -67,6 +67,18 @@ def build_primitive(vessel: Vessel, spec: PrimitiveSpec) -> Primitive:
         entry_inputs=entry,
         trajectory=simulate(vessel, commands, velocity=wished[0]),
     )
+
+
+def _ready(vessel: Vessel, entry: Array, force: Array) -> Array:
+    """Entry commands with every azimuth that gives no thrust turned to where the run will need it first."""
+    ready, place = entry.copy(), 0
+    pushes = np.linalg.norm(force, axis=1) > 1e-3 * np.linalg.norm(force, axis=1).max(initial=1e-12)
+    first = allocate(vessel.actuators, force[pushes][:1], sample_time_s=vessel.sample_time_s)
+    for actuator in vessel.actuators:
+        if actuator.kind == "azimuth" and abs(entry[place]) < 1e-9 and len(first):
+            ready[place + 1] = first[0, place + 1]
+        place += len(actuator.limits)
+    return ready
 
 
 def trim(vessel: Vessel, velocity: Array) -> Array:

@@ -39,7 +39,7 @@ def load_dictionary(path: Path | str, *, families: tuple[Family, ...] = FAMILIES
 
     Each `[[primitives]]` names a family and gives its settings; one with lists of values stands for every combination,
     in the order of the file, the last list running fastest. Names are given by `name` or else by the family (with -2,
-    -3 ... for further entries of the same family); a grid adds `-setting-value` for every list.
+    -3 ... for further entries of the same family); a grid adds `-setting-value`, without the unit, for every list.
 
     Args:
         path: a TOML file with `[dictionary]` and `[[primitives]]`.
@@ -97,8 +97,13 @@ def _grid(row: Mapping[str, Any], family: Family, stem: str, entry: Entry) -> It
             complete = complete_settings(family, settings)
         except InputError as error:
             raise entry.error(str(error)) from None
-        name = "-".join([stem, *(f"{name}-{settings[name]:.12g}" for name in lists)])
+        name = "-".join([stem, *(f"{_without_unit(name)}-{settings[name]:.12g}" for name in lists)])
         yield PrimitiveSpec(name=name, family=family.name, settings=complete)
+
+
+def _without_unit(setting: str) -> str:
+    """The setting's name as it reads in a primitive's: yaw_rate_radps -> yaw-rate."""
+    return re.sub(r"_(s|m|mps|rad|radps)$", "", setting).replace("_", "-")
 
 
 def _values(value: object, entry: Entry) -> list[float]:
