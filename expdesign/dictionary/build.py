@@ -100,7 +100,7 @@ def _entry_inputs(vessel: Vessel, name: str, velocity: Array) -> Array:
     if np.abs(drift(vessel, velocity, inputs)).max() * vessel.sample_time_s > 0.02 * max(1e-9, np.abs(velocity).max()):
         raise InputError(
             f"primitive {name!r}: the actuators cannot hold its entry state u = {velocity[0]:g} m/s, "
-            f"v = {velocity[1]:g} m/s: needed tau_x = {wanted[0]:.4g}, tau_y = {wanted[1]:.4g}, "
+            f"v = {velocity[1] + 0.0:g} m/s: needed tau_x = {wanted[0]:.4g}, tau_y = {wanted[1]:.4g}, "
             f"they give {given[0]:.4g}, {given[1]:.4g}"
         )
     return inputs

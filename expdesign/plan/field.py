@@ -159,5 +159,7 @@ def narrowest_passage(field: ClearanceField, start: Array, goal: Array) -> tuple
         middle = (low + high) / 2
         regions, _ = label(field.clearance_m >= middle, structure=eight)
         low, high = (middle, high) if regions[a] == regions[b] else (low, middle)
+    regions, _ = label(field.clearance_m >= high, structure=eight)
+    apart = sum(distance_transform_edt(regions != regions[end]) if regions[end] else 0.0 * regions for end in (a, b))
     way = goal_field(field, goal, clearance_m=low - field.cell_m).way(start)
-    return low, way[int(np.argmin(field.at(way)))]
+    return low, way[int(np.argmin(apart[field.index(way)]))]

@@ -1,0 +1,86 @@
+"""A linear regression with several outputs, in several batches: y(k) = Phi(k)^T theta + eps(k).
+
+Arrays put samples first: `Phi` is (k, n, p), so that sample k's regression matrix of the literature, Phi(k), is the
+transpose of `Phi[k]`. Instruments have the same layout, (k, n, q).
+
+Source: F. Ljungberg, doctoral thesis, Linköping University, (2.14)-(2.21).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from expdesign.errors import InputError
+from expdesign.values import Array, frozen_set, seal
+
+Integers = NDArray[np.int64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Regression:
+    """Data of a linear regression.
+
+    Attributes:
+        parameters: names of the p columns.
+        Phi: (k, n, p) regressors.
+        y: (k, n) what they explain.
+        batch: (k,) number of the batch of each row, rising; all zeros when left out.
+        step: (k,) sample number within the batch, so that lags skip rows left out; counted when left out.
+        outputs: names of the n outputs, "y1", "y2" ... when left out.
+    """
+
+    parameters: tuple[str, ...]
+    Phi: Array
+    y: Array
+    batch: Integers | None = None
+    step: Integers | None = None
+    outputs: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        seal(self, Phi="k n p", y="k n")
+        k, n, p = self.Phi.shape
+        if len(self.parameters) != p:
+            raise InputError(f"Regression has {p} columns for {len(self.parameters)} parameter names")
+        if not (np.isfinite(self.Phi).all() and np.isfinite(self.y).all()):
+            raise InputError("Regression holds numbers that are not finite; leave such rows out")
+        batch = np.zeros(k, dtype=np.int64) if self.batch is None else np.array(self.batch, dtype=np.int64)
+        if batch.shape != (k,) or (np.diff(batch) < 0).any():
+            raise InputError(f"Regression.batch needs {k} batch numbers that never fall")
+        step = _count(batch) if self.step is None else np.array(self.step, dtype=np.int64)
+        if step.shape != (k,) or ((np.diff(step) <= 0) & (np.diff(batch) == 0)).any():
+            raise InputError(f"Regression.step needs {k} sample numbers that rise within every batch")
+        frozen_set(self, "batch", batch)
+        frozen_set(self, "step", step)
+        frozen_set(self, "outputs", self.outputs or tuple(f"y{i + 1}" for i in range(n)))
+
+    def __len__(self) -> int:
+        return len(self.y)
+
+    @property
+    def batch_of(self) -> Integers:
+        """(k,) batch numbers."""
+        assert self.batch is not None  # set at birth
+        return self.batch
+
+    @property
+    def step_of(self) -> Integers:
+        """(k,) sample numbers within the batches."""
+        assert self.step is not None  # set at birth
+        return self.step
+
+    def residuals(self, values: Array) -> Array:
+        """(k, n) y - Phi^T theta for parameters (p,)."""
+        return np.asarray(self.y - self.Phi @ values)
+
+
+def single_output(Phi: Array, y: Array, *, parameters: tuple[str, ...], batch: Integers | None = None) -> Regression:
+    """A regression of one output from regressors (k, p) and values (k,)."""
+    return Regression(parameters=parameters, Phi=Phi[:, None, :], y=y[:, None], batch=batch)
+
+
+def _count(batch: Integers) -> Integers:
+    starts = np.searchsorted(batch, batch, side="left")
+    return np.asarray(np.arange(len(batch)) - starts, dtype=np.int64)

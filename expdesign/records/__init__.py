@@ -1,0 +1,20 @@
+"""Measured data: CSV files read with suspicion, cut into batches, with velocities measured or derived from pose.
+
+One file has one header row (row 1 in every message) and one row per sample. Columns carry their unit in the name:
+
+- `time_s` from any origin, increasing; a gap over 1.5 sample times starts a new batch, so does a change of `batch`;
+- `u_mps v_mps r_radps`, velocity over ground in the b-frame;
+- `north_m east_m` or `lat_deg lon_deg`, and `heading_rad` or `heading_deg`, clockwise from north, wrapped or not;
+- inputs `tau_x tau_y tau_psi`, or per actuator `n1_rps a1_rad rudder1_rad ...`;
+- relative wind `wind_u_mps wind_v_mps` (ship's velocity through the air), or of a vane `wind_speed_mps wind_angle_rad`,
+  the direction it comes from, clockwise from the bow: u_q = V cos, v_q = V sin;
+- `depth_m`, water depth.
+
+Known quantities in other units (`u_knots`, `n1_rpm`, `wind_angle_deg`) are converted and noted; columns that mean
+nothing here are ignored and noted. Whatever is wrong becomes one `FileError` with the rows it was seen in.
+"""
+
+from expdesign.records.load import load_records
+from expdesign.records.velocity import VELOCITY_METHODS, central_difference, smoothed_velocity
+
+__all__ = ["VELOCITY_METHODS", "central_difference", "load_records", "smoothed_velocity"]

@@ -1,0 +1,129 @@
+"""What a column name means: the quantity, and the factor from the file's unit to the package's."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+
+from expdesign.conventions import KNOTS_PER_MPS, METRES_PER_NAUTICAL_MILE
+
+FORCES = ("tau_x", "tau_y", "tau_psi")
+PLAIN = ("batch", *FORCES)
+"""Names without a unit."""
+
+DEGREE = math.pi / 180.0
+SPEED = {
+    "mps": 1.0,
+    **dict.fromkeys(("m/s", "m_s"), 1.0),
+    **dict.fromkeys(("knots", "knot", "kn", "kt", "kts"), 1.0 / KNOTS_PER_MPS),
+    **dict.fromkeys(("kmph", "kmh", "km/h", "kph"), 1.0 / 3.6),
+    **dict.fromkeys(("cmps", "cm/s"), 0.01),
+}
+ANGLE = {"rad": 1.0, **dict.fromkeys(("deg", "degrees"), DEGREE)}
+LENGTH = {"m": 1.0, "km": 1000.0, "cm": 0.01, "nm": METRES_PER_NAUTICAL_MILE}
+YAW_RATE = {
+    "radps": 1.0,
+    **dict.fromkeys(("rad/s", "rad_s"), 1.0),
+    **dict.fromkeys(("degps", "dps", "deg/s", "deg_s"), DEGREE),
+    **dict.fromkeys(("degpmin", "deg/min", "deg_min"), DEGREE / 60.0),
+}
+PLACE = {"deg": 1.0, "degrees": 1.0, "rad": 1.0 / DEGREE}
+CLOCK = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0}
+REVOLUTIONS = {"rps": 1.0, "hz": 1.0, **dict.fromkeys(("rpm", "1/min"), 1.0 / 60.0)}
+
+QUANTITIES: tuple[tuple[str, dict[str, float]], ...] = (
+    ("time", CLOCK),
+    ("u|v", SPEED),
+    ("r", YAW_RATE),
+    ("north|east", LENGTH),
+    ("lat|lon", PLACE),
+    ("heading", ANGLE),
+    ("wind_u|wind_v|wind_speed", SPEED),
+    ("wind_angle", ANGLE),
+    ("depth", LENGTH),
+    (r"n\d+", REVOLUTIONS),
+    (r"(?:a|rudder)\d+", ANGLE),
+)
+"""Pattern of the stem -> units it may be given in; the first is the package's own."""
+
+SYNONYMS = {
+    "latitude": "lat",
+    "longitude": "lon",
+    "psi": "heading",
+    "hdg": "heading",
+    "n": "n1",
+    "a": "a1",
+    "rudder": "rudder1",
+}
+CONTRACT = ("heading_deg",)
+"""Names in other units that need no remark."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a quantity comes from.
+
+    Attributes:
+        column: index in the header.
+        header: as written in the file.
+        name: the contract's name, e.g. "u_mps".
+        factor: the file's value times this is in the contract's unit.
+    """
+
+    column: int
+    header: str
+    name: str
+    factor: float = 1.0
+
+    @property
+    def exact(self) -> bool:
+        """True when the file uses the contract's own name."""
+        return self.header == self.name
+
+
+@dataclass(frozen=True)
+class Unitless:
+    """A known quantity whose name lacks the unit: `heading`.
+
+    Attributes:
+        header: as written in the file.
+        names: the names that would be understood.
+    """
+
+    header: str
+    names: tuple[str, ...]
+
+
+def meaning(header: str, column: int) -> Source | Unitless | None:
+    """What a column holds, or None when its name says nothing that is known here."""
+    name = re.sub(r"[\s\[\]()]+", "_", header.lower()).strip("_")
+    if name in PLAIN:
+        return Source(column, header, name)
+    for pattern, units in QUANTITIES:
+        found = re.fullmatch(rf"({pattern}|{_synonyms(pattern)})(?:_(.+))?", name)
+        if not found:
+            continue
+        stem, unit = SYNONYMS.get(found[1], found[1]), found[2]
+        own = next(iter(units))
+        if unit is None:
+            return Unitless(header, _offered(stem, units))
+        if unit in units:
+            return Source(column, header, f"{stem}_{own}", units[unit])
+    return None
+
+
+def is_input(name: str) -> bool:
+    """True for the contract's names of actuator signals and generalised forces."""
+    return name in FORCES or re.fullmatch(r"n\d+_rps|(?:a|rudder)\d+_rad", name) is not None
+
+
+def _synonyms(pattern: str) -> str:
+    words = [word for word, stem in SYNONYMS.items() if re.fullmatch(pattern, stem)]
+    return "|".join(words) or "(?!)"
+
+
+def _offered(stem: str, units: dict[str, float]) -> tuple[str, ...]:
+    own = f"{stem}_{next(iter(units))}"
+    other = {"heading_rad": ("heading_deg",)}.get(own, ())
+    return (own, *other)

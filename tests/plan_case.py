@@ -1,0 +1,51 @@
+"""Small sea areas and the example ship, for tests of the planner's parts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import shapely
+
+from expdesign.plan import LocalFrame, PlanSettings, SeaArea, as_multipolygon
+from expdesign.plan.capability import capability
+from expdesign.plan.field import clearance_field
+from expdesign.plan.legs import LegWater
+from expdesign.scenario import load_vessel
+from expdesign.simulation import CALM
+
+VESSELS = Path(__file__).parents[1] / "scenarios" / "vessels"
+
+
+def area(water: shapely.Geometry) -> SeaArea:
+    """A sea area from a polygon in (east, north) metres."""
+    return SeaArea(
+        name="test",
+        frame=LocalFrame(60.0, 25.0),
+        water=as_multipolygon(water),
+        land=shapely.MultiPolygon(),
+        depth_rule="",
+    )
+
+
+def ship():
+    """The nominal 30 m ship."""
+    return load_vessel(VESSELS / "azimuth-30m.toml")
+
+
+def leg_water(water: shapely.Geometry, *, clearance_m: float = 20.0) -> LegWater:
+    """Everything legs need, in calm water."""
+    vessel, sea = ship(), area(water)
+    return LegWater(
+        vessel=vessel,
+        environment=CALM,
+        ship=capability(vessel, PlanSettings(clearance_m=clearance_m)),
+        area=sea,
+        clearance_m=clearance_m,
+        field=clearance_field(sea, resolution_m=vessel.length_m / 8),
+    )
+
+
+def at_rest(north: float, east: float, heading: float) -> np.ndarray:
+    """(6,) state."""
+    return np.array([north, east, heading, 0.0, 0.0, 0.0])

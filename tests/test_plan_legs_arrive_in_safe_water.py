@@ -1,0 +1,100 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+from plan_case import at_rest, leg_water
+
+from expdesign.plan._ompl import dubins_curve
+from expdesign.plan.footprint import swept_area
+from expdesign.plan.legs import LegTask, find_leg, find_path, leg_trajectory
+
+OPEN = shapely.box(-1500, -1500, 1500, 1500)
+WALL = shapely.box(-20, -1500, 20, 150)
+
+
+def length(path: np.ndarray) -> float:
+    return float(np.hypot(*np.diff(path[:, :2], axis=0).T).sum())
+
+
+def task(start, end, inputs=(0.0, 0.0, 0.0, 0.0), end_inputs=(0.0, 0.0, 0.0, 0.0)) -> LegTask:
+    return LegTask(start=start, end=end, start_inputs=inputs, end_inputs=end_inputs, seed=1)
+
+
+def test_dubins_curves_have_their_closed_form_lengths():
+    straight = dubins_curve(np.zeros(3), np.array([300.0, 0.0, 0.0]), radius_m=50.0, spacing_m=1.0)
+    assert length(straight) == pytest.approx(300.0, rel=1e-6)
+    half_turn = dubins_curve(np.zeros(3), np.array([0.0, 100.0, np.pi]), radius_m=50.0, spacing_m=0.5)
+    assert length(half_turn) == pytest.approx(50 * np.pi, rel=1e-4)
+    assert half_turn[len(half_turn) // 2, 0] == pytest.approx(50.0, abs=0.5)  # first ahead, then to starboard
+
+
+def test_a_path_round_a_wall_is_found_and_its_hull_is_clear():
+    water = leg_water(OPEN.difference(WALL))
+    start, end = at_rest(-200, -300, 0.0), at_rest(-200, 300, np.pi)
+    path = find_path(task(start, end), water)
+    assert path is not None
+    assert shapely.contains_properly(water.safe, swept_area(path, water.vessel.hull_b))
+    shortest = 2 * np.hypot(350 + 20, 300 - 20) + 2 * 20  # taut string round the wall's end at the clearance
+    assert shortest < length(path) < 1.25 * shortest
+
+
+def test_a_walled_in_vessel_has_no_path_and_no_leg():
+    water = leg_water(OPEN.difference(shapely.box(-20, -1500, 20, 1500)))
+    wanted = task(at_rest(0, -300, 0.0), at_rest(0, 300, 0.0))
+    assert find_path(wanted, water) is None
+    assert find_leg(wanted, water) is None
+
+
+@pytest.mark.parametrize(
+    ("start", "end"),
+    [
+        (at_rest(0, 0, 0.0), at_rest(400, 100, 0.5)),
+        (np.array([0.0, 0.0, 0.0, 1.2, 0.0, 0.0]), np.array([250.0, 150.0, 1.5, 0.5, 0.0, 0.0])),
+        (np.array([0.0, 0.0, 0.0, 0.8, 0.3, -0.05]), at_rest(300, -200, -2.0)),
+    ],
+)
+def test_commands_take_the_vessel_to_the_wanted_state_within_limits_and_rates(start, end):
+    water = leg_water(OPEN)
+    begin = np.array([5.0, 0.3, -2.0, 0.1])
+    values = find_leg(task(start, end, begin), water)
+    assert values is not None
+    track = leg_trajectory(water, start, values)
+    assert np.allclose(track.pose[-1, :2], end[:2], atol=0.03)
+    assert abs((track.pose[-1, 2] - end[2] + np.pi) % (2 * np.pi) - np.pi) < 1e-3
+    assert np.allclose(track.velocity[-1], end[3:], atol=2e-3)
+    low = [limit.low for limit in water.vessel.limits]
+    high = [limit.high for limit in water.vessel.limits]
+    rate = [limit.rate for limit in water.vessel.limits]
+    assert (values >= np.array(low) - 1e-6).all()
+    assert (values <= np.array(high) + 1e-6).all()
+    steps = np.abs(np.diff(np.vstack([begin, values]), axis=0))
+    assert (steps <= np.array(rate) * water.vessel.sample_time_s * (1 + 1e-6)).all()
+    assert shapely.contains_properly(water.safe, swept_area(track.pose, water.vessel.hull_b))
+
+
+def test_a_leg_through_a_gap_keeps_the_hull_clear_of_both_sides():
+    gap = shapely.box(-60, -1500, 60, -40).union(shapely.box(-60, 40, 60, 1500))
+    water = leg_water(OPEN.difference(gap))
+    values = find_leg(task(at_rest(-150, -350, 0.5), at_rest(150, 350, 1.0)), water)
+    assert values is not None
+    track = leg_trajectory(water, at_rest(-150, -350, 0.5), values)
+    assert shapely.contains_properly(water.safe, swept_area(track.pose, water.vessel.hull_b))
+
+
+def test_the_mirrored_leg_takes_as_long():
+    water = leg_water(OPEN)
+    mirror = np.array([1, -1, -1, 1, -1, -1])
+    start, end = at_rest(0, 0, 0.0), at_rest(300, 200, 1.0)
+    left, right = (find_leg(task(start * flip, end * flip), water) for flip in (np.ones(6), mirror))
+    assert left is not None
+    assert right is not None
+    assert abs(len(left) - len(right)) <= 2
+
+
+def test_a_leg_is_not_faster_than_top_speed_and_not_slower_than_twice_the_estimate():
+    water = leg_water(OPEN)
+    values = find_leg(task(at_rest(0, 0, 0.0), at_rest(600, 0, 0.0)), water)
+    assert values is not None
+    seconds = len(values) * water.vessel.sample_time_s
+    assert 600 / water.ship.transit_speed_mps < seconds < 2 * 600 / water.ship.transit_speed_mps

@@ -1,0 +1,122 @@
+"""A plan is spoilt in one way at a time; the check must find each, and find nothing in the sound plan."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+from plan_case import area, ship
+
+from expdesign.dictionary import PrimitiveSpec, build_primitive, complete_settings, family
+from expdesign.plan.checks import hull_clearance, verify_plan
+from expdesign.plan.values import Leg
+from expdesign.signals import Commands, Trajectory
+from expdesign.simulation import CALM, simulate
+
+CLEARANCE_M = 20.0
+
+
+def primitive(vessel):
+    acceleration = family("acceleration")
+    settings = complete_settings(acceleration, {"duration_s": 60.0, "speed_mps": 1.0})
+    return build_primitive(vessel, PrimitiveSpec(name="go", family="acceleration", settings=settings))
+
+
+def sound():
+    """An acceleration from rest and twenty seconds of keeping the thrust, as a plan of two legs."""
+    vessel = ship()
+    run = primitive(vessel)
+    values = np.vstack([run.commands.values, np.repeat(run.commands.values[-1:], 20, axis=0)])
+    commands = replace(run.commands, values=values)
+    return {
+        "vessel": vessel,
+        "area": area(shapely.box(-100, -100, 100, 250)),
+        "environment": CALM,
+        "commands": commands,
+        "trajectory": simulate(vessel, commands),
+        "legs": (
+            Leg(kind="primitive", name="go", first=0, last=60),
+            Leg(kind="reposition", name="goal", first=60, last=80),
+        ),
+        "clearance_m": CLEARANCE_M,
+        "primitives": {"go": run},
+        "repeats": {"go": 1},
+    }
+
+
+def check(plan):
+    plan = dict(plan)
+    return verify_plan(plan.pop("vessel"), plan.pop("area"), plan.pop("environment"), **plan)
+
+
+def changed(commands: Commands, row: int, column: int, by: float) -> Commands:
+    values = commands.values.copy()
+    values[row, column] += by
+    return replace(commands, values=values)
+
+
+def test_a_sound_plan_has_no_problems_and_its_true_clearance():
+    found = check(sound())
+    assert found.verified
+    assert found.clearance_min_m == pytest.approx(85.0)  # 100 m astern of the origin, 15 m of hull
+    assert found.reproduction_error_m < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("spoil", "word"),
+    [
+        (lambda p: {"commands": changed(p["commands"], 70, 0, -3.0)}, "rate"),
+        (lambda p: {"commands": changed(p["commands"], 70, 0, 100.0)}, "limit"),
+        (lambda p: {"commands": changed(p["commands"], 30, 0, 0.5)}, "not the dictionary's"),
+        (lambda p: {"repeats": {"go": 2}}, "run 1 times"),
+        (lambda p: {"repeats": {}}, "ask for 0"),
+        (lambda p: {"legs": p["legs"][:1]}, "gaps"),
+        (lambda p: {"legs": (replace(p["legs"][0], last=59), p["legs"][1])}, ""),
+        (lambda p: {"area": area(shapely.box(-100, -100, 100, 90))}, "forbidden water"),
+        (lambda p: {"area": area(shapely.box(-30, -100, 23, 250))}, "promised 20"),
+        (lambda p: {"clearance_m": 90.0}, "promised 90"),
+    ],
+)
+def test_each_flaw_is_named(spoil, word):
+    plan = sound()
+    try:
+        found = check({**plan, **spoil(plan)})
+    except ValueError:  # legs that do not even fit the commands
+        assert not word
+        return
+    assert not found.verified
+    assert any(word in problem for problem in found.problems), found.problems
+
+
+def test_a_shifted_track_does_not_pass_for_the_commands_motion():
+    plan = sound()
+    track = plan["trajectory"]
+    pose = track.pose.copy()
+    pose[40:, 1] += 3.0
+    bent = Trajectory(sample_time_s=track.sample_time_s, pose=pose, velocity=track.velocity)
+    found = check({**plan, "trajectory": bent})
+    assert any("off the track" in problem for problem in found.problems)
+
+
+def test_a_run_that_begins_at_the_wrong_speed_is_named():
+    plan = sound()
+    start = simulate(plan["vessel"], plan["commands"], velocity=(0.2, 0.0, 0.0))
+    found = check({**plan, "trajectory": start})
+    assert any("entry" in problem for problem in found.problems)
+
+
+def test_an_island_between_two_samples_is_not_jumped_over():
+    vessel = ship()
+    pose = np.array([[0.0, 0.0, 0.0], [200.0, 0.0, 0.0]])
+    track = Trajectory(sample_time_s=1.0, pose=pose, velocity=np.zeros((2, 3)))
+    sea = area(shapely.box(-500, -500, 500, 500).difference(shapely.box(-1, 99, 1, 101)))
+    assert hull_clearance(sea, track, vessel.hull_b).min() < 0
+
+
+def test_clearance_to_an_island_is_exact():
+    vessel = ship()
+    track = Trajectory(sample_time_s=1.0, pose=np.zeros((1, 3)), velocity=np.zeros((1, 3)))
+    sea = area(shapely.box(-500, -500, 500, 500).difference(shapely.box(34.5, -5, 60, 5)))
+    assert hull_clearance(sea, track, vessel.hull_b)[0] == pytest.approx(30.0)

@@ -1,0 +1,167 @@
+"""The main job on the example scenarios, looked at only through the files it leaves."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import tomllib
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from outside_check import columns, hull_to_land_m, recomputed_gap, replayed, runs_of_plan
+from scenario_files import spoil
+
+from expdesign import workflows
+
+SCENARIOS = Path(__file__).parents[1] / "scenarios"
+CASES = {
+    "helsinki": ("areas/helsinki-gshhg.geojson", "vessels/azimuth-30m.toml", 20.0),
+    "model-ship": ("areas/pond.geojson", "vessels/model-ship.toml", 1.0),
+}
+EXPECTED = {
+    "dictionary.json",
+    "durations.json",
+    "plan.json",
+    "track.csv",
+    "commands.csv",
+    "route.csv",
+    "route.geojson",
+    "route.gpx",
+    "route.rtz",
+    "report.html",
+}
+
+
+@pytest.fixture(scope="module", params=CASES)
+def result(request, tmp_path_factory):
+    folder = tmp_path_factory.mktemp(request.param)
+    outcome = workflows.run(SCENARIOS / f"{request.param}.toml", folder, seed=1)
+    chart, vessel, clearance_m = CASES[request.param]
+    return outcome, folder, SCENARIOS / chart, SCENARIOS / vessel, clearance_m
+
+
+def test_every_promised_file_is_there_and_nothing_else(result):
+    outcome, folder, *_ = result
+    assert {path.name for path in outcome.files} == EXPECTED
+    assert {path.name for path in folder.iterdir()} == EXPECTED
+
+
+def test_the_certificate_can_be_recomputed_from_the_dictionary_file(result):
+    _, folder, *_ = result
+    written = json.loads((folder / "durations.json").read_text())
+    assert written["gap"] < 1e-6 * written["dimension"]
+    assert abs(recomputed_gap(folder)) < 1e-6
+    assert abs(sum(item["fraction"] for item in written["primitives"]) - 1) < 1e-12
+
+
+def test_the_hull_keeps_its_clearance_at_every_sample(result):
+    _, folder, chart, vessel, clearance_m = result
+    ship = tomllib.loads(vessel.read_text())["vessel"]
+    distance = hull_to_land_m(columns(folder / "track.csv"), chart, ship["length_m"], ship["beam_m"])
+    # two projections of a few kilometres agree to a few parts in ten thousand
+    assert distance.min() > 0.98 * clearance_m
+    assert json.loads((folder / "plan.json").read_text())["clearance_min_m"] == pytest.approx(distance.min(), rel=0.02)
+
+
+def test_the_commands_reproduce_the_track(result):
+    _, folder, _, vessel, _ = result
+    track, commands = columns(folder / "track.csv"), columns(folder / "commands.csv")
+    again = replayed(commands, track, vessel)
+    sailed = np.r_[0.0, np.cumsum(np.hypot(np.diff(track["north_m"]), np.diff(track["east_m"])))]
+    apart = np.hypot(again[:, 0] - track["north_m"], again[:, 1] - track["east_m"])
+    assert len(again) == len(track["time_s"])
+    assert (apart <= np.maximum(1.0 if sailed[-1] > 2000 else 0.03, 0.01 * sailed)).all()
+
+
+def test_every_chosen_primitive_is_run_as_often_as_asked(result):
+    _, folder, *_ = result
+    done, asked = runs_of_plan(folder)
+    assert done == asked
+    assert sum(asked.values()) >= 6
+
+
+def test_the_plan_is_verified_and_keeps_its_confidence(result):
+    _, folder, *_ = result
+    plan = json.loads((folder / "plan.json").read_text())
+    assert plan["verified"] is True
+    assert plan["leave_water_probability"] <= 0.05
+    assert plan["reposition_s"] >= plan["reposition_bound_s"]
+    assert plan["informative_s"] + plan["reposition_s"] == pytest.approx(plan["legs"][-1]["end"]["time_s"])
+
+
+def test_nothing_jumps(result):
+    _, folder, _, vessel, _ = result
+    track, commands = columns(folder / "track.csv"), columns(folder / "commands.csv")
+    step_s = tomllib.loads(vessel.read_text())["vessel"]["sample_time_s"]
+    speed = np.hypot(track["u_mps"], track["v_mps"])
+    moved = np.hypot(np.diff(track["north_m"]), np.diff(track["east_m"]))
+    assert (moved <= step_s * (speed[1:] + speed[:-1]) * 0.75 + 1e-3).all()
+    turned = np.abs(np.diff(track["heading_rad"]))
+    rate = np.abs(track["r_radps"])
+    assert (turned <= step_s * np.maximum(rate[1:], rate[:-1]) * 1.5 + 1e-3).all()
+    ship = tomllib.loads(vessel.read_text())
+    if "n1_rps" in commands:
+        for name, rate_key in (("n1_rps", "speed_rate_rps2"), ("a1_rad", "angle_rate_radps")):
+            limit = ship["actuators"][0][rate_key] * step_s
+            assert np.abs(np.diff(commands[name])).max() <= limit * (1 + 1e-9)
+
+
+def test_the_route_names_itself_as_its_file(result):
+    _, folder, *_ = result
+    root = ElementTree.parse(folder / "route.rtz").getroot()
+    info = root.find("{http://www.cirm.org/RTZ/1/2}routeInfo")
+    assert info.get("routeName") == "route"
+
+
+def test_export_and_rehearsal_work_on_the_files_alone(result, tmp_path):
+    _, folder, _, vessel, _ = result
+    workflows.export(folder / "plan.json", tmp_path, formats=("rtz", "gpx"))
+    assert {path.name for path in tmp_path.iterdir()} == {"route.rtz", "route.gpx"}
+    truth = vessel.with_name(vessel.stem + "-true.toml")
+    outcome = workflows.simulate(folder / "plan.json", tmp_path, truth=truth, seed=3)
+    measured = columns(tmp_path / "measured.csv")
+    commands = columns(folder / "commands.csv")
+    assert outcome.summary["samples"] == len(measured["time_s"]) == len(commands["time_s"])
+    for name in set(commands) - {"time_s", "leg"}:
+        np.testing.assert_allclose(measured[name], commands[name], rtol=1e-9)
+
+
+def test_same_seed_same_files_another_seed_another_measurement(result, tmp_path):
+    _, folder, _, vessel, _ = result
+    truth = vessel.with_name(vessel.stem + "-true.toml")
+    texts = []
+    for number, seed in enumerate((3, 3, 4)):
+        workflows.simulate(folder / "plan.json", tmp_path / str(number), truth=truth, seed=seed)
+        texts.append((tmp_path / str(number) / "measured.csv").read_bytes())
+    assert texts[0] == texts[1] != texts[2]
+
+
+def test_the_same_seed_gives_the_same_plan(tmp_path):
+    for number in (1, 2):
+        workflows.plan(SCENARIOS / "model-ship.toml", tmp_path / str(number), seed=5)
+    for name in ("plan.json", "track.csv", "commands.csv"):
+        assert (tmp_path / "1" / name).read_bytes() == (tmp_path / "2" / name).read_bytes()
+
+
+def test_a_plan_follows_edited_durations(tmp_path):
+    scenario = SCENARIOS / "model-ship.toml"
+    workflows.durations(scenario, tmp_path)
+    content = json.loads((tmp_path / "durations.json").read_text())
+    for item in content["primitives"]:
+        item["repeats"] = min(item["repeats"], 1)
+    (tmp_path / "durations.json").write_text(json.dumps(content))
+    workflows.plan(scenario, tmp_path, durations=tmp_path / "durations.json")
+    done, asked = runs_of_plan(tmp_path)
+    assert done == asked
+    assert set(done.values()) == {1}
+
+
+def test_a_what_if_is_one_changed_line(tmp_path):
+    copy = tmp_path / "scenarios"
+    shutil.copytree(SCENARIOS, copy)
+    before = workflows.durations(copy / "model-ship.toml", tmp_path / "before").summary
+    spoil(copy / "model-ship.toml", 'mean_subtraction = "complete"', 'mean_subtraction = "none"')
+    after = workflows.durations(copy / "model-ship.toml", tmp_path / "after").summary
+    assert before["runs"] != after["runs"]
