@@ -9,6 +9,7 @@ Source: F. Ljungberg, doctoral thesis, Linköping University, (2.14)-(2.21).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,6 +80,13 @@ class Regression:
 def single_output(Phi: Array, y: Array, *, parameters: tuple[str, ...], batch: Integers | None = None) -> Regression:
     """A regression of one output from regressors (k, p) and values (k,)."""
     return Regression(parameters=parameters, Phi=Phi[:, None, :], y=y[:, None], batch=batch)
+
+
+def batch_slices(batch: Integers) -> list[slice]:
+    """The rows of each batch, in order."""
+    edges = np.flatnonzero(np.diff(batch)) + 1
+    bounds = [0, *edges.tolist(), len(batch)]
+    return [slice(low, high) for low, high in pairwise(bounds)]
 
 
 def _count(batch: Integers) -> Integers:

@@ -24,7 +24,7 @@ import numpy as np
 from expdesign.errors import InputError, ShapeError, UnknownName
 from expdesign.estimation.long_run import automatic_lags, long_run_covariance
 from expdesign.estimation.null_space import NullSpace, null_space, require_informative
-from expdesign.estimation.regression import Regression
+from expdesign.estimation.regression import Regression, batch_slices
 from expdesign.estimation.zero_mean import subtract_mean
 from expdesign.values import Array, seal
 
@@ -104,52 +104,91 @@ def solve_iv(regression: Regression, instruments: Array, weighting: Weighting | 
     Raises:
         NotInformative: some parameters cannot be told apart; the message names the combinations.
         ShapeError: the instruments do not fit the regression.
+        InputError: weights that do not fit, or blocks per batch with a mean subtracted over all of them.
     """
     weighting = weighting or Weighting()
-    if instruments.shape != regression.Phi.shape:
-        raise ShapeError(f"instruments have shape {instruments.shape}, expected {regression.Phi.shape}")
-    if not np.isfinite(instruments).all():
-        raise InputError("instruments hold numbers that are not finite")
-    Z = subtract_mean(instruments, regression.batch_of, weighting.mean) * _output_weights(regression, weighting)
-    A, found = _equations(regression, Z, weighting)
-    k, n, p = Z.shape
-    values = A @ _blocks(Z * regression.y[:, :, None], regression, weighting).sum(axis=(0, 1))
+    _check(regression, instruments, weighting)
+    Z = subtract_mean(instruments, regression.batch_of, weighting.mean)
+    if weighting.output_weights:
+        Z = Z * np.array(weighting.output_weights)[:, None]
+    solvers, found = _solvers(regression, Z, weighting, exogenous=instruments is regression.Phi)
+    values = _influences(Z, regression.y, solvers).sum(axis=0)
     residuals = subtract_mean(regression.residuals(values), regression.batch_of, weighting.mean)
-    scores = _blocks(Z * residuals[:, :, None], regression, weighting).sum(axis=1) @ A.T  # (k, p) influence of a sample
+    scores = _influences(Z, residuals, solvers)
     lags = _lags(scores, regression, weighting)
     P = long_run_covariance(scores, regression.batch_of, regression.step_of, lags=lags, kernel=weighting.kernel)
-    factor = 1.0 if weighting.covariance == "hc0" else k * n / max(1, k * n - p)
+    rows, p = residuals.size, len(values)
+    factor = 1.0 if weighting.covariance == "hc0" else rows / max(1, rows - p)
     return Solution(values=values, covariance=factor * P, residuals=residuals, lags=lags, null_space=found)
 
 
-def _equations(regression: Regression, Z: Array, weighting: Weighting) -> tuple[Array, NullSpace]:
-    """A (p, q) with theta = A sum Z y, and the report on the moment matrix."""
-    k, n, p = Z.shape
-    Phi = subtract_mean(regression.Phi, regression.batch_of, weighting.mean).reshape(k * n, p)
-    stacked = _blocks(Z, regression, weighting).reshape(k * n, -1)
-    G = stacked.T @ Phi
-    found = null_space(G, stacked, Phi, regression, symmetric=weighting.blocks == "one")
-    require_informative(found)
-    column, row = np.sqrt((Phi**2).sum(axis=0)), np.sqrt((stacked**2).sum(axis=0))
+Part = tuple[slice, Array]
+"""Rows of one batch, and A (p, p) with theta = sum over batches of A sum Z y."""
+
+
+def _influences(Z: Array, y: Array, solvers: list[Part]) -> Array:
+    """(k, p) what each sample adds to the sum that is theta."""
+    scores = np.einsum("knp,kn->kp", Z, y)
+    return np.concatenate([scores[rows] @ A.T for rows, A in solvers])
+
+
+def _solvers(
+    regression: Regression, Z: Array, weighting: Weighting, *, exogenous: bool
+) -> tuple[list[Part], NullSpace]:
+    Phi = subtract_mean(regression.Phi, regression.batch_of, weighting.mean)
+    parts = batch_slices(regression.batch_of)
+    weights = weighting.batch_weights or (1.0,) * len(parts)
+    size = np.sqrt((Phi**2).sum(axis=(0, 1)))
+    size[size <= 1e-11 * np.sqrt((regression.Phi**2).sum(axis=(0, 1)))] = 0.0  # constant, to working precision
+    column, row = np.where(size > 0, size, 1.0), np.sqrt((Z**2).sum(axis=(0, 1)))
     row[row == 0] = 1.0
-    scaled = G / row[:, None] / column
+    moments = [_moment(Z[rows] / row, Phi[rows] * (size > 0) / column) for rows in parts]
     if weighting.blocks == "one":
-        return np.asarray(np.linalg.inv(scaled) / column[:, None] / row), found
-    half = _whitening(stacked / row)
-    return np.asarray(np.linalg.pinv(half @ scaled, rcond=1e-12) @ half / column[:, None] / row), found
+        total = sum((w * H for w, H in zip(weights, moments, strict=True)), start=np.zeros_like(moments[0]))
+        found = null_space(total, regression, exogenous=exogenous)
+        require_informative(found)
+        A = np.linalg.inv(total) / column[:, None] / row
+        return [(rows, w * A) for w, rows in zip(weights, parts, strict=True)], found
+    halves = [np.sqrt(w) * _whitening(Z[rows] / row) for w, rows in zip(weights, parts, strict=True)]
+    stacked = np.concatenate([half @ H for half, H in zip(halves, moments, strict=True)])
+    found = null_space(stacked, regression, exogenous=exogenous)
+    require_informative(found)
+    pieces = np.split(np.linalg.pinv(stacked), np.cumsum([len(half) for half in halves])[:-1], axis=1)
+    return [
+        (rows, piece @ half / column[:, None] / row) for rows, piece, half in zip(parts, pieces, halves, strict=True)
+    ], found
 
 
-def _whitening(instruments: Array) -> Array:
+def _moment(Z: Array, Phi: Array) -> Array:
+    return np.asarray(Z.reshape(-1, Z.shape[2]).T @ Phi.reshape(-1, Phi.shape[2]))
+
+
+def _whitening(Z: Array) -> Array:
     """Square root of the inverse second moments, on the directions in which the instruments vary at all."""
-    values, vectors = np.linalg.eigh(instruments.T @ instruments)
+    values, vectors = np.linalg.eigh(_moment(Z, Z))
     kept = values > 1e-12 * values[-1]
     return np.asarray((vectors[:, kept] / np.sqrt(values[kept])).T)
 
 
-def _blocks(rows: Array, regression: Regression, weighting: Weighting) -> Array:
-    """Rows (k, n, p) spread over one block of columns per batch, (k, n, p x batches), each with its weight."""
-    if weighting.blocks == "one":
-        return _batch_weighted(rows, regression, weighting)
-    numbers = np.unique(regression.batch_of)
-    member = (regression.batch_of[:, None] == numbers).astype(float)
-    return np.asarray(np.einsum("knp,kb->knbp", rows, member).reshape(*rows.shape[:2], -1))
+def _lags(scores: Array, regression: Regression, weighting: Weighting) -> int:
+    if weighting.covariance != "hac":
+        return 0
+    if weighting.lags is not None:
+        return weighting.lags
+    return automatic_lags(scores, regression.batch_of, regression.step_of, kernel=weighting.kernel)
+
+
+def _check(regression: Regression, instruments: Array, weighting: Weighting) -> None:
+    if instruments.shape != regression.Phi.shape:
+        raise ShapeError(f"instruments have shape {instruments.shape}, expected {regression.Phi.shape}")
+    if not np.isfinite(instruments).all():
+        raise InputError("instruments hold numbers that are not finite")
+    if weighting.blocks == "batch" and weighting.mean == "complete":
+        raise InputError("instrument blocks per batch need their mean subtracted per batch, found 'complete'")
+    batches = len(np.unique(regression.batch_of))
+    for what, weights, count in (
+        ("batch_weights", weighting.batch_weights, batches),
+        ("output_weights", weighting.output_weights, len(regression.outputs)),
+    ):
+        if weights and len(weights) != count:
+            raise InputError(f"{what} has {len(weights)} entries, expected {count}")
