@@ -56,8 +56,6 @@ SYNONYMS = {
     "a": "a1",
     "rudder": "rudder1",
 }
-CONTRACT = ("heading_deg",)
-"""Names in other units that need no remark."""
 
 
 @dataclass(frozen=True)
@@ -78,8 +76,8 @@ class Source:
 
     @property
     def exact(self) -> bool:
-        """True when the file uses the contract's own name."""
-        return self.header == self.name
+        """True when the file uses a name of the contract."""
+        return self.header in (self.name, "heading_deg")
 
 
 @dataclass(frozen=True)
@@ -107,7 +105,7 @@ def meaning(header: str, column: int) -> Source | Unitless | None:
         stem, unit = SYNONYMS.get(found[1], found[1]), found[2]
         own = next(iter(units))
         if unit is None:
-            return Unitless(header, _offered(stem, units))
+            return Unitless(header, _offered(stem, units)) if len(found[1]) > 1 or found[1] == stem else None
         if unit in units:
             return Source(column, header, f"{stem}_{own}", units[unit])
     return None

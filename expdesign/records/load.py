@@ -1,0 +1,155 @@
+"""Files to a record: read, check, cut into batches, derive what is not measured."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from expdesign.conventions import OUTPUTS, POSE_COLUMNS
+from expdesign.errors import InputError, UnknownName
+from expdesign.records.agreement import check_agreement
+from expdesign.records.choice import Inputs
+from expdesign.records.clock import Clock, read_clock
+from expdesign.records.motion import (
+    MEASURED,
+    Request,
+    batch_velocity,
+    kept_samples,
+    left_out_notes,
+    long_enough,
+    origin_notes,
+    velocity_origins,
+)
+from expdesign.records.position import LocalMetres, check_jumps, with_continuous_heading, with_metres
+from expdesign.records.ranges import check_ranges
+from expdesign.records.remarks import motion_remarks, table_remarks
+from expdesign.records.table import Table, read_table
+from expdesign.records.velocity import VELOCITY_METHODS
+from expdesign.records.wind import check_wind, relative_wind
+from expdesign.signals import Batch, Record
+from expdesign.vessel import column_name
+
+
+def load_records(
+    paths: Sequence[Path | str] | Path | str,
+    *,
+    vessel_inputs: tuple[str, ...] | None = None,
+    sample_time_s: float | None = None,
+    velocity: str = "auto",
+    heading_std_rad: float | None = None,
+    outputs: tuple[str, ...] = OUTPUTS,
+) -> Record:
+    """Read measured data from one or more CSV files.
+
+    Args:
+        paths: the files; each starts a new batch, and so does every gap in time.
+        vessel_inputs: signals to read, e.g. ("n1", "a1", "rudder1"), in the order the record gives them; None for all
+            inputs of the first file, in its order.
+        sample_time_s: what every file must have [s]; None for what the first file has.
+        velocity: "measured"; "difference" or "smoothed" for velocities from pose even where measured ones stand; "auto"
+            for measured ones where they stand and differences elsewhere.
+        heading_std_rad: standard deviation of the heading's noise [rad], which corrects differences and informs the
+            smoother; None when not known: differences stay as they are, the smoother learns it.
+        outputs: which of u, v, r there must be; another one is nan in the record when nothing tells it.
+
+    Returns:
+        Batches in file order. Positions of all files share one origin. A batch with a differenced velocity lacks the
+        first and the last sample.
+
+    Raises:
+        FileError: something in a file is wrong; one line with the column, the value, the rows and what would be right.
+        InputError: an argument is wrong.
+    """
+    files = _names(paths)
+    request = _request(velocity, heading_std_rad, outputs, sample_time_s)
+    inputs = Inputs(tuple(map(column_name, vessel_inputs)), "the vessel") if vessel_inputs is not None else None
+    whose, origin = "the vessel", None
+    batches: list[Batch] = []
+    notes: list[str] = []
+    for path, name in files.items():
+        table, origin = _read(path, inputs, origin)
+        clock = read_clock(table, sample_time_s=sample_time_s, whose=whose)
+        if sample_time_s is None:
+            sample_time_s, whose = clock.sample_time_s, f"the first file, {name}"
+        inputs = inputs or Inputs(table.inputs, f"the first file, {name}")
+        found, told = _batches(_judged(table, clock, request), name, clock, request, inputs)
+        batches += found
+        notes += [f"{name}: {note}" for note in told]
+    return Record(batches=tuple(batches), notes=tuple(notes))
+
+
+def _names(paths: Sequence[Path | str] | Path | str) -> dict[Path, str]:
+    """Each file and what it is called in notes and batches: its name, or its path where names coincide."""
+    files = [Path(path) for path in ([paths] if isinstance(paths, Path | str) else paths)]
+    if not files:
+        raise InputError("no data files are given, expected one or more CSV files")
+    for index, path in enumerate(files):
+        if path in files[:index]:
+            raise InputError(f"{path} is given twice, expected every data file once")
+    names = [path.name for path in files]
+    return {path: path.name if names.count(path.name) == 1 else str(path) for path in files}
+
+
+def _request(
+    velocity: str, heading_std_rad: float | None, outputs: tuple[str, ...], sample_time_s: float | None
+) -> Request:
+    if velocity not in VELOCITY_METHODS:
+        raise UnknownName("velocity method", velocity, known=VELOCITY_METHODS)
+    for output in outputs:
+        if output not in OUTPUTS:
+            raise UnknownName("output", output, known=OUTPUTS)
+    if heading_std_rad is not None and not 0 <= heading_std_rad < math.inf:
+        raise InputError(f"heading_std_rad is {heading_std_rad:g}, expected a standard deviation of 0 or more")
+    if sample_time_s is not None and not 0 < sample_time_s < math.inf:
+        raise InputError(f"sample_time_s is {sample_time_s:g}, expected more than 0")
+    return Request(method=velocity, heading_std_rad=heading_std_rad, outputs=outputs)
+
+
+def _read(path: Path, inputs: Inputs | None, origin: LocalMetres | None) -> tuple[Table, LocalMetres | None]:
+    """One file in metres and radians, every number within reason."""
+    table = read_table(path, inputs=inputs)
+    check_ranges(table)
+    return with_metres(with_continuous_heading(check_wind(table)), origin)
+
+
+def _judged(table: Table, clock: Clock, request: Request) -> Table:
+    """The same with remarks; raises where pose and velocity jump, or contradict each other."""
+    table = check_jumps(table.noted(*clock.notes), clock.batches, clock.sample_time_s)
+    if MEASURED in velocity_origins(table, request).values():
+        table = check_agreement(table, clock.batches, clock.sample_time_s)
+    return table.noted(*table_remarks(table))
+
+
+def _batches(
+    table: Table, name: str, clock: Clock, request: Request, inputs: Inputs
+) -> tuple[list[Batch], tuple[str, ...]]:
+    """The batches of one file, and all notes on it."""
+    origins = velocity_origins(table, request)
+    parts = long_enough(clock.batches, origins)
+    if not parts:
+        raise table.error("time_s", "leaves no batch long enough to derive velocities in, expected 4 samples in a row")
+    batches = [
+        _batch(table, part, f"{name}, batch {index}" if len(parts) > 1 else name, clock, request, origins, inputs)
+        for index, part in enumerate(parts, start=1)
+    ]
+    left_out = left_out_notes(table, clock.batches, parts)
+    return batches, (*table.notes, *left_out, *origin_notes(origins), *motion_remarks(batches, origins))
+
+
+def _batch(
+    table: Table, part: slice, name: str, clock: Clock, request: Request, origins: Mapping[str, str], inputs: Inputs
+) -> Batch:
+    kept = kept_samples(part, origins)
+    wind, depth = relative_wind(table), table.columns.get("depth_m")
+    return Batch(
+        name=name,
+        sample_time_s=clock.sample_time_s,
+        input_names=tuple(column.removesuffix("_rps").removesuffix("_rad") for column in inputs.columns),
+        inputs=table.stack(*inputs.columns)[kept],
+        velocity=batch_velocity(table, part, clock.sample_time_s, origins, request.heading_std_rad),
+        pose=table.stack(*POSE_COLUMNS)[kept] if set(POSE_COLUMNS) & set(table.columns) else None,
+        wind=wind[kept] if wind is not None else None,
+        depth_m=depth[kept] if depth is not None else None,
+        first_row=table.first_row + kept.start,
+    )
