@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from expdesign.durations.certificate import log_det
 from expdesign.durations.values import DurationProblem
 from expdesign.errors import NoAnswer
 from expdesign.values import Array
+
+LENT = 1e-6
+"""Share of the optimal design lent to every set of runs, so that singular ones can be compared too."""
+GAIN = 1e-9
+"""Gains in log det below this count as rounding."""
+PUSHES = 200
+"""Primitives that are tried as pushes, those that would gain most per second first."""
 
 
 def whole_runs(problem: DurationProblem, matrices: Array, fractions: Array) -> tuple[int, ...]:
@@ -18,15 +27,15 @@ def whole_runs(problem: DurationProblem, matrices: Array, fractions: Array) -> t
 
     Args:
         problem: gives run lengths and the total time.
-        matrices: (q, d, d) scaled B_q.
+        matrices: (q, d, d) whitened B_q.
         fractions: (q,) optimal fractions, where the search starts.
 
     Raises:
-        NoAnswer: no set of whole runs within the total time informs about every parameter.
+        NoAnswer: no set of whole runs was found that fits the total time and informs about every parameter.
     """
-    runs = np.floor(fractions * problem.total_s / problem.run_s + 1e-9).astype(int)
-    runs = _grow(problem, matrices, runs, fractions)
-    while (better := _exchange(problem, matrices, runs, fractions)) is not None:
+    search = _Search.of(problem, matrices, fractions)
+    runs = search.grown(np.floor(fractions / search.shares + 1e-9).astype(int))
+    while (better := _exchanged(search, runs)) is not None:
         runs = better
     if not np.isfinite(value(problem, matrices, runs)):
         raise NoAnswer(
@@ -46,38 +55,96 @@ def value(problem: DurationProblem, matrices: Array, runs: Array) -> float:
     return log_det(matrices, times / used) + len(problem.parameters) * float(np.log(used / problem.total_s))
 
 
-def _guide(problem: DurationProblem, matrices: Array, runs: Array, fractions: Array) -> float:
-    """As `value`, but finite for singular sets: a millionth of the optimal design is thrown in."""
-    times = runs * problem.run_s + 1e-6 * problem.total_s * fractions
-    used = float(times.sum())
-    return log_det(matrices, times / used) + len(problem.parameters) * float(np.log(used / problem.total_s))
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Search:
+    """What is the same for all sets of runs.
+
+    Attributes:
+        pieces: (q, d, d) share of one run in the total time, times B_q.
+        shares: (q,) that share.
+        lent: (d, d) a little of the optimal design.
+        means: d - p, the rows of B that hold means.
+    """
+
+    pieces: Array
+    shares: Array
+    lent: Array
+    means: int
+
+    @staticmethod
+    def of(problem: DurationProblem, matrices: Array, fractions: Array) -> _Search:
+        shares = problem.run_s / problem.total_s
+        return _Search(
+            pieces=shares[:, None, None] * matrices,
+            shares=shares,
+            lent=LENT * np.tensordot(fractions, matrices, axes=1),
+            means=problem.dimension - len(problem.parameters),
+        )
+
+    def total(self, runs: Array) -> Array:
+        """(d, d) sum of the runs' pieces and what is lent."""
+        return np.asarray(np.tensordot(runs, self.pieces, axes=1) + self.lent)
+
+    def worth(self, totals: Array, used: Array) -> Array:
+        """As `value`, for totals (..., d, d) of sets that take shares (...) of the time, but never infinite."""
+        return np.asarray(np.linalg.slogdet(totals)[1] - self.means * np.log(used + LENT))
+
+    def worth_of(self, runs: Array) -> float:
+        """`worth` of one set of runs (q,)."""
+        return float(self.worth(self.total(runs), runs @ self.shares))
+
+    def fitting(self, runs: Array) -> Array:
+        """Indices of the primitives of which one more run fits."""
+        return np.flatnonzero(self.shares <= 1.0 - runs @ self.shares + 1e-9)
+
+    def after(self, total: Array, used: float, indices: Array, sign: float) -> Array:
+        """(c,) worth after one run of each indexed primitive is added (sign 1) or taken away (sign -1)."""
+        return self.worth(total + sign * self.pieces[indices], used + sign * self.shares[indices])
+
+    def grown(self, runs: Array) -> Array:
+        """With runs added, always the one that gains most per second, while one fits."""
+        while len(fits := self.fitting(runs)):
+            gains = self.after(self.total(runs), float(runs @ self.shares), fits, 1.0) - self.worth_of(runs)
+            runs = runs + _unit(int(fits[np.argmax(gains / self.shares[fits])]), runs)
+        return runs
+
+    def thinned(self, runs: Array, keep: int) -> Array:
+        """With runs taken away until the rest fits, always the one that loses least per second; `keep` is left."""
+        while (used := float(runs @ self.shares)) > 1.0 + 1e-9:
+            spare = np.setdiff1d(np.flatnonzero(runs), keep)
+            if not len(spare):
+                return np.zeros_like(runs)
+            losses = self.worth_of(runs) - self.after(self.total(runs), used, spare, -1.0)
+            runs = runs - _unit(int(spare[np.argmin(losses / self.shares[spare])]), runs)
+        return runs
 
 
-def _grow(problem: DurationProblem, matrices: Array, runs: Array, fractions: Array) -> Array:
-    """Add the run with the largest gain per second while one fits."""
-    while True:
-        room = problem.total_s - float(runs @ problem.run_s)
-        fits = [q for q in range(len(runs)) if problem.run_s[q] <= room + 1e-9]
-        if not fits:
-            return runs
-        here = _guide(problem, matrices, runs, fractions)
-        gains = [(_guide(problem, matrices, runs + _unit(q, runs), fractions) - here) / problem.run_s[q] for q in fits]
-        runs = runs + _unit(fits[int(np.argmax(gains))], runs)
+def _exchanged(search: _Search, runs: Array) -> Array | None:
+    """A better set of runs nearby, or None: the best swap of one run for one, else any push that helps."""
+    target = search.worth_of(runs) + GAIN
+    swap = _swapped(search, runs, target)
+    if swap is not None:
+        return search.grown(swap)
+    if np.ptp(search.shares) < 1e-12:
+        return None  # runs of one length: a push is a swap
+    everything = np.arange(len(runs))
+    added = search.after(search.total(runs), float(runs @ search.shares), everything, 1.0)
+    for index in np.argsort(-(added - search.worth_of(runs)) / search.shares)[:PUSHES]:
+        pushed = search.grown(search.thinned(runs + _unit(int(index), runs), int(index)))
+        if search.worth_of(pushed) > target:
+            return pushed
+    return None
 
 
-def _exchange(problem: DurationProblem, matrices: Array, runs: Array, fractions: Array) -> Array | None:
-    """The best set that swaps one run for others, or None when no swap helps."""
-    here = _guide(problem, matrices, runs, fractions)
-    best, best_value = None, here + 1e-9
+def _swapped(search: _Search, runs: Array, target: float) -> Array | None:
+    """The best set above `target` that has one run in place of another."""
+    best = None
     for out in np.flatnonzero(runs):
         left = runs - _unit(int(out), runs)
-        for into in range(len(runs)):
-            trial = left + _unit(into, runs)
-            if into == out or float(trial @ problem.run_s) > problem.total_s + 1e-9:
-                continue
-            trial = _grow(problem, matrices, trial, fractions)
-            if (worth := _guide(problem, matrices, trial, fractions)) > best_value:
-                best, best_value = trial, worth
+        fits = search.fitting(left)
+        worths = search.after(search.total(left), float(left @ search.shares), fits, 1.0)
+        if worths.max() > target:
+            target, best = float(worths.max()), left + _unit(int(fits[np.argmax(worths)]), runs)
     return best
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from expdesign.durations._cvxpy import maximise_log_det
-from expdesign.durations.certificate import log_det, scaled, sensitivities
+from expdesign.durations.certificate import log_det, sensitivities, whitened
 from expdesign.durations.polish import polish
 from expdesign.durations.rounding import value, whole_runs
 from expdesign.durations.values import MEAN_SUBTRACTIONS, DurationDesign, DurationProblem
@@ -60,12 +60,10 @@ def solve_durations(problem: DurationProblem) -> DurationDesign:
     Raises:
         NoAnswer: the certificate cannot be brought below `LARGEST_GAP`, or whole runs do not fit.
     """
-    matrices, _ = scaled(problem.matrices)
-    count = len(problem.names)
+    matrices, _ = whitened(problem.matrices)
     start = maximise_log_det(matrices)
-    uniform = np.full(count, 1.0 / count)
-    if start is None or not np.isfinite(log_det(matrices, 0.999 * start + 0.001 * uniform)):
-        start = uniform
+    if start is None:
+        start = np.full(len(problem.names), 1.0 / len(problem.names))
     fractions = polish(matrices, start)
     d = sensitivities(matrices, fractions)
     gap = max(float(d.max()) - problem.dimension, 0.0)
@@ -94,7 +92,7 @@ def with_repeats(design: DurationDesign, repeats: Sequence[int]) -> DurationDesi
 def _rounded(
     problem: DurationProblem, fractions: Array, sensitivity: Array, gap: float, repeats: tuple[int, ...]
 ) -> DurationDesign:
-    matrices, offset = scaled(problem.matrices)
+    matrices, offset = whitened(problem.matrices)
     best, p = log_det(matrices, fractions), len(problem.parameters)
     uniform = np.full(len(problem.names), 1.0 / len(problem.names))
     return DurationDesign(
