@@ -12,6 +12,7 @@ D. M. Titterington and B. Torsney, An algorithm for optimal designs on a design 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from expdesign.durations.certificate import log_det, sensitivities
@@ -58,7 +59,7 @@ def _inside(fractions: Array) -> Array:
     return np.asarray((1.0 - MIXED_IN) * fractions + MIXED_IN / len(fractions))
 
 
-def _largest(matrices: Array, weights: Array) -> Array:
+def _largest(matrices: Array, weights: Array) -> NDArray[np.intp]:
     """Indices of the primitives with the largest weights, enough of them to inform about everything."""
     order = np.argsort(-weights)
     first = order[: max(SMALLEST_SET, 4 * matrices.shape[1])]

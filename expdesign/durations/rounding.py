@@ -5,11 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from expdesign.durations.certificate import log_det
 from expdesign.durations.values import DurationProblem
 from expdesign.errors import NoAnswer
 from expdesign.values import Array
+
+Indices = NDArray[np.intp]
 
 LENT = 1e-6
 """Share of the optimal design lent to every set of runs, so that singular ones can be compared too."""
@@ -93,11 +96,11 @@ class _Search:
         """`worth` of one set of runs (q,)."""
         return float(self.worth(self.total(runs), runs @ self.shares))
 
-    def fitting(self, runs: Array) -> Array:
+    def fitting(self, runs: Array) -> Indices:
         """Indices of the primitives of which one more run fits."""
         return np.flatnonzero(self.shares <= 1.0 - runs @ self.shares + 1e-9)
 
-    def after(self, total: Array, used: float, indices: Array, sign: float) -> Array:
+    def after(self, total: Array, used: float, indices: Indices, sign: float) -> Array:
         """(c,) worth after one run of each indexed primitive is added (sign 1) or taken away (sign -1)."""
         return self.worth(total + sign * self.pieces[indices], used + sign * self.shares[indices])
 
