@@ -222,7 +222,10 @@ class _Transcription:
             lbg=self.constraint_low,
             ubg=self.constraint_high,
         )
-        if not self.solver.stats()["success"]:
+        outcome = self.solver.stats()
+        if outcome["return_status"] == "NonIpopt_Exception_Thrown":
+            raise KeyboardInterrupt  # the only exception there can be, as nothing in the program calls back to Python
+        if not outcome["success"]:
             return None
         values = np.asarray(answer["x"]).ravel()
         found = values[: 6 * (j + 1)].reshape(j + 1, 6) * self.state_scale + origin
