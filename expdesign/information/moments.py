@@ -120,7 +120,7 @@ def excitation_condition(
         spread = environment.wind_std_mps if {"u_q", "v_q"} & set(expression.signals) else environment.current_std_mps
         margin = sigmas * float(np.hypot(vessel.sensors.velocity_mps, spread))
         for modulus in expression.moduli:
-            inside = np.asarray(modulus(table, NUMPY))
+            inside = np.asarray(modulus.evaluate(table, NUMPY))
             if not (np.all(inside > margin) or np.all(inside < -margin)):
                 return False
     return True

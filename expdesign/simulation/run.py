@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from expdesign.vessel import NUMPY, SCALAR, Vessel
 
 STEPS = {"rk4": rk4_step, "euler": euler_step}
 SUBSTEPS = 2
-"""Runge-Kutta steps per sample; a sample of the reference vessels is at most a fifth of their fastest time constant."""
+"""Runge-Kutta steps per sample; a step is at most a fifth of the fastest time constant of the reference vessels."""
 LARGEST_SPEED = 1e3
 """Speeds [m/s, rad/s] beyond this mean that the model is unstable."""
 
@@ -47,19 +48,20 @@ def simulate(
     _check_inputs(vessel, commands)
     step = _step(integrator)
     current, wind = environment.current_to.tolist(), environment.wind_to.tolist()
+    theta = vessel.model.parameters.tolist()
     step_s = commands.sample_time_s / substeps
     state: State = tuple(float(x) for x in (*pose, *velocity))
     rows = [state]
     for inputs in commands.values.tolist():
 
         def rates(x: State, held: Any = inputs) -> State:
-            return motion_rates(vessel.model, x, held, current_to=current, wind_to=wind, ops=SCALAR)
+            return motion_rates(vessel.model, x, held, current_to=current, wind_to=wind, ops=SCALAR, parameters=theta)
 
-        for _ in range(substeps):
-            state = step(rates, state, step_s)
-        if not max(map(abs, state[3:])) < LARGEST_SPEED:
+        state = _advanced(step, rates, state, step_s, substeps)
+        if not all(abs(speed) < LARGEST_SPEED for speed in state[3:]):
             raise Diverged(
-                f"vessel {vessel.name!r}: the simulation diverges after {len(rows) * commands.sample_time_s:.1f} s"
+                f"vessel {vessel.name!r}: the simulation diverges after {len(rows) * commands.sample_time_s:.1f} s: "
+                f"a speed passes {LARGEST_SPEED:g} m/s or rad/s; the model is unstable under these commands"
             )
         rows.append(state)
     table: Array = np.array(rows)
@@ -110,6 +112,16 @@ def simulate_many(
     settled = np.abs(result[..., 3:]).max(axis=(0, 2)) < LARGEST_SPEED
     result[:, ~settled] = np.nan
     return result
+
+
+def _advanced(step: Any, rates: Any, state: State, step_s: float, substeps: int) -> State:
+    """The state one sample later; not-a-numbers where it left the range of floating point."""
+    try:
+        for _ in range(substeps):
+            state = step(rates, state, step_s)
+    except ValueError:  # the sine of an infinite heading
+        return (math.nan,) * len(state)
+    return state
 
 
 def _check_inputs(vessel: Vessel, commands: Commands) -> None:

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import ast
 import math
+import sys
+import warnings
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -30,6 +32,9 @@ NUMPY = Operators(np.abs, np.sin, np.cos)
 SCALAR = Operators(abs, math.sin, math.cos)
 FUNCTIONS = ("abs", "sin", "cos")
 
+DEEPEST = 50
+"""Operations inside one another; a term of a ship model has a handful."""
+
 Signals = Mapping[str, Any]
 Evaluate = Callable[[Signals, Operators], Any]
 
@@ -42,13 +47,13 @@ class Expression:
         text: as written.
         signals: the signal names it reads, sorted.
         evaluate: (signals, operators) -> value.
-        moduli: what stands inside each `abs`, in the same form as `evaluate`.
+        moduli: what stands inside each `abs`, innermost first.
     """
 
     text: str
     signals: tuple[str, ...]
     evaluate: Evaluate
-    moduli: tuple[Evaluate, ...] = ()
+    moduli: tuple[Expression, ...] = ()
 
 
 def parse_expression(text: str, *, signals: tuple[str, ...]) -> Expression:
@@ -63,12 +68,14 @@ def parse_expression(text: str, *, signals: tuple[str, ...]) -> Expression:
         UnknownName: it reads a signal that does not exist.
     """
     try:
-        tree = ast.parse(text.strip(), mode="eval").body
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # odd spellings are refused below, in our own words
+            tree = ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise InputError(f"expression {text!r} cannot be read: expected signals, numbers, + - *, abs sin cos") from None
-    parser = _Parser(text, frozenset(signals))
-    evaluate = parser.build(tree)
-    return Expression(text, tuple(sorted(parser.used)), evaluate, tuple(parser.moduli))
+        raise InputError(
+            f"expression {_short(text)!r} cannot be read: expected signals, numbers, + - *, abs sin cos"
+        ) from None
+    return replace(_Parser(text, frozenset(signals)).parse(tree), text=text)
 
 
 class _Parser:
@@ -77,9 +84,17 @@ class _Parser:
     def __init__(self, text: str, known: frozenset[str]) -> None:
         self.text, self.known = text, known
         self.used: set[str] = set()
-        self.moduli: list[Evaluate] = []
+        self.moduli: list[Expression] = []
 
-    def build(self, node: ast.expr) -> Evaluate:
+    def parse(self, tree: ast.expr, depth: int = 0) -> Expression:
+        evaluate = self.build(tree, depth)
+        return Expression(self._source(tree), tuple(sorted(self.used)), evaluate, tuple(self.moduli))
+
+    def build(self, node: ast.expr, depth: int) -> Evaluate:
+        if depth > DEEPEST:
+            raise InputError(
+                f"expression {_short(self.text)!r} is nested too deeply, expected at most {DEEPEST} levels"
+            )
         match node:
             case ast.Constant(value=int() | float() as number) if _is_finite(number):
                 constant = float(number)
@@ -87,31 +102,42 @@ class _Parser:
             case ast.Name(id=name):
                 return self._signal(name)
             case ast.UnaryOp(op=ast.USub(), operand=operand):
-                inner = self.build(operand)
+                inner = self.build(operand, depth + 1)
                 return lambda signals, ops: -inner(signals, ops)
             case ast.BinOp(left=left, op=ast.Add() | ast.Sub() | ast.Mult() as operator, right=right):
-                return _binary(operator, self.build(left), self.build(right))
+                return _binary(operator, self.build(left, depth + 1), self.build(right, depth + 1))
+            case ast.Call(func=ast.Name(id="abs"), args=[argument], keywords=[]):
+                return self._modulus(_Parser(self.text, self.known).parse(argument, depth + 1))
             case ast.Call(func=ast.Name(id=name), args=[argument], keywords=[]) if name in FUNCTIONS:
-                return self._call(name, self.build(argument))
+                called = self.build(argument, depth + 1)
+                return lambda signals, ops: getattr(ops, name)(called(signals, ops))
         raise InputError(
-            f"expression {self.text!r}: {ast.unparse(node)!r} is not allowed, "
+            f"expression {_short(self.text)!r}: {_short(self._source(node))!r} is not allowed, "
             "only signals, finite numbers, + - * and abs sin cos"
         )
 
+    def _source(self, node: ast.expr) -> str:
+        return ast.get_source_segment(self.text.strip(), node) or self.text
+
     def _signal(self, name: str) -> Evaluate:
         if name not in self.known:
-            raise UnknownName(f"signal in expression {self.text!r}:", name, known=sorted(self.known))
+            raise UnknownName(f"signal in expression {_short(self.text)!r}:", name, known=sorted(self.known))
         self.used.add(name)
         return lambda signals, ops: signals[name]
 
-    def _call(self, name: str, inner: Evaluate) -> Evaluate:
-        if name == "abs":
-            self.moduli.append(inner)
-        return lambda signals, ops: getattr(ops, name)(inner(signals, ops))
+    def _modulus(self, inside: Expression) -> Evaluate:
+        self.used.update(inside.signals)
+        self.moduli += [*inside.moduli, inside]
+        return lambda signals, ops: ops.abs(inside.evaluate(signals, ops))
 
 
 def _is_finite(number: float) -> bool:
-    return not isinstance(number, bool) and math.isfinite(number)
+    return not isinstance(number, bool) and abs(number) <= sys.float_info.max
+
+
+def _short(text: str) -> str:
+    """Enough of a text to recognise it."""
+    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def _binary(operator: ast.operator, left: Evaluate, right: Evaluate) -> Evaluate:

@@ -68,8 +68,8 @@ def allocate(
 ) -> Array:
     """Commands (k, m) for wished generalised forces (k, 3): smallest thrusts, then limits and rates.
 
-    An azimuth turns the shorter way, reversing its propeller where that is nearer; near zero thrust it keeps its
-    angle. Rudders stay amidships.
+    An azimuth turns the shorter way, reversing its propeller where that is nearer and gives as much; near zero thrust
+    it keeps its angle. A saturated thruster is not relieved by the others. Rudders stay amidships.
 
     Args:
         actuators: in command order.
@@ -107,18 +107,19 @@ def _limited(actuators: tuple[Actuator, ...], row: list[float], last: Array | No
 
 
 def _polar(ahead: float, side: float, old: Array | None, actuator: Actuator) -> list[float]:
-    """Propeller speed and angle of a thrust, the angle as near to the old one as limits allow."""
-    speed, angle = math.hypot(ahead, side), math.atan2(side, ahead)
+    """Propeller speed and angle that come closest to a thrust within limits, by the shortest turn."""
+    wish, bearing = math.hypot(ahead, side), math.atan2(side, ahead)
     reference = 0.0 if old is None else float(old[1])
-    low, high = actuator.limits[1].low, actuator.limits[1].high
-    if speed < 1e-9:
+    if wish < 1e-9:
         return [0.0, reference]
-    options = [
-        (abs(turned - reference), sign * speed, turned)
-        for sign, base in ((1.0, angle), (-1.0, angle + math.pi))
-        for turned in (base + 2 * math.pi * (k + round((reference - base) / (2 * math.pi))) for k in (-1, 0, 1))
-        if low <= turned <= high and actuator.limits[0].low <= sign * speed
-    ]
-    if not options:
-        return [speed, min(max(angle, low), high)]
-    return list(min(options)[1:])
+    speeds, angles = actuator.limits
+    options = []
+    for base in (bearing, bearing + math.pi):
+        whole = round((reference - base) / (2 * math.pi))
+        for turns in (whole - 1, whole, whole + 1):
+            angle = min(max(base + 2 * math.pi * turns, angles.low), angles.high)
+            along = math.cos(angle - bearing)
+            speed = min(max(wish * along, speeds.low), speeds.high)
+            missed = math.hypot(wish - speed * along, speed * math.sin(angle - bearing))
+            options.append((round(missed / wish, 9), abs(angle - reference), speed, angle))
+    return list(min(options)[2:])
