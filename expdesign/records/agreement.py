@@ -17,9 +17,11 @@ from expdesign.values import Array
 
 WINDOW_S = 10.0
 DISAGREE = 0.3
-"""Root-mean-square difference, relative to the larger of both changes, from which a mistake is looked for."""
-EXPLAINED = 0.15
-"""What a mistake must bring the difference down to."""
+"""Root-mean-square difference, relative to the larger of both changes, that is worth a note."""
+SUSPICIOUS = 0.1
+"""The same, from which a mistake is looked for."""
+EXPLAINED = 0.25
+"""What a mistake must bring the difference down to, as a share of it."""
 AS_GOOD = 1.5
 """Mistakes that explain nearly as well as the best are named with it."""
 TURNING_RAD = 0.05
@@ -35,7 +37,7 @@ SPEED_UNITS = (
     ("u_mps and v_mps have the wrong sign", -1.0),
 )
 RATE_UNITS = (
-    ("r_radps is in degrees per second", DEGREE),
+    ("r_radps is in degrees per second, or the heading in radians under a degree name", DEGREE),
     ("r_radps is in degrees per minute", DEGREE / 60.0),
     ("the heading is in degrees under a radian name", 1.0 / DEGREE),
     ("r_radps is positive to port, or the heading counts counter-clockwise", -1.0),
@@ -88,7 +90,7 @@ def _check_turning(table: Table, windows: Array, sample_time_s: float) -> Table:
     expected = _integral(table.columns["r_radps"][:, None], windows, sample_time_s)
     mistakes = [Mistake(text=text, moved=turned, expected=factor * expected) for text, factor in RATE_UNITS]
     as_is = Mistake(text="", moved=turned, expected=expected)
-    _raise_explained(table, "r_radps", "does not fit the change of heading", as_is, mistakes)
+    _raise_explained(table, "r_radps", "disagrees with the change of heading", as_is, mistakes)
     if as_is.difference > DISAGREE and np.sqrt(np.mean(turned**2)) > TURNING_RAD:
         return table.noted(f"heading and r_radps disagree by {as_is.difference:.0%} over {WINDOW_S:g} s")
     return table
@@ -117,22 +119,32 @@ def _check_moving(table: Table, windows: Array, sample_time_s: float) -> Table:
     swapped = _change(_swapped(table), windows)
     names = f"{table.sources['north_m'].header} and {table.sources['east_m'].header}"
     mistakes.append(Mistake(text=f"{names} are exchanged", moved=swapped, expected=as_is.expected))
-    _raise_explained(table, "u_mps", "does not fit the positions", as_is, mistakes)
+    _raise_explained(table, "u_mps", "disagrees with the positions", as_is, mistakes)
     if as_is.difference > DISAGREE:
-        return table.noted(f"positions and measured velocities disagree by {as_is.difference:.0%} over {WINDOW_S:g} s")
+        disagree = f"positions and measured velocities disagree by {as_is.difference:.0%} over {WINDOW_S:g} s"
+        return table.noted(disagree + _heading_offset(as_is))
     return table
+
+
+def _heading_offset(as_is: Mistake) -> str:
+    """The constant error of the heading that would explain a disagreement, if one does."""
+    moved, expected = (pairs[:, 0] + 1j * pairs[:, 1] for pairs in (as_is.moved, as_is.expected))
+    offset = float(np.angle(np.vdot(expected, moved)))
+    turned = expected * np.exp(1j * offset)
+    mended = Mistake(text="", moved=as_is.moved, expected=np.stack([turned.real, turned.imag], axis=-1))
+    if mended.difference > EXPLAINED * as_is.difference:
+        return ""
+    return f", only by {mended.difference:.0%} with {offset / DEGREE:+.0f} degrees added to the heading"
 
 
 def _raise_explained(table: Table, name: str, problem: str, as_is: Mistake, mistakes: list[Mistake]) -> None:
     """Raise when a mistake explains what the file as it is does not."""
-    if as_is.difference <= DISAGREE:
-        return
     best = min(mistake.difference for mistake in mistakes)
-    if best > EXPLAINED or best > as_is.difference / 3:
+    if as_is.difference <= SUSPICIOUS or best > EXPLAINED * as_is.difference:
         return
     likely = [mistake for mistake in mistakes if mistake.difference <= AS_GOOD * best + 0.01]
     texts = ", or ".join(mistake.text for mistake in sorted(likely, key=lambda mistake: mistake.difference))
-    found = f"{problem} (off by {as_is.difference:.0%}); within {best:.0%} if {texts}"
+    found = f"{problem} by {as_is.difference:.0%}, but only by {best:.0%} if {texts}"
     raise table.error(name, f"{found}; expected units, signs and axes as in the column names")
 
 

@@ -69,11 +69,15 @@ def _text(path: Path) -> str:
 def _rows(path: Path, text: str) -> list[list[str]]:
     if not text.strip():
         raise FileError(path, "", "is empty, expected a header row and one row per sample")
-    _check_separator(path, text.lstrip("\r\n").splitlines()[0])
+    if text.lstrip().startswith(("#", "%")):
+        raise FileError(path, "row 1", "is a comment, expected the header with names such as time_s")
+    _check_separator(path, text.lstrip("\r\n").partition("\n")[0])
+    rows: list[list[str]] = []
     try:
-        rows = list(csv.reader(io.StringIO(text, newline=None), strict=True))
+        rows.extend(csv.reader(io.StringIO(text, newline=None), strict=True))
     except csv.Error as error:
-        raise FileError(path, "", f"is not readable CSV: {error}") from None
+        problem = f"is not readable CSV ({error}), expected numbers between commas, without quotes"
+        raise FileError(path, f"row {len(rows) + 1}", problem) from None
     while not rows[-1]:
         rows.pop()
     if not rows[0]:
@@ -92,8 +96,6 @@ def _check_separator(path: Path, line: str) -> None:
 
 
 def _check_header(path: Path, header: tuple[str, ...]) -> None:
-    if header[0].startswith(("#", "%")):
-        raise FileError(path, "row 1", f"is a comment ({shown(header[0])}), expected the header")
     if all(_is_number(name) for name in header):
         raise FileError(path, "row 1", "holds numbers, expected the header with names such as time_s")
     seen: dict[str, int] = {}
@@ -109,10 +111,10 @@ def _check_widths(path: Path, header: tuple[str, ...], rows: list[list[str]]) ->
     if not wrong:
         return
     found = len(rows[wrong[0] - 1])
-    more = f" (and {len(wrong) - 1} more rows)" if len(wrong) > 1 else ""
+    more = f"; {len(wrong) - 1} more rows differ too" if len(wrong) > 1 else ""
     hint = ": decimal commas?" if len(wrong) == len(rows) - 1 and found > width else ""
     cells = {0: "is empty", 1: "has 1 cell"}.get(found, f"has {found} cells")
-    raise FileError(path, f"row {wrong[0]}", f"{cells}{more}, expected {width} as in the header{hint}")
+    raise FileError(path, f"row {wrong[0]}", f"{cells}, expected {width} cells as in the header{more}{hint}")
 
 
 def _is_number(text: str) -> bool:

@@ -82,8 +82,7 @@ def _announced(table: Table) -> Mask:
         return np.zeros(len(table) - 1, dtype=bool)
     broken = numbers != np.round(numbers)
     if broken.any():
-        found = f"is {table.value('batch', int(np.argmax(broken)))} in {table.rows(broken)}"
-        raise table.error("batch", f"{found}, expected whole numbers")
+        raise table.error("batch", f"{table.found('batch', broken, 'broken')}, expected whole numbers")
     change: Mask = np.diff(numbers) != 0
     starts = np.flatnonzero(np.concatenate([[True], change]))
     seen: set[float] = set()
@@ -96,19 +95,17 @@ def _announced(table: Table) -> Mask:
 
 
 def _check_increasing(table: Table, step: Array, announced: Mask) -> None:
-    for wrong, word in ((step == 0, "again"), (step < 0, "")):
-        later = np.concatenate([[False], wrong & ~announced])
-        if not later.any():
-            continue
-        index = int(np.argmax(later))
+    repeated, backward = (np.concatenate([[False], wrong & ~announced]) for wrong in (step == 0, step < 0))
+    if repeated.any():
+        stuck = f"stays at {table.value('time_s', int(np.argmax(repeated)))} in {table.rows(repeated)}"
+        raise table.error("time_s", f"{stuck}, expected increasing times")
+    if backward.any():
+        index = int(np.argmax(backward))
         now, before = table.value("time_s", index), table.value("time_s", index - 1)
-        if word:
-            raise table.error("time_s", f"is {now} again in {table.rows(later)}, expected increasing times")
         reset = table.columns["time_s"][index] <= table.columns["time_s"][0] + abs(step[0])
         why = ": a clock that was reset needs a batch column that changes there" if reset else ""
-        raise table.error(
-            "time_s", f"goes back from {before} to {now} in {table.rows(later)}, expected increasing times{why}"
-        )
+        problem = f"goes back from {before} to {now} in {table.rows(backward)}, expected increasing times{why}"
+        raise table.error("time_s", problem)
 
 
 def _check_sample_time(table: Table, found_s: float, wanted_s: float | None, whose: str) -> None:
@@ -117,7 +114,7 @@ def _check_sample_time(table: Table, found_s: float, wanted_s: float | None, who
             problem = f"has a sample every {found_s:g} s, expected at most {SLOWEST_S:g} s{_unit(found_s, None)}"
             raise table.error("time_s", problem)
     elif not same_sample_time(found_s, wanted_s):
-        problem = f"has a sample every {found_s:g} s, expected every {wanted_s:g} s as {whose}"
+        problem = f"has a sample every {found_s:g} s, expected every {wanted_s:g} s, as {whose} has it"
         raise table.error("time_s", problem + _unit(found_s, wanted_s))
 
 

@@ -94,13 +94,13 @@ def check_jumps(table: Table, batches: tuple[slice, ...], sample_time_s: float) 
             step = np.hypot(step, _steps(table.columns["east_m"], batches))
         ordinary = float(np.percentile(step[step > 0], 95)) if step.any() else 0.0
         jump = step > max(least, fastest * sample_time_s, JUMP * ordinary)
-        what = "the position" if name == "north_m" else "it"
         if jump.any():
-            found = f"{what} jumps by {step[int(np.argmax(jump))]:.3g} {unit} in {table.rows(jump)}"
+            what = "position jumps" if name == "north_m" else "jumps"
+            found = f"{what} by {step[int(np.argmax(jump))]:.3g} {unit} in {table.rows(jump)}"
             raise table.error(name, f"{found}, expected what a ship can do in {sample_time_s:g} s")
         odd = step > JUMP * ordinary
         if odd.any() and name in NOTED:
-            what = what if name == "north_m" else table.sources[name].header
+            what = "the position" if name == "north_m" else table.sources[name].header
             notes.append(f"{what} changes by up to {step[odd].max():.3g} {unit} at once in {table.rows(odd)}")
     return table.noted(*notes)
 

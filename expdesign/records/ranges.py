@@ -59,7 +59,7 @@ def check_ranges(table: Table) -> None:
             slack = ROUNDING if allowed.degrees else 0.0
             wrong = (values < allowed.low - slack) | (values > allowed.high + slack)
             if wrong.any():
-                found = f"is {table.value(name, int(np.argmax(wrong)))} in {table.rows(wrong)}"
+                found = table.found(name, wrong, "out of range")
                 raise table.error(name, f"{found}, expected {allowed.expected}{_hint(table, name, allowed)}")
     _check_fix(table)
     _check_heading(table)

@@ -54,7 +54,7 @@ class Table:
 
     def value(self, name: str, index: int) -> str:
         """A number as it stands in the file."""
-        return f"{self.columns[name][index] / self.sources[name].factor:.6g}"
+        return f"{self.columns[name][index] / self.sources[name].factor:.10g}"
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -65,6 +65,13 @@ class Table:
         """Columns side by side, (k, m); nan where one is not there."""
         absent = np.full(len(self), np.nan)
         return np.stack([self.columns.get(name, absent) for name in names], axis=-1)
+
+    def found(self, name: str, wrong: Mask, also: str) -> str:
+        """The first wrong value with its row, and the other rows where a mask (k,) is set: `is 7 in row 3 (...)`."""
+        first = int(np.argmax(wrong))
+        rest = wrong & (np.arange(len(wrong)) > first)
+        more = f" (and {also} in {self.rows(rest)})" if rest.any() else ""
+        return f"is {self.value(name, first)} in row {first + self.first_row}{more}"
 
     def rows(self, wrong: Mask) -> str:
         """The rows of the file where a mask (k,) is set, in words."""
