@@ -15,6 +15,9 @@ from expdesign.simulation import simulate
 from expdesign.values import Array
 from expdesign.vessel import SCALAR, Vessel, allocate, generalised_force, required_force
 
+STEADY = 1e-6
+"""Share of its speed that a vessel may lose or gain per sample where an entry state counts as held."""
+
 
 def family(name: str) -> Family:
     """A manoeuvre family by name.
@@ -50,7 +53,10 @@ def build_primitive(vessel: Vessel, spec: PrimitiveSpec) -> Primitive:
             f"expected at least two samples of {vessel.sample_time_s:g} s"
         )
     time_s = np.arange(count + 1, dtype=float) * vessel.sample_time_s
-    wished = family(spec.family).reference(spec.settings, time_s)
+    try:
+        wished = family(spec.family).reference(spec.settings, time_s)
+    except InputError as error:
+        raise InputError(f"primitive {spec.name!r}: {error}") from None
     if not np.isfinite(wished).all():
         raise InputError(f"primitive {spec.name!r}: its settings give velocities that are not numbers")
     slopes = np.diff(wished, axis=0) / vessel.sample_time_s
@@ -97,7 +103,8 @@ def _entry_inputs(vessel: Vessel, name: str, velocity: Array) -> Array:
     inputs = trim(vessel, velocity)
     wanted = required_force(vessel.model, velocity, np.zeros(3))
     given = np.array(generalised_force(vessel.actuators, dict(zip(vessel.model.inputs, inputs, strict=True)), SCALAR))
-    if np.abs(drift(vessel, velocity, inputs)).max() * vessel.sample_time_s > 0.02 * max(1e-9, np.abs(velocity).max()):
+    lost = np.abs(drift(vessel, velocity, inputs)).max() * vessel.sample_time_s
+    if lost > STEADY * max(1e-9, np.abs(velocity).max()):
         raise InputError(
             f"primitive {name!r}: the actuators cannot hold its entry state u = {velocity[0]:g} m/s, "
             f"v = {velocity[1] + 0.0:g} m/s: needed tau_x = {wanted[0]:.4g}, tau_y = {wanted[1]:.4g}, "

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from expdesign.errors import InputError
 from expdesign.values import Array
+
+LEAST_SWING = 0.5
+"""A wave that does not reach this far to both sides before it is brought to amplitude 1 is not the wave asked for."""
 
 
 def ramp(time_s: Array, *, start_s: float = 0.0, length_s: float) -> Array:
@@ -19,13 +23,22 @@ def envelope(time_s: Array, *, length_s: float) -> Array:
 
 
 def flat_wave(time_s: Array, *, period_s: float) -> Array:
-    """A rounded square wave of amplitude about 1 that begins and ends at zero and has zero mean.
+    """A rounded square wave of amplitude 1 that begins and ends at zero and has zero mean.
 
     It starts in the middle of a plateau, so what it is the rate of (heading, sideways distance) swings evenly to both
     sides and comes back.
+
+    Raises:
+        InputError: the samples hold no swing of that period.
     """
     sharpness = 3.0
     wave = np.tanh(sharpness * np.cos(2.0 * np.pi * time_s / period_s)) / np.tanh(sharpness)
     fade = envelope(time_s, length_s=period_s / 12)
     weights = np.r_[0.5, np.ones(len(time_s) - 2), 0.5]
-    return np.asarray(fade * (wave - weights @ (fade * wave) / (weights @ fade)))
+    centred = fade * (wave - weights @ (fade * wave) / max(weights @ fade, 1e-300))
+    if not (centred.max() > LEAST_SWING and centred.min() < -LEAST_SWING):
+        raise InputError(
+            f"period_s is {period_s:g}, expected a full swing within duration_s = {time_s[-1]:g} and several samples "
+            f"of {time_s[1]:g} s within a swing"
+        )
+    return np.asarray(centred / np.abs(centred).max())

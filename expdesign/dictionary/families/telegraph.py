@@ -15,6 +15,7 @@ def _switching(rng: np.random.Generator, time_s: Array, *, hold_s: float, rise_s
     """A +-1 signal that changes sign after exponential times of mean `hold_s`, smoothed over `rise_s`."""
     end_s = float(time_s[-1])
     flips = np.cumsum(rng.exponential(hold_s, size=max(8, int(8 * end_s / hold_s))))
+    flips = flips[flips < end_s + 10 * rise_s]  # later ones are not seen
     sign = 2.0 * rng.integers(0, 2) - 1.0
     level = sum((np.tanh(2.0 * (time_s - flip) / rise_s) + 1.0) * (-1.0) ** n for n, flip in enumerate(flips))
     return np.asarray(sign * (1.0 - level))
