@@ -21,8 +21,12 @@ UNSEEN = 1e-10
 """Relative singular value below which a combination is invisible to working precision."""
 FAINT = 1e-5
 """The same for combinations that least squares sees so faintly that estimates along them mean little."""
+WEAK_STATISTIC = 10.0
+"""Cragg-Donald statistic per instrument below which a combination counts as weakly instrumented."""
 SMALL_WEIGHT = 0.05
-"""Parameters with less than this weight are left out of sentences."""
+"""Parameters with less than this weight are left out of reports."""
+NAMED = 4
+"""Sentences name at most so many parameters of a combination."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -43,9 +47,11 @@ class Direction:
         seal(self, weights="k")
 
     def __str__(self) -> str:
-        parts = [f"{weight:+.2f} {name}" for name, weight in zip(self.parameters, self.weights, strict=True)]
-        text = " ".join(f"{part[0]} {part[1:]}" for part in parts).removeprefix("+ ")
-        return f"{' and '.join(self.parameters)}: {text}" if len(parts) > 1 else self.parameters[0]
+        pairs = list(zip(self.parameters, self.weights.tolist(), strict=True))[:NAMED]
+        text = " ".join(f"{'-' if weight < 0 else '+'} {abs(weight):.2f} {name}" for name, weight in pairs)
+        more = f" and {len(self.parameters) - NAMED} more" if len(self.parameters) > NAMED else ""
+        names = " and ".join(name for name, _ in pairs)
+        return f"{names}: {text.removeprefix('+ ')}{more}" if len(pairs) > 1 else self.parameters[0]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -66,31 +72,58 @@ class NullSpace:
         seal(self, singular_values="p")
 
 
-def null_space(moment: Array, regression: Regression, *, exogenous: bool) -> NullSpace:
+def null_space(moment: Array, regression: Regression, *, exogenous: bool, second: Second | None = None) -> NullSpace:
     """The report on a scaled moment matrix (q, p), columns in parameter order.
 
     Args:
         moment: instruments against regressors, each scaled to unit norm over the data (columns without variation zero).
         regression: for names and for which parameters share an output.
-        exogenous: instruments are the regressors themselves; otherwise chance correlation sets what is faint.
+        exogenous: the instruments are the regressors themselves.
+        second: second moments (q, q) of instruments and (p, p) of regressors, scaled alike, to find what is weakly
+            instrumented; without them nothing is.
     """
     values: list[float] = []
     unseen: list[Direction] = []
     faint: list[Direction] = []
-    limit = FAINT if exogenous else 3.0 / np.sqrt(len(regression))
     for group in _groups(regression):
-        part = moment[:, group]
-        sizes, rows = _right_vectors(part)
+        sizes, rows = _right_vectors(moment[:, group])
         top = max(float(sizes[0]), 1e-300)
         values += (sizes / top).tolist()
         names = tuple(regression.parameters[index] for index in group)
         dark = sizes <= UNSEEN * top
         unseen += [_direction(names, vector, 0.0) for vector in _sparse(rows[dark])]
-        weak = ~dark & (sizes <= limit * (top if exogenous else 1.0))
-        faint += [
-            _direction(names, vector, float(size / top)) for size, vector in zip(sizes[weak], rows[weak], strict=True)
-        ]
+        if dark.any():
+            continue
+        if exogenous:
+            weak = sizes <= FAINT * top
+            faint += [
+                _direction(names, row, float(size / top)) for size, row in zip(sizes[weak], rows[weak], strict=True)
+            ]
+        elif second is not None:
+            faint += _weak(
+                moment[np.ix_(group, group)], [part[np.ix_(group, group)] for part in second], names, regression
+            )
     return NullSpace(singular_values=np.sort(values)[::-1], unseen=tuple(unseen), faint=tuple(faint))
+
+
+Second = tuple[Array, Array]
+
+
+def _weak(G: Array, second: list[Array], names: tuple[str, ...], regression: Regression) -> list[Direction]:
+    """Combinations whose regressor the instruments explain hardly better than chance would.
+
+    Source: J. G. Cragg and S. G. Donald, Econometric Theory 9 (1993), 222-240; J. H. Stock and M. Yogo, in
+    Identification and Inference for Econometric Models (2005), 80-108.
+    """
+    instruments, regressors = second
+    explained = G.T @ np.linalg.pinv(instruments, rcond=1e-12, hermitian=True) @ G
+    left = regressors - explained
+    left = left + max(1e-9, -2.0 * float(np.linalg.eigvalsh(left)[0])) * np.eye(len(left))  # rounding
+    ratios, vectors = scipy.linalg.eigh((explained + explained.T) / 2, (left + left.T) / 2)
+    statistics = ratios * len(regression) / len(names)
+    weak = statistics < WEAK_STATISTIC
+    unit = vectors / np.linalg.norm(vectors, axis=0)
+    return [_direction(names, unit[:, i], float(np.clip(ratios[i], 0.0, 1.0))) for i in np.flatnonzero(weak)]
 
 
 def require_informative(found: NullSpace) -> None:

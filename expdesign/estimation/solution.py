@@ -145,7 +145,9 @@ def _solvers(
     moments = [_moment(Z[rows] / row, Phi[rows] * (size > 0) / column) for rows in parts]
     if weighting.blocks == "one":
         total = sum((w * H for w, H in zip(weights, moments, strict=True)), start=np.zeros_like(moments[0]))
-        found = null_space(total, regression, exogenous=exogenous)
+        flat = Phi * (size > 0) / column
+        second = None if exogenous else (_moment(Z / row, Z / row), _moment(flat, flat))
+        found = null_space(total, regression, exogenous=exogenous, second=second)
         require_informative(found)
         A = np.linalg.inv(total) / column[:, None] / row
         return [(rows, w * A) for w, rows in zip(weights, parts, strict=True)], found

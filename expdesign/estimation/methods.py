@@ -1,0 +1,192 @@
+"""The methods that users choose from, in one tuple, and the estimation itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from expdesign.errors import Diverged, UnknownName
+from expdesign.estimation.instruments import InstrumentModel
+from expdesign.estimation.null_space import NullSpace
+from expdesign.estimation.predictors import Layout, Rows, build_layout, build_regression
+from expdesign.estimation.refine import MOST_REFINEMENTS, Refined, refine_iv
+from expdesign.estimation.regression import Regression
+from expdesign.estimation.replay import Integration, build_replay
+from expdesign.estimation.solution import Solution, Weighting, solve_ls
+from expdesign.estimation.tables import model_for
+from expdesign.estimation.values import Estimate, Residuals
+from expdesign.signals import Record
+from expdesign.values import Array
+from expdesign.vessel import VesselModel
+
+
+@dataclass(frozen=True)
+class Method:
+    """One way to estimate.
+
+    Attributes:
+        name: as users type it.
+        title: for tables.
+        predictor: a name in `predictors.PREDICTORS`.
+        instruments: whether instruments are simulated; otherwise least squares.
+    """
+
+    name: str
+    title: str
+    predictor: str
+    instruments: bool
+
+
+METHODS = (
+    Method("ls", "least squares", "basic", instruments=False),
+    Method("ls-air", "least squares with measured wind", "basic-wind", instruments=False),
+    Method("ls-augmented", "least squares, augmented", "augmented", instruments=False),
+    Method("ls-wind", "least squares, augmented, with measured wind", "wind", instruments=False),
+    Method("iv", "instrumental variables", "basic", instruments=True),
+    Method("iv-air", "instrumental variables with measured wind", "basic-wind", instruments=True),
+    Method("iv-augmented", "instrumental variables, augmented", "augmented", instruments=True),
+    Method("iv-wind", "instrumental variables, augmented, with measured wind", "wind", instruments=True),
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """Choices that most users leave alone.
+
+    Attributes:
+        fixed: parameters held at the model's values.
+        weighting: how IV equations are formed; least squares subtracts no mean and uses one block.
+        start: first instruments from the "nominal" model or from the "ls" estimate.
+        most_refinements: 0 for instruments of the first model only.
+        heading: of the instruments, "measured" or "simulated".
+        wind: of the instruments, "lagged", "mean" or "measured".
+        integration: how instrument models are simulated.
+    """
+
+    fixed: tuple[str, ...] = ()
+    weighting: Weighting = field(default_factory=lambda: Weighting(mean="complete"))
+    start: str = "nominal"
+    most_refinements: int = MOST_REFINEMENTS
+    heading: str = "measured"
+    wind: str = "lagged"
+    integration: Integration = field(default_factory=Integration)
+
+    def __post_init__(self) -> None:
+        if self.start not in STARTS:
+            raise UnknownName("start of instruments", self.start, known=STARTS)
+
+
+STARTS = ("nominal", "ls")
+
+
+def method_named(name: str) -> Method:
+    """The method of that name.
+
+    Raises:
+        UnknownName: there is none.
+    """
+    for method in METHODS:
+        if method.name == name:
+            return method
+    raise UnknownName("method", name, known=[method.name for method in METHODS])
+
+
+def estimate(record: Record, model: VesselModel, *, method: str = "iv", settings: Settings | None = None) -> Estimate:
+    """Parameters of a model from measured data.
+
+    Args:
+        record: batches with the model's inputs, or generalised forces.
+        model: structure; its values start the instruments and stand for parameters held fixed.
+        method: a name in `METHODS`.
+        settings: the rest.
+
+    Raises:
+        InputError: the data lack what the method needs.
+        NotInformative: parameters that the data cannot tell apart; the message names the combinations.
+        Diverged: the model that the first instruments come from is unstable.
+    """
+    chosen, choices = method_named(method), settings or Settings()
+    layout = build_layout(model_for(model, record), record, predictor=chosen.predictor, fixed=choices.fixed)
+    rows = build_regression(layout, record)
+    refined = _instrumental(layout, record, rows, choices) if chosen.instruments else _least_squares(rows, choices)
+    return _estimate(chosen, layout, rows, refined)
+
+
+def _least_squares(rows: Rows, choices: Settings) -> Refined:
+    weighting = replace(choices.weighting, mean="none", blocks="one")
+    return Refined(solve_ls(rows.regression, weighting), 0, ())
+
+
+def _instrumental(layout: Layout, record: Record, rows: Rows, choices: Settings) -> Refined:
+    replay = build_replay(layout.model, record, choices.integration)
+    simulation = InstrumentModel(layout, record, rows, replay, choices.heading, choices.wind)
+    start = layout.model.parameters
+    if choices.start == "ls":
+        start = full_parameters(layout, _least_squares(rows, choices).solution.values)
+    try:
+        first = simulation.instruments(start)
+    except Diverged as error:
+        raise Diverged(f"instruments cannot be simulated from the {choices.start} model: {error}") from None
+    return refine_iv(
+        rows.regression,
+        first,
+        lambda values: simulation.instruments(full_parameters(layout, values)),
+        choices.weighting,
+        most=choices.most_refinements,
+    )
+
+
+def full_parameters(layout: Layout, values: Array) -> Array:
+    """All parameters (all,) of the model: estimated ones, those held, zero for those merged into others."""
+    full = np.array(layout.model.parameters)
+    for name, value in zip(layout.parameters, values, strict=False):
+        full[layout.model.names.index(name)] = value
+    for name in layout.merged:
+        full[layout.model.names.index(name)] = 0.0
+    return full
+
+
+def _estimate(method: Method, layout: Layout, rows: Rows, refined: Refined) -> Estimate:
+    solution, p = refined.solution, len(layout.parameters)
+    full = dict(zip(layout.model.names, full_parameters(layout, solution.values).tolist(), strict=True))
+    return Estimate(
+        method=method.name,
+        names=layout.parameters,
+        values=solution.values[:p],
+        covariance=solution.covariance[:p, :p],
+        held={name: full[name] for name in layout.model.names if name not in layout.parameters},
+        nuisance_names=layout.names[p:],
+        nuisance_values=solution.values[p:],
+        joint_covariance=solution.covariance,
+        residuals=_statistics(rows.regression, solution, rows.left_out),
+        null_space=solution.null_space,
+        refinements=refined.refinements,
+        warnings=(*layout.notes, *_row_notes(rows), *refined.warnings, *faint_notes(solution.null_space)),
+    )
+
+
+def _statistics(regression: Regression, solution: Solution, left_out: int) -> Residuals:
+    eps = solution.residuals - solution.residuals.mean(axis=0)
+    joined = (np.diff(regression.step_of) == 1) & (np.diff(regression.batch_of) == 0)
+    power = (eps**2).mean(axis=0)
+    pairs = (eps[1:] * eps[:-1])[joined]
+    correlation = pairs.mean(axis=0) / np.where(power > 0, power, 1.0) if len(pairs) else np.zeros_like(power)
+    return Residuals(
+        outputs=regression.outputs,
+        std=np.sqrt(power),
+        correlation=correlation,
+        rows=len(regression),
+        left_out=left_out,
+        lags=solution.lags,
+    )
+
+
+def _row_notes(rows: Rows) -> Sequence[str]:
+    return [f"{rows.left_out} samples are left out because numbers are missing."] if rows.left_out else []
+
+
+def faint_notes(found: NullSpace) -> Sequence[str]:
+    """One sentence per combination of parameters that the data hardly show."""
+    return [f"The data hardly show this combination of parameters: {direction}." for direction in found.faint]

@@ -1,0 +1,71 @@
+"""Batches as tables of signals, the form that model terms and nuisance regressors read."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from expdesign.errors import InputError
+from expdesign.signals import Batch, Record
+from expdesign.values import Array
+from expdesign.vessel import NUMPY, Actuator, Limit, VesselModel
+from expdesign.vessel.structures import FORCE_SIGNALS
+
+Table = dict[str, Array]
+AIR = ("u_q", "v_q")
+
+
+def model_for(model: VesselModel, record: Record) -> VesselModel:
+    """The model driven by the inputs that were recorded: its own actuators, or plain generalised forces.
+
+    Raises:
+        InputError: no batches, or the recorded inputs do not drive the model.
+    """
+    if not record.batches:
+        raise InputError("the record holds no batches")
+    recorded = record.batches[0].input_names
+    for batch in record.batches:
+        if batch.input_names != recorded:
+            raise InputError(f"{batch.name} has inputs {', '.join(batch.input_names)}, expected {', '.join(recorded)}")
+    if set(model.inputs) <= set(recorded):
+        return model
+    needs = {name for expression in model.expressions for name in expression.signals} & set(model.inputs)
+    if set(FORCE_SIGNALS) <= set(recorded) and not needs - set(FORCE_SIGNALS):
+        force = Actuator(kind="force", number=1, limits=(Limit(), Limit(), Limit()))
+        return replace(model, actuators=(force,))
+    raise InputError(
+        f"{record.batches[0].name} has inputs {', '.join(recorded)}, expected {', '.join(model.inputs)} "
+        f"or {', '.join(FORCE_SIGNALS)}"
+    )
+
+
+def inputs_of(model: VesselModel, batch: Batch) -> Array:
+    """(k, m) recorded inputs in the model's order."""
+    return batch.inputs[:, [batch.input_names.index(name) for name in model.inputs]]
+
+
+def measured_table(model: VesselModel, batch: Batch, *, wind_measured: bool) -> Table:
+    """Measured signals; without measured wind the air velocities are those over ground.
+
+    Raises:
+        InputError: wind is asked for and was not measured.
+    """
+    if wind_measured and batch.wind is None:
+        raise InputError(f"{batch.name} has no measured wind; use a predictor without wind")
+    air = batch.wind if wind_measured and batch.wind is not None else batch.velocity[:, :2]
+    return signal_table(model, batch.velocity, air, heading_of(batch), inputs_of(model, batch))
+
+
+def signal_table(model: VesselModel, velocity: Array, air: Array, heading: Array, inputs: Array) -> Table:
+    """Every signal (k,) that a term may read, and the heading as "psi"."""
+    table = model.signals(tuple(velocity.T), tuple(air.T), inputs.T, NUMPY)
+    count = len(velocity)
+    return {name: np.broadcast_to(np.asarray(values, dtype=float), (count,)) for name, values in table.items()} | {
+        "psi": heading
+    }
+
+
+def heading_of(batch: Batch) -> Array:
+    """(k,) measured heading [rad], nan where there is none."""
+    return np.full(len(batch), np.nan) if batch.pose is None else batch.pose[:, 2]

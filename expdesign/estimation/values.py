@@ -1,0 +1,101 @@
+"""The result of an estimation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from expdesign.errors import UnknownName
+from expdesign.estimation.null_space import NullSpace
+from expdesign.values import Array, seal
+from expdesign.vessel import VesselModel
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Residuals:
+    """Statistics of the one-step residuals (for "oe": of the simulated output).
+
+    Attributes:
+        outputs: names.
+        std: (n,) standard deviation, in the unit of a sample-to-sample difference (for "oe": of the output).
+        correlation: (n,) with the sample before; -0.5 is measurement noise, +1 is a missing slow effect.
+        rows: samples used.
+        left_out: samples left out because numbers are missing.
+        lags: last lag that the covariance of the estimate counts.
+    """
+
+    outputs: tuple[str, ...]
+    std: Array
+    correlation: Array
+    rows: int
+    left_out: int
+    lags: int
+
+    def __post_init__(self) -> None:
+        seal(self, std="n", correlation="n")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Estimate:
+    """Parameters of a vessel model from data.
+
+    Attributes:
+        method: name of the method.
+        names: estimated parameters, in model order.
+        values: (p,) in the model's own form.
+        covariance: (p, p).
+        held: parameters not estimated, and the values they were given.
+        nuisance_names: nuisance parameters.
+        nuisance_values: (q,).
+        joint_covariance: (p + q, p + q) of parameters, then nuisance parameters.
+        residuals: statistics.
+        null_space: what the data cannot see, or see faintly.
+        refinements: how many times the instruments were simulated anew.
+        warnings: one sentence each.
+    """
+
+    method: str
+    names: tuple[str, ...]
+    values: Array
+    covariance: Array
+    held: Mapping[str, float]
+    nuisance_names: tuple[str, ...]
+    nuisance_values: Array
+    joint_covariance: Array
+    residuals: Residuals
+    null_space: NullSpace
+    refinements: int
+    warnings: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        seal(self, values="p", covariance="p p", nuisance_values="q", joint_covariance="r r")
+
+    @property
+    def std(self) -> Array:
+        """(p,) standard deviations."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def assignments(self) -> dict[str, float]:
+        """Every parameter of the model by name."""
+        return {**dict(zip(self.names, self.values.tolist(), strict=True)), **self.held}
+
+    def value(self, name: str) -> float:
+        """One parameter.
+
+        Raises:
+            UnknownName: not a parameter of the model.
+        """
+        if name not in self.assignments:
+            raise UnknownName("parameter", name, known=self.assignments)
+        return self.assignments[name]
+
+    def model(self, model: VesselModel) -> VesselModel:
+        """A model with these values, and these standard deviations as its prior; held parameters count as known."""
+        std = dict(zip(self.names, self.std.tolist(), strict=True))
+        return replace(
+            model.with_parameters(self.assignments),
+            parameter_std=np.array([std.get(name, 0.0) for name in model.names]),
+        )
