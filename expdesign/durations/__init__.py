@@ -2,7 +2,8 @@
 
 from expdesign.durations.certificate import log_det, sensitivities
 from expdesign.durations.solve import bordered, build_durations, solve_durations, with_repeats
-from expdesign.durations.values import MEAN_SUBTRACTIONS, DurationDesign, DurationProblem
+from expdesign.durations.values import DurationDesign, DurationProblem
+from expdesign.information import MEAN_SUBTRACTIONS
 
 __all__ = [
     "MEAN_SUBTRACTIONS",

@@ -10,9 +10,9 @@ from expdesign.durations._cvxpy import maximise_log_det
 from expdesign.durations.certificate import log_det, sensitivities, whitened
 from expdesign.durations.polish import polish
 from expdesign.durations.rounding import value, whole_runs
-from expdesign.durations.values import MEAN_SUBTRACTIONS, DurationDesign, DurationProblem
+from expdesign.durations.values import DurationDesign, DurationProblem
 from expdesign.errors import NoAnswer, NotInformative, UnknownName
-from expdesign.information import PrimitiveInformation, check_informative
+from expdesign.information import MEAN_SUBTRACTIONS, PrimitiveInformation, check_informative
 from expdesign.values import Array
 
 LARGEST_GAP = 1e-6
@@ -50,7 +50,7 @@ def bordered(item: PrimitiveInformation, mean_subtraction: str) -> Array:
     if mean_subtraction == "none":
         return item.X
     if mean_subtraction == "batch":
-        return item.X - item.Y @ item.Z.T
+        return item.X - item.YZ
     return np.block([[item.X, item.Y], [item.Z.T, np.eye(item.Y.shape[1])]])
 
 

@@ -8,8 +8,6 @@ import numpy as np
 
 from expdesign.values import Array, seal
 
-MEAN_SUBTRACTIONS = ("none", "batch", "complete")
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DurationProblem:

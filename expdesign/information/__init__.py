@@ -1,6 +1,7 @@
 """Information: moments of regressors and instruments, identifiability."""
 
 from expdesign.information.moments import (
+    MEAN_SUBTRACTIONS,
     check_informative,
     estimated_parameters,
     excitation_condition,
@@ -12,6 +13,7 @@ from expdesign.information.moments import (
 from expdesign.information.primitive_information import PrimitiveInformation
 
 __all__ = [
+    "MEAN_SUBTRACTIONS",
     "PrimitiveInformation",
     "check_informative",
     "estimated_parameters",

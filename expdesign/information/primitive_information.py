@@ -17,6 +17,8 @@ class PrimitiveInformation:
         X: (p, p) mean of Phi Z^T.
         Y: (p, n) mean of Phi.
         Z: (p, n) mean of the instruments.
+        YZ: (p, p) what subtracting each run's own means takes off X: the mean over headings of Y Z^T, and Y Z^T itself
+            when heading does not matter.
         log_det_alone: log det of its own information matrix under the design's mean subtraction, or None if singular.
         excitation_condition: whether every state inside a modulus keeps its sign and clears the stated noise.
     """
@@ -25,8 +27,9 @@ class PrimitiveInformation:
     X: Array
     Y: Array
     Z: Array
+    YZ: Array
     log_det_alone: float | None
     excitation_condition: bool
 
     def __post_init__(self) -> None:
-        seal(self, X="p p", Y="p n", Z="p n")
+        seal(self, X="p p", Y="p n", Z="p n", YZ="p p")
