@@ -18,6 +18,7 @@ from expdesign.records.motion import (
     kept_samples,
     left_out_notes,
     long_enough,
+    needed_columns,
     origin_notes,
     velocity_origins,
 )
@@ -71,8 +72,8 @@ def load_records(
         table, origin = _read(path, inputs, origin)
         clock = read_clock(table, sample_time_s=sample_time_s, whose=whose)
         if sample_time_s is None:
-            sample_time_s, whose = clock.sample_time_s, f"the first file, {name}"
-        inputs = inputs or Inputs(table.inputs, f"the first file, {name}")
+            sample_time_s, whose = clock.sample_time_s, f"the first file ({name})"
+        inputs = inputs or Inputs(table.inputs, f"the first file ({name})")
         found, told = _batches(_judged(table, clock, request), name, clock, request, inputs)
         batches += found
         notes += [f"{name}: {note}" for note in told]
@@ -115,8 +116,10 @@ def _read(path: Path, inputs: Inputs | None, origin: LocalMetres | None) -> tupl
 
 def _judged(table: Table, clock: Clock, request: Request) -> Table:
     """The same with remarks; raises where pose and velocity jump, or contradict each other."""
-    table = check_jumps(table.noted(*clock.notes), clock.batches, clock.sample_time_s)
-    if MEASURED in velocity_origins(table, request).values():
+    origins = velocity_origins(table, request)
+    table = table.noted(*clock.notes)
+    table = check_jumps(table, clock.batches, clock.sample_time_s, needed=needed_columns(origins))
+    if MEASURED in origins.values():
         table = check_agreement(table, clock.batches, clock.sample_time_s)
     return table.noted(*table_remarks(table))
 

@@ -16,6 +16,7 @@ from expdesign.records.velocity import central_difference, smoothed_velocity
 from expdesign.values import Array
 
 MEASURED, DIFFERENCE, SMOOTHED = "measured", "difference", "smoothed"
+COLUMN_OF = dict(zip(OUTPUTS, VELOCITY_COLUMNS, strict=True))
 NEEDS = {"u": POSE_COLUMNS, "v": POSE_COLUMNS, "r": POSE_COLUMNS[2:]}
 SAMPLES = {MEASURED: 2, DIFFERENCE: 4, SMOOTHED: SHORTEST}
 """Samples that a batch must have."""
@@ -45,7 +46,7 @@ def velocity_origins(table: Table, request: Request) -> dict[str, str]:
         FileError: one that must be there can neither be read nor derived.
     """
     origins: dict[str, str] = {}
-    for output, column in zip(OUTPUTS, VELOCITY_COLUMNS, strict=True):
+    for output, column in COLUMN_OF.items():
         if request.method in ("auto", MEASURED) and column in table.columns:
             origins[output] = MEASURED
         elif request.method != MEASURED and set(NEEDS[output]) <= set(table.columns):
@@ -53,6 +54,13 @@ def velocity_origins(table: Table, request: Request) -> dict[str, str]:
         elif output in request.outputs:
             raise _missing(table, output, column, request.method)
     return origins
+
+
+def needed_columns(origins: Mapping[str, str]) -> set[str]:
+    """The columns that velocities are taken or derived from, and the heading, which everything is turned by."""
+    measured = {column for output, column in COLUMN_OF.items() if origins.get(output) == MEASURED}
+    derived = (NEEDS[output] for output, origin in origins.items() if origin != MEASURED)
+    return measured.union(["heading_rad"], *derived)
 
 
 def long_enough(batches: tuple[slice, ...], origins: Mapping[str, str]) -> tuple[slice, ...]:

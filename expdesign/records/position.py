@@ -79,8 +79,14 @@ def with_continuous_heading(table: Table) -> Table:
     return replace(table, columns=columns).noted(note)
 
 
-def check_jumps(table: Table, batches: tuple[slice, ...], sample_time_s: float) -> Table:
-    """Raise where pose or velocity jumps as no ship can; note steps that are only out of the ordinary.
+def check_jumps(table: Table, batches: tuple[slice, ...], sample_time_s: float, *, needed: set[str]) -> Table:
+    """Raise where what is needed jumps as no ship can; note other steps of the pose that are out of the ordinary.
+
+    Args:
+        table: a file in metres and radians.
+        batches: stretches without a gap.
+        sample_time_s: time between samples [s].
+        needed: columns that velocities are taken or derived from.
 
     Raises:
         FileError: naming the column, the size of the jump and the row it lands in.
@@ -92,13 +98,13 @@ def check_jumps(table: Table, batches: tuple[slice, ...], sample_time_s: float) 
         step = np.abs(_steps(table.columns[name], batches))
         if name == "north_m":
             step = np.hypot(step, _steps(table.columns["east_m"], batches))
-        ordinary = float(np.percentile(step[step > 0], 95)) if step.any() else 0.0
-        jump = step > max(least, fastest * sample_time_s, JUMP * ordinary)
-        if jump.any():
+        ordinary = JUMP * float(np.percentile(step[step > 0], 95)) if step.any() else 0.0
+        jump = step > max(least, fastest * sample_time_s, ordinary)
+        if jump.any() and name in needed:
             what = "position jumps" if name == "north_m" else "jumps"
-            found = f"{what} by {step[int(np.argmax(jump))]:.3g} {unit} in {table.rows(jump)}"
+            found = f"{what} by {step[int(np.argmax(jump))]:.4g} {unit} in {table.rows(jump)}"
             raise table.error(name, f"{found}, expected what a ship can do in {sample_time_s:g} s")
-        odd = step > JUMP * ordinary
+        odd = step > ordinary
         if odd.any() and name in NOTED:
             what = "the position" if name == "north_m" else table.sources[name].header
             notes.append(f"{what} changes by up to {step[odd].max():.3g} {unit} at once in {table.rows(odd)}")

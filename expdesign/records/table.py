@@ -147,10 +147,8 @@ def _without_empty_columns(table: Table) -> Table:
             raise table.error(name, "holds no number in any row, expected one in every row")
     gone = [name for name in table.columns if name in dropped]
     columns = {name: values for name, values in table.columns.items() if name not in dropped}
-    notes = [
-        f"{table.sources[name].header} holds no numbers and counts as not measured" for name in gone if name in empty
-    ]
-    return replace(table, columns=columns).noted(*notes)
+    names = [table.sources[name].header for name in gone if name in empty]
+    return replace(table, columns=columns).noted(*(f"{name} holds no numbers: not measured" for name in names))
 
 
 def _without_missing(table: Table, cells: Cells) -> Table:
