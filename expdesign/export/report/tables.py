@@ -9,6 +9,7 @@ import numpy as np
 from expdesign.export.report import words
 from expdesign.export.report.content import ReportContent, primitive_runs
 from expdesign.information.primitive_information import PrimitiveInformation
+from expdesign.plan.safety import DRAWS
 from expdesign.plan.values import Leg, Plan
 
 REST_MPS, REST_RADPS = 0.02, 0.0005
@@ -168,8 +169,8 @@ def checks(content: ReportContent) -> list[Check]:
         allowed = 1.0 - content.confidence
         rows.append(
             Check(
-                what="Chance that a run, flown open loop, leaves safe water",
-                found=words.percent(plan.leave_water_probability),
+                what="Chance that a run, sailed open loop, leaves allowed water",
+                found=_share_of_draws(plan.leave_water_probability),
                 required=f"at most {words.percent(allowed)}",
                 passed=plan.leave_water_probability <= allowed + 1e-12,
             )
@@ -186,3 +187,11 @@ def parameter_rows(content: ReportContent) -> list[tuple[str, str, str, str]]:
         (name, terms[name], words.significant(nominal[name]), words.significant(std) if std > 0 else "not stated")
         for name, std in zip(content.parameters, content.parameter_std.tolist(), strict=True)
     ]
+
+
+def _share_of_draws(probability: float) -> str:
+    """The share in drawn ships; none at all bounds the chance by three in the number drawn, at 95 % confidence."""
+    left = round(probability * DRAWS)
+    if left == 0:
+        return f"none of {DRAWS} drawn ships, so below {words.percent(3 / DRAWS)}"
+    return f"{words.percent(probability)}, {left} of {DRAWS} drawn ships"
