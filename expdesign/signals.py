@@ -84,7 +84,8 @@ class Batch:
         sample_time_s: time between samples [s].
         input_names: actuator signals, e.g. ("n1", "a1"), or ("tau_x", "tau_y", "tau_psi").
         inputs: (k, m) commands, held from their sample to the next.
-        velocity: (k, 3) b-frame u, v, r over ground, measured or derived from pose.
+        velocity: (k, 3) b-frame u, v, r over ground, measured or derived from pose; nan in a whole column that nothing
+            tells, which records have only when they were told to do without it.
         pose: (k, 3) n-frame, heading continuous, or None when not measured; nan where a part is not measured.
         wind: (k, 2) relative wind in the b-frame, the air's velocity past the ship as (u_q, v_q) = velocity - wind,
             or None when not measured.

@@ -1,6 +1,7 @@
 """Each way in which a data file may be wrong gives one line: where, what was found, what would be right."""
 
 from collections.abc import Callable
+from itertools import zip_longest
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 from record_files import Columns, csv_text, motion, texts
 
 from expdesign.errors import FileError
-from expdesign.records import load_records
+from expdesign.records import VELOCITY_METHODS, load_records
 
 VESSEL = ("n1", "rudder1")
 DEGREES = 180 / np.pi
@@ -138,8 +139,9 @@ CASES: dict[str, tuple[Spoil, str]] = {
     ),
     "infinite": (
         cells({"r_radps": {12: "inf", 15: "-inf"}}),
-        "r_radps: is infinite in rows 12, 15, expected finite numbers",
+        "r_radps: is infinite in rows 12, 15, expected finite numbers up to 1e+15",
     ),
+    "huge": (cell("time_s", 12, "1e300"), "time_s: is 1e+300 in row 12, expected finite numbers up to 1e+15"),
     "no numbers": (
         cells({"u_mps": dict.fromkeys(range(2, 82), "")}),
         "u_mps: holds no number in any row, expected one in every row",
@@ -164,6 +166,10 @@ CASES: dict[str, tuple[Spoil, str]] = {
     "milliseconds": (
         column("time_s", lambda t: 1000 * t),
         "time_s: has a sample every 500 s, expected every 0.5 s, as the vessel has it (is it in milliseconds?)",
+    ),
+    "too quick": (
+        column("time_s", lambda t: t / 1e9),
+        "time_s: has a sample every 5e-10 s, expected 0.0001 s or more",
     ),
     "irregular": (
         cells({"time_s": {12: "5.2", 13: "5.3"}}),
@@ -360,3 +366,40 @@ def test_a_bad_file_gives_one_line(tmp_path: Path, kind: str) -> None:
         load_records([path], vessel_inputs=VESSEL, sample_time_s=0.5)
     assert str(caught.value) == f"{path}: {message}"
     assert "\n" not in message
+
+
+ODD_TEXTS = ("", "nan", "inf", "1e308", "1e-320", "0", "abc", '"', "1,5", "\x00", "360", " ", "-1")
+ODD_NAMES = ("time", "batch", "u", "v [kn]", "heading", "lat_deg", "wind_u_mps", "", "n1_rpm", "tau_x", "time_ms")
+
+
+def randomly_spoiled(rng: np.random.Generator) -> str:
+    """A trial with up to three random changes to names, cells and columns."""
+    count = int(rng.choice([1, 2, 3, 5, 80]))
+    columns = {name: values[:count] for name, values in texts(motion()).items()}
+    for _ in range(rng.integers(1, 4)):
+        name, odd = list(columns)[rng.integers(len(columns))], str(rng.choice(ODD_TEXTS))
+        match rng.integers(4):
+            case 0:
+                columns[name][rng.integers(count)] = odd
+            case 1:
+                columns[name][rng.integers(count) :] = [odd]
+            case 2:
+                columns[str(rng.choice(ODD_NAMES))] = columns.pop(name)
+            case _:
+                columns[name] = [odd] * count
+    return "\n".join([",".join(columns), *(",".join(row) for row in zip_longest(*columns.values(), fillvalue=""))])
+
+
+def test_whatever_is_in_a_file_it_loads_or_gives_one_line(tmp_path: Path) -> None:
+    rng, outcomes = np.random.default_rng(0), {"loaded": 0, "refused": 0}
+    for _ in range(400):
+        path = spoiled(tmp_path, randomly_spoiled(rng))
+        try:
+            record = load_records(path, velocity=str(rng.choice(VELOCITY_METHODS)))
+        except FileError as error:
+            outcomes["refused"] += 1
+            assert "\n" not in str(error)
+            continue
+        outcomes["loaded"] += 1
+        assert all(np.isfinite(batch.velocity).all() and np.isfinite(batch.inputs).all() for batch in record.batches)
+    assert min(outcomes.values()) > 40

@@ -21,6 +21,7 @@ GAPPY = 0.2
 """Share of intervals that may be gaps before the sampling counts as irregular."""
 SLOWEST_S = 20.0
 """No manoeuvre is sampled more slowly (IMO MSC/Circ.1053 asks for 20 s or less)."""
+FASTEST_S = 1e-4
 UNITS = ((1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds"), (1 / 60, "minutes"), (1 / 3600, "hours"))
 
 
@@ -109,6 +110,8 @@ def _check_increasing(table: Table, step: Array, announced: Mask) -> None:
 
 
 def _check_sample_time(table: Table, found_s: float, wanted_s: float | None, whose: str) -> None:
+    if found_s < FASTEST_S:
+        raise table.error("time_s", f"has a sample every {found_s:g} s, expected {FASTEST_S:g} s or more")
     if wanted_s is None:
         if found_s > SLOWEST_S:
             problem = f"has a sample every {found_s:g} s, expected at most {SLOWEST_S:g} s{_unit(found_s, None)}"

@@ -36,5 +36,5 @@ def motion_remarks(batches: list[Batch], origins: Mapping[str, str]) -> Iterator
         return
     u, v = np.sqrt(np.mean(np.vstack([batch.velocity[:, :2] for batch in batches]) ** 2, axis=0))
     if v > SIDEWAYS * u:
-        found = f"the ship moves {v / u:.3g} times as fast sideways as ahead"
+        found = f"the ship moves sideways at {v:.3g} m/s and ahead at {u:.3g} m/s, root mean square"
         yield f"{found}: are the axes of the pose what their names say?"

@@ -19,6 +19,8 @@ from expdesign.values import Array
 FIRST_ROW = 2
 MISSING = ("", "na", "n/a", "nan", "-nan", "null", "none")
 OPTIONAL = (("wind_u_mps", "wind_v_mps"), ("wind_speed_mps", "wind_angle_rad"), ("depth_m",))
+LARGEST = 1e15
+"""No measurement is near it; what is larger would only overflow further on."""
 LISTED = 3
 """Stretches of rows that a message names before it only counts."""
 
@@ -113,10 +115,11 @@ def _numbers(cells: Cells, source: Source) -> Array:
     if "_" in "".join(texts):
         row, text = next((row, text) for row, text in enumerate(texts, start=FIRST_ROW) if "_" in text)
         raise _not_a_number(cells, source, row, text)
-    infinite = np.isinf(values)
-    if infinite.any():
-        rows = rows_in_words(np.flatnonzero(infinite) + FIRST_ROW)
-        raise FileError(cells.path, source.header, f"is infinite in {rows}, expected finite numbers")
+    huge = np.abs(values) > LARGEST
+    if huge.any():
+        rows = rows_in_words(np.flatnonzero(huge) + FIRST_ROW)
+        found = "infinite" if np.isinf(values).any() else f"{values[int(np.argmax(huge))]:.6g}"
+        raise FileError(cells.path, source.header, f"is {found} in {rows}, expected finite numbers up to {LARGEST:g}")
     return values * source.factor if source.factor != 1.0 else values
 
 
