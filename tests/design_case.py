@@ -1,0 +1,118 @@
+"""Vessels, primitives and duration problems that the tests of the design floors share."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from expdesign.conventions import Array
+from expdesign.dictionary import Primitive, PrimitiveSpec, build_dictionary, complete_settings, family
+from expdesign.durations import DurationProblem
+from expdesign.scenario import load_dictionary, load_vessel
+from expdesign.vessel import Actuator, Limit, Vessel, VesselModel, structure_terms
+
+SCENARIOS = Path(__file__).resolve().parent.parent / "scenarios"
+FREE = Limit()
+
+
+@cache
+def vessel(name: str) -> Vessel:
+    """A vessel of the examples: model-ship, azimuth-30m, or one of them with -true."""
+    return load_vessel(SCENARIOS / "vessels" / f"{name}.toml")
+
+
+@cache
+def example_dictionary(name: str) -> tuple[Primitive, ...]:
+    """An example dictionary built with its vessel: model-ship or standard."""
+    ship = vessel({"model-ship": "model-ship", "standard": "azimuth-30m"}[name])
+    return build_dictionary(ship, load_dictionary(SCENARIOS / "dictionaries" / f"{name}.toml"))
+
+
+def spec(family_name: str, /, name: str = "", **settings: float) -> PrimitiveSpec:
+    """A request with defaults filled in."""
+    complete = complete_settings(family(family_name), settings)
+    return PrimitiveSpec(name=name or family_name, family=family_name, settings=complete)
+
+
+def force_actuator(limit: Limit = FREE) -> Actuator:
+    """Plain generalised forces, the same limit on all three."""
+    return Actuator(kind="force", number=1, limits=(limit, limit, limit))
+
+
+def azimuth(
+    number: int = 1, *, speed: Limit = FREE, angle: Limit = FREE, forward_m: float = 0.0, starboard_m: float = 0.0
+) -> Actuator:
+    """An azimuth thruster."""
+    return Actuator(kind="azimuth", number=number, forward_m=forward_m, starboard_m=starboard_m, limits=(speed, angle))
+
+
+def tunnel(number: int = 1, *, speed: Limit = FREE, forward_m: float = 0.0) -> Actuator:
+    """A tunnel thruster."""
+    return Actuator(kind="tunnel", number=number, forward_m=forward_m, limits=(speed,))
+
+
+def structured(structure: str, parameters: Array, actuators: tuple[Actuator, ...], **more: object) -> VesselModel:
+    """A model of a built-in structure; discrete at 1 s unless told otherwise."""
+    given = {"form": "discrete", "sample_time_s": 1.0, "parameter_std": np.zeros(len(parameters)), **more}
+    return VesselModel(terms=structure_terms(structure), parameters=parameters, actuators=actuators, **given)
+
+
+def with_limit(ship: Vessel, limit: Limit) -> Vessel:
+    """The same vessel moved by plain forces with one limit on all of them."""
+    return replace(ship, model=replace(ship.model, actuators=(force_actuator(limit),)))
+
+
+def resampled(ship: Vessel, sample_time_s: float) -> Vessel:
+    """The same vessel, in continuous form, commanded at another sample time."""
+    model = replace(
+        ship.model, parameters=ship.model.parameters / ship.model.time_scale_s, form="continuous", sample_time_s=1.0
+    )
+    return replace(ship, model=model, sample_time_s=sample_time_s)
+
+
+def duration_problem(
+    matrices: Array | Sequence[Array],
+    *,
+    means: int = 0,
+    run_s: float | Sequence[float] = 1.0,
+    total_s: float = 1000.0,
+) -> DurationProblem:
+    """A problem from bare matrices (q, d, d), of which the last `means` rows hold means."""
+    stack = np.array(matrices, dtype=float)
+    count, size = stack.shape[:2]
+    return DurationProblem(
+        names=tuple(f"primitive {index}" for index in range(count)),
+        parameters=tuple(f"parameter {index}" for index in range(size - means)),
+        mean_subtraction="complete" if means else "none",
+        matrices=stack,
+        run_s=np.broadcast_to(run_s, (count,)),
+        total_s=total_s,
+    )
+
+
+def random_matrices(rng: np.random.Generator, *, count: int, parameters: int, outputs: int, samples: int) -> Array:
+    """(count, p + n, p + n) [[X, Y], [Y^T, I]] of regressors drawn around a random offset, one output each."""
+    output = np.arange(parameters) % outputs
+    same = output[:, None] == output
+    member = output[:, None] == np.arange(outputs)
+    matrices = []
+    for _ in range(count):
+        rows = rng.standard_normal((samples, parameters)) + rng.standard_normal(parameters)
+        X, Y = same * (rows.T @ rows) / samples, member * rows.mean(axis=0)[:, None]
+        matrices.append(np.block([[X, Y], [Y.T, np.eye(outputs)]]))
+    return np.array(matrices)
+
+
+def one_line(error: object) -> bool:
+    """Whether an error reads as one line of bearable length."""
+    return "\n" not in str(error) and 0 < len(str(error)) < 400
+
+
+def closeness(value: float) -> float:
+    """Rounding allowed to a number of this size after a few hundred operations."""
+    return 1e3 * math.ulp(max(abs(value), 1.0))
