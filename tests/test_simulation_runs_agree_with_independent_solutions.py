@@ -1,6 +1,7 @@
 """Runs agree with an independent solver, converge at their order, and do the same alone as together."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -64,7 +65,6 @@ def test_runge_kutta_agrees_with_an_adaptive_solver_of_equations_written_out():
     coarse, fine = (states(simulate(SHIP, commands, **START, environment=SEA, substeps=n)) for n in (8, 16))
     # Halving the step takes most of the error away, also where moduli cost order; what it changed bounds what is left.
     assert np.abs(fine - exact).max() <= np.abs(coarse - fine).max()
-    assert np.abs(fine - exact).max() < 1e-5
 
 
 @pytest.mark.parametrize(("integrator", "order", "substeps"), [("rk4", 4, 4), ("euler", 1, 64)])
@@ -75,7 +75,7 @@ def test_integrators_converge_at_their_order(integrator: str, order: int, subste
     calm = Environment(current_to=np.zeros(2), wind_to=np.zeros(2))
     runs = [states(simulate(SHIP, commands, **start, environment=calm, integrator=integrator, substeps=n * substeps))
             for n in (1, 2, 4)]  # fmt: skip
-    first, second = (np.abs(a - b).max() for a, b in zip(runs, runs[1:], strict=False))
+    first, second = (np.abs(a - b).max() for a, b in pairwise(runs))
     assert np.log2(first / second) == pytest.approx(order, abs=0.2)
 
 

@@ -45,14 +45,14 @@ def test_expressions_know_what_they_read_and_what_their_moduli_hold():
 
 
 REFUSED = {
-    "call": ["sqrt(u)", "__import__('os')", "eval('u')", "abs(u, v)", "abs()", "abs(x=u)", "abs(*u)", "(abs)(u)(v)", "1(2)"],
+    "call": ["sqrt(u)", "__import__('os')", "eval('u')", "abs(u, v)", "abs()", "abs(x=u)", "abs(*u)", "abs(u)(v)"],
     "attribute": ["u.real", "(u).__class__", "abs.real(u)"],
     "power and division": ["u**2", "u/v", "u//v", "u%v", "u@v", "u<<2"],
     "comparison and choice": ["u<v", "u==v", "u if v else r", "u and v", "not u"],
     "name": ["x", "abs", "U", "tau_x", "u1", "None"],
-    "number": ["1e999", "-1e999", "1" + "0" * 400, "1" + "0" * 5000, "5" + "0" * 308, "1j", "True", "False", "nan", "inf"],
-    "other syntax": ["", " ", "u +", "u v", "u, v", "[u]", "{u}", "u[0]", "lambda: u", "u := v", "u = v", "+u", "~u", "*u",
-                     "f'{u}'", "'u'", "...", "u\x00", "u; v", "import os", "1and u", "(yield u)", "u # v\n+ r\n)",
+    "number": ["1e999", "-1e999", "1" + "0" * 400, "1" + "0" * 5000, "5" + "0" * 308, "1j", "True", "nan", "inf"],
+    "other syntax": ["", " ", "u +", "u v", "u, v", "[u]", "{u}", "u[0]", "lambda: u", "u := v", "u = v", "+u", "1(2)",
+                     "*u", "~u", "f'{u}'", "'u'", "...", "u\x00", "u; v", "import os", "1and u", "(yield u)", "u # v\n+ r\n)",
                      "[u for u in v]", "await u", "\\", "\ud800"],
     "nesting": ["(" * 300 + "u" + ")" * 300, "-" * 60 + "u", "-" * 3000 + "u", "+".join(["u"] * 60),
                 "+".join(["u"] * 3000), "abs(" * 60 + "u" + ")" * 60, "(lambda:" * 90 + "u" + ")" * 90],

@@ -1,4 +1,4 @@
-"""Regressors and accelerations are those of the thesis, in every kind of number, in both forms, and mirror-symmetric."""
+"""Regressors and accelerations are those of the thesis, in every kind of number and both forms, and have mirrors."""
 
 from dataclasses import replace
 
@@ -14,6 +14,7 @@ from expdesign.vessel import NUMPY, SCALAR, STRUCTURES, Operators, Term, VesselM
 
 CASADI = Operators(casadi.fabs, casadi.sin, casadi.cos)
 FORCES = (force_actuator(),)
+TEN = STRUCTURES["manoeuvring-10"]
 
 
 def random_state(rng: np.random.Generator) -> tuple[list[float], list[float], list[float]]:
