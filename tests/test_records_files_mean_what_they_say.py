@@ -267,6 +267,13 @@ def test_files_with_the_same_name_are_told_apart(tmp_path: Path) -> None:
     assert [batch.name for batch in load_records(paths).batches] == [str(path) for path in paths]
 
 
+def test_files_share_the_notes_that_are_the_same(tmp_path: Path) -> None:
+    data = motion()
+    paths = [write_trial(tmp_path / f"{name}.csv", data | {"leg": data["u_mps"]}) for name in "abc"]
+    assert load_records(paths[:2]).notes == ("a.csv and 1 more file: ignored leg",)
+    assert load_records(paths).notes == ("a.csv and 2 more files: ignored leg",)
+
+
 def test_dead_sensors_and_idle_inputs_are_noted(tmp_path: Path) -> None:
     data = motion()
     record = loaded(tmp_path, data | {"wind_speed_mps": 0 * data["u_mps"] + 3, "n1_rps": 0 * data["u_mps"] + 5})

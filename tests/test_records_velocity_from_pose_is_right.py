@@ -158,4 +158,4 @@ def test_a_track_that_goes_sideways_is_noted(tmp_path: Path) -> None:
     data = motion()
     names = ("time_s", "north_m", "east_m", "n1_rps")
     path = write_trial(tmp_path / "trial.csv", {n: data[n] for n in names} | {"heading_rad": data["heading_rad"] + 1.4})
-    assert load_records(path).notes[-1].startswith("trial.csv: the ship moves sideways at 1.9")
+    assert load_records(path).notes[-1].startswith("trial.csv: the ship moves sideways at 2 m/s and ahead at 0.434 m/s")

@@ -67,7 +67,7 @@ def load_records(
     inputs = Inputs(tuple(map(column_name, vessel_inputs)), "the vessel") if vessel_inputs is not None else None
     whose, origin = "the vessel", None
     batches: list[Batch] = []
-    notes: list[str] = []
+    notes: dict[str, list[str]] = {}
     for path, name in files.items():
         table, origin = _read(path, inputs, origin)
         clock = read_clock(table, sample_time_s=sample_time_s, whose=whose)
@@ -76,8 +76,16 @@ def load_records(
         inputs = inputs or Inputs(table.inputs, f"the first file ({name})")
         found, told = _batches(_judged(table, clock, request), name, clock, request, inputs)
         batches += found
-        notes += [f"{name}: {note}" for note in told]
-    return Record(batches=tuple(batches), notes=tuple(notes))
+        for note in told:
+            notes.setdefault(note, []).append(name)
+    return Record(batches=tuple(batches), notes=tuple(f"{_listed(names)}: {note}" for note, names in notes.items()))
+
+
+def _listed(names: list[str]) -> str:
+    """File names in front of a note that they share."""
+    if len(names) == 1:
+        return names[0]
+    return f"{names[0]} and {len(names) - 1} more file{'s' if len(names) > 2 else ''}"
 
 
 def _names(paths: Sequence[Path | str] | Path | str) -> dict[Path, str]:
