@@ -91,7 +91,7 @@ def test_latitudes_become_metres_from_the_first_position_of_the_first_file(tmp_p
     north, east = record.batches[0].pose[:, 0], record.batches[1].pose[0, 1]
     assert np.abs(north - 111_412 * (lat - 60)).max() < 0.1  # length of a degree of latitude there, WGS84
     assert east == pytest.approx(0.01 * 55_800, rel=1e-3)  # and of longitude
-    assert record.notes[0] == "a.csv: north_m and east_m are metres from lat_deg 60, lon_deg 25"
+    assert record.notes[0] == "a.csv and 1 more file: north_m and east_m are metres from lat_deg 60, lon_deg 25"
 
 
 def test_a_track_over_the_date_line_is_continuous(tmp_path: Path) -> None:
@@ -257,6 +257,7 @@ def test_inputs_come_in_the_order_of_the_vessel(tmp_path: Path) -> None:
     assert record.notes == ("trial.csv: ignored tau_x",)
     assert load_records(path, vessel_inputs=("tau_x",)).batches[0].input_names == ("tau_x",)
     assert load_records(path).batches[0].input_names == ("n1", "rudder1", "tau_x")
+    assert load_records(path, vessel_inputs=()).batches[0].inputs.shape == (80, 0)
 
 
 def test_files_with_the_same_name_are_told_apart(tmp_path: Path) -> None:

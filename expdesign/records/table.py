@@ -65,8 +65,10 @@ class Table:
 
     def stack(self, *names: str) -> Array:
         """Columns side by side, (k, m); nan where one is not there."""
-        absent = np.full(len(self), np.nan)
-        return np.stack([self.columns.get(name, absent) for name in names], axis=-1)
+        columns = np.full((len(self), len(names)), np.nan)
+        for index, name in enumerate(names):
+            columns[:, index] = self.columns.get(name, np.nan)
+        return columns
 
     def found(self, name: str, wrong: Mask, also: str) -> str:
         """The first wrong value with its row, and the other rows where a mask (k,) is set: `is 7 in row 3 (...)`."""
