@@ -74,7 +74,7 @@ class InstrumentModel:
         ]
         return np.concatenate(parts)
 
-    def _batch(self, batch: Batch, parameters: Array, used: Array) -> Array:
+    def _batch(self, batch: Batch, parameters: Array, used: Integers) -> Array:
         model, wind = self.layout.model, self.layout.predictor.wind
         states = self.replay.states(batch, parameters)
         psi = states[:, 2] if self.heading == "simulated" else carried_heading(heading_of(batch), states[:, 2])

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from expdesign.errors import InputError
-from expdesign.estimation.polynomial import MOVING, Algebra, Polynomial, Table, symbol
+from expdesign.estimation.polynomial import MOVING, Algebra, Polynomial, Table, lift, symbol
 from expdesign.vessel import VesselModel
 from expdesign.vessel.expressions import Expression
 
@@ -88,7 +88,7 @@ def symbolic(expression: Expression, algebra: Algebra, *, wind_measured: bool) -
     table: dict[str, Polynomial] = {name: symbol(name) for name in expression.signals}
     if not wind_measured:
         table |= {f"{name}_q": symbol(name) for name in MOVING}
-    return Polynomial({}) + expression.evaluate(table, algebra.operators)
+    return lift(expression.evaluate(table, algebra.operators))
 
 
 def batch_signs(regressors: Sequence[Nuisance], table: Table) -> dict[str, float]:

@@ -30,24 +30,24 @@ class Polynomial:
 
     def __add__(self, other: Polynomial | float) -> Polynomial:
         total = dict(self.terms)
-        for monomial, coefficient in _lift(other).terms.items():
+        for monomial, coefficient in lift(other).terms.items():
             total[monomial] = total.get(monomial, 0.0) + coefficient
         return Polynomial({monomial: value for monomial, value in total.items() if value})
 
     def __mul__(self, other: Polynomial | float) -> Polynomial:
         total = Polynomial({})
         for left, a in self.terms.items():
-            total = total + Polynomial({_product(left, right): a * b for right, b in _lift(other).terms.items()})
+            total = total + Polynomial({_product(left, right): a * b for right, b in lift(other).terms.items()})
         return total
 
     def __neg__(self) -> Polynomial:
         return self * -1.0
 
     def __sub__(self, other: Polynomial | float) -> Polynomial:
-        return self + -_lift(other)
+        return self + -lift(other)
 
     def __rsub__(self, other: float) -> Polynomial:
-        return _lift(other) - self
+        return lift(other) - self
 
     __radd__, __rmul__ = __add__, __mul__
 
@@ -127,7 +127,7 @@ class Algebra:
         return Operators(self._modulus, lambda x: self._opaque("sin", x), lambda x: self._opaque("cos", x))
 
     def _modulus(self, inside: Polynomial | float) -> Polynomial:
-        inner = _lift(inside)
+        inner = lift(inside)
         if not inner.signals & set(MOVING):
             return self._opaque("abs", inner)
         name = f"sign({inner})"
@@ -136,7 +136,7 @@ class Algebra:
         return symbol(name) * inner
 
     def _opaque(self, function: str, inside: Polynomial | float) -> Polynomial:
-        inner = _lift(inside)
+        inner = lift(inside)
         if inner.signals & set(MOVING):
             raise InputError(f"{function}({inner}) is not of second order in the velocities")
         name = f"{function}({inner})"
@@ -145,7 +145,8 @@ class Algebra:
         return symbol(name)
 
 
-def _lift(value: Polynomial | float) -> Polynomial:
+def lift(value: Polynomial | float) -> Polynomial:
+    """A number as a polynomial."""
     if isinstance(value, Polynomial):
         return value
     return Polynomial({(): float(value)} if value else {})

@@ -74,7 +74,7 @@ class Ensemble:
     @property
     def runs(self) -> int:
         """Number of runs."""
-        return self.velocity.shape[1]
+        return int(self.velocity.shape[1])
 
     def batch(self, run: int) -> Batch:
         """What was measured in one run."""
