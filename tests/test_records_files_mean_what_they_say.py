@@ -116,11 +116,12 @@ def test_columns_that_mean_nothing_here_are_ignored_whatever_they_hold(tmp_path:
     columns = texts(motion())
     columns["thrust1_N"] = ["x"] * 80
     columns["leg"] = ['"turn, to port"'] * 80
+    columns['"true\nwind"'] = ["1"] * 80
     columns[""] = [""] * 80
     path = tmp_path / "trial.csv"
     path.write_text(csv_text(columns), encoding="utf-8")
     record = load_records(path)
-    assert record.notes == ("trial.csv: ignored thrust1_N, leg, column 15",)
+    assert record.notes == ("trial.csv: ignored thrust1_N, leg, true wind, column 16",)
     assert same(only(record), only(loaded(tmp_path, motion())))
 
 

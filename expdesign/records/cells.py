@@ -20,7 +20,7 @@ class Cells:
 
     Attributes:
         path: the file.
-        header: names in row 1, without surrounding blanks.
+        header: names in row 1, on one line, without surrounding blanks.
         columns: for each name the texts of rows 2, 3, ...
     """
 
@@ -36,7 +36,7 @@ def read_cells(path: Path) -> Cells:
         FileError: unreadable, not UTF-8, empty, no header, another separator, or rows of another width.
     """
     rows = _rows(path, _text(path))
-    header = tuple(name.strip() for name in rows[0])
+    header = tuple(_one_line(name) for name in rows[0])
     _check_header(path, header)
     if len(rows) == 1:
         raise FileError(path, "", "has a header but no data, expected one row per sample")
@@ -47,6 +47,11 @@ def read_cells(path: Path) -> Cells:
 def shown(text: str) -> str:
     """A cell as it appears in messages: quoted, on one line, not too long."""
     return repr(text if len(text) <= LONGEST_SHOWN else text[:LONGEST_SHOWN] + "...")
+
+
+def _one_line(name: str) -> str:
+    """A column name with single blanks, cut where it gets longer than any name."""
+    return "".join(letter if letter.isprintable() else "?" for letter in " ".join(name.split()))[: 2 * LONGEST_SHOWN]
 
 
 def _text(path: Path) -> str:
