@@ -52,7 +52,7 @@ REFUSED = {
     "name": ["x", "abs", "U", "tau_x", "u1", "None"],
     "number": ["1e999", "-1e999", "1" + "0" * 400, "1" + "0" * 5000, "5" + "0" * 308, "1j", "True", "nan", "inf"],
     "other syntax": ["", " ", "u +", "u v", "u, v", "[u]", "{u}", "u[0]", "lambda: u", "u := v", "u = v", "+u", "1(2)",
-                     "*u", "~u", "f'{u}'", "'u'", "...", "u\x00", "u; v", "import os", "1and u", "(yield u)", "u # v\n+ r\n)",
+                     "*u", "~u", "f'{u}'", "'u'", "...", "u\x00", "u; v", "import os", "1and u", "(yield u)",
                      "[u for u in v]", "await u", "\\", "\ud800"],
     "nesting": ["(" * 300 + "u" + ")" * 300, "-" * 60 + "u", "-" * 3000 + "u", "+".join(["u"] * 60),
                 "+".join(["u"] * 3000), "abs(" * 60 + "u" + ")" * 60, "(lambda:" * 90 + "u" + ")" * 90],
