@@ -13,11 +13,15 @@ import numpy as np
 from expdesign.conventions import Array
 from expdesign.dictionary import Primitive, PrimitiveSpec, build_dictionary, complete_settings, family
 from expdesign.durations import DurationProblem
+from expdesign.information import PrimitiveInformation, score_primitives
 from expdesign.scenario import load_dictionary, load_vessel
+from expdesign.simulation import CALM, Environment
 from expdesign.vessel import Actuator, Limit, Vessel, VesselModel, structure_terms
 
 SCENARIOS = Path(__file__).resolve().parent.parent / "scenarios"
 FREE = Limit()
+WIND = Environment(wind_to=np.array([3.0, 2.0]), current_to=np.array([0.1, -0.2]))
+"""A sea in which every parameter of the full structure shows."""
 
 
 @cache
@@ -31,6 +35,13 @@ def example_dictionary(name: str) -> tuple[Primitive, ...]:
     """An example dictionary built with its vessel: model-ship or standard."""
     ship = vessel({"model-ship": "model-ship", "standard": "azimuth-30m"}[name])
     return build_dictionary(ship, load_dictionary(SCENARIOS / "dictionaries" / f"{name}.toml"))
+
+
+@cache
+def scored_example(name: str, sea: Environment = CALM) -> tuple[PrimitiveInformation, ...]:
+    """An example dictionary scored without mean subtraction; moments are the same with."""
+    ship = vessel({"model-ship": "model-ship", "standard": "azimuth-30m"}[name])
+    return score_primitives(ship, example_dictionary(name), environment=sea, mean_subtraction="none")
 
 
 def spec(family_name: str, /, name: str = "", **settings: float) -> PrimitiveSpec:
