@@ -15,7 +15,7 @@ from expdesign.errors import NoPlan
 from expdesign.plan.area import SeaArea
 from expdesign.plan.capability import Capability, capability
 from expdesign.plan.checks import verify_plan
-from expdesign.plan.field import ClearanceField, clearance_field, goal_field, narrowest_passage
+from expdesign.plan.field import ROUTING_CELLS, ClearanceField, clearance_field, goal_field, narrowest_passage
 from expdesign.plan.footprint import covering_discs, swept_area
 from expdesign.plan.legs import LegTask, LegWater, find_leg, leg_trajectory
 from expdesign.plan.placement import SearchSpace, Stamp, place_runs, refusing, stamp
@@ -277,10 +277,12 @@ def _at_rest(problem: PlanProblem, pose: Array) -> Array:
 def _reposition_bound_s(problem: PlanProblem, water: LegWater) -> float:
     """No plan with these runs repositions in less: the way to the goal less all that runs can carry, at top speed.
 
-    The way is measured for a hull that keeps the clearance abeam only, with the grid's error given away.
+    The way is measured for a hull that keeps the clearance abeam only. A cell counts as passable when any point nearer
+    to it than to its neighbours could be: clearance changes no faster than distance.
     """
-    narrow = problem.settings.clearance_m + problem.vessel.beam_m / 2 - water.field.error_m
-    way = goal_field(water.field, problem.goal[:2], clearance_m=max(narrow, 0.0))
+    coarse = water.field.thinned(ROUTING_CELLS)
+    narrow = problem.settings.clearance_m + problem.vessel.beam_m / 2 - water.field.error_m - coarse.error_m / 2
+    way = goal_field(coarse, problem.goal[:2], clearance_m=max(narrow, 0.0))
     current = float(np.hypot(*problem.environment.current_to))
     used = _repeats(problem)
     carried = sum(
