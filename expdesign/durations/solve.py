@@ -58,9 +58,16 @@ def solve_durations(problem: DurationProblem) -> DurationDesign:
     """The D-optimal time fractions, whole runs, and the proof of both.
 
     Raises:
+        NotInformative: no shares inform about every parameter.
         NoAnswer: the certificate cannot be brought below `LARGEST_GAP`, or whole runs do not fit.
     """
-    matrices, _ = whitened(problem.matrices)
+    try:
+        matrices, _ = whitened(problem.matrices)
+    except np.linalg.LinAlgError:
+        raise NotInformative(
+            "all primitives together do not inform about every parameter, to working precision",
+            parameters=problem.parameters,
+        ) from None
     start = maximise_log_det(matrices)
     if start is None:
         start = np.full(len(problem.names), 1.0 / len(problem.names))

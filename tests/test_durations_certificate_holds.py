@@ -1,0 +1,206 @@
+"""The durations are optimal, proven from the problem, and no independent search finds better ones."""
+
+import cvxpy
+import numpy as np
+import pytest
+from design_case import WIND, duration_problem, random_matrices, scored_example, vessel
+from scipy.optimize import minimize
+
+from expdesign.durations import (
+    DurationDesign,
+    DurationProblem,
+    _cvxpy,
+    build_durations,
+    log_det,
+    sensitivities,
+    solve,
+    solve_durations,
+)
+from expdesign.durations.certificate import scaled
+from expdesign.information import MEAN_SUBTRACTIONS
+from expdesign.simulation import CALM
+from expdesign.values import Array
+
+CERTIFICATE = 1e-6
+"""Relative to the dimension: what a certificate must reach to be given out."""
+EXAMPLES = {"model-ship": ("model-ship", CALM, 450.0), "standard": ("azimuth-30m", WIND, 3600.0)}
+subtractions = pytest.mark.parametrize("subtraction", MEAN_SUBTRACTIONS)
+dictionaries = pytest.mark.parametrize("dictionary", EXAMPLES)
+
+
+def example(dictionary: str, subtraction: str = "complete") -> DurationProblem:
+    """The duration problem of an example scenario's dictionary."""
+    ship, sea, total_s = EXAMPLES[dictionary]
+    return build_durations(
+        scored_example(dictionary, sea), vessel(ship).model.names, total_s=total_s, mean_subtraction=subtraction
+    )
+
+
+def certificate(design: DurationDesign) -> float:
+    """max_q trace(B^-1 B_q) / dimension - 1, from the problem alone, in other arithmetic than the package's."""
+    matrices, _ = scaled(design.problem.matrices)
+    B = np.tensordot(design.fractions, matrices, axes=1)
+    values, vectors = np.linalg.eigh(B)
+    half = vectors / np.sqrt(values)
+    return float(max(np.sum(half * (Bq @ half)) for Bq in matrices) / design.problem.dimension - 1.0)
+
+
+def solved(problem: DurationProblem) -> DurationDesign:
+    """The design, checked to be one."""
+    design = solve_durations(problem)
+    assert design.fractions.sum() == pytest.approx(1.0, abs=1e-12)
+    assert (design.fractions >= 0).all()
+    assert design.gap_relative < CERTIFICATE
+    return design
+
+
+@dictionaries
+@subtractions
+def test_the_examples_are_certified(dictionary: str, subtraction: str):
+    design = solved(example(dictionary, subtraction))
+    assert certificate(design) < CERTIFICATE
+    np.testing.assert_allclose(design.fractions @ design.sensitivities, design.problem.dimension, rtol=1e-9)
+    used = design.fractions > 1e-6
+    np.testing.assert_allclose(design.sensitivities[used], design.problem.dimension, rtol=1e-3)
+    assert design.log_det_bound == design.log_det + design.gap
+
+
+@pytest.mark.parametrize("draw", range(200))
+def test_random_problems_are_certified(draw: int):
+    rng = np.random.default_rng(draw)
+    outputs = int(rng.integers(1, 4))
+    parameters = int(rng.integers(outputs, 13))
+    count = int(rng.integers(3, 41))
+    samples = int(rng.integers(max(2, 2 * parameters // count + 2), 3 * parameters + 3))
+    matrices = random_matrices(rng, count=count, parameters=parameters, outputs=outputs, samples=samples)
+    if draw % 4 in (1, 3) and parameters > outputs:  # two parameters that can hardly be told apart
+        mix = np.eye(parameters + outputs)
+        mix[outputs, 0], mix[outputs, outputs] = 1.0, 1e-4
+        matrices = mix @ matrices @ mix.T
+    if draw % 4 in (2, 3):  # units that spread the parameters over eight decades
+        units = np.r_[10.0 ** rng.uniform(-4, 4, parameters), np.ones(outputs)]
+        matrices = matrices * np.outer(units, units)
+    assert certificate(solved(duration_problem(matrices, means=outputs))) < CERTIFICATE
+
+
+@pytest.mark.parametrize("count", [200, 1000])
+def test_large_dictionaries_are_certified(count: int):
+    matrices = random_matrices(np.random.default_rng(count), count=count, parameters=18, outputs=3, samples=12)
+    problem = duration_problem(matrices, means=3)
+    assert certificate(solved(problem)) < CERTIFICATE
+
+
+@dictionaries
+def test_the_weighted_mean_of_the_sensitivities_is_the_dimension_at_any_design(dictionary: str):
+    problem = example(dictionary)
+    matrices, _ = scaled(problem.matrices)
+    for draw in range(20):
+        w = np.random.default_rng(draw).dirichlet(np.ones(len(matrices)))
+        assert w @ sensitivities(matrices, w) == pytest.approx(problem.dimension, rel=1e-7)
+
+
+@dictionaries
+def test_the_sensitivities_are_the_slope_of_the_log_det(dictionary: str):
+    matrices, _ = scaled(example(dictionary).matrices)
+    w = np.full(len(matrices), 1 / len(matrices))
+    step = 1e-5 * np.eye(len(matrices))
+    slope = [(log_det(matrices, w + e) - log_det(matrices, w - e)) / 2e-5 for e in step]
+    # A central difference errs by step^2 times the third derivative, here of the order of (d_q / w_q) squared at most.
+    np.testing.assert_allclose(slope, sensitivities(matrices, w), rtol=1e-5)
+
+
+def schur_cost(problem: DurationProblem, w: Array) -> float:
+    """Minus log det(T - S Zbar^T), thesis (7.57), in scaled parameters."""
+    p = len(problem.parameters)
+    matrices, _ = scaled(problem.matrices)
+    B = np.tensordot(w, matrices, axes=1)
+    T, S, means = B[:p, :p], B[:p, p:], B[p:, p:]
+    sign, value = np.linalg.slogdet(T - S @ np.linalg.solve(means, S.T))
+    return -float(value + np.linalg.slogdet(means)[1]) if sign > 0 else 1e9
+
+
+def best_of_local_searches(problem: DurationProblem, starts: int) -> float:
+    """The largest log det that sequential quadratic programming finds from random starts on (7.57)."""
+    count = len(problem.names)
+    total = {"type": "eq", "fun": lambda w: w.sum() - 1.0}
+    rng = np.random.default_rng(0)
+    found = [
+        minimize(lambda w: schur_cost(problem, w), rng.dirichlet(np.ones(count)), method="SLSQP",
+                 bounds=[(0.0, 1.0)] * count, constraints=[total], options={"maxiter": 300, "ftol": 1e-12})
+        for _ in range(starts)
+    ]  # fmt: skip
+    return max(-schur_cost(problem, np.clip(r.x, 0, None) / np.clip(r.x, 0, None).sum()) for r in found)
+
+
+@pytest.mark.filterwarnings("ignore:Values in x were outside bounds")
+@dictionaries
+def test_local_searches_on_the_published_cost_find_the_same_and_nothing_better(dictionary: str):
+    problem = example(dictionary)
+    own = -schur_cost(problem, solved(problem).fractions)
+    best = best_of_local_searches(problem, 20)
+    assert best < own + 1e-7
+    assert best == pytest.approx(own, abs=1e-4)  # finite differences in the search cost it digits
+
+
+@pytest.mark.filterwarnings("ignore:Values in x were outside bounds")
+@pytest.mark.parametrize("draw", range(10))
+def test_local_searches_find_nothing_better_on_random_problems(draw: int):
+    matrices = random_matrices(np.random.default_rng(draw), count=8, parameters=4, outputs=2, samples=4)
+    problem = duration_problem(matrices, means=2)
+    assert best_of_local_searches(problem, 20) < -schur_cost(problem, solved(problem).fractions) + 1e-7
+
+
+@dictionaries
+def test_no_design_beats_the_bound(dictionary: str):
+    problem = example(dictionary)
+    design = solved(problem)
+    matrices, offset = scaled(problem.matrices)
+    rng = np.random.default_rng(0)
+    for _ in range(200):
+        w = rng.dirichlet(np.full(len(matrices), rng.choice([0.1, 1.0])))
+        assert log_det(matrices, w) + offset <= design.log_det_bound + 1e-9
+
+
+@dictionaries
+@pytest.mark.parametrize("seed", range(3))
+def test_units_of_the_parameters_do_not_change_the_shares(dictionary: str, seed: int):
+    problem = example(dictionary)
+    p = len(problem.parameters)
+    units = np.r_[10.0 ** np.random.default_rng(seed).uniform(-6, 6, p), np.ones(problem.dimension - p)]
+    there = duration_problem(
+        problem.matrices * np.outer(units, units), means=3, run_s=problem.run_s.tolist(), total_s=problem.total_s
+    )
+    here, there = solved(problem), solved(there)
+    np.testing.assert_allclose(there.fractions, here.fractions, atol=1e-6)
+    assert there.repeats == here.repeats
+    assert there.log_det - here.log_det == pytest.approx(2 * np.log(units).sum(), abs=1e-6)
+    assert there.efficiency_uniform == pytest.approx(here.efficiency_uniform, rel=1e-6)
+
+
+def test_the_order_of_primitives_does_not_change_their_shares():
+    matrices = random_matrices(np.random.default_rng(5), count=12, parameters=5, outputs=2, samples=5)
+    order = np.random.default_rng(6).permutation(12)
+    here, there = solved(duration_problem(matrices, means=2)), solved(duration_problem(matrices[order], means=2))
+    np.testing.assert_allclose(there.fractions, here.fractions[order], atol=1e-6)
+
+
+@pytest.mark.parametrize("answer", [None, np.eye(11)[0]], ids=["none", "corner"])
+def test_the_certificate_does_not_depend_on_the_outside_solver(monkeypatch: pytest.MonkeyPatch, answer: Array | None):
+    usual = solved(example("model-ship"))
+    monkeypatch.setattr(solve, "maximise_log_det", lambda matrices: answer)
+    alone = solved(example("model-ship"))
+    assert certificate(alone) < CERTIFICATE
+    np.testing.assert_allclose(alone.fractions, usual.fractions, atol=1e-6)
+
+
+def test_an_outside_solver_that_fails_or_finds_nothing_says_so(monkeypatch: pytest.MonkeyPatch):
+    matrices = random_matrices(np.random.default_rng(0), count=4, parameters=2, outputs=1, samples=4)
+
+    def fail(self: cvxpy.Problem, **options: object) -> None:
+        raise cvxpy.error.SolverError("no")
+
+    assert _cvxpy.maximise_log_det(matrices) is not None
+    monkeypatch.setattr(cvxpy.Problem, "solve", fail)
+    assert _cvxpy.maximise_log_det(matrices) is None
+    monkeypatch.setattr(cvxpy.Problem, "solve", lambda self, **options: None)
+    assert _cvxpy.maximise_log_det(matrices) is None

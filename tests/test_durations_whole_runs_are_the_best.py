@@ -1,0 +1,170 @@
+"""Whole runs fit the time, keep what is needed, and are the best or nearly so."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+from design_case import WIND, duration_problem, one_line, random_matrices, scored_example, vessel
+
+from expdesign.durations import DurationDesign, DurationProblem, build_durations, solve_durations, with_repeats
+from expdesign.durations.certificate import scaled
+from expdesign.errors import NoAnswer, NotInformative
+from expdesign.values import Array
+
+
+def information(problem: DurationProblem, repeats: tuple[int, ...]) -> float:
+    """log det of the information collected, means taken off over all runs together; -inf when singular."""
+    p = len(problem.parameters)
+    matrices, _ = scaled(problem.matrices)
+    total = np.tensordot(np.array(repeats) * problem.run_s, matrices, axes=1)
+    collected = total[:p, :p]
+    if problem.dimension > p:
+        if not any(repeats):
+            return -np.inf
+        collected = collected - total[:p, p:] @ np.linalg.solve(total[p:, p:], total[p:, :p])
+    values = np.linalg.eigvalsh(collected)
+    return float(np.log(values).sum()) if values[0] > 1e-12 * values[-1] else -np.inf
+
+
+def best(problem: DurationProblem) -> float:
+    """The same of the best of all sets of whole runs."""
+    counts = [range(int(problem.total_s / run_s + 1e-9) + 1) for run_s in problem.run_s]
+    fitting = (runs for runs in product(*counts) if np.dot(runs, problem.run_s) <= problem.total_s + 1e-9)
+    return max(information(problem, runs) for runs in fitting)
+
+
+def loss(problem: DurationProblem, design: DurationDesign) -> float:
+    """1 - efficiency of the whole runs against the best whole runs."""
+    return 1 - float(np.exp((information(problem, design.repeats) - best(problem)) / len(problem.parameters)))
+
+
+def small_problem(draw: int, *, equal: bool) -> DurationProblem:
+    """Few primitives and a time that holds few runs, so that all sets can be tried."""
+    rng = np.random.default_rng(draw)
+    parameters, count = int(rng.integers(1, 4)), int(rng.integers(3, 6))
+    matrices = random_matrices(rng, count=count, parameters=parameters, outputs=1, samples=parameters + 1)
+    run_s = 10.0 if equal else rng.integers(5, 25, count).astype(float).tolist()
+    return duration_problem(matrices, means=1, run_s=run_s, total_s=float(rng.integers(50, 80)))
+
+
+def test_whole_runs_of_one_length_are_the_best_there_are():
+    losses = [loss(problem, solve_durations(problem)) for problem in (small_problem(d, equal=True) for d in range(40))]
+    assert max(losses) < 1e-9
+
+
+def test_whole_runs_of_different_lengths_are_mostly_the_best_and_never_far_from_it():
+    losses = [loss(problem, solve_durations(problem)) for problem in (small_problem(d, equal=False) for d in range(60))]
+    # Exchange finds a local optimum; `whole_runs` states how good those were on such problems.
+    assert np.mean(np.array(losses) < 1e-9) >= 0.9
+    assert max(losses) < 0.03
+
+
+@pytest.mark.parametrize("draw", range(20))
+def test_whole_runs_fit_and_leave_no_room_and_say_their_efficiency(draw: int):
+    problem = small_problem(draw, equal=draw % 2 == 0)
+    design = solve_durations(problem)
+    left = problem.total_s - np.dot(design.repeats, problem.run_s)
+    assert -1e-9 <= left < problem.run_s.min()
+    promised = design.log_det + len(problem.parameters) * np.log(problem.total_s)
+    assert len(design.repeats) == len(problem.names)
+    _, offset = scaled(problem.matrices)
+    ratio = np.exp((information(problem, design.repeats) + offset - promised) / len(problem.parameters))
+    assert design.efficiency_repeats == pytest.approx(ratio, rel=1e-9)
+    assert design.efficiency_repeats <= 1 + 1e-9
+
+
+@pytest.mark.parametrize("weak", [1.0, 1e-3, 1e-8])
+@pytest.mark.parametrize("total_s", [20.0, 50.0, 1000.0])
+def test_the_only_primitive_that_tells_of_a_parameter_is_never_dropped(weak: float, total_s: float):
+    rich = [np.diag([a, b, 0.0]) for a, b in ((3.0, 1.0), (1.0, 3.0), (2.0, 2.0))]
+    design = solve_durations(duration_problem([*rich, np.diag([0.0, 0.0, weak])], run_s=10.0, total_s=total_s))
+    assert design.repeats[3] >= 1
+    assert sum(design.repeats) == total_s / 10
+
+
+def test_a_long_run_that_is_needed_pushes_short_ones_out():
+    # 3 s runs would leave no room for the 40 s run that alone tells of the second parameter.
+    design = solve_durations(
+        duration_problem([np.diag([1.0, 0.0]), np.diag([0.0, 1e-6])], run_s=[3.0, 40.0], total_s=47)
+    )
+    assert design.repeats == (2, 1)
+
+
+@pytest.mark.parametrize(("run_s", "total_s"), [(60.0, 50.0), (30.0, 50.0)])
+def test_too_little_time_for_what_is_needed_has_no_answer(run_s: float, total_s: float):
+    matrices = [np.diag([1.0, 0.0]), np.diag([0.0, 1.0])]
+    with pytest.raises(
+        NoAnswer, match=rf"^design\.total_s is 50: whole runs .* shortest run takes {run_s:g} s"
+    ) as caught:
+        solve_durations(duration_problem(matrices, run_s=run_s, total_s=total_s))
+    assert one_line(caught.value)
+
+
+def test_just_enough_time_is_enough():
+    matrices = [np.diag([1.0, 0.0]), np.diag([0.0, 1.0])]
+    assert solve_durations(duration_problem(matrices, run_s=[20.0, 30.0], total_s=50.0)).repeats == (1, 1)
+
+
+def apportioned(fractions: Array, runs: int) -> Array:
+    """Efficient apportionment: F. Pukelsheim and S. Rieder, Biometrika 79 (1992), 763-770."""
+    support = np.flatnonzero(fractions > 1e-6)
+    w = fractions[support] / fractions[support].sum()
+    counts = np.ceil((runs - len(support) / 2) * w).astype(int)
+    while (left := runs - counts.sum()) != 0:
+        index = np.argmin(counts / w) if left > 0 else np.argmax((counts - 1) / w)
+        counts[index] += np.sign(left)
+    repeats = np.zeros(len(fractions), dtype=int)
+    repeats[support] = counts
+    return repeats
+
+
+@pytest.mark.parametrize(("count", "total_s"), [(12, 900.0), (60, 3600.0), (200, 6000.0)])
+def test_whole_runs_of_one_length_are_never_worse_than_efficient_apportionment(count: int, total_s: float):
+    matrices = random_matrices(np.random.default_rng(count), count=count, parameters=6, outputs=2, samples=8)
+    problem = duration_problem(matrices, means=2, run_s=60.0, total_s=total_s)
+    design = solve_durations(problem)
+    other = apportioned(design.fractions, int(total_s / 60))
+    assert other.sum() == sum(design.repeats)
+    assert information(problem, design.repeats) >= information(problem, tuple(other)) - 1e-9
+
+
+def test_many_candidates_of_different_lengths_are_rounded_better_than_downwards():
+    rng = np.random.default_rng(0)
+    matrices = random_matrices(rng, count=200, parameters=18, outputs=3, samples=12)
+    problem = duration_problem(matrices, means=3, run_s=rng.uniform(20, 120, 200).round().tolist(), total_s=3600.0)
+    design = solve_durations(problem)
+    down = np.floor(design.fractions * 3600.0 / problem.run_s).astype(int)
+    assert information(problem, design.repeats) > information(problem, tuple(down))
+    assert np.dot(design.repeats, problem.run_s) <= 3600.0
+
+
+@pytest.mark.parametrize(("dictionary", "sea", "total_s"), [("model-ship", None, 450.0), ("standard", WIND, 3600.0)])
+def test_no_swap_of_one_run_improves_the_examples(dictionary: str, sea: object, total_s: float):
+    items = scored_example(dictionary, *([sea] if sea else []))
+    names = vessel({"model-ship": "model-ship", "standard": "azimuth-30m"}[dictionary]).model.names
+    problem = build_durations(items, names, total_s=total_s)
+    design = solve_durations(problem)
+    here = information(problem, design.repeats)
+    for out, into in product(range(len(items)), repeat=2):
+        runs = np.array(design.repeats)
+        runs[out] -= 1
+        runs[into] += 1
+        if runs.min() >= 0 and runs @ problem.run_s <= total_s + 1e-9:
+            assert information(problem, tuple(runs)) <= here + 1e-8
+
+
+def test_given_repeats_are_measured_against_the_same_optimum():
+    problem = small_problem(3, equal=True)
+    design = solve_durations(problem)
+    again = with_repeats(design, design.repeats)
+    assert again.efficiency_repeats == design.efficiency_repeats
+    halved = with_repeats(design, tuple(2 * n for n in design.repeats))
+    assert halved.efficiency_repeats == pytest.approx(2 * design.efficiency_repeats)
+    with pytest.raises(NotInformative, match="do not inform about every parameter"):
+        with_repeats(design, (0,) * len(problem.names))
+
+
+def test_a_problem_without_information_about_a_parameter_has_no_answer():
+    with pytest.raises(NotInformative, match="do not inform about every parameter") as caught:
+        solve_durations(duration_problem([np.diag([1.0, 0.0]), np.diag([2.0, 0.0])]))
+    assert one_line(caught.value)
