@@ -6,6 +6,8 @@ between (`scored`, `designed`, `planned`) are for notebooks: value in, value out
 
 from __future__ import annotations
 
+import re
+import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from expdesign import __version__
+from expdesign.assessment import NO_TESTS, Assessment, Wish, assess
 from expdesign.conventions import Array
 from expdesign.dictionary import build_dictionary
 from expdesign.durations import DurationDesign, build_durations, solve_durations, with_repeats
@@ -23,7 +26,14 @@ from expdesign.export import (
     commands_csv,
     dictionary_json,
     durations_json,
+    estimate_json,
+    estimate_warnings,
+    estimated_vessel,
     find_format,
+    fit_entries,
+    fit_table,
+    parameter_entries,
+    parameter_table,
     plan_json,
     planned_track,
     read_plan,
@@ -31,13 +41,18 @@ from expdesign.export import (
     track_csv,
     write_files,
 )
+from expdesign.export.estimate_page import EstimateContent, estimate_html
 from expdesign.export.report import ReportContent, report_html
 from expdesign.information import PrimitiveInformation, estimated_parameters, score_primitives
 from expdesign.plan.solve import PlanProblem, plan_trial
 from expdesign.plan.values import Plan
+from expdesign.records import load_records
 from expdesign.scenario import Scenario, load_repeats, load_scenario, load_vessel
+from expdesign.signals import Record
 from expdesign.simulation import draw_environment, measure
 from expdesign.simulation import simulate as simulate_run
+from expdesign.vessel import Vessel, column_name
+from expdesign.vessel.structures import FORCE_SIGNALS
 
 Progress = Callable[[str, float], None]
 """(what is being done, share of the command done from 0 to 1)."""
@@ -54,10 +69,27 @@ class Outcome:
     Attributes:
         files: written, in the order of their contents.
         summary: key numbers, ready for JSON; units in the names.
+        tables: the same for people where key numbers are many.
     """
 
     files: tuple[Path, ...]
     summary: Mapping[str, object]
+    tables: tuple[TextTable, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class TextTable:
+    """A table for a terminal.
+
+    Attributes:
+        title: what it shows.
+        header: names of the columns.
+        rows: as many cells each.
+    """
+
+    title: str
+    header: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
 
 
 def run(scenario: Path, out: Path | None, *, seed: int = 0, progress: Progress = silent) -> Outcome:
@@ -154,6 +186,61 @@ def simulate(plan: Path, out: Path | None, *, truth: Path, seed: int = 0, progre
         "wind_to_east_mps": float(weather.wind_to[1]),
     }
     return Outcome(files=files, summary=summary)
+
+
+def estimate(
+    data: Sequence[Path],
+    out: Path | None,
+    *,
+    vessel: Path,
+    methods: Sequence[str] = (),
+    fixed: Sequence[str] = (),
+    velocity: str = "auto",
+    mean: str = "complete",
+    start: str = "auto",
+    tests: Sequence[Path] = (),
+    progress: Progress = silent,
+) -> Outcome:
+    """Parameters of a vessel from measured data, into `out` or runs/<first data file>."""
+    if not data:
+        raise InputError("no data files are given, expected one or more CSV files")
+    for path in tests:
+        if path in data:
+            raise InputError(f"{path} is given for estimation and for testing, expected one of the two")
+    progress("reading the data", 0.02)
+    ship = load_vessel(vessel)
+    wish = Wish(methods=tuple(methods), fixed=tuple(fixed), mean=mean, start=start)
+    record = measured(data, ship, velocity=velocity)
+    apart = measured(tests, ship, velocity=velocity) if tests else NO_TESTS
+    found = assess(ship, record, wish, tests=apart, progress=_within(progress, 0.1, 0.8))
+    progress("drawing the report", 0.8)
+    command = _estimate_command(data, vessel, wish, velocity, tests)
+    files = {
+        "estimate.json": estimate_json(found, ship),
+        "vessel-estimated.toml": estimated_vessel(found, ship, command=command),
+        "estimate.html": estimate_html(EstimateContent(vessel=ship, found=found, command=command, version=__version__)),
+    }
+    written = write_files(out or Path("runs") / data[0].stem, files)
+    progress("done", 1.0)
+    return Outcome(files=written, summary=_estimate_summary(found), tables=_estimate_tables(found))
+
+
+def measured(data: Sequence[Path], vessel: Vessel, *, velocity: str = "auto") -> Record:
+    """Measured data of a vessel: its own actuators' signals, or generalised forces where the first file has those.
+
+    A model in discrete form holds for one sample time, which the data must have; in continuous form any will do.
+    """
+    inputs, header = vessel.model.inputs, _header(data[0])
+    if not {column_name(name) for name in inputs} <= header and set(FORCE_SIGNALS) <= header:
+        inputs = FORCE_SIGNALS
+    return load_records(
+        list(data),
+        vessel_inputs=inputs,
+        sample_time_s=vessel.sample_time_s if vessel.model.form == "discrete" else None,
+        velocity=velocity,
+        heading_std_rad=vessel.sensors.heading_rad or None,
+        outputs=vessel.model.outputs,
+    )
 
 
 def scored(case: Scenario, *, progress: Progress = silent) -> tuple[PrimitiveInformation, ...]:
@@ -281,6 +368,50 @@ def _report(
     )
 
 
+def _header(path: Path) -> set[str]:
+    """Names in the first row; empty where the file cannot be read, of which the reader will complain."""
+    try:
+        with path.open(encoding="utf-8-sig") as file:
+            return {cell.strip(' "') for cell in re.split("[,;\t]", file.readline().strip())}
+    except (OSError, UnicodeDecodeError):
+        return set()
+
+
+def _estimate_command(data: Sequence[Path], vessel: Path, wish: Wish, velocity: str, tests: Sequence[Path]) -> str:
+    options = [("--method", wish.methods), ("--fixed", wish.fixed), ("--test", tests)]
+    spelled = [part for option, values in options if values for part in (option, *map(str, values))]
+    chosen = [("--velocity", velocity, "auto"), ("--mean", wish.mean, "complete"), ("--start", wish.start, "auto")]
+    spelled += [part for option, value, usual in chosen if value != usual for part in (option, value)]
+    return shlex.join(["expdesign", "estimate", *map(str, data), "--vessel", str(vessel), *spelled])
+
+
+def _estimate_summary(found: Assessment) -> dict[str, object]:
+    batches = found.record.batches
+    return {
+        "runs": len(batches),
+        "samples": sum(len(batch) for batch in batches),
+        "runs_kept_apart": len(found.tests.batches),
+        "vessel_file_holds": found.best.method.name,
+        "methods_left_out": list(found.left_out),
+        "methods": {
+            item.method.name: {
+                "parameters": parameter_entries(item),
+                "fit": fit_entries(item),
+                "warnings": len(estimate_warnings(found, item)),
+            }
+            for item in found.methods
+        },
+    }
+
+
+def _estimate_tables(found: Assessment) -> tuple[TextTable, ...]:
+    tables = (
+        ("Estimates, with standard deviations", parameter_table(found)),
+        ("Fit of the simulated output to the measured one, in per cent", fit_table(found)),
+    )
+    return tuple(TextTable(title=title, header=header, rows=tuple(rows)) for title, (header, rows) in tables)
+
+
 def _design_summary(design: DurationDesign) -> dict[str, object]:
     chosen = {name: count for name, count in zip(design.problem.names, design.repeats, strict=True) if count}
     return {
@@ -312,9 +443,12 @@ def _csv(columns: Mapping[str, Array]) -> str:
 __all__ = [
     "Outcome",
     "Progress",
+    "TextTable",
     "designed",
     "durations",
+    "estimate",
     "export",
+    "measured",
     "plan",
     "planned",
     "run",

@@ -17,7 +17,7 @@ FLOORS = (
     ("vessel",),
     ("simulation", "records"),
     ("dictionary", "estimation"),
-    ("information", "diagnosis"),
+    ("information", "diagnosis", "assessment"),
     ("durations",),
     ("plan",),
     ("scenario", "export"),
@@ -30,7 +30,7 @@ EXCEPTIONS = {("__main__", "cli")}  # `python -m` is nothing but the command lin
 IMPORTERS = {
     "cvxpy": ("durations/_cvxpy.py",),
     "ompl": ("plan/_ompl.py",),
-    "casadi": ("plan/_casadi.py",),
+    "casadi": ("estimation/_casadi.py", "plan/_casadi.py"),
     "matplotlib": ("export/",),
 }
 BANNED_CALLS = ("eval", "exec", "compile", "__import__", "import_module")

@@ -21,7 +21,16 @@ SUMMARY = {
     "verified": True,
     "parameters": ["X_u", "X_mu"],
 }
-COMMANDS = ("run", "score", "durations", "plan", "export", "simulate")
+ESTIMATE = {
+    "vessel": Path("v.toml"),
+    "methods": (),
+    "fixed": (),
+    "velocity": "auto",
+    "mean": "complete",
+    "start": "auto",
+    "tests": (),
+}
+COMMANDS = ("run", "score", "durations", "plan", "export", "simulate", "estimate")
 
 
 @dataclass
@@ -30,6 +39,7 @@ class Finished:
 
     files: tuple[Path, ...] = (Path("runs/a/plan.json"), Path("runs/a/report.html"))
     summary: dict[str, object] = field(default_factory=lambda: dict(SUMMARY))
+    tables: tuple[object, ...] = ()
 
 
 @dataclass
@@ -67,6 +77,19 @@ def workflows(monkeypatch: pytest.MonkeyPatch) -> Workflows:
         ("export p.json --format rtz gpx", "export", (Path("p.json"), None), {"formats": ("rtz", "gpx")}),
         ("export --format rtz p.json --format csv", "export", (Path("p.json"), None), {"formats": ("rtz", "csv")}),
         ("simulate p.json --truth v.toml", "simulate", (Path("p.json"), None), {"seed": 0, "truth": Path("v.toml")}),
+        ("estimate d.csv --vessel v.toml", "estimate", ((Path("d.csv"),), None), ESTIMATE),
+        (
+            "estimate a.csv b.csv --vessel v.toml --method ls iv --fixed X_u N_r --test c.csv d.csv --out o",
+            "estimate",
+            ((Path("a.csv"), Path("b.csv")), Path("o")),
+            ESTIMATE | {"methods": ("ls", "iv"), "fixed": ("X_u", "N_r"), "tests": (Path("c.csv"), Path("d.csv"))},
+        ),
+        (
+            "estimate --method iv a.csv --vessel v.toml --velocity smoothed --mean none --start ls",
+            "estimate",
+            ((Path("a.csv"),), None),
+            ESTIMATE | {"methods": ("iv",), "velocity": "smoothed", "mean": "none", "start": "ls"},
+        ),
     ],
 )
 def test_what_was_typed_reaches_the_workflow(

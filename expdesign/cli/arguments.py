@@ -10,17 +10,18 @@ from pathlib import Path
 from expdesign.errors import InputError
 
 
-def repeat_option(arguments: Sequence[str], option: str) -> list[str]:
+def repeat_option(arguments: Sequence[str], option: str, *, files: bool = False) -> list[str]:
     """Spell out a list of values: `--format rtz gpx` becomes `--format rtz --format gpx`.
 
-    A list ends at the next option and at anything that looks like a file, i.e. has a dot or a slash.
+    A list ends at the next option and, unless it lists files, at anything that looks like a file, i.e. has a dot or a
+    slash.
     """
     spelled, rest = [], list(arguments)
     while rest:
         spelled.append(rest.pop(0))
         if spelled[-1] == option and rest:
             first, *more = rest
-            values = [first, *takewhile(_looks_like_value, more)]
+            values = [first, *takewhile(_looks_like_file_or_value if files else _looks_like_value, more)]
             spelled += [values[0], *(part for value in values[1:] for part in (option, value))]
             rest = rest[len(values) :]
     return spelled
@@ -55,3 +56,7 @@ def check_out(out: Path | None) -> Path | None:
 
 def _looks_like_value(text: str) -> bool:
     return not text.startswith("-") and "." not in text and "/" not in text
+
+
+def _looks_like_file_or_value(text: str) -> bool:
+    return not text.startswith("-")

@@ -186,6 +186,89 @@ def simulate(
     )
 
 
+@app.command()
+def estimate(
+    data: Annotated[
+        list[Path], typer.Argument(metavar="DATA.csv ...", help="Measured runs; what is read is told in the README.")
+    ],
+    vessel: Annotated[
+        Path, typer.Option("--vessel", metavar="VESSEL.toml", help="Model structure, start values and sensors.")
+    ],
+    methods: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--method",
+            metavar="M ...",
+            help="One or more of: ls ls-air ls-augmented ls-wind iv iv-air iv-augmented iv-wind. When not given: ls "
+            "and iv, and those with wind where wind is measured and the model has terms for it.",
+        ),
+    ] = None,
+    fixed: Annotated[
+        list[str] | None,
+        typer.Option("--fixed", metavar="NAME ...", help="Parameters kept at the vessel file's values."),
+    ] = None,
+    tests: Annotated[
+        list[Path] | None,
+        typer.Option("--test", metavar="FILE ...", help="Runs kept apart: simulated, but not used to estimate."),
+    ] = None,
+    velocity: Annotated[
+        str,
+        typer.Option(
+            metavar="HOW",
+            help="Where u, v, r come from: measured; difference or smoothed from the pose; auto: measured where they "
+            "stand, else differences.",
+        ),
+    ] = "auto",
+    mean: Annotated[
+        str,
+        typer.Option(
+            metavar="HOW",
+            help="Mean taken off the instruments, against constant disturbances: complete, batch or none. Where an "
+            "input never changes only none lets its effect be seen.",
+        ),
+    ] = "complete",
+    start: Annotated[
+        str,
+        typer.Option(
+            metavar="HOW",
+            help="First instruments simulated with: nominal, the vessel file's values; ls, least squares; auto: "
+            "nominal, unless they are all zero or fail.",
+        ),
+    ] = "auto",
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", metavar="FOLDER", help="Where to write; runs/<first data file> when not given."),
+    ] = None,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> None:
+    """Estimate the model's parameters from measured data, with standard errors.
+
+    Writes estimate.json, vessel-estimated.toml and estimate.html.
+
+    Example: expdesign estimate zigzag.csv circle.csv --vessel ship.toml --method ls iv --test other.csv
+    """
+    from expdesign import workflows
+
+    _carry_out(
+        "estimate",
+        lambda tell: workflows.estimate(
+            tuple(data),
+            check_out(out),
+            vessel=vessel,
+            methods=tuple(methods or ()),
+            fixed=tuple(fixed or ()),
+            velocity=velocity,
+            mean=mean,
+            start=start,
+            tests=tuple(tests or ()),
+            progress=tell,
+        ),
+        quiet,
+        json,
+    )
+
+
 def _carry_out(name: str, work: Callable[[Progress], Outcome], quiet: bool, json: bool) -> None:
     """Do the work of one command and say what came of it."""
     with shown_progress(quiet=quiet) as progress:

@@ -18,6 +18,8 @@ from expdesign.cli.arguments import repeat_option
 from expdesign.cli.commands import app
 from expdesign.errors import InputError, NoAnswer
 
+LISTS = ("--format", "--method", "--fixed", "--test")
+"""Options that take several values."""
 DONE, BUG, WRONG_INPUT, NO_ANSWER, INTERRUPTED = 0, 1, 2, 3, 130
 
 
@@ -31,7 +33,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         Exit status: 0 done, 2 the input is wrong, 3 the input is fine but has no answer, 130 interrupted (Ctrl-C or
         a termination signal), 1 a defect of this program or a reader of the output that went away.
     """
-    arguments = repeat_option(sys.argv[1:] if argv is None else argv, "--format")
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    for option in LISTS:
+        arguments = repeat_option(arguments, option, files=option == "--test")
     try:
         with _termination_interrupts():
             return _invoke(arguments)

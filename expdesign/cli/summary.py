@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 if TYPE_CHECKING:
-    from expdesign.workflows import Outcome
+    from expdesign.workflows import Outcome, TextTable
 
 UNITS = {"s": "s", "m": "m", "mps": "m/s", "radps": "rad/s", "rad": "rad", "deg": "°", "kn": "kn", "rps": "1/s"}
 """Last part of a name -> unit as people write it."""
@@ -28,15 +28,33 @@ def print_summary(outcome: Outcome) -> None:
     """Key numbers as a table, then the files and the page to open."""
     console = Console(highlight=False, markup=False, soft_wrap=True)
     table = Table(show_header=False, box=None, padding=(0, 3, 0, 0))
-    for row in _rows(outcome.summary):
+    told = {key: value for key, value in outcome.summary.items() if not outcome.tables or _brief(value)}
+    for row in _rows(told):
         table.add_row(*row)
     if table.row_count:
         console.print(table)
         console.print()
+    for text in outcome.tables:
+        _print_table(console, text)
     for folder, names in _by_folder(outcome.files).items():
         console.print(f"Written to {folder}: {', '.join(names)}")
     for page in (path for path in outcome.files if path.suffix == ".html"):
         console.print(f"Open {page} in a browser.")
+
+
+def _brief(value: object) -> bool:
+    """Whether a value is worth a line where tables tell the rest."""
+    return not isinstance(value, Mapping) and value != []
+
+
+def _print_table(console: Console, text: TextTable) -> None:
+    """Title, header and rows, each line as long as it needs to be."""
+    widths = [max(map(len, column)) for column in zip(text.header, *text.rows, strict=True)]
+    console.print(text.title, style="bold")
+    for index, row in enumerate((text.header, *text.rows)):
+        line = "   ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        console.print(line, style="" if index else "underline")
+    console.print()
 
 
 def _rows(summary: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, str]]:

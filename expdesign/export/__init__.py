@@ -1,11 +1,21 @@
 """Results leave the package here: JSON and CSV, route files, and the report (in `expdesign.export.report`)."""
 
+from expdesign.export.estimates import (
+    estimate_json,
+    estimate_warnings,
+    estimated_vessel,
+    fit_entries,
+    fit_table,
+    parameter_entries,
+    parameter_table,
+)
 from expdesign.export.folder import write_files
 from expdesign.export.formats import FORMATS, Format, find_format, route_files
 from expdesign.export.planned import PlannedTrack, planned_track
 from expdesign.export.read_plan import read_plan
 from expdesign.export.results import commands_csv, dictionary_json, durations_json, plan_json, track_csv
 from expdesign.export.route import Route, Waypoint, build_route
+from expdesign.export.vessel_file import vessel_toml
 
 __all__ = [
     "FORMATS",
@@ -17,11 +27,19 @@ __all__ = [
     "commands_csv",
     "dictionary_json",
     "durations_json",
+    "estimate_json",
+    "estimate_warnings",
+    "estimated_vessel",
     "find_format",
+    "fit_entries",
+    "fit_table",
+    "parameter_entries",
+    "parameter_table",
     "plan_json",
     "planned_track",
     "read_plan",
     "route_files",
     "track_csv",
+    "vessel_toml",
     "write_files",
 ]

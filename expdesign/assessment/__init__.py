@@ -1,0 +1,19 @@
+"""Assessment: estimates put to the test, on the runs they come from and on runs kept apart."""
+
+from expdesign.assessment.assess import NO_TESTS, Wish, assess, default_methods
+from expdesign.assessment.residuals import OneStep, one_step
+from expdesign.assessment.runs import RunCheck, check_run
+from expdesign.assessment.values import Assessed, Assessment
+
+__all__ = [
+    "NO_TESTS",
+    "Assessed",
+    "Assessment",
+    "OneStep",
+    "RunCheck",
+    "Wish",
+    "assess",
+    "check_run",
+    "default_methods",
+    "one_step",
+]

@@ -1,0 +1,170 @@
+"""Estimate by several methods and check each: the choice of methods, of instruments, and of the one to go on with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from expdesign.assessment.residuals import one_step
+from expdesign.assessment.runs import ESTIMATION, TEST, check_run
+from expdesign.assessment.values import Assessed, Assessment
+from expdesign.errors import Diverged, InputError, NoAnswer, NotInformative, UnknownName
+from expdesign.estimation.excitation import check_excitation, worst_case
+from expdesign.estimation.methods import STARTS, Method, Settings, estimate, method_named
+from expdesign.estimation.predictors import PREDICTORS
+from expdesign.estimation.solution import Weighting
+from expdesign.estimation.tables import AIR
+from expdesign.estimation.values import Estimate
+from expdesign.estimation.zero_mean import MEANS
+from expdesign.signals import Record
+from expdesign.vessel import Vessel
+
+Progress = Callable[[str, float], None]
+AUTO = "auto"
+NO_TESTS = Record(batches=())
+USES_WIND = {item.name: item.wind for item in PREDICTORS}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wish:
+    """What is to be estimated, and how.
+
+    Attributes:
+        methods: names in `estimation.methods.METHODS`; empty for those that suit the data.
+        fixed: parameters held at the vessel's values.
+        mean: subtracted from the instruments: "none", "batch" or "complete".
+        start: of the first instruments: "nominal" for the vessel's values, "ls" for the least-squares estimate, "auto"
+            for the vessel's values unless they are all zero or fail.
+    """
+
+    methods: tuple[str, ...] = ()
+    fixed: tuple[str, ...] = ()
+    mean: str = "complete"
+    start: str = AUTO
+
+    def __post_init__(self) -> None:
+        for what, value, known in (("instrument mean", self.mean, MEANS), ("start", self.start, (AUTO, *STARTS))):
+            if value not in known:
+                raise UnknownName(what, value, known=known)
+
+
+def default_methods(vessel: Vessel, record: Record) -> tuple[str, ...]:
+    """Least squares and instrumental variables; before them those that use the wind, when measured and modelled."""
+    reads_air = any(set(AIR) & set(expression.signals) for expression in vessel.model.expressions)
+    if reads_air and all(batch.wind is not None for batch in record.batches):
+        return ("iv-wind", "iv-air", "ls-air", "iv", "ls")
+    return ("ls", "iv")
+
+
+def assess(
+    vessel: Vessel,
+    record: Record,
+    wish: Wish | None = None,
+    *,
+    tests: Record = NO_TESTS,
+    progress: Progress = lambda what, share: None,
+) -> Assessment:
+    """Estimate by every method and simulate every run with every estimate.
+
+    Methods that are named must succeed. Of the ones tried on our own account those with wind may fail, which is told.
+
+    Args:
+        vessel: structure, start values and sensors.
+        record: what the estimates come from.
+        wish: methods and what is held fixed.
+        tests: runs that are simulated but not used.
+        progress: told what is being done and the share done.
+
+    Raises:
+        InputError: the data lack what a method needs, or a name is unknown.
+        NotInformative: parameters that the data cannot tell apart; the message names them.
+        Diverged: no stable model to make instruments with.
+    """
+    wish = wish or Wish()
+    named = tuple(method_named(name) for name in dict.fromkeys(wish.methods))
+    chosen = named or tuple(method_named(name) for name in default_methods(vessel, record))
+    done: list[Assessed] = []
+    left_out: list[str] = []
+    for index, method in enumerate(chosen):
+        progress(f"estimating by {method.title}", index / len(chosen))
+        try:
+            done.append(_assessed(vessel, record, tests, method, wish))
+        except (InputError, NoAnswer) as error:
+            if named or not USES_WIND[method.predictor]:
+                raise _told(error, method) from None
+            left_out.append(f"Method {method.name} gave no estimate: {error}.")
+    return Assessment(
+        record=record,
+        tests=tests,
+        methods=tuple(done),
+        left_out=tuple(left_out),
+        chosen=_preferred(done),
+        mean=wish.mean,
+        fixed=wish.fixed,
+    )
+
+
+def _preferred(found: Sequence[Assessed]) -> int:
+    """The first with instruments whose model can simulate every run; the first such without; else the first of all.
+
+    Only instruments can be consistent when the regressors are noisy, and an unstable model is of no use.
+    """
+    stable = [index for index, item in enumerate(found) if item.stable]
+    return next((index for index in stable if found[index].method.instruments), (stable or [0])[0])
+
+
+def _told(error: InputError | NoAnswer, method: Method) -> InputError | NoAnswer:
+    """The same error with the method in front."""
+    if isinstance(error, NotInformative):
+        return NotInformative(f"method {method.name}: {error}", parameters=error.parameters)
+    if isinstance(error, Diverged):
+        return Diverged(f"method {method.name}: {error}")
+    return error
+
+
+def _assessed(vessel: Vessel, record: Record, tests: Record, method: Method, wish: Wish) -> Assessed:
+    found, start = _estimated(vessel, record, method, wish)
+    wind = USES_WIND[method.predictor]
+    model = found.model(vessel.model)
+    runs = [
+        check_run(model, batch, use=use, wind=wind)
+        for use, part in ((ESTIMATION, record), (TEST, tests))
+        for batch in part.batches
+    ]
+    breaches = check_excitation(record, vessel.model, worst=worst_case(vessel.sensors), wind_measured=wind)
+    return Assessed(
+        method=method,
+        estimate=found,
+        start=start,
+        model=model,
+        runs=tuple(runs),
+        one_step=one_step(record, vessel.model, found, fixed=wish.fixed),
+        breaches=breaches,
+    )
+
+
+def _estimated(vessel: Vessel, record: Record, method: Method, wish: Wish) -> tuple[Estimate, str]:
+    """The estimate, and what its first instruments came from: the vessel's values, or least squares where they fail."""
+
+    def attempt(start: str) -> Estimate:
+        weighting = Weighting(mean=wish.mean)
+        settings = Settings(fixed=wish.fixed, weighting=weighting, start=start)
+        return estimate(record, vessel.model, method=method.name, settings=settings)
+
+    nominal, ls = STARTS
+    if not method.instruments:
+        return attempt(nominal), ""
+    if wish.start != AUTO:
+        return attempt(wish.start), wish.start
+    if not vessel.model.parameters.any():
+        return _noted(attempt(ls), "those of the vessel file are all zero"), ls
+    try:
+        return attempt(nominal), nominal
+    except (Diverged, NotInformative) as error:
+        why = f"those of the vessel file fail: {error}"
+    return _noted(attempt(ls), why), ls
+
+
+def _noted(found: Estimate, why: str) -> Estimate:
+    note = f"The first instruments are simulated with the least-squares parameters, since {why}."
+    return replace(found, warnings=(*found.warnings, note))

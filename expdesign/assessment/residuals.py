@@ -1,0 +1,107 @@
+"""One-step residuals of an estimate: how much of the accelerations it explains, and what is left over time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from expdesign.estimation.methods import method_named
+from expdesign.estimation.predictors import build_layout, build_regression
+from expdesign.estimation.regression import Integers
+from expdesign.estimation.tables import model_for
+from expdesign.estimation.values import Estimate
+from expdesign.signals import Record
+from expdesign.values import Array, frozen_set, seal
+from expdesign.vessel import VesselModel
+
+LAGS = 60
+"""Longest lag of the autocorrelation, in samples."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class OneStep:
+    """Residuals nu(k) - nu(k - 1) - Phi(k - 1)^T theta, their mean taken off.
+
+    Attributes:
+        outputs: names.
+        residuals: (k, n) in the unit of a sample-to-sample difference.
+        batch: (k,) number of the run.
+        step: (k,) sample k - 1 within the run.
+        explained: (n,) share of the variance of nu(k) - nu(k - 1) that the model explains, at most 1.
+        autocorrelation: (lags + 1, n), 1 at lag 0; pairs never reach across runs or missing samples.
+    """
+
+    outputs: tuple[str, ...]
+    residuals: Array
+    batch: Integers
+    step: Integers
+    explained: Array
+    autocorrelation: Array
+
+    def __post_init__(self) -> None:
+        seal(self, residuals="k n", explained="n", autocorrelation="l n")
+        for name in ("batch", "step"):
+            numbers = np.array(getattr(self, name), dtype=np.int64)
+            numbers.setflags(write=False)
+            frozen_set(self, name, numbers)
+
+    @property
+    def white_band(self) -> float:
+        """Autocorrelations of white residuals stay within this, 95 times in 100."""
+        return 1.96 / float(np.sqrt(max(1, len(self.residuals))))
+
+
+def one_step(record: Record, model: VesselModel, found: Estimate, *, fixed: Sequence[str] = ()) -> OneStep:
+    """The residuals of an estimate on the record it comes from.
+
+    Args:
+        record: the data.
+        model: the one the estimation began with; its values are those of the parameters held fixed.
+        found: the estimate.
+        fixed: parameters held fixed.
+    """
+    predictor = method_named(found.method).predictor
+    layout = build_layout(model_for(model, record), record, predictor=predictor, fixed=tuple(fixed))
+    regression = build_regression(layout, record).regression
+    residuals = regression.residuals(np.concatenate([found.values, found.nuisance_values]))
+    residuals = residuals - residuals.mean(axis=0)
+    total = np.var(regression.y, axis=0)
+    explained = 1.0 - np.var(residuals, axis=0) / np.where(total > 0, total, np.nan)
+    return OneStep(
+        outputs=regression.outputs,
+        residuals=residuals,
+        batch=regression.batch_of,
+        step=regression.step_of,
+        explained=explained,
+        autocorrelation=autocorrelation(residuals, regression.batch_of, regression.step_of),
+    )
+
+
+def autocorrelation(residuals: Array, batch: Integers, step: Integers, *, lags: int = LAGS) -> Array:
+    """(lags + 1, n) mean products of residuals so many samples apart over the mean square; 0 where no pair exists."""
+    power = (residuals**2).mean(axis=0)
+    power = np.where(power > 0, power, 1.0)
+    rows = [np.ones(residuals.shape[1])]
+    place = _places(batch, step)
+    grid = np.zeros((int(place[-1]) + 1, residuals.shape[1]))
+    there = np.zeros(len(grid))
+    grid[place], there[place] = residuals, 1.0
+    owner = np.full(len(grid), -1)
+    owner[place] = batch
+    for lag in range(1, lags + 1):
+        same = (owner[lag:] == owner[:-lag]) & (there[lag:] > 0) & (there[:-lag] > 0)
+        pairs = (grid[lag:] * grid[:-lag])[same]
+        rows.append(pairs.mean(axis=0) / power if len(pairs) else np.zeros(residuals.shape[1]))
+    return np.array(rows)
+
+
+def _places(batch: Integers, step: Integers) -> Integers:
+    """(k,) places of the samples on one line on which the runs lie one after the other, gaps and all."""
+    starts = np.flatnonzero(np.diff(batch, prepend=batch[0] - 1))
+    ends = np.append(starts[1:], len(batch)) - 1
+    lengths = step[ends] - step[starts] + 1
+    offsets = np.concatenate([[0], np.cumsum(lengths)[:-1]])
+    run = np.searchsorted(starts, np.arange(len(batch)), side="right") - 1
+    return np.asarray(step - step[starts][run] + offsets[run], dtype=np.int64)

@@ -1,0 +1,93 @@
+"""One run, simulated with an estimated model from its first measured state and set against what was measured."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from expdesign.conventions import OUTPUTS
+from expdesign.errors import Diverged
+from expdesign.estimation.fit import fit_percent
+from expdesign.estimation.instruments import instrument_wind
+from expdesign.estimation.replay import simulate_batch, start_state
+from expdesign.estimation.tables import inputs_of, model_for
+from expdesign.signals import Batch, Record
+from expdesign.simulation import euler_step, motion_rates
+from expdesign.simulation.run import LARGEST_SPEED
+from expdesign.values import Array, seal
+from expdesign.vessel import SCALAR, VesselModel
+
+ESTIMATION, TEST = "estimation", "test"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RunCheck:
+    """What a simulation of one run gives.
+
+    Attributes:
+        batch: the run.
+        use: "estimation" for a run the estimate comes from, "test" for one kept apart.
+        outputs: the velocities that have an equation.
+        fit_percent: (n,) of the simulated output, nan where the measured one is constant or the simulation diverges.
+        rmse: (n,) root-mean-square error [m/s, rad/s], nan likewise.
+        simulated: (k, 3) u, v, r; None when the simulation diverges.
+        problem: why there is no simulation, or "".
+    """
+
+    batch: Batch
+    use: str
+    outputs: tuple[str, ...]
+    fit_percent: Array
+    rmse: Array
+    simulated: Array | None
+    problem: str
+
+    def __post_init__(self) -> None:
+        seal(self, fit_percent="n", rmse="n", **({} if self.simulated is None else {"simulated": "k 3"}))
+
+
+def check_run(model: VesselModel, batch: Batch, *, use: str, wind: bool) -> RunCheck:
+    """Simulate a run and compare.
+
+    Args:
+        model: with estimated parameters.
+        batch: the run.
+        use: "estimation" or "test".
+        wind: simulate in the wind that was measured; otherwise in still air. The water is still in both.
+    """
+    try:
+        simulated, problem = _simulated(model, batch, wind=wind), ""
+    except Diverged as error:
+        simulated, problem = None, str(error)
+    columns = [OUTPUTS.index(name) for name in model.outputs]
+    fit = rmse = np.full(len(columns), np.nan)
+    if simulated is not None:
+        measured, compared = batch.velocity[:, columns], simulated[:, columns]
+        fit = fit_percent(measured, compared)
+        rmse = np.sqrt(np.nanmean((measured - compared) ** 2, axis=0))
+    return RunCheck(
+        batch=batch, use=use, outputs=model.outputs, fit_percent=fit, rmse=rmse, simulated=simulated, problem=problem
+    )
+
+
+def _simulated(model: VesselModel, batch: Batch, *, wind: bool) -> Array:
+    """(k, 3) by Euler's map at the sample time, the map that the parameters were estimated for."""
+    return _in_wind(model, batch) if wind else simulate_batch(model, batch).velocity
+
+
+def _in_wind(model: VesselModel, batch: Batch) -> Array:
+    """In the n-frame wind that anemometer, velocity and heading give at each sample."""
+    driven = model_for(model, Record(batches=(batch,)))
+    inputs, wind = inputs_of(driven, batch).tolist(), instrument_wind(batch, "lagged").T.tolist()
+    theta = driven.parameters.tolist()
+    state: tuple[float, ...] = tuple(start_state(driven, batch).tolist())
+    rows = [state]
+    for held, air in zip(inputs[:-1], wind[:-1], strict=True):
+        rates = motion_rates(driven, state, held, wind_to=air, ops=SCALAR, parameters=theta)
+        state = euler_step(lambda _, rates=rates: rates, state, batch.sample_time_s)  # type: ignore[misc]
+        if not all(abs(speed) < LARGEST_SPEED for speed in state[3:]):
+            seconds = len(rows) * batch.sample_time_s
+            raise Diverged(f"{batch.name}: the model's simulation diverges after {seconds:.1f} s")
+        rows.append(state)
+    return np.array(rows)[:, 3:]

@@ -1,0 +1,34 @@
+"""What the page is made from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from expdesign.assessment import Assessed, Assessment
+from expdesign.vessel import Vessel
+
+DRAWN = 3
+"""Simulations drawn beside the measured velocities, at most."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class EstimateContent:
+    """Everything the page tells, as values.
+
+    Attributes:
+        vessel: as it was before the estimation.
+        found: the estimates and what they were set against.
+        command: the command line that reproduces the result.
+        version: of the program.
+    """
+
+    vessel: Vessel
+    found: Assessment
+    command: str
+    version: str
+
+    @property
+    def drawn(self) -> tuple[Assessed, ...]:
+        """The methods whose simulations are drawn: the one in the vessel file first."""
+        others = [item for item in self.found.methods if item is not self.found.best]
+        return (self.found.best, *others)[:DRAWN]

@@ -1,0 +1,206 @@
+"""The page about an estimation."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
+
+from expdesign.assessment import Assessed
+from expdesign.export.estimate_page.content import EstimateContent
+from expdesign.export.estimate_page.figures import autocorrelation_figure, interval_figure, residual_figure, run_figure
+from expdesign.export.estimates import breach_sentences, fit_table, plus_minus
+from expdesign.export.formats.format import xml_text
+from expdesign.export.report import words
+from expdesign.export.report.figures.style import report_style
+
+FACTOR = 1.959964
+"""Standard deviations to either side that hold 95 % of a normal distribution."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ParameterRow:
+    """A parameter with one cell per method."""
+
+    name: str
+    term: str
+    before: str
+    cells: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class MethodNotes:
+    """What there is to say about one method."""
+
+    name: str
+    title: str
+    how: str
+    chosen: bool
+    explained: str
+    correlation: str
+    warnings: tuple[str, ...]
+
+
+def estimate_html(content: EstimateContent) -> str:
+    """One HTML page without any outside reference."""
+    loaders = [PackageLoader(f"expdesign.export.{name}") for name in ("estimate_page", "report")]
+    templates = Environment(
+        loader=ChoiceLoader(loaders),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        finalize=_shown,
+    )
+    found = content.found
+    return templates.get_template("estimate.html").render(
+        content=content,
+        found=found,
+        best=found.best,
+        summary=summary(content),
+        parameters=parameter_rows(content),
+        fits=fit_table(found),
+        methods=[_notes(content, item) for item in found.methods],
+        conditions=_conditions(content),
+        advice=advice(content),
+        notes=[*found.record.notes, *found.tests.notes, *found.left_out],
+        figures=_figures(content),
+        sample_time_s=found.record.batches[0].sample_time_s,
+    )
+
+
+def _shown(value: object) -> object:
+    return xml_text(value) if type(value) is str else value
+
+
+def _figures(content: EstimateContent) -> dict[str, object]:
+    found = content.found
+    step = found.record.batches[0].sample_time_s
+    names = tuple(batch.name for batch in found.record.batches)
+    with report_style():
+        return {
+            "intervals": interval_figure(found.methods, found.best),
+            "runs": [run_figure(index, content.drawn) for index in range(len(found.best.runs))],
+            "residuals": residual_figure(found.best, names, step),
+            "autocorrelation": autocorrelation_figure(found.best, step),
+        }
+
+
+def summary(content: EstimateContent) -> list[str]:
+    """What was estimated from what, in a few sentences."""
+    found, best = content.found, content.found.best
+    batches = found.record.batches
+    seconds = sum(len(batch) * batch.sample_time_s for batch in batches)
+    samples = sum(len(batch) for batch in batches)
+    tests = words.counted(len(found.tests.batches), "run")
+    apart = (
+        f" {tests} {'is' if len(found.tests.batches) == 1 else 'are'} kept apart to test on."
+        if found.tests.batches
+        else ""
+    )
+    fixed = f" Held fixed: {', '.join(found.fixed)}." if found.fixed else ""
+    return [
+        f"{words.counted(len(best.estimate.names), 'parameter')} of {content.vessel.name} from "
+        f"{words.counted(len(batches), 'run')}, {samples} samples, {words.duration(seconds)} in all.{apart}{fixed}",
+        f"The vessel file vessel-estimated.toml holds the estimate of {best.method.title} ({best.method.name}).",
+        _fit_sentence(best),
+    ]
+
+
+def _fit_sentence(best: Assessed) -> str:
+    kinds = [(use, [run for run in best.runs if run.use == use]) for use in ("estimation", "test")]
+    parts = []
+    for use, runs in kinds:
+        fits = np.array([run.fit_percent for run in runs if not run.problem])
+        if len(fits) and np.isfinite(fits).any():
+            medians = ", ".join(
+                f"{name} {words.number(float(np.nanmedian(column)), 0)}{words.NB}%"
+                for name, column in zip(best.model.outputs, fits.T, strict=True)
+                if np.isfinite(column).any()
+            )
+            parts.append(f"{medians} on the {use} runs")
+        failed = sum(bool(run.problem) for run in runs)
+        if failed:
+            parts.append(f"{failed} of {len(runs)} {use} runs cannot be simulated")
+    return f"Its simulations fit (median over runs): {'; '.join(parts)}." if parts else "No run could be simulated."
+
+
+def parameter_rows(content: EstimateContent) -> list[ParameterRow]:
+    """Every parameter of the model: value before, and (value with deviation, 95 % interval) per method."""
+    model = content.vessel.model
+    return [
+        ParameterRow(
+            name=term.name,
+            term=f"d{term.equation}/dt = ... + {term.name} * {term.expression}",
+            before=words.significant(float(value)),
+            cells=tuple(_cell(item, term.name) for item in content.found.methods),
+        )
+        for term, value in zip(model.terms, model.parameters, strict=True)
+    ]
+
+
+def _cell(item: Assessed, name: str) -> tuple[str, str]:
+    estimate = item.estimate
+    if name not in estimate.names:
+        return words.significant(estimate.held[name]), "not estimated"
+    index = estimate.names.index(name)
+    value, std = float(estimate.values[index]), float(estimate.std[index])
+    low, high = (words.significant(value + sign * FACTOR * std) for sign in (-1, 1))
+    return plus_minus(value, std).replace("-", words.MINUS), f"{low} to {high}"
+
+
+def _notes(content: EstimateContent, item: Assessed) -> MethodNotes:
+    estimate, found = item.estimate, item.one_step
+    how = "no instruments"
+    if item.method.instruments:
+        source = "the vessel file's values" if item.start == "nominal" else "the least-squares estimate"
+        how = (
+            f"instruments simulated first with {source}, refined {words.counted(estimate.refinements, 'time')}; "
+            f"mean taken off: {content.found.mean}"
+        )
+    diverged = tuple(f"Simulation fails: {run.problem}." for run in item.runs if run.problem)
+    return MethodNotes(
+        name=item.method.name,
+        title=item.method.title,
+        how=how,
+        chosen=item is content.found.best,
+        explained=_listed(found.outputs, found.explained.tolist(), 3),
+        correlation=_listed(found.outputs, estimate.residuals.correlation.tolist(), 2),
+        warnings=(*estimate.warnings, *diverged),
+    )
+
+
+def _listed(outputs: tuple[str, ...], values: list[float], decimals: int) -> str:
+    texts = ("-" if math.isnan(value) else words.number(value, decimals) for value in values)
+    return ", ".join(f"{name} {text}" for name, text in zip(outputs, texts, strict=True))
+
+
+def _conditions(content: EstimateContent) -> list[str]:
+    return breach_sentences(content.found.best.breaches, len(content.found.record.batches))
+
+
+def advice(content: EstimateContent) -> list[str]:
+    """Honest words on which estimate to believe when, the ones that these data call for first."""
+    best = content.found.best
+    lag = best.estimate.residuals.correlation
+    sentences = []
+    if (lag < -0.25).any():
+        sentences.append(
+            f"Successive residuals of {_names(best, lag < -0.25)} are negatively correlated, the mark of measurement "
+            "noise in the velocities. Least squares is then biased; estimates by instruments need not be."
+        )
+    if (lag > 0.25).any():
+        sentences.append(
+            f"Successive residuals of {_names(best, lag > 0.25)} are positively correlated: a slow effect is missing "
+            "from the model, such as wind, current, waves or a term. No method is consistent for a model that "
+            "lacks what moved the ship, and the standard deviations do not count that error."
+        )
+    if not best.method.instruments:
+        sentences.append("No stable estimate by instruments is at hand, so the vessel file holds least squares.")
+    return sentences
+
+
+def _names(best: Assessed, chosen: np.ndarray) -> str:
+    return " and ".join(name for name, is_in in zip(best.one_step.outputs, chosen, strict=True) if is_in)
