@@ -150,12 +150,12 @@ def excitation_condition(
     Source: F. Ljungberg, doctoral thesis, Linköping University, assumptions A5 and A7, (5.8).
     """
     table = _signals(vessel.model, trajectory, commands, environment)
-    noise = signal_noise(vessel, environment)
+    noise = _signal_noise(vessel, environment)
     moduli = [modulus for expression in vessel.model.expressions for modulus in expression.moduli]
     return all(_keeps_clear(modulus, table, noise, sigmas) for modulus in moduli)
 
 
-def signal_noise(vessel: Vessel, environment: Environment) -> dict[str, float]:
+def _signal_noise(vessel: Vessel, environment: Environment) -> dict[str, float]:
     """Standard deviation of what a sensor says of each motion signal about the disturbed true one."""
     sensors = vessel.sensors
     water = math.hypot(sensors.velocity_mps, environment.current_std_mps)
