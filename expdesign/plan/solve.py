@@ -18,9 +18,10 @@ from expdesign.plan.checks import verify_plan
 from expdesign.plan.field import ROUTING_CELLS, ClearanceField, clearance_field, goal_field, narrowest_passage
 from expdesign.plan.footprint import covering_discs, swept_area
 from expdesign.plan.legs import LegTask, LegWater, find_leg, leg_trajectory
-from expdesign.plan.placement import SearchSpace, Stamp, place_runs, refusing, stamp
+from expdesign.plan.placement import place_runs
 from expdesign.plan.realised import realised_efficiency
 from expdesign.plan.safety import leave_water_probability
+from expdesign.plan.search_space import SearchSpace, Stamp, refusing, stamp
 from expdesign.plan.uncertainty import stray_m
 from expdesign.plan.values import Leg, Placement, Plan, PlanSettings
 from expdesign.signals import Commands, Trajectory

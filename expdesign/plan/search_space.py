@@ -1,0 +1,114 @@
+"""What the search for order and placement knows: the runs as stamps, the water as grids, plans as far as they got."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from expdesign.dictionary import Primitive
+from expdesign.plan.area import LocalFrame
+from expdesign.plan.capability import Capability
+from expdesign.plan.field import ClearanceField, GoalField
+from expdesign.plan.footprint import covering_discs, disc_points, thinned_poses
+from expdesign.plan.values import Placement
+from expdesign.values import Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Stamp:
+    """A primitive as the search sees it.
+
+    Attributes:
+        name: of the primitive.
+        discs: (n, 2) forward/starboard centres of the discs that cover its swept hull [m].
+        times_s: (n,) when the hull is there [s].
+        room_m: (n,) clearance that each disc centre needs [m].
+        displacement: (3,) forward m, starboard m, turn rad through water.
+        duration_s: of one run [s].
+        entry_mps, exit_mps: surge speed at its ends.
+    """
+
+    name: str
+    discs: Array
+    times_s: Array
+    room_m: Array
+    displacement: Array
+    duration_s: float
+    entry_mps: float
+    exit_mps: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SearchSpace:
+    """What the search looks up.
+
+    Attributes:
+        stamps: the primitives to place.
+        frame: for messages.
+        field, goal_way: clearance and the way to the goal.
+        goal: (3,) pose.
+        ship: speeds and turns on legs.
+        hull_m: hull length [m].
+        leg_margin_m: clearance that leg centre lines need on the grid [m].
+        current_to: (2,) mean current [m/s].
+        run_up: extra straight before a run, by (name before, name) in hull lengths; grows where a leg failed.
+        refused: (b, 3) start poses that turned out unreachable or unsafe; none is tried near them again.
+    """
+
+    stamps: tuple[Stamp, ...]
+    frame: LocalFrame
+    field: ClearanceField
+    goal_way: GoalField
+    goal: Array
+    ship: Capability
+    hull_m: float
+    leg_margin_m: float
+    current_to: Array
+    run_up: Mapping[tuple[str, str], float] = dataclasses.field(default_factory=dict)
+    refused: Array = dataclasses.field(default_factory=lambda: np.zeros((0, 3)))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PartialPlans:
+    """Partial plans with equally many runs.
+
+    Attributes:
+        pose: (b, 3) where they end; exit_mps (b,) how fast; last (b,) index of the last primitive, -1 at the start.
+        left: (b, q) runs still to do.
+        cost_s: (b,) repositioning time so far.
+        history: per plan, its (primitive index, start pose) so far.
+    """
+
+    pose: Array
+    exit_mps: Array
+    last: np.ndarray
+    left: np.ndarray
+    cost_s: Array
+    history: tuple[tuple[tuple[int, Array], ...], ...]
+
+
+def stamp(primitive: Primitive, room_m: Array, *, length_m: float, beam_m: float) -> Stamp:
+    """Reduce a primitive to what the search needs; `room_m` (k + 1,) is the clearance for discs at each sample."""
+    centres, _ = covering_discs(length_m, beam_m)
+    pose = primitive.trajectory.pose
+    kept = thinned_poses(pose, reach_m=length_m / 2, spacing_m=length_m / 4)
+    return Stamp(
+        name=primitive.name,
+        discs=disc_points(pose[kept], centres).reshape(-1, 2),
+        times_s=np.repeat(kept * primitive.trajectory.sample_time_s, len(centres)),
+        room_m=np.repeat(room_m[kept], len(centres)),
+        displacement=primitive.displacement,
+        duration_s=primitive.duration_s,
+        entry_mps=float(primitive.entry_velocity[0]),
+        exit_mps=float(primitive.exit_velocity[0]),
+    )
+
+
+def refusing(space: SearchSpace, before: str, placement: Placement) -> SearchSpace:
+    """The same space after a leg to, or a run from, a placement failed: not there again, and more run-up."""
+    pair = (before, placement.primitive)
+    grown = {**space.run_up, pair: space.run_up.get(pair, 0.0) + 0.5}
+    return replace(space, run_up=grown, refused=np.vstack([space.refused, placement.pose]))
