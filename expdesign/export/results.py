@@ -64,6 +64,7 @@ def _primitive_entry(item: PrimitiveInformation, vessel: Vessel) -> dict[str, An
         "X": item.X.tolist(),
         "Y": item.Y.tolist(),
         "Z": item.Z.tolist(),
+        "YZ": item.YZ.tolist(),
         "log_det_alone": item.log_det_alone,
     }
 

@@ -97,7 +97,7 @@ def information_rate(content: ReportContent) -> Array:
     if subtraction == "none":
         matrices = X
     elif subtraction == "batch":
-        matrices = X - Y @ Z.transpose(0, 2, 1)
+        matrices = X - np.array([item.YZ for item in content.information])
     else:
         weights = content.design.fractions
         mean_y, mean_z = np.tensordot(weights, Y, axes=1), np.tensordot(weights, Z, axes=1)
