@@ -11,7 +11,7 @@ from expdesign.assessment import Assessed, Assessment, RunCheck
 from expdesign.assessment.runs import ESTIMATION, TEST
 from expdesign.estimation.excitation import Breach
 from expdesign.estimation.null_space import Direction
-from expdesign.export.report.words import significant
+from expdesign.export.report import words
 from expdesign.export.results import strict_json
 from expdesign.export.vessel_file import vessel_toml
 from expdesign.values import Array
@@ -77,12 +77,13 @@ def breach_sentences(breaches: Sequence[Breach], runs: int) -> list[str]:
     sentences = []
     for inside in dict.fromkeys(breach.inside for breach in breaches):
         same = [breach for breach in breaches if breach.inside == inside]
-        samples, count = sum(len(breach.samples) for breach in same), sum(breach.count for breach in same)
+        share = sum(len(breach.samples) for breach in same) / sum(breach.count for breach in same)
         worst = max(breach.margin for breach in same)
+        nearer = f"changes sign or comes nearer to zero than {worst:.3g}" if worst > 0 else "changes sign"
         sentences.append(
             f"The experiment condition does not hold for {inside}, inside a modulus of "
-            f"{', '.join(same[0].parameters)}: in {len(same)} of {runs} runs "
-            f"it changes sign or comes nearer to zero than {worst:.3g}, in {samples / count:.0%} of their samples; measurement noise then biases these parameters."
+            f"{', '.join(same[0].parameters)}: it {nearer} in {len(same)} of {words.counted(runs, 'run')}, in "
+            f"{words.percent(share)} of their samples; noise and disturbances then bias these parameters."
         )
     return sentences
 
@@ -126,7 +127,7 @@ def fit_table(found: Assessment) -> tuple[tuple[str, ...], list[tuple[str, ...]]
 def plus_minus(value: float, std: float) -> str:
     """A value to the second digit of its standard deviation: -0.0548 ± 0.0036."""
     if not (std > 0 and math.isfinite(std)):
-        return significant(value, 4)
+        return words.significant(value, 4)
     decimals = 1 - math.floor(math.log10(std))
     if abs(value) < 1e-4 or decimals > 9 or abs(value) >= 1e6:
         exponent = math.floor(math.log10(max(abs(value), std)))
@@ -137,7 +138,7 @@ def plus_minus(value: float, std: float) -> str:
 
 def _cell(item: Assessed, name: str) -> str:
     if name not in item.estimate.names:
-        return f"{significant(item.estimate.held[name])} held"
+        return f"{words.significant(item.estimate.held[name])} held"
     index = item.estimate.names.index(name)
     return plus_minus(float(item.estimate.values[index]), float(item.estimate.std[index]))
 

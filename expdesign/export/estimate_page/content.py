@@ -29,6 +29,7 @@ class EstimateContent:
 
     @property
     def drawn(self) -> tuple[Assessed, ...]:
-        """The methods whose simulations are drawn: the one in the vessel file first."""
+        """The methods whose simulations are drawn: the one in the vessel file, then those that simulate most runs."""
         others = [item for item in self.found.methods if item is not self.found.best]
+        others.sort(key=lambda item: sum(bool(run.problem) for run in item.runs))
         return (self.found.best, *others)[:DRAWN]

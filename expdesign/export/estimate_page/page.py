@@ -133,7 +133,7 @@ def parameter_rows(content: EstimateContent) -> list[ParameterRow]:
     return [
         ParameterRow(
             name=term.name,
-            term=f"d{term.equation}/dt = ... + {term.name} * {term.expression}",
+            term=f"{term.expression} in d{term.equation}/dt",
             before=words.significant(float(value)),
             cells=tuple(_cell(item, term.name) for item in content.found.methods),
         )

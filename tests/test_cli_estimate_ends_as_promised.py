@@ -1,0 +1,150 @@
+"""`expdesign estimate`: what is wrong is one line and no file, what has no answer names the parameters."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from measured_trials import EULER, MODEL_SHIP, MODEL_SHIP_TRUE, model_ship_commands, write_run
+
+from expdesign.cli import main
+from expdesign.signals import Commands
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A short noisy trial."""
+    return write_run(tmp_path_factory.mktemp("data") / "run.csv", MODEL_SHIP_TRUE, model_ship_commands(1500), **EULER)
+
+
+def line_of(capsys: pytest.CaptureFixture[str]) -> str:
+    """The one line that is not progress."""
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    (line,) = (line for line in captured.err.splitlines() if not line.startswith("["))
+    return line
+
+
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        ("--method lss", "unknown method 'lss', did you mean 'ls'?"),
+        ("--fixed X_uu", "unknown parameter 'X_uu'"),
+        ("--velocity guessed", "unknown velocity method 'guessed'"),
+        ("--mean some", "unknown instrument mean 'some'"),
+        ("--start here", "unknown start 'here'"),
+        ("--test RUN", "is given for estimation and for testing"),
+        ("--fixed X_u X_abs_u_u X_vr X_mu Y_v Y_ur Y_mu N_r N_uv N_mu", "nothing is left to estimate"),
+        ("--vessel missing.toml", "missing.toml"),
+    ],
+)
+def test_wrong_wishes_are_one_line_and_no_file(
+    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], options: str, named: str
+) -> None:
+    typed = options.replace("RUN", str(run)).split()
+    assert main(["estimate", str(run), "--vessel", str(MODEL_SHIP), "--out", str(tmp_path / "out"), *typed]) == 2
+    assert named in line_of(capsys)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("spoil", "named"),
+    [
+        (lambda text: text.replace("tau_x", "tau_xx", 1), "tau_x"),
+        (lambda text: text.replace("u_mps", "u_mpss", 1).replace("north_m", "norht_m", 1), "row 1"),
+        (lambda text: re.sub(r"\n0\.5,", "\n0.25,", text, count=1), "time_s"),
+        (lambda text: re.sub(r"(?<=\n)([^,\n]*),", lambda m: f"{2 * float(m[1])},", text), "0.125"),
+        (lambda text: "", "empty"),
+    ],
+    ids=["inputs", "velocities", "clock", "sample time", "nothing"],
+)
+def test_bad_data_are_one_line_and_no_file(
+    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], spoil: object, named: str
+) -> None:
+    bad = tmp_path / "bad.csv"
+    bad.write_text(spoil(run.read_text(encoding="utf-8")), encoding="utf-8")  # type: ignore[operator]
+    assert main(["estimate", str(bad), "--vessel", str(MODEL_SHIP), "--out", str(tmp_path / "out")]) == 2
+    line = line_of(capsys)
+    assert "bad.csv" in line
+    assert named in line
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_trial_that_tells_nothing_of_a_parameter_names_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """No side force, ever: Y_mu cannot be seen."""
+    values = model_ship_commands(800).values * (1, 0, 1)
+    commands = Commands(sample_time_s=0.125, names=MODEL_SHIP_TRUE.model.inputs, values=values)
+    path = write_run(tmp_path / "one.csv", MODEL_SHIP_TRUE, commands, **EULER)
+    arguments = ["estimate", str(path), "--vessel", str(MODEL_SHIP), "--out", str(tmp_path / "out")]
+    assert main(arguments) == 3
+    line = line_of(capsys)
+    assert "Y_mu" in line
+    assert "cannot see" in line
+    assert not (tmp_path / "out").exists()
+    assert (
+        main(["estimate", str(path), "--vessel", str(MODEL_SHIP), "--out", str(tmp_path / "out"), "--fixed", "Y_mu"])
+        == 0
+    )
+
+
+def test_the_table_holds_what_the_file_holds(run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert (
+        main(["estimate", str(run), "--vessel", str(MODEL_SHIP), "--out", str(tmp_path), "--method", "ls", "iv"]) == 0
+    )
+    lines = capsys.readouterr().out.splitlines()
+    found = json.loads((tmp_path / "estimate.json").read_text(encoding="utf-8"))
+    rows = {line.split()[0]: line for line in lines if line.strip()}
+    number = r"\(?(-?[\d.]+) \N{PLUS-MINUS SIGN} ([\d.]+)\)?(?:e(-?\d+))?"
+    for name in MODEL_SHIP_TRUE.model.names:
+        shown = re.findall(number, rows[name])
+        assert len(shown) == 2
+        for (value, std, power), method in zip(shown, ("ls", "iv"), strict=True):
+            item, scale = found[method]["parameters"][name], 10.0 ** int(power or 0)
+            assert float(std) * scale == pytest.approx(item["std"], rel=0.06)
+            assert abs(float(value) * scale - item["value"]) <= 0.06 * item["std"]
+    assert f"Open {tmp_path}/estimate.html in a browser." in lines
+
+
+def test_json_says_the_same_without_a_table(run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["estimate", str(run), "--vessel", str(MODEL_SHIP), "--out", str(tmp_path), "--json", "--quiet"]
+    assert main(arguments) == 0
+    told = json.loads(capsys.readouterr().out)["summary"]
+    found = json.loads((tmp_path / "estimate.json").read_text(encoding="utf-8"))
+    assert told["vessel_file_holds"] == "iv"
+    for method, entry in told["methods"].items():
+        assert entry["parameters"] == found[method]["parameters"]
+        assert entry["fit"] == found[method]["fit"]
+
+
+def test_the_same_data_give_the_same_files(run: Path, tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        main(["estimate", str(run), "--vessel", str(MODEL_SHIP), "--out", str(tmp_path / name), "--quiet"])
+    for path in (tmp_path / "a").iterdir():
+        assert path.read_bytes() == (tmp_path / "b" / path.name).read_bytes()
+
+
+def test_results_go_to_runs_by_the_name_of_the_first_file(
+    run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["estimate", str(run), "--vessel", str(MODEL_SHIP), "--method", "ls", "--quiet"]) == 0
+    assert sorted(path.name for path in (tmp_path / "runs" / "run").iterdir()) == [
+        "estimate.html",
+        "estimate.json",
+        "vessel-estimated.toml",
+    ]
+
+
+def test_the_page_stands_alone_and_names_everything(run: Path, tmp_path: Path) -> None:
+    odd = tmp_path / "run <b> & co.csv"
+    odd.write_bytes(run.read_bytes())
+    assert main(["estimate", str(odd), "--vessel", str(MODEL_SHIP), "--out", str(tmp_path / "out"), "--quiet"]) == 0
+    page = (tmp_path / "out" / "estimate.html").read_text(encoding="utf-8")
+    assert not re.findall(r'(?:src|href)="(?!#)', page.replace("xlink:href", "href"))
+    assert "<b> & co" not in page
+    assert all(f"<b>{name}</b>" in page for name in MODEL_SHIP_TRUE.model.names)
+    assert not re.search(r"\b(nan|inf|None)\b", re.sub(r"<(svg|style).*?</\1>", "", page, flags=re.DOTALL))
+    identities = re.findall(r'\sid="([^"]+)"', page)
+    assert len(identities) == len(set(identities))
+    assert np.isclose(page.count("<svg"), 4)
