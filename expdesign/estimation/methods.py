@@ -10,6 +10,7 @@ import numpy as np
 from expdesign.errors import Diverged, UnknownName
 from expdesign.estimation.instruments import InstrumentModel
 from expdesign.estimation.null_space import NullSpace
+from expdesign.estimation.output_error import minimise_output_error
 from expdesign.estimation.predictors import Layout, Rows, build_layout, build_regression
 from expdesign.estimation.refine import MOST_REFINEMENTS, Refined, refine_iv
 from expdesign.estimation.regression import Regression
@@ -30,24 +31,25 @@ class Method:
         name: as users type it.
         title: for tables.
         predictor: a name in `predictors.PREDICTORS`.
-        instruments: whether instruments are simulated; otherwise least squares.
+        solver: "ls", "iv" (with simulated, refined instruments) or "oe" (least simulation error).
     """
 
     name: str
     title: str
     predictor: str
-    instruments: bool
+    solver: str
 
 
 METHODS = (
-    Method("ls", "least squares", "basic", instruments=False),
-    Method("ls-air", "least squares with measured wind", "basic-wind", instruments=False),
-    Method("ls-augmented", "least squares, augmented", "augmented", instruments=False),
-    Method("ls-wind", "least squares, augmented, with measured wind", "wind", instruments=False),
-    Method("iv", "instrumental variables", "basic", instruments=True),
-    Method("iv-air", "instrumental variables with measured wind", "basic-wind", instruments=True),
-    Method("iv-augmented", "instrumental variables, augmented", "augmented", instruments=True),
-    Method("iv-wind", "instrumental variables, augmented, with measured wind", "wind", instruments=True),
+    Method("ls", "least squares", "basic", solver="ls"),
+    Method("ls-air", "least squares with measured wind", "basic-wind", solver="ls"),
+    Method("ls-augmented", "least squares, augmented", "augmented", solver="ls"),
+    Method("ls-wind", "least squares, augmented, with measured wind", "wind", solver="ls"),
+    Method("iv", "instrumental variables", "basic", solver="iv"),
+    Method("iv-air", "instrumental variables with measured wind", "basic-wind", solver="iv"),
+    Method("iv-augmented", "instrumental variables, augmented", "augmented", solver="iv"),
+    Method("iv-wind", "instrumental variables, augmented, with measured wind", "wind", solver="iv"),
+    Method("oe", "output error, for calm weather", "basic", solver="oe"),
 )
 
 
@@ -110,7 +112,13 @@ def estimate(record: Record, model: VesselModel, *, method: str = "iv", settings
     chosen, choices = method_named(method), settings or Settings()
     layout = build_layout(model_for(model, record), record, predictor=chosen.predictor, fixed=choices.fixed)
     rows = build_regression(layout, record)
-    refined = _instrumental(layout, record, rows, choices) if chosen.instruments else _least_squares(rows, choices)
+    refined = _instrumental(layout, record, rows, choices) if chosen.solver == "iv" else _least_squares(rows, choices)
+    if chosen.solver == "oe":
+        solution, regression = minimise_output_error(layout, record, refined.solution, choices.integration)
+        left_out = sum(map(len, record.batches)) - len(regression)
+        return _estimate(
+            chosen, layout, Rows(regression=regression, used=(), left_out=left_out), Refined(solution, 0, ())
+        )
     return _estimate(chosen, layout, rows, refined)
 
 
@@ -157,7 +165,7 @@ def _estimate(method: Method, layout: Layout, rows: Rows, refined: Refined) -> E
         values=solution.values[:p],
         covariance=solution.covariance[:p, :p],
         held={name: full[name] for name in layout.model.names if name not in layout.parameters},
-        nuisance_names=layout.names[p:],
+        nuisance_names=rows.regression.parameters[p:],
         nuisance_values=solution.values[p:],
         joint_covariance=solution.covariance,
         residuals=_statistics(rows.regression, solution, rows.left_out),
