@@ -1,6 +1,7 @@
 """From a measured file to parameters: instruments find the truth where least squares does not, and say so in files."""
 
 import json
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -21,7 +22,8 @@ from record_files import write_trial
 from vessel_files import KVLCC2, write_vessel
 
 from expdesign import workflows
-from expdesign.assessment import check_run
+from expdesign.assessment import Wish, assess, check_run
+from expdesign.assessment.assess import preferred
 from expdesign.assessment.residuals import autocorrelation
 from expdesign.records import load_records
 from expdesign.scenario import load_vessel
@@ -208,3 +210,43 @@ def test_shares_of_progress_never_fall(tmp_path: Path) -> None:
     )
     assert all(a <= b for a, b in pairwise(told))
     assert told[-1] == 1.0
+
+
+def test_the_mean_current_is_read_out_of_an_augmented_estimate(tmp_path: Path) -> None:
+    current = Environment(current_to=np.array([0.2, -0.2]))
+    path = write_run(
+        tmp_path / "one.csv", TUG_TRUE, tug_commands(), velocity=(1.7, 0.7, 0), environment=current, **EULER
+    )
+    workflows.estimate([path], tmp_path / "out", vessel=TUG, methods=["iv-augmented", "ls"])
+    found = estimates(tmp_path / "out")
+    read = [found["iv-augmented"]["current_to"][name] for name in ("north_mps", "east_mps")]
+    for item, truth in zip(read, (0.2, -0.2), strict=True):
+        assert abs(item["value"] - truth) < 4 * item["std"] < 0.8
+    assert found["ls"]["current_to"] is None
+    assert "Mean current read out" in (tmp_path / "out" / "estimate.html").read_text(encoding="utf-8")
+
+
+def test_a_vessel_file_without_values_starts_from_least_squares(trial: Path, tmp_path: Path) -> None:
+    """All parameters zero say nothing of the ship: the refined estimate is the same as from good values."""
+    text = MODEL_SHIP.read_text(encoding="utf-8")
+    head, _, rest = text.partition("[model.parameters]")
+    zeros = "".join(f"{name} = 0.0\n" for name in TRUTH)
+    (tmp_path / "zero.toml").write_text(f"{head}[model.parameters]\n{zeros}\n[sensors]{rest.partition('[sensors]')[2]}")
+    workflows.estimate([trial.parent / "one.csv"], tmp_path / "out", vessel=tmp_path / "zero.toml", methods=["iv"])
+    entry, usual = estimates(tmp_path / "out")["iv"], estimates(trial)["iv"]
+    assert (entry["instruments"]["start"], usual["instruments"]["start"]) == ("ls", "nominal")
+    assert any("all zero" in text for text in entry["warnings"])
+    for name, item in entry["parameters"].items():
+        assert abs(item["value"] - usual["parameters"][name]["value"]) < 0.1 * item["std"]
+
+
+def test_an_unstable_estimate_does_not_get_into_the_vessel_file(trial: Path) -> None:
+    """Of two estimates by instruments the first is spoilt: the second is chosen, and least squares where both are."""
+    ship = load_vessel(MODEL_SHIP)
+    record = load_records(trial.parent / "one.csv", vessel_inputs=ship.model.inputs)
+    good = assess(ship, record, Wish(methods=("ls", "iv"))).methods
+    spoilt = replace(good[1], runs=(replace(good[1].runs[0], simulated=None, problem="diverges"),))
+    assert preferred(good) == 1
+    assert preferred((good[0], spoilt, good[1])) == 2
+    assert preferred((good[0], spoilt)) == 0
+    assert preferred((spoilt,)) == 0

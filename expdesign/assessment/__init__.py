@@ -3,12 +3,13 @@
 from expdesign.assessment.assess import NO_TESTS, Wish, assess, default_methods
 from expdesign.assessment.residuals import OneStep, one_step
 from expdesign.assessment.runs import RunCheck, check_run
-from expdesign.assessment.values import Assessed, Assessment
+from expdesign.assessment.values import Assessed, Assessment, Current
 
 __all__ = [
     "NO_TESTS",
     "Assessed",
     "Assessment",
+    "Current",
     "OneStep",
     "RunCheck",
     "Wish",

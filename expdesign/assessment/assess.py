@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 
 from expdesign.assessment.residuals import one_step
 from expdesign.assessment.runs import ESTIMATION, TEST, check_run
-from expdesign.assessment.values import Assessed, Assessment
+from expdesign.assessment.values import INSTRUMENTAL, Assessed, Assessment, Current
 from expdesign.errors import Diverged, InputError, NoAnswer, NotInformative, UnknownName
+from expdesign.estimation.disturbance import COLUMNS, DAMPING, mean_current
 from expdesign.estimation.excitation import check_excitation, worst_case
 from expdesign.estimation.methods import STARTS, Method, Settings, estimate, method_named
 from expdesign.estimation.predictors import PREDICTORS
@@ -98,19 +99,19 @@ def assess(
         tests=tests,
         methods=tuple(done),
         left_out=tuple(left_out),
-        chosen=_preferred(done),
+        chosen=preferred(done),
         mean=wish.mean,
         fixed=wish.fixed,
     )
 
 
-def _preferred(found: Sequence[Assessed]) -> int:
+def preferred(found: Sequence[Assessed]) -> int:
     """The first with instruments whose model can simulate every run; the first such without; else the first of all.
 
     Only instruments can be consistent when the regressors are noisy, and an unstable model is of no use.
     """
     stable = [index for index, item in enumerate(found) if item.stable]
-    return next((index for index in stable if found[index].method.instruments), (stable or [0])[0])
+    return next((index for index in stable if found[index].uses_instruments), (stable or [0])[0])
 
 
 def _told(error: InputError | NoAnswer, method: Method) -> InputError | NoAnswer:
@@ -140,7 +141,15 @@ def _assessed(vessel: Vessel, record: Record, tests: Record, method: Method, wis
         runs=tuple(runs),
         one_step=one_step(record, vessel.model, found, fixed=wish.fixed),
         breaches=breaches,
+        current=_current(found, vessel),
     )
+
+
+def _current(found: Estimate, vessel: Vessel) -> Current | None:
+    if not {DAMPING, *COLUMNS} <= {*found.names, *found.nuisance_names}:
+        return None
+    to_mps, covariance = mean_current(found, heading_std_rad=vessel.sensors.heading_rad)
+    return Current(to_mps=to_mps, std_mps=covariance.diagonal() ** 0.5)
 
 
 def _estimated(vessel: Vessel, record: Record, method: Method, wish: Wish) -> tuple[Estimate, str]:
@@ -152,7 +161,7 @@ def _estimated(vessel: Vessel, record: Record, method: Method, wish: Wish) -> tu
         return estimate(record, vessel.model, method=method.name, settings=settings)
 
     nominal, ls = STARTS
-    if not method.instruments:
+    if not method.name.startswith(INSTRUMENTAL):
         return attempt(nominal), ""
     if wish.start != AUTO:
         return attempt(wish.start), wish.start

@@ -65,7 +65,8 @@ def one_step(record: Record, model: VesselModel, found: Estimate, *, fixed: Sequ
     predictor = method_named(found.method).predictor
     layout = build_layout(model_for(model, record), record, predictor=predictor, fixed=tuple(fixed))
     regression = build_regression(layout, record).regression
-    residuals = regression.residuals(np.concatenate([found.values, found.nuisance_values]))
+    names, values = (*found.names, *found.nuisance_names), np.concatenate([found.values, found.nuisance_values])
+    residuals = regression.residuals(values[[names.index(name) for name in regression.parameters]])
     residuals = residuals - residuals.mean(axis=0)
     total = np.var(regression.y, axis=0)
     explained = 1.0 - np.var(residuals, axis=0) / np.where(total > 0, total, np.nan)

@@ -10,7 +10,27 @@ from expdesign.estimation.excitation import Breach
 from expdesign.estimation.methods import Method
 from expdesign.estimation.values import Estimate
 from expdesign.signals import Record
+from expdesign.values import Array, seal
 from expdesign.vessel import VesselModel
+
+INSTRUMENTAL = "iv"
+"""How the names of methods with instruments begin."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Current:
+    """A mean current.
+
+    Attributes:
+        to_mps: (2,) to north and to east [m/s].
+        std_mps: (2,) standard deviations.
+    """
+
+    to_mps: Array
+    std_mps: Array
+
+    def __post_init__(self) -> None:
+        seal(self, to_mps="2", std_mps="2")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -25,6 +45,7 @@ class Assessed:
         runs: every run simulated with it, first those of the estimation, then those kept apart.
         one_step: its residuals.
         breaches: where the data break the experiment condition, for the signals this method uses.
+        current: the mean current that the nuisance parameters speak of, or None where they do not.
     """
 
     method: Method
@@ -34,6 +55,12 @@ class Assessed:
     runs: tuple[RunCheck, ...]
     one_step: OneStep
     breaches: tuple[Breach, ...]
+    current: Current | None
+
+    @property
+    def uses_instruments(self) -> bool:
+        """Whether the method is one of instrumental variables."""
+        return self.method.name.startswith(INSTRUMENTAL)
 
     @property
     def stable(self) -> bool:

@@ -199,7 +199,7 @@ def estimate(
         typer.Option(
             "--method",
             metavar="M ...",
-            help="One or more of: ls ls-air ls-augmented ls-wind iv iv-air iv-augmented iv-wind. When not given: ls "
+            help="One or more of: ls ls-air ls-augmented ls-wind iv iv-air iv-augmented iv-wind oe. When not given: ls "
             "and iv, and those with wind where wind is measured and the model has terms for it.",
         ),
     ] = None,

@@ -37,6 +37,7 @@ def _method_entry(found: Assessment, item: Assessed, vessel: Vessel) -> dict[str
             estimate.nuisance_values,
             estimate.joint_covariance.diagonal()[-q:] ** 0.5 if q else estimate.nuisance_values,
         ),
+        "current_to": _current(item),
         "form": model.form,
         "sample_time_s": found.record.batches[0].sample_time_s,
         "fit": fit_entries(item),
@@ -168,9 +169,15 @@ def _residual_entry(item: Assessed) -> dict[str, Any]:
 
 
 def _instruments(found: Assessment, item: Assessed) -> dict[str, Any] | None:
-    if not item.method.instruments:
+    if not item.uses_instruments:
         return None
     return {"mean_subtraction": found.mean, "start": item.start, "refinements": item.estimate.refinements}
+
+
+def _current(item: Assessed) -> dict[str, Any] | None:
+    if item.current is None:
+        return None
+    return _valued(("north_mps", "east_mps"), item.current.to_mps, item.current.std_mps)
 
 
 def _data(found: Assessment) -> dict[str, Any]:

@@ -38,6 +38,7 @@ class MethodNotes:
     title: str
     how: str
     chosen: bool
+    current: str
     explained: str
     correlation: str
     warnings: tuple[str, ...]
@@ -154,7 +155,7 @@ def _cell(item: Assessed, name: str) -> tuple[str, str]:
 def _notes(content: EstimateContent, item: Assessed) -> MethodNotes:
     estimate, found = item.estimate, item.one_step
     how = "no instruments"
-    if item.method.instruments:
+    if item.uses_instruments:
         source = "the vessel file's values" if item.start == "nominal" else "the least-squares estimate"
         how = (
             f"instruments simulated first with {source}, refined {words.counted(estimate.refinements, 'time')}; "
@@ -166,10 +167,21 @@ def _notes(content: EstimateContent, item: Assessed) -> MethodNotes:
         title=item.method.title,
         how=how,
         chosen=item is content.found.best,
+        current=_current(item),
         explained=_listed(found.outputs, found.explained.tolist(), 3),
-        correlation=_listed(found.outputs, estimate.residuals.correlation.tolist(), 2),
+        correlation=_listed(found.outputs, found.autocorrelation[1].tolist(), 2),
         warnings=(*estimate.warnings, *diverged),
     )
+
+
+def _current(item: Assessed) -> str:
+    if item.current is None:
+        return ""
+    north, east = (
+        plus_minus(float(value), float(std)).replace("-", words.MINUS)
+        for value, std in zip(item.current.to_mps, item.current.std_mps, strict=True)
+    )
+    return f"Mean current read out of the nuisance parameters: {north} m/s to north, {east} m/s to east."
 
 
 def _listed(outputs: tuple[str, ...], values: list[float], decimals: int) -> str:
@@ -184,7 +196,7 @@ def _conditions(content: EstimateContent) -> list[str]:
 def advice(content: EstimateContent) -> list[str]:
     """Honest words on which estimate to believe when, the ones that these data call for first."""
     best = content.found.best
-    lag = best.estimate.residuals.correlation
+    lag = best.one_step.autocorrelation[1]
     sentences = []
     if (lag < -0.25).any():
         sentences.append(
@@ -197,8 +209,8 @@ def advice(content: EstimateContent) -> list[str]:
             "from the model, such as wind, current, waves or a term. No method is consistent for a model that "
             "lacks what moved the ship, and the standard deviations do not count that error."
         )
-    if not best.method.instruments:
-        sentences.append("No stable estimate by instruments is at hand, so the vessel file holds least squares.")
+    if not best.uses_instruments:
+        sentences.append(f"No stable estimate by instruments is at hand, so the vessel file holds that of {best.method.title}.")
     return sentences
 
 
