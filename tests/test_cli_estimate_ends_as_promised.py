@@ -9,6 +9,7 @@ import pytest
 from measured_trials import EULER, MODEL_SHIP, MODEL_SHIP_TRUE, model_ship_commands, write_run
 
 from expdesign.cli import main
+from expdesign.estimation.methods import METHODS
 from expdesign.signals import Commands
 
 
@@ -148,3 +149,9 @@ def test_the_page_stands_alone_and_names_everything(run: Path, tmp_path: Path) -
     identities = re.findall(r'\sid="([^"]+)"', page)
     assert len(identities) == len(set(identities))
     assert np.isclose(page.count("<svg"), 4)
+
+
+def test_help_names_every_method(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["estimate", "--help"]) == 0
+    words = set(re.findall(r"[a-z-]+", capsys.readouterr().out))
+    assert {method.name for method in METHODS} <= words

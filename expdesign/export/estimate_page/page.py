@@ -210,7 +210,9 @@ def advice(content: EstimateContent) -> list[str]:
             "lacks what moved the ship, and the standard deviations do not count that error."
         )
     if not best.uses_instruments:
-        sentences.append(f"No stable estimate by instruments is at hand, so the vessel file holds that of {best.method.title}.")
+        sentences.append(
+            f"No stable estimate by instruments is at hand, so the vessel file holds that of {best.method.title}."
+        )
     return sentences
 
 
