@@ -52,7 +52,7 @@ def batch_simulator(
     def simulate(parameters: Array, start: Array, values: Array) -> Array:
         if samples == 1:
             return np.asarray(start[None, :])
-        states = np.asarray(run(np.concatenate([start, parameters]), values[:-1].T))[:6].T
+        states = np.asarray(run(np.concatenate([start, parameters]), values[:-1].T)[:6, :]).T
         return np.concatenate([start[None, :], states])
 
     return simulate

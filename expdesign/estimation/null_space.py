@@ -8,13 +8,13 @@ vectors, so that the sentences stay short.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import scipy
 
 from expdesign.errors import NotInformative
-from expdesign.estimation.regression import Regression
 from expdesign.values import Array, seal
 
 UNSEEN = 1e-10
@@ -72,44 +72,45 @@ class NullSpace:
         seal(self, singular_values="p")
 
 
-def null_space(moment: Array, regression: Regression, *, exogenous: bool, second: Second | None = None) -> NullSpace:
-    """The report on a scaled moment matrix (q, p), columns in parameter order.
+def null_space(
+    moment: Array, names: tuple[str, ...], *, samples: int, exogenous: bool, second: Second | None = None
+) -> NullSpace:
+    """The report on the scaled moment matrix (q, p) of parameters that share outputs.
 
     Args:
         moment: instruments against regressors, each scaled to unit norm over the data (columns without variation zero).
-        regression: for names and for which parameters share an output.
+        names: of the p parameters.
+        samples: number of rows behind the moments.
         exogenous: the instruments are the regressors themselves.
         second: second moments (q, q) of instruments and (p, p) of regressors, scaled alike, to find what is weakly
             instrumented; without them nothing is.
     """
-    values: list[float] = []
-    unseen: list[Direction] = []
+    sizes, rows = _right_vectors(moment)
+    top = max(float(sizes[0]), 1e-300)
+    dark = sizes <= UNSEEN * top
+    unseen = [_direction(names, vector, 0.0) for vector in _sparse(rows[dark])]
     faint: list[Direction] = []
-    for group in _groups(regression):
-        sizes, rows = _right_vectors(moment[:, group])
-        top = max(float(sizes[0]), 1e-300)
-        values += (sizes / top).tolist()
-        names = tuple(regression.parameters[index] for index in group)
-        dark = sizes <= UNSEEN * top
-        unseen += [_direction(names, vector, 0.0) for vector in _sparse(rows[dark])]
-        if dark.any():
-            continue
-        if exogenous:
-            weak = sizes <= FAINT * top
-            faint += [
-                _direction(names, row, float(size / top)) for size, row in zip(sizes[weak], rows[weak], strict=True)
-            ]
-        elif second is not None:
-            faint += _weak(
-                moment[np.ix_(group, group)], [part[np.ix_(group, group)] for part in second], names, regression
-            )
-    return NullSpace(singular_values=np.sort(values)[::-1], unseen=tuple(unseen), faint=tuple(faint))
+    if exogenous:
+        weak = ~dark & (sizes <= FAINT * top)
+        faint = [_direction(names, row, float(size / top)) for size, row in zip(sizes[weak], rows[weak], strict=True)]
+    elif second is not None and not dark.any():
+        faint = _weak(moment, second, names, samples)
+    return NullSpace(singular_values=sizes / top, unseen=tuple(unseen), faint=tuple(faint))
+
+
+def joined(parts: Sequence[NullSpace]) -> NullSpace:
+    """One report from those of parameters that share no output."""
+    return NullSpace(
+        singular_values=np.sort(np.concatenate([part.singular_values for part in parts]))[::-1],
+        unseen=tuple(direction for part in parts for direction in part.unseen),
+        faint=tuple(direction for part in parts for direction in part.faint),
+    )
 
 
 Second = tuple[Array, Array]
 
 
-def _weak(G: Array, second: list[Array], names: tuple[str, ...], regression: Regression) -> list[Direction]:
+def _weak(G: Array, second: Second, names: tuple[str, ...], samples: int) -> list[Direction]:
     """Combinations whose regressor the instruments explain hardly better than chance would.
 
     Source: J. G. Cragg and S. G. Donald, Econometric Theory 9 (1993), 222-240; J. H. Stock and M. Yogo, in
@@ -120,7 +121,7 @@ def _weak(G: Array, second: list[Array], names: tuple[str, ...], regression: Reg
     left = regressors - explained
     left = left + max(1e-9, -2.0 * float(np.linalg.eigvalsh(left)[0])) * np.eye(len(left))  # rounding
     ratios, vectors = scipy.linalg.eigh((explained + explained.T) / 2, (left + left.T) / 2)
-    statistics = ratios * len(regression) / len(names)
+    statistics = ratios * samples / len(names)
     weak = statistics < WEAK_STATISTIC
     unit = vectors / np.linalg.norm(vectors, axis=0)
     return [_direction(names, unit[:, i], float(np.clip(ratios[i], 0.0, 1.0))) for i in np.flatnonzero(weak)]
@@ -140,13 +141,6 @@ def require_informative(found: NullSpace) -> None:
         f"the data cannot see these parameters or combinations: {listed}; excite them, or hold some of them fixed",
         parameters=names,
     )
-
-
-def _groups(regression: Regression) -> list[list[int]]:
-    """Parameters that are tied together through outputs."""
-    uses = (regression.Phi != 0).any(axis=0)  # (n, p)
-    count, labels = scipy.sparse.csgraph.connected_components(uses.T.astype(int) @ uses.astype(int), directed=False)
-    return [np.flatnonzero(labels == label).tolist() for label in range(count)]
 
 
 def _right_vectors(matrix: Array) -> tuple[Array, Array]:

@@ -20,11 +20,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+import scipy
 
 from expdesign.errors import InputError, ShapeError, UnknownName
 from expdesign.estimation.long_run import automatic_lags, long_run_covariance
-from expdesign.estimation.null_space import NullSpace, null_space, require_informative
-from expdesign.estimation.regression import Regression, batch_slices
+from expdesign.estimation.null_space import NullSpace, joined, null_space, require_informative
+from expdesign.estimation.regression import Integers, Regression, batch_slices
 from expdesign.estimation.zero_mean import subtract_mean
 from expdesign.values import Array, seal
 
@@ -108,18 +109,77 @@ def solve_iv(regression: Regression, instruments: Array, weighting: Weighting | 
     """
     weighting = weighting or Weighting()
     _check(regression, instruments, weighting)
-    Z = subtract_mean(instruments, regression.batch_of, weighting.mean)
-    if weighting.output_weights:
-        Z = Z * np.array(weighting.output_weights)[:, None]
-    solvers, found = _solvers(regression, Z, weighting, exogenous=instruments is regression.Phi)
-    values = _influences(Z, regression.y, solvers).sum(axis=0)
-    residuals = subtract_mean(regression.residuals(values), regression.batch_of, weighting.mean)
-    scores = _influences(Z, residuals, solvers)
+    exogenous = instruments is regression.Phi
+    systems = [_system(regression, instruments, group, weighting) for group in _groups(regression, instruments)]
+    solved = [_solvers(system, weighting, exogenous=exogenous) for system in systems]
+    found = joined([report for _, report in solved])
+    require_informative(found)
+    k, p = len(regression), len(regression.parameters)
+    values, residuals, scores = np.zeros(p), np.array(regression.y), np.zeros((k, p))
+    for system, (parts, _) in zip(systems, solved, strict=True):
+        theta = _influences(system.Z, system.y, parts).sum(axis=0)
+        left = subtract_mean(system.y - system.Phi @ theta, regression.batch_of, weighting.mean)
+        values[system.columns], residuals[:, system.outputs] = theta, left
+        scores[:, system.columns] = _influences(system.Z, left, parts)
     lags = _lags(scores, regression, weighting)
     P = long_run_covariance(scores, regression.batch_of, regression.step_of, lags=lags, kernel=weighting.kernel)
-    rows, p = residuals.size, len(values)
-    factor = 1.0 if weighting.covariance == "hc0" else rows / max(1, rows - p)
+    factor = 1.0 if weighting.covariance == "hc0" else residuals.size / max(1, residuals.size - p)
     return Solution(values=values, covariance=factor * P, residuals=residuals, lags=lags, null_space=found)
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """The part of a regression that some parameters and outputs have to themselves.
+
+    Attributes:
+        names: of the parameters.
+        columns, outputs: places in the regression.
+        Phi: (k, n, p) regressors.
+        varying: (k, n, p) the same without the mean that is subtracted from instruments.
+        Z: (k, n, p) instruments without mean, weighted.
+        y: (k, n).
+        parts: rows of each batch.
+    """
+
+    names: tuple[str, ...]
+    columns: Integers
+    outputs: Integers
+    Phi: Array
+    varying: Array
+    Z: Array
+    y: Array
+    parts: list[slice]
+
+
+Group = tuple[Integers, Integers]
+"""Places of parameters, and of the outputs they act on."""
+
+
+def _groups(regression: Regression, instruments: Array) -> list[Group]:
+    """Parameters tied together through outputs; in ship models every equation is a group of its own."""
+    uses = ((regression.Phi != 0) | (instruments != 0)).any(axis=0)  # (n, p)
+    ties = uses.T.astype(int) @ uses.astype(int)
+    count, labels = scipy.sparse.csgraph.connected_components(ties, directed=False)
+    columns = [np.flatnonzero(labels == label) for label in range(count)]
+    return [(places, np.flatnonzero(uses[:, places].any(axis=1))) for places in columns]
+
+
+def _system(regression: Regression, instruments: Array, group: Group, weighting: Weighting) -> System:
+    columns, outputs = group
+    cut = (slice(None), outputs[:, None], columns)
+    Phi, Z = regression.Phi[cut], subtract_mean(instruments[cut], regression.batch_of, weighting.mean)
+    if weighting.output_weights:
+        Z = Z * np.array(weighting.output_weights)[outputs, None]
+    return System(
+        names=tuple(regression.parameters[index] for index in columns),
+        columns=columns,
+        outputs=outputs,
+        Phi=Phi,
+        varying=subtract_mean(Phi, regression.batch_of, weighting.mean),
+        Z=Z,
+        y=regression.y[:, outputs],
+        parts=batch_slices(regression.batch_of),
+    )
 
 
 Part = tuple[slice, Array]
@@ -132,42 +192,49 @@ def _influences(Z: Array, y: Array, solvers: list[Part]) -> Array:
     return np.concatenate([scores[rows] @ A.T for rows, A in solvers])
 
 
-def _solvers(
-    regression: Regression, Z: Array, weighting: Weighting, *, exogenous: bool
-) -> tuple[list[Part], NullSpace]:
-    Phi = subtract_mean(regression.Phi, regression.batch_of, weighting.mean)
-    parts = batch_slices(regression.batch_of)
-    weights = weighting.batch_weights or (1.0,) * len(parts)
-    size = np.sqrt((Phi**2).sum(axis=(0, 1)))
-    size[size <= 1e-11 * np.sqrt((regression.Phi**2).sum(axis=(0, 1)))] = 0.0  # constant, to working precision
-    column, row = np.where(size > 0, size, 1.0), np.sqrt((Z**2).sum(axis=(0, 1)))
+def _solvers(system: System, weighting: Weighting, *, exogenous: bool) -> tuple[list[Part], NullSpace]:
+    """Solvers of all batches, and the report; without solvers where the report says that there are none."""
+    column, row = _norm(system.varying), _norm(system.Z)
+    column[column <= 1e-11 * _norm(system.Phi)] = np.inf  # constant, to working precision
     row[row == 0] = 1.0
-    moments = [_moment(Z[rows] / row, Phi[rows] * (size > 0) / column) for rows in parts]
+    Z, Phi = system.Z, system.varying
+    moments = [_moment(Z[rows], Phi[rows]) / row[:, None] / column for rows in system.parts]
+    weights = weighting.batch_weights or (1.0,) * len(moments)
     if weighting.blocks == "one":
         total = sum((w * H for w, H in zip(weights, moments, strict=True)), start=np.zeros_like(moments[0]))
-        flat = Phi * (size > 0) / column
-        second = None if exogenous else (_moment(Z / row, Z / row), _moment(flat, flat))
-        found = null_space(total, regression, exogenous=exogenous, second=second)
-        require_informative(found)
+        second = (
+            None if exogenous else (_moment(Z, Z) / np.outer(row, row), _moment(Phi, Phi) / np.outer(column, column))
+        )
+        found = null_space(total, system.names, samples=len(Z), exogenous=exogenous, second=second)
+        if found.unseen:
+            return [], found
         A = np.linalg.inv(total) / column[:, None] / row
-        return [(rows, w * A) for w, rows in zip(weights, parts, strict=True)], found
-    halves = [np.sqrt(w) * _whitening(Z[rows] / row) for w, rows in zip(weights, parts, strict=True)]
+        return [(rows, w * A) for w, rows in zip(weights, system.parts, strict=True)], found
+    halves = [
+        np.sqrt(w) * _whitening(_moment(Z[rows], Z[rows]) / np.outer(row, row))
+        for w, rows in zip(weights, system.parts, strict=True)
+    ]
     stacked = np.concatenate([half @ H for half, H in zip(halves, moments, strict=True)])
-    found = null_space(stacked, regression, exogenous=exogenous)
-    require_informative(found)
+    found = null_space(stacked, system.names, samples=len(Z), exogenous=exogenous)
+    if found.unseen:
+        return [], found
     pieces = np.split(np.linalg.pinv(stacked), np.cumsum([len(half) for half in halves])[:-1], axis=1)
-    return [
-        (rows, piece @ half / column[:, None] / row) for rows, piece, half in zip(parts, pieces, halves, strict=True)
-    ], found
+    solvers = [piece @ half / column[:, None] / row for piece, half in zip(pieces, halves, strict=True)]
+    return list(zip(system.parts, solvers, strict=True)), found
+
+
+def _norm(rows: Array) -> Array:
+    """(p,) over samples and outputs."""
+    return np.asarray(np.sqrt(np.einsum("knp,knp->p", rows, rows)))
 
 
 def _moment(Z: Array, Phi: Array) -> Array:
     return np.asarray(Z.reshape(-1, Z.shape[2]).T @ Phi.reshape(-1, Phi.shape[2]))
 
 
-def _whitening(Z: Array) -> Array:
+def _whitening(moments: Array) -> Array:
     """Square root of the inverse second moments, on the directions in which the instruments vary at all."""
-    values, vectors = np.linalg.eigh(_moment(Z, Z))
+    values, vectors = np.linalg.eigh(moments)
     kept = values > 1e-12 * values[-1]
     return np.asarray((vectors[:, kept] / np.sqrt(values[kept])).T)
 
