@@ -61,3 +61,20 @@ def test_the_narrowest_passage_is_half_the_gap_and_is_found_where_it_is(gap_m):
     assert widest == pytest.approx(gap_m / 2, abs=field.error_m)
     assert abs(place[1]) < 10 + 3 * field.error_m + gap_m / 2
     assert 100 <= place[0] <= 100 + gap_m
+
+
+def test_a_pier_thinner_than_a_cell_is_not_overlooked():
+    pier = shapely.box(-0.3, -600, 0.3, 300)
+    field = clearance_field(area(shapely.box(-500, -500, 500, 500).difference(pier)), resolution_m=4.0)
+    north = np.linspace(-400, 250, 60)
+    assert field.at(np.stack([north, 0 * north], axis=1)).max() <= field.cell_m
+    way = goal_field(field, np.array([0.0, 200.0]), clearance_m=5.0)
+    assert way.to_goal(np.array([0.0, -200.0])) > 2 * np.hypot(300, 200) * 0.95
+
+
+def test_near_a_berth_no_more_clearance_is_asked_than_the_berth_has():
+    field = clearance_field(area(shapely.box(-500, -500, 500, 500)), resolution_m=4.0)
+    berth, goal = np.array([0.0, -480.0]), np.array([0.0, 0.0])
+    assert np.isinf(goal_field(field, goal, clearance_m=40.0).to_goal(berth))
+    berths = np.array([berth])
+    assert np.isfinite(goal_field(field, goal, clearance_m=40.0, berths=berths, berth_m=60.0).to_goal(berth))

@@ -3,11 +3,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapely
-from plan_case import at_rest, leg_water
+from plan_case import VESSELS, area, at_rest, leg_water
 
+from expdesign.plan import PlanSettings
 from expdesign.plan._ompl import dubins_curve
+from expdesign.plan.capability import capability
+from expdesign.plan.field import clearance_field
 from expdesign.plan.footprint import swept_area
-from expdesign.plan.legs import LegTask, find_leg, find_path, leg_trajectory
+from expdesign.plan.legs import LegTask, LegWater, find_leg, find_path, leg_trajectory
+from expdesign.scenario import load_vessel
+from expdesign.simulation import CALM
 
 OPEN = shapely.box(-1500, -1500, 1500, 1500)
 WALL = shapely.box(-20, -1500, 20, 150)
@@ -98,3 +103,21 @@ def test_a_leg_is_not_faster_than_top_speed_and_not_slower_than_twice_the_estima
     assert values is not None
     seconds = len(values) * water.vessel.sample_time_s
     assert 600 / water.ship.transit_speed_mps < seconds < 2 * 600 / water.ship.transit_speed_mps
+
+
+def test_legs_do_not_cheat_the_transit_speed_by_going_sideways():
+    vessel = load_vessel(VESSELS / "model-ship.toml")
+    sea = area(shapely.box(-80, -80, 80, 80))
+    water = LegWater(
+        vessel=vessel,
+        environment=CALM,
+        ship=capability(vessel, PlanSettings()),
+        area=sea,
+        clearance_m=1.0,
+        field=clearance_field(sea, resolution_m=0.5),
+    )
+    start, end = at_rest(-50, 0, 0.0), at_rest(50, 0, 0.0)
+    values = find_leg(task(start, end, np.zeros(3), np.zeros(3)), water)
+    assert values is not None
+    speed = np.hypot(*leg_trajectory(water, start, values).velocity[:, :2].T)
+    assert speed.max() < 1.01 * water.ship.transit_speed_mps

@@ -45,9 +45,8 @@ def test_an_uncertain_current_strays_like_its_rayleigh_quantile():
     draws, confidence = 4000, 0.9
     end = stray(vessel, spread, confidence, draws=draws)[-1]
     exact = 60.0 * 0.05 * np.sqrt(-2 * np.log(1 - confidence))
-    density = confidence_density = (1 - confidence) * np.sqrt(-2 * np.log(1 - confidence)) / (60.0 * 0.05)
+    density = (1 - confidence) * np.sqrt(-2 * np.log(1 - confidence)) / (60.0 * 0.05)
     error = np.sqrt(confidence * (1 - confidence) / draws) / density
-    assert confidence_density > 0
     # entering water that moves, the ship lags by its own time constant: allow that besides four standard errors
     assert exact * 0.85 - 4 * error < end < exact + 4 * error
 
@@ -91,3 +90,14 @@ def test_half_of_the_currents_carry_the_ship_over_a_line_at_its_side():
     draws = 1000
     share = leave(vessel, shapely.box(-300, -100, 4.5 + 1e-6, 300), Environment(current_std_mps=0.05), draws)
     assert abs(share - 0.5) < 4 * np.sqrt(0.25 / draws)
+
+
+@pytest.mark.parametrize("north_m", np.linspace(20.0, 40.0, 9))
+def test_a_thin_wall_across_the_course_is_not_stepped_over(north_m):
+    basin = shapely.box(-100, -100, 100, 200).difference(shapely.box(-101, north_m, 101, north_m + 0.3))
+    assert leave(certain(ship()), basin) == 1.0
+
+
+def test_more_confidence_than_draws_can_tell_is_refused():
+    with pytest.raises(NoPlan, match="too high to be estimated"):
+        stray(ship(), confidence=0.99999, draws=None)

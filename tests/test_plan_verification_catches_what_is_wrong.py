@@ -25,30 +25,40 @@ def primitive(vessel):
 
 
 def sound():
-    """An acceleration from rest and twenty seconds of keeping the thrust, as a plan of two legs."""
+    """An acceleration from rest and minutes of slowing down to rest again, as a plan of two legs."""
     vessel = ship()
     run = primitive(vessel)
-    values = np.vstack([run.commands.values, np.repeat(run.commands.values[-1:], 20, axis=0)])
-    commands = replace(run.commands, values=values)
+    last = run.commands.values[-1]
+    slowing = last * np.clip(1 - np.arange(1, 101) / 20, 0, 1)[:, None]
+    commands = replace(run.commands, values=np.vstack([run.commands.values, slowing]))
+    track = simulate(vessel, commands)
     return {
         "vessel": vessel,
         "area": area(shapely.box(-100, -100, 100, 250)),
         "environment": CALM,
         "commands": commands,
-        "trajectory": simulate(vessel, commands),
+        "trajectory": track,
         "legs": (
             Leg(kind="primitive", name="go", first=0, last=60),
-            Leg(kind="reposition", name="goal", first=60, last=80),
+            Leg(kind="reposition", name="goal", first=60, last=160),
         ),
         "clearance_m": CLEARANCE_M,
         "primitives": {"go": run},
         "repeats": {"go": 1},
+        "start": np.zeros(3),
+        "goal": track.pose[-1],
     }
 
 
 def check(plan):
     plan = dict(plan)
     return verify_plan(plan.pop("vessel"), plan.pop("area"), plan.pop("environment"), **plan)
+
+
+def bent(track: Trajectory, name: str, column: int, by: float) -> Trajectory:
+    values = getattr(track, name).copy()
+    values[80:120, column] += by
+    return replace(track, **{name: values})
 
 
 def changed(commands: Commands, row: int, column: int, by: float) -> Commands:
@@ -67,16 +77,21 @@ def test_a_sound_plan_has_no_problems_and_its_true_clearance():
 @pytest.mark.parametrize(
     ("spoil", "word"),
     [
-        (lambda p: {"commands": changed(p["commands"], 70, 0, -3.0)}, "rate"),
+        (lambda p: {"commands": changed(p["commands"], 70, 0, 3.0)}, "rate"),
         (lambda p: {"commands": changed(p["commands"], 70, 0, 100.0)}, "limit"),
         (lambda p: {"commands": changed(p["commands"], 30, 0, 0.5)}, "not the dictionary's"),
         (lambda p: {"repeats": {"go": 2}}, "run 1 times"),
         (lambda p: {"repeats": {}}, "ask for 0"),
         (lambda p: {"legs": p["legs"][:1]}, "gaps"),
         (lambda p: {"legs": (replace(p["legs"][0], last=59), p["legs"][1])}, ""),
-        (lambda p: {"area": area(shapely.box(-100, -100, 100, 90))}, "forbidden water"),
+        (lambda p: {"area": area(shapely.box(-100, -100, 100, 60))}, "forbidden water"),
         (lambda p: {"area": area(shapely.box(-30, -100, 23, 250))}, "promised 20"),
         (lambda p: {"clearance_m": 90.0}, "promised 90"),
+        (lambda p: {"start": np.array([0.0, 5.0, 0.0])}, "off the start"),
+        (lambda p: {"goal": p["goal"] + [0.0, 0.0, 0.1]}, "off the goal"),
+        (lambda p: {"goal": p["goal"] + [3.0, 0.0, 0.0]}, "off the goal"),
+        (lambda p: {"trajectory": bent(p["trajectory"], "pose", 2, 0.1)}, "heading"),
+        (lambda p: {"trajectory": bent(p["trajectory"], "velocity", 1, 0.3)}, "speed"),
     ],
 )
 def test_each_flaw_is_named(spoil, word):
@@ -92,12 +107,17 @@ def test_each_flaw_is_named(spoil, word):
 
 def test_a_shifted_track_does_not_pass_for_the_commands_motion():
     plan = sound()
-    track = plan["trajectory"]
-    pose = track.pose.copy()
-    pose[40:, 1] += 3.0
-    bent = Trajectory(sample_time_s=track.sample_time_s, pose=pose, velocity=track.velocity)
-    found = check({**plan, "trajectory": bent})
+    found = check({**plan, "trajectory": bent(plan["trajectory"], "pose", 1, 3.0)})
     assert any("off the track" in problem for problem in found.problems)
+
+
+def test_the_hull_is_checked_where_the_commands_take_it_not_only_where_the_track_says():
+    plan = sound()
+    north = plan["trajectory"].pose[:, 0].max()
+    plan["area"] = area(shapely.box(-100, -100, 100, north + 15 + 19.5))  # half a metre too near at the goal
+    track = plan["trajectory"]
+    drawn = replace(track, pose=track.pose - [[0.9, 0, 0]] * (track.pose[:, :1] > north - 2))
+    assert check({**plan, "trajectory": drawn}).clearance_min_m == pytest.approx(19.5, abs=0.01)
 
 
 def test_a_run_that_begins_at_the_wrong_speed_is_named():

@@ -150,7 +150,7 @@ def build_route(
 
 
 def _tolerance(track: PlannedTrack, tolerance_m: float | None) -> float:
-    value = min(track.clearance_m / 3, track.beam_m / 2) if tolerance_m is None else tolerance_m
+    value = min(max(track.clearance_m / 3, track.beam_m / 20), track.beam_m / 2) if tolerance_m is None else tolerance_m
     if not 0 < value < math.inf:
         raise InputError(f"tolerance of the route is {value:g} m, expected more than 0: give one with the clearance 0")
     return value

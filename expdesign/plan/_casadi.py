@@ -43,7 +43,7 @@ class LegProblem:
         side: (j + 1, 2) unit normals of the path, to starboard, north/east.
         room_port_m, room_starboard_m: (j + 1,) how far the origin may be from the reference to either side.
         hull_arm_m: points this far ahead and astern of the origin must keep to the corridor too.
-        top_speed_mps, yaw_rate_radps: bounds on surge speed and yaw rate at the nodes.
+        top_speed_mps, yaw_rate_radps: bounds on speed over ground, in any direction, and yaw rate at the nodes.
     """
 
     vessel: Vessel
@@ -149,6 +149,9 @@ class _Transcription:
             constraints += [ca.vertcat(change, fall) / self.input_scale[index]]
             low.append(np.full(2 * j, -np.inf))
             high.append(np.zeros(2 * j))
+        constraints.append(ca.sum1(x[3:5, 1:-1] ** 2).T)  # speed over ground in units of its bound
+        low.append(np.zeros(j - 1))
+        high.append(np.ones(j - 1))
         steps, sample = ca.diff(u, 1, 1), p.vessel.sample_time_s
         cost = SMOOTHNESS * ca.sumsqr(steps) + SMALLNESS * ca.sumsqr(u) / j
         if free_time:
@@ -207,7 +210,7 @@ class _Transcription:
         origin = np.array([*p.start[:2], 0, 0, 0, 0])
         ends = ((p.start - origin) / self.state_scale, (p.end - origin) / self.state_scale)
         big = np.full((j + 1, 6), np.inf)
-        big[:, 3], big[:, 5] = 1.0, 1.0  # surge and yaw rate in units of their bounds
+        big[:, 3:] = 1.0  # speeds and yaw rate in units of their bounds
         low, high = -big, big.copy()
         low[0] = high[0] = ends[0]
         low[-1] = high[-1] = ends[1]

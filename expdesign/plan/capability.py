@@ -38,22 +38,36 @@ class Capability:
     acceleration_mps2: float
 
 
-def capability(vessel: Vessel, settings: PlanSettings) -> Capability:
-    """Repositioning speeds and turns: the user's wishes, or what the nominal model gives.
+def capability(vessel: Vessel, settings: PlanSettings, *, current_mps: float = 0.0) -> Capability:
+    """Repositioning speeds and turns: the user's wishes, or what the nominal model gives in calm air.
 
     Raises:
-        NoPlan: the vessel cannot make headway, cannot reach the wished speed, or cannot turn while moving.
+        NoPlan: the vessel cannot make headway, not even against the mean current, cannot reach the wished speed or
+            the wished radius, or cannot turn while moving.
     """
+    for output, motion in (("u", "move ahead"), ("r", "turn")):
+        if output not in vessel.model.outputs:
+            raise NoPlan(
+                f"the model of vessel {vessel.name!r} has no {output} equation and cannot {motion}: its primitives "
+                "can be scored and given durations, but a plan needs a model that can be steered"
+            )
     top = _largest(lambda u: _holds(vessel, (u, 0.0, 0.0)), start=1e-3 * vessel.length_m)
     if top is None:
         raise NoPlan(f"vessel {vessel.name!r} cannot hold any speed ahead with its actuators and nominal model")
     transit = settings.transit_speed_mps or USABLE * top
     if transit > top:
         raise NoPlan(f"plan.transit_speed_mps is {transit:g}, vessel {vessel.name!r} reaches {top:.3g} m/s")
+    if current_mps >= transit:
+        raise NoPlan(f"the mean current of {current_mps:.3g} m/s is not slower than repositioning at {transit:.3g} m/s")
     yaw = _largest(lambda r: _holds(vessel, (transit, 0.0, r)), start=1e-4 * transit / vessel.length_m)
     if yaw is None:
         raise NoPlan(f"vessel {vessel.name!r} cannot turn at {transit:.3g} m/s with its actuators and nominal model")
     yaw = min(yaw, LATERAL_MPS2 / transit / USABLE)
+    if settings.turning_radius_m is not None and settings.turning_radius_m < transit / yaw:
+        raise NoPlan(
+            f"plan.turning_radius_m is {settings.turning_radius_m:g}, at {transit:.3g} m/s vessel {vessel.name!r} "
+            f"needs {transit / yaw:.3g} m or more"
+        )
     radius = settings.turning_radius_m or max(transit / (USABLE * yaw), 1.5 * vessel.length_m)
     return Capability(
         top_speed_mps=top,

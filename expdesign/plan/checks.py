@@ -1,4 +1,7 @@
-"""Independent verification: nothing here knows how the plan was made, only the chart, the vessel and the commands."""
+"""Independent verification: from the chart, the vessel, the commands and the track, not from how the plan was made.
+
+It shares the equations of motion and the hull's outline with the planner, but none of its grids, margins or paths.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import shapely
 
+from expdesign.conventions import wrap_angle
 from expdesign.dictionary import Primitive
 from expdesign.plan.area import SeaArea
 from expdesign.plan.footprint import hull_polygons
@@ -34,8 +38,12 @@ def verify_plan(
     clearance_m: float,
     primitives: Mapping[str, Primitive],
     repeats: Mapping[str, int],
+    start: Array,
+    goal: Array,
 ) -> Verification:
-    """Re-simulate the commands ten times finer and check track, hull, limits, runs and entry states.
+    """Re-simulate the commands ten times finer and check motion, hull, limits, runs, entry states, start and goal.
+
+    The hull is checked on the track and on the re-simulated motion.
 
     Args:
         vessel, environment: the nominal model and the forecast's means.
@@ -44,6 +52,7 @@ def verify_plan(
         clearance_m: promised distance from hull to forbidden water.
         primitives: the dictionary by name.
         repeats: how often each is to be run.
+        start, goal: (3,) poses where the ship is to begin and end at rest through the water.
     """
     again = simulate(
         vessel,
@@ -53,16 +62,12 @@ def verify_plan(
         environment=environment,
         substeps=FINE_SUBSTEPS,
     )
-    apart = np.hypot(*(again.pose - trajectory.pose)[:, :2].T)
-    allowed_m = np.maximum(vessel.length_m / 30, 0.001 * _sailed(trajectory))
-    clearance = hull_clearance(area, trajectory, vessel.hull_b)
+    clearance = np.minimum(*(hull_clearance(area, track, vessel.hull_b) for track in (trajectory, again)))
     worst = int(np.argmin(clearance))
     excess, excess_signal = _limit_excess(vessel, commands)
     problems = [
-        *_if(
-            bool((apart > allowed_m).any()),
-            f"the re-simulated commands are {apart.max():.2f} m off the track, allowed {allowed_m.max():.2f} m",
-        ),
+        *_motion_problems(vessel, trajectory, again),
+        *_end_problems(vessel, environment, trajectory, start, goal),
         *_if(
             bool(clearance[worst] < clearance_m - 1e-6),
             f"the hull is {clearance[worst]:.2f} m from forbidden water, promised {clearance_m:g} m, "
@@ -75,7 +80,7 @@ def verify_plan(
     return Verification(
         clearance_min_m=float(clearance[worst]),
         clearance_time_s=worst * commands.sample_time_s,
-        reproduction_error_m=float(apart.max()),
+        reproduction_error_m=float(np.hypot(*(again.pose - trajectory.pose)[:, :2].T).max()),
         limit_excess=excess,
         problems=tuple(problems),
     )
@@ -110,6 +115,44 @@ def _pieces(line: shapely.Geometry) -> np.ndarray:
     return np.asarray(shapely.linestrings(np.stack([points[:-1], points[1:]], axis=1)))
 
 
+def _motion_problems(vessel: Vessel, trajectory: Trajectory, again: Trajectory) -> list[str]:
+    """Where the track is not the motion that the commands give."""
+    sailed, speed = _sailed(trajectory), np.abs(again.velocity).max(axis=0) + 1e-9
+    found = (
+        ("m", np.hypot(*(again.pose - trajectory.pose)[:, :2].T), np.maximum(vessel.length_m / 30, 0.001 * sailed)),
+        ("rad of heading", np.abs(again.pose - trajectory.pose)[:, 2], np.full(len(sailed), 0.02)),
+        ("of the largest speed", (np.abs(again.velocity - trajectory.velocity) / speed).max(axis=1), 0.02 + 0 * sailed),
+    )
+    problems = []
+    for what, apart, allowed in found:
+        worst = int(np.argmax(apart - allowed))
+        if apart[worst] > allowed[worst]:
+            problems.append(
+                f"the re-simulated commands are {apart[worst]:.3g} {what} off the track at "
+                f"{worst * trajectory.sample_time_s:.0f} s, allowed {allowed[worst]:.3g}"
+            )
+    return problems
+
+
+def _end_problems(
+    vessel: Vessel, environment: Environment, trajectory: Trajectory, start: Array, goal: Array
+) -> list[str]:
+    """How the plan's ends differ from start and goal, at rest through the water."""
+    problems = []
+    for name, pose, index in (("start", start, 0), ("goal", goal, -1)):
+        place, velocity = trajectory.pose[index], trajectory.velocity[index]
+        off_m = float(np.hypot(*(place - pose)[:2]))
+        turned = abs(float(wrap_angle(place[2] - pose[2])))
+        u_c, v_c = to_body(environment.current_to, place[2], NUMPY)
+        moving = float(np.hypot(velocity[0] - u_c, velocity[1] - v_c))
+        slow = ENTRY_TOLERANCE * float(np.hypot(*trajectory.velocity[:, :2].T).max())
+        if off_m > vessel.length_m / 30 or turned > ENTRY_TOLERANCE or moving > slow:
+            problems.append(
+                f"the plan is {off_m:.2f} m and {turned:.3f} rad off the {name}, at {moving:.3f} m/s through the water"
+            )
+    return problems
+
+
 def _sailed(trajectory: Trajectory) -> Array:
     return np.asarray(np.r_[0.0, np.cumsum(np.hypot(*np.diff(trajectory.pose[:, :2], axis=0).T))])
 
@@ -120,7 +163,8 @@ def _limit_excess(vessel: Vessel, commands: Commands) -> tuple[float, str]:
     for name, limit, values in zip(commands.names, vessel.limits, commands.values.T, strict=True):
         span = limit.high - limit.low if np.isfinite(limit.high - limit.low) else 2 * np.pi
         over = max(float((values - limit.high).max()), float((limit.low - values).max()))
-        steps = np.abs(np.diff(values)).max(initial=0.0) - limit.rate * commands.sample_time_s
+        first = [] if name.startswith("a") else [0.0]  # everything but an angle begins at rest
+        steps = np.abs(np.diff([*first, *values])).max(initial=0.0) - limit.rate * commands.sample_time_s
         relative = max(over, float(steps)) / span
         if relative > worst:
             worst, where = relative, name

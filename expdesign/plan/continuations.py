@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.conventions import wrap_angle
+from expdesign.plan.field import OCTILE_EXCESS
 from expdesign.plan.search_space import PartialPlans, SearchSpace
 from expdesign.values import Array
 
@@ -113,7 +114,7 @@ def _way_points(space: SearchSpace, pose: Array) -> tuple[Array, Array]:
     if len(way) < 3:
         return np.zeros((0, 4)), np.zeros(0)
     steps = np.hypot(*np.diff(way, axis=0).T)
-    along = np.r_[0.0, np.cumsum(steps)] / np.sqrt(1.0824)
+    along = np.r_[0.0, np.cumsum(steps)] / np.sqrt(OCTILE_EXCESS)
     wished = np.r_[WAYS * space.hull_m, along[-1]]
     at = np.searchsorted(along, wished[wished <= along[-1]]).clip(1, len(way) - 1)
     back = np.maximum(at - 5, 0)

@@ -36,7 +36,7 @@ class ClearanceField:
     @property
     def error_m(self) -> float:
         """A looked-up clearance differs from the true one by less than this [m]."""
-        return float(self.cell_m * np.sqrt(2.0))
+        return 2.0 * self.cell_m  # half a cell's diagonal at the point and at the shore, and half a cell of rounding
 
     def index(self, points: Array) -> tuple[np.ndarray, np.ndarray]:
         """Nearest cell's row and column of (..., 2) north/east points; outside the grid they are clipped."""
@@ -75,6 +75,11 @@ def clearance_field(area: SeaArea, *, resolution_m: float) -> ClearanceField:
     easts = np.arange(west - cell, east + 2 * cell, cell)
     shapely.prepare(area.water)
     free = shapely.contains_xy(area.water, *np.meshgrid(easts, norths))
+    # a pier thinner than a cell hides between the centres: every cell that a shore passes through is forbidden
+    shore = shapely.get_coordinates(shapely.segmentize(shapely.boundary(area.water), cell / 2))
+    free[
+        np.rint((shore[:, 1] - norths[0]) / cell).astype(int), np.rint((shore[:, 0] - easts[0]) / cell).astype(int)
+    ] = False
     free[[0, -1], :] = free[:, [0, -1]] = False
     distance = np.asarray(distance_transform_edt(free)) * cell - cell / 2
     return ClearanceField(origin=np.array([norths[0], easts[0]]), cell_m=cell, clearance_m=distance.clip(0.0))
@@ -115,11 +120,19 @@ class GoalField:
         return self.field.centre(np.array(cells))
 
 
-def goal_field(fine: ClearanceField, goal: Array, *, clearance_m: float) -> GoalField:
-    """Distances to a goal (2,) over cells with at least `clearance_m`; the goal's own cell always counts."""
+def goal_field(
+    fine: ClearanceField, goal: Array, *, clearance_m: float, berths: Array | None = None, berth_m: float = 0.0
+) -> GoalField:
+    """Distances to a goal (2,) over cells with at least `clearance_m`; the goal's own cell always counts.
+
+    Near `berths` (b, 2), within `berth_m`, no more is asked than the berth itself has.
+    """
     field = fine.thinned(ROUTING_CELLS)
     rows, columns = field.clearance_m.shape
     free = field.clearance_m >= clearance_m
+    for berth in np.zeros((0, 2)) if berths is None else berths:
+        away = np.hypot(*np.moveaxis(field.centre(np.arange(rows * columns)) - berth, -1, 0)).reshape(rows, columns)
+        free |= (away <= berth_m) & (field.clearance_m >= float(fine.at(berth)) - field.cell_m)
     goal_row, goal_column = field.index(goal)
     free[goal_row, goal_column] = True
     numbers = np.arange(rows * columns).reshape(rows, columns)

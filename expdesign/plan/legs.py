@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -22,6 +23,8 @@ from expdesign.vessel import Vessel, allocate, required_force
 
 ROOM_M = 3.0
 """Hull lengths to either side beyond which a corridor is not widened."""
+NEAR_ENDS = 2.0
+"""Hull lengths round a leg's ends within which its path needs no more clearance than the ends have."""
 ARRIVAL = 1e-3
 """Largest miss of a leg's end state, in hull lengths, and in transit speeds."""
 
@@ -126,7 +129,7 @@ def _checker(task: LegTask, water: LegWater, slack_m: float) -> Clear:
     field, margin = water.field, water.path_margin_m + slack_m
     grid, (north, east), cell = field.clearance_m, field.origin.tolist(), field.cell_m
     rows, columns = grid.shape
-    near = 2 * water.vessel.length_m
+    near = NEAR_ENDS * water.vessel.length_m
     ends = [(*end[:2].tolist(), float(field.at(end[:2])) - cell) for end in (task.start, task.end)]
 
     def clear(x: float, y: float) -> bool:
@@ -168,6 +171,7 @@ def _leg_problem(task: LegTask, water: LegWater, path: Array, narrowing: float) 
     end = np.r_[task.end[:2], reference[-1, 2], task.end[3:]]
     reference[0], reference[-1], guess[-1] = task.start, end, end_inputs
     side = np.stack([-np.sin(reference[:, 2]), np.cos(reference[:, 2])], axis=-1)
+    current = float(np.hypot(*water.environment.current_to))
     centres, disc_m = covering_discs(vessel.length_m, vessel.beam_m)
     margin = water.clearance_m + disc_m + water.field.cell_m / 2
     port, starboard = (_room(water, reference[:, :2], sign * side, margin, narrowing) for sign in (-1.0, 1.0))
@@ -185,9 +189,14 @@ def _leg_problem(task: LegTask, water: LegWater, path: Array, narrowing: float) 
         room_port_m=port,
         room_starboard_m=starboard,
         hull_arm_m=float(centres[-1]),
-        top_speed_mps=max(ship.transit_speed_mps, 1.02 * abs(task.start[3]), 1.02 * abs(task.end[3])),
+        top_speed_mps=leg_speed_mps(ship, (task.start[3:], task.end[3:])) + current,
         yaw_rate_radps=max(ship.yaw_rate_radps, 1.02 * abs(task.start[5]), 1.02 * abs(task.end[5])),
     )
+
+
+def leg_speed_mps(ship: Capability, ends: Iterable[Array]) -> float:
+    """Largest speed on a leg: transit speed, or 2 % above what its ends (3,) have."""
+    return max(ship.transit_speed_mps, *(1.02 * float(np.hypot(*velocity[:2])) for velocity in ends))
 
 
 def _timed(path: Array, first_mps: float, last_mps: float, ship: Capability, length_m: float) -> tuple[Array, float]:

@@ -64,13 +64,12 @@ def leave_water_probability(
 
 
 def _leaves(area: SeaArea, vessel: Vessel, states: Array) -> np.ndarray:
-    """(n,) whether a hull corner is outside at any looked-at sample of states (k, n, 6)."""
-    speed = float(np.nanquantile(np.hypot(states[..., 3], states[..., 4]), 0.9)) + 1e-9
-    span = 2 * np.pi * vessel.length_m  # a turn on the spot sweeps this far
-    rate = speed + float(np.nanquantile(np.abs(states[..., 5]), 0.9)) * span / (2 * np.pi)
-    every = max(1, int(LOOK_EVERY_M * vessel.length_m / (rate * vessel.sample_time_s)))
-    pose = states[::every, :, :3]
+    """(n,) whether the hull, or what it sweeps between looks, ever reaches outside, from states (k, n, 6)."""
+    speed = np.hypot(states[..., 3], states[..., 4]) + np.abs(states[..., 5]) * vessel.length_m / 2
+    every = max(1, int(LOOK_EVERY_M * vessel.length_m / (np.nanquantile(speed, 0.9) * vessel.sample_time_s + 1e-9)))
+    looked = np.unique(np.r_[np.arange(0, len(states), every), len(states) - 1])
+    pose = states[looked, :, :3]
     lost = np.isnan(pose).any(axis=(0, 2))
-    corners = hull_outlines(np.nan_to_num(pose).reshape(-1, 3), vessel.hull_b)
-    inside = shapely.contains_xy(area.water, corners[..., 0], corners[..., 1]).all(axis=1)
-    return np.asarray(lost | ~inside.reshape(pose.shape[:2]).all(axis=0))
+    corners = hull_outlines(np.nan_to_num(pose).reshape(-1, 3), vessel.hull_b).reshape(*pose.shape[:2], -1, 2)
+    spans = shapely.convex_hull(shapely.multipoints(np.concatenate([corners[:-1], corners[1:]], axis=2)))
+    return np.asarray(lost | ~shapely.contains_properly(area.water, spans).all(axis=0))

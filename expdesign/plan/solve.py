@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
@@ -13,15 +13,16 @@ from expdesign.dictionary import Primitive
 from expdesign.durations import DurationDesign
 from expdesign.errors import NoPlan
 from expdesign.plan.area import SeaArea
-from expdesign.plan.capability import Capability, capability
+from expdesign.plan.capability import capability
 from expdesign.plan.checks import verify_plan
 from expdesign.plan.field import ROUTING_CELLS, ClearanceField, clearance_field, goal_field, narrowest_passage
 from expdesign.plan.footprint import covering_discs, swept_area
-from expdesign.plan.legs import LegTask, LegWater, find_leg, leg_trajectory
+from expdesign.plan.legs import NEAR_ENDS, LegTask, LegWater, find_leg, leg_speed_mps, leg_trajectory
 from expdesign.plan.placement import place_runs
 from expdesign.plan.realised import realised_efficiency
 from expdesign.plan.safety import leave_water_probability
 from expdesign.plan.search_space import SearchSpace, Stamp, refusing, stamp
+from expdesign.plan.timeline import Timeline
 from expdesign.plan.uncertainty import stray_m
 from expdesign.plan.values import Leg, Placement, Plan, PlanSettings
 from expdesign.signals import Commands, Trajectory
@@ -56,27 +57,6 @@ class PlanProblem:
     seed: int = 0
 
 
-@dataclass
-class _Log:
-    """What has been sailed so far."""
-
-    state: Array
-    inputs: Array
-    last: str = ""
-    exit_mps: float = 0.0
-    commands: list[Array] = field(default_factory=list)
-    states: list[Array] = field(default_factory=list)
-    legs: list[Leg] = field(default_factory=list)
-
-    def sail(self, kind: str, name: str, commands: Array, track: Trajectory) -> None:
-        first = self.legs[-1].last if self.legs else 0
-        self.legs.append(Leg(kind=kind, name=name, first=first, last=first + len(commands)))
-        states = np.hstack([track.pose, track.velocity])
-        self.commands.append(commands)
-        self.states.append(states[1:])
-        self.state, self.inputs = states[-1], commands[-1]
-
-
 def plan_trial(problem: PlanProblem, *, progress: Progress = lambda what, share: None) -> Plan:
     """One continuous, verified trial from start to goal with every run the design asks for.
 
@@ -86,17 +66,12 @@ def plan_trial(problem: PlanProblem, *, progress: Progress = lambda what, share:
     progress("measuring the water", 0.0)
     water = _water(problem)
     space = _search_space(problem, water)
-    log = _sail_all(problem, water, space, progress)
-    commands = Commands(
-        sample_time_s=problem.vessel.sample_time_s,
-        names=problem.vessel.model.inputs,
-        values=np.concatenate(log.commands),
+    line = _sail_all(problem, water, space, progress)
+    commands, trajectory, legs = line.joined(
+        sample_time_s=problem.vessel.sample_time_s, names=problem.vessel.model.inputs
     )
-    begin = _at_rest(problem, problem.start)
-    states = np.concatenate([begin[None], *log.states])
-    trajectory = Trajectory(sample_time_s=commands.sample_time_s, pose=states[:, :3], velocity=states[:, 3:])
     progress("verifying", 0.9)
-    return _finished(problem, water, commands, trajectory, tuple(log.legs))
+    return _finished(problem, water, commands, trajectory, legs)
 
 
 def _finished(
@@ -114,15 +89,23 @@ def _finished(
         clearance_m=problem.settings.clearance_m,
         primitives={item.name: item for item in problem.primitives},
         repeats=_repeats(problem),
+        start=problem.start,
+        goal=problem.goal,
     )
     if not verification.verified:
         raise NoPlan("the plan found does not pass its own verification: " + "; ".join(verification.problems))
     rng = np.random.default_rng(problem.seed)
+    leaving = leave_water_probability(vessel, area, environment, rng=rng, **sailed)  # type: ignore[arg-type]
+    if leaving > 1.0 - problem.settings.confidence + 1e-12:
+        raise NoPlan(
+            f"{leaving:.1%} of drawn vessels leave allowed water during the runs of the plan found, more than "
+            f"plan.confidence = {problem.settings.confidence:g} allows: more plan.clearance_m helps"
+        )
     return Plan(
         area=area,
         **sailed,  # type: ignore[arg-type]
         reposition_bound_s=_reposition_bound_s(problem, water),
-        leave_water_probability=leave_water_probability(vessel, area, environment, rng=rng, **sailed),  # type: ignore[arg-type]
+        leave_water_probability=leaving,
         design_efficiency_realised=realised_efficiency(vessel, problem.design, environment, **sailed),  # type: ignore[arg-type]
         verification=verification,
     )
@@ -136,7 +119,7 @@ def _water(problem: PlanProblem) -> LegWater:
     return LegWater(
         vessel=problem.vessel,
         environment=problem.environment,
-        ship=capability(problem.vessel, problem.settings),
+        ship=capability(problem.vessel, problem.settings, current_mps=float(np.hypot(*problem.environment.current_to))),
         area=problem.area,
         clearance_m=problem.settings.clearance_m,
         field=clearance_field(problem.area, resolution_m=problem.vessel.length_m / 8),
@@ -146,7 +129,13 @@ def _water(problem: PlanProblem) -> LegWater:
 def _search_space(problem: PlanProblem, water: LegWater) -> SearchSpace:
     vessel, grid = problem.vessel, water.field
     margin = water.path_margin_m + grid.cell_m / 2
-    way = goal_field(grid, problem.goal[:2], clearance_m=margin)
+    way = goal_field(
+        grid,
+        problem.goal[:2],
+        clearance_m=margin,
+        berths=np.array([problem.start[:2], problem.goal[:2]]),
+        berth_m=NEAR_ENDS * vessel.length_m,
+    )
     if not np.isfinite(way.to_goal(problem.start[:2])):
         raise NoPlan(_no_way(problem, grid, margin))
     return SearchSpace(
@@ -181,10 +170,16 @@ def _stamps(problem: PlanProblem, grid: ClearanceField) -> tuple[Stamp, ...]:
 
 
 def _no_way(problem: PlanProblem, grid: ClearanceField, needed_m: float) -> str:
+    ends = shapely.points(problem.start[1::-1]), shapely.points(problem.goal[1::-1])
+    if not any(shapely.contains(part, ends).all() for part in problem.area.water.geoms):
+        return "the goal cannot be reached from the start: forbidden water lies between them on every way"
     widest, place = narrowest_passage(grid, problem.start[:2], problem.goal[:2])
     lat, lon = problem.area.frame.to_degrees(place)
-    if widest <= grid.cell_m / 2:
-        return "the goal cannot be reached from the start: forbidden water lies between them on every way"
+    if widest <= grid.error_m:
+        return (
+            f"the goal cannot be reached from the start in a chart grid of {grid.cell_m:.3g} m: if there is a "
+            "narrow way, give the area smaller [bounds]"
+        )
     return (
         f"the goal cannot be reached from the start: the widest way leaves {widest:.1f} m on each side near "
         f"{lat:.5f}, {lon:.5f}, while {needed_m:.1f} m are needed (plan.clearance_m = "
@@ -192,71 +187,80 @@ def _no_way(problem: PlanProblem, grid: ClearanceField, needed_m: float) -> str:
     )
 
 
-def _sail_all(problem: PlanProblem, water: LegWater, space: SearchSpace, progress: Progress) -> _Log:
-    log = _Log(state=_at_rest(problem, problem.start), inputs=np.zeros(len(problem.vessel.limits)))
+def _sail_all(problem: PlanProblem, water: LegWater, space: SearchSpace, progress: Progress) -> Timeline:
+    line = Timeline(begin=_at_rest(problem, problem.start), begin_inputs=np.zeros(len(problem.vessel.limits)))
     left = _repeats(problem)
     total, deadline = sum(left.values()), time.monotonic() + problem.settings.time_budget_s
     queue: list[Placement] = []
     stuck = ""
-    while sum(left.values()):
+    while sum(left.values()) or not _sail_home(problem, water, line):
+        if not sum(left.values()):  # all runs are done, but no way leads home: do the last one elsewhere
+            undone = line.undo_run()
+            space, queue, stuck = refusing(space, line.last, undone), [], "no leg leads from the last run to the goal"
+            left[undone.primitive] += 1
+        if stuck and time.monotonic() > deadline:
+            raise NoPlan(f"no plan within plan.time_budget_s = {problem.settings.time_budget_s:g}: {stuck}")
         if not queue:
-            if stuck and time.monotonic() > deadline:
-                raise NoPlan(f"no plan within plan.time_budget_s = {problem.settings.time_budget_s:g}: {stuck}")
             progress("placing runs", _share(total, left))
-            queue = list(_placed(space, left, log))
+            queue = _placed(space, left, line, stuck)
         placement = queue.pop(0)
-        stuck = _sail_run(problem, water, log, placement)
+        stuck = _sail_run(problem, water, line, placement)
         if stuck:
-            space, queue = refusing(space, log.last, placement), []
+            space, queue = refusing(space, line.last, placement), []
             continue
         left[placement.primitive] -= 1
         progress(f"sailing {placement.primitive}", _share(total, left))
-    _sail_home(problem, water, log)
-    return log
+    return line
 
 
 def _share(total: int, left: dict[str, int]) -> float:
     return 0.05 + 0.8 * (total - sum(left.values())) / max(total, 1)
 
 
-def _placed(space: SearchSpace, left: dict[str, int], log: _Log) -> Sequence[Placement]:
+def _placed(space: SearchSpace, left: dict[str, int], line: Timeline, stuck: str) -> list[Placement]:
     counts = [left[item.name] for item in space.stamps]
-    return place_runs(space, counts, start=log.state[:3], exit_mps=log.exit_mps, last=log.last)
+    try:
+        return list(place_runs(space, counts, start=line.state[:3], exit_mps=float(line.state[3]), last=line.last))
+    except NoPlan as error:
+        raise NoPlan(f"{error}; before that, {stuck}" if stuck else str(error)) from None
 
 
-def _sail_run(problem: PlanProblem, water: LegWater, log: _Log, placement: Placement) -> str:
+def _sail_run(problem: PlanProblem, water: LegWater, line: Timeline, placement: Placement) -> str:
     """Sail to a placement and do its run; what stands in the way, or "" when both were done."""
     primitive = next(item for item in problem.primitives if item.name == placement.primitive)
     entry = _through_water(problem, placement.pose, primitive.entry_velocity)
     lat, lon = problem.area.frame.to_degrees(placement.pose[:2])
     where = f"{primitive.name!r} near {lat:.5f}, {lon:.5f}"
-    leg = find_leg(_task(problem, log, entry, primitive.entry_inputs), water)
+    leg = find_leg(_task(problem, line, entry, primitive.entry_inputs), water)
     if leg is None:
         return f"no leg leads to {where}"
-    track = leg_trajectory(water, log.state, leg)
+    track = leg_trajectory(water, line.state, leg)
     arrived = np.r_[track.pose[-1], track.velocity[-1]]
     values = primitive.commands.values + _whole_turns(leg[-1] - primitive.entry_inputs)
     run = leg_trajectory(water, arrived, values)
     if not shapely.contains_properly(water.safe, swept_area(run.pose, problem.vessel.hull_b)):
         return f"the run {where} leaves safe water"
-    log.sail("reposition", primitive.name, leg, track)
-    log.sail("primitive", primitive.name, values, run)
-    log.last, log.exit_mps = primitive.name, float(run.velocity[-1, 0])
+    line.sail("reposition", primitive.name, leg, track)
+    line.sail("primitive", primitive.name, values, run)
     return ""
 
 
-def _sail_home(problem: PlanProblem, water: LegWater, log: _Log) -> None:
-    task = _task(problem, log, _at_rest(problem, problem.goal), np.zeros(len(problem.vessel.limits)))
+def _sail_home(problem: PlanProblem, water: LegWater, line: Timeline) -> bool:
+    """Sail the last leg; whether there is one."""
+    task = _task(problem, line, _at_rest(problem, problem.goal), np.zeros(len(problem.vessel.limits)))
     leg = find_leg(task, water)
-    if leg is None:
-        lat, lon = problem.area.frame.to_degrees(log.state[:2])
-        raise NoPlan(f"no leg leads from the last run, near {lat:.5f}, {lon:.5f}, to the goal")
-    log.sail("reposition", GOAL, leg, leg_trajectory(water, log.state, leg))
+    if leg is not None:
+        line.sail("reposition", GOAL, leg, leg_trajectory(water, line.state, leg))
+    return leg is not None
 
 
-def _task(problem: PlanProblem, log: _Log, end: Array, end_inputs: Array) -> LegTask:
+def _task(problem: PlanProblem, line: Timeline, end: Array, end_inputs: Array) -> LegTask:
     return LegTask(
-        start=log.state, end=end, start_inputs=log.inputs, end_inputs=end_inputs, seed=problem.seed + len(log.legs) + 1
+        start=line.state,
+        end=end,
+        start_inputs=line.inputs,
+        end_inputs=end_inputs,
+        seed=problem.seed + len(line.stretches) + 1,
     )
 
 
@@ -276,19 +280,20 @@ def _at_rest(problem: PlanProblem, pose: Array) -> Array:
 
 
 def _reposition_bound_s(problem: PlanProblem, water: LegWater) -> float:
-    """No plan with these runs repositions in less: the way to the goal less all that runs can carry, at top speed.
+    """No plan with these runs and legs no faster than transit speed repositions in less.
 
-    The way is measured for a hull that keeps the clearance abeam only. A cell counts as passable when any point nearer
-    to it than to its neighbours could be: clearance changes no faster than distance.
+    The way to the goal less all that runs can carry, which is the length of their paths: a run may round an island. The
+    way is measured for a hull that keeps the clearance abeam only. A cell counts as passable when any point nearer to
+    it than to its neighbours could be: clearance changes no faster than distance.
     """
     coarse = water.field.thinned(ROUTING_CELLS)
     narrow = problem.settings.clearance_m + problem.vessel.beam_m / 2 - water.field.error_m - coarse.error_m / 2
     way = goal_field(coarse, problem.goal[:2], clearance_m=max(narrow, 0.0))
-    current = float(np.hypot(*problem.environment.current_to))
-    used = _repeats(problem)
+    current, used = float(np.hypot(*problem.environment.current_to)), _repeats(problem)
     carried = sum(
-        used[item.name] * (float(np.hypot(*item.displacement[:2])) + current * item.duration_s)
-        for item in problem.primitives
+        used[item.name] * (item.trajectory.distance_m + current * item.duration_s) for item in problem.primitives
     )
-    ship: Capability = water.ship
-    return max(0.0, way.lower_bound(problem.start[:2]) - carried) / (ship.top_speed_mps + current)
+    fastest = leg_speed_mps(
+        water.ship, [x for item in problem.primitives for x in (item.entry_velocity, item.exit_velocity)]
+    )
+    return max(0.0, way.lower_bound(problem.start[:2]) - carried) / (fastest + current)

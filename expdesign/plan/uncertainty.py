@@ -11,7 +11,7 @@ from expdesign.simulation import Environment, draw_environment, simulate_many
 from expdesign.values import Array
 from expdesign.vessel import Vessel
 
-DRAWS = 200
+FEWEST_DRAWS, MOST_DRAWS = 200, 2000
 
 
 def draw_truths(
@@ -35,7 +35,7 @@ def stray_m(
     centres_m: Array,
     confidence: float,
     rng: np.random.Generator,
-    draws: int = DRAWS,
+    draws: int | None = None,
 ) -> Array:
     """(k + 1,) radius round the nominal disc centres that a share `confidence` of drawn runs keeps to all the time.
 
@@ -47,11 +47,17 @@ def stray_m(
         centres_m: (c,) forward positions of the discs that cover the hull.
         confidence: between 0 and 1.
         rng: draws.
-        draws: how many.
+        draws: how many; by default two beyond the wished share, within `FEWEST_DRAWS` and `MOST_DRAWS`.
 
     Raises:
-        NoPlan: so many drawn vessels are unstable that the share cannot be met.
+        NoPlan: so many drawn vessels are unstable that the share cannot be met, or it is too high to be estimated.
     """
+    draws = draws or int(np.clip(np.ceil(2.0 / (1.0 - confidence)), FEWEST_DRAWS, MOST_DRAWS))
+    if draws * (1.0 - confidence) < 1.0:
+        raise NoPlan(
+            f"plan.confidence is too high to be estimated: each run would have to keep to its room in {confidence:.6g} "
+            f"of all cases, which {draws} drawn vessels cannot tell"
+        )
     parameters, current, wind = draw_truths(vessel, environment, draws, rng)
     heading = rng.uniform(-np.pi, np.pi, draws)
     c, s = np.cos(heading), np.sin(heading)

@@ -1,0 +1,75 @@
+"""The trial as it grows: stretches sailed one after the other, and what they come to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from expdesign.plan.values import Leg, Placement
+from expdesign.signals import Commands, Trajectory
+from expdesign.values import Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Stretch:
+    """A leg with its commands (k, m) and states (k + 1, 6)."""
+
+    kind: str
+    name: str
+    commands: Array
+    states: Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Timeline:
+    """What has been sailed so far.
+
+    Attributes:
+        begin: (6,) state before the first stretch.
+        begin_inputs: (m,) commands standing then.
+        stretches: in time order; the only part that grows.
+    """
+
+    begin: Array
+    begin_inputs: Array
+    stretches: list[Stretch] = field(default_factory=list)
+
+    @property
+    def state(self) -> Array:
+        """(6,) where the ship is now."""
+        return np.asarray(self.stretches[-1].states[-1] if self.stretches else self.begin)
+
+    @property
+    def inputs(self) -> Array:
+        """(m,) commands standing now."""
+        return np.asarray(self.stretches[-1].commands[-1] if self.stretches else self.begin_inputs)
+
+    @property
+    def last(self) -> str:
+        """Name of the stretch sailed last, or ""."""
+        return self.stretches[-1].name if self.stretches else ""
+
+    def sail(self, kind: str, name: str, commands: Array, track: Trajectory) -> None:
+        """Add a stretch."""
+        states = np.hstack([track.pose, track.velocity])
+        self.stretches.append(Stretch(kind=kind, name=name, commands=commands, states=states))
+
+    def undo_run(self) -> Placement:
+        """Forget the last run and the leg to it; where the run began."""
+        run = self.stretches.pop()
+        self.stretches.pop()
+        return Placement(primitive=run.name, pose=run.states[0, :3])
+
+    def joined(self, *, sample_time_s: float, names: tuple[str, ...]) -> tuple[Commands, Trajectory, tuple[Leg, ...]]:
+        """Everything as one command series, one trajectory and the legs in it."""
+        values = np.concatenate([stretch.commands for stretch in self.stretches])
+        states = np.concatenate([self.begin[None], *(stretch.states[1:] for stretch in self.stretches)])
+        ends = np.cumsum([len(stretch.commands) for stretch in self.stretches]).tolist()
+        legs = tuple(
+            Leg(kind=stretch.kind, name=stretch.name, first=end - len(stretch.commands), last=end)
+            for stretch, end in zip(self.stretches, ends, strict=True)
+        )
+        commands = Commands(sample_time_s=sample_time_s, names=names, values=values)
+        track = Trajectory(sample_time_s=sample_time_s, pose=states[:, :3], velocity=states[:, 3:])
+        return commands, track, legs
