@@ -93,7 +93,9 @@ def summary(content: ReportContent) -> list[str]:
     """The trial in a few sentences, key numbers first."""
     plan, check = content.plan, content.plan.verification
     total, runs = plan.commands.duration_s, len(primitive_runs(plan))
-    bound = f", which no plan with these runs can bring below {words.duration(plan.reposition_bound_s)}"
+    bound = (
+        f" (at this transit speed no plan with these runs needs less than {words.duration(plan.reposition_bound_s)})"
+    )
     verdict = (
         f"The plan is verified: with its commands simulated again, the hull comes no nearer to forbidden water than "
         f"{words.distance(check.clearance_min_m)} ({words.distance(content.clearance_m)} asked for)."
