@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import numpy as np
-
-from expdesign.dictionary.families.shapes import ramp
+from expdesign.dictionary.families.shapes import speed_change
 from expdesign.dictionary.spec import Family, Setting
 from expdesign.values import Array
 
 
 def _reference(settings: Mapping[str, float], time_s: Array) -> Array:
-    low, high = settings["from_speed_mps"], settings["speed_mps"]
-    surge = low + (high - low) * ramp(time_s, length_s=settings["ramp_fraction"] * float(time_s[-1]))
-    return np.stack([surge, 0 * surge, 0 * surge], axis=1)
+    first, last = settings["from_speed_mps"], settings["speed_mps"]
+    return speed_change(time_s, first=first, last=last, share=settings["ramp_fraction"])
 
 
 ACCELERATION = Family(

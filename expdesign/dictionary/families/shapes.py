@@ -42,3 +42,9 @@ def flat_wave(time_s: Array, *, period_s: float) -> Array:
             f"of {time_s[1]:g} s within a swing"
         )
     return np.asarray(centred / np.abs(centred).max())
+
+
+def speed_change(time_s: Array, *, first: float, last: float, share: float) -> Array:
+    """(k, 3) u, v, r of a straight run whose surge speed changes over a share of it and then stays."""
+    surge = first + (last - first) * ramp(time_s, length_s=share * float(time_s[-1]))
+    return np.stack([surge, 0 * surge, 0 * surge], axis=1)
