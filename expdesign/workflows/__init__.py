@@ -1,0 +1,26 @@
+"""The story of the package: from a scenario file to a folder of results, one function for each command.
+
+Each function reads its input, does the work and only then writes, so that a failure leaves no files. The pieces in
+between (`scored`, `designed`, `planned`) are for notebooks: value in, value out.
+"""
+
+from expdesign.workflows.after import estimate, export, measured, simulate
+from expdesign.workflows.outcome import Outcome, Progress, TextTable
+from expdesign.workflows.trial import designed, durations, plan, planned, run, score, scored
+
+__all__ = [
+    "Outcome",
+    "Progress",
+    "TextTable",
+    "designed",
+    "durations",
+    "estimate",
+    "export",
+    "measured",
+    "plan",
+    "planned",
+    "run",
+    "score",
+    "scored",
+    "simulate",
+]

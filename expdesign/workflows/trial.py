@@ -1,0 +1,225 @@
+"""From a scenario to a trial: score, durations, plan, and all of it in one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from expdesign import __version__
+from expdesign.dictionary import build_dictionary
+from expdesign.durations import DurationDesign, build_durations, solve_durations, with_repeats
+from expdesign.export import (
+    FORMATS,
+    build_route,
+    commands_csv,
+    dictionary_json,
+    durations_json,
+    plan_json,
+    planned_track,
+    route_files,
+    track_csv,
+    write_files,
+)
+from expdesign.export.report import ReportContent, report_html
+from expdesign.information import PrimitiveInformation, estimated_parameters, score_primitives
+from expdesign.plan.solve import PlanProblem, plan_trial
+from expdesign.plan.values import Plan
+from expdesign.scenario import Scenario, load_repeats, load_scenario
+from expdesign.workflows.outcome import Outcome, Progress, silent, within
+
+
+def run(scenario: Path, out: Path | None, *, seed: int = 0, progress: Progress = silent) -> Outcome:
+    """The main job: score, durations, plan, verification, route files and report, into `out` or runs/<scenario>."""
+    case = _load(scenario, progress)
+    information = scored(case, progress=within(progress, 0.02, 0.08))
+    progress("sharing out time", 0.08)
+    design = designed(case, information)
+    plan = planned(case, information, design, seed=seed, progress=within(progress, 0.1, 0.85))
+    progress("writing routes and report", 0.85)
+    files = {
+        **_dictionary_files(case, information),
+        "durations.json": durations_json(design, criterion=case.design.criterion),
+        **_plan_files(case, plan),
+        **_route_files(case, plan),
+        "report.html": report_html(_report(case, information, design, plan, seed)),
+    }
+    return _written(case, out, files, {**_design_summary(design), **_plan_summary(plan)}, progress)
+
+
+def score(scenario: Path, out: Path | None, *, seed: int = 0, progress: Progress = silent) -> Outcome:
+    """Information of every primitive of a scenario's dictionary."""
+    case = _load(scenario, progress)
+    information = scored(case, progress=within(progress, 0.05, 0.95))
+    summary = {
+        "primitives": len(information),
+        "parameters": len(_parameters(case)),
+        "meet_excitation_condition": sum(item.excitation_condition for item in information),
+        "informative_alone": sum(item.log_det_alone is not None for item in information),
+    }
+    return _written(case, out, _dictionary_files(case, information), summary, progress)
+
+
+def durations(scenario: Path, out: Path | None, *, seed: int = 0, progress: Progress = silent) -> Outcome:
+    """How long to run each primitive, with its certificate."""
+    case = _load(scenario, progress)
+    information = scored(case, progress=within(progress, 0.05, 0.9))
+    design = designed(case, information)
+    files = {"durations.json": durations_json(design, criterion=case.design.criterion)}
+    return _written(case, out, files, _design_summary(design), progress)
+
+
+def plan(
+    scenario: Path, out: Path | None, *, durations: Path | None = None, seed: int = 0, progress: Progress = silent
+) -> Outcome:
+    """One verified trajectory with the runs of a durations file, or of the optimal durations."""
+    case = _load(scenario, progress)
+    information = scored(case, progress=within(progress, 0.02, 0.08))
+    design = designed(case, information)
+    if durations is not None:
+        design = with_repeats(design, load_repeats(durations, names=design.problem.names))
+    result = planned(case, information, design, seed=seed, progress=within(progress, 0.1, 0.95))
+    return _written(case, out, _plan_files(case, result), _plan_summary(result), progress)
+
+
+def scored(case: Scenario, *, progress: Progress = silent) -> tuple[PrimitiveInformation, ...]:
+    """Information of every primitive of a scenario."""
+    progress("simulating the dictionary", 0.0)
+    primitives = build_dictionary(case.vessel, case.dictionary)
+    progress("scoring the dictionary", 0.5)
+    return score_primitives(
+        case.vessel,
+        primitives,
+        environment=case.environment,
+        fixed_parameters=case.design.fixed_parameters,
+        mean_subtraction=case.design.mean_subtraction,
+    )
+
+
+def designed(case: Scenario, information: Sequence[PrimitiveInformation]) -> DurationDesign:
+    """The certified durations of a scored scenario."""
+    return solve_durations(
+        build_durations(
+            information,
+            _parameters(case),
+            total_s=case.design.total_s,
+            mean_subtraction=case.design.mean_subtraction,
+        )
+    )
+
+
+def planned(
+    case: Scenario,
+    information: Sequence[PrimitiveInformation],
+    design: DurationDesign,
+    *,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Plan:
+    """The verified trial of a scenario."""
+    problem = PlanProblem(
+        vessel=case.vessel,
+        area=case.area,
+        environment=case.environment,
+        settings=case.plan,
+        primitives=tuple(item.primitive for item in information),
+        design=design,
+        start=case.start,
+        goal=case.goal,
+        seed=seed,
+    )
+    return plan_trial(problem, progress=progress)
+
+
+def _load(scenario: Path, progress: Progress) -> Scenario:
+    progress("reading the scenario", 0.0)
+    return load_scenario(scenario)
+
+
+def _parameters(case: Scenario) -> tuple[str, ...]:
+    return estimated_parameters(case.vessel.model, case.design.fixed_parameters)
+
+
+def _written(
+    case: Scenario,
+    out: Path | None,
+    files: Mapping[str, str | bytes],
+    summary: Mapping[str, object],
+    progress: Progress,
+) -> Outcome:
+    written = write_files(out or Path("runs") / case.name, files)
+    progress("done", 1.0)
+    return Outcome(files=written, summary={"scenario": case.name, **summary})
+
+
+def _dictionary_files(case: Scenario, information: Sequence[PrimitiveInformation]) -> dict[str, str | bytes]:
+    return {"dictionary.json": dictionary_json(information, _parameters(case), vessel=case.vessel)}
+
+
+def _plan_files(case: Scenario, plan: Plan) -> dict[str, str | bytes]:
+    return {
+        "plan.json": plan_json(
+            plan,
+            scenario=case.name,
+            vessel=case.vessel,
+            environment=case.environment,
+            clearance_m=case.plan.clearance_m,
+        ),
+        "track.csv": track_csv(plan),
+        "commands.csv": commands_csv(plan),
+    }
+
+
+def _route_files(case: Scenario, plan: Plan) -> dict[str, bytes]:
+    track = planned_track(
+        plan,
+        scenario=case.name,
+        vessel=case.vessel,
+        environment=case.environment,
+        clearance_m=case.plan.clearance_m,
+    )
+    route = build_route(track, safe_water=case.area.water)
+    return route_files(route, [item.name for item in FORMATS])
+
+
+def _report(
+    case: Scenario, information: tuple[PrimitiveInformation, ...], design: DurationDesign, plan: Plan, seed: int
+) -> ReportContent:
+    return ReportContent(
+        scenario=case.name,
+        vessel=case.vessel,
+        environment=case.environment,
+        start=case.start,
+        goal=case.goal,
+        criterion=case.design.criterion,
+        fixed_parameters=case.design.fixed_parameters,
+        clearance_m=case.plan.clearance_m,
+        confidence=case.plan.confidence,
+        information=information,
+        design=design,
+        plan=plan,
+        command=f"expdesign run {case.path} --seed {seed}",
+        version=__version__,
+    )
+
+
+def _design_summary(design: DurationDesign) -> dict[str, object]:
+    chosen = {name: count for name, count in zip(design.problem.names, design.repeats, strict=True) if count}
+    return {
+        "runs": chosen,
+        "certificate_gap": design.gap_relative,
+        "efficiency_of_whole_runs": design.efficiency_repeats,
+        "efficiency_of_equal_shares": design.efficiency_uniform,
+    }
+
+
+def _plan_summary(plan: Plan) -> dict[str, object]:
+    return {
+        "verified": plan.verification.verified,
+        "informative_s": plan.seconds("primitive"),
+        "repositioning_s": plan.seconds("reposition"),
+        "repositioning_bound_s": plan.reposition_bound_s,
+        "distance_m": plan.trajectory.distance_m,
+        "least_clearance_m": plan.verification.clearance_min_m,
+        "leave_water_probability": plan.leave_water_probability,
+        "design_efficiency_realised": plan.design_efficiency_realised,
+    }
