@@ -37,7 +37,7 @@ def test_iv_and_its_heteroscedasticity_robust_covariance(ours: str, debiased: bo
 def test_iv_and_its_autocorrelation_robust_covariance(kernel: str, lags: int) -> None:
     Z, Phi, y = errors_in_variables_case()
     theirs = linearmodels.IV2SLS(y, None, Phi, Z).fit(cov_type="kernel", kernel=kernel, bandwidth=lags, debiased=True)
-    weighting = Weighting(kernel=kernel, lags=lags)
+    weighting = Weighting(covariance="kernel", kernel=kernel, lags=lags)
     mine = solve_iv(single_output(Phi, y, parameters=NAMES), Z[:, None, :], weighting)
     np.testing.assert_allclose(mine.covariance, theirs.cov, rtol=1e-6, atol=1e-12)
 
@@ -69,6 +69,8 @@ def test_least_squares_and_newey_west(lags: int) -> None:
     _, Phi, y = errors_in_variables_case()
     options = {"maxlags": lags, "use_correction": True}
     theirs = statsmodels.OLS(y, Phi).fit(cov_type="HAC", cov_kwds=options)
-    mine = solve_ls(single_output(Phi, y, parameters=NAMES), Weighting(kernel="bartlett", lags=lags))
+    mine = solve_ls(
+        single_output(Phi, y, parameters=NAMES), Weighting(covariance="kernel", kernel="bartlett", lags=lags)
+    )
     np.testing.assert_allclose(mine.values, theirs.params, rtol=1e-6)
     np.testing.assert_allclose(mine.covariance, theirs.cov_params(), rtol=1e-6)

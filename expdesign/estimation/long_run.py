@@ -63,8 +63,21 @@ def long_run_covariance(scores: Array, batch: Integers, step: Integers, *, lags:
     return total
 
 
+def lost_share(count: int, *, lags: int, kernel: str) -> float:
+    """Share of Omega that is missing because the scores of an estimate sum to zero.
+
+    Their ordinate at frequency zero is gone, which carries this share of the window's weight; for no lags it is the
+    familiar 1 / N of a variance around a mean.
+    """
+    weights = KERNELS[kernel](np.arange(1, lags + 1) / (lags + 1.0))
+    return float(min(0.5, (1.0 + 2.0 * weights.sum()) / count))
+
+
 def automatic_lags(series: Array, batch: Integers, step: Integers, *, kernel: str = "parzen") -> int:
-    """L for series (k, q): Andrews's plug-in with a kernel pilot in place of a model; the largest over the columns."""
+    """L for series (k, q): Andrews's plug-in with a kernel pilot in place of a model.
+
+    The plug-in of a single column is noisy, and the largest of many is always too long: the median is taken.
+    """
     order, constant = PLUG_IN[kernel]
     batches = list(_filled(series, batch, step))
     count, longest = len(series), max(len(rows) for rows in batches)
@@ -81,7 +94,7 @@ def automatic_lags(series: Array, batch: Integers, step: Integers, *, kernel: st
     seen = moments[0] > 0
     if not seen.any():
         return 0
-    alpha = float(np.max((slopes[seen] / level[seen]) ** 2))
+    alpha = float(np.median((slopes[seen] / level[seen]) ** 2))
     return int(np.clip(np.ceil(constant * (alpha * count) ** (1.0 / (2 * order + 1))), 1, limit))
 
 

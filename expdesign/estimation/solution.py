@@ -5,7 +5,8 @@
 
 Residuals of one-step predictors from noisy data are coloured (noise enters at k and, through Phi, at k - 1), so Omega
 is by default robust to both changing variance and correlation in time ("hac"). "hc0" and "hc1" are robust to
-changing variance only, as in econometric software.
+changing variance only, and "kernel" to both but without the correction that "hac" makes for the share of the variance
+that is lost because the scores of an estimate sum to zero: these three are as in econometric software.
 
 With one block of instruments per batch there are more equations than unknowns; they are weighted by the inverse second
 moments of the instruments (two-stage least squares), which keeps the estimate free of the scale of parameters, or by
@@ -23,13 +24,13 @@ import numpy as np
 import scipy
 
 from expdesign.errors import InputError, ShapeError, UnknownName
-from expdesign.estimation.long_run import automatic_lags, long_run_covariance
+from expdesign.estimation.long_run import automatic_lags, long_run_covariance, lost_share
 from expdesign.estimation.null_space import NullSpace, joined, null_space, require_informative
 from expdesign.estimation.regression import Integers, Regression, batch_slices
 from expdesign.estimation.zero_mean import subtract_mean
 from expdesign.values import Array, seal
 
-COVARIANCES = ("hac", "hc1", "hc0")
+COVARIANCES = ("hac", "kernel", "hc1", "hc0")
 BLOCKS = ("one", "batch")
 
 
@@ -43,8 +44,8 @@ class Weighting:
         batch_weights: one factor per batch, how much its equations count; () for all alike.
         output_weights: one factor per output, how much its equation counts; () for all alike.
         covariance: one of `COVARIANCES`.
-        kernel: of the "hac" covariance.
-        lags: last lag of the "hac" covariance, None for automatic.
+        kernel: of the "hac" and "kernel" covariance.
+        lags: their last lag, None for automatic.
     """
 
     mean: str = "none"
@@ -124,6 +125,8 @@ def solve_iv(regression: Regression, instruments: Array, weighting: Weighting | 
     lags = _lags(scores, regression, weighting)
     P = long_run_covariance(scores, regression.batch_of, regression.step_of, lags=lags, kernel=weighting.kernel)
     factor = 1.0 if weighting.covariance == "hc0" else residuals.size / max(1, residuals.size - p)
+    if weighting.covariance == "hac":
+        factor /= 1.0 - lost_share(k, lags=lags, kernel=weighting.kernel)
     return Solution(values=values, covariance=factor * P, residuals=residuals, lags=lags, null_space=found)
 
 
@@ -240,7 +243,7 @@ def _whitening(moments: Array) -> Array:
 
 
 def _lags(scores: Array, regression: Regression, weighting: Weighting) -> int:
-    if weighting.covariance != "hac":
+    if weighting.covariance not in ("hac", "kernel"):
         return 0
     if weighting.lags is not None:
         return weighting.lags
