@@ -70,7 +70,7 @@ def simulate(
 
 def simulate_many(
     vessel: Vessel,
-    commands: Commands,
+    commands: Commands | Array,
     *,
     pose: Array,
     velocity: Array,
@@ -79,11 +79,11 @@ def simulate_many(
     parameters: Array,
     substeps: int = SUBSTEPS,
 ) -> Array:
-    """The same commands for n truths at once.
+    """Many runs at once: the same commands for n truths, or commands of their own for each.
 
     Args:
         vessel: gives structure and actuators.
-        commands: k samples, held.
+        commands: k samples, held, for all runs alike; or (n, k, m) in the model's order.
         pose, velocity: (n, 3) start states.
         current_to, wind_to: (n, 2) steady n-frame velocities.
         parameters: (n, p) in the model's own form.
@@ -92,13 +92,17 @@ def simulate_many(
     Returns:
         (k + 1, n, 6) states; runs that diverge are nan instead of raising, for the caller to count.
     """
-    _check_inputs(vessel, commands)
+    if isinstance(commands, Commands):
+        _check_inputs(vessel, commands)
+        held_rows, sample_time_s = commands.values, commands.sample_time_s
+    else:
+        held_rows, sample_time_s = commands.transpose(1, 2, 0), vessel.sample_time_s
     state: State = tuple(np.asarray(column, dtype=float) for column in (*pose.T, *velocity.T))
     rows = [np.stack(state, axis=-1)]
     theta, current, wind = parameters.T, current_to.T, wind_to.T
-    step_s = commands.sample_time_s / substeps
+    step_s = sample_time_s / substeps
     with np.errstate(over="ignore", invalid="ignore"):
-        for inputs in commands.values:
+        for inputs in held_rows:
 
             def rates(x: State, held: Array = inputs) -> State:
                 return motion_rates(

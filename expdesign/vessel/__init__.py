@@ -2,7 +2,7 @@
 
 from expdesign.vessel.actuators import KINDS, Actuator, Limit, column_name, generalised_force
 from expdesign.vessel.expressions import NUMPY, SCALAR, Operators
-from expdesign.vessel.inverse import allocate, force_matrix, required_force
+from expdesign.vessel.inverse import allocate, direct_terms, force_matrix, required_force, within_limits
 from expdesign.vessel.model import VesselModel
 from expdesign.vessel.structures import STRUCTURES, TERMS, Term, structure_terms
 from expdesign.vessel.vessel import Sensors, Vessel
@@ -22,8 +22,10 @@ __all__ = [
     "VesselModel",
     "allocate",
     "column_name",
+    "direct_terms",
     "force_matrix",
     "generalised_force",
     "required_force",
     "structure_terms",
+    "within_limits",
 ]

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
 from expdesign.errors import InputError
 from expdesign.values import Array
 from expdesign.vessel.actuators import Actuator
-from expdesign.vessel.expressions import SCALAR
+from expdesign.vessel.expressions import NUMPY
 from expdesign.vessel.model import VesselModel
-from expdesign.vessel.structures import FORCE_SIGNALS
+from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS
 
 
 def required_force(model: VesselModel, velocity: Array, acceleration: Array) -> Array:
-    """Generalised force (3,) that gives an acceleration (3,) at a velocity (3,) in calm water and air.
+    """Generalised force (..., 3) that gives an acceleration (..., 3) at a velocity (..., 3) in calm water and air.
 
     The model must be affine in the generalised force. Directions that it cannot push (no equation, no gain) get the
     least-squares answer.
@@ -23,25 +24,32 @@ def required_force(model: VesselModel, velocity: Array, acceleration: Array) -> 
     Raises:
         InputError: a term reads an actuator signal directly, so force alone does not determine the motion.
     """
-    signals = dict(zip(("u", "v", "r"), velocity.tolist(), strict=True)) | {"u_q": velocity[0], "v_q": velocity[1]}
-    for term, expression in zip(model.terms, model.expressions, strict=True):
-        direct = set(expression.signals) - set(signals) - set(FORCE_SIGNALS)
-        if direct:
-            raise InputError(
-                f"term {term.name} reads {', '.join(sorted(direct))}: primitives are built for models that see their "
-                f"actuators through {', '.join(FORCE_SIGNALS)}"
-            )
+    direct = direct_terms(model)
+    if direct:
+        raise InputError(
+            f"term {direct[0]}: velocities can be wished for only where the model sees its actuators through "
+            f"{', '.join(FORCE_SIGNALS)}; use families that give commands"
+        )
+    motion = dict(zip(("u", "v", "r"), np.moveaxis(velocity, -1, 0), strict=True))
+    signals = motion | {"u_q": motion["u"], "v_q": motion["v"]}
 
     def response(force: Array) -> Array:
-        table = signals | dict(zip(FORCE_SIGNALS, force.tolist(), strict=True))
-        totals = dict.fromkeys(("u", "v", "r"), 0.0)
+        table = signals | dict(zip(FORCE_SIGNALS, force, strict=True))
+        totals: dict[str, Any] = dict.fromkeys(("u", "v", "r"), np.zeros(velocity.shape[:-1]))
         for term, expression, value in zip(model.terms, model.expressions, model.parameters, strict=True):
-            totals[term.equation] += float(value * expression.evaluate(table, SCALAR))
-        return np.array(list(totals.values())) / model.time_scale_s
+            totals[term.equation] = totals[term.equation] + value * expression.evaluate(table, NUMPY)
+        return np.stack(list(totals.values()), axis=-1) / model.time_scale_s
 
     free = response(np.zeros(3))
-    gain = np.stack([response(unit) - free for unit in np.eye(3)], axis=1)  # (3 outputs, 3 forces)
-    return np.asarray(np.linalg.lstsq(gain, acceleration - free, rcond=None)[0], dtype=float)
+    gain = np.stack([response(unit) - free for unit in np.eye(3)], axis=-1)  # (..., 3 outputs, 3 forces)
+    return np.asarray((np.linalg.pinv(gain) @ (acceleration - free)[..., None])[..., 0], dtype=float)
+
+
+def direct_terms(model: VesselModel) -> tuple[str, ...]:
+    """Terms that read actuator signals themselves instead of the generalised force they give, as "X_n reads n1"."""
+    seen = {*MOTION_SIGNALS, *FORCE_SIGNALS}
+    read = [(term.name, sorted(set(x.signals) - seen)) for term, x in zip(model.terms, model.expressions, strict=True)]
+    return tuple(f"{name} reads {', '.join(signals)}" for name, signals in read if signals)
 
 
 def force_matrix(actuators: tuple[Actuator, ...]) -> Array:
@@ -66,60 +74,89 @@ def force_matrix(actuators: tuple[Actuator, ...]) -> Array:
 def allocate(
     actuators: tuple[Actuator, ...], force: Array, *, sample_time_s: float, before: Array | None = None
 ) -> Array:
-    """Commands (k, m) for wished generalised forces (k, 3): smallest thrusts, then limits and rates.
+    """Commands (..., k, m) for wished generalised forces (..., k, 3): smallest thrusts, then limits and rates.
 
     An azimuth turns the shorter way, reversing its propeller where that is nearer and gives as much; near zero thrust
     it keeps its angle. A saturated thruster is not relieved by the others. Rudders stay amidships.
 
     Args:
         actuators: in command order.
-        force: (k, 3) tau_x, tau_y, tau_psi.
+        force: (..., k, 3) tau_x, tau_y, tau_psi.
         sample_time_s: time between rows [s].
-        before: (m,) commands standing before the first row, from which rates count; None for no rate limit there.
+        before: (..., m) commands standing before the first row, from which rates count; None for no rate limit there.
     """
-    wished = force @ np.linalg.pinv(force_matrix(actuators)).T  # (k, c)
+    wished = force @ np.linalg.pinv(force_matrix(actuators)).T  # (..., k, c)
+    bounds = _bounds(actuators, sample_time_s)
     rows, last = [], before
-    for row in wished:
-        last = _limited(actuators, row.tolist(), last, sample_time_s)
+    for row in np.moveaxis(wished, -2, 0):
+        last = _reached(bounds, _wished_commands(actuators, row, last), last)
         rows.append(last)
-    return np.array(rows)
+    return np.stack(rows, axis=-2)
 
 
-def _limited(actuators: tuple[Actuator, ...], row: list[float], last: Array | None, sample_time_s: float) -> Array:
-    parts, taken, place = [], 0, 0
+def within_limits(actuators: tuple[Actuator, ...], values: Array, *, sample_time_s: float, before: Array) -> Array:
+    """Wished commands (..., k, m) as near as limits and rates let them come, from those standing before (..., m)."""
+    bounds = _bounds(actuators, sample_time_s)
+    rows, last = [], before
+    for row in np.moveaxis(values, -2, 0):
+        last = _reached(bounds, row, last)
+        rows.append(last)
+    return np.stack(rows, axis=-2)
+
+
+def _bounds(actuators: tuple[Actuator, ...], sample_time_s: float) -> tuple[Array, Array, Array]:
+    """(m,) lowest, highest command and largest change from sample to sample."""
+    limits = [limit for actuator in actuators for limit in actuator.limits]
+    low, high, rate = (np.array([getattr(limit, name) for limit in limits]) for name in ("low", "high", "rate"))
+    return low, high, rate * sample_time_s
+
+
+def _reached(bounds: tuple[Array, Array, Array], wish: Array, last: Array | None) -> Array:
+    """Commands (..., m) nearest to a wish within limits, and within a sample's change from the last ones."""
+    low, high, reach = bounds
+    inside = np.minimum(np.maximum(wish, low), high)
+    if last is None:
+        return np.asarray(inside)
+    return np.asarray(np.minimum(np.maximum(inside, last - reach), last + reach))
+
+
+def _wished_commands(actuators: tuple[Actuator, ...], row: Array, last: Array | None) -> Array:
+    """Commands (..., m) that give thrusts (..., c), by the shortest turn of azimuths; limits of speeds come later."""
+    parts: list[Array] = []
+    taken, place = 0, 0
     for actuator in actuators:
-        count = len(actuator.limits)
-        old = None if last is None else last[place : place + count]
-        width = {"force": 3, "azimuth": 2, "rudder": 0}.get(actuator.kind, 1)
-        wish = row[taken : taken + width]
         if actuator.kind == "azimuth":
-            wish = _polar(wish[0], wish[1], old, actuator)
+            old = np.zeros(row.shape[:-1]) if last is None else last[..., place + 1]
+            parts += _polar(row[..., taken], row[..., taken + 1], old, actuator)
         elif actuator.kind == "rudder":
-            wish = [0.0]
-        for index, limit in enumerate(actuator.limits):
-            value = min(max(wish[index], limit.low), limit.high)
-            if old is not None:
-                reach = limit.rate * sample_time_s
-                value = min(max(value, old[index] - reach), old[index] + reach)
-            parts.append(value)
-        taken, place = taken + width, place + count
-    return np.array(parts)
+            parts.append(np.zeros(row.shape[:-1]))
+        else:
+            parts += [row[..., taken + index] for index in range(len(actuator.limits))]
+        taken += {"azimuth": 2, "rudder": 0}.get(actuator.kind, len(actuator.limits))
+        place += len(actuator.limits)
+    return np.stack(parts, axis=-1)
 
 
-def _polar(ahead: float, side: float, old: Array | None, actuator: Actuator) -> list[float]:
+WAYS_ROUND = np.array([(half, turns) for half in (0.0, math.pi) for turns in (-1.0, 0.0, 1.0)]).T
+"""Thrust ahead or reversed, and whole turns from the nearest: (2, 6)."""
+
+
+def _polar(ahead: Array, side: Array, reference: Array, actuator: Actuator) -> list[Array]:
     """Propeller speed and angle that come closest to a thrust within limits, by the shortest turn."""
-    wish, bearing = math.hypot(ahead, side), math.atan2(side, ahead)
-    reference = 0.0 if old is None else float(old[1])
-    if wish < 1e-9:
-        return [0.0, reference]
     speeds, angles = actuator.limits
-    options = []
-    for base in (bearing, bearing + math.pi):
-        whole = round((reference - base) / (2 * math.pi))
-        for turns in (whole - 1, whole, whole + 1):
-            angle = min(max(base + 2 * math.pi * turns, angles.low), angles.high)
-            along = math.cos(angle - bearing)
-            speed = min(max(wish * along, speeds.low), speeds.high)
-            missed = math.hypot(wish - speed * along, speed * math.sin(angle - bearing))
-            options.append((round(missed / wish, 9), abs(angle - reference), speed, angle))
-    return list(min(options)[2:])
+    wish, bearing = np.hypot(ahead, side), np.arctan2(side, ahead)
+    base = bearing[..., None] + WAYS_ROUND[0]  # (..., 6)
+    whole = np.round((reference[..., None] - base) / (2 * math.pi))
+    base = base + 2 * math.pi * (whole + WAYS_ROUND[1])
+    angle = np.minimum(np.maximum(base, angles.low), angles.high)
+    along = np.cos(angle - bearing[..., None])
+    speed = np.minimum(np.maximum(wish[..., None] * along, speeds.low), speeds.high)
+    missed = np.hypot(wish[..., None] - speed * along, speed * np.sin(angle - bearing[..., None]))
+    short = np.round(missed / np.maximum(wish[..., None], 1e-9), 9)
+    turn = np.where(short <= short.min(axis=-1, keepdims=True), np.abs(angle - reference[..., None]), np.inf)
+    best = np.argmin(turn, axis=-1)[..., None]
+    still = wish < 1e-9
+    return [
+        np.where(still, 0.0, np.take_along_axis(speed, best, -1)[..., 0]),
+        np.where(still, reference, np.take_along_axis(angle, best, -1)[..., 0]),
+    ]
