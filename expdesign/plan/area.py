@@ -62,6 +62,7 @@ class SeaArea:
         depth_rule: one sentence on how depth was taken into account.
         notes: what was repaired or assumed while reading the chart.
         source: chart file and licence notice.
+        depths: (charted least depth [m], polygons) from shallow to deep, for drawing; empty where depth is not charted.
     """
 
     name: str
@@ -71,6 +72,7 @@ class SeaArea:
     depth_rule: str
     notes: tuple[str, ...] = ()
     source: str = ""
+    depths: tuple[tuple[float, shapely.MultiPolygon], ...] = ()
 
     def safe_water(self, clearance_m: float) -> shapely.MultiPolygon:
         """The water that a hull may touch when it must keep `clearance_m` from everything forbidden."""
@@ -86,12 +88,14 @@ class Zones:
         land: the trial stays outside.
         no_go: the trial stays outside, too.
         deep: water known to be deep enough, or None when depth is not taken into account.
+        depths: (charted least depth [m], polygons), for drawing.
     """
 
     bounds: shapely.Geometry
     land: shapely.Geometry
     no_go: shapely.Geometry
     deep: shapely.Geometry | None = None
+    depths: tuple[tuple[float, shapely.Geometry], ...] = ()
 
 
 def build_sea_area(
@@ -120,7 +124,17 @@ def build_sea_area(
         raise NoPlan(f"area {name!r} has no allowed water: {reason}")
     land = as_multipolygon(zones.bounds.intersection(zones.land))
     water = as_multipolygon(water)
-    return SeaArea(name=name, frame=frame, water=water, land=land, depth_rule=depth_rule, notes=notes, source=source)
+    drawn = ((depth, as_multipolygon(polygons.intersection(zones.bounds))) for depth, polygons in zones.depths)
+    return SeaArea(
+        name=name,
+        frame=frame,
+        water=water,
+        land=land,
+        depth_rule=depth_rule,
+        notes=notes,
+        source=source,
+        depths=tuple((depth, polygons) for depth, polygons in drawn if not polygons.is_empty),
+    )
 
 
 def _dry(water: shapely.Geometry) -> bool:

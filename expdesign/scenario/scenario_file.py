@@ -11,7 +11,8 @@ from pydantic import Field
 
 from expdesign.plan.area import SeaArea
 from expdesign.plan.values import PlanSettings
-from expdesign.scenario.area_file import Latitude, Longitude, load_area
+from expdesign.scenario.area_file import load_area
+from expdesign.scenario.area_tables import Latitude, Longitude
 from expdesign.scenario.berth import berth_problem
 from expdesign.scenario.dictionary_file import NAME, NAME_RULE, load_dictionary
 from expdesign.scenario.tables import (

@@ -1,0 +1,101 @@
+"""GeoJSON charts to zones: land layers, and layers of known least depth."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import shapely
+
+from expdesign.errors import FileError, InputError, NoPlan
+from expdesign.plan.area import LocalFrame
+from expdesign.scenario.area_tables import AreaTable, ChartTable
+from expdesign.scenario.chart import Chart, read_layers
+from expdesign.scenario.chart_zones import ChartZones, OpenChart, wish_text
+from expdesign.scenario.geojson import Feature, read_features
+from expdesign.scenario.metres import Box, around, in_metres
+from expdesign.scenario.tables import Entry
+
+
+def open_geojson(file: AreaTable, *, draught_m: float, given: Box | None, entry: Entry) -> OpenChart:
+    """The chart that an area file names with `chart.geojson`."""
+    path = _chart_path(file.chart, entry)
+    chart = _read_chart(file.chart, read_features(path), given, entry)
+
+    def zones(box: Box, frame: LocalFrame) -> ChartZones:
+        deep, rule = _deep_water(file, draught_m, entry.at("depth_layers"))
+        depths = file.chart.depth_layers or {}
+        return ChartZones(
+            land=_layer_union(chart, file.chart.land_layers, box, frame),
+            deep=None if deep is None else _layer_union(chart, deep, box, frame),
+            closed=shapely.MultiPolygon(),
+            depths=tuple(
+                (depths[name], _layer_union(chart, [name], box, frame))
+                for name in sorted(depths, key=depths.__getitem__)
+            ),
+            depth_rule=rule,
+            notes=(*(f"{path.name}: {note}" for note in chart.notes), *_beyond_chart(box, chart, deep)),
+        )
+
+    return OpenChart(path=path, extent=chart.extent, zones=zones)
+
+
+def _chart_path(chart: ChartTable, entry: Entry) -> Path:
+    if not chart.land_layers and not chart.depth_layers:
+        raise entry.at("land_layers").error("is an empty list, expected a layer, or depth_layers to be given")
+    if chart.depth_layers is not None and not chart.depth_layers:
+        raise entry.at("depth_layers").error("is empty, expected layers with their depth, e.g. seabed5m = 5.0")
+    return entry.at("geojson").file(chart.geojson or "")
+
+
+def _read_chart(table: ChartTable, features: tuple[Feature, ...], given: Box | None, entry: Entry) -> Chart:
+    """The layers that the file names."""
+    known = sorted({feature.layer for feature in features})
+    _check_layers(table, known, entry)
+    layers = dict.fromkeys((*table.land_layers, *(table.depth_layers or {})))
+    try:
+        return read_layers(features, layers, near_lon_deg=None if given is None else (given[0] + given[2]) / 2)
+    except FileError:
+        raise
+    except InputError as error:
+        raise entry.at("geojson").error(str(error)) from None
+
+
+def _check_layers(chart: ChartTable, known: list[str], entry: Entry) -> None:
+    for index, name in enumerate(chart.land_layers, start=1):
+        if name not in known:
+            raise entry.at("land_layers").item(index).unknown(name, known)
+    for name in chart.depth_layers or {}:
+        if name not in known:
+            raise entry.at("depth_layers").unknown(name, known)
+        if name in chart.land_layers:
+            raise entry.at("depth_layers").at(name).error("is also a land layer, expected one or the other")
+
+
+def _deep_water(file: AreaTable, draught_m: float, entry: Entry) -> tuple[list[str] | None, str]:
+    """The layers that are deep enough, or None when depth is not checked, and the sentence that says so."""
+    needed_m, wish = wish_text(file.depth, draught_m)
+    depths = file.chart.depth_layers
+    if depths is None:
+        return None, "Depth is not checked: no depth layers are named, all water outside land counts as deep enough."
+    deep = sorted((name for name in depths if depths[name] >= needed_m), key=lambda name: depths[name])
+    if not deep:
+        deepest = max(depths, key=lambda name: depths[name])
+        found = f"no layer is as deep as {wish}, the deepest is {deepest!r} with {depths[deepest]:g} m"
+        raise NoPlan(str(entry.error(found)))
+    return deep, f"Allowed water lies in the layers {', '.join(deep)}: at least {depths[deep[0]]:g} m deep for {wish}."
+
+
+def _layer_union(chart: Chart, names: Iterable[str], box: Box, frame: LocalFrame) -> shapely.Geometry:
+    """The named layers around the bounds, in metres."""
+    window = around(box)
+    polygons = [polygon for name in names for polygon in chart.layers[name] if polygon.intersects(window)]
+    cut = [polygon if window.contains(polygon) else polygon.intersection(window) for polygon in polygons]
+    return in_metres(shapely.union_all(cut), frame)
+
+
+def _beyond_chart(box: Box, chart: Chart, deep: list[str] | None) -> tuple[str, ...]:
+    west, south, east, north = chart.extent
+    if deep is not None or (box[0] >= west and box[1] >= south and box[2] <= east and box[3] <= north):
+        return ()
+    return ("the bounds reach beyond everything drawn in the chart; what lies there counts as water",)

@@ -1,0 +1,209 @@
+"""S-57 cells (electronic navigational charts) to the features that decide where a ship may go, in degrees.
+
+GDAL reads the cell and applies the update files beside it (.001, .002, ...). Whether it did is checked against the
+update number that the cell then states; a gap in the chain of updates is refused.
+
+Source: International Hydrographic Organization, S-57 edition 3.1 (2000), appendix A (object catalogue) and B.1 (ENC
+product specification).
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyogrio
+import shapely
+from pyogrio.errors import DataSourceError
+
+from expdesign.scenario.tables import Entry
+
+OPTIONS = {"UPDATES": "APPLY", "SPLIT_MULTIPOINT": "YES", "ADD_SOUNDG_DEPTH": "YES"}
+DEPTHS = ("DEPARE", "DRGARE")
+"""Areas with a least depth DRVAL1: natural and dredged."""
+SOLID = (
+    *("LNDARE", "SLCONS", "PONTON", "HULKES", "FLODOC", "DRYDOC", "GATCON", "DAMCON", "DYKCON", "CAUSWY", "LOGPON"),
+    *("MORFAC", "PILPNT", "OFSPLF", "PYLONS", "BCNCAR", "BCNISD", "BCNLAT", "BCNSAW", "BCNSPP", "MARCUL", "FSHFAC"),
+)
+"""What a hull must not touch whatever the depth: land, works, moored and floating structures, piles, beacons."""
+BUOYS = ("BOYCAR", "BOYINB", "BOYISD", "BOYLAT", "BOYSAW", "BOYSPP", "LITFLT", "LITVES", "ICEARE", "WEDKLP")
+DANGERS = {"OBSTRN": "VALSOU", "WRECKS": "VALSOU", "UWTROC": "VALSOU", "SOUNDG": "DEPTH"}
+"""Dangers and the attribute with their depth; where it is empty they count as at the surface."""
+OVERHEAD = ("BRIDGE", "CBLOHD", "PIPOHD", "CONVYR")
+CLEARANCES = ("VERCLR", "VERCCL", "VERCSA")
+KEEP_OUT = {"7": "entry prohibited", "8": "entry restricted", "14": "area to be avoided"}
+"""Values of the attribute RESTRN that keep a trial out."""
+WGS84, METRES = 2, 1
+DATUMS = {
+    1: "mean low water springs",
+    3: "mean sea level",
+    5: "mean low water",
+    8: "approximate lowest astronomical tide",
+    12: "mean lower low water",
+    19: "approximate mean low water",
+    23: "lowest astronomical tide",
+    24: "local datum",
+}
+"""Common values of the sounding datum, VERDAT."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Feature57:
+    """One charted object.
+
+    Attributes:
+        kind: its object class, e.g. "WRECKS".
+        geometry: any, coordinates (longitude, latitude) [deg].
+        depth_m: least depth below the sounding datum; nan where not stated or meaningless.
+        clearance_m: height below it of what crosses overhead; nan where not stated.
+        why: what keeps a trial out of a restricted area, else "".
+    """
+
+    kind: str
+    geometry: shapely.Geometry
+    depth_m: float = np.nan
+    clearance_m: float = np.nan
+    why: str = ""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Cell:
+    """What a cell says of where a ship may go.
+
+    Attributes:
+        features: of the classes in `DEPTHS`, `SOLID`, `BUOYS`, `DANGERS`, `OVERHEAD`, and restricted areas.
+        notes: edition, updates, datum, scale, and what was repaired.
+    """
+
+    features: tuple[Feature57, ...]
+    notes: tuple[str, ...]
+
+    def of(self, *kinds: str) -> tuple[Feature57, ...]:
+        """The features of some classes."""
+        return tuple(feature for feature in self.features if feature.kind in kinds and not feature.why)
+
+    @property
+    def restricted(self) -> tuple[Feature57, ...]:
+        """Areas that a trial keeps out of by rule."""
+        return tuple(feature for feature in self.features if feature.why)
+
+    @property
+    def extent(self) -> tuple[float, float, float, float]:
+        """West, south, east, north of the charted depths [deg]."""
+        west, south, east, north = shapely.total_bounds([feature.geometry for feature in self.of(*DEPTHS)])
+        return float(west), float(south), float(east), float(north)
+
+
+def read_cell(path: Path) -> Cell:
+    """Read a base cell and its updates.
+
+    Args:
+        path: the file `NAME.000`; its updates `NAME.001`, ... lie beside it.
+
+    Raises:
+        FileError: no S-57 cell, not in WGS84 and metres, an update is missing or did not apply, or no depths in it.
+    """
+    entry = Entry(path)
+    updates = _updates(path, entry)
+    try:
+        layers = {str(name) for name, _ in pyogrio.list_layers(path)}
+        header = _header(path, layers, entry)
+        repaired: list[str] = []
+        features = tuple(feature for layer in sorted(layers) for feature in _features(path, layer, repaired))
+    except DataSourceError as error:
+        raise entry.error(f"cannot be read as an S-57 cell: {' '.join(str(error).split())}") from None
+    if not any(feature.kind in DEPTHS for feature in features):
+        raise entry.error("holds no depth areas, expected an S-57 base cell of a navigational chart")
+    return Cell(features=features, notes=(*_notes(header, updates, entry), *_counted(repaired)))
+
+
+def _updates(path: Path, entry: Entry) -> int:
+    """The number of update files beside the cell."""
+    numbers = sorted(
+        int(other.suffix[1:])
+        for other in path.parent.glob(f"{path.stem}.[0-9][0-9][0-9]")
+        if other.suffix != ".000" and other.stem == path.stem
+    )
+    for expected, number in enumerate(numbers, start=1):
+        if number != expected:
+            raise entry.error(
+                f"has the update {path.stem}.{number:03d} beside it but not {path.stem}.{expected:03d}, expected all "
+                "updates up to the newest, or none"
+            )
+    return len(numbers)
+
+
+def _header(path: Path, layers: set[str], entry: Entry) -> dict[str, Any]:
+    if "DSID" not in layers:
+        raise entry.error("has no data set identification, expected an S-57 base cell (.000)")
+    header = {name: values[0] for name, values in _columns(path, "DSID")[0].items()}
+    if header["DSPM_HDAT"] != WGS84:
+        raise entry.error(f"has the horizontal datum {header['DSPM_HDAT']}, expected {WGS84} (WGS84)")
+    if header["DSPM_DUNI"] != METRES:
+        raise entry.error(f"has depth units {header['DSPM_DUNI']}, expected {METRES} (metres)")
+    return header
+
+
+def _columns(path: Path, layer: str) -> tuple[dict[str, Any], Any]:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # encodings of names that are not used
+        meta, _, geometry, fields = pyogrio.raw.read(path, layer=layer, **OPTIONS)
+    return dict(zip(meta["fields"], fields, strict=True)), geometry
+
+
+def _features(path: Path, layer: str, repaired: list[str]) -> Iterator[Feature57]:
+    wanted = {*DEPTHS, *SOLID, *BUOYS, *DANGERS, *OVERHEAD}
+    if layer in ("DSID", "C_AGGR", "C_ASSO"):
+        return
+    columns, raw = _columns(path, layer)
+    if raw is None or not (layer in wanted or "RESTRN" in columns):
+        return
+    geometries = shapely.from_wkb(raw)
+    restricted = columns.get("RESTRN", [None] * len(geometries))
+    for index, geometry in enumerate(geometries):
+        why = _keep_out(restricted[index])
+        if geometry is None or geometry.is_empty or not (why or layer in wanted):
+            continue
+        if not shapely.is_valid(geometry):
+            geometry = shapely.make_valid(geometry)
+            repaired.append(layer)
+        depth = columns.get(DANGERS.get(layer, "DRVAL1"))
+        heights = [float(columns[name][index]) for name in CLEARANCES if name in columns]
+        found = {
+            "kind": layer,
+            "geometry": geometry,
+            "depth_m": np.nan if depth is None else float(depth[index]),
+            "clearance_m": min((height for height in heights if not np.isnan(height)), default=np.nan),
+        }
+        if layer in wanted:
+            yield Feature57(**found)
+        if why:
+            yield Feature57(**found, why=why)
+
+
+def _keep_out(codes: Any) -> str:
+    """Why a trial keeps out, from the list of restrictions of an area, or ""."""
+    given = codes if isinstance(codes, Iterable) and not isinstance(codes, str) else str(codes or "").split(",")
+    return ", ".join(KEEP_OUT[str(code)] for code in given if str(code) in KEEP_OUT)
+
+
+def _notes(header: dict[str, Any], updates: int, entry: Entry) -> tuple[str, ...]:
+    edition, update, issued = header["DSID_EDTN"], int(header["DSID_UPDN"]), header["DSID_ISDT"]
+    if update < updates:
+        raise entry.error(f"has {updates} updates beside it of which {update} apply, expected all to apply")
+    state = f"updates 1 to {update} applied" if updates else "no updates lie beside the cell, so none are applied"
+    if update and not updates:
+        state = f"issued with updates up to {update}, none lie beside the cell"
+    datum = DATUMS.get(int(header["DSPM_SDAT"]), f"datum {header['DSPM_SDAT']}")
+    return (
+        f"edition {edition}, {state}, issued {issued[:4]}-{issued[4:6]}-{issued[6:]}, scale 1:{header['DSPM_CSCL']}",
+        f"depths are below {datum}",
+    )
+
+
+def _counted(repaired: list[str]) -> tuple[str, ...]:
+    return (f"{len(repaired)} outlines that touch or cross themselves taken apart",) if repaired else ()
