@@ -1,0 +1,248 @@
+"""One helm and one engine order for any vessel, and the steady run ahead that standard trials begin with.
+
+The helm turns all rudders together. A vessel without rudders steers with the common angle of its azimuth thrusters:
+those abaft amidships ("stern", or all where none is abaft), or every one ("all"). A vessel known only by generalised
+forces steers as if one thruster at its stern, half a length abaft amidships, gave all of its thrust.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq, root
+
+from expdesign.errors import InputError, UnknownName
+from expdesign.values import Array, seal
+from expdesign.vessel import SCALAR, Actuator, Limit, Vessel
+
+THRUSTERS = ("stern", "all")
+SERVICE_SHARE = 0.85 ** (1 / 3)
+"""Propeller speed at 85 % of the largest power, as a share of the largest, as power goes with its cube."""
+FASTEST_MPS = 60.0
+STEADY = 1e-9
+"""Share of its speed that a steady vessel may gain or lose in a second."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Helm:
+    """How a helm angle and an engine order become actuator commands.
+
+    Attributes:
+        vessel: the one that is steered.
+        thrusters: "stern" or "all": which azimuth thrusters turn with the helm where there are no rudders.
+    """
+
+    vessel: Vessel
+    thrusters: str = "stern"
+
+    def __post_init__(self) -> None:
+        if self.thrusters not in THRUSTERS:
+            raise UnknownName("choice of steering thrusters", self.thrusters, known=THRUSTERS)
+        kinds = {actuator.kind for actuator in self.vessel.actuators}
+        if not kinds & {"propeller", "azimuth", "force"}:
+            raise InputError(f"vessel {self.vessel.name!r} has no propeller, azimuth thruster or force to drive it")
+        for name, limit in zip(self.vessel.model.inputs, self.vessel.limits, strict=True):
+            if name.startswith(("n", "tau_x")) and not (math.isfinite(limit.low) and math.isfinite(limit.high)):
+                raise InputError(f"vessel {self.vessel.name!r}: {name} has no limits, expected finite ones")
+
+    @property
+    def means(self) -> str:
+        """What steers: "rudder", "azimuth", "force", or "" where nothing does."""
+        kinds = [actuator.kind for actuator in self.vessel.actuators]
+        return next((kind for kind in ("rudder", "azimuth", "force") if kind in kinds), "")
+
+    @property
+    def steering(self) -> tuple[Actuator, ...]:
+        """The actuators that turn with the helm."""
+        able = tuple(actuator for actuator in self.vessel.actuators if actuator.kind == self.means)
+        abaft = tuple(actuator for actuator in able if actuator.forward_m < 0)
+        return abaft if self.means == "azimuth" and self.thrusters == "stern" and abaft else able
+
+    @property
+    def description(self) -> str:
+        """One phrase for reports."""
+        names = ", ".join(a.signals[-1] for a in self.steering)
+        return {
+            "rudder": f"rudder angle ({names})",
+            "azimuth": f"common angle of the {'stern ' if self.thrusters == 'stern' else ''}thrusters ({names})",
+            "force": "angle of all thrust, as if it were given at the stern",
+        }.get(self.means, "none")
+
+    def inputs(self, drive: float, angle_rad: float) -> list[float]:
+        """Commands in the model's order.
+
+        Args:
+            drive: engine order from -1, full astern, to 1, full ahead: the share of each actuator's limit.
+            angle_rad: helm, in the sense of the actuators' own angles.
+        """
+        row: list[float] = []
+        steering = self.steering
+        for actuator in self.vessel.actuators:
+            turned = angle_rad if actuator in steering else 0.0
+            thrust = 0.0 if actuator.kind in ("tunnel", "rudder") else _share(actuator.limits[0], drive)
+            side = thrust * math.sin(turned)
+            row += {
+                "rudder": [turned],
+                "azimuth": [thrust, turned],
+                "force": [thrust * math.cos(turned), side, 0.0 - self.vessel.length_m / 2 * side],
+            }.get(actuator.kind, [thrust])
+        return row
+
+    @property
+    def drive_rate(self) -> float:
+        """Largest change of the engine order per second."""
+        thrust = [a.limits[0] for a in self.vessel.actuators if a.kind in ("propeller", "azimuth", "force")]
+        return min(limit.rate / max(abs(limit.low), abs(limit.high)) for limit in thrust)
+
+    def angle_rate(self, drive: float) -> float:
+        """Largest change of the helm angle per second [rad/s] at an engine order."""
+        if self.means != "force":
+            return min((actuator.limits[-1].rate for actuator in self.steering), default=math.inf)
+        limits = self.steering[0].limits
+        thrust = max(abs(_share(limits[0], drive)), 1e-300)
+        levers = (1.0, 1.0, self.vessel.length_m / 2)
+        return min(limit.rate / (thrust * lever) for limit, lever in zip(limits, levers, strict=True))
+
+    def check(self, drive: float, angle_rad: float) -> None:
+        """Raise InputError when an actuator cannot give this."""
+        row = self.inputs(drive, angle_rad)
+        for name, value, limit in zip(self.vessel.model.inputs, row, self.vessel.limits, strict=True):
+            slack = 1e-9 * max(1.0, abs(value))
+            if not limit.low - slack <= value <= limit.high + slack:
+                raise InputError(
+                    f"vessel {self.vessel.name!r}: a helm of {math.degrees(angle_rad):.4g} deg needs {name} = "
+                    f"{value:.4g}, expected {limit.low:.4g} to {limit.high:.4g}"
+                )
+
+    def hardest(self, drive: float, *, up_to_rad: float = math.radians(35.0)) -> float:
+        """Largest helm angle to both sides [rad] that all actuators can give, `up_to_rad` at most."""
+        if self.means != "force":
+            reaches = [min(-a.limits[-1].low, a.limits[-1].high) for a in self.steering]
+            return min([up_to_rad, *reaches])
+        _, side, turn = self.steering[0].limits
+        thrust, arm = abs(_share(self.steering[0].limits[0], drive)), self.vessel.length_m / 2
+        most = min(-side.low, side.high, -turn.low / arm, turn.high / arm)
+        return min(up_to_rad, math.asin(min(1.0, max(0.0, most) / max(thrust, 1e-300))))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Approach:
+    """A steady run straight ahead in calm water.
+
+    Attributes:
+        helm: how the vessel is steered.
+        drive: engine order that holds the speed.
+        angle_rad: helm that holds the course; 0 for a symmetric vessel.
+        starboard: +1 or -1: sign of a change of helm that turns the vessel to starboard, 0 where nothing does.
+        velocity: (3,) u, v, r through water, r = 0.
+    """
+
+    helm: Helm
+    drive: float
+    angle_rad: float
+    starboard: int
+    velocity: Array
+
+    def __post_init__(self) -> None:
+        seal(self, velocity="3")
+
+    @property
+    def inputs(self) -> Array:
+        """(m,) commands that stand during the approach."""
+        return np.array(self.helm.inputs(self.drive, self.angle_rad))
+
+    @property
+    def speed_mps(self) -> float:
+        """Speed through water [m/s]."""
+        return float(np.hypot(*self.velocity[:2]))
+
+
+def steady_ahead(vessel: Vessel, speed_mps: float | None = None, *, thrusters: str = "stern") -> Approach:
+    """Trim for a straight course: engine order, drift and helm at which nothing accelerates.
+
+    Args:
+        vessel: nominal model, in calm water.
+        speed_mps: surge speed through water, or None for `service_speed`.
+        thrusters: "stern" or "all", which azimuth thrusters steer.
+
+    Raises:
+        InputError: the engines cannot hold the speed, or the helm cannot hold the course.
+    """
+    helm = Helm(vessel=vessel, thrusters=thrusters)
+    speed = service_speed(vessel, thrusters=thrusters) if speed_mps is None else float(speed_mps)
+    if not 0 < speed < FASTEST_MPS:
+        raise InputError(f"approach speed is {speed:g} m/s, expected more than 0 and less than {FASTEST_MPS:g}")
+    drive, sway, angle = _balance(helm, speed, _engine_order(helm, speed))
+    helm.check(drive, angle)
+    tilt = 1e-3
+    right, left = (_acceleration(helm, (speed, sway, 0.0), drive, angle + side * tilt)[2] for side in (1, -1))
+    felt = abs(right - left) > 1e-12 * (abs(right) + abs(left)) and right != left
+    return Approach(
+        helm=helm,
+        drive=drive,
+        angle_rad=angle,
+        starboard=(1 if right > left else -1) if felt else 0,
+        velocity=np.array([speed, sway, 0.0]),
+    )
+
+
+def service_speed(vessel: Vessel, *, thrusters: str = "stern") -> float:
+    """Steady surge speed ahead [m/s] in calm water at 85 % of the engines' power (`SERVICE_SHARE` of their speed).
+
+    Raises:
+        InputError: the model has no steady speed there.
+    """
+    helm = Helm(vessel=vessel, thrusters=thrusters)
+
+    def gain(speed: float) -> float:
+        return _acceleration(helm, (speed, 0.0, 0.0), SERVICE_SHARE, 0.0)[0]
+
+    grid = np.linspace(0.0, FASTEST_MPS, 601)
+    gains = [gain(speed) for speed in grid.tolist()]
+    for low, high, before, after in zip(grid[:-1], grid[1:], gains[:-1], gains[1:], strict=True):
+        if before > 0 >= after:
+            return float(brentq(gain, low, high, xtol=1e-12))
+    raise InputError(
+        f"vessel {vessel.name!r}: the model has no steady speed below {FASTEST_MPS:g} m/s at 85 % power: "
+        f"du/dt is {gains[0]:.3g} m/s2 at rest; give the approach speed"
+    )
+
+
+def _share(limit: Limit, drive: float) -> float:
+    return drive * (limit.high if drive >= 0 else abs(limit.low))
+
+
+def _acceleration(helm: Helm, motion: tuple[float, float, float], drive: float, angle: float) -> list[float]:
+    model = helm.vessel.model
+    return [float(a) for a in model.accelerations(motion, motion[:2], helm.inputs(drive, angle), SCALAR)]
+
+
+def _engine_order(helm: Helm, speed: float) -> float:
+    def gain(drive: float) -> float:
+        return _acceleration(helm, (speed, 0.0, 0.0), drive, 0.0)[0]
+
+    idle, full = gain(0.0), gain(1.0)
+    if full < -STEADY * speed or idle > STEADY * speed:
+        found = f"loses {-full:.3g} m/s2 at full ahead" if full < 0 else f"gains {idle:.3g} m/s2 without thrust"
+        raise InputError(f"vessel {helm.vessel.name!r} cannot hold {speed:g} m/s: it {found}; choose another speed")
+    if idle * full >= 0:
+        return 0.0 if abs(idle) <= abs(full) else 1.0
+    return float(brentq(gain, 0.0, 1.0, xtol=1e-14))
+
+
+def _balance(helm: Helm, speed: float, drive: float) -> tuple[float, float, float]:
+    """Engine order, sway speed and helm of the straight course, from the engine order of a symmetric vessel."""
+    if max(map(abs, _acceleration(helm, (speed, 0.0, 0.0), drive, 0.0)[1:])) <= STEADY * speed:
+        return drive, 0.0, 0.0
+    sways = "v" in helm.vessel.model.outputs
+
+    def excess(x: Array) -> list[float]:
+        surge, sway, yaw = _acceleration(helm, (speed, x[2] if sways else 0.0, 0.0), x[0], x[1])
+        return [surge, yaw, sway] if sways else [surge, yaw]
+
+    found = root(excess, [drive, 0.0, 0.0][: 3 if sways else 2], tol=1e-14)
+    if max(map(abs, excess(found.x))) > STEADY * speed or not 0 <= found.x[0] <= 1:
+        raise InputError(f"vessel {helm.vessel.name!r} has no helm that holds a straight course at {speed:g} m/s")
+    return float(found.x[0]), float(found.x[2]) if sways else 0.0, float(found.x[1])

@@ -1,0 +1,153 @@
+"""The simulated helmsman and engineer: orders that follow the ship's motion, carried out as fast as the actuators allow.
+
+An order falls where its moment falls, also between samples: the command of that sample is the mean over it of an order
+that moves with the largest rate.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+
+from expdesign.errors import Diverged, NoAnswer
+from expdesign.signals import Commands, Trajectory
+from expdesign.simulation.helm import Approach, Helm
+from expdesign.simulation.motion import State, motion_rates, rk4_step
+from expdesign.simulation.run import LARGEST_SPEED, SUBSTEPS
+from expdesign.values import Array
+from expdesign.vessel import SCALAR, Vessel
+
+Trial = tuple[Commands, Trajectory]
+LONGEST = 300.0
+"""Ship lengths at approach speed after which a trial that has not come to its end is given up."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Conduct:
+    """How a standard trial is run.
+
+    Attributes:
+        speed_mps: approach speed through water, or None for `service_speed`.
+        approach_s: steady run before the first order.
+        duration_s: length of the whole trial, or None to end it where the trial is complete.
+        sample_time_s: time between commands, or None for the vessel's.
+        thrusters: "stern" or "all", which azimuth thrusters steer a vessel without rudders.
+    """
+
+    speed_mps: float | None = None
+    approach_s: float = 0.0
+    duration_s: float | None = None
+    sample_time_s: float | None = None
+    thrusters: str = "stern"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stage:
+    """Orders that stand until `left`, a function of (time since its start, state), comes down to zero."""
+
+    angle_rad: float
+    drive: float
+    left: Callable[[float, State], float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Orders:
+    """Where engine order and helm stand; they move towards a stage's with their largest rates.
+
+    Attributes:
+        helm: turns them into commands.
+        drive, angle_rad: at the beginning of the sample.
+        step_s: time between samples.
+    """
+
+    helm: Helm
+    drive: float
+    angle_rad: float
+    step_s: float
+
+    def toward(self, old: Stage, new: Stage, share: float) -> tuple[list[float], _Orders]:
+        """The mean command of a sample in which `new` follows `old` after a share of it, and the orders at its end."""
+        drives, angles = [], []
+        drive, angle = self.drive, self.angle_rad
+        for stage, part in ((old, share), (new, 1 - share)):
+            time_s = part * self.step_s
+            mean, drive = _moved(drive, stage.drive, self.helm.drive_rate, time_s)
+            drives.append(mean * part)
+            mean, angle = _moved(angle, stage.angle_rad, self.helm.angle_rate(stage.drive), time_s)
+            angles.append(mean * part)
+        end = _Orders(helm=self.helm, drive=drive, angle_rad=angle, step_s=self.step_s)
+        return self.helm.inputs(sum(drives), sum(angles)), end
+
+
+def _moved(value: float, goal: float, rate: float, time_s: float) -> tuple[float, float]:
+    """(mean, last) over a time of what moves from a value towards a goal at a rate and stays there."""
+    if time_s <= 0:
+        return value, value
+    way = goal - value
+    ramp_s = min(abs(way) / rate, time_s)
+    last = goal if abs(way) <= rate * time_s else value + math.copysign(rate * time_s, way)
+    return last - (last - value) * ramp_s / (2 * time_s), last
+
+
+def sail(approach: Approach, stages: Iterable[Stage], conduct: Conduct, what: str) -> Trial:
+    """Run the stages after the approach, sample by sample, each until nothing of it is left."""
+    vessel = approach.helm.vessel
+    step_s = conduct.sample_time_s or vessel.sample_time_s
+    orders = _Orders(helm=approach.helm, drive=approach.drive, angle_rad=approach.angle_rad, step_s=step_s)
+    lead_s = step_s * math.ceil(conduct.approach_s / step_s - 1e-9)
+    ahead = Stage(angle_rad=approach.angle_rad, drive=approach.drive, left=lambda time, _: lead_s - time)
+    waiting = [ahead, *stages] if lead_s else list(stages)
+    end_s = LONGEST * vessel.length_m / approach.speed_mps if conduct.duration_s is None else conduct.duration_s
+    state: State = (0.0, 0.0, 0.0, *approach.velocity.tolist())
+    rows: list[list[float]] = []
+    states, began_s, finished = [state], 0.0, False
+    while not finished and len(rows) < round(end_s / step_s):
+        stage, since_s = waiting[0], len(rows) * step_s - began_s
+        row, moved = orders.toward(stage, stage, 1.0)
+        share = _share_left(vessel, row, state, stage, since_s, step_s)
+        if share is not None and len(waiting) > 1:
+            waiting, began_s = waiting[1:], len(rows) * step_s + share * step_s
+            row, moved = orders.toward(stage, waiting[0], share)
+        elif share is not None:
+            finished = conduct.duration_s is None
+        orders, state = moved, _stepped(vessel, row, state, step_s)
+        rows.append(row)
+        states.append(state)
+    if conduct.duration_s is None and not finished:
+        raise NoAnswer(f"{what}: vessel {vessel.name!r} does not come to the end of it within {end_s:.4g} s")
+    table: Array = np.array(states)
+    commands = Commands(sample_time_s=step_s, names=vessel.model.inputs, values=np.array(rows))
+    return commands, Trajectory(sample_time_s=step_s, pose=table[:, :3], velocity=table[:, 3:])
+
+
+def _share_left(
+    vessel: Vessel, row: list[float], state: State, stage: Stage, since_s: float, step_s: float
+) -> float | None:
+    """The share of a sample after which a stage is over, or None when it goes on."""
+
+    def left(share: float) -> float:
+        return stage.left(since_s + share * step_s, _stepped(vessel, row, state, share * step_s))
+
+    if left(1.0) > 1e-9:
+        return None
+    if left(1.0) > 0:
+        return 1.0
+    return 0.0 if left(0.0) <= 0 else float(brentq(left, 0.0, 1.0, xtol=1e-12))
+
+
+def _stepped(vessel: Vessel, row: list[float], state: State, step_s: float) -> State:
+    """The state after a time under held commands, by the steps of `simulate`."""
+    theta = vessel.model.parameters.tolist()
+
+    def rates(x: State) -> State:
+        return motion_rates(vessel.model, x, row, ops=SCALAR, parameters=theta)
+
+    for _ in range(SUBSTEPS):
+        state = rk4_step(rates, state, step_s / SUBSTEPS)
+    if not all(abs(speed) < LARGEST_SPEED for speed in state[3:]):
+        raise Diverged(f"vessel {vessel.name!r}: the model is unstable: a speed passes {LARGEST_SPEED:g} m/s or rad/s")
+    return state
