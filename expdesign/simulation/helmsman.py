@@ -1,4 +1,4 @@
-"""The simulated helmsman and engineer: orders that follow the ship's motion, carried out as fast as the actuators allow.
+"""The simulated helmsman and engineer: orders that follow the motion, carried out as fast as the actuators allow.
 
 An order falls where its moment falls, also between samples: the command of that sample is the mean over it of an order
 that moves with the largest rate.
