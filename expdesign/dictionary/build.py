@@ -1,4 +1,4 @@
-"""From a request to a primitive: wished velocities, the commands that give them, the simulated answer."""
+"""From a request to a primitive: wished velocities or commands, kept within limits, and the simulated answer."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ import numpy as np
 
 from expdesign.dictionary.families import FAMILIES
 from expdesign.dictionary.primitive import Primitive
-from expdesign.dictionary.spec import Family, PrimitiveSpec
+from expdesign.dictionary.spec import Excitation, Family, PrimitiveSpec
+from expdesign.dictionary.trim import STEADY, drift, lost, trim
 from expdesign.errors import InputError, UnknownName
 from expdesign.signals import Commands
 from expdesign.simulation import simulate
 from expdesign.values import Array
-from expdesign.vessel import SCALAR, Vessel, allocate, generalised_force, required_force
+from expdesign.vessel import NUMPY, Vessel, allocate, generalised_force, required_force, within_limits
 
-STEADY = 1e-6
-"""Share of its speed that a vessel may lose or gain per sample where an entry state counts as held."""
+__all__ = ["build_dictionary", "build_primitive", "drift", "excitation", "family", "follow", "trim"]
 
 
 def family(name: str) -> Family:
@@ -37,77 +37,104 @@ def build_dictionary(vessel: Vessel, specs: Iterable[PrimitiveSpec]) -> tuple[Pr
 
 
 def build_primitive(vessel: Vessel, spec: PrimitiveSpec) -> Primitive:
-    """One primitive: feed-forward commands by the inverse nominal model, within limits and rates, then simulated.
+    """One primitive: commands of its family, or by the inverse nominal model, within limits and rates, then simulated.
 
     The simulated motion is what counts from here on; where limits or unmodelled directions keep the vessel from the
     wished velocities it differs from them.
 
     Raises:
-        InputError: the run is shorter than two samples, or the actuators cannot hold its entry state.
+        InputError: the run is shorter than two samples, the actuators cannot hold its entry state, or the family asks
+            for what the vessel cannot do; the message names the primitive and, where it has one, its file and key.
         Diverged: the nominal model is unstable under the commands.
     """
-    count = round(spec.settings["duration_s"] / vessel.sample_time_s)
-    if count < 2:
-        raise InputError(
-            f"primitive {spec.name!r}: duration_s is {spec.settings['duration_s']:g}, "
-            f"expected at least two samples of {vessel.sample_time_s:g} s"
-        )
-    time_s = np.arange(count + 1, dtype=float) * vessel.sample_time_s
     try:
-        wished = family(spec.family).reference(spec.settings, time_s)
+        found = excitation(vessel, spec)
     except InputError as error:
-        raise InputError(f"primitive {spec.name!r}: {error}") from None
-    if not np.isfinite(wished).all():
-        raise InputError(f"primitive {spec.name!r}: its settings give velocities that are not numbers")
-    slopes = np.diff(wished, axis=0) / vessel.sample_time_s
-    middles = (wished[:-1] + wished[1:]) / 2
-    force = np.array([required_force(vessel.model, nu, rate) for nu, rate in zip(middles, slopes, strict=True)])
-    entry = _ready(vessel, _entry_inputs(vessel, spec.name, wished[0]), force)
-    values = allocate(vessel.actuators, force, sample_time_s=vessel.sample_time_s, before=entry)
-    commands = Commands(sample_time_s=vessel.sample_time_s, names=vessel.model.inputs, values=values)
+        before = f"{spec.place}: " if spec.place else ""
+        raise InputError(f"{before}primitive {spec.name!r}: {error}") from None
+    commands = Commands(sample_time_s=vessel.sample_time_s, names=vessel.model.inputs, values=found.commands)
     return Primitive(
         name=spec.name,
         family=spec.family,
         settings=spec.settings,
         commands=commands,
-        entry_inputs=entry,
-        trajectory=simulate(vessel, commands, velocity=wished[0]),
+        entry_inputs=found.inputs,
+        trajectory=simulate(vessel, commands, velocity=found.velocity),
     )
+
+
+def excitation(vessel: Vessel, spec: PrimitiveSpec) -> Excitation:
+    """Entry state and commands (k, m) of a request, within limits and rates.
+
+    Raises:
+        InputError: as in `build_primitive`.
+    """
+    kind = family(spec.family)
+    count = round(spec.settings["duration_s"] / vessel.sample_time_s)
+    if count < 2:
+        length_s = spec.settings["duration_s"]
+        raise InputError(f"duration_s is {length_s:g}, expected at least two samples of {vessel.sample_time_s:g} s")
+    if kind.orders is not None:
+        wished = kind.orders(vessel, spec)
+        values = within_limits(
+            vessel.actuators, wished.commands, sample_time_s=vessel.sample_time_s, before=wished.inputs
+        )
+        return Excitation(velocity=wished.velocity, inputs=wished.inputs, commands=values)
+    velocities = wished_velocities(vessel, spec)
+    inputs, values = follow(vessel, velocities)
+    if lost(vessel, velocities[0], inputs) > STEADY:
+        raise InputError(_not_held(vessel, velocities[0]))
+    return Excitation(velocity=velocities[0], inputs=inputs, commands=values)
+
+
+def wished_velocities(vessel: Vessel, spec: PrimitiveSpec) -> Array:
+    """(k + 1, 3) what a family with a reference wishes for.
+
+    Raises:
+        InputError: its settings make no sense together.
+    """
+    reference = family(spec.family).reference
+    assert reference is not None
+    count = round(spec.settings["duration_s"] / vessel.sample_time_s)
+    wished = reference(spec.settings, np.arange(count + 1, dtype=float) * vessel.sample_time_s)
+    if not np.isfinite(wished).all():
+        raise InputError("its settings give velocities that are not numbers")
+    return wished
+
+
+def follow(vessel: Vessel, wished: Array) -> tuple[Array, Array]:
+    """Entry commands (..., m) and commands (..., k, m) for wished velocities (..., k + 1, 3), by the inverse model.
+
+    Raises:
+        InputError: the model reads its actuators directly.
+    """
+    slopes = np.diff(wished, axis=-2) / vessel.sample_time_s
+    middles = (wished[..., :-1, :] + wished[..., 1:, :]) / 2
+    force = required_force(vessel.model, middles, slopes)
+    entry = _ready(vessel, trim(vessel, wished[..., 0, :]), force)
+    return entry, allocate(vessel.actuators, force, sample_time_s=vessel.sample_time_s, before=entry)
 
 
 def _ready(vessel: Vessel, entry: Array, force: Array) -> Array:
     """Entry commands with every azimuth that gives no thrust turned to where the run will need it first."""
+    size = np.linalg.norm(force, axis=-1)
+    pushes = size > 1e-3 * np.maximum(size.max(axis=-1, keepdims=True), 1e-12)
+    first = np.take_along_axis(force, np.argmax(pushes, axis=-1)[..., None, None], axis=-2)
+    turned = allocate(vessel.actuators, first, sample_time_s=vessel.sample_time_s)[..., 0, :]
     ready, place = entry.copy(), 0
-    pushes = np.linalg.norm(force, axis=1) > 1e-3 * np.linalg.norm(force, axis=1).max(initial=1e-12)
-    first = allocate(vessel.actuators, force[pushes][:1], sample_time_s=vessel.sample_time_s)
     for actuator in vessel.actuators:
-        if actuator.kind == "azimuth" and abs(entry[place]) < 1e-9 and len(first):
-            ready[place + 1] = first[0, place + 1]
+        if actuator.kind == "azimuth":
+            idle = (np.abs(entry[..., place]) < 1e-9) & pushes.any(axis=-1)
+            ready[..., place + 1] = np.where(idle, turned[..., place + 1], entry[..., place + 1])
         place += len(actuator.limits)
     return ready
 
 
-def trim(vessel: Vessel, velocity: Array) -> Array:
-    """Commands (m,) that hold a velocity (3,) through calm water, as far as the actuators can."""
-    force = required_force(vessel.model, velocity, np.zeros(3))
-    return np.asarray(allocate(vessel.actuators, force[None], sample_time_s=vessel.sample_time_s)[0])
-
-
-def drift(vessel: Vessel, velocity: Array, inputs: Array) -> Array:
-    """Acceleration (3,) at a velocity through calm water under given commands."""
-    motion = velocity.tolist()
-    return np.array(vessel.model.accelerations(motion, motion[:2], inputs.tolist(), SCALAR))
-
-
-def _entry_inputs(vessel: Vessel, name: str, velocity: Array) -> Array:
-    inputs = trim(vessel, velocity)
+def _not_held(vessel: Vessel, velocity: Array) -> str:
     wanted = required_force(vessel.model, velocity, np.zeros(3))
-    given = np.array(generalised_force(vessel.actuators, dict(zip(vessel.model.inputs, inputs, strict=True)), SCALAR))
-    lost = np.abs(drift(vessel, velocity, inputs)).max() * vessel.sample_time_s
-    if lost > STEADY * max(1e-9, np.abs(velocity).max()):
-        raise InputError(
-            f"primitive {name!r}: the actuators cannot hold its entry state u = {velocity[0]:g} m/s, "
-            f"v = {velocity[1] + 0.0:g} m/s: needed tau_x = {wanted[0]:.4g}, tau_y = {wanted[1]:.4g}, "
-            f"they give {given[0]:.4g}, {given[1]:.4g}"
-        )
-    return inputs
+    inputs = trim(vessel, velocity)
+    given = generalised_force(vessel.actuators, dict(zip(vessel.model.inputs, inputs, strict=True)), NUMPY)
+    return (
+        f"the actuators cannot hold its entry state u = {velocity[0]:g} m/s, v = {velocity[1] + 0.0:g} m/s: "
+        f"needed tau_x = {wanted[0]:.4g}, tau_y = {wanted[1]:.4g}, they give {given[0]:.4g}, {given[1]:.4g}"
+    )

@@ -8,7 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.errors import InputError, UnknownName
+from expdesign.signals import Commands
 from expdesign.values import Array
+from expdesign.vessel import Vessel
+
+SEARCHED = ("", "surge", "sway", "yaw", "time", "share", "helm", "heading", "draw")
+"""What a setting is when a search moves it: a velocity, a time within the run, a share of 1, a helm angle, a change of
+heading, the number of a random draw; "" for one that a search leaves at its default."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,6 +26,7 @@ class Setting:
         default: value when not given, or None when it must be given.
         low, high: allowed range, ends included.
         meaning: one line for the user.
+        searched: one of `SEARCHED`.
     """
 
     name: str
@@ -27,27 +34,15 @@ class Setting:
     default: float | None = None
     low: float = -np.inf
     high: float = np.inf
+    searched: str = ""
+
+    def __post_init__(self) -> None:
+        if self.searched not in SEARCHED:
+            raise UnknownName(f"way to search {self.name}:", self.searched, known=SEARCHED[1:])
 
 
 Reference = Callable[[Mapping[str, float], Array], Array]
 """(settings, time_s (k,)) -> (k, 3) wished u, v, r through water; the row at time 0 is the entry velocity."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Family:
-    """A kind of manoeuvre.
-
-    Attributes:
-        name: as in dictionary files.
-        summary: one line for the user.
-        settings: its parameters; each family also has `duration_s`.
-        reference: the velocities it wishes for; the builder turns them into commands within the actuators' limits.
-    """
-
-    name: str
-    summary: str
-    settings: tuple[Setting, ...]
-    reference: Reference
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,11 +53,59 @@ class PrimitiveSpec:
         name: unique in the dictionary.
         family: name of the family.
         settings: every setting of the family, by name.
+        commands: what a "recorded" primitive repeats; None for the other families.
+        place: file and key of the request, for messages; "" when it comes from no file.
     """
 
     name: str
     family: str
     settings: Mapping[str, float]
+    commands: Commands | None = None
+    place: str = ""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Excitation:
+    """Commands wished for, and the steady state they start from.
+
+    Attributes:
+        velocity: (3,) u, v, r through water at the start.
+        inputs: (m,) commands that hold it.
+        commands: (k, m) wished commands; the builder keeps them within limits and rates.
+    """
+
+    velocity: Array
+    inputs: Array
+    commands: Array
+
+
+Orders = Callable[[Vessel, PrimitiveSpec], Excitation]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Family:
+    """A kind of manoeuvre, by the velocities it wishes for or by the commands it gives; one of the two.
+
+    Attributes:
+        name: as in dictionary files.
+        summary: one line for the user.
+        settings: its parameters; each family also has `duration_s`.
+        reference: the velocities it wishes for; the builder turns them into commands within the actuators' limits.
+        orders: the commands it gives. Any vessel can follow them, also one with propeller and rudder whose model does
+            not see generalised forces.
+        closed_loop: whether its commands depend on the simulated motion, so that each must be simulated by itself.
+    """
+
+    name: str
+    summary: str
+    settings: tuple[Setting, ...]
+    reference: Reference | None = None
+    orders: Orders | None = None
+    closed_loop: bool = False
+
+    def __post_init__(self) -> None:
+        if (self.reference is None) == (self.orders is None):
+            raise InputError(f"family {self.name!r} must have a reference or orders, and not both")
 
 
 def complete_settings(family: Family, given: Mapping[str, float]) -> dict[str, float]:

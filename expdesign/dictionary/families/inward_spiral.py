@@ -22,10 +22,16 @@ INWARD_SPIRAL = Family(
     summary="steady surge and sway while the yaw rate grows from zero, so the turn tightens",
     settings=(
         Setting(name="duration_s", meaning="length of one run", low=1e-3, high=1e5),
-        Setting(name="speed_mps", meaning="surge speed", low=-50, high=50),
-        Setting(name="yaw_rate_radps", meaning="yaw rate at the end, positive to starboard", low=-5, high=5),
-        Setting(name="sway_mps", meaning="sway speed, positive to starboard", default=0.0, low=-20, high=20),
-        Setting(name="entry_s", meaning="time in which the sway builds up", default=3.0, low=0, high=1e4),
+        Setting(name="speed_mps", meaning="surge speed", low=-50, high=50, searched="surge"),
+        Setting(
+            name="yaw_rate_radps", meaning="yaw rate at the end, positive to starboard", low=-5, high=5, searched="yaw"
+        ),
+        Setting(
+            name="sway_mps", meaning="sway speed, positive to starboard", default=0.0, low=-20, high=20, searched="sway"
+        ),
+        Setting(
+            name="entry_s", meaning="time in which the sway builds up", default=3.0, low=0, high=1e4, searched="time"
+        ),
     ),
     reference=_reference,
 )

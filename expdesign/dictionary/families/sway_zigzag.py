@@ -22,9 +22,15 @@ SWAY_ZIGZAG = Family(
     summary="alternating sideways motion on a steady heading, with or without headway",
     settings=(
         Setting(name="duration_s", meaning="length of one run, best a whole number of periods", low=1e-3, high=1e5),
-        Setting(name="sway_mps", meaning="largest sway speed; the first push is to starboard", low=-20, high=20),
-        Setting(name="period_s", meaning="time of one full swing", low=1e-2, high=1e5),
-        Setting(name="speed_mps", meaning="surge speed", default=0.0, low=-50, high=50),
+        Setting(
+            name="sway_mps",
+            meaning="largest sway speed; the first push is to starboard",
+            low=-20,
+            high=20,
+            searched="sway",
+        ),
+        Setting(name="period_s", meaning="time of one full swing", low=1e-2, high=1e5, searched="time"),
+        Setting(name="speed_mps", meaning="surge speed", default=0.0, low=-50, high=50, searched="surge"),
     ),
     reference=_reference,
 )

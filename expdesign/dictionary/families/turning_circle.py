@@ -22,11 +22,15 @@ TURNING_CIRCLE = Family(
     summary="a turn to one side from a straight approach to a steady yaw rate, drifting outwards",
     settings=(
         Setting(name="duration_s", meaning="length of one run", low=1e-3, high=1e5),
-        Setting(name="speed_mps", meaning="approach speed", low=-50, high=50),
-        Setting(name="turn_speed_mps", meaning="surge speed in the turn", low=-50, high=50),
-        Setting(name="yaw_rate_radps", meaning="yaw rate in the turn, positive to starboard", low=-5, high=5),
-        Setting(name="entry_s", meaning="time from straight to steady turn", low=0, high=1e4),
-        Setting(name="sway_mps", meaning="outward sway, positive to port", default=0.0, low=-20, high=20),
+        Setting(name="speed_mps", meaning="approach speed", low=-50, high=50, searched="surge"),
+        Setting(name="turn_speed_mps", meaning="surge speed in the turn", low=-50, high=50, searched="surge"),
+        Setting(
+            name="yaw_rate_radps", meaning="yaw rate in the turn, positive to starboard", low=-5, high=5, searched="yaw"
+        ),
+        Setting(name="entry_s", meaning="time from straight to steady turn", low=0, high=1e4, searched="time"),
+        Setting(
+            name="sway_mps", meaning="outward sway, positive to port", default=0.0, low=-20, high=20, searched="sway"
+        ),
     ),
     reference=_reference,
 )

@@ -1,0 +1,69 @@
+"""Steady states: commands that hold a velocity, and what they leave over."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from expdesign.errors import InputError
+from expdesign.values import Array
+from expdesign.vessel import NUMPY, Vessel, allocate, direct_terms, required_force
+
+STEADY = 1e-6
+"""Share of its speed that a vessel may lose or gain per sample where a state counts as held."""
+STARTS = (0.05, 0.4, 0.9)
+"""Shares of full thrust that the search for commands of a direct model starts from."""
+
+
+def trim(vessel: Vessel, velocity: Array) -> Array:
+    """Commands (..., m) that hold a velocity (..., 3) through calm water, as far as the actuators can."""
+    if direct_terms(vessel.model):
+        flat = velocity.reshape(-1, 3)
+        return np.array([_direct_trim(vessel, row) for row in flat]).reshape(*velocity.shape[:-1], -1)
+    force = required_force(vessel.model, velocity, np.zeros(3))
+    return np.asarray(allocate(vessel.actuators, force[..., None, :], sample_time_s=vessel.sample_time_s)[..., 0, :])
+
+
+def drift(vessel: Vessel, velocity: Array, inputs: Array) -> Array:
+    """Acceleration (..., 3) at a velocity (..., 3) through calm water under given commands (..., m)."""
+    motion, held = np.moveaxis(velocity, -1, 0), np.moveaxis(inputs, -1, 0)
+    parts = vessel.model.accelerations(motion, motion[:2], held, NUMPY)
+    return np.stack(np.broadcast_arrays(*parts), axis=-1)
+
+
+def lost(vessel: Vessel, velocity: Array, inputs: Array) -> Array:
+    """(...) share of its speed that the vessel loses or gains per sample; `STEADY` at most where the state is held."""
+    change = np.abs(drift(vessel, velocity, inputs)).max(axis=-1) * vessel.sample_time_s
+    return np.asarray(change / np.maximum(1e-9, np.abs(velocity).max(axis=-1)))
+
+
+def hold(vessel: Vessel, velocity: Array) -> Array:
+    """Commands (m,) that hold a velocity (3,) through calm water.
+
+    Raises:
+        InputError: the actuators cannot.
+    """
+    inputs = trim(vessel, velocity)
+    if lost(vessel, velocity, inputs) > STEADY:
+        raise InputError(
+            f"the actuators cannot hold its entry state u = {velocity[0]:g} m/s, v = {velocity[1] + 0.0:g} m/s, "
+            f"r = {velocity[2] + 0.0:g} rad/s"
+        )
+    return inputs
+
+
+def _direct_trim(vessel: Vessel, velocity: Array) -> Array:
+    """Least accelerations within limits, by commands as small as do it, for a model that reads its actuators."""
+    scale = np.array(
+        [max(abs(x.low), abs(x.high)) if np.isfinite([x.low, x.high]).all() else 1.0 for x in vessel.limits]
+    )
+    low, high = (np.array([getattr(x, side) for x in vessel.limits]) / scale for side in ("low", "high"))
+    free = np.maximum(np.abs(drift(vessel, velocity, 0 * scale)).max(), 1e-12)
+
+    def excess(share: Array) -> Array:
+        return np.r_[drift(vessel, velocity, share * scale) / free, 1e-9 * share]
+
+    ahead = np.array([name.startswith(("n", "tau_x")) for name in vessel.model.inputs])
+    tries = [np.clip(start * np.sign(velocity[0]) * ahead, low + 1e-9, high - 1e-9) for start in STARTS]
+    found = [least_squares(excess, start, bounds=(low, high), xtol=1e-15, ftol=1e-15, gtol=1e-15) for start in tries]
+    return np.asarray(min(found, key=lambda item: float(item.cost)).x * scale)
