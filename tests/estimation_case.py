@@ -7,7 +7,7 @@ import numpy as np
 
 from expdesign.scenario import load_vessel
 from expdesign.signals import Batch, Record
-from expdesign.simulation import Weather, simulate_ensemble
+from expdesign.simulation import Environment, simulate_ensemble
 from expdesign.vessel import Sensors, Vessel
 
 ROOT = Path(__file__).parent.parent
@@ -33,7 +33,7 @@ def measured(
     vessel: Vessel,
     inputs: np.ndarray,
     *,
-    weather: Weather | None = None,
+    weather: Environment | None = None,
     seed: int = 0,
     velocity=(1.7, 0.7, 0.0),
     **kwargs,
@@ -41,7 +41,7 @@ def measured(
     """One trial, by Euler's map unless told otherwise."""
     rng = np.random.default_rng(seed)
     ensemble = simulate_ensemble(
-        vessel, inputs, runs=1, weather=weather or Weather(), rng=rng, velocity=velocity, **kwargs
+        vessel, inputs, runs=1, environment=weather or Environment(), rng=rng, velocity=velocity, **kwargs
     )
     return ensemble.batch(0)
 

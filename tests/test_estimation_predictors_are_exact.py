@@ -12,7 +12,7 @@ from expdesign.estimation.methods import METHODS, Settings, estimate
 from expdesign.estimation.predictors import build_layout, build_regression
 from expdesign.estimation.solution import Weighting
 from expdesign.signals import Batch
-from expdesign.simulation import Weather
+from expdesign.simulation import Environment, Variation
 from expdesign.vessel import Term
 
 TRUTH = dict(zip(TRUE.model.names, TRUE.model.parameters.tolist(), strict=True))
@@ -56,7 +56,7 @@ def test_calm_noise_free_data_give_the_truth(method: str) -> None:
 
 @pytest.mark.parametrize("mean", ["complete", "batch"])
 def test_a_steady_current_is_removed_exactly_and_read_out(mean: str) -> None:
-    weather = Weather(current_to=CURRENT)
+    weather = Environment(current_to=CURRENT)
     batches = [calm_trial(seed, samples=900, weather=weather) for seed in (4, 5)]
     found = estimate(
         record(*batches), NOMINAL, method="iv-augmented", settings=Settings(weighting=Weighting(mean=mean))
@@ -67,7 +67,7 @@ def test_a_steady_current_is_removed_exactly_and_read_out(mean: str) -> None:
 
 def test_batches_excited_the_other_way_round_flip_the_signs_of_nuisance_terms() -> None:
     """(5.37): with the ship sailing astern and to port in one batch, moduli there are minus signs."""
-    weather = Weather(current_to=CURRENT)
+    weather = Environment(current_to=CURRENT)
     ahead = calm_trial(6, samples=900, weather=weather)
     inputs = commands(900, np.random.default_rng(7)) * [-1, 1, -1, 1]
     astern = measured(QUIET, inputs, weather=weather, velocity=(-1.7, -0.7, 0.0))
@@ -140,7 +140,12 @@ def test_a_mirrored_ship_gives_mirrored_parameters(method: str) -> None:
         parameters=np.append(NOMINAL.parameters, 0.0),
         parameter_std=np.append(NOMINAL.parameter_std, 0.0),
     )
-    weather = Weather(current_to=CURRENT, wind_to=np.ones(2), current_std_mps=0.03, wind_std_mps=0.03)
+    weather = Environment(
+        current_to=CURRENT,
+        wind_to=np.ones(2),
+        current_variation=Variation(std_mps=0.03),
+        wind_variation=Variation(std_mps=0.03),
+    )
     batch = measured(TRUE, commands(1500, np.random.default_rng(13)), weather=weather)
     flipped = replace(
         batch,

@@ -13,7 +13,7 @@ from expdesign.estimation.methods import Settings, estimate
 from expdesign.estimation.physical import PhysicalModel, from_physical, to_physical
 from expdesign.estimation.replay import Integration, simulate_batch
 from expdesign.signals import Commands
-from expdesign.simulation import CALM, Environment, Weather, simulate, simulate_ensemble
+from expdesign.simulation import CALM, Environment, Variation, simulate, simulate_ensemble
 
 
 def test_fit_is_hundred_zero_negative_and_undefined_where_it_should_be() -> None:
@@ -94,9 +94,9 @@ def test_many_trials_at_once_are_single_trials() -> None:
     rng = np.random.default_rng(4)
     inputs = np.stack([commands(80, rng) for _ in range(3)], axis=1)
     parameters = TRUE.model.parameters * (1 + 0.1 * rng.normal(size=(3, len(TRUE.model.terms))))
-    weather = Weather(current_to=CURRENT, wind_to=np.array([3.0, -2.0]))
+    weather = Environment(current_to=CURRENT, wind_to=np.array([3.0, -2.0]))
     many = simulate_ensemble(
-        QUIET, inputs, runs=3, weather=weather, rng=rng, velocity=(1.0, 0.2, 0.0), parameters=parameters
+        QUIET, inputs, runs=3, environment=weather, rng=rng, velocity=(1.0, 0.2, 0.0), parameters=parameters
     )
     for run in range(3):
         truth = replace(QUIET, model=TRUE.model.with_parameters(parameters[run]))
@@ -113,7 +113,14 @@ def test_many_trials_at_once_are_single_trials() -> None:
 def test_noise_of_many_trials_has_the_stated_spread() -> None:
     rng = np.random.default_rng(5)
     inputs = commands(600, rng)
-    many = simulate_ensemble(TRUE, inputs, runs=50, weather=Weather(wind_std_mps=0.5), rng=rng, velocity=(1.7, 0.7, 0))
+    many = simulate_ensemble(
+        TRUE,
+        inputs,
+        runs=50,
+        environment=Environment(wind_variation=Variation(std_mps=0.5)),
+        rng=rng,
+        velocity=(1.7, 0.7, 0),
+    )
     count = many.velocity[..., 0].size
     for noise, std in (
         (many.measured_velocity - many.velocity, [TRUE.sensors.velocity_mps] * 2 + [TRUE.sensors.yaw_rate_radps]),

@@ -9,8 +9,7 @@ from vessel_files import KVLCC2, write_vessel
 
 from expdesign.errors import InputError
 from expdesign.export import vessel_toml
-from expdesign.export.vessel_file import LIMIT_KEYS
-from expdesign.scenario import load_vessel, vessel_tables
+from expdesign.scenario import load_vessel
 from expdesign.vessel import Vessel
 
 FILES = sorted((Path(__file__).parents[1] / "scenarios" / "vessels").glob("*.toml"))
@@ -64,7 +63,3 @@ def test_a_sample_time_of_the_models_own_cannot_be_written() -> None:
     vessel = load_vessel(FILES[0])
     with pytest.raises(InputError, match="expected the same in a vessel file"):
         vessel_toml(replace(vessel, sample_time_s=0.3))
-
-
-def test_keys_are_those_that_are_read() -> None:
-    assert LIMIT_KEYS == vessel_tables.LIMIT_KEYS

@@ -59,7 +59,7 @@ def build_primitive(vessel: Vessel, spec: PrimitiveSpec) -> Primitive:
         settings=spec.settings,
         commands=commands,
         entry_inputs=found.inputs,
-        trajectory=simulate(vessel, commands, velocity=found.velocity),
+        trajectory=simulate(vessel, commands, velocity=found.velocity, standing=found.inputs),
     )
 
 
@@ -75,7 +75,7 @@ def excitation(vessel: Vessel, spec: PrimitiveSpec) -> Excitation:
         length_s = spec.settings["duration_s"]
         raise InputError(f"duration_s is {length_s:g}, expected at least two samples of {vessel.sample_time_s:g} s")
     if kind.orders is not None:
-        wished = kind.orders(vessel, spec)
+        wished = wished_commands(vessel, spec)
         values = within_limits(
             vessel.actuators, wished.commands, sample_time_s=vessel.sample_time_s, before=wished.inputs
         )
@@ -85,6 +85,17 @@ def excitation(vessel: Vessel, spec: PrimitiveSpec) -> Excitation:
     if lost(vessel, velocities[0], inputs) > STEADY:
         raise InputError(_not_held(vessel, velocities[0]))
     return Excitation(velocity=velocities[0], inputs=inputs, commands=values)
+
+
+def wished_commands(vessel: Vessel, spec: PrimitiveSpec) -> Excitation:
+    """What a family with orders asks for, before limits and rates.
+
+    Raises:
+        InputError: the vessel cannot do it.
+    """
+    orders = family(spec.family).orders
+    assert orders is not None
+    return orders(vessel, spec)
 
 
 def wished_velocities(vessel: Vessel, spec: PrimitiveSpec) -> Array:

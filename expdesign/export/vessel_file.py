@@ -8,17 +8,21 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 
 from expdesign.errors import InputError
-from expdesign.vessel import KINDS, STRUCTURES, Actuator, Sensors, Vessel, VesselModel
-
-LIMIT_KEYS = {
-    "n": ("speed_min_rps", "speed_max_rps", "speed_rate_rps2"),
-    "a": ("angle_min_rad", "angle_max_rad", "angle_rate_radps"),
-    "rudder": ("angle_min_rad", "angle_max_rad", "angle_rate_radps"),
-    "tau_x": ("x_min", "x_max", "x_rate"),
-    "tau_y": ("y_min", "y_max", "y_rate"),
-    "tau_psi": ("psi_min", "psi_max", "psi_rate"),
-}
-"""Signal stem -> keys of its lower limit, upper limit and rate."""
+from expdesign.values import Array
+from expdesign.vessel import (
+    CENTRAL,
+    KINDS,
+    SENSORS,
+    STRUCTURES,
+    Actuator,
+    Environment,
+    Sensors,
+    Variation,
+    Vessel,
+    VesselModel,
+    limit_keys,
+    response_keys,
+)
 
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -45,7 +49,8 @@ def vessel_toml(vessel: Vessel, *, comments: Sequence[str] = ()) -> str:
         lines += ["", *_table("[[actuators]]", _actuator(actuator))]
     lines += _model(vessel.model)
     if vessel.sensors != Sensors():
-        lines += ["", *_table("[sensors]", vars(vessel.sensors))]
+        lines += ["", *_table("[sensors]", _sensors(vessel.sensors))]
+    lines += _environment(vessel.environment)
     return "\n".join(lines) + "\n"
 
 
@@ -55,10 +60,48 @@ def _actuator(actuator: Actuator) -> dict[str, str | float]:
         "forward_m": actuator.forward_m,
         "starboard_m": actuator.starboard_m,
     }
-    for stem, limit in zip(KINDS[actuator.kind], actuator.limits, strict=True):
-        values = zip(LIMIT_KEYS[stem], (limit.low, limit.high, limit.rate), strict=True)
+    for stem, limit, response in zip(KINDS[actuator.kind], actuator.limits, actuator.responses, strict=True):
+        values = zip(limit_keys(stem), (limit.low, limit.high, limit.rate), strict=True)
         entries |= {key: value for key, value in values if math.isfinite(value)}
+        values = zip(response_keys(stem), vars(response).values(), strict=True)
+        entries |= {key: value for key, value in values if value}
     return entries
+
+
+def _sensors(sensors: Sensors) -> dict[str, str | float]:
+    """What is not as it is when nothing is said."""
+    usual = Sensors()
+    entries = {
+        name: value for name, value in vars(sensors).items() if name not in SENSORS and value != getattr(usual, name)
+    }
+    for sensor in SENSORS:
+        mounting = vars(getattr(sensors, sensor))
+        entries |= {f"{sensor}_{key}": value for key, value in mounting.items() if value != getattr(CENTRAL, key)}
+    return entries
+
+
+def _environment(environment: Environment) -> Iterator[str]:
+    flows = {
+        "current_to": (environment.current_to, environment.current_std_mps, environment.current_variation),
+        "wind_to": (environment.wind_to, environment.wind_std_mps, environment.wind_variation),
+    }
+    rows = {name: _flow(*flow) for name, flow in flows.items()}
+    known = {name: row for name, row in rows.items() if any(row.values())}
+    if known:
+        yield from ("", "[environment]")
+    for name, row in known.items():
+        yield f"{name} = {{{', '.join(f'{key} = {_value(value)}' for key, value in row.items())}}}"
+
+
+def _flow(to: Array, std_mps: float, variation: Variation) -> dict[str, float]:
+    north, east = to.tolist()
+    certain = {"north_mps": north, "east_mps": east}
+    rest = {
+        "std_mps": std_mps,
+        "variation_std_mps": variation.std_mps,
+        "correlation_s": variation.correlation_s,
+    }
+    return certain | {key: value for key, value in rest.items() if value}
 
 
 def _model(model: VesselModel) -> Iterator[str]:

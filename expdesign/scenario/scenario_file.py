@@ -15,6 +15,7 @@ from expdesign.scenario.area_file import load_area
 from expdesign.scenario.area_tables import Latitude, Longitude
 from expdesign.scenario.berth import berth_problem
 from expdesign.scenario.dictionary_file import NAME, NAME_RULE, load_dictionary
+from expdesign.scenario.environment_table import EnvironmentTable, build_environment
 from expdesign.scenario.tables import (
     Entry,
     NonNegative,
@@ -28,14 +29,11 @@ from expdesign.scenario.tables import (
 )
 from expdesign.scenario.values import DesignSettings, Scenario
 from expdesign.scenario.vessel_file import load_vessel
-from expdesign.simulation.environment import Environment
 from expdesign.values import Array
 from expdesign.vessel import Vessel
 
 Degrees = Annotated[float, Field(ge=-360, le=360)]
 POSITION_KEYS = ("lat_deg", "lon_deg", "north_m", "east_m")
-WIND_LIMIT_MPS = 100.0
-CURRENT_LIMIT_MPS = 15.0
 
 
 class ScenarioTable(Table):
@@ -64,29 +62,6 @@ class PoseTable(Table):
     north_m: Number | None = None
     east_m: Number | None = None
     heading_deg: Degrees = Field(description="the heading [deg], clockwise from north")
-
-
-class CurrentTable(Table):
-    """A velocity to which the water moves."""
-
-    north_mps: float = Field(description="the velocity to north [m/s]", ge=-CURRENT_LIMIT_MPS, le=CURRENT_LIMIT_MPS)
-    east_mps: float = Field(description="the velocity to east [m/s]", ge=-CURRENT_LIMIT_MPS, le=CURRENT_LIMIT_MPS)
-    std_mps: NonNegative = 0.0
-
-
-class WindTable(Table):
-    """A velocity to which the air moves."""
-
-    north_mps: float = Field(description="the velocity to north [m/s]", ge=-WIND_LIMIT_MPS, le=WIND_LIMIT_MPS)
-    east_mps: float = Field(description="the velocity to east [m/s]", ge=-WIND_LIMIT_MPS, le=WIND_LIMIT_MPS)
-    std_mps: NonNegative = 0.0
-
-
-class EnvironmentTable(Table):
-    """`[environment]`."""
-
-    current_to: CurrentTable = CurrentTable(north_mps=0.0, east_mps=0.0)
-    wind_to: WindTable = WindTable(north_mps=0.0, east_mps=0.0)
 
 
 class PlanTable(Table):
@@ -142,7 +117,7 @@ def load_scenario(path: Path | str) -> Scenario:
         area=area,
         design=_design(file.design, vessel, entry.at("design")),
         plan=plan,
-        environment=_environment(file.environment),
+        environment=build_environment(file.environment),
         **poses,
     )
 
@@ -190,13 +165,3 @@ def _pose(place: PoseTable, area: SeaArea) -> Array:
         return np.array([place.north_m, place.east_m, math.radians(place.heading_deg)], dtype=float)
     north_east = area.frame.to_metres(np.array([place.lat_deg, place.lon_deg], dtype=float))
     return np.array([*north_east, math.radians(place.heading_deg)])
-
-
-def _environment(table: EnvironmentTable) -> Environment:
-    current, wind = table.current_to, table.wind_to
-    return Environment(
-        current_to=np.array([current.north_mps, current.east_mps]),
-        wind_to=np.array([wind.north_mps, wind.east_mps]),
-        current_std_mps=current.std_mps,
-        wind_std_mps=wind.std_mps,
-    )

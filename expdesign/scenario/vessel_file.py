@@ -4,32 +4,53 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from expdesign.errors import InputError
+from expdesign.scenario.environment_table import build_environment
 from expdesign.scenario.tables import Entry, check_table, offer, read_toml, shown
 from expdesign.scenario.vessel_tables import (
     ACTUATOR_TABLES,
-    LIMIT_KEYS,
+    SAME_AS,
     ActuatorTable,
     ModelTable,
     ParticularsTable,
+    SensorsTable,
     TermTable,
     VesselTable,
 )
-from expdesign.vessel import KINDS, STRUCTURES, Actuator, Limit, Sensors, Term, Vessel, VesselModel, structure_terms
+from expdesign.vessel import (
+    CALM,
+    KINDS,
+    SENSORS,
+    STRUCTURES,
+    Actuator,
+    Limit,
+    Mounting,
+    Response,
+    Sensors,
+    Term,
+    Vessel,
+    VesselModel,
+    limit_keys,
+    response_keys,
+    structure_terms,
+)
 from expdesign.vessel.expressions import parse_expression
 from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS
+
+MOUNTING_KEYS = tuple(field.name for field in fields(Mounting))
 
 
 def load_vessel(path: Path | str) -> Vessel:
     """Read a vessel file.
 
     Args:
-        path: a TOML file with `[vessel]`, `[[actuators]]`, `[model]` and optionally `[sensors]`.
+        path: a TOML file with `[vessel]`, `[[actuators]]`, `[model]` and optionally `[sensors]` and `[environment]`.
 
     Raises:
         FileError: unreadable, or something in it is wrong, missing or unknown.
@@ -38,7 +59,20 @@ def load_vessel(path: Path | str) -> Vessel:
     file = check_table(VesselTable, read_toml(entry.path), entry)
     actuators = _actuators(file.actuators, file.vessel, entry.at("actuators"))
     model = _model(file.model, actuators, file.vessel.sample_time_s, entry.at("model"))
-    return Vessel(**file.vessel.model_dump(), model=model, sensors=Sensors(**file.sensors.model_dump()))
+    return Vessel(
+        **file.vessel.model_dump(),
+        model=model,
+        sensors=_sensors(file.sensors),
+        environment=CALM if file.environment is None else build_environment(file.environment),
+    )
+
+
+def _sensors(table: SensorsTable) -> Sensors:
+    flat: dict[str, Any] = table.model_dump()
+    for sensor in SENSORS:
+        keys = {key: f"{sensor}_{key}" for key in MOUNTING_KEYS if f"{sensor}_{key}" in flat}
+        flat[sensor] = Mounting(**{key: flat.pop(name) for key, name in keys.items()})
+    return Sensors(**flat)
 
 
 def _actuators(rows: list[dict[str, Any]], ship: ParticularsTable, entry: Entry) -> tuple[Actuator, ...]:
@@ -47,15 +81,17 @@ def _actuators(rows: list[dict[str, Any]], ship: ParticularsTable, entry: Entry)
     for index, row in enumerate(rows, start=1):
         table = _actuator_table(row, entry.item(index))
         _check_place(table, ship, entry.item(index))
-        number = 1 + sum(KINDS[other.kind][0] == KINDS[table.kind][0] for other in actuators)
-        limits = tuple(_limit(table, LIMIT_KEYS[stem], entry.item(index)) for stem in KINDS[table.kind])
+        kind = SAME_AS.get(table.kind, table.kind)
+        number = 1 + sum(KINDS[other.kind][0] == KINDS[kind][0] for other in actuators)
+        limits = tuple(_limit(table, limit_keys(stem), entry.item(index)) for stem in KINDS[kind])
         actuators.append(
             Actuator(
-                kind=table.kind,
+                kind=kind,
                 number=number,
                 forward_m=table.forward_m,
                 starboard_m=table.starboard_m,
                 limits=limits,
+                responses=tuple(_response(table, stem) for stem in KINDS[kind]),
             )
         )
     _check_force_alone([actuator.kind for actuator in actuators], entry)
@@ -95,6 +131,11 @@ def _limit(table: ActuatorTable, keys: tuple[str, str, str], entry: Entry) -> Li
         high=math.inf if high is None else high,
         rate=math.inf if rate is None else rate,
     )
+
+
+def _response(table: ActuatorTable, stem: str) -> Response:
+    lag, delay, deadband, offset = (getattr(table, key, 0.0) for key in response_keys(stem))
+    return Response(lag_s=lag, delay_s=delay, deadband=deadband, offset=offset)
 
 
 def _model(table: ModelTable, actuators: tuple[Actuator, ...], sample_time_s: float, entry: Entry) -> VesselModel:

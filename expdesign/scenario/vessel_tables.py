@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
+from expdesign.scenario.environment_table import EnvironmentTable
 from expdesign.scenario.tables import NonNegative, Number, Positive, Table, Text
 from expdesign.vessel import STRUCTURES
 
@@ -38,6 +39,9 @@ class PropellerTable(ActuatorTable):
     speed_min_rps: Number = Field(description="the lowest propeller speed [rps], negative for astern")
     speed_max_rps: Number = Field(description="the highest propeller speed [rps]")
     speed_rate_rps2: Positive | None = None
+    speed_lag_s: NonNegative = 0.0
+    speed_delay_s: NonNegative = 0.0
+    speed_deadband_rps: NonNegative = 0.0
 
 
 class AzimuthTable(PropellerTable):
@@ -46,6 +50,17 @@ class AzimuthTable(PropellerTable):
     angle_min_rad: TwoTurns | None = None
     angle_max_rad: TwoTurns | None = None
     angle_rate_radps: Positive | None = None
+    angle_lag_s: NonNegative = 0.0
+    angle_delay_s: NonNegative = 0.0
+    angle_deadband_rad: NonNegative = 0.0
+    angle_offset_rad: HalfTurn = 0.0
+
+
+class PoddedTable(AzimuthTable):
+    """A podded drive: an azimuth thruster that turns only so far."""
+
+    angle_min_rad: TwoTurns = Field(description="the lowest angle [rad]")
+    angle_max_rad: TwoTurns = Field(description="the highest angle [rad]")
 
 
 class RudderTable(ActuatorTable):
@@ -54,6 +69,10 @@ class RudderTable(ActuatorTable):
     angle_min_rad: HalfTurn = Field(description="the lowest rudder angle [rad]")
     angle_max_rad: HalfTurn = Field(description="the highest rudder angle [rad]")
     angle_rate_radps: Positive | None = None
+    angle_lag_s: NonNegative = 0.0
+    angle_delay_s: NonNegative = 0.0
+    angle_deadband_rad: NonNegative = 0.0
+    angle_offset_rad: HalfTurn = 0.0
 
 
 class ForceTable(ActuatorTable):
@@ -62,12 +81,21 @@ class ForceTable(ActuatorTable):
     x_min: Number = Field(description="the lowest tau_x")
     x_max: Number = Field(description="the highest tau_x")
     x_rate: Positive | None = None
+    x_lag_s: NonNegative = 0.0
+    x_delay_s: NonNegative = 0.0
+    x_deadband: NonNegative = 0.0
     y_min: Number = Field(description="the lowest tau_y")
     y_max: Number = Field(description="the highest tau_y")
     y_rate: Positive | None = None
+    y_lag_s: NonNegative = 0.0
+    y_delay_s: NonNegative = 0.0
+    y_deadband: NonNegative = 0.0
     psi_min: Number = Field(description="the lowest tau_psi")
     psi_max: Number = Field(description="the highest tau_psi")
     psi_rate: Positive | None = None
+    psi_lag_s: NonNegative = 0.0
+    psi_delay_s: NonNegative = 0.0
+    psi_deadband: NonNegative = 0.0
 
 
 class TermTable(Table):
@@ -89,13 +117,33 @@ class ModelTable(Table):
 
 
 class SensorsTable(Table):
-    """`[sensors]`: standard deviations per sample."""
+    """`[sensors]`: standard deviations per sample, faults, and by sensor its place, delay and interval."""
 
     position_m: NonNegative = 0.0
     heading_rad: NonNegative = 0.0
     velocity_mps: NonNegative = 0.0
     yaw_rate_radps: NonNegative = 0.0
     wind_mps: NonNegative = 0.0
+    wind_angle_rad: NonNegative = 0.0
+    heading_bias_rad: HalfTurn = 0.0
+    yaw_rate_scale: Positive = 1.0
+    wind_sensor: Literal["cartesian", "vane"] = "cartesian"
+    position_forward_m: Number = 0.0
+    position_starboard_m: Number = 0.0
+    position_delay_s: NonNegative = 0.0
+    position_interval_s: NonNegative = 0.0
+    heading_delay_s: NonNegative = 0.0
+    heading_interval_s: NonNegative = 0.0
+    velocity_forward_m: Number = 0.0
+    velocity_starboard_m: Number = 0.0
+    velocity_delay_s: NonNegative = 0.0
+    velocity_interval_s: NonNegative = 0.0
+    yaw_rate_delay_s: NonNegative = 0.0
+    yaw_rate_interval_s: NonNegative = 0.0
+    wind_forward_m: Number = 0.0
+    wind_starboard_m: Number = 0.0
+    wind_delay_s: NonNegative = 0.0
+    wind_interval_s: NonNegative = 0.0
 
 
 class VesselTable(Table):
@@ -105,6 +153,7 @@ class VesselTable(Table):
     actuators: list[dict[str, Any]] = Field(min_length=1, description="at least one table [[actuators]]")
     model: ModelTable = Field(description="a table [model]")
     sensors: SensorsTable = SensorsTable()
+    environment: EnvironmentTable | None = None
 
 
 ACTUATOR_TABLES: dict[str, type[ActuatorTable]] = {
@@ -113,15 +162,9 @@ ACTUATOR_TABLES: dict[str, type[ActuatorTable]] = {
     "propeller": PropellerTable,
     "rudder": RudderTable,
     "force": ForceTable,
+    "podded": PoddedTable,
 }
 """Kind of actuator -> its table."""
 
-LIMIT_KEYS = {
-    "n": ("speed_min_rps", "speed_max_rps", "speed_rate_rps2"),
-    "a": ("angle_min_rad", "angle_max_rad", "angle_rate_radps"),
-    "rudder": ("angle_min_rad", "angle_max_rad", "angle_rate_radps"),
-    "tau_x": ("x_min", "x_max", "x_rate"),
-    "tau_y": ("y_min", "y_max", "y_rate"),
-    "tau_psi": ("psi_min", "psi_max", "psi_rate"),
-}
-"""Signal stem -> keys of its lower limit, upper limit and rate."""
+SAME_AS = {"podded": "azimuth"}
+"""Kind in a file -> the kind it is a case of."""

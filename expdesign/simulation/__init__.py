@@ -1,30 +1,55 @@
 """Simulation: equations of motion, integrators, environment and sensors."""
 
-from expdesign.simulation.ensemble import Ensemble, Weather, simulate_ensemble
-from expdesign.simulation.environment import CALM, Environment
+from expdesign.simulation.actuation import (
+    SampleMap,
+    deliver,
+    delivered,
+    delivered_at_samples,
+    past_deadband,
+    sample_map,
+)
+from expdesign.simulation.ensemble import Ensemble, simulate_ensemble
+from expdesign.simulation.environment import (
+    CALM,
+    STEADY,
+    Environment,
+    Variation,
+    WeatherSeries,
+    draw_environment,
+    draw_weather,
+)
 from expdesign.simulation.helm import Approach, Helm, service_speed, steady_ahead
 from expdesign.simulation.helmsman import Conduct
 from expdesign.simulation.motion import euler_step, motion_rates, relative_velocity, rk4_step, to_body
 from expdesign.simulation.run import simulate, simulate_many
-from expdesign.simulation.sensors import draw_environment, measure
+from expdesign.simulation.sensors import measure
 from expdesign.simulation.standard_trials import initial_turn, pull_out, stopping, turning_circle, zigzag
 
 __all__ = [
     "CALM",
+    "STEADY",
     "Approach",
     "Conduct",
     "Ensemble",
     "Environment",
     "Helm",
-    "Weather",
+    "SampleMap",
+    "Variation",
+    "WeatherSeries",
+    "deliver",
+    "delivered",
+    "delivered_at_samples",
     "draw_environment",
+    "draw_weather",
     "euler_step",
     "initial_turn",
     "measure",
     "motion_rates",
+    "past_deadband",
     "pull_out",
     "relative_velocity",
     "rk4_step",
+    "sample_map",
     "service_speed",
     "simulate",
     "simulate_ensemble",

@@ -10,38 +10,23 @@ Source: F. Ljungberg, doctoral thesis, Linköping University, (3.18), (5.3), (5.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from expdesign.errors import InputError, ShapeError, UnknownName
+from expdesign.errors import InputError, ShapeError
 from expdesign.signals import Batch
-from expdesign.simulation.motion import State, euler_step, motion_rates, rk4_step, to_body
-from expdesign.values import Array, readonly, seal
-from expdesign.vessel import NUMPY, Vessel
+from expdesign.simulation.actuation import deliver
+from expdesign.simulation.environment import Environment, vary
+from expdesign.simulation.motion import integrator_step
+from expdesign.simulation.program import STATES, RatesProgram
+from expdesign.simulation.sensors import ROWS, noise_std, observe
+from expdesign.values import Array
+from expdesign.vessel import Vessel
 
-STEPS = {"euler": euler_step, "rk4": rk4_step}
-STRETCH = 250
+STRETCH = 64
 """Samples for which noise is drawn at once."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Weather:
-    """Current and wind of a trial: means in the n-frame and white variation from sample to sample.
-
-    Attributes:
-        current_to, wind_to: (2,) means, velocity to north/east [m/s].
-        current_std_mps, wind_std_mps: standard deviation of each component from sample to sample [m/s].
-    """
-
-    current_to: Array = field(default_factory=lambda: np.zeros(2))
-    wind_to: Array = field(default_factory=lambda: np.zeros(2))
-    current_std_mps: float = 0.0
-    wind_std_mps: float = 0.0
-
-    def __post_init__(self) -> None:
-        seal(self, current_to="2", wind_to="2")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -94,11 +79,12 @@ def simulate_ensemble(
     inputs: Array,
     *,
     runs: int,
-    weather: Weather,
+    environment: Environment,
     rng: np.random.Generator,
     pose: Array | tuple[float, ...] = (0.0, 0.0, 0.0),
     velocity: Array | tuple[float, ...] = (0.0, 0.0, 0.0),
     parameters: Array | None = None,
+    standing: Array | None = None,
     integrator: str = "euler",
     substeps: int = 1,
 ) -> Ensemble:
@@ -108,10 +94,11 @@ def simulate_ensemble(
         vessel: model, sample time and sensors.
         inputs: (k, runs, m) commands in the model's order, or (k, m) for all runs alike.
         runs: number of runs.
-        weather: means and variation of current and wind.
+        environment: forecast; every run draws its own means around it and its own variation.
         rng: all chance.
         pose, velocity: start, (3,) or (runs, 3).
         parameters: (runs, p) in the model's own form, or None for the model's.
+        standing: (m,) commands that stood before the first sample; None for those of the first sample.
         integrator: "euler", the map of discrete parameters (with one substep), or "rk4".
         substeps: integrator steps per sample; current and wind are held over a sample.
 
@@ -119,31 +106,30 @@ def simulate_ensemble(
         ShapeError: inputs that do not fit.
         UnknownName: no such integrator.
     """
-    if integrator not in STEPS:
-        raise UnknownName("integrator", integrator, known=STEPS)
+    step = integrator_step(integrator)
     commands = _commands(vessel, inputs, runs)
-    theta: Any = vessel.model.parameters if parameters is None else readonly(parameters).T
-    samples = len(commands)
-    states = np.empty((samples, 6, runs))
-    seen = np.empty((samples, 8, runs))
-    state = _start(pose, velocity, runs)
-    step_s = vessel.sample_time_s / substeps
+    standing = None if standing is None else np.asarray(standing, dtype=float).reshape(commands.shape[2], 1)
+    program = RatesProgram(vessel.model, runs=runs, own_inputs=commands.shape[1] > 1, parameters=parameters)
+    given = deliver(
+        vessel.responses,
+        commands.swapaxes(1, 2),
+        sample_time_s=vessel.sample_time_s,
+        substeps=substeps,
+        standing=standing,
+    )
+    step_s, state = vessel.sample_time_s / substeps, _start(pose, velocity, runs)
+    states, wind, noise = (np.empty((len(commands), rows, runs)) for rows in (STATES, 2, len(ROWS)))
     with np.errstate(over="ignore", invalid="ignore"):
-        for k, current, wind, noise in _chances(vessel, weather, samples, runs, rng):
-            states[k] = state
-            u_w, v_w = to_body(wind, state[2], NUMPY)
-            seen[k, :6] = state
-            seen[k, 6], seen[k, 7] = state[3] - u_w, state[4] - v_w
-            seen[k] += noise
-            held = tuple(commands[k].T)
-
-            def rates(x: State, held: Any = held, current: Array = current, wind: Array = wind) -> State:
-                return motion_rates(
-                    vessel.model, x, held, current_to=current, wind_to=wind, ops=NUMPY, parameters=theta
-                )
-
-            for _ in range(substeps):
-                state = STEPS[integrator](rates, state, step_s)
+        for first, sea in _stretches(vessel, environment, noise, wind, rng):
+            held = given[first : first + len(sea)]
+            program.hold(held.reshape(-1, *held.shape[2:]))
+            for k in range(len(sea)):
+                states[first + k] = state
+                program.sea[...] = sea[k]
+                for part in range(substeps):
+                    program.select(k * held.shape[1] + min(part, held.shape[1] - 1))
+                    (state,) = step(program.rates, (state,), step_s)
+    seen = observe(vessel.sensors, states, wind, noise, sample_time_s=vessel.sample_time_s)
     return Ensemble(
         sample_time_s=vessel.sample_time_s,
         input_names=vessel.model.inputs,
@@ -167,30 +153,36 @@ def _commands(vessel: Vessel, inputs: Array, runs: int) -> Array:
     return commands
 
 
-def _start(pose: Any, velocity: Any, runs: int) -> State:
-    columns = [np.broadcast_to(np.asarray(start, dtype=float), (runs, 3)).T for start in (pose, velocity)]
-    return tuple(row.copy() for rows in columns for row in rows)
+def _start(pose: Any, velocity: Any, runs: int) -> Array:
+    """(6, n)."""
+    return np.concatenate([np.broadcast_to(np.asarray(start, dtype=float), (runs, 3)).T for start in (pose, velocity)])
 
 
-def _chances(
-    vessel: Vessel, weather: Weather, samples: int, runs: int, rng: np.random.Generator
-) -> Iterator[tuple[int, Array, Array, Array]]:
-    """(sample, current (2, n), wind (2, n), sensor noise (8, n)) of every sample."""
-    s = vessel.sensors
-    spread = np.array(
-        [weather.current_std_mps] * 2
-        + [weather.wind_std_mps] * 2
-        + [s.position_m] * 2
-        + [s.heading_rad]
-        + [s.velocity_mps] * 2
-        + [s.yaw_rate_radps]
-        + [s.wind_mps] * 2
-    )
-    mean = np.concatenate([weather.current_to, weather.wind_to, np.zeros(8)])
+def _stretches(
+    vessel: Vessel, environment: Environment, noise: Array, wind: Array, rng: np.random.Generator
+) -> Iterator[tuple[int, Array]]:
+    """First sample and sea (k, 4, n) of stretch after stretch; sensor noise and wind are kept."""
+    samples, _, runs = noise.shape
+    spread = noise_std(vessel.sensors)[:, None]
+    mean = _means(environment, runs, rng)
+    variations = (environment.current_variation, environment.wind_variation)
+    before: list[Array | None] = [None, None]
     for first in range(0, samples, STRETCH):
         count = min(STRETCH, samples - first)
-        drawn = rng.standard_normal((count, 12, runs))
-        drawn *= spread[:, None]
-        drawn += mean[:, None]
-        for row in range(count):
-            yield first + row, drawn[row, :2], drawn[row, 2:4], drawn[row, 4:]
+        drawn = rng.standard_normal((count, 4 + len(ROWS), runs))
+        np.multiply(drawn[:, 4:], spread, out=noise[first : first + count])
+        sea = drawn[:, :4]
+        for index, variation in enumerate(variations):
+            rows = slice(2 * index, 2 * index + 2)
+            sea[:, rows] = vary(variation, sea[:, rows], sample_time_s=vessel.sample_time_s, before=before[index])
+            before[index] = sea[-1, rows].copy()
+        sea += mean
+        wind[first : first + count] = sea[:, 2:]
+        yield first, sea
+
+
+def _means(environment: Environment, runs: int, rng: np.random.Generator) -> Array:
+    """(4, n) current and wind that each run has on average."""
+    mean = np.concatenate([environment.current_to, environment.wind_to])[:, None]
+    spread = np.repeat([environment.current_std_mps, environment.wind_std_mps], 2)[:, None]
+    return mean + spread * rng.standard_normal((4, runs)) if spread.any() else np.tile(mean, runs)

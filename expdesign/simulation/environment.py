@@ -1,37 +1,102 @@
-"""Current and wind: constant means in the n-frame with a stated standard deviation."""
+"""Current and wind as a trial meets them: drawn around the forecast, steady or varying from sample to sample."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
+from expdesign.errors import InputError
 from expdesign.values import Array, seal
+from expdesign.vessel.environment import CALM, STEADY, Environment, Variation
+
+__all__ = [
+    "CALM",
+    "STEADY",
+    "Environment",
+    "Variation",
+    "WeatherSeries",
+    "draw_environment",
+    "draw_weather",
+    "vary",
+    "weather_rows",
+]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Environment:
-    """Forecast for the trial.
+class WeatherSeries:
+    """Current and wind at every sample, held until the next.
 
     Attributes:
-        current_to: (2,) mean current, velocity to north/east [m/s].
-        current_std_mps: standard deviation of each component [m/s].
-        wind_to: (2,) mean wind, velocity to north/east [m/s].
-        wind_std_mps: standard deviation of each component [m/s].
+        current_to, wind_to: (k, 2) velocity to north/east [m/s].
     """
 
-    current_to: Array = field(default_factory=lambda: np.zeros(2))
-    wind_to: Array = field(default_factory=lambda: np.zeros(2))
-    current_std_mps: float = 0.0
-    wind_std_mps: float = 0.0
+    current_to: Array
+    wind_to: Array
 
     def __post_init__(self) -> None:
-        seal(self, current_to="2", wind_to="2")
-
-    @property
-    def isotropic(self) -> bool:
-        """True when no mean current or wind singles out a heading."""
-        return not (self.current_to.any() or self.wind_to.any())
+        seal(self, current_to="k 2", wind_to="k 2")
 
 
-CALM = Environment()
+def draw_environment(forecast: Environment, rng: np.random.Generator) -> Environment:
+    """One trial's mean current and wind, drawn around the forecast; they vary as it says."""
+    return Environment(
+        current_to=forecast.current_to + forecast.current_std_mps * rng.standard_normal(2),
+        wind_to=forecast.wind_to + forecast.wind_std_mps * rng.standard_normal(2),
+        current_variation=forecast.current_variation,
+        wind_variation=forecast.wind_variation,
+    )
+
+
+def draw_weather(
+    environment: Environment, samples: int, *, sample_time_s: float, rng: np.random.Generator
+) -> WeatherSeries:
+    """What happens sample by sample around an environment's means."""
+    current, wind = (
+        mean + vary(variation, rng.standard_normal((samples, 2)), sample_time_s=sample_time_s)
+        for mean, variation in (
+            (environment.current_to, environment.current_variation),
+            (environment.wind_to, environment.wind_variation),
+        )
+    )
+    return WeatherSeries(current_to=current, wind_to=wind)
+
+
+def vary(variation: Variation, normal: Array, *, sample_time_s: float, before: Array | None = None) -> Array:
+    """A Gauss-Markov process sampled exactly, stationary from the first sample.
+
+    x(0) = s w(0),  x(k+1) = a x(k) + s sqrt(1 - a**2) w(k+1),  a = exp(-sample time / correlation time)
+
+    Args:
+        variation: s and correlation time.
+        normal: (k, ...) independent standard normal numbers w.
+        sample_time_s: time between samples [s].
+        before: (...) the process one sample earlier, where it goes on.
+
+    Returns:
+        (k, ...) [m/s].
+    """
+    keep = variation.memory(sample_time_s)
+    values = np.asarray(variation.std_mps * normal)
+    if keep == 0.0:
+        return values
+    if before is not None:
+        values[0] = keep * before + np.sqrt(1.0 - keep**2) * values[0]
+    values[1:] *= np.sqrt(1.0 - keep**2)
+    for k in range(1, len(values)):
+        values[k] += keep * values[k - 1]
+    return values
+
+
+def weather_rows(environment: Environment | WeatherSeries, samples: int) -> tuple[Array, Array]:
+    """(k, 2) current and wind of every sample; the means of an environment.
+
+    Raises:
+        InputError: weather of another number of samples.
+    """
+    if isinstance(environment, Environment):
+        shape = (samples, 2)
+        return np.broadcast_to(environment.current_to, shape), np.broadcast_to(environment.wind_to, shape)
+    if len(environment.current_to) != samples:
+        raise InputError(f"weather has {len(environment.current_to)} samples, expected {samples} as of the commands")
+    return environment.current_to, environment.wind_to

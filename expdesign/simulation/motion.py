@@ -11,10 +11,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from expdesign.errors import UnknownName
 from expdesign.vessel import NUMPY, Operators, VesselModel
 
 State = tuple[Any, ...]
 Rates = Callable[[State], State]
+Step = Callable[[Rates, State, Any], State]
 
 
 def to_body(vector_n: Any, heading_rad: Any, ops: Operators) -> tuple[Any, Any]:
@@ -66,3 +68,17 @@ def rk4_step(rates: Rates, state: State, step_s: Any) -> State:
     return tuple(
         x + step_s / 6.0 * (a + 2.0 * b + 2.0 * c + d) for x, a, b, c, d in zip(state, k1, k2, k3, k4, strict=True)
     )
+
+
+STEPS: dict[str, Step] = {"rk4": rk4_step, "euler": euler_step}
+
+
+def integrator_step(name: str) -> Step:
+    """A step by the integrator's name.
+
+    Raises:
+        UnknownName: there is none.
+    """
+    if name not in STEPS:
+        raise UnknownName("integrator", name, known=STEPS)
+    return STEPS[name]

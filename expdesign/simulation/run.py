@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from expdesign.errors import Diverged, InputError, UnknownName
+from expdesign.errors import Diverged, InputError
 from expdesign.signals import Commands, Trajectory
-from expdesign.simulation.environment import CALM, Environment
-from expdesign.simulation.motion import State, euler_step, motion_rates, rk4_step
+from expdesign.simulation.actuation import deliver
+from expdesign.simulation.environment import CALM, Environment, WeatherSeries, weather_rows
+from expdesign.simulation.motion import State, integrator_step, motion_rates, rk4_step
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, SCALAR, Vessel
 
-STEPS = {"rk4": rk4_step, "euler": euler_step}
 SUBSTEPS = 2
 """Runge-Kutta steps per sample; a step is at most a fifth of the fastest time constant of the reference vessels."""
 LARGEST_SPEED = 1e3
@@ -27,17 +27,20 @@ def simulate(
     *,
     pose: Array | tuple[float, float, float] = (0.0, 0.0, 0.0),
     velocity: Array | tuple[float, float, float] = (0.0, 0.0, 0.0),
-    environment: Environment = CALM,
+    environment: Environment | WeatherSeries = CALM,
+    standing: Array | None = None,
     substeps: int = SUBSTEPS,
     integrator: str = "rk4",
 ) -> Trajectory:
-    """Run the commands from a pose and a velocity over ground under the environment's mean current and wind.
+    """Run the commands from a pose and a velocity over ground under an environment's means or a series of weather.
 
     Args:
         vessel: whose model is integrated.
         commands: k samples, held.
         pose, velocity: (3,) at the first sample.
-        environment: its means act as steady n-frame current and wind.
+        environment: its means act as steady n-frame current and wind; a series acts sample by sample.
+        standing: (m,) commands that stood before the first sample, from which the actuators begin to move; None for
+            those of the first sample. Without lag or dead time it means nothing.
         substeps: integrator steps per sample.
         integrator: "rk4", or "euler" for the map of the discrete parameters (with one substep).
 
@@ -46,18 +49,18 @@ def simulate(
         InputError: commands of another vessel.
     """
     _check_inputs(vessel, commands)
-    step = _step(integrator)
-    current, wind = environment.current_to.tolist(), environment.wind_to.tolist()
+    step = integrator_step(integrator)
+    current, wind = (rows.tolist() for rows in weather_rows(environment, len(commands)))
     theta = vessel.model.parameters.tolist()
     step_s = commands.sample_time_s / substeps
     state: State = tuple(float(x) for x in (*pose, *velocity))
     rows = [state]
-    for inputs in commands.values.tolist():
+    for delivered, water, air in zip(_delivered(vessel, commands, substeps, standing), current, wind, strict=True):
 
-        def rates(x: State, held: Any = inputs) -> State:
-            return motion_rates(vessel.model, x, held, current_to=current, wind_to=wind, ops=SCALAR, parameters=theta)
+        def rates(x: State, held: Any, water: Any = water, air: Any = air) -> State:
+            return motion_rates(vessel.model, x, held, current_to=water, wind_to=air, ops=SCALAR, parameters=theta)
 
-        state = _advanced(step, rates, state, step_s, substeps)
+        state = _advanced(step, rates, delivered, state, step_s)
         if not all(abs(speed) < LARGEST_SPEED for speed in state[3:]):
             raise Diverged(
                 f"vessel {vessel.name!r}: the simulation diverges after {len(rows) * commands.sample_time_s:.1f} s: "
@@ -118,11 +121,23 @@ def simulate_many(
     return result
 
 
-def _advanced(step: Any, rates: Any, state: State, step_s: float, substeps: int) -> State:
+def _delivered(vessel: Vessel, commands: Commands, substeps: int, standing: Array | None) -> Any:
+    """For every sample a list of what the actuators give in each step."""
+    given = deliver(
+        vessel.responses,
+        commands.values,
+        sample_time_s=commands.sample_time_s,
+        substeps=substeps,
+        standing=standing,
+    )
+    return np.broadcast_to(given, (len(commands), substeps, given.shape[-1])).tolist()
+
+
+def _advanced(step: Any, rates: Any, delivered: Any, state: State, step_s: float) -> State:
     """The state one sample later; not-a-numbers where it left the range of floating point."""
     try:
-        for _ in range(substeps):
-            state = step(rates, state, step_s)
+        for held in delivered:
+            state = step(lambda x, held=held: rates(x, held), state, step_s)
     except ValueError:  # the sine of an infinite heading
         return (math.nan,) * len(state)
     return state
@@ -134,9 +149,3 @@ def _check_inputs(vessel: Vessel, commands: Commands) -> None:
             f"commands {', '.join(commands.names)} do not fit vessel {vessel.name!r}, "
             f"which takes {', '.join(vessel.model.inputs)}"
         )
-
-
-def _step(integrator: str) -> Any:
-    if integrator not in STEPS:
-        raise UnknownName("integrator", integrator, known=STEPS)
-    return STEPS[integrator]

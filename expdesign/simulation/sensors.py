@@ -2,57 +2,176 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from expdesign.conventions import wrap_angle
 from expdesign.signals import Commands, Trajectory
-from expdesign.simulation.environment import Environment
+from expdesign.simulation.environment import Environment, WeatherSeries, weather_rows
 from expdesign.simulation.motion import to_body
 from expdesign.values import Array
-from expdesign.vessel import NUMPY, Vessel, column_name
+from expdesign.vessel import NUMPY, Mounting, Sensors, Vessel, column_name
+
+ROWS = ("north", "east", "heading", "u", "v", "r", "wind_u", "wind_v")
+"""What is measured, in order; a vane's noise on speed and angle takes the places of wind_u and wind_v."""
+OWNERS = {"position": (0, 1), "heading": (2,), "velocity": (3, 4), "yaw_rate": (5,), "wind": (6, 7)}
+"""Sensor -> its rows."""
 
 
-def draw_environment(forecast: Environment, rng: np.random.Generator) -> Environment:
-    """One trial's steady current and wind, drawn around the forecast."""
-    return Environment(
-        current_to=forecast.current_to + forecast.current_std_mps * rng.standard_normal(2),
-        wind_to=forecast.wind_to + forecast.wind_std_mps * rng.standard_normal(2),
+def noise_std(sensors: Sensors) -> Array:
+    """(8,) standard deviations of the rows."""
+    second = sensors.wind_angle_rad if sensors.wind_sensor == "vane" else sensors.wind_mps
+    position, velocity = [sensors.position_m] * 2, [sensors.velocity_mps] * 2
+    return np.array(
+        [*position, sensors.heading_rad, *velocity, sensors.yaw_rate_radps, sensors.wind_mps, second], dtype=float
     )
 
 
+def observe(sensors: Sensors, states: Array, wind_to: Array, noise: Array, *, sample_time_s: float) -> Array:
+    """What sensors tell of a motion.
+
+        position = north/east + R(heading) (forward, starboard)       heading = heading + bias
+        u = u - r starboard     v = v + r forward                      r = scale r
+        (u_q, v_q) = (u, v) - wind, and the same lever arm for a wind sensor of its own place
+
+    all late by each sensor's delay, held over its interval, plus noise; a vane's noise is on speed and angle, and
+    (u_q, v_q) = V (cos angle, sin angle). Before the first sample all was as at the first sample.
+
+    Args:
+        sensors: noise, places, timing, faults.
+        states: (k, 6, ...) pose, heading continuous, and velocity over ground at the samples.
+        wind_to: (k, 2, ...) n-frame wind at the samples.
+        noise: (k, 8, ...) with the deviations of `noise_std`.
+        sample_time_s: time between samples [s].
+
+    Returns:
+        (k, 8, ...) measured rows.
+
+    Source: F. Ljungberg, doctoral thesis, Linköping University, (5.39)-(5.50), with the angle counted clockwise from
+    the bow; T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control (2011), (2.28) for lever arms.
+    """
+    told = np.empty_like(noise)
+    for name, rows in OWNERS.items():
+        mounting: Mounting = getattr(sensors, name)
+        signals = np.stack(_SIGNALS[name](sensors, states, wind_to), axis=1)
+        time, origin = _readings(mounting, len(states), sample_time_s)
+        seen, error = _late(signals, time), noise[:, list(rows)]
+        if origin is not None:
+            error = error[origin]
+        if name == "wind" and sensors.wind_sensor == "vane":
+            told[:, list(rows)] = _vane(seen, error)
+        else:
+            told[:, list(rows)] = seen + error
+    return told
+
+
+def _position(sensors: Sensors, states: Array, wind_to: Array) -> tuple[Array, ...]:
+    place = sensors.position
+    c, s = np.cos(states[:, 2]), np.sin(states[:, 2])
+    return (
+        states[:, 0] + c * place.forward_m - s * place.starboard_m,
+        states[:, 1] + s * place.forward_m + c * place.starboard_m,
+    )
+
+
+def _heading(sensors: Sensors, states: Array, wind_to: Array) -> tuple[Array, ...]:
+    return (states[:, 2] + sensors.heading_bias_rad,)
+
+
+def _velocity(sensors: Sensors, states: Array, wind_to: Array) -> tuple[Array, ...]:
+    return _at(sensors.velocity, states)
+
+
+def _yaw_rate(sensors: Sensors, states: Array, wind_to: Array) -> tuple[Array, ...]:
+    return (sensors.yaw_rate_scale * states[:, 5],)
+
+
+def _wind(sensors: Sensors, states: Array, wind_to: Array) -> tuple[Array, ...]:
+    u, v = _at(sensors.wind, states)
+    u_w, v_w = to_body((wind_to[:, 0], wind_to[:, 1]), states[:, 2], NUMPY)
+    return u - u_w, v - v_w
+
+
+_SIGNALS: dict[str, Any] = {
+    "position": _position,
+    "heading": _heading,
+    "velocity": _velocity,
+    "yaw_rate": _yaw_rate,
+    "wind": _wind,
+}
+
+
+def _at(place: Mounting, states: Array) -> tuple[Array, Array]:
+    """Velocity over ground of a place on the ship, in the b-frame."""
+    r = states[:, 5]
+    return states[:, 3] - r * place.starboard_m, states[:, 4] + r * place.forward_m
+
+
+def _readings(mounting: Mounting, count: int, sample_time_s: float) -> tuple[Array | None, Any]:
+    """For every sample the time of the reading told [samples], and the sample that first told it; None for now."""
+    now = np.arange(count, dtype=float)
+    delay, interval = mounting.delay_s / sample_time_s, mounting.interval_s / sample_time_s
+    if interval <= 1.0:
+        return (np.maximum(now - delay, 0.0) if delay > 0 else None), None
+    number = np.maximum(np.floor((now - delay) / interval + 1e-9), 0.0)
+    _, first, place = np.unique(number, return_index=True, return_inverse=True)
+    return number * interval, first[place]
+
+
+def _late(signals: Array, time: Array | None) -> Array:
+    """Signals (k, ...) at other times [samples], straight lines between samples."""
+    if time is None:
+        return signals
+    before = np.minimum(time.astype(int), len(signals) - 1)
+    after = np.minimum(before + 1, len(signals) - 1)
+    share = (time - before).reshape(-1, *[1] * (signals.ndim - 1))
+    return np.asarray((1.0 - share) * signals[before] + share * signals[after])
+
+
+def _vane(seen: Array, error: Array) -> Array:
+    """Components (k, 2, ...) as a vane's noisy speed and angle give them."""
+    speed = np.hypot(seen[:, 0], seen[:, 1]) + error[:, 0]
+    angle = np.arctan2(seen[:, 1], seen[:, 0]) + error[:, 1]
+    return np.stack([speed * np.cos(angle), speed * np.sin(angle)], axis=1)
+
+
 def measure(
-    vessel: Vessel, commands: Commands, trajectory: Trajectory, *, environment: Environment, rng: np.random.Generator
+    vessel: Vessel,
+    commands: Commands,
+    trajectory: Trajectory,
+    *,
+    environment: Environment | WeatherSeries,
+    rng: np.random.Generator,
 ) -> dict[str, Array]:
-    """Measured signals with the vessel's white sensor noise, named and in units as in measured-data files.
+    """Measured signals as the vessel's sensors tell them, named and in units as in measured-data files.
 
     Args:
         vessel: whose sensors measure.
-        commands: k samples, recorded without noise.
+        commands: k samples, recorded as they were given.
         trajectory: k + 1 samples; the last is left out, as no command follows it.
-        environment: the actual current and wind.
+        environment: the actual current and wind, steady or sample by sample.
         rng: noise.
 
     Returns:
         Column name -> (k,). Wind is the relative wind in the b-frame, the air's velocity past the ship taken as
         (u_q, v_q) = velocity - wind.
     """
-    count, noise = len(commands), vessel.sensors
-    pose, velocity = trajectory.pose[:count], trajectory.velocity[:count]
-
-    def noisy(values: Array, std: float) -> Array:
-        return np.asarray(values + std * rng.standard_normal(len(values)))
-
-    u_w, v_w = to_body(environment.wind_to, pose[:, 2], NUMPY)
+    count = len(commands)
+    states = np.concatenate([trajectory.pose[:count], trajectory.velocity[:count]], axis=1)
+    noise = (noise_std(vessel.sensors)[:, None] * rng.standard_normal((len(ROWS), count))).T
+    _, wind = weather_rows(environment, count)
+    told = observe(vessel.sensors, states, wind, noise, sample_time_s=commands.sample_time_s).T
     columns = {
         "time_s": trajectory.time_s[:count],
-        "north_m": noisy(pose[:, 0], noise.position_m),
-        "east_m": noisy(pose[:, 1], noise.position_m),
-        "heading_rad": wrap_angle(noisy(pose[:, 2], noise.heading_rad)),
-        "u_mps": noisy(velocity[:, 0], noise.velocity_mps),
-        "v_mps": noisy(velocity[:, 1], noise.velocity_mps),
-        "r_radps": noisy(velocity[:, 2], noise.yaw_rate_radps),
-        "wind_u_mps": noisy(velocity[:, 0] - u_w, noise.wind_mps),
-        "wind_v_mps": noisy(velocity[:, 1] - v_w, noise.wind_mps),
+        "north_m": told[0],
+        "east_m": told[1],
+        "heading_rad": wrap_angle(told[2]),
+        "u_mps": told[3],
+        "v_mps": told[4],
+        "r_radps": told[5],
+        "wind_u_mps": told[6],
+        "wind_v_mps": told[7],
     }
     inputs = {column_name(name): commands.column(name) for name in commands.names}
     return {**columns, **inputs}

@@ -24,7 +24,7 @@ import numpy as np
 from expdesign.errors import NoAnswer
 from expdesign.estimation.methods import Settings, estimate
 from expdesign.signals import Record
-from expdesign.simulation import Ensemble, Weather, simulate_ensemble
+from expdesign.simulation import Ensemble, Environment, Variation, simulate_ensemble
 from expdesign.values import Array
 from expdesign.vessel import TERMS, Actuator, Limit, Sensors, Vessel, VesselModel, structure_terms
 
@@ -167,14 +167,14 @@ def draw_inputs(case: Case, rng: np.random.Generator) -> Array:
 
 def simulate_case(case: Case, *, runs: int, rng: np.random.Generator) -> Ensemble:
     """Measured trials of one case, all with the same input."""
-    weather = Weather(
+    weather = Environment(
         current_to=np.array([0.2, -0.2]),
         wind_to=np.full(2, case.wind_mps),
-        current_std_mps=1e-3**0.5,
-        wind_std_mps=1e-3**0.5,
+        current_variation=Variation(std_mps=1e-3**0.5),
+        wind_variation=Variation(std_mps=1e-3**0.5),
     )
     inputs = draw_inputs(case, rng)
-    return simulate_ensemble(ship(), inputs, runs=runs, weather=weather, rng=rng, velocity=(1.7, 0.7, 0.0))
+    return simulate_ensemble(ship(), inputs, runs=runs, environment=weather, rng=rng, velocity=(1.7, 0.7, 0.0))
 
 
 def run_case(

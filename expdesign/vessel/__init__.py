@@ -1,23 +1,44 @@
 """The vessel: particulars, actuators, term library, model structures, regressors and accelerations."""
 
-from expdesign.vessel.actuators import KINDS, Actuator, Limit, column_name, generalised_force
+from expdesign.vessel.actuators import (
+    IDEAL,
+    KINDS,
+    Actuator,
+    Limit,
+    Response,
+    column_name,
+    generalised_force,
+    limit_keys,
+    response_keys,
+)
+from expdesign.vessel.environment import CALM, STEADY, Environment, Variation
 from expdesign.vessel.expressions import NUMPY, SCALAR, Operators
 from expdesign.vessel.inverse import allocate, direct_terms, force_matrix, required_force, within_limits
 from expdesign.vessel.model import VesselModel
+from expdesign.vessel.sensors import CENTRAL, SENSORS, Mounting, Sensors
 from expdesign.vessel.structures import STRUCTURES, TERMS, Term, structure_terms
-from expdesign.vessel.vessel import Sensors, Vessel
+from expdesign.vessel.vessel import Vessel
 
 __all__ = [
+    "CALM",
+    "CENTRAL",
+    "IDEAL",
     "KINDS",
     "NUMPY",
     "SCALAR",
+    "SENSORS",
+    "STEADY",
     "STRUCTURES",
     "TERMS",
     "Actuator",
+    "Environment",
     "Limit",
+    "Mounting",
     "Operators",
+    "Response",
     "Sensors",
     "Term",
+    "Variation",
     "Vessel",
     "VesselModel",
     "allocate",
@@ -25,7 +46,9 @@ __all__ = [
     "direct_terms",
     "force_matrix",
     "generalised_force",
+    "limit_keys",
     "required_force",
+    "response_keys",
     "structure_terms",
     "within_limits",
 ]

@@ -3,6 +3,11 @@
 `tau_x`, `tau_y` and `tau_psi` are in propeller speed units (rps, rps m), as in the thesis: the thrust gain belongs to
 the model's parameters X_mu, Y_mu, N_mu. Angles are 0 for thrust ahead and grow from bow towards starboard.
 
+A rudder has no generalised force of its own here: what it gives depends on the water that the hull and the propeller
+send past it, which is a matter of the model. A vessel with propeller and rudder therefore has a custom structure whose
+terms read its signals, e.g. ``u*abs(u)*sin(rudder1)`` for the ship's own speed and ``abs(n1)*n1*sin(rudder1)`` for the
+slipstream; a propeller alone also adds its speed to tau_x.
+
 Source: F. Ljungberg, doctoral thesis, Linköping University, (3.47)-(3.55).
 """
 
@@ -13,6 +18,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from expdesign.errors import InputError
+from expdesign.values import frozen_set
 from expdesign.vessel.expressions import Operators, Signals
 
 KINDS: dict[str, tuple[str, ...]] = {
@@ -26,6 +32,28 @@ KINDS: dict[str, tuple[str, ...]] = {
 
 UNITS = {"n": "rps", "a": "rad", "rudder": "rad"}
 """Signal stem -> unit in column names; generalised forces carry none."""
+
+QUANTITIES = {
+    "n": ("speed", "_rps", "_rps2"),
+    "a": ("angle", "_rad", "_radps"),
+    "rudder": ("angle", "_rad", "_radps"),
+    "tau_x": ("x", "", ""),
+    "tau_y": ("y", "", ""),
+    "tau_psi": ("psi", "", ""),
+}
+"""Signal stem -> quantity, its unit and the unit of its rate, as endings of keys in vessel files."""
+
+
+def limit_keys(stem: str) -> tuple[str, str, str]:
+    """Keys in vessel files of a signal's lower limit, upper limit and rate."""
+    name, unit, rate = QUANTITIES[stem]
+    return f"{name}_min{unit}", f"{name}_max{unit}", f"{name}_rate{rate}"
+
+
+def response_keys(stem: str) -> tuple[str, str, str, str]:
+    """Keys in vessel files of a signal's lag, dead time, dead band and misalignment."""
+    name, unit, _ = QUANTITIES[stem]
+    return f"{name}_lag_s", f"{name}_delay_s", f"{name}_deadband{unit}", f"{name}_offset{unit}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,6 +77,38 @@ class Limit:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Response:
+    """How one actuator signal follows its command c(t), in this order.
+
+    A command acts `delay_s` after it is given; one smaller in size than `deadband` counts as zero, others are not
+    shortened; what is delivered approaches it as a first-order lag, dx/dt = (c - x) / `lag_s`; a misalignment is added,
+    x + `offset`. Limits and rates are those of commands and come before all this.
+
+    Attributes:
+        lag_s: time constant [s], 0 for none.
+        delay_s: dead time [s].
+        deadband: [unit of the signal], not negative.
+        offset: delivered beyond the command [rad]: positive turns thrust, or rudder, from bow towards starboard.
+    """
+
+    lag_s: float = 0.0
+    delay_s: float = 0.0
+    deadband: float = 0.0
+    offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("lag_s", "delay_s", "deadband"):
+            if not 0 <= getattr(self, name) < math.inf:
+                raise InputError(f"response.{name} is {getattr(self, name):g}, expected 0 or more")
+        if not math.isfinite(self.offset):
+            raise InputError(f"response.offset is {self.offset:g}, expected a finite angle")
+
+
+IDEAL = Response()
+"""The command is delivered at once and as it is."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Actuator:
     """One actuator.
 
@@ -57,6 +117,7 @@ class Actuator:
         number: distinguishes actuators of one kind in signal names, from 1.
         forward_m, starboard_m: place in the b-frame [m].
         limits: one `Limit` for each signal of the kind, in order.
+        responses: one `Response` for each signal likewise; ideal ones when left out.
     """
 
     kind: str
@@ -64,6 +125,13 @@ class Actuator:
     forward_m: float = 0.0
     starboard_m: float = 0.0
     limits: tuple[Limit, ...]
+    responses: tuple[Response, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.responses:
+            frozen_set(self, "responses", (IDEAL,) * len(KINDS[self.kind]))
+        if len(self.responses) != len(KINDS[self.kind]):
+            raise InputError(f"{self.kind} has {len(self.responses)} responses, expected {len(KINDS[self.kind])}")
 
     @property
     def signals(self) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""The vessel: particulars, hull outline, sensors and model."""
+"""The vessel: particulars, hull outline, model, sensors and the weather it was found in."""
 
 from __future__ import annotations
 
@@ -8,28 +8,10 @@ import numpy as np
 
 from expdesign.errors import InputError
 from expdesign.values import Array
-from expdesign.vessel.actuators import Actuator, Limit
+from expdesign.vessel.actuators import Actuator, Limit, Response
+from expdesign.vessel.environment import CALM, Environment
 from expdesign.vessel.model import VesselModel
-
-
-@dataclass(frozen=True, kw_only=True)
-class Sensors:
-    """Standard deviations of the measurements, white noise per sample.
-
-    Attributes:
-        position_m, heading_rad, velocity_mps, yaw_rate_radps, wind_mps: standard deviations, not negative.
-    """
-
-    position_m: float = 0.0
-    heading_rad: float = 0.0
-    velocity_mps: float = 0.0
-    yaw_rate_radps: float = 0.0
-    wind_mps: float = 0.0
-
-    def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not 0 <= value < np.inf:
-                raise InputError(f"sensors.{name} is {value:g}, expected a standard deviation of 0 or more")
+from expdesign.vessel.sensors import EXACT, Sensors
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,7 +23,8 @@ class Vessel:
         length_m, beam_m, draught_m: particulars [m]; the origin of the b-frame is amidships.
         sample_time_s: time between commands and between measurements [s].
         model: structure, parameters, actuators.
-        sensors: measurement noise.
+        sensors: what they add to the truth.
+        environment: weather that came with the model, e.g. from a diagnosis; calm when nothing is known.
     """
 
     name: str
@@ -50,7 +33,8 @@ class Vessel:
     draught_m: float
     sample_time_s: float
     model: VesselModel
-    sensors: Sensors = Sensors()
+    sensors: Sensors = EXACT
+    environment: Environment = CALM
 
     def __post_init__(self) -> None:
         for name in ("length_m", "beam_m", "draught_m", "sample_time_s"):
@@ -67,6 +51,11 @@ class Vessel:
     def limits(self) -> tuple[Limit, ...]:
         """Limits of every actuator signal, in command order."""
         return tuple(limit for actuator in self.actuators for limit in actuator.limits)
+
+    @property
+    def responses(self) -> tuple[Response, ...]:
+        """How every actuator signal follows its command, in command order."""
+        return tuple(response for actuator in self.actuators for response in actuator.responses)
 
     @property
     def hull_b(self) -> Array:

@@ -14,14 +14,17 @@ from pathlib import Path
 import numpy as np
 
 from expdesign.scenario import load_vessel
-from expdesign.simulation import euler_step, motion_rates, relative_velocity
-from expdesign.simulation.ensemble import Weather, simulate_ensemble
+from expdesign.simulation import Environment, Variation, euler_step, motion_rates, relative_velocity
+from expdesign.simulation.ensemble import simulate_ensemble
 from expdesign.vessel import SCALAR
 
 VESSEL = Path(__file__).parents[2] / "scenarios" / "vessels" / "azimuth-30m-true.toml"
 RUNS, SAMPLES, LOOP_SAMPLES = 500, 5000, 20_000
-WEATHER = Weather(
-    current_to=np.array([0.2, -0.2]), wind_to=np.array([1.0, 1.0]), current_std_mps=0.03, wind_std_mps=0.03
+WEATHER = Environment(
+    current_to=np.array([0.2, -0.2]),
+    wind_to=np.array([1.0, 1.0]),
+    current_variation=Variation(std_mps=0.03),
+    wind_variation=Variation(std_mps=0.03),
 )
 
 
@@ -39,8 +42,8 @@ def plain_loop_s(vessel, rng: np.random.Generator) -> float:
     state = (0.0,) * 6
     began = time.perf_counter()
     for held in rows:
-        current = [rng.normal(mean, WEATHER.current_std_mps) for mean in (0.2, -0.2)]
-        wind = [rng.normal(1.0, WEATHER.wind_std_mps) for _ in range(2)]
+        current = [rng.normal(mean, 0.03) for mean in (0.2, -0.2)]
+        wind = [rng.normal(1.0, 0.03) for _ in range(2)]
         _, air = relative_velocity(state, current, wind, SCALAR)
         [value + rng.normal(0.0, std) for value, std in zip((*state, *air), noise, strict=True)]
 
@@ -55,7 +58,7 @@ if __name__ == "__main__":
     ship, chance = load_vessel(VESSEL), np.random.default_rng(0)
     loop = min(plain_loop_s(ship, chance) for _ in range(3)) / LOOP_SAMPLES
     began = time.perf_counter()
-    result = simulate_ensemble(ship, commands(SAMPLES), runs=RUNS, weather=WEATHER, rng=chance)
+    result = simulate_ensemble(ship, commands(SAMPLES), runs=RUNS, environment=WEATHER, rng=chance)
     many = (time.perf_counter() - began) / (RUNS * SAMPLES)
     peak_mib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     print(f"plain loop {loop * 1e6:.1f} us a sample, {RUNS} runs at once {many * 1e9:.0f} ns a sample and run")

@@ -1,0 +1,78 @@
+"""Current and wind: means in the n-frame, how well they are known, and how they vary during a trial."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from expdesign.errors import InputError
+from expdesign.values import Array, seal
+
+
+@dataclass(frozen=True, kw_only=True)
+class Variation:
+    """A stationary first-order Gauss-Markov process, one for each n-frame component, around the trial's mean.
+
+    Its autocorrelation is std_mps**2 exp(-|lag| / correlation_s); a correlation time of zero is white noise from sample
+    to sample.
+
+    Attributes:
+        std_mps: standard deviation of each component [m/s].
+        correlation_s: correlation time [s].
+
+    Source: A. Gelb (ed.), Applied Optimal Estimation (1974), section 3.8 (exponentially correlated processes).
+    """
+
+    std_mps: float = 0.0
+    correlation_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not 0 <= value < math.inf:
+                raise InputError(f"variation.{name} is {value:g}, expected 0 or more")
+
+    def memory(self, time_s: float) -> float:
+        """Correlation of values that lie a time apart."""
+        return math.exp(-time_s / self.correlation_s) if self.correlation_s > 0 else 0.0
+
+
+STEADY = Variation()
+"""No variation."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Environment:
+    """Forecast for a trial: its mean current and wind, and how they vary while it lasts.
+
+    Attributes:
+        current_to: (2,) mean current, velocity to north/east [m/s].
+        current_std_mps: standard deviation with which the trial's mean of each component is known [m/s].
+        wind_to: (2,) mean wind, velocity to north/east [m/s].
+        wind_std_mps: standard deviation with which the trial's mean of each component is known [m/s].
+        current_variation, wind_variation: what happens around the trial's mean from sample to sample.
+    """
+
+    current_to: Array = field(default_factory=lambda: np.zeros(2))
+    wind_to: Array = field(default_factory=lambda: np.zeros(2))
+    current_std_mps: float = 0.0
+    wind_std_mps: float = 0.0
+    current_variation: Variation = STEADY
+    wind_variation: Variation = STEADY
+
+    def __post_init__(self) -> None:
+        seal(self, current_to="2", wind_to="2")
+
+    @property
+    def isotropic(self) -> bool:
+        """True when no mean current or wind singles out a heading."""
+        return not (self.current_to.any() or self.wind_to.any())
+
+    @property
+    def steady(self) -> bool:
+        """True when current and wind keep their means through the trial."""
+        return not (self.current_variation.std_mps or self.wind_variation.std_mps)
+
+
+CALM = Environment()

@@ -1,0 +1,84 @@
+"""Sensors: noise, place, timing and faults of what measures the ship."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from expdesign.errors import InputError, UnknownName
+
+WIND_SENSORS = ("cartesian", "vane")
+SENSORS = ("position", "heading", "velocity", "yaw_rate", "wind")
+"""What is measured; each has a `Mounting`."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mounting:
+    """Where a sensor sits, how late it tells, and how often it reads anew.
+
+    Attributes:
+        forward_m, starboard_m: place in the b-frame [m]; means something to position, velocity and wind.
+        delay_s: what is told at a time is what was so this long before [s].
+        interval_s: time between new readings [s]; in between the last one is repeated, noise and all. Not above the
+            sample time, every sample is new.
+    """
+
+    forward_m: float = 0.0
+    starboard_m: float = 0.0
+    delay_s: float = 0.0
+    interval_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not math.isfinite(value) or (name.endswith("_s") and value < 0):
+                raise InputError(f"mounting.{name} is {value:g}, expected a finite number, not negative for times")
+
+
+CENTRAL = Mounting()
+"""At the origin of the b-frame, at once, every sample."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sensors:
+    """What the measurements have beside the truth.
+
+    Attributes:
+        position_m, heading_rad, velocity_mps, yaw_rate_radps: standard deviations of white noise, not negative.
+        wind_mps: of each component of a cartesian wind sensor, or of a vane's speed.
+        wind_angle_rad: of a vane's angle.
+        heading_bias_rad: measured heading less true heading.
+        yaw_rate_scale: measured yaw rate over true yaw rate.
+        wind_sensor: "cartesian" measures the components of the relative wind, "vane" its speed and angle.
+        position, heading, velocity, yaw_rate, wind: where, how late and how often each is measured.
+    """
+
+    position_m: float = 0.0
+    heading_rad: float = 0.0
+    velocity_mps: float = 0.0
+    yaw_rate_radps: float = 0.0
+    wind_mps: float = 0.0
+    wind_angle_rad: float = 0.0
+    heading_bias_rad: float = 0.0
+    yaw_rate_scale: float = 1.0
+    wind_sensor: str = "cartesian"
+    position: Mounting = CENTRAL
+    heading: Mounting = CENTRAL
+    velocity: Mounting = CENTRAL
+    yaw_rate: Mounting = CENTRAL
+    wind: Mounting = CENTRAL
+
+    def __post_init__(self) -> None:
+        for name in ("position_m", "heading_rad", "velocity_mps", "yaw_rate_radps", "wind_mps", "wind_angle_rad"):
+            value = getattr(self, name)
+            if not 0 <= value < math.inf:
+                raise InputError(f"sensors.{name} is {value:g}, expected a standard deviation of 0 or more")
+        if not math.isfinite(self.heading_bias_rad):
+            raise InputError(f"sensors.heading_bias_rad is {self.heading_bias_rad:g}, expected a finite angle")
+        if not 0 < self.yaw_rate_scale < math.inf:
+            raise InputError(f"sensors.yaw_rate_scale is {self.yaw_rate_scale:g}, expected more than 0")
+        if self.wind_sensor not in WIND_SENSORS:
+            raise UnknownName("wind sensor", self.wind_sensor, known=WIND_SENSORS)
+
+
+EXACT = Sensors()
+"""They tell the truth."""
