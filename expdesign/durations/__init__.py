@@ -1,17 +1,28 @@
 """Durations: how long to run each primitive, with a certificate."""
 
 from expdesign.durations.certificate import log_det, sensitivities
-from expdesign.durations.solve import bordered, build_durations, solve_durations, with_repeats
-from expdesign.durations.values import DurationDesign, DurationProblem
+from expdesign.durations.constraints import NO_CONSTRAINTS, Budget, Constraints
+from expdesign.durations.criteria import CRITERIA, Aim, Criterion
+from expdesign.durations.solve import bordered, build_durations, optimal_shares, solve_durations, with_repeats
+from expdesign.durations.values import ROBUST, Certificate, DurationDesign, DurationProblem
 from expdesign.information import MEAN_SUBTRACTIONS
 
 __all__ = [
+    "CRITERIA",
     "MEAN_SUBTRACTIONS",
+    "NO_CONSTRAINTS",
+    "ROBUST",
+    "Aim",
+    "Budget",
+    "Certificate",
+    "Constraints",
+    "Criterion",
     "DurationDesign",
     "DurationProblem",
     "bordered",
     "build_durations",
     "log_det",
+    "optimal_shares",
     "sensitivities",
     "solve_durations",
     "with_repeats",

@@ -1,10 +1,12 @@
-"""The equivalence theorem: what any design is worth, computed from the problem alone.
+"""Equivalence theorems: what any design is worth, computed from the problem alone.
 
 For f(w) = log det B(w), B(w) = sum_q w_q B_q with B_q positive semidefinite, the sensitivities
 d_q = trace(B(w)^-1 B_q) are the gradient of f, their w-weighted mean is the dimension, and concavity bounds every
-other design by f(w) + max_q d_q - dimension.
+other design by f(w) + max_q d_q - dimension. The same goes for every concave criterion, with limits at their prices,
+and for the average or the least over several models with a mixture of their tangents.
 
-Source: J. Kiefer and J. Wolfowitz, The equivalence of two extremum problems, Canad. J. Math. 12 (1960), 363-366.
+Source: J. Kiefer and J. Wolfowitz, The equivalence of two extremum problems, Canad. J. Math. 12 (1960), 363-366;
+F. Pukelsheim, Optimal Design of Experiments (2006), 7.19-7.23 (general equivalence theorem) and 11 (mixtures).
 """
 
 from __future__ import annotations
@@ -12,10 +14,13 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
+from expdesign.durations.interior import Interior, Task
+from expdesign.durations.objective import SINGULAR
+from expdesign.durations.values import Certificate
 from expdesign.values import Array
 
-SINGULAR = 1e-13
-"""Eigenvalues below this, relative to the largest, are rounding."""
+BLURS = (1.0, 10.0, 100.0)
+"""Multiples of the last barrier that are tried for the mixture of tangents; every one gives a valid bound."""
 
 
 def scaled(matrices: Array) -> tuple[Array, float]:
@@ -62,3 +67,53 @@ def sensitivities(matrices: Array, fractions: Array) -> Array:
     factor = cho_factor(np.tensordot(fractions, matrices, axes=1))
     inverse = cho_solve(factor, np.eye(matrices.shape[1]))
     return np.asarray(np.einsum("ij,qji->q", inverse, matrices))
+
+
+def certify(task: Task, found: Interior, *, kind: str) -> tuple[Certificate, Array]:
+    """The best bound that tangents at a design give, and the criterion's sensitivities (q,) there.
+
+    Args:
+        task: the problem.
+        found: the design, with guesses of the limits' prices; the bound holds whatever they are.
+        kind: the theorem, in words.
+
+    Raises:
+        numpy.linalg.LinAlgError: the design is singular.
+    """
+    tried = [_certified(task, found, blur * found.barrier, kind) for blur in BLURS]
+    return min(tried, key=lambda pair: pair[0].bound)
+
+
+def _certified(task: Task, found: Interior, blur: float, kind: str) -> tuple[Certificate, Array]:
+    w, polytope = found.fractions, task.polytope
+    tangent = task.objective.tangent(w, blur)
+    value, slope = tangent.value, np.array(tangent.slope)
+    for floor, price in zip(task.floors, found.floor_prices, strict=True):
+        bound = floor.tangent(w, blur)
+        value, slope = value + price * bound.value, slope + price * bound.slope
+    bounds = {polytope.bound(slope, prices): prices for prices in (found.prices, polytope.prices(slope))}
+    prices = bounds[min(bounds)]
+    net = slope - polytope.rows.T @ prices
+    level = _level(task, w, net)
+    net = np.where(w >= polytope.most - 1e-9, np.minimum(net, level), net)
+    names = (*polytope.labels, *(f"balance {number}" for number in range(1, len(task.floors) + 1)))
+    certificate = Certificate(
+        kind=kind,
+        value=task.objective.value(w),
+        bound=value - float(slope @ w) + min(bounds),
+        degree=task.objective.pieces[0].measure.degree,
+        level=level,
+        mixture=tangent.mixture,
+        prices=tangent.slope - net,
+        multipliers=dict(zip(names, (*prices.tolist(), *found.floor_prices.tolist()), strict=True)),
+    )
+    return certificate, tangent.slope
+
+
+def _level(task: Task, w: Array, net: Array) -> float:
+    """The net sensitivity of primitives whose time is free to move both ways."""
+    least, most = task.polytope.least, task.polytope.most
+    free = (w > least + 1e-6) & (w < np.where(most < 1.0, most - 1e-9, 2.0))
+    if not free.any():
+        return float(net[w > least - 1e-12].max())
+    return float((w[free] * net[free]).sum() / w[free].sum())

@@ -7,57 +7,62 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from expdesign.durations.certificate import log_det
+from expdesign.durations.collected import Collected
+from expdesign.durations.constraints import TIGHT, Polytope
+from expdesign.durations.task import polytope_of
 from expdesign.durations.values import DurationProblem
 from expdesign.errors import NoAnswer
 from expdesign.values import Array
 
 Indices = NDArray[np.intp]
+Totals = tuple[Array, ...]
+"""(..., d, d) information collected, for each model."""
 
 LENT = 1e-6
 """Share of the optimal design lent to every set of runs, so that singular ones can be compared too."""
 GAIN = 1e-9
-"""Gains in log det below this count as rounding."""
+"""Gains below this count as rounding."""
 PUSHES = 200
 """Primitives that are tried as pushes, those that would gain most per second first."""
 
 
-def whole_runs(problem: DurationProblem, matrices: Array, fractions: Array) -> tuple[int, ...]:
-    """Numbers of whole runs within the total time, by greedy addition and exchange on the determinant itself.
+def whole_runs(problem: DurationProblem, fractions: Array) -> tuple[int, ...]:
+    """Numbers of whole runs within the total time and the limits, by greedy addition and exchange on the criterion.
 
-    The value of a set of runs is log det of B at its time shares plus p log of its time: information adds with time.
-    Every primitive that is alone in informing about a parameter stays, since without it the value is minus infinity.
-    The result is a local optimum; on problems small enough to try every set it was the best set whenever runs were of
-    one length, else in nine cases out of ten, and never lost more than 3 % of efficiency to it.
+    The value of a set of runs is the criterion of the information they collect. Every primitive that is alone in
+    informing about a parameter stays, since without it the value is minus infinity. The result is a local optimum; on
+    problems small enough to try every set it was the best set whenever runs were of one length, else in nine cases out
+    of ten, and never lost more than 3 % of efficiency to it.
 
     Args:
-        problem: gives run lengths and the total time.
-        matrices: (q, d, d) whitened B_q.
+        problem: gives run lengths, the total time and the limits.
         fractions: (q,) optimal fractions, where the search starts.
 
     Raises:
-        NoAnswer: no set of whole runs was found that fits the total time and informs about every parameter.
+        NoAnswer: no set of whole runs was found that keeps the limits and informs about every parameter.
     """
-    search = _Search.of(problem, matrices, fractions)
-    runs = search.grown(np.floor(fractions / search.shares + 1e-9).astype(int))
+    search = _Search.of(problem, fractions)
+    runs = np.maximum(np.floor(fractions / search.shares + 1e-9).astype(int), search.fewest)
+    runs = search.grown(search.thinned(np.minimum(runs, np.maximum(search.most_runs, search.fewest)), -1))
     while (better := _exchanged(search, runs)) is not None:
         runs = better
-    if not np.isfinite(value(problem, matrices, runs)):
+    if not search.allowed(runs) or not np.isfinite(Collected.of(problem).value(runs * search.shares)):
         raise NoAnswer(
             f"design.total_s is {problem.total_s:g}: whole runs that inform about every parameter do not fit; the "
             f"shortest run takes {problem.run_s.min():g} s, the optimal design uses {int((fractions > 1e-6).sum())} "
-            "primitives"
+            "primitives" + (" (least and most times and budgets counted)" if not search.polytope.plain else "")
         )
     return tuple(int(n) for n in runs)
 
 
-def value(problem: DurationProblem, matrices: Array, runs: Array) -> float:
-    """log det of the information collected by whole runs, up to a constant; -inf when singular."""
-    times = runs * problem.run_s
-    used = float(times.sum())
-    if used <= 0:
-        return -np.inf
-    return log_det(matrices, times / used) + len(problem.parameters) * float(np.log(used / problem.total_s))
+def efficiency_of_runs(problem: DurationProblem, fractions: Array, runs: Array) -> float:
+    """Efficiency of whole runs (q,) against fractions (q,) of the total time, by the problem's criterion."""
+    return Collected.of(problem).efficiency(runs * problem.run_s / problem.total_s, fractions)
+
+
+def efficiency_of_shares(problem: DurationProblem, fractions: Array, shares: Array) -> float:
+    """Efficiency of other shares (q,) of the total time."""
+    return Collected.of(problem).efficiency(shares, fractions)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -65,61 +70,84 @@ class _Search:
     """What is the same for all sets of runs.
 
     Attributes:
-        pieces: (q, d, d) share of one run in the total time, times B_q.
+        collected: the criterion.
+        pieces: for each model (q, d, d) share of one run in the total time, times B_q.
         shares: (q,) that share.
-        lent: (d, d) a little of the optimal design.
-        means: d - p, the rows of B that hold means.
+        lent: for each model (d, d) prior and a little of the optimal design.
+        polytope: limits.
+        fewest, most_runs: (q,) least and most runs.
     """
 
-    pieces: Array
+    collected: Collected
+    pieces: Totals
     shares: Array
-    lent: Array
-    means: int
+    lent: Totals
+    polytope: Polytope
+    fewest: NDArray[np.int64]
+    most_runs: NDArray[np.int64]
 
     @staticmethod
-    def of(problem: DurationProblem, matrices: Array, fractions: Array) -> _Search:
-        shares = problem.run_s / problem.total_s
+    def of(problem: DurationProblem, fractions: Array) -> _Search:
+        collected, polytope = Collected.of(problem), polytope_of(problem)
+        shares = np.asarray(problem.run_s / problem.total_s)
+        most = np.where(polytope.most < 1.0, polytope.most, np.inf) / shares
         return _Search(
-            pieces=shares[:, None, None] * matrices,
+            collected=collected,
+            pieces=tuple(shares[:, None, None] * piece.matrices for piece in collected.pieces),
             shares=shares,
-            lent=LENT * np.tensordot(fractions, matrices, axes=1),
-            means=problem.dimension - len(problem.parameters),
+            lent=tuple(
+                piece.prior + LENT * np.tensordot(fractions, piece.matrices, axes=1) for piece in collected.pieces
+            ),
+            polytope=polytope,
+            fewest=np.ceil(polytope.least / shares - 1e-9).astype(int),
+            most_runs=np.floor(np.minimum(most, 1e9) + 1e-9).astype(int),
         )
 
-    def total(self, runs: Array) -> Array:
-        """(d, d) sum of the runs' pieces and what is lent."""
-        return np.asarray(np.tensordot(runs, self.pieces, axes=1) + self.lent)
-
-    def worth(self, totals: Array, used: Array) -> Array:
-        """As `value`, for totals (..., d, d) of sets that take shares (...) of the time, but never infinite."""
-        return np.asarray(np.linalg.slogdet(totals)[1] - self.means * np.log(used + LENT))
+    def totals(self, runs: Array) -> Totals:
+        """Sum of the runs' pieces and what is lent, for each model."""
+        return tuple(np.tensordot(runs, P, axes=1) + L for P, L in zip(self.pieces, self.lent, strict=True))
 
     def worth_of(self, runs: Array) -> float:
-        """`worth` of one set of runs (q,)."""
-        return float(self.worth(self.total(runs), runs @ self.shares))
+        """Value of one set of runs (q,), never infinite."""
+        return float(self.collected.compared(tuple(total[None] for total in self.totals(runs)))[0])
+
+    def after(self, totals: Totals, indices: Indices, sign: float) -> Array:
+        """(c,) worth after one run of each indexed primitive is added (sign 1) or taken away (sign -1)."""
+        moved = tuple(total + sign * P[indices] for total, P in zip(totals, self.pieces, strict=True))
+        return self.collected.compared(moved)
+
+    def allowed(self, runs: Array) -> bool:
+        """Whether runs keep the time and all limits."""
+        shares = runs * self.shares
+        return bool(
+            shares.sum() <= 1.0 + 1e-9
+            and (runs >= self.fewest).all()
+            and (runs <= self.most_runs).all()
+            and (self.polytope.rows @ shares <= self.polytope.limits + 2 * TIGHT).all()
+        )
 
     def fitting(self, runs: Array) -> Indices:
         """Indices of the primitives of which one more run fits."""
-        return np.flatnonzero(self.shares <= 1.0 - runs @ self.shares + 1e-9)
-
-    def after(self, total: Array, used: float, indices: Indices, sign: float) -> Array:
-        """(c,) worth after one run of each indexed primitive is added (sign 1) or taken away (sign -1)."""
-        return self.worth(total + sign * self.pieces[indices], used + sign * self.shares[indices])
+        used = runs * self.shares
+        fits = (self.shares <= 1.0 - used.sum() + 1e-9) & (runs < self.most_runs)
+        left = self.polytope.limits + TIGHT - self.polytope.rows @ used
+        fits &= (self.polytope.rows * self.shares <= left[:, None]).all(axis=0)
+        return np.flatnonzero(fits)
 
     def grown(self, runs: Array) -> Array:
         """With runs added, always the one that gains most per second, while one fits."""
         while len(fits := self.fitting(runs)):
-            gains = self.after(self.total(runs), float(runs @ self.shares), fits, 1.0) - self.worth_of(runs)
+            gains = self.after(self.totals(runs), fits, 1.0) - self.worth_of(runs)
             runs = runs + _unit(int(fits[np.argmax(gains / self.shares[fits])]), runs)
         return runs
 
     def thinned(self, runs: Array, keep: int) -> Array:
-        """With runs taken away until the rest fits, always the one that loses least per second; `keep` is left."""
-        while (used := float(runs @ self.shares)) > 1.0 + 1e-9:
-            spare = np.setdiff1d(np.flatnonzero(runs), keep)
+        """With runs taken away until the limits hold, always the one that loses least per second; `keep` is left."""
+        while not self.allowed(runs):
+            spare = np.setdiff1d(np.flatnonzero(runs > self.fewest), keep)
             if not len(spare):
-                return np.zeros_like(runs)
-            losses = self.worth_of(runs) - self.after(self.total(runs), used, spare, -1.0)
+                return np.array(self.fewest)
+            losses = self.worth_of(runs) - self.after(self.totals(runs), spare, -1.0)
             runs = runs - _unit(int(spare[np.argmin(losses / self.shares[spare])]), runs)
         return runs
 
@@ -130,13 +158,14 @@ def _exchanged(search: _Search, runs: Array) -> Array | None:
     swap = _swapped(search, runs, target)
     if swap is not None:
         return search.grown(swap)
-    if np.ptp(search.shares) < 1e-12:
+    if np.ptp(search.shares) < 1e-12 and search.polytope.plain:
         return None  # runs of one length: a push is a swap
-    everything = np.arange(len(runs))
-    added = search.after(search.total(runs), float(runs @ search.shares), everything, 1.0)
-    for index in np.argsort(-(added - search.worth_of(runs)) / search.shares)[:PUSHES]:
-        pushed = search.grown(search.thinned(runs + _unit(int(index), runs), int(index)))
-        if search.worth_of(pushed) > target:
+    everything = np.flatnonzero(runs < search.most_runs)
+    added = search.after(search.totals(runs), everything, 1.0)
+    for place in np.argsort(-(added - search.worth_of(runs)) / search.shares[everything])[:PUSHES]:
+        index = int(everything[place])
+        pushed = search.thinned(runs + _unit(index, runs), index)
+        if search.allowed(pushed) and search.worth_of(pushed := search.grown(pushed)) > target:
             return pushed
     return None
 
@@ -144,10 +173,12 @@ def _exchanged(search: _Search, runs: Array) -> Array | None:
 def _swapped(search: _Search, runs: Array, target: float) -> Array | None:
     """The best set above `target` that has one run in place of another."""
     best = None
-    for out in np.flatnonzero(runs):
+    for out in np.flatnonzero(runs > search.fewest):
         left = runs - _unit(int(out), runs)
         fits = search.fitting(left)
-        worths = search.after(search.total(left), float(left @ search.shares), fits, 1.0)
+        if not len(fits):
+            continue
+        worths = search.after(search.totals(left), fits, 1.0)
         if worths.max() > target:
             target, best = float(worths.max()), left + _unit(int(fits[np.argmax(worths)]), runs)
     return best

@@ -3,20 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from expdesign.durations._cvxpy import maximise_log_det
-from expdesign.durations.certificate import log_det, sensitivities, whitened
-from expdesign.durations.polish import polish
-from expdesign.durations.rounding import value, whole_runs
+from expdesign.durations.certificate import certify
+from expdesign.durations.constraints import NO_CONSTRAINTS, Constraints
+from expdesign.durations.criteria import Aim
+from expdesign.durations.interior import climb
+from expdesign.durations.rounding import efficiency_of_runs, efficiency_of_shares, whole_runs
+from expdesign.durations.task import start_of, task_of
 from expdesign.durations.values import DurationDesign, DurationProblem
 from expdesign.errors import NoAnswer, NotInformative, UnknownName
 from expdesign.information import MEAN_SUBTRACTIONS, PrimitiveInformation, check_informative
 from expdesign.values import Array
 
 LARGEST_GAP = 1e-6
-"""Certificates above this, relative to the dimension, are not given out as optimal designs."""
+"""Certificates above this, per degree, are not given out as optimal designs."""
+TOLERANCES = {"smooth": (1e-10, 1e-8), "cornered": (1e-7, 1e-8)}
+"""What the solver aims at, per degree, one after the other until the certificate holds."""
+THEOREMS = {
+    "D": "Kiefer and Wolfowitz 1960",
+    "D_s": "Pukelsheim 2006, general equivalence theorem",
+    "A": "Pukelsheim 2006, general equivalence theorem",
+    "E": "Pukelsheim 2006, general equivalence theorem with a mixture of eigenvectors",
+    "V": "Pukelsheim 2006, general equivalence theorem",
+}
 
 
 def build_durations(
@@ -25,8 +37,26 @@ def build_durations(
     *,
     total_s: float,
     mean_subtraction: str = "complete",
+    aim: Aim | None = None,
+    constraints: Constraints = NO_CONSTRAINTS,
+    prior: Array | None = None,
+    sampled: Sequence[Sequence[PrimitiveInformation]] = (),
+    robust: str = "nominal",
+    equations: Sequence[str] = (),
 ) -> DurationProblem:
     """The duration problem of a scored dictionary.
+
+    Args:
+        information: of each primitive, by the nominal model.
+        parameters: p names in the order of the matrices.
+        total_s: time to share out [s].
+        mean_subtraction: "none", "batch" or "complete".
+        aim: criterion and what it needs; D when not given.
+        constraints: limits on the sharing.
+        prior: (d, d) what is known already, per sample of the total time; see `prior_information`.
+        sampled: the information again by every model drawn from the prior of the nominal parameters.
+        robust: "nominal", or what the sampled models count for: "average" or "worst".
+        equations: of each parameter; only needed for `constraints.balance`.
 
     Raises:
         UnknownName: no such mean subtraction.
@@ -34,15 +64,26 @@ def build_durations(
     """
     if mean_subtraction not in MEAN_SUBTRACTIONS:
         raise UnknownName("mean subtraction", mean_subtraction, known=MEAN_SUBTRACTIONS)
-    check_informative(information, parameters, mean_subtraction)
+    if prior is None:
+        check_informative(information, parameters, mean_subtraction)
     return DurationProblem(
         names=tuple(item.primitive.name for item in information),
         parameters=tuple(parameters),
         mean_subtraction=mean_subtraction,
-        matrices=np.array([bordered(item, mean_subtraction) for item in information]),
+        matrices=_stack(information, mean_subtraction),
         run_s=np.array([item.primitive.duration_s for item in information]),
         total_s=total_s,
+        aim=aim or Aim(),
+        constraints=constraints,
+        prior=np.zeros((0, 0)) if prior is None else prior,
+        robust=robust,
+        sampled=np.array([_stack(items, mean_subtraction) for items in sampled]),
+        equations=tuple(equations),
     )
+
+
+def _stack(information: Sequence[PrimitiveInformation], mean_subtraction: str) -> Array:
+    return np.array([bordered(item, mean_subtraction) for item in information])
 
 
 def bordered(item: PrimitiveInformation, mean_subtraction: str) -> Array:
@@ -55,31 +96,52 @@ def bordered(item: PrimitiveInformation, mean_subtraction: str) -> Array:
 
 
 def solve_durations(problem: DurationProblem) -> DurationDesign:
-    """The D-optimal time fractions, whole runs, and the proof of both.
+    """The optimal time fractions by the problem's criterion, whole runs, and the proof of both.
 
     Raises:
+        UnknownName, InputError: the aim or the limits are wrong.
         NotInformative: no shares inform about every parameter.
-        NoAnswer: the certificate cannot be brought below `LARGEST_GAP`, or whole runs do not fit.
+        NoAnswer: no sharing meets the limits, the certificate cannot be brought below `LARGEST_GAP`, or whole runs do
+            not fit.
     """
-    try:
-        matrices, _ = whitened(problem.matrices)
-    except np.linalg.LinAlgError:
-        raise NotInformative(
-            "all primitives together do not inform about every parameter, to working precision",
-            parameters=problem.parameters,
-        ) from None
-    start = maximise_log_det(matrices)
-    if start is None:
-        start = np.full(len(problem.names), 1.0 / len(problem.names))
-    fractions = polish(matrices, start)
-    d = sensitivities(matrices, fractions)
-    gap = max(float(d.max()) - problem.dimension, 0.0)
-    if not gap < LARGEST_GAP * problem.dimension:
+    design = optimal_shares(problem)
+    return _with_runs(design, whole_runs(problem, design.fractions))
+
+
+def optimal_shares(problem: DurationProblem) -> DurationDesign:
+    """As `solve_durations`, but without whole runs: `repeats` are all zero and their efficiency is nan."""
+    task = task_of(problem)
+    start, best = start_of(task), None
+    cornered = problem.aim.criterion == "E" or problem.robust == "worst"
+    for tolerance in TOLERANCES["cornered" if cornered else "smooth"]:
+        found = climb(task, start, tolerance=tolerance)
+        answer = certify(task, found, kind=THEOREMS.get(problem.aim.criterion, ""))
+        if best is None or answer[0].bound - answer[0].value < best[1][0].gap:
+            best = (found, answer)
+        if best[1][0].gap < 0.3 * LARGEST_GAP * best[1][0].degree:
+            break
+    assert best is not None
+    found, (certificate, slope) = best
+    if not certificate.gap < LARGEST_GAP * certificate.degree:
         raise NoAnswer(
-            f"the durations could not be certified: the sensitivity of {problem.names[int(d.argmax())]!r} is "
-            f"{d.max():.9g}, an optimum needs at most {problem.dimension}"
+            f"the durations could not be certified: a design better by {certificate.gap / certificate.degree:.2g} "
+            f"in {problem.aim.criterion}-efficiency is not excluded, at most {LARGEST_GAP:g} is accepted"
         )
-    return _rounded(problem, fractions, d, gap, whole_runs(problem, matrices, fractions))
+    gap = max(certificate.gap, 0.0)
+    certificate = replace(certificate, bound=certificate.value + gap)
+    return DurationDesign(
+        problem=problem,
+        fractions=found.fractions,
+        sensitivities=slope,
+        log_det=_log_det(problem, found.fractions),
+        gap=gap,
+        repeats=(0,) * len(problem.names),
+        efficiency_repeats=float("nan"),
+        efficiency_uniform=efficiency_of_shares(
+            problem, found.fractions, np.full(len(problem.names), 1.0 / len(problem.names))
+        ),
+        certificate=certificate,
+    )
 
 
 def with_repeats(design: DurationDesign, repeats: Sequence[int]) -> DurationDesign:
@@ -88,7 +150,7 @@ def with_repeats(design: DurationDesign, repeats: Sequence[int]) -> DurationDesi
     Raises:
         NotInformative: the runs do not inform about every parameter.
     """
-    changed = _rounded(design.problem, design.fractions, design.sensitivities, design.gap, tuple(repeats))
+    changed = _with_runs(design, tuple(repeats))
     if not changed.efficiency_repeats > 0:
         raise NotInformative(
             "the given whole runs do not inform about every parameter", parameters=design.problem.parameters
@@ -96,19 +158,13 @@ def with_repeats(design: DurationDesign, repeats: Sequence[int]) -> DurationDesi
     return changed
 
 
-def _rounded(
-    problem: DurationProblem, fractions: Array, sensitivity: Array, gap: float, repeats: tuple[int, ...]
-) -> DurationDesign:
-    matrices, offset = whitened(problem.matrices)
-    best, p = log_det(matrices, fractions), len(problem.parameters)
-    uniform = np.full(len(problem.names), 1.0 / len(problem.names))
-    return DurationDesign(
-        problem=problem,
-        fractions=fractions,
-        sensitivities=sensitivity,
-        log_det=best + offset,
-        gap=gap,
-        repeats=repeats,
-        efficiency_repeats=float(np.exp((value(problem, matrices, np.array(repeats)) - best) / p)),
-        efficiency_uniform=float(np.exp((log_det(matrices, uniform) - best) / p)),
-    )
+def _with_runs(design: DurationDesign, repeats: tuple[int, ...]) -> DurationDesign:
+    efficiency = efficiency_of_runs(design.problem, design.fractions, np.array(repeats))
+    return replace(design, repeats=repeats, efficiency_repeats=efficiency)
+
+
+def _log_det(problem: DurationProblem, fractions: Array) -> float:
+    """log |det B| of the nominal model."""
+    matrix = problem.prior + np.tensordot(fractions, problem.matrices, axes=1)
+    size = np.sqrt(np.where(np.diag(matrix) > 0, np.diag(matrix), 1.0))
+    return float(np.linalg.slogdet(matrix / np.outer(size, size))[1] + 2 * np.log(size).sum())

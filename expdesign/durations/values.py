@@ -2,29 +2,42 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from expdesign.values import Array, seal
+from expdesign.durations.constraints import NO_CONSTRAINTS, Constraints
+from expdesign.durations.criteria import Aim, Picked
+from expdesign.errors import InputError, UnknownName
+from expdesign.values import Array, frozen_set, seal
+
+ROBUST = ("nominal", "average", "worst")
+"""What several models of the ship count for: only the nominal one, their average, or the least of them."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DurationProblem:
-    """Maximise log det B(w), B(w) = sum_q w_q B_q, over time fractions w.
+    """Maximise a criterion of B(w) = B_prior + sum_q w_q B_q over time fractions w.
 
-    With complete mean subtraction B_q = [[X_q, Y_q], [Z_q^T, I]], of dimension p + n: log det B(w) is then the log
-    det of the information matrix after subtraction, because sum w = 1. Otherwise B_q has dimension p.
+    With complete mean subtraction B_q = [[X_q, Y_q], [Z_q^T, I]], of dimension p + n: its Schur complement is the
+    information matrix after subtraction, because sum w = 1. Otherwise B_q has dimension p.
 
     Attributes:
         names: of the primitives.
         parameters: names of the p parameters.
         mean_subtraction: "none", "batch" or "complete".
-        matrices: (q, d, d) B_q in physical parameter scale.
+        matrices: (q, d, d) B_q of the nominal model, in physical parameter scale.
         run_s: (q,) duration of one whole run of each primitive [s].
         total_s: time to share out [s].
+        aim: the criterion and what it needs to know.
+        constraints: limits on the sharing.
+        prior: (d, d) what is known already, per sample of the total time (thesis (7.58)).
+        robust: one of `ROBUST`.
+        sampled: (m, q, d, d) B_q of models drawn from the prior of the nominal parameters; m is 0 for "nominal".
+        equations: (p) equation, "u", "v" or "r", of each parameter; only `constraints.balance` needs it.
 
-    Source: F. Ljungberg, doctoral thesis, Linköping University, (7.50)-(7.57); Schur complement form derived here.
+    Source: F. Ljungberg, doctoral thesis, Linköping University, (7.50)-(7.58); Schur complement form derived here.
     """
 
     names: tuple[str, ...]
@@ -33,14 +46,86 @@ class DurationProblem:
     matrices: Array
     run_s: Array
     total_s: float
+    aim: Aim = field(default_factory=Aim)
+    constraints: Constraints = NO_CONSTRAINTS
+    prior: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    robust: str = "nominal"
+    sampled: Array = field(default_factory=lambda: np.zeros((0, 0, 0, 0)))
+    equations: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        seal(self, matrices="q d d", run_s="q")
+        if np.size(self.prior) == 0:
+            frozen_set(self, "prior", np.zeros(np.shape(self.matrices)[1:]))
+        if np.size(self.sampled) == 0:
+            frozen_set(self, "sampled", np.zeros((0, *np.shape(self.matrices))))
+        seal(self, matrices="q d d", run_s="q", prior="d d", sampled="m q d d")
+        if len(set(self.names)) < len(self.names):
+            twice = next(name for name in self.names if self.names.count(name) > 1)
+            raise InputError(f"two primitives are named {twice!r}, expected every name once")
+        if not 0 < self.total_s < np.inf:
+            raise InputError(f"total_s is {self.total_s:g}, expected more than 0")
+        if self.robust not in ROBUST:
+            raise UnknownName("robust", self.robust, known=ROBUST)
+        if (self.robust != "nominal") != bool(len(self.sampled)):
+            raise InputError(f"robust is {self.robust!r} and {len(self.sampled)} models were sampled")
 
     @property
     def dimension(self) -> int:
         """Size d of B: parameters, and means when they are subtracted over the complete data."""
         return int(self.matrices.shape[1])
+
+    @property
+    def picked(self) -> Picked:
+        """What a criterion works on."""
+        return Picked(aim=self.aim, parameters=self.parameters, dimension=self.dimension)
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether regressors and instruments come from the same noise-free run, so that the problem is convex."""
+        stacks = (self.matrices, self.prior[None], *self.sampled)
+        return all(_symmetric(stack) for stack in stacks)
+
+
+def _symmetric(stack: Array) -> bool:
+    size = np.sqrt(np.abs(np.diagonal(stack, axis1=1, axis2=2)).max(axis=0))
+    size = np.where(size > 0, size, 1.0)
+    return bool(np.all(np.abs(stack - np.swapaxes(stack, 1, 2)) <= 1e-9 * np.outer(size, size)))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Certificate:
+    """Why no other sharing can be better by more than the gap, as numbers that anyone can check.
+
+    For any feasible v the criterion is at most `value` + slope (v - w), with the slope mixed from the models and the
+    limits at their prices; the largest value of that over all feasible v is the bound.
+
+    Attributes:
+        kind: the theorem in a few words, or why there is none.
+        value: the criterion at the design, as a logarithm; `degree` of it are one unit of information.
+        bound: no feasible sharing has more; inf when there is no certificate.
+        degree: value of twice the information is higher by degree x log 2.
+        level: what every sensitivity less its price is at most, and where time is free to move, exactly.
+        mixture: (m,) weights of the sampled models.
+        prices: (q,) what the limits take off each sensitivity.
+        multipliers: price of every limit by name; a limit whose price is zero does not matter.
+    """
+
+    kind: str
+    value: float
+    bound: float
+    degree: int
+    level: float
+    mixture: Array
+    prices: Array
+    multipliers: Mapping[str, float]
+
+    def __post_init__(self) -> None:
+        seal(self, mixture="m", prices="q")
+
+    @property
+    def gap(self) -> float:
+        """bound - value."""
+        return self.bound - self.value
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -50,12 +135,15 @@ class DurationDesign:
     Attributes:
         problem: what was asked.
         fractions: (q,) optimal time fractions, sum 1.
-        sensitivities: (q,) d_q = trace(B(w)^-1 B_q); at the optimum at most `dimension`, equal where w_q > 0.
-        log_det: log det B at `fractions`.
-        gap: max d_q - dimension: no design has a log det above log_det + gap (Kiefer and Wolfowitz 1960).
+        sensitivities: (q,) slope of the criterion; for D trace(B(w)^-1 B_q), at the optimum at most `dimension`, equal
+            where w_q > 0.
+        log_det: log det B at `fractions`, by the nominal model.
+        gap: what any other design may be better by, in the criterion's logarithm (for D in log det).
         repeats: (q,) whole runs.
-        efficiency_repeats: D-efficiency of the whole runs against the optimum, by determinant to the power 1/p.
-        efficiency_uniform: the same for equal time on every primitive.
+        efficiency_repeats: of the whole runs against the optimum, by the criterion: share of the time that the optimum
+            would need for the same.
+        efficiency_uniform: the same for equal time on every primitive, whether that is allowed or not.
+        certificate: the proof.
     """
 
     problem: DurationProblem
@@ -66,19 +154,21 @@ class DurationDesign:
     repeats: tuple[int, ...]
     efficiency_repeats: float
     efficiency_uniform: float
+    certificate: Certificate
 
     def __post_init__(self) -> None:
         seal(self, fractions="q", sensitivities="q")
 
     @property
     def log_det_bound(self) -> float:
-        """Upper bound on the log det of any design."""
-        return self.log_det + self.gap
+        """Upper bound on the log det of any design; inf when the certificate is about something else."""
+        own = self.problem.aim.criterion == "D" and self.problem.robust == "nominal"
+        return self.log_det + self.gap if own else float("inf")
 
     @property
     def gap_relative(self) -> float:
-        """The gap relative to the dimension."""
-        return self.gap / self.problem.dimension
+        """The gap per degree of the criterion: the share of information that may be missing."""
+        return self.gap / self.certificate.degree
 
     @property
     def durations_s(self) -> Array:

@@ -1,0 +1,228 @@
+"""Limits on how the time may be shared, and the polytope of time fractions that they leave.
+
+    least <= w <= most,   rows w <= limits,   sum w = 1
+
+Linear functions over it are bounded from weak duality: for any prices l >= 0 and any feasible v,
+g v <= l limits + max over the box of (g - rows^T l) v, and that maximum is found by sorting. The bound holds whatever
+the prices are; good ones make it tight.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.optimize import linprog
+
+from expdesign.errors import InputError, NoAnswer, UnknownName
+from expdesign.values import Array, seal
+
+TIGHT = 1e-9
+"""Limits are loosened by this share of themselves where they leave no room inside."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Budget:
+    """Something that is used up, e.g. energy or wear.
+
+    Attributes:
+        name: for reports.
+        cost_per_s: use per second of each primitive, by name; those left out use nothing.
+        limit: what there is, in the same unit.
+    """
+
+    name: str
+    cost_per_s: Mapping[str, float]
+    limit: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Constraints:
+    """What the user asks of the sharing, by names of primitives.
+
+    Attributes:
+        least_s, most_s: least and most time of a primitive in all [s].
+        required: primitives that get one whole run at least.
+        excluded: primitives that get no time.
+        budgets: what may be used up.
+        balance: from 0 to 1: the information about each equation's parameters (surge, sway, yaw) must be at least this
+            share, in D-efficiency, of the most that could be had for that equation alone.
+    """
+
+    least_s: Mapping[str, float] = field(default_factory=dict)
+    most_s: Mapping[str, float] = field(default_factory=dict)
+    required: tuple[str, ...] = ()
+    excluded: tuple[str, ...] = ()
+    budgets: tuple[Budget, ...] = ()
+    balance: float = 0.0
+
+    def __post_init__(self) -> None:
+        for what, times in (("least", self.least_s), ("most", self.most_s)):
+            for name, value in times.items():
+                if not 0 <= value < np.inf:
+                    raise InputError(f"design.{what}_s.{name} is {value:g}, expected 0 or more")
+        if not 0 <= self.balance < 1:
+            raise InputError(f"design.balance is {self.balance:g}, expected at least 0 and below 1")
+
+
+NO_CONSTRAINTS = Constraints()
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Polytope:
+    """Feasible time fractions.
+
+    Attributes:
+        least, most: (q,) bounds, 0 to 1.
+        rows: (i, q) use per unit of fraction, each as a share of its limit.
+        limits: (i,) all 1, or 0 where nothing may be used.
+        labels: (i) names of the rows.
+    """
+
+    least: Array
+    most: Array
+    rows: Array
+    limits: Array
+    labels: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        seal(self, least="q", most="q", rows="i q", limits="i")
+
+    @property
+    def plain(self) -> bool:
+        """Whether fractions only have to sum to one."""
+        return not (self.least.any() or (self.most < 1.0).any() or len(self.rows))
+
+    def bound(self, slope: Array, prices: Array) -> float:
+        """Upper bound on slope v over the polytope, from prices (i,) of 0 or more of the rows."""
+        reduced = slope - self.rows.T @ prices
+        order = np.argsort(-reduced)
+        room = (self.most - self.least)[order]
+        left = 1.0 - float(self.least.sum())
+        taken = np.clip(left - np.r_[0.0, np.cumsum(room)[:-1]], 0.0, room)
+        return float(prices @ self.limits + reduced @ self.least + reduced[order] @ taken)
+
+    def prices(self, slope: Array) -> Array:
+        """(i,) prices that make `bound` tight, from linear programming; zero where that fails."""
+        if not len(self.rows):
+            return np.zeros(0)
+        bounds = np.stack([self.least, np.maximum(self.most, self.least)], axis=1)
+        answer = linprog(-slope, self.rows, self.limits, np.ones((1, len(slope))), [1.0], bounds, method="highs")
+        return np.maximum(-answer.ineqlin.marginals, 0.0) if answer.status == 0 else np.zeros(len(self.rows))
+
+    def inside(self) -> Array | None:
+        """(q,) fractions as far from every bound as possible, or None when there is no room."""
+        free = self.most > self.least
+        margin = np.where(free, 1.0 / len(free), 0.0)
+        upper = np.where(self.most < 1.0, margin, 0.0)
+        weight = np.maximum(np.abs(self.rows).max(axis=1, initial=0.0), 1e-12)
+        eye = np.eye(len(free))
+        A = np.block([[-eye, margin[:, None]], [eye, upper[:, None]], [self.rows, weight[:, None]]])
+        b = np.r_[-self.least, np.maximum(self.most, self.least), self.limits]
+        sum_row = np.r_[np.ones(len(free)), 0.0][None]
+        bounds = [(None, None)] * len(free) + [(None, 1.0)]
+        goal = np.r_[np.zeros(len(free)), -1.0]
+        answer = linprog(goal, A, b, sum_row, [1.0], bounds, method="highs")
+        if answer.status != 0 or answer.x[-1] <= TIGHT:
+            return None
+        return np.asarray(answer.x[:-1])
+
+    def loosened(self) -> Polytope:
+        """The same with limits of rows moved by `TIGHT`."""
+        return Polytope(
+            least=self.least, most=self.most, rows=self.rows, limits=self.limits + TIGHT, labels=self.labels
+        )
+
+
+def feasible_set(constraints: Constraints, names: Sequence[str], *, run_s: Array, total_s: float) -> Polytope:
+    """The polytope of time fractions.
+
+    Args:
+        constraints: what was asked.
+        names: of the q primitives.
+        run_s: (q,) duration of one run [s].
+        total_s: time to share out [s].
+
+    Raises:
+        UnknownName: a primitive that is not in the dictionary.
+        InputError: limits that contradict each other.
+        NoAnswer: no sharing meets them all; the message names the one in the way.
+    """
+    least, most = np.zeros(len(names)), np.ones(len(names))
+    for name, value in constraints.least_s.items():
+        least[_index(names, name, "design.least_s")] = value / total_s
+    for name in constraints.required:
+        index = _index(names, name, "design.required")
+        least[index] = max(least[index], run_s[index] / total_s)
+    for name, value in constraints.most_s.items():
+        most[_index(names, name, "design.most_s")] = min(value / total_s, 1.0)
+    for name in constraints.excluded:
+        most[_index(names, name, "design.excluded")] = 0.0
+    rows, limits = _rows(constraints.budgets, names, total_s)
+    polytope = Polytope(
+        least=least, most=most, rows=rows, limits=limits, labels=tuple(item.name for item in constraints.budgets)
+    )
+    _check_box(polytope, names, total_s)
+    _check_budgets(polytope, constraints.budgets)
+    return polytope
+
+
+def _index(names: Sequence[str], name: str, key: str) -> int:
+    if name not in names:
+        raise UnknownName(f"primitive in {key}", name, known=names)
+    return list(names).index(name)
+
+
+def _rows(budgets: Sequence[Budget], names: Sequence[str], total_s: float) -> tuple[Array, Array]:
+    rows, limits = np.zeros((len(budgets), len(names))), np.ones(len(budgets))
+    for row, budget in zip(range(len(budgets)), budgets, strict=True):
+        if not 0 <= budget.limit < np.inf:
+            raise InputError(f"budget {budget.name!r} has the limit {budget.limit:g}, expected 0 or more")
+        for name, cost in budget.cost_per_s.items():
+            if not 0 <= cost < np.inf:
+                raise InputError(f"budget {budget.name!r}: the cost of {name!r} is {cost:g}, expected 0 or more")
+            rows[row, _index(names, name, f"budget {budget.name!r}")] = cost * total_s
+        scale = budget.limit or float(rows[row].max(initial=0.0)) or 1.0
+        rows[row] /= scale
+        limits[row] = budget.limit / scale
+    return rows, limits
+
+
+def _check_box(polytope: Polytope, names: Sequence[str], total_s: float) -> None:
+    wrong = np.flatnonzero(polytope.least > polytope.most * (1 + 1e-12))
+    if len(wrong):
+        index = int(wrong[0])
+        raise InputError(
+            f"primitive {names[index]!r} must get at least {polytope.least[index] * total_s:g} s and may get at most "
+            f"{polytope.most[index] * total_s:g} s"
+        )
+    if polytope.least.sum() > 1 + 1e-12:
+        raise NoAnswer(
+            f"design.total_s is {total_s:g}, but the least times and required runs take "
+            f"{polytope.least.sum() * total_s:g} s"
+        )
+    if polytope.most.sum() < 1 - 1e-12:
+        raise NoAnswer(
+            f"design.total_s is {total_s:g}, but the most times allow only {polytope.most.sum() * total_s:g} s"
+        )
+
+
+def _check_budgets(polytope: Polytope, budgets: Sequence[Budget]) -> None:
+    """Each budget alone against the least it can be brought to, then all together."""
+    for row, limit, budget in zip(polytope.rows, polytope.limits, budgets, strict=True):
+        alone = Polytope(
+            least=polytope.least, most=polytope.most, rows=np.zeros((0, len(row))), limits=np.zeros(0), labels=()
+        )
+        needed = -alone.bound(-row, np.zeros(0))
+        if needed > limit * (1 + TIGHT) + TIGHT:
+            scale = budget.limit / limit if limit else 1.0
+            raise NoAnswer(
+                f"budget {budget.name!r} has the limit {budget.limit:g}, but no sharing of the time uses less than "
+                f"{needed * scale:g}"
+            )
+    if len(budgets) and polytope.inside() is None and polytope.loosened().inside() is None:
+        raise NoAnswer(
+            f"no sharing of the time keeps the budgets {', '.join(item.name for item in budgets)} together with the "
+            "least and most times"
+        )

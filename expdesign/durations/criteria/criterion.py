@@ -1,0 +1,112 @@
+"""What a design is good for: a criterion, and what the user has to say for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from expdesign.durations.criteria.measures import Measure
+from expdesign.errors import InputError, UnknownName
+from expdesign.values import Array, seal
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Aim:
+    """What the estimates are for.
+
+    The noise of an equation is the standard deviation of its one-step residual; with it M / noise^2 is information in
+    the units of the parameters. D and D_s do without, because each parameter stands in one equation; A, E and V compare
+    parameters of different equations and need it.
+
+    Attributes:
+        criterion: name in `CRITERIA`.
+        interest: parameters of interest; empty for all. Parameters that stand for disturbances should be left out.
+        unit: (p,) error of each parameter of interest that counts as one, e.g. |theta|; empty when not stated, zero
+            where it is not known. A and E use it.
+        noise: (p,) residual noise of each parameter's equation; empty when not stated, zero where it is not known.
+        outcomes: names of what is to be predicted.
+        gradients: (o, p) slope of each outcome with the parameters, in units of the error that counts as one.
+    """
+
+    criterion: str = "D"
+    interest: tuple[str, ...] = ()
+    unit: Array = field(default_factory=lambda: np.zeros(0))
+    noise: Array = field(default_factory=lambda: np.zeros(0))
+    outcomes: tuple[str, ...] = ()
+    gradients: Array = field(default_factory=lambda: np.zeros((0, 0)))
+
+    def __post_init__(self) -> None:
+        seal(self, unit="a", noise="b", gradients="o g")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Picked:
+    """What a criterion works on.
+
+    Attributes:
+        aim: what the user said.
+        parameters: p names.
+        dimension: d, size of the information matrix: parameters, then means.
+    """
+
+    aim: Aim
+    parameters: tuple[str, ...]
+    dimension: int
+
+    def columns(self, names: tuple[str, ...]) -> Array:
+        """(d, k) unit columns of named parameters.
+
+        Raises:
+            UnknownName: no such parameter.
+        """
+        for name in names:
+            if name not in self.parameters:
+                raise UnknownName("parameter of interest", name, known=self.parameters)
+        return np.eye(self.dimension)[:, [self.parameters.index(name) for name in names]]
+
+    @property
+    def interest(self) -> tuple[str, ...]:
+        """Names of the parameters of interest."""
+        return self.aim.interest or self.parameters
+
+    def scaled_columns(self, criterion: str) -> Array:
+        """(d, k) columns of the parameters of interest, each over the error that counts as one, times its noise.
+
+        Raises:
+            InputError: a unit or a noise is not stated.
+        """
+        unit = self._stated(self.aim.unit, criterion, "a nominal value other than zero, or a unit", self.interest)
+        noise = self.noise(criterion, self.interest)
+        return self.columns(self.interest) * (noise / unit)
+
+    def noise(self, criterion: str, names: tuple[str, ...]) -> Array:
+        """(k,) residual noise of the equations of named parameters.
+
+        Raises:
+            InputError: it is not stated.
+        """
+        return self._stated(self.aim.noise, criterion, "the noise of its equation", names)
+
+    def _stated(self, values: Array, criterion: str, what: str, names: tuple[str, ...]) -> Array:
+        known: Mapping[str, float] = dict(zip(self.parameters, values.tolist(), strict=False))
+        missing = [name for name in names if not known.get(name, 0.0) > 0.0]
+        if missing:
+            raise InputError(f"criterion {criterion} needs {what} for {', '.join(missing)}")
+        return np.array([known[name] for name in names])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Criterion:
+    """A design criterion.
+
+    Attributes:
+        name: as in scenario files.
+        title: what it makes best, in a few words.
+        measure: of the information matrix; raises InputError when the aim does not say enough.
+    """
+
+    name: str
+    title: str
+    measure: Callable[[Picked], Measure]

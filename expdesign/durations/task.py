@@ -1,0 +1,102 @@
+"""From a duration problem to the concave task that the interior-point method solves."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from expdesign.durations.constraints import Polytope, feasible_set
+from expdesign.durations.criteria import LogDet, Measure, criterion
+from expdesign.durations.interior import Task, climb, warmed
+from expdesign.durations.objective import Objective, pieces_of
+from expdesign.durations.values import DurationProblem
+from expdesign.errors import InputError, NoAnswer
+from expdesign.values import Array
+
+
+def symmetric_part(matrices: Array) -> Array:
+    """(..., d, d) half the sum with the transpose."""
+    return np.asarray((matrices + np.swapaxes(matrices, -1, -2)) / 2)
+
+
+def objective_of(problem: DurationProblem, measure: Measure) -> Objective:
+    """A measure over the models that the problem asks to be robust against.
+
+    Raises:
+        NotInformative: equal shares do not inform about every parameter.
+    """
+    stacks = problem.sampled if len(problem.sampled) else problem.matrices[None]
+    stacks, prior = symmetric_part(stacks), symmetric_part(problem.prior)
+    pieces = pieces_of(stacks, [prior] * len(stacks), [measure] * len(stacks))
+    return Objective(pieces, np.zeros(len(stacks)), worst=problem.robust == "worst")
+
+
+def polytope_of(problem: DurationProblem) -> Polytope:
+    """The linear limits.
+
+    Raises:
+        UnknownName, InputError, NoAnswer: see `feasible_set`.
+    """
+    return feasible_set(problem.constraints, problem.names, run_s=problem.run_s, total_s=problem.total_s)
+
+
+def task_of(problem: DurationProblem, measure: Measure | None = None) -> Task:
+    """The concave task of a problem, for its own criterion or another measure.
+
+    Raises:
+        UnknownName, InputError: the aim or the limits are wrong.
+        NotInformative: equal shares do not inform about every parameter.
+        NoAnswer: no sharing meets the limits.
+    """
+    measure = measure or criterion(problem.aim.criterion).measure(problem.picked)
+    return Task(objective=objective_of(problem, measure), polytope=polytope_of(problem), floors=_floors(problem))
+
+
+def start_of(task: Task) -> Array:
+    """(q,) fractions strictly inside the limits.
+
+    Raises:
+        NoAnswer: the floors cannot all be kept.
+    """
+    if task.polytope.plain:
+        start: Array | None = np.full(len(task.polytope.least), 1.0 / len(task.polytope.least))
+    else:
+        start = task.polytope.inside()
+    if start is None:  # a checked polytope has points; only rounding leaves it no inside
+        start = task.polytope.loosened().inside()
+    if start is None:
+        start = np.array(task.polytope.least)
+    if not task.floors:
+        return warmed(task, start)
+    least = Objective(
+        tuple(piece for floor in task.floors for piece in floor.pieces),
+        np.concatenate([floor.levels for floor in task.floors]),
+        worst=True,
+    )
+    best = climb(Task(objective=least, polytope=task.polytope), start, tolerance=1e-6).fractions
+    inside = 0.99 * best + 0.01 * start if least.value(0.99 * best + 0.01 * start) > 0 else best
+    if not least.value(inside) > 0:
+        share = float(np.exp(least.value(best) / least.pieces[0].measure.degree))
+        raise NoAnswer(
+            "design.balance cannot be met: no sharing within the other limits informs about every equation as well; "
+            f"about {share:.2g} of it can be had"
+        )
+    return inside
+
+
+def _floors(problem: DurationProblem) -> tuple[Objective, ...]:
+    """One concave function per equation: its log det above the balanced share of the best for it alone."""
+    balance = problem.constraints.balance
+    if not balance > 0:
+        return ()
+    if len(problem.equations) != len(problem.parameters):
+        raise InputError("design.balance needs the equation of every parameter")
+    return tuple(_floor(problem, equation, balance) for equation in dict.fromkeys(problem.equations))
+
+
+def _floor(problem: DurationProblem, equation: str, balance: float) -> Objective:
+    names = tuple(n for n, e in zip(problem.parameters, problem.equations, strict=True) if e == equation)
+    measure = LogDet(problem.picked.columns(names))
+    piece = pieces_of([symmetric_part(problem.matrices)], [symmetric_part(problem.prior)], [measure])
+    alone = Task(objective=Objective(piece, np.zeros(1)), polytope=polytope_of(problem))
+    best = alone.objective.value(climb(alone, start_of(alone), tolerance=1e-8).fractions)
+    return Objective(piece, np.array([best + len(names) * np.log(balance)]))
