@@ -16,7 +16,7 @@ FLOORS = (
     ("signals",),
     ("vessel",),
     ("simulation", "records"),
-    ("dictionary", "estimation"),
+    ("dictionary", "estimation", "indices"),
     ("information", "diagnosis", "assessment"),
     ("durations",),
     ("plan",),

@@ -1,0 +1,37 @@
+"""Manoeuvring indices of IMO MSC.137(76): from simulated and from measured standard trials, with their criteria.
+
+Advance, transfer and tactical diameter are those of the midship point, the origin of the b-frame, counted from the
+rudder order along and across the heading of the approach. SI units and radians; sides are "starboard" and "port".
+"""
+
+from expdesign.indices.admissibility import BEAUFORT_MPS, Condition, Conditions, admissibility, beaufort
+from expdesign.indices.criteria import Criterion, Verdict, criteria, judge
+from expdesign.indices.measured import NotStandard, measured_trial, measured_trials
+from expdesign.indices.outcomes import OUTCOMES, StandardResults, outcomes, standard_results
+from expdesign.indices.values import Circle, Execute, Stop, ZigZag
+from expdesign.indices.watched import Watched, watched
+
+__all__ = [
+    "BEAUFORT_MPS",
+    "OUTCOMES",
+    "Circle",
+    "Condition",
+    "Conditions",
+    "Criterion",
+    "Execute",
+    "NotStandard",
+    "StandardResults",
+    "Stop",
+    "Verdict",
+    "Watched",
+    "ZigZag",
+    "admissibility",
+    "beaufort",
+    "criteria",
+    "judge",
+    "measured_trial",
+    "measured_trials",
+    "outcomes",
+    "standard_results",
+    "watched",
+]

@@ -1,0 +1,207 @@
+"""The outcomes of a vessel's standard trials, simulated: value in, named numbers out."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from expdesign.errors import InputError, NoAnswer
+from expdesign.indices.read import read_circle, read_stop, read_zigzag
+from expdesign.indices.values import Circle, Stop, ZigZag
+from expdesign.indices.watched import watched
+from expdesign.simulation import Conduct, stopping, turning_circle, zigzag
+from expdesign.simulation.helm import steady_ahead
+from expdesign.values import Array
+from expdesign.vessel import Vessel
+
+OUTCOMES = {
+    "advance_m": "advance in the turning circle",
+    "transfer_m": "transfer in the turning circle",
+    "tactical_diameter_m": "tactical diameter of the turning circle",
+    "initial_turning_m": "distance to 10 degrees of heading at 10 degrees of helm",
+    "overshoot_10_10_rad": "first overshoot of the 10/10 zig-zag",
+    "second_overshoot_10_10_rad": "second overshoot of the 10/10 zig-zag",
+    "overshoot_20_20_rad": "first overshoot of the 20/20 zig-zag",
+    "stopping_distance_m": "track reach of the stop at full astern",
+}
+"""Name -> meaning of every outcome."""
+ZIGZAGS = (math.radians(10.0), math.radians(20.0))
+
+
+@dataclass(frozen=True, kw_only=True)
+class StandardResults:
+    """All standard trials of one vessel at one approach speed.
+
+    Attributes:
+        vessel: its name.
+        length_m: of the ship.
+        speed_mps: approach speed.
+        helm: what steered, in words.
+        circles, zigzags, stops: what was run, starboard before port.
+        not_run: why a trial could not be run, one sentence each.
+    """
+
+    vessel: str
+    length_m: float
+    speed_mps: float
+    helm: str
+    circles: tuple[Circle, ...]
+    zigzags: tuple[ZigZag, ...]
+    stops: tuple[Stop, ...]
+    not_run: tuple[str, ...]
+
+    @property
+    def trials(self) -> tuple[Circle | ZigZag | Stop, ...]:
+        """All of them in order."""
+        return (*self.circles, *self.zigzags, *self.stops)
+
+
+def standard_results(
+    vessel: Vessel,
+    *,
+    speed_mps: float | None = None,
+    helm_rad: float | None = None,
+    sides: tuple[str, ...] = ("starboard", "port"),
+    thrusters: str = "stern",
+) -> StandardResults:
+    """Turning circles, 10/10 and 20/20 zig-zags and the stop of a vessel in calm water.
+
+    Args:
+        vessel: with its nominal model.
+        speed_mps: approach speed, or None for the speed at 85 % of the engines' power.
+        helm_rad: of the turning circles, or None for 35 degrees or what the actuators can give.
+        sides: of the first turn.
+        thrusters: "stern" or "all", which azimuth thrusters steer a vessel without rudders.
+
+    Raises:
+        InputError: the vessel cannot hold a steady course at that speed.
+    """
+    approach = steady_ahead(vessel, speed_mps, thrusters=thrusters)
+    speed = float(approach.velocity[0])
+    conduct = Conduct(speed_mps=speed, thrusters=thrusters)
+    circles, zigzags, stops, not_run = [], [], [], []
+    for side in sides:
+        try:
+            circles.append(simulated_circle(vessel, side=side, helm_rad=helm_rad, conduct=conduct))
+        except (InputError, NoAnswer) as error:
+            not_run.append(f"turning circle to {side}: {error}")
+        for angle in ZIGZAGS:
+            try:
+                zigzags.append(simulated_zigzag(vessel, angle_rad=angle, side=side, conduct=conduct))
+            except (InputError, NoAnswer) as error:
+                not_run.append(f"zig-zag {math.degrees(angle):.0f}/{math.degrees(angle):.0f} to {side}: {error}")
+    try:
+        stops.append(simulated_stop(vessel, conduct=conduct))
+    except (InputError, NoAnswer) as error:
+        not_run.append(str(error))
+    return StandardResults(
+        vessel=vessel.name,
+        length_m=vessel.length_m,
+        speed_mps=approach.speed_mps,
+        helm=approach.helm.description,
+        circles=tuple(circles),
+        zigzags=tuple(zigzags),
+        stops=tuple(stops),
+        not_run=tuple(not_run),
+    )
+
+
+def simulated_circle(vessel: Vessel, *, side: str, helm_rad: float | None, conduct: Conduct) -> Circle:
+    """A simulated turning circle."""
+    commands, motion = turning_circle(vessel, side=side, helm_rad=helm_rad, conduct=conduct)
+    run = watched(vessel, commands, motion, name=f"circle to {side}", thrusters=conduct.thrusters)
+    approach = steady_ahead(vessel, conduct.speed_mps, thrusters=conduct.thrusters)
+    return read_circle(
+        run,
+        order_s=0.0,
+        course_rad=0.0,
+        side=1 if side == "starboard" else -1,
+        helm_rad=abs(float(run.helm_rad[-1]) - approach.angle_rad),
+        speed_mps=approach.speed_mps,
+        current=False,
+    )
+
+
+def simulated_zigzag(vessel: Vessel, *, angle_rad: float, side: str, conduct: Conduct) -> ZigZag:
+    """A simulated zig-zag with equal angles of heading and helm."""
+    commands, motion = zigzag(vessel, heading_rad=angle_rad, helm_rad=angle_rad, side=side, conduct=conduct)
+    degrees = f"{math.degrees(angle_rad):.0f}"
+    run = watched(vessel, commands, motion, name=f"zig-zag {degrees}/{degrees} to {side}", thrusters=conduct.thrusters)
+    way = 1 if side == "starboard" else -1
+    first = run.first_turned(way * angle_rad, since_s=0.0, course_rad=0.0)
+    second = None if first is None else run.first_turned(-way * angle_rad, since_s=first, course_rad=0.0)
+    return read_zigzag(
+        run,
+        orders_s=tuple(time for time in (0.0, first, second) if time is not None),
+        course_rad=0.0,
+        side=way,
+        helm_rad=angle_rad,
+        speed_mps=float(math.hypot(*motion.velocity[0, :2])),
+        heading_rad=angle_rad,
+    )
+
+
+def simulated_stop(vessel: Vessel, *, conduct: Conduct) -> Stop:
+    """A simulated stop at full astern."""
+    commands, motion = stopping(vessel, conduct=conduct)
+    run = watched(vessel, commands, motion, name="full astern", thrusters=conduct.thrusters)
+    found = read_stop(run, order_s=0.0, course_rad=0.0, speed_mps=float(math.hypot(*motion.velocity[0, :2])))
+    if found is None:
+        raise NoAnswer(f"stopping: vessel {vessel.name!r} keeps its headway")
+    return found
+
+
+def outcomes(
+    vessel: Vessel,
+    *,
+    speed_mps: float | None = None,
+    parameters: Array | None = None,
+    names: tuple[str, ...] = tuple(OUTCOMES),
+    side: str = "starboard",
+    thrusters: str = "stern",
+) -> dict[str, float]:
+    """Named outcomes of the standard trials, for criteria that ask what the model predicts.
+
+    They vary continuously with the parameters: orders fall between samples and crossings are interpolated.
+
+    Args:
+        vessel: structure, actuators and nominal parameters.
+        speed_mps: approach speed, or None for the speed at 85 % of the engines' power *of these parameters*; give it
+            when parameters vary, so that the trial stays the same.
+        parameters: (p,) other parameter values, or None for the vessel's.
+        names: keys of `OUTCOMES`, in the order wished; only the trials they need are run.
+        side: of the first turn.
+        thrusters: "stern" or "all".
+
+    Raises:
+        InputError: the vessel cannot run a trial, or a name is not an outcome.
+        NoAnswer: a trial does not come to its end.
+    """
+    ship = vessel if parameters is None else replace(vessel, model=vessel.model.with_parameters(parameters))
+    unknown = [name for name in names if name not in OUTCOMES]
+    if unknown:
+        raise InputError(f"outcome {unknown[0]!r} is not known, expected some of {', '.join(OUTCOMES)}")
+    conduct = Conduct(
+        speed_mps=float(steady_ahead(ship, speed_mps, thrusters=thrusters).velocity[0]), thrusters=thrusters
+    )
+    values: dict[str, float | None] = {}
+    if {"advance_m", "transfer_m", "tactical_diameter_m"} & set(names):
+        circle = simulated_circle(ship, side=side, helm_rad=None, conduct=conduct)
+        values |= {key: getattr(circle, key) for key in ("advance_m", "transfer_m", "tactical_diameter_m")}
+    if {"initial_turning_m", "overshoot_10_10_rad", "second_overshoot_10_10_rad"} & set(names):
+        ten = simulated_zigzag(ship, angle_rad=ZIGZAGS[0], side=side, conduct=conduct)
+        first, second = (*ten.overshoots_rad, None, None)[:2]
+        values["initial_turning_m"] = ten.initial_turning_m
+        values |= {"overshoot_10_10_rad": first, "second_overshoot_10_10_rad": second}
+    if "overshoot_20_20_rad" in names:
+        twenty = simulated_zigzag(ship, angle_rad=ZIGZAGS[1], side=side, conduct=conduct)
+        values["overshoot_20_20_rad"] = (*twenty.overshoots_rad, None)[0]
+    if "stopping_distance_m" in names:
+        values["stopping_distance_m"] = simulated_stop(ship, conduct=conduct).track_reach_m
+    return {name: _shown(ship, name, values[name]) for name in names}
+
+
+def _shown(vessel: Vessel, name: str, value: float | None) -> float:
+    if value is None:
+        raise NoAnswer(f"vessel {vessel.name!r}: its trial does not show {OUTCOMES[name]}")
+    return value

@@ -1,0 +1,95 @@
+"""What standard trials show."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class Circle:
+    """A turning circle; None where the trial ended too early to show it.
+
+    Attributes:
+        name: of the run.
+        side: "starboard" or "port", to which the ship turned.
+        helm_rad: size of the helm, positive.
+        speed_mps: approach speed.
+        advance_m: way along the approach heading from the rudder order to 90 degrees change of heading.
+        transfer_m: way across it to 90 degrees.
+        tactical_diameter_m: way across it to 180 degrees.
+        initial_turning_m: distance sailed until the heading has changed by 10 degrees.
+        steady_diameter_m: of the steady turn.
+        current_north_mps, current_east_mps: uniform current that was found in the turn and taken out, or None.
+    """
+
+    name: str
+    side: str
+    helm_rad: float
+    speed_mps: float
+    advance_m: float | None
+    transfer_m: float | None
+    tactical_diameter_m: float | None
+    initial_turning_m: float | None
+    steady_diameter_m: float | None
+    current_north_mps: float | None = None
+    current_east_mps: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Execute:
+    """A rudder order of a zig-zag.
+
+    Attributes:
+        time_s: since the start of the run.
+        heading_rad: change of heading from the approach, positive to the side of the first turn.
+    """
+
+    time_s: float
+    heading_rad: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class ZigZag:
+    """A zig-zag.
+
+    Attributes:
+        name: of the run.
+        side: of the first turn.
+        heading_rad, helm_rad: change of heading at which the helm was reversed, and its size, positive.
+        speed_mps: approach speed.
+        executes: rudder orders, the first included.
+        overshoots_rad: additional change of heading after the second, third, ... execute, positive.
+        initial_turning_m: distance sailed from the first execute until the heading has changed by `heading_rad`.
+    """
+
+    name: str
+    side: str
+    heading_rad: float
+    helm_rad: float
+    speed_mps: float
+    executes: tuple[Execute, ...]
+    overshoots_rad: tuple[float, ...]
+    initial_turning_m: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stop:
+    """A stopping trial.
+
+    Attributes:
+        name: of the run.
+        speed_mps: approach speed.
+        track_reach_m: distance sailed from the order astern until the ship has no headway.
+        head_reach_m: the same along the approach heading.
+        lateral_m: deviation to starboard of the approach heading.
+        heading_change_rad: at the end, positive to starboard.
+        time_s: from the order.
+    """
+
+    name: str
+    speed_mps: float
+    track_reach_m: float
+    head_reach_m: float
+    lateral_m: float
+    heading_change_rad: float
+    time_s: float

@@ -1,0 +1,127 @@
+"""A run of a steered ship as the indices see it: motion between samples, helm, engine order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+from scipy.optimize import brentq
+
+from expdesign.signals import Commands, Trajectory
+from expdesign.simulation import Helm
+from expdesign.values import Array, seal
+from expdesign.vessel import KINDS, Vessel
+
+Curve = Callable[[float], float]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Watched:
+    """Motion and orders of one run; between samples positions and heading are cubics that fit the velocities.
+
+    Attributes:
+        name: for reports.
+        length_m: of the ship.
+        time_s: (k,).
+        pose: (k, 3) midship point north, east [m]; heading [rad], continuous.
+        velocity: (k, 3) over ground, b-frame.
+        order_time_s: (j,) times that `helm_rad` and `drive` belong to.
+        helm_rad: (j,) helm angle in the actuators' own sense.
+        drive: (j,) engine order or mean propeller speed, ahead positive.
+    """
+
+    name: str
+    length_m: float
+    time_s: Array
+    pose: Array
+    velocity: Array
+    order_time_s: Array
+    helm_rad: Array
+    drive: Array
+
+    def __post_init__(self) -> None:
+        seal(self, time_s="k", pose="k 3", velocity="k 3", order_time_s="j", helm_rad="j", drive="j")
+
+    @cached_property
+    def _motion(self) -> CubicHermiteSpline:
+        c, s = np.cos(self.pose[:, 2]), np.sin(self.pose[:, 2])
+        u, v, r = self.velocity.T
+        return CubicHermiteSpline(self.time_s, self.pose, np.stack([u * c - v * s, u * s + v * c, r], axis=1))
+
+    def at(self, time_s: float) -> Array:
+        """(3,) pose at a time within the run."""
+        return np.asarray(self._motion(time_s), dtype=float)
+
+    def sailed_m(self, first_s: float, last_s: float) -> float:
+        """Distance sailed between two times [m]."""
+        inner = self.time_s[(self.time_s > first_s) & (self.time_s < last_s)]
+        times = np.concatenate([[first_s], inner, [last_s]])
+        fine = np.concatenate([*(np.linspace(a, b, 4, endpoint=False) for a, b in pairwise(times)), [last_s]])
+        return float(np.hypot(*np.diff(self._motion(fine)[:, :2], axis=0).T).sum())
+
+    def first_turned(self, change_rad: float, *, since_s: float, course_rad: float) -> float | None:
+        """When the heading first differs by `change_rad` (signed) from the course, or None."""
+        beyond = np.sign(change_rad) * (self.pose[:, 2] - course_rad - change_rad)
+        found = np.flatnonzero((beyond >= 0) & (self.time_s >= since_s))
+        if not len(found) or found[0] == 0:
+            return None
+        index = int(found[0])
+        return crossing(
+            lambda t: float(self._motion(t)[2]) - course_rad - change_rad, self.time_s[index - 1], self.time_s[index]
+        )
+
+    def turning_point(self, first_s: float, last_s: float, *, side: int) -> tuple[float, float] | None:
+        """(time, heading) of the largest heading to a side (+1 starboard) strictly between two times, or None."""
+        inside = np.flatnonzero((self.time_s >= first_s) & (self.time_s <= last_s))
+        if len(inside) < 3:
+            return None
+        top = int(inside[np.argmax(side * self.pose[inside, 2])])
+        if top == len(self.time_s) - 1 or self.time_s[top] >= last_s:
+            return None
+        low, high = self.time_s[max(top - 1, 0)], self.time_s[top + 1]
+        fine = np.linspace(low, high, 401)
+        headings = self._motion(fine)[:, 2]
+        best = int(np.argmax(side * headings))
+        return float(fine[best]), float(headings[best])
+
+
+def crossing(curve: Curve, low: float, high: float) -> float:
+    """Where a curve changes sign between two times; the nearer end where it does not quite."""
+    first, last = curve(low), curve(high)
+    if first * last > 0:
+        return low if abs(first) < abs(last) else high
+    return float(brentq(curve, low, high, xtol=1e-9))
+
+
+def watched(vessel: Vessel, commands: Commands, motion: Trajectory, *, name: str, thrusters: str = "stern") -> Watched:
+    """A simulated trial as the indices see it; the mean command of a sample belongs to its middle."""
+    helm = Helm(vessel=vessel, thrusters=thrusters)
+    return Watched(
+        name=name,
+        length_m=vessel.length_m,
+        time_s=motion.time_s,
+        pose=motion.pose,
+        velocity=motion.velocity,
+        order_time_s=motion.time_s[:-1] + commands.sample_time_s / 2,
+        **orders(helm, commands.names, commands.values),
+    )
+
+
+def orders(helm: Helm, names: tuple[str, ...], values: Array) -> dict[str, Array]:
+    """`helm_rad` and `drive` (k,) of recorded actuator signals (k, m); zero where nothing tells."""
+    column = {name: values[:, index] for index, name in enumerate(names)}
+    thrust = [column[a.signals[0]] for a in helm.vessel.actuators if KINDS[a.kind][0] == "n" and a.signals[0] in column]
+    if "tau_x" in column:
+        thrust = [column["tau_x"]]
+    turned = [column[a.signals[-1]] for a in helm.steering if a.kind != "force" and a.signals[-1] in column]
+    if not turned and {"tau_x", "tau_y"} <= column.keys():
+        turned = [np.arctan2(column["tau_y"], np.abs(column["tau_x"]))]
+    nothing = np.zeros(len(values))
+    return {
+        "helm_rad": np.mean(turned, axis=0) if turned else nothing,
+        "drive": np.mean(thrust, axis=0) if thrust else nothing,
+    }

@@ -1,0 +1,147 @@
+"""Indices agree with plain readings of finely sampled motion, and with measured records of the same trials."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from measured_trials import TUG_TRUE
+from nomoto_ship import nomoto_ship
+from vessel_files import KVLCC2, write_vessel
+
+from expdesign.errors import InputError
+from expdesign.indices import Circle, NotStandard, Stop, ZigZag, measured_trial, standard_results
+from expdesign.records import load_records
+from expdesign.scenario import load_vessel
+from expdesign.signals import Batch, Commands, Trajectory
+from expdesign.simulation import Conduct, steady_ahead, stopping, turning_circle, zigzag
+from expdesign.vessel import Vessel
+
+DATA = Path(__file__).parents[2] / "shared" / "data" / "kvlcc2-hsva-7m"
+SPEED, TEN = 2.0, math.radians(10)
+FINE = Conduct(speed_mps=SPEED, sample_time_s=0.02)
+
+
+def test_the_tugs_circle_agrees_with_a_reading_of_fine_samples_to_half_a_per_cent() -> None:
+    found = standard_results(TUG_TRUE, speed_mps=SPEED, sides=("port",)).circles[0]
+    pose = turning_circle(TUG_TRUE, side="port", conduct=FINE)[1].pose
+    quarter, half = (int(np.argmax(-pose[:, 2] >= angle)) for angle in (math.pi / 2, math.pi))
+    assert found.advance_m == pytest.approx(pose[quarter, 0], rel=5e-3)
+    assert found.transfer_m == pytest.approx(-pose[quarter, 1], rel=5e-3)
+    assert found.tactical_diameter_m == pytest.approx(-pose[half, 1], rel=5e-3)
+
+
+def test_the_tugs_zigzag_and_stop_agree_with_a_reading_of_fine_samples() -> None:
+    found = standard_results(TUG_TRUE, speed_mps=SPEED, sides=("starboard",))
+    heading = zigzag(TUG_TRUE, heading_rad=TEN, helm_rad=TEN, conduct=FINE)[1].pose[:, 2]
+    assert found.zigzags[0].overshoots_rad == pytest.approx(
+        (heading.max() - TEN, -heading.min() - TEN), rel=5e-3, abs=math.radians(0.1)
+    )
+    assert found.stops[0].track_reach_m == pytest.approx(stopping(TUG_TRUE, conduct=FINE)[1].pose[-1, 0], rel=5e-3)
+
+
+def as_batch(vessel: Vessel, commands: Commands, motion: Trajectory, *, turn_rad: float = 0.0) -> Batch:
+    """What perfect instruments record, in a frame turned by an angle."""
+    c, s = math.cos(turn_rad), math.sin(turn_rad)
+    pose = motion.pose[:-1] @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) + (300.0, -80.0, turn_rad)
+    return Batch(
+        name="recorded",
+        sample_time_s=motion.sample_time_s,
+        input_names=vessel.model.inputs,
+        inputs=commands.values,
+        velocity=motion.velocity[:-1],
+        pose=pose,
+    )
+
+
+@pytest.mark.parametrize("vessel", [nomoto_ship(), nomoto_ship(sense=1.0, bias=0.02), TUG_TRUE])
+@pytest.mark.parametrize("side", ["starboard", "port"])
+def test_a_record_of_a_trial_shows_what_the_trial_showed(vessel: Vessel, side: str) -> None:
+    speed = 2.0 if vessel is TUG_TRUE else 7.0
+    step = 0.1
+    conduct = Conduct(speed_mps=speed, approach_s=30.0, sample_time_s=step)
+    expected = standard_results(vessel, speed_mps=speed, sides=(side,))
+    circle, zig = expected.circles[0], expected.zigzags[0]
+    trial = turning_circle(vessel, side=side, conduct=conduct)
+    found = measured_trial(vessel, as_batch(vessel, *trial, turn_rad=1.0))
+    assert isinstance(found, Circle)
+    assert (found.side, found.speed_mps) == (side, pytest.approx(steady_ahead(vessel, speed).speed_mps))
+    for key in ("advance_m", "transfer_m", "tactical_diameter_m"):
+        assert getattr(found, key) == pytest.approx(getattr(circle, key), rel=0.01, abs=2 * speed * step)
+    trial = zigzag(vessel, heading_rad=TEN, helm_rad=TEN, side=side, conduct=conduct)
+    swing = measured_trial(vessel, as_batch(vessel, *trial, turn_rad=-2.0))
+    assert isinstance(swing, ZigZag)
+    assert (swing.side, len(swing.executes)) == (side, 3)
+    assert (swing.heading_rad, swing.helm_rad) == pytest.approx((TEN, TEN), rel=0.05)
+    assert swing.overshoots_rad == pytest.approx(zig.overshoots_rad, abs=math.radians(0.4))
+
+
+def test_a_recorded_stop_is_found_and_other_runs_say_why_they_are_no_trials() -> None:
+    ship = nomoto_ship()
+    conduct = Conduct(speed_mps=7.0, approach_s=20.0)
+    expected = standard_results(ship, speed_mps=7.0).stops[0]
+    commands, motion = stopping(ship, conduct=Conduct(speed_mps=7.0, approach_s=20.0, duration_s=600.0))
+    found = measured_trial(ship, as_batch(ship, commands, motion))
+    assert isinstance(found, Stop)
+    assert found.track_reach_m == pytest.approx(expected.track_reach_m, rel=0.01)
+    ahead = zigzag(ship, heading_rad=TEN, helm_rad=TEN, conduct=Conduct(speed_mps=7.0, approach_s=90, duration_s=80))
+    straight = measured_trial(ship, as_batch(ship, *ahead))
+    assert isinstance(straight, NotStandard)
+    assert "neither the helm nor the engines" in straight.reason
+    short = turning_circle(ship, turn_rad=math.radians(60), conduct=conduct)
+    part = measured_trial(ship, as_batch(ship, *short))
+    assert isinstance(part, NotStandard)
+    assert "one helm order, and the heading changes by" in part.reason
+    batch = as_batch(ship, *short)
+    with pytest.raises(InputError, match="no complete positions"):
+        measured_trial(ship, Batch(**{**vars(batch), "pose": None}))
+
+
+def test_positions_of_an_antenna_forward_are_brought_amidships() -> None:
+    ship = nomoto_ship()
+    trial = turning_circle(ship, conduct=Conduct(speed_mps=7.0, approach_s=20.0))
+    batch = as_batch(ship, *trial)
+    forward, pose, velocity = 30.0, np.array(batch.pose), np.array(batch.velocity)
+    pose[:, :2] += forward * np.stack([np.cos(pose[:, 2]), np.sin(pose[:, 2])], axis=1)
+    velocity[:, 1] += forward * velocity[:, 2]
+    moved = Batch(**{**vars(batch), "pose": pose, "velocity": velocity})
+    one, two = measured_trial(ship, batch), measured_trial(ship, moved, reference_forward_m=forward)
+    assert isinstance(one, Circle)
+    assert isinstance(two, Circle)
+    assert two.advance_m == pytest.approx(one.advance_m)
+    assert two.tactical_diameter_m == pytest.approx(one.tactical_diameter_m)
+
+
+@pytest.mark.skipif(not DATA.exists(), reason="measured trials are not here")
+@pytest.mark.parametrize("path", sorted(DATA.glob("*.csv")), ids=lambda path: path.stem)
+def test_measured_zigzags_show_the_overshoots_that_plain_readings_show(path: Path, tmp_path: Path) -> None:
+    """They lie between two plain readings, with the order taken early and late in the rudder's movement."""
+    vessel = load_vessel(write_vessel(tmp_path / "kvlcc2.toml", KVLCC2))
+    batch = load_records([path], vessel_inputs=vessel.model.inputs, sample_time_s=None).batches[0]
+    found = measured_trial(vessel, batch)
+    assert isinstance(found, ZigZag)
+    helm, heading = float(path.stem.split("_")[1]), float(path.stem.split("_")[2])
+    assert math.degrees(found.helm_rad) == pytest.approx(helm, abs=0.5)
+    assert math.degrees(found.heading_rad) == pytest.approx(heading, abs=1.5)
+    rudder, course = batch.inputs[:, 1], batch.pose[:, 2]
+    count = len(found.overshoots_rad)
+    early, late = (plain_overshoots(rudder, course, share * found.helm_rad)[:count] for share in (0.985, 0.9))
+    assert count >= 2
+    slack = math.radians(0.1)
+    assert (np.array(found.overshoots_rad) < early + slack).all()
+    assert (np.array(found.overshoots_rad) > late - slack).all()
+    assert np.abs(early - late).max() < math.radians(1.5)
+
+
+def plain_overshoots(rudder: np.ndarray, course: np.ndarray, plateau_rad: float) -> np.ndarray:
+    """Largest headings beyond those at the last samples that the rudder is as far over as its plateau."""
+    held = np.flatnonzero(np.abs(rudder) > plateau_rad)
+    change = np.flatnonzero(np.diff(np.sign(rudder[held])) != 0)
+    left, turned = held[change], held[change + 1]
+    ends = [*left[1:], len(course) - 1]
+    return np.array(
+        [
+            (np.sign(course[a]) * (course[t : b + 1] - course[a])).max()
+            for a, t, b in zip(left, turned, ends, strict=True)
+        ]
+    )
