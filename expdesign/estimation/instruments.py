@@ -16,7 +16,7 @@ Source: F. Ljungberg, doctoral thesis, Linköping University, (4.37)-(4.39), for
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,10 +26,10 @@ from expdesign.estimation.nuisance import batch_signs
 from expdesign.estimation.predictors import Layout, Rows
 from expdesign.estimation.regression import Integers
 from expdesign.estimation.replay import Replay
-from expdesign.estimation.tables import heading_of, inputs_of, measured_table, signal_table
+from expdesign.estimation.tables import Table, heading_of, measured_table
 from expdesign.signals import Batch, Record
 from expdesign.simulation import to_body
-from expdesign.values import Array
+from expdesign.values import Array, frozen_set
 from expdesign.vessel import NUMPY
 
 HEADINGS = ("measured", "simulated")
@@ -47,6 +47,7 @@ class InstrumentModel:
         replay: simulates the batches.
         heading: one of `HEADINGS`.
         wind: one of `WINDS`.
+        measured: per batch, the table of measured signals and the signs that its moduli have.
     """
 
     layout: Layout
@@ -55,12 +56,17 @@ class InstrumentModel:
     replay: Replay
     heading: str = "measured"
     wind: str = "lagged"
+    measured: tuple[tuple[Table, dict[str, float]], ...] = field(init=False)
 
     def __post_init__(self) -> None:
         if self.heading not in HEADINGS:
             raise UnknownName("heading of instruments", self.heading, known=HEADINGS)
         if self.wind not in WINDS:
             raise UnknownName("wind of instruments", self.wind, known=WINDS)
+        model, predictor = self.layout.model, self.layout.predictor
+        tables = [measured_table(model, batch, wind_measured=predictor.wind) for batch in self.record.batches]
+        signed = tuple((table, batch_signs(self.layout.nuisance, table)) for table in tables)
+        frozen_set(self, "measured", signed)
 
     def instruments(self, parameters: Array) -> Array:
         """(k, n, p) for a model with all parameters (all,) in model order.
@@ -68,26 +74,31 @@ class InstrumentModel:
         Raises:
             Diverged: that model is unstable.
         """
-        parts = [
-            self._batch(batch, parameters, used)
-            for batch, used in zip(self.record.batches, self.rows.used, strict=True)
-        ]
-        return np.concatenate(parts)
+        parts = [self._batch(index, parameters) for index in range(len(self.record.batches))]
+        return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
-    def _batch(self, batch: Batch, parameters: Array, used: Integers) -> Array:
-        model, wind = self.layout.model, self.layout.predictor.wind
+    def _batch(self, index: int, parameters: Array) -> Array:
+        batch, wind = self.record.batches[index], self.layout.predictor.wind
         states = self.replay.states(batch, parameters)
         psi = states[:, 2] if self.heading == "simulated" else carried_heading(heading_of(batch), states[:, 2])
-        velocity, air = states[:, 3:], states[:, 3:5]
+        u, v, r = states[:, 3:].T
+        air = u, v
         if wind and self.wind == "measured":
             assert batch.wind is not None  # the regression was built from it
-            air = batch.wind
+            air = batch.wind.T[0], batch.wind.T[1]
         elif wind:
-            air = air - np.stack(to_body(instrument_wind(batch, self.wind), psi, NUMPY), axis=1)
-        table = signal_table(model, velocity, air, psi, inputs_of(model, batch))
-        signs = batch_signs(self.layout.nuisance, measured_table(model, batch, wind_measured=wind))
-        ratio = batch.sample_time_s / model.time_scale_s
-        return np.asarray(ratio * self.layout.rows(table, signs)[used])
+            u_w, v_w = to_body(instrument_wind(batch, self.wind), psi, NUMPY)
+            air = u - u_w, v - v_w
+        moved = {"u": u, "v": v, "r": r, "u_q": air[0], "v_q": air[1], "psi": psi}
+        ratio = batch.sample_time_s / self.layout.model.time_scale_s
+        table, signs = self.measured[index]
+        return self.layout.rows({**table, **moved}, signs, used=_run(self.rows.used[index]), scale=ratio)
+
+
+def _run(places: Integers) -> Integers | slice:
+    """The same places, as a slice where none is left out."""
+    whole = len(places) == places[-1] + 1 if len(places) else False
+    return slice(0, len(places)) if whole else places
 
 
 def carried_heading(measured: Array, simulated: Array) -> Array:

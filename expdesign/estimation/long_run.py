@@ -4,9 +4,8 @@
 
 Lags never reach from one batch into another. Kernels are positive semidefinite, and so is Omega.
 
-Measurement noise enters a one-step residual at k and, with opposite sign, at k - 1; the lags then nearly cancel lag
-zero. Bartlett's kernel (Newey and West) loses a share 1 / L of that cancellation, Parzen's only about 6 / L^2,
-therefore Parzen's is the default.
+Where lags nearly cancel lag zero, as noise does that enters with opposite sign a sample later, Bartlett's kernel (Newey
+and West) loses a share 1 / L of that cancellation, Parzen's only about 6 / L^2; Parzen's is therefore the default.
 
 Source: W. K. Newey and K. D. West, Econometrica 55 (1987), 703-708, and Review of Economic Studies 61 (1994), 631-653;
 D. W. K. Andrews, Econometrica 59 (1991), 817-858.
@@ -39,6 +38,8 @@ PLUG_IN = {"bartlett": (1, 1.1447), "parzen": (2, 2.6614)}
 """Kernel -> order of its bias in 1 / L and Andrews's constant."""
 LONGEST_SHARE = 8
 """Automatic lags stop at this part of the longest batch."""
+FEW_LAGS = 10
+"""Up to so many, sums of products are quicker than Fourier transforms."""
 
 
 def long_run_covariance(scores: Array, batch: Integers, step: Integers, *, lags: int, kernel: str = "parzen") -> Array:
@@ -73,29 +74,22 @@ def lost_share(count: int, *, lags: int, kernel: str) -> float:
     return float(min(0.5, (1.0 + 2.0 * weights.sum()) / count))
 
 
-def automatic_lags(series: Array, batch: Integers, step: Integers, *, kernel: str = "parzen") -> int:
-    """L for series (k, q): Andrews's plug-in with a kernel pilot in place of a model.
+def automatic_lags(scores: Array, batch: Integers, step: Integers, *, kernel: str = "parzen") -> int:
+    """L for scores (k, q): Andrews's plug-in of a first-order autoregression.
 
     The plug-in of a single column is noisy, and the largest of many is always too long: the median is taken.
     """
     order, constant = PLUG_IN[kernel]
-    batches = list(_filled(series, batch, step))
-    count, longest = len(series), max(len(rows) for rows in batches)
-    limit = max(1, longest // LONGEST_SHARE)
-    pilot = min(limit, max(4, round(4.0 * count ** (1.0 / 3.0))))
-    moments = np.zeros((pilot + 1, series.shape[1]))
-    for rows in batches:
-        for lag in range(min(pilot, len(rows) - 1) + 1):
-            moments[lag] += (rows[lag:] * rows[: len(rows) - lag]).sum(axis=0)
-    weights = parzen(np.arange(pilot + 1) / (pilot + 1.0))[:, None]
-    weights[1:] *= 2.0
-    level = np.maximum((weights * moments).sum(axis=0), 1e-6 * moments[0])
-    slopes = (weights * np.arange(pilot + 1)[:, None] ** order * moments).sum(axis=0)
-    seen = moments[0] > 0
-    if not seen.any():
+    batches = _filled(scores, batch, step)
+    power = sum(((rows**2).sum(axis=0) for rows in batches), start=np.zeros(scores.shape[1]))
+    lagged = sum(((rows[1:] * rows[:-1]).sum(axis=0) for rows in batches), start=np.zeros(scores.shape[1]))
+    if not (power > 0).any():
         return 0
-    alpha = float(np.median((slopes[seen] / level[seen]) ** 2))
-    return int(np.clip(np.ceil(constant * (alpha * count) ** (1.0 / (2 * order + 1))), 1, limit))
+    rho = np.clip(lagged[power > 0] / power[power > 0], -0.97, 0.97)
+    alpha = 4.0 * rho**2 / (1.0 - rho) ** 4 if order == 2 else 4.0 * rho**2 / (1.0 - rho**2) ** 2
+    limit = max(1, max(len(rows) for rows in batches) // LONGEST_SHARE)
+    lags = constant * (float(np.median(alpha)) * len(scores)) ** (1.0 / (2 * order + 1))
+    return int(np.clip(np.ceil(lags), 1, limit))
 
 
 def _filled(scores: Array, batch: Integers, step: Integers) -> list[Array]:
@@ -111,8 +105,14 @@ def _filled(scores: Array, batch: Integers, step: Integers) -> list[Array]:
 
 
 def _windowed(series: Array, weights: Array) -> Array:
-    """Sum over lags of w(l) Gamma(l), by way of the cross-periodogram."""
+    """Sum over lags of w(l) Gamma(l); for many lags by way of the cross-periodogram."""
     lags = len(weights) - 1
+    if lags <= FEW_LAGS:
+        near = series * (weights[0] / 2.0)
+        for lag in range(1, min(lags, len(series) - 1) + 1):
+            near[lag:] += weights[lag] * series[:-lag]
+        half = series.T @ near
+        return np.asarray(half + half.T)
     size = 1 << int(np.ceil(np.log2(len(series) + lags)))
     circular = np.zeros(size)
     circular[: lags + 1] = weights

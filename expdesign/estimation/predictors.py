@@ -82,14 +82,15 @@ class Layout:
         """Parameters, then nuisance parameters."""
         return self.parameters + tuple(item.name for item in self.nuisance)
 
-    def rows(self, table: Table, signs: dict[str, float]) -> Array:
-        """(k, n, p) regressors of a table of signals."""
-        outputs = self.model.outputs
-        columns = [(self._term(name), self._values(name, table)) for name in self.parameters]
+    def rows(self, table: Table, signs: dict[str, float], *, used: Integers | slice, scale: float) -> Array:
+        """(k, n, p) regressors of a table of signals, times a scale, at the samples used."""
+        places = {name: index for index, name in enumerate(self.model.names)}
+        columns = [(self._term(places[name]), self._values(places[name], table)) for name in self.parameters]
         columns += [(item.equation, item.evaluate({**table, **signs})) for item in self.nuisance]
-        rows = np.zeros((len(table["psi"]), len(outputs), len(columns)))
+        rows = np.zeros((len(table["psi"][used]), len(self.model.outputs), len(columns)))
+        row_of = {name: index for index, name in enumerate(self.model.outputs)}
         for index, (equation, values) in enumerate(columns):
-            rows[:, outputs.index(equation), index] = values
+            np.multiply(np.broadcast_to(values, table["psi"].shape)[used], scale, out=rows[:, row_of[equation], index])
         return rows
 
     def known(self, table: Table) -> Array:
@@ -97,15 +98,15 @@ class Layout:
         outputs = self.model.outputs
         total = np.zeros((len(table["psi"]), len(outputs)))
         for name in self.fixed:
-            value = self.model.parameters[self.model.names.index(name)]
-            total[:, outputs.index(self._term(name))] += value * self._values(name, table)
+            place = self.model.names.index(name)
+            total[:, outputs.index(self._term(place))] += self.model.parameters[place] * self._values(place, table)
         return total
 
-    def _term(self, name: str) -> str:
-        return self.model.terms[self.model.names.index(name)].equation
+    def _term(self, place: int) -> str:
+        return self.model.terms[place].equation
 
-    def _values(self, name: str, table: Table) -> Array:
-        return np.asarray(self.model.expressions[self.model.names.index(name)].evaluate(table, NUMPY))
+    def _values(self, place: int, table: Table) -> Array:
+        return np.asarray(self.model.expressions[place].evaluate(table, NUMPY))
 
 
 def build_layout(model: VesselModel, record: Record, *, predictor: str, fixed: Sequence[str] = ()) -> Layout:
@@ -176,10 +177,11 @@ def build_regression(layout: Layout, record: Record) -> Rows:
     for batch in record.batches:
         table = measured_table(layout.model, batch, wind_measured=layout.predictor.wind)
         ratio = batch.sample_time_s / layout.model.time_scale_s
-        Phi = ratio * layout.rows(table, batch_signs(layout.nuisance, table))[:-1]
+        signs = batch_signs(layout.nuisance, table)
+        Phi = layout.rows(table, signs, used=slice(0, -1), scale=ratio)
         y = np.diff(batch.velocity[:, states], axis=0) - ratio * layout.known(table)[:-1]
         whole = np.flatnonzero(np.isfinite(Phi).all(axis=(1, 2)) & np.isfinite(y).all(axis=1))
-        parts.append((Phi[whole], y[whole]))
+        parts.append((Phi, y) if len(whole) == len(y) else (Phi[whole], y[whole]))
         used.append(whole)
         left_out += len(y) - len(whole)
     if not sum(len(rows) for rows in used):

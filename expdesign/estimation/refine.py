@@ -7,13 +7,13 @@ Automatica 51 (2015), 35-46.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from expdesign.errors import Diverged, NotInformative
 from expdesign.estimation.regression import Regression
-from expdesign.estimation.solution import Solution, Weighting, solve_iv
+from expdesign.estimation.solution import Solution, Weighting, build_equations, solve, solve_quick
 from expdesign.values import Array
 
 Simulate = Callable[[Array], Array]
@@ -55,24 +55,23 @@ def refine_iv(
     Raises:
         NotInformative: the first instruments already fail.
     """
-    quick = replace(weighting, covariance="hc0")  # the lags of the covariance matter at the end only
-    instruments, solution = first, solve_iv(regression, first, quick)
+    equations = build_equations(regression, first, weighting)
+    instruments, (values, _) = first, solve_quick(equations, first)
     moved, count, warnings = 0.0, 0, []
     while count < most:
         try:
-            newer_instruments = simulate(solution.values)
-            newer = solve_iv(regression, newer_instruments, quick)
+            newer_instruments = simulate(values)
+            newer, deviations = solve_quick(equations, newer_instruments)
         except Diverged as error:
             warnings.append(f"Refinement stopped: the estimated model is unstable ({error}).")
             break
         except NotInformative as error:
             warnings.append(f"Refinement stopped: {error}.")
             break
-        deviations = np.sqrt(np.clip(np.diag(newer.covariance), 1e-300, None))
-        moved = float(np.max(np.abs(newer.values - solution.values) / deviations))
-        instruments, solution, count = newer_instruments, newer, count + 1
+        moved = float(np.max(np.abs(newer - values) / np.maximum(deviations, 1e-150)))
+        instruments, values, count = newer_instruments, newer, count + 1
         if moved < settled:
             break
     if count == most and moved >= settled:
         warnings.append(f"After {most} refinements the estimate still moves by {moved:.2g} standard deviations.")
-    return Refined(solve_iv(regression, instruments, weighting), count, tuple(warnings))
+    return Refined(solve(equations, instruments), count, tuple(warnings))

@@ -4,9 +4,9 @@
     P = G^-1 Omega G^-T,   G = sum Z Phi^T,   Omega = long-run covariance of Z(k) eps(k)
 
 Residuals of one-step predictors from noisy data are coloured (noise enters at k and, through Phi, at k - 1), so Omega
-is by default robust to both changing variance and correlation in time ("hac"). "hc0" and "hc1" are robust to
-changing variance only, and "kernel" to both but without the correction that "hac" makes for the share of the variance
-that is lost because the scores of an estimate sum to zero: these three are as in econometric software.
+is by default robust to both changing variance and correlation in time ("hac"): the residuals are made white first, and
+a kernel counts what colour is left, see `whitening`. "kernel" is robust to both too, by the kernel alone; "hc0" and
+"hc1" are robust to changing variance only. These three are as in econometric software.
 
 With one block of instruments per batch there are more equations than unknowns; they are weighted by the inverse second
 moments of the instruments (two-stage least squares), which keeps the estimate free of the scale of parameters, or by
@@ -21,51 +21,16 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-import scipy
 
-from expdesign.errors import InputError, ShapeError, UnknownName
+from expdesign.errors import InputError, ShapeError
 from expdesign.estimation.long_run import automatic_lags, long_run_covariance, lost_share
-from expdesign.estimation.null_space import NullSpace, joined, null_space, require_informative
-from expdesign.estimation.regression import Integers, Regression, batch_slices
+from expdesign.estimation.null_space import NullSpace, joined, require_informative
+from expdesign.estimation.regression import Regression, batch_slices
+from expdesign.estimation.systems import System, instruments_of, occupied, solvers, split
+from expdesign.estimation.weighting import Weighting as Weighting
+from expdesign.estimation.whitening import Timeline, timeline, white_parts
 from expdesign.estimation.zero_mean import subtract_mean
 from expdesign.values import Array, seal
-
-COVARIANCES = ("hac", "kernel", "hc1", "hc0")
-BLOCKS = ("one", "batch")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Weighting:
-    """How equations are formed and what the covariance allows for.
-
-    Attributes:
-        mean: subtracted from the instruments, one of `zero_mean.MEANS`.
-        blocks: "one" block of instruments for all batches, or one per "batch" (4.45).
-        batch_weights: one factor per batch, how much its equations count; () for all alike.
-        output_weights: one factor per output, how much its equation counts; () for all alike.
-        covariance: one of `COVARIANCES`.
-        kernel: of the "hac" and "kernel" covariance.
-        lags: their last lag, None for automatic.
-    """
-
-    mean: str = "none"
-    blocks: str = "one"
-    batch_weights: tuple[float, ...] = ()
-    output_weights: tuple[float, ...] = ()
-    covariance: str = "hac"
-    kernel: str = "parzen"
-    lags: int | None = None
-
-    def __post_init__(self) -> None:
-        for what, value, known in (
-            ("instrument blocks", self.blocks, BLOCKS),
-            ("covariance", self.covariance, COVARIANCES),
-        ):
-            if value not in known:
-                raise UnknownName(what, value, known=known)
-        for name in ("batch_weights", "output_weights"):
-            if not all(0 < weight < np.inf for weight in getattr(self, name)):
-                raise InputError(f"{name} {getattr(self, name)} need to be positive numbers")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -108,153 +73,141 @@ def solve_iv(regression: Regression, instruments: Array, weighting: Weighting | 
         ShapeError: the instruments do not fit the regression.
         InputError: weights that do not fit, or blocks per batch with a mean subtracted over all of them.
     """
-    weighting = weighting or Weighting()
-    _check(regression, instruments, weighting)
-    exogenous = instruments is regression.Phi
-    systems = [_system(regression, instruments, group, weighting) for group in _groups(regression, instruments)]
-    solved = [_solvers(system, weighting, exogenous=exogenous) for system in systems]
-    found = joined([report for _, report in solved])
-    require_informative(found)
-    k, p = len(regression), len(regression.parameters)
-    values, residuals, scores = np.zeros(p), np.array(regression.y), np.zeros((k, p))
-    for system, (parts, _) in zip(systems, solved, strict=True):
-        theta = _influences(system.Z, system.y, parts).sum(axis=0)
-        left = subtract_mean(system.y - system.Phi @ theta, regression.batch_of, weighting.mean)
-        values[system.columns], residuals[:, system.outputs] = theta, left
-        scores[:, system.columns] = _influences(system.Z, left, parts)
-    lags = _lags(scores, regression, weighting)
-    P = long_run_covariance(scores, regression.batch_of, regression.step_of, lags=lags, kernel=weighting.kernel)
-    factor = 1.0 if weighting.covariance == "hc0" else residuals.size / max(1, residuals.size - p)
-    if weighting.covariance == "hac":
-        factor /= 1.0 - lost_share(k, lags=lags, kernel=weighting.kernel)
-    return Solution(values=values, covariance=factor * P, residuals=residuals, lags=lags, null_space=found)
+    return solve(build_equations(regression, instruments, weighting or Weighting()), instruments)
 
 
 @dataclass(frozen=True, eq=False)
-class System:
-    """The part of a regression that some parameters and outputs have to themselves.
+class Equations:
+    """A regression split into parts, to be solved with one set of instruments after the other.
 
     Attributes:
-        names: of the parameters.
-        columns, outputs: places in the regression.
-        Phi: (k, n, p) regressors.
-        varying: (k, n, p) the same without the mean that is subtracted from instruments.
-        Z: (k, n, p) instruments without mean, weighted.
-        y: (k, n).
-        parts: rows of each batch.
+        regression: the data.
+        weighting: how equations are formed.
+        uses: (n, p) nonzero where parameters or instruments act.
+        systems: the parts.
     """
 
-    names: tuple[str, ...]
-    columns: Integers
-    outputs: Integers
-    Phi: Array
-    varying: Array
+    regression: Regression
+    weighting: Weighting
+    uses: Array
+    systems: tuple[System, ...]
+
+
+def build_equations(regression: Regression, instruments: Array, weighting: Weighting) -> Equations:
+    """Equations for instruments (k, n, p) that act where these do; errors as in `solve_iv`."""
+    _check(regression, weighting)
+    uses = occupied(regression.Phi) + _power(regression, instruments)
+    return Equations(regression, weighting, uses, split(regression, uses, weighting.mean))
+
+
+def solve(equations: Equations, instruments: Array) -> Solution:
+    """The estimate with instruments (k, n, p); errors as in `solve_iv`."""
+    regression, weighting = equations.regression, equations.weighting
+    equations = _fitting(equations, instruments)
+    parts = _parts(equations, instruments, exogenous=instruments is regression.Phi)
+    values, residuals = np.zeros(len(regression.parameters)), np.array(regression.y)
+    for part in parts:
+        theta, left = part.solved(weighting.mean)
+        values[part.system.columns], residuals[:, part.system.outputs] = theta, left
+    found = joined([part.found for part in parts])
+    covariance, lags = _covariance(equations, parts, residuals)
+    return Solution(values=values, covariance=covariance, residuals=residuals, lags=lags, null_space=found)
+
+
+def solve_quick(equations: Equations, instruments: Array) -> tuple[Array, Array]:
+    """Parameters (p,), and standard deviations (p,) that ignore correlation in time: for iterations."""
+    equations = _fitting(equations, instruments)
+    values, std = np.zeros((2, len(equations.regression.parameters)))
+    for part in _parts(equations, instruments, exogenous=True):  # spares the search for weak instruments
+        theta, left = part.solved(equations.weighting.mean)
+        influences = _by_batch(part, np.einsum("knp,kn->kp", part.Z, left), part.system.parts)
+        values[part.system.columns] = theta
+        std[part.system.columns] = np.sqrt(np.einsum("kp,kp->p", influences, influences))
+    return values, std
+
+
+def _fitting(equations: Equations, instruments: Array) -> Equations:
+    """The same, or split anew where the instruments tie together what was apart."""
+    power = _power(equations.regression, instruments)
+    if not ((equations.uses == 0) & (power > 0)).any():
+        return equations
+    return build_equations(equations.regression, instruments, equations.weighting)
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A system with its instruments.
+
+    Attributes:
+        system: the part of the regression.
+        Z: (k, n, p) instruments, without mean and weighted.
+        A: (p, p) per batch, with theta = sum over batches of A sum Z y.
+        found: what its data cannot see.
+    """
+
+    system: System
     Z: Array
-    y: Array
-    parts: list[slice]
+    A: list[Array]
+    found: NullSpace
+
+    def solved(self, mean: str) -> tuple[Array, Array]:
+        """Parameters (p,) and residuals (k, n) without the mean that instruments are without."""
+        system, p = self.system, len(self.system.names)
+        theta = np.zeros(p)
+        for rows, A in zip(system.parts, self.A, strict=True):
+            theta += A @ (self.Z[rows].reshape(-1, p).T @ system.y[rows].ravel())
+        return theta, subtract_mean(system.y - system.Phi @ theta, system.batch, mean)
 
 
-Group = tuple[Integers, Integers]
-"""Places of parameters, and of the outputs they act on."""
+def _parts(equations: Equations, instruments: Array, *, exogenous: bool) -> list[Part]:
+    parts = []
+    for system in equations.systems:
+        Z = instruments_of(system, instruments, equations.weighting)
+        parts.append(Part(system, Z, *solvers(system, Z, equations.weighting, exogenous=exogenous)))
+    require_informative(joined([part.found for part in parts]))
+    return parts
 
 
-def _groups(regression: Regression, instruments: Array) -> list[Group]:
-    """Parameters tied together through outputs; in ship models every equation is a group of its own."""
-    uses = ((regression.Phi != 0) | (instruments != 0)).any(axis=0)  # (n, p)
-    ties = uses.T.astype(int) @ uses.astype(int)
-    count, labels = scipy.sparse.csgraph.connected_components(ties, directed=False)
-    columns = [np.flatnonzero(labels == label) for label in range(count)]
-    return [(places, np.flatnonzero(uses[:, places].any(axis=1))) for places in columns]
+def _covariance(equations: Equations, parts: list[Part], residuals: Array) -> tuple[Array, int]:
+    """(p, p), and the last lag counted."""
+    regression, weighting = equations.regression, equations.weighting
+    p, kind = len(regression.parameters), weighting.covariance
+    when = timeline(regression.batch_of, regression.step_of)
+    scores = np.zeros((len(when.batch), p))
+    lags = 0 if weighting.lags is None or kind in ("hc0", "hc1") else weighting.lags
+    for part in parts:
+        own = _influences(part, residuals[:, part.system.outputs], when, white=kind == "hac")
+        scores[:, part.system.columns] = own
+        if weighting.lags is None and kind in ("hac", "kernel"):
+            lags = max(lags, automatic_lags(own, when.batch, when.step, kernel=weighting.kernel))
+    P = long_run_covariance(scores, when.batch, when.step, lags=lags, kernel=weighting.kernel)
+    factor = 1.0 if kind == "hc0" else residuals.size / max(1, residuals.size - p)
+    if kind == "hac":
+        factor /= 1.0 - lost_share(len(regression), lags=lags, kernel=weighting.kernel)
+    return factor * P, lags
 
 
-def _system(regression: Regression, instruments: Array, group: Group, weighting: Weighting) -> System:
-    columns, outputs = group
-    cut = (slice(None), outputs[:, None], columns)
-    Phi, Z = regression.Phi[cut], subtract_mean(instruments[cut], regression.batch_of, weighting.mean)
-    if weighting.output_weights:
-        Z = Z * np.array(weighting.output_weights)[outputs, None]
-    return System(
-        names=tuple(regression.parameters[index] for index in columns),
-        columns=columns,
-        outputs=outputs,
-        Phi=Phi,
-        varying=subtract_mean(Phi, regression.batch_of, weighting.mean),
-        Z=Z,
-        y=regression.y[:, outputs],
-        parts=batch_slices(regression.batch_of),
-    )
+def _influences(part: Part, left: Array, when: Timeline, *, white: bool) -> Array:
+    """(t, p) what each sample adds to the error of the estimate, or, made white, terms of the same sum."""
+    Z, left = white_parts(part.Z, left, when) if white else (when.spread(part.Z), when.spread(left))
+    return _by_batch(part, np.einsum("knp,kn->kp", Z, left), batch_slices(when.batch))
 
 
-Part = tuple[slice, Array]
-"""Rows of one batch, and A (p, p) with theta = sum over batches of A sum Z y."""
+def _by_batch(part: Part, scores: Array, batches: list[slice]) -> Array:
+    return np.concatenate([scores[rows] @ A.T for rows, A in zip(batches, part.A, strict=True)])
 
 
-def _influences(Z: Array, y: Array, solvers: list[Part]) -> Array:
-    """(k, p) what each sample adds to the sum that is theta."""
-    scores = np.einsum("knp,kn->kp", Z, y)
-    return np.concatenate([scores[rows] @ A.T for rows, A in solvers])
-
-
-def _solvers(system: System, weighting: Weighting, *, exogenous: bool) -> tuple[list[Part], NullSpace]:
-    """Solvers of all batches, and the report; without solvers where the report says that there are none."""
-    column, row = _norm(system.varying), _norm(system.Z)
-    column[column <= 1e-11 * _norm(system.Phi)] = np.inf  # constant, to working precision
-    row[row == 0] = 1.0
-    Z, Phi = system.Z, system.varying
-    moments = [_moment(Z[rows], Phi[rows]) / row[:, None] / column for rows in system.parts]
-    weights = weighting.batch_weights or (1.0,) * len(moments)
-    if weighting.blocks == "one":
-        total = sum((w * H for w, H in zip(weights, moments, strict=True)), start=np.zeros_like(moments[0]))
-        second = (
-            None if exogenous else (_moment(Z, Z) / np.outer(row, row), _moment(Phi, Phi) / np.outer(column, column))
-        )
-        found = null_space(total, system.names, samples=len(Z), exogenous=exogenous, second=second)
-        if found.unseen:
-            return [], found
-        A = np.linalg.inv(total) / column[:, None] / row
-        return [(rows, w * A) for w, rows in zip(weights, system.parts, strict=True)], found
-    halves = [
-        np.sqrt(w) * _whitening(_moment(Z[rows], Z[rows]) / np.outer(row, row))
-        for w, rows in zip(weights, system.parts, strict=True)
-    ]
-    stacked = np.concatenate([half @ H for half, H in zip(halves, moments, strict=True)])
-    found = null_space(stacked, system.names, samples=len(Z), exogenous=exogenous)
-    if found.unseen:
-        return [], found
-    pieces = np.split(np.linalg.pinv(stacked), np.cumsum([len(half) for half in halves])[:-1], axis=1)
-    solvers = [piece @ half / column[:, None] / row for piece, half in zip(pieces, halves, strict=True)]
-    return list(zip(system.parts, solvers, strict=True)), found
-
-
-def _norm(rows: Array) -> Array:
-    """(p,) over samples and outputs."""
-    return np.asarray(np.sqrt(np.einsum("knp,knp->p", rows, rows)))
-
-
-def _moment(Z: Array, Phi: Array) -> Array:
-    return np.asarray(Z.reshape(-1, Z.shape[2]).T @ Phi.reshape(-1, Phi.shape[2]))
-
-
-def _whitening(moments: Array) -> Array:
-    """Square root of the inverse second moments, on the directions in which the instruments vary at all."""
-    values, vectors = np.linalg.eigh(moments)
-    kept = values > 1e-12 * values[-1]
-    return np.asarray((vectors[:, kept] / np.sqrt(values[kept])).T)
-
-
-def _lags(scores: Array, regression: Regression, weighting: Weighting) -> int:
-    if weighting.covariance not in ("hac", "kernel"):
-        return 0
-    if weighting.lags is not None:
-        return weighting.lags
-    return automatic_lags(scores, regression.batch_of, regression.step_of, kernel=weighting.kernel)
-
-
-def _check(regression: Regression, instruments: Array, weighting: Weighting) -> None:
+def _power(regression: Regression, instruments: Array) -> Array:
+    """(n, p) sum of squares of instruments that fit."""
     if instruments.shape != regression.Phi.shape:
         raise ShapeError(f"instruments have shape {instruments.shape}, expected {regression.Phi.shape}")
-    if not np.isfinite(instruments).all():
+    power = occupied(instruments)
+    if not np.isfinite(power).all():
         raise InputError("instruments hold numbers that are not finite")
+    return power
+
+
+def _check(regression: Regression, weighting: Weighting) -> None:
     if weighting.blocks == "batch" and weighting.mean == "complete":
         raise InputError("instrument blocks per batch need their mean subtracted per batch, found 'complete'")
     batches = len(np.unique(regression.batch_of))
