@@ -21,15 +21,24 @@ Step = Callable[[Rates, State, Any], State]
 
 def to_body(vector_n: Any, heading_rad: Any, ops: Operators) -> tuple[Any, Any]:
     """A horizontal (north, east) vector in the b-frame of a heading."""
-    c, s = ops.cos(heading_rad), ops.sin(heading_rad)
+    return _turned(vector_n, ops.cos(heading_rad), ops.sin(heading_rad))
+
+
+def _turned(vector_n: Any, c: Any, s: Any) -> tuple[Any, Any]:
+    """`to_body` with cosine and sine known: they cost more than all the rest."""
     return vector_n[0] * c + vector_n[1] * s, vector_n[1] * c - vector_n[0] * s
 
 
 def relative_velocity(state: State, current_to: Any, wind_to: Any, ops: Operators) -> tuple[State, State]:
     """(u, v, r) through water and (u_q, v_q) through air, from the state and the n-frame current and wind."""
-    *_, heading, u, v, r = state
-    u_c, v_c = to_body(current_to, heading, ops)
-    u_w, v_w = to_body(wind_to, heading, ops)
+    heading = state[2]
+    return _relative(state, current_to, wind_to, ops.cos(heading), ops.sin(heading))
+
+
+def _relative(state: State, current_to: Any, wind_to: Any, c: Any, s: Any) -> tuple[State, State]:
+    *_, u, v, r = state
+    u_c, v_c = _turned(current_to, c, s)
+    u_w, v_w = _turned(wind_to, c, s)
     return (u - u_c, v - v_c, r), (u - u_w, v - v_w)
 
 
@@ -46,7 +55,7 @@ def motion_rates(
     """Time derivative of the state under held inputs and steady n-frame current and wind."""
     _, _, heading, u, v, r = state
     c, s = ops.cos(heading), ops.sin(heading)
-    water, air = relative_velocity(state, current_to, wind_to, ops)
+    water, air = _relative(state, current_to, wind_to, c, s)
     return (u * c - v * s, u * s + v * c, r, *model.accelerations(water, air, inputs, ops, parameters))
 
 
