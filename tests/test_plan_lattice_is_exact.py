@@ -76,9 +76,9 @@ def test_mirrored_worlds_cost_the_same():
     assert search_lattice(as_problem(mirrored)).cost == pytest.approx(search_lattice(as_problem(world)).cost)
 
 
-def test_free_moves_are_refused():
+def test_moves_that_pay_are_refused():
     moves = csr_array((np.array([-1.0]), (np.array([0]), np.array([1]))), shape=(2, 2))
-    with pytest.raises(InputError, match="cheapest move costs -1, expected more than 0"):
+    with pytest.raises(InputError, match="cheapest move costs -1, expected 0 or more"):
         LatticeProblem(moves=moves, ends=np.zeros((0, 2)), run_costs=np.zeros((0, 2)), counts=(), start=0, goal=1)
 
 

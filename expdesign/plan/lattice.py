@@ -38,7 +38,7 @@ class LatticeProblem:
     """Poses, what leads from one to the other, and how often each run is wanted.
 
     Attributes:
-        moves: (n, n) sparse matrix, entry (a, b) the positive cost of the basic move from pose a to pose b.
+        moves: (n, n) sparse matrix, entry (a, b) the cost, 0 or more, of the basic move from pose a to pose b.
         ends: (q, n) pose in which run q ends when it begins at a pose, -1 where it has no room.
         run_costs: (q, n) cost of what a run needs beyond itself, 0 or more; ignored where it has no room.
         counts: how often each run is wanted.
@@ -56,8 +56,8 @@ class LatticeProblem:
         n = self.moves.shape[0]
         if self.ends.shape != self.run_costs.shape or self.ends.shape != (len(self.counts), n):
             raise InputError(f"ends {self.ends.shape} and costs {self.run_costs.shape} do not fit {n} poses")
-        if self.moves.nnz and not self.moves.data.min() > 0:
-            raise InputError(f"the cheapest move costs {self.moves.data.min():g}, expected more than 0")
+        if self.moves.nnz and not self.moves.data.min() >= 0:
+            raise InputError(f"the cheapest move costs {self.moves.data.min():g}, expected 0 or more")
 
     @property
     def states(self) -> int:
@@ -134,7 +134,8 @@ def _next_multiple(limit: float, quantum: float) -> float:
 def _quantum(problem: LatticeProblem) -> float:
     """A cost of which every cost is a whole multiple, or 0: two plans then differ by nothing or at least by that."""
     used = problem.run_costs[problem.ends >= 0]
-    costs = np.unique(np.concatenate([problem.moves.data, used[used > 0]]))
+    costs = np.unique(np.concatenate([problem.moves.data, used]))
+    costs = costs[costs > 0]
     if not len(costs):
         return 0.0
     smallest = float(costs[0])
