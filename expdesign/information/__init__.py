@@ -8,9 +8,9 @@ from expdesign.information.moments import (
     log_det_or_none,
     moments,
     regressor_rows,
-    score_primitives,
 )
 from expdesign.information.primitive_information import PrimitiveInformation
+from expdesign.information.scoring import score_models, score_primitives
 
 __all__ = [
     "MEAN_SUBTRACTIONS",
@@ -21,5 +21,6 @@ __all__ = [
     "log_det_or_none",
     "moments",
     "regressor_rows",
+    "score_models",
     "score_primitives",
 ]

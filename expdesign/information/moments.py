@@ -9,15 +9,16 @@ Source: F. Ljungberg, doctoral thesis, Linköping University, (7.50)-(7.57).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
-from expdesign.dictionary import Primitive
 from expdesign.errors import InputError, NotInformative, UnknownName
 from expdesign.information.primitive_information import PrimitiveInformation
 from expdesign.signals import Commands, Trajectory
-from expdesign.simulation import CALM, Environment, relative_velocity, simulate, to_body
+from expdesign.simulation import Environment, relative_velocity
+from expdesign.simulation.motion import State
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, Operators, Vessel, VesselModel
 from expdesign.vessel.expressions import Expression, Signals
@@ -51,27 +52,38 @@ def regressor_rows(model: VesselModel, trajectory: Trajectory, commands: Command
 
     A term that only rounding keeps from being zero throughout the run is zero: no matrix could tell afterwards.
     """
-    table = _signals(model, trajectory, commands, environment)
-    values = [np.broadcast_to(expression.evaluate(table, NUMPY), (len(commands),)) for expression in model.expressions]
-    rows = np.stack(values, axis=1).astype(float)
-    return np.where(np.abs(rows).max(axis=0) > ROUNDING * _magnitudes(model, table), rows, 0.0)
+    return rows_of(model, _signals(model, trajectory, commands, environment), (len(commands),)).T
 
 
 def _signals(model: VesselModel, trajectory: Trajectory, commands: Commands, environment: Environment) -> Signals:
     """Everything a term may read, at every command's start."""
     k = len(commands)
     state = (*trajectory.pose[:k].T, *trajectory.velocity[:k].T)
+    return signals_of(model, state, commands.values.T, environment)
+
+
+def signals_of(model: VesselModel, state: State, inputs: Array, environment: Environment) -> Signals:
+    """Everything a term may read, for states and inputs of any shape (k, ...)."""
     water, air = relative_velocity(state, environment.current_to, environment.wind_to, NUMPY)
-    return model.signals(water, air, commands.values.T, NUMPY)
+    return model.signals(water, air, inputs, NUMPY)
 
 
-def _magnitudes(model: VesselModel, table: Signals) -> Array:
-    """(p,) every term with its signals replaced by the largest of their kind in the run."""
-    largest = {name: float(np.abs(values).max()) for name, values in table.items()}
+def rows_of(model: VesselModel, table: Signals, shape: tuple[int, ...]) -> Array:
+    """(p, k, ...) value of every term, for signals that broadcast to (k, ...); rounding counts as zero."""
+    rows = np.stack([np.broadcast_to(expression.evaluate(table, NUMPY), shape) for expression in model.expressions])
+    told = np.abs(rows).max(axis=1) > ROUNDING * _magnitudes(model, table, shape[1:])
+    return np.where((told | np.isnan(rows).any(axis=1))[:, None], rows, 0.0)
+
+
+def _magnitudes(model: VesselModel, table: Signals, shape: tuple[int, ...]) -> Array:
+    """(p, ...) every term with its signals replaced by the largest of their kind in the run."""
+    largest = {name: np.broadcast_to(np.abs(values).max(axis=0), shape) for name, values in table.items()}
     for kind in (MOTION_SIGNALS, FORCE_SIGNALS):
-        largest.update(dict.fromkeys(kind, max(largest[name] for name in kind)))
-    bounds = Operators(abs, lambda angle: 1.0, lambda angle: 1.0)
-    return np.array([abs(expression.evaluate(largest, bounds)) for expression in model.expressions])
+        largest.update(dict.fromkeys(kind, np.max([largest[name] for name in kind], axis=0)))
+    bounds = Operators(abs, np.ones_like, np.ones_like)
+    return np.array(
+        [np.broadcast_to(np.abs(expression.evaluate(largest, bounds)), shape) for expression in model.expressions]
+    )
 
 
 def moments(model: VesselModel, rows: Array, parameters: Sequence[str]) -> tuple[Array, Array]:
@@ -82,61 +94,6 @@ def moments(model: VesselModel, rows: Array, parameters: Sequence[str]) -> tuple
     same = np.array([[a.equation == b.equation for b in terms] for a in terms])
     member = np.array([[term.equation == output for output in model.outputs] for term in terms])
     return np.where(same, kept.T @ kept / len(kept), 0.0), np.where(member, kept.mean(axis=0)[:, None], 0.0)
-
-
-def score_primitives(
-    vessel: Vessel,
-    primitives: Iterable[Primitive],
-    *,
-    environment: Environment = CALM,
-    fixed_parameters: Sequence[str] = (),
-    mean_subtraction: str = "complete",
-) -> tuple[PrimitiveInformation, ...]:
-    """Information of every primitive about the parameters to estimate.
-
-    When a mean current or wind singles out headings, each primitive is simulated on `HEADINGS` evenly spread ones
-    and its moments are averaged, because its heading is not known before the plan is.
-
-    Raises:
-        UnknownName: no such parameter or mean subtraction.
-        InputError: nothing is left to estimate.
-        Diverged: the nominal model is unstable.
-    """
-    names = estimated_parameters(vessel.model, fixed_parameters)
-    if mean_subtraction not in MEAN_SUBTRACTIONS:
-        raise UnknownName("mean subtraction", mean_subtraction, known=MEAN_SUBTRACTIONS)
-    return tuple(
-        _score(vessel, primitive, names, environment=environment, mean_subtraction=mean_subtraction)
-        for primitive in primitives
-    )
-
-
-def _score(
-    vessel: Vessel, primitive: Primitive, names: Sequence[str], *, environment: Environment, mean_subtraction: str
-) -> PrimitiveInformation:
-    headings = [0.0] if environment.isotropic else 2 * np.pi * np.arange(HEADINGS) / HEADINGS
-    pieces = [_run_rows(vessel, primitive, float(heading), environment) for heading in headings]
-    runs = [moments(vessel.model, rows, names) for rows, _ in pieces]
-    X, Y = np.mean([X for X, _ in runs], axis=0), np.mean([Y for _, Y in runs], axis=0)
-    YZ = np.mean([Y @ Y.T for _, Y in runs], axis=0)
-    taken = {"none": np.zeros_like(X), "batch": YZ, "complete": Y @ Y.T}[mean_subtraction]
-    return PrimitiveInformation(
-        primitive=primitive,
-        X=X,
-        Y=Y,
-        Z=Y,
-        YZ=YZ,
-        log_det_alone=log_det_or_none(X - taken, np.diag(X)),
-        excitation_condition=all(holds for _, holds in pieces),
-    )
-
-
-def _run_rows(vessel: Vessel, primitive: Primitive, heading: float, environment: Environment) -> tuple[Array, bool]:
-    current_b = np.array(to_body(environment.current_to, heading, NUMPY))
-    start = primitive.entry_velocity + np.append(current_b, 0.0)
-    trajectory = simulate(vessel, primitive.commands, pose=(0.0, 0.0, heading), velocity=start, environment=environment)
-    rows = regressor_rows(vessel.model, trajectory, primitive.commands, environment)
-    return rows, excitation_condition(vessel, trajectory, primitive.commands, environment)
 
 
 def excitation_condition(
@@ -150,9 +107,19 @@ def excitation_condition(
     Source: F. Ljungberg, doctoral thesis, Linköping University, assumptions A5 and A7, (5.8).
     """
     table = _signals(vessel.model, trajectory, commands, environment)
+    return bool(clear_of_zero(vessel, table, environment, shape=(len(commands),), sigmas=sigmas))
+
+
+def clear_of_zero(
+    vessel: Vessel, table: Signals, environment: Environment, *, shape: tuple[int, ...], sigmas: float = 3.0
+) -> NDArray[np.bool_]:
+    """(...) whether the excitation condition holds, for signals that broadcast to (k, ...)."""
     noise = _signal_noise(vessel, environment)
-    moduli = [modulus for expression in vessel.model.expressions for modulus in expression.moduli]
-    return all(_keeps_clear(modulus, table, noise, sigmas) for modulus in moduli)
+    clear = np.ones(shape[1:], dtype=bool)
+    for expression in vessel.model.expressions:
+        for modulus in expression.moduli:
+            clear &= _keeps_clear(modulus, table, noise, sigmas, shape)
+    return clear
 
 
 def _signal_noise(vessel: Vessel, environment: Environment) -> dict[str, float]:
@@ -163,13 +130,15 @@ def _signal_noise(vessel: Vessel, environment: Environment) -> dict[str, float]:
     return {"u": water, "v": water, "r": sensors.yaw_rate_radps, "u_q": air, "v_q": air}
 
 
-def _keeps_clear(modulus: Expression, table: Signals, noise: Mapping[str, float], sigmas: float) -> bool:
-    inside = np.asarray(modulus.evaluate(table, NUMPY))
+def _keeps_clear(
+    modulus: Expression, table: Signals, noise: Mapping[str, float], sigmas: float, shape: tuple[int, ...]
+) -> NDArray[np.bool_]:
+    inside = np.broadcast_to(np.asarray(modulus.evaluate(table, NUMPY)), shape)
     shifted = (
         modulus.evaluate({**table, name: table[name] + noise[name]}, NUMPY) for name in modulus.signals if name in noise
     )
     margin = sigmas * np.sqrt(sum(((other - inside) ** 2 for other in shifted), np.zeros_like(inside)))
-    return bool(np.all(inside > margin) or np.all(inside < -margin))
+    return np.asarray(np.all(inside > margin, axis=0) | np.all(inside < -margin, axis=0))
 
 
 def log_det_or_none(information: Array, squares: Array) -> float | None:

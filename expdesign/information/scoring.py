@@ -1,0 +1,258 @@
+"""Scoring a dictionary: primitives of one length, all headings and all models are simulated together.
+
+Source: F. Ljungberg, doctoral thesis, Linköping University, (7.50)-(7.57).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from expdesign.dictionary import Primitive
+from expdesign.errors import Diverged, UnknownName
+from expdesign.information.moments import (
+    HEADINGS,
+    MEAN_SUBTRACTIONS,
+    clear_of_zero,
+    estimated_parameters,
+    log_det_or_none,
+    rows_of,
+    signals_of,
+)
+from expdesign.information.primitive_information import PrimitiveInformation
+from expdesign.signals import Commands
+from expdesign.simulation import CALM, Environment, motion_rates, simulate, to_body
+from expdesign.simulation.motion import State, rk4_step
+from expdesign.simulation.run import LARGEST_SPEED, SUBSTEPS
+from expdesign.values import Array
+from expdesign.vessel import NUMPY, Vessel
+
+SIMULATED_AT_ONCE, EVALUATED_AT_ONCE = 3_000_000, 500_000
+"""Samples held in memory."""
+
+
+def score_primitives(
+    vessel: Vessel,
+    primitives: Iterable[Primitive],
+    *,
+    environment: Environment = CALM,
+    fixed_parameters: Sequence[str] = (),
+    mean_subtraction: str = "complete",
+) -> tuple[PrimitiveInformation, ...]:
+    """Information of every primitive about the parameters to estimate.
+
+    When a mean current or wind singles out headings, each primitive is simulated on `HEADINGS` evenly spread ones
+    and its moments are averaged, because its heading is not known before the plan is.
+
+    Raises:
+        UnknownName: no such parameter or mean subtraction.
+        InputError: nothing is left to estimate.
+        Diverged: the nominal model is unstable.
+    """
+    ((scored, _),) = score_models(
+        vessel,
+        tuple(primitives),
+        vessel.model.parameters[None],
+        environment=environment,
+        fixed_parameters=fixed_parameters,
+        mean_subtraction=mean_subtraction,
+    )
+    return scored
+
+
+def score_models(
+    vessel: Vessel,
+    primitives: Sequence[Primitive],
+    parameters: Array,
+    *,
+    environment: Environment = CALM,
+    fixed_parameters: Sequence[str] = (),
+    mean_subtraction: str = "complete",
+    unstable: str = "raise",
+) -> tuple[tuple[tuple[PrimitiveInformation, ...], bool], ...]:
+    """As `score_primitives`, for several parameter vectors (m, all) of the same structure under the same commands.
+
+    Args:
+        vessel, primitives, environment, fixed_parameters, mean_subtraction: as in `score_primitives`.
+        parameters: (m, all) in the model's own form.
+        unstable: "raise" when a model diverges, or "mark".
+
+    Returns:
+        For each model the information and whether it stayed stable; the information of an unstable one is nan.
+
+    Raises:
+        UnknownName, InputError, Diverged: as in `score_primitives`.
+    """
+    names = estimated_parameters(vessel.model, fixed_parameters)
+    if mean_subtraction not in MEAN_SUBTRACTIONS:
+        raise UnknownName("mean subtraction", mean_subtraction, known=MEAN_SUBTRACTIONS)
+    p, n, m = len(names), len(vessel.model.outputs), len(parameters)
+    count = len(primitives)
+    found = _Moments(
+        X=np.zeros((m, count, p, p)),
+        Y=np.zeros((m, count, p, n)),
+        YZ=np.zeros((m, count, p, p)),
+        clear=np.zeros((m, count), dtype=bool),
+    )
+    for members in _groups(primitives, len(parameters) * len(_headings(environment))):
+        stack = _Runs.of(vessel, [primitives[index] for index in members], parameters, environment)
+        part = stack.moments(names)
+        if unstable == "raise" and not np.isfinite(part.X).all():
+            _raise_diverged(vessel, [primitives[index] for index in members], environment)
+        for name in ("X", "Y", "YZ", "clear"):
+            getattr(found, name)[:, members] = getattr(part, name)
+    stable = np.isfinite(found.X).all(axis=(1, 2, 3))
+    return tuple(
+        (
+            tuple(found.item(model, index, primitive, mean_subtraction) for index, primitive in enumerate(primitives)),
+            bool(stable[model]),
+        )
+        for model in range(m)
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Moments:
+    """X, Y, YZ (m, n, ...) and the excitation condition (m, n) of runs under every model, averaged over headings."""
+
+    X: Array
+    Y: Array
+    YZ: Array
+    clear: NDArray[np.bool_]
+
+    def item(self, model: int, index: int, primitive: Primitive, mean_subtraction: str) -> PrimitiveInformation:
+        X, Y, YZ = self.X[model, index], self.Y[model, index], self.YZ[model, index]
+        taken = {"none": np.zeros_like(X), "batch": YZ, "complete": Y @ Y.T}[mean_subtraction]
+        return PrimitiveInformation(
+            primitive=primitive,
+            X=X,
+            Y=Y,
+            Z=Y,
+            YZ=YZ,
+            log_det_alone=log_det_or_none(X - taken, np.diag(X)) if np.isfinite(X).all() else None,
+            excitation_condition=bool(self.clear[model, index]),
+        )
+
+
+def _headings(environment: Environment) -> Array:
+    return np.zeros(1) if environment.isotropic else np.asarray(2 * np.pi * np.arange(HEADINGS) / HEADINGS)
+
+
+def _groups(primitives: Sequence[Primitive], copies: int) -> Iterator[list[int]]:
+    """Indices of primitives that can be simulated together: of one length, and not too many."""
+    lengths: dict[tuple[int, float], list[int]] = {}
+    for index, primitive in enumerate(primitives):
+        key = (len(primitive.commands), primitive.commands.sample_time_s)
+        lengths.setdefault(key, []).append(index)
+    for (samples, _), members in lengths.items():
+        size = max(1, SIMULATED_AT_ONCE // (samples * copies))
+        yield from (members[first : first + size] for first in range(0, len(members), size))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Runs:
+    """Simulated runs: models m, headings h, primitives n, samples k.
+
+    Attributes:
+        vessel, environment: as given.
+        commands: (k, inputs, n).
+        states: (k, 6, m, h, n) at the start of every command; nan where a run diverges.
+    """
+
+    vessel: Vessel
+    environment: Environment
+    commands: Array
+    states: Array
+
+    @staticmethod
+    def of(vessel: Vessel, primitives: Sequence[Primitive], parameters: Array, environment: Environment) -> _Runs:
+        commands = np.array([primitive.commands.values for primitive in primitives]).transpose(1, 2, 0)
+        headings = _headings(environment)
+        shape = (len(parameters), len(headings), len(primitives))
+        current_b = to_body(environment.current_to, headings[:, None], NUMPY)
+        entry = np.array([primitive.entry_velocity for primitive in primitives]).T
+        start = (0.0, 0.0, headings[:, None], entry[0] + current_b[0], entry[1] + current_b[1], entry[2])
+        states = _simulated(
+            vessel,
+            commands,
+            tuple(np.broadcast_to(value, shape).copy() for value in start),
+            parameters,
+            environment,
+            sample_time_s=primitives[0].commands.sample_time_s,
+        )
+        return _Runs(vessel=vessel, environment=environment, commands=commands, states=states)
+
+    def moments(self, names: Sequence[str]) -> _Moments:
+        """Averages over headings, some primitives at a time."""
+        samples, _, models, headings, count = self.states.shape
+        size = max(1, EVALUATED_AT_ONCE // (samples * models * headings))
+        parts = [self._some(slice(first, first + size), names) for first in range(0, count, size)]
+        columns = {name: np.concatenate([getattr(part, name) for part in parts], axis=1) for name in vars(parts[0])}
+        return _Moments(**columns)
+
+    def _some(self, chosen: slice, names: Sequence[str]) -> _Moments:
+        model, p = self.vessel.model, len(names)
+        states = np.moveaxis(self.states[..., chosen], 1, 0)  # (6, k, m, h, n)
+        inputs = self.commands[:, :, None, None, chosen].swapaxes(0, 1)  # (inputs, k, 1, 1, n)
+        with np.errstate(invalid="ignore", over="ignore"):
+            table = signals_of(model, tuple(states), inputs, self.environment)
+            rows = rows_of(model, table, states.shape[1:])[[model.names.index(name) for name in names]]
+            clear = clear_of_zero(self.vessel, table, self.environment, shape=states.shape[1:])
+        models, count = rows.shape[2], rows.shape[4]
+        X, YZ = np.zeros((models, count, p, p)), np.zeros((models, count, p, p))
+        Y = np.zeros((models, count, p, len(model.outputs)))
+        equations = [model.terms[model.names.index(name)].equation for name in names]
+        for column, output in enumerate(model.outputs):
+            index = np.flatnonzero([equation == output for equation in equations])
+            if not len(index):
+                continue
+            own = np.ascontiguousarray(rows[index].transpose(2, 3, 4, 0, 1))  # (m, h, n, own, k)
+            mean = own.mean(axis=-1)
+            place = np.ix_(np.arange(models), np.arange(count), index, index)
+            X[place] = (own @ own.swapaxes(-1, -2)).mean(axis=1) / own.shape[-1]
+            YZ[place] = (mean[..., :, None] * mean[..., None, :]).mean(axis=1)
+            Y[:, :, index, column] = mean.mean(axis=1)
+        return _Moments(X=X, Y=Y, YZ=YZ, clear=np.atleast_2d(clear.all(axis=1)))
+
+
+def _simulated(
+    vessel: Vessel, commands: Array, start: State, parameters: Array, environment: Environment, *, sample_time_s: float
+) -> Array:
+    """(k, 6, m, h, n) states at the start of every command; runs that diverge are nan throughout."""
+    theta = parameters[0].tolist() if len(parameters) == 1 else list(parameters.T[:, :, None, None])
+    current, wind = environment.current_to.tolist(), environment.wind_to.tolist()
+    states = np.empty((len(commands), 6, *start[0].shape))
+    state, largest = start, np.zeros(start[0].shape)
+    with np.errstate(over="ignore", invalid="ignore"):
+        for sample, held in enumerate(commands):
+
+            def rates(x: State, held: Array = held) -> State:
+                return motion_rates(
+                    vessel.model, x, held, current_to=current, wind_to=wind, ops=NUMPY, parameters=theta
+                )
+
+            for place, value in enumerate(state):
+                states[sample, place] = value
+            for _ in range(SUBSTEPS):
+                state = rk4_step(rates, state, sample_time_s / SUBSTEPS)
+            for speed in state[3:]:
+                largest = np.maximum(largest, np.abs(speed))
+    states[..., ~(largest < LARGEST_SPEED)] = np.nan
+    return states
+
+
+def _raise_diverged(vessel: Vessel, primitives: Sequence[Primitive], environment: Environment) -> None:
+    """Simulate one by one, for the message of the first that diverges."""
+    for primitive in primitives:
+        for heading in _headings(environment):
+            current_b = np.array(to_body(environment.current_to, float(heading), NUMPY))
+            _try(vessel, primitive.commands, float(heading), primitive.entry_velocity + np.append(current_b, 0.0),
+                 environment)  # fmt: skip
+    raise Diverged(f"vessel {vessel.name!r}: a regressor overflows under the commands of the dictionary")
+
+
+def _try(vessel: Vessel, commands: Commands, heading: float, velocity: Array, environment: Environment) -> None:
+    simulate(vessel, commands, pose=(0.0, 0.0, heading), velocity=velocity, environment=environment)
