@@ -30,7 +30,7 @@ EXCEPTIONS = {("__main__", "cli")}  # `python -m` is nothing but the command lin
 IMPORTERS = {
     "cvxpy": ("durations/_cvxpy.py",),
     "ompl": ("plan/_ompl.py",),
-    "casadi": ("estimation/_casadi.py", "plan/_casadi.py"),
+    "casadi": ("durations/_casadi.py", "estimation/_casadi.py", "plan/_casadi.py"),
     "matplotlib": ("export/",),
 }
 BANNED_CALLS = ("eval", "exec", "compile", "__import__", "import_module")

@@ -50,8 +50,9 @@ def ordered(approach: Approach, drive: Array, helm_rad: Array) -> Excitation:
     angles = approach.angle_rad + approach.starboard * helm_rad
     for angle in (float(angles.min()), float(angles.max())):
         approach.helm.check(approach.drive, angle)
-    rows = [approach.helm.inputs(d, a) for d, a in zip(drive.tolist(), angles.tolist(), strict=True)]
-    return Excitation(velocity=approach.velocity, inputs=approach.inputs, commands=np.array(rows))
+    pairs, place = np.unique(np.stack([drive, angles], axis=1), axis=0, return_inverse=True)
+    rows = np.array([approach.helm.inputs(*pair) for pair in pairs.tolist()])
+    return Excitation(velocity=approach.velocity, inputs=approach.inputs, commands=rows[place.ravel()])
 
 
 def helm_family(

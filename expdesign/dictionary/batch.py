@@ -1,0 +1,70 @@
+"""Many candidates at once: commands and calm-water motion of requests of one length, without building primitives."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from expdesign.dictionary.build import family, follow, wished_commands, wished_velocities
+from expdesign.dictionary.spec import PrimitiveSpec
+from expdesign.dictionary.trim import STEADY, lost
+from expdesign.errors import InputError, NoAnswer
+from expdesign.values import Array, seal
+from expdesign.vessel import Vessel, within_limits
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ExcitedRuns:
+    """What requests of one length command.
+
+    Attributes:
+        possible: (n,) 1 where the request makes sense and the vessel can hold its entry state; the others' rows are
+            zero.
+        velocity: (n, 3) entry u, v, r through water.
+        commands: (n, k, m) within limits and rates.
+    """
+
+    possible: Array
+    velocity: Array
+    commands: Array
+
+    def __post_init__(self) -> None:
+        seal(self, possible="n", velocity="n 3", commands="n k m")
+
+
+def excite_many(vessel: Vessel, specs: Sequence[PrimitiveSpec]) -> ExcitedRuns:
+    """Commands of many requests; those that cannot be are marked instead of raising.
+
+    Args:
+        vessel: nominal.
+        specs: requests of the same duration; those of families with a reference are turned round together.
+    """
+    samples = round(specs[0].settings["duration_s"] / vessel.sample_time_s)
+    possible, velocity = np.zeros(len(specs)), np.zeros((len(specs), 3))
+    entry = np.zeros((len(specs), len(vessel.limits)))
+    commands = np.zeros((len(specs), samples, len(vessel.limits)))
+    wished: dict[int, Array] = {}
+    for index, spec in enumerate(specs):
+        try:
+            if family(spec.family).reference is not None:
+                wished[index] = wished_velocities(vessel, spec)
+                continue
+            found = wished_commands(vessel, spec)
+        except (InputError, NoAnswer):
+            continue
+        if len(found.commands) == samples:
+            possible[index], velocity[index], entry[index] = 1.0, found.velocity, found.inputs
+            commands[index] = found.commands
+    ordered = np.flatnonzero(possible)
+    commands[ordered] = within_limits(
+        vessel.actuators, commands[ordered], sample_time_s=vessel.sample_time_s, before=entry[ordered]
+    )
+    if wished:
+        rows = np.array(list(wished))
+        references = np.array(list(wished.values()))
+        before, followed = follow(vessel, references)
+        possible[rows] = lost(vessel, references[:, 0], before) <= STEADY
+        velocity[rows], commands[rows] = references[:, 0], followed
+    return ExcitedRuns(possible=possible, velocity=velocity, commands=commands)

@@ -1,0 +1,91 @@
+"""Information of many candidate runs at once: the matrices of `moments`, without primitives."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from expdesign.information.moments import HEADINGS
+from expdesign.simulation import Environment, relative_velocity, simulate_many, to_body
+from expdesign.values import Array
+from expdesign.vessel import NUMPY, Vessel
+
+
+def bordered_runs(
+    vessel: Vessel,
+    commands: Array,
+    velocity: Array,
+    names: Sequence[str],
+    *,
+    environment: Environment,
+    mean_subtraction: str,
+) -> tuple[Array, Array]:
+    """B (n, d, d) of many runs, and their motion through calm water (n, k + 1, 3).
+
+    The same numbers as `score_primitives` and `durations.bordered` give run by run; nan where a run diverges.
+
+    Args:
+        vessel: nominal.
+        commands: (n, k, m) commands of each run.
+        velocity: (n, 3) entry velocities through water.
+        names: parameters to estimate.
+        environment: mean current and wind; information is averaged over headings where they matter.
+        mean_subtraction: "none", "batch" or "complete".
+    """
+    calm = _states(vessel, commands, velocity, Environment(), 0.0)
+    if environment.isotropic:
+        pieces = [_matrices(vessel, calm, commands, names, Environment(), mean_subtraction)]
+    else:
+        pieces = []
+        for heading in 2 * np.pi * np.arange(HEADINGS) / HEADINGS:
+            states = _states(vessel, commands, velocity, environment, float(heading))
+            pieces.append(_matrices(vessel, states, commands, names, environment, mean_subtraction))
+    return np.mean(pieces, axis=0), calm[..., 3:].transpose(1, 0, 2)
+
+
+def _states(vessel: Vessel, commands: Array, velocity: Array, environment: Environment, heading: float) -> Array:
+    """(k + 1, n, 6)."""
+    runs = len(commands)
+    current_b = np.array([*to_body(environment.current_to, heading, NUMPY), 0.0])
+    return simulate_many(
+        vessel,
+        commands,
+        pose=np.tile([0.0, 0.0, heading], (runs, 1)),
+        velocity=velocity + current_b,
+        current_to=np.tile(environment.current_to, (runs, 1)),
+        wind_to=np.tile(environment.wind_to, (runs, 1)),
+        parameters=np.tile(vessel.model.parameters, (runs, 1)),
+    )
+
+
+def _matrices(
+    vessel: Vessel,
+    states: Array,
+    commands: Array,
+    names: Sequence[str],
+    environment: Environment,
+    mean_subtraction: str,
+) -> Array:
+    model = vessel.model
+    with np.errstate(invalid="ignore", over="ignore"):
+        water, air = relative_velocity(
+            tuple(np.moveaxis(states[:-1], -1, 0)), environment.current_to, environment.wind_to, NUMPY
+        )
+        values = model.regressors(water, air, commands.transpose(2, 1, 0))
+        rows = np.stack([np.broadcast_to(value, states[:-1, :, 0].shape) for value in values])  # (all, k, n)
+        chosen = [model.names.index(name) for name in names]
+        equations = [model.terms[index].equation for index in chosen]
+        kept = rows[chosen].transpose(2, 0, 1)  # (n, p, k)
+        same = np.array([[a == b for b in equations] for a in equations])
+        member = np.array([[equation == output for output in model.outputs] for equation in equations])
+        X = np.where(same, kept @ kept.transpose(0, 2, 1) / kept.shape[2], 0.0)
+        Y = np.where(member, kept.mean(axis=2)[:, :, None], 0.0)
+    if mean_subtraction == "none":
+        return X
+    if mean_subtraction == "batch":
+        return X - Y @ Y.transpose(0, 2, 1)
+    unit = np.broadcast_to(np.eye(len(model.outputs)), (len(X), len(model.outputs), len(model.outputs)))
+    return np.concatenate(
+        [np.concatenate([X, Y], axis=2), np.concatenate([Y.transpose(0, 2, 1), unit], axis=2)], axis=1
+    )
