@@ -70,9 +70,14 @@ def signals_of(model: VesselModel, state: State, inputs: Array, environment: Env
 
 def rows_of(model: VesselModel, table: Signals, shape: tuple[int, ...]) -> Array:
     """(p, k, ...) value of every term, for signals that broadcast to (k, ...); rounding counts as zero."""
-    rows = np.stack([np.broadcast_to(expression.evaluate(table, NUMPY), shape) for expression in model.expressions])
-    told = np.abs(rows).max(axis=1) > ROUNDING * _magnitudes(model, table, shape[1:])
-    return np.where((told | np.isnan(rows).any(axis=1))[:, None], rows, 0.0)
+    rows = np.empty((len(model.expressions), *shape))
+    for row, expression in zip(rows, model.expressions, strict=True):
+        row[...] = expression.evaluate(table, NUMPY)
+    largest = np.maximum(rows.max(axis=1), -rows.min(axis=1))
+    rounding = largest <= ROUNDING * _magnitudes(model, table, shape[1:])
+    if rounding.any():
+        np.multiply(rows, ~rounding[:, None], out=rows)
+    return rows
 
 
 def _magnitudes(model: VesselModel, table: Signals, shape: tuple[int, ...]) -> Array:
@@ -115,10 +120,10 @@ def clear_of_zero(
 ) -> NDArray[np.bool_]:
     """(...) whether the excitation condition holds, for signals that broadcast to (k, ...)."""
     noise = _signal_noise(vessel, environment)
-    clear = np.ones(shape[1:], dtype=bool)
-    for expression in vessel.model.expressions:
-        for modulus in expression.moduli:
-            clear &= _keeps_clear(modulus, table, noise, sigmas, shape)
+    clear: NDArray[np.bool_] = np.ones(shape[1:], dtype=bool)
+    moduli = {modulus.text: modulus for expression in vessel.model.expressions for modulus in expression.moduli}
+    for modulus in moduli.values():
+        clear = clear & _keeps_clear(modulus, table, noise, sigmas, shape)
     return clear
 
 
@@ -138,7 +143,8 @@ def _keeps_clear(
         modulus.evaluate({**table, name: table[name] + noise[name]}, NUMPY) for name in modulus.signals if name in noise
     )
     margin = sigmas * np.sqrt(sum(((other - inside) ** 2 for other in shifted), np.zeros_like(inside)))
-    return np.asarray(np.all(inside > margin, axis=0) | np.all(inside < -margin, axis=0))
+    above, below = np.min(inside - margin, axis=0) > 0, np.max(inside + margin, axis=0) < 0
+    return np.asarray(above | below, dtype=bool)
 
 
 def log_det_or_none(information: Array, squares: Array) -> float | None:

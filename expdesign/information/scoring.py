@@ -104,7 +104,7 @@ def score_models(
             _raise_diverged(vessel, [primitives[index] for index in members], environment)
         for name in ("X", "Y", "YZ", "clear"):
             getattr(found, name)[:, members] = getattr(part, name)
-    stable = np.isfinite(found.X).all(axis=(1, 2, 3))
+    stable = np.asarray(np.isfinite(found.X).all(axis=(1, 2, 3)))
     return tuple(
         (
             tuple(found.item(model, index, primitive, mean_subtraction) for index, primitive in enumerate(primitives)),
