@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from pydantic import Field
 from expdesign.dictionary import FAMILIES
 from expdesign.dictionary.spec import Family, PrimitiveSpec, complete_settings
 from expdesign.errors import InputError
+from expdesign.scenario.recorded_file import load_recorded
 from expdesign.scenario.tables import Entry, Table, Text, check_table, read_toml, shown
 
 LARGEST_GRID = 10_000
@@ -40,6 +42,7 @@ def load_dictionary(path: Path | str, *, families: tuple[Family, ...] = FAMILIES
     Each `[[primitives]]` names a family and gives its settings; one with lists of values stands for every combination,
     in the order of the file, the last list running fastest. Names are given by `name` or else by the family (with -2,
     -3 ... for further entries of the same family); a grid adds `-setting-value`, without the unit, for every list.
+    `family = "recorded"` takes `file`, the path of a CSV of commands beside this file, instead of a duration.
 
     Args:
         path: a TOML file with `[dictionary]` and `[[primitives]]`.
@@ -56,10 +59,13 @@ def load_dictionary(path: Path | str, *, families: tuple[Family, ...] = FAMILIES
     for index, row in enumerate(file.primitives, start=1):
         place = entry.at("primitives").item(index)
         family = _family(row, by_name, place.at("family"))
-        for spec in _grid(row, family, _stem(row, family, unnamed, place.at("name")), place):
+        stem = _stem(row, family, unnamed, place.at("name"))
+        for spec in (
+            _recorded(row, family, stem, place) if family.name == "recorded" else _grid(row, family, stem, place)
+        ):
             if spec.name in specs:
                 raise place.at("name").error(f"is {spec.name!r}, expected a name not used before")
-            specs[spec.name] = spec
+            specs[spec.name] = replace(spec, place=f"{place.path}: {place.key}")
     return tuple(specs.values())
 
 
@@ -82,6 +88,24 @@ def _stem(row: Mapping[str, Any], family: Family, unnamed: dict[str, int], entry
     if not isinstance(name, str) or not NAME.fullmatch(name):
         raise entry.error(f"is {shown(name)}, expected {NAME_RULE}")
     return name
+
+
+def _recorded(row: Mapping[str, Any], family: Family, stem: str, entry: Entry) -> Iterator[PrimitiveSpec]:
+    """The one primitive of a command file; its duration is the file's."""
+    named = row.get("file")
+    if not isinstance(named, str) or not named:
+        found = "is missing" if named is None else f"is {shown(named)}"
+        raise entry.at("file").error(f"{found}, expected the path of a CSV of commands")
+    if "duration_s" in row:
+        raise entry.at("duration_s").error("is given, but the file of a recorded primitive tells how long it lasts")
+    commands, begins = load_recorded(entry.at("file").file(named))
+    rest = {name: value for name, value in row.items() if name != "file"}
+    for name in rest:
+        if name not in ("family", "name") and isinstance(rest[name], list):
+            raise entry.at(name).error("is a list, expected a number")
+    whole = {**begins, **rest, "duration_s": commands.duration_s}
+    for spec in _grid(whole, family, stem, entry):
+        yield replace(spec, commands=commands)
 
 
 def _grid(row: Mapping[str, Any], family: Family, stem: str, entry: Entry) -> Iterator[PrimitiveSpec]:

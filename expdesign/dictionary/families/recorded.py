@@ -14,7 +14,7 @@ def _orders(vessel: Vessel, request: PrimitiveSpec) -> Excitation:
     recorded, settings = request.commands, request.settings
     if recorded is None:
         raise InputError("family 'recorded' needs commands, which a dictionary file gives by the key file")
-    if recorded.names != vessel.model.inputs:
+    if set(recorded.names) != set(vessel.model.inputs):
         raise InputError(
             f"its file commands {', '.join(recorded.names)}, vessel {vessel.name!r} takes "
             f"{', '.join(vessel.model.inputs)}"
@@ -24,8 +24,9 @@ def _orders(vessel: Vessel, request: PrimitiveSpec) -> Excitation:
             f"its file has a sample every {recorded.sample_time_s:g} s, vessel {vessel.name!r} takes one every "
             f"{vessel.sample_time_s:g} s"
         )
+    values = np.stack([recorded.column(name) for name in vessel.model.inputs], axis=1)
     velocity = np.array([settings["speed_mps"], settings["sway_mps"], settings["yaw_rate_radps"]])
-    return Excitation(velocity=velocity, inputs=hold(vessel, velocity), commands=recorded.values)
+    return Excitation(velocity=velocity, inputs=hold(vessel, velocity), commands=values)
 
 
 RECORDED = Family(
