@@ -5,6 +5,7 @@ import io
 import json
 from dataclasses import replace
 from datetime import UTC, datetime
+from functools import cache
 from pathlib import Path
 
 import export_case as case
@@ -16,7 +17,7 @@ from shapely.geometry import shape
 
 from expdesign.conventions import KNOTS_PER_MPS, METRES_PER_NAUTICAL_MILE
 from expdesign.errors import InputError, UnknownName
-from expdesign.export import FORMATS, Route, build_route, find_format, route_files
+from expdesign.export import FORMATS, STANDARD, Route, build_route, find_format, route_files
 from expdesign.export.formats.geojson import cut_at_antimeridian
 
 SCHEMAS = Path(__file__).parents[2] / "shared" / "data" / "schemas"
@@ -24,8 +25,9 @@ DEPARTURE = datetime(2027, 5, 1, 8, 0, tzinfo=UTC)
 ODD = 'A&B <"\N{SNOWMAN}"> \x07'
 
 
+@cache
 def routes() -> dict[str, Route]:
-    plain = build_route(case.planned())
+    plain = build_route(case.planned(), safe_water=case.plan().area.water)
     named = replace(plain.waypoints[3], leg_name=ODD)
     odd = replace(plain, scenario=ODD, vessel=ODD, waypoints=(*plain.waypoints[:3], named, *plain.waypoints[4:]))
     return {"plain": plain, "timed": build_route(case.planned(), departure=DEPARTURE), "odd": odd}
@@ -47,8 +49,11 @@ def schema(name: str) -> etree.XMLSchema:
     return etree.XMLSchema(etree.parse(path))
 
 
-def test_rtz_passes_the_schema_of_version_1_2(route: Route) -> None:
-    schema("RTZ_Schema_version_1_2.xsd").assertValid(etree.fromstring(find_format("rtz").write(route)))
+@pytest.mark.parametrize(
+    ("name", "version"), [("rtz", "1_2"), ("rtz-1.1", "1_1"), ("rtz-1.0", "1_0")], ids=lambda value: str(value)
+)
+def test_rtz_passes_the_schema_of_its_version(route: Route, name: str, version: str) -> None:
+    schema(f"RTZ_Schema_version_{version}.xsd").assertValid(etree.fromstring(find_format(name).write(route)))
 
 
 def test_gpx_passes_the_schema_of_version_1_1(route: Route) -> None:
@@ -154,9 +159,10 @@ def test_a_route_too_long_for_an_ecdis_is_refused_with_a_way_out() -> None:
 
 def test_files_are_named_as_the_contract_says_and_unknown_formats_list_the_known_ones() -> None:
     route = routes()["plain"]
-    assert set(route_files(route, ["rtz", "gpx", "geojson", "csv"])) == {
-        "route.rtz", "route.gpx", "route.geojson", "route.csv"
+    assert set(route_files(route, STANDARD)) == {
+        "route.rtz", "route.gpx", "route.kml", "route.geojson", "route.plan", "route.waypoints", "route.csv"
     }  # fmt: skip
+    assert len({known.file_name for known in FORMATS}) == len(FORMATS)
     names = [known.name for known in FORMATS]
     assert len(set(names)) == len(names)
     with pytest.raises(UnknownName) as caught:

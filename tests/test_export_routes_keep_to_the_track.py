@@ -12,6 +12,7 @@ import shapely
 
 from expdesign.errors import InputError, NoPlan
 from expdesign.export import PlannedTrack, Route, build_route
+from expdesign.export.fence import fence_polygon
 from expdesign.plan.area import LocalFrame
 from expdesign.plan.values import Leg
 from expdesign.signals import Commands, Trajectory
@@ -77,7 +78,7 @@ def test_a_circle_is_cut_into_few_more_chords_than_the_sagitta_asks_for() -> Non
 def test_a_ship_that_goes_back_on_its_own_track_gets_waypoints_where_it_turns() -> None:
     north = np.concatenate([np.linspace(0, 100, 51), np.linspace(100, 40, 31)[1:], np.linspace(40, 200, 81)[1:]])
     route = build_route(track_along(np.stack([north, np.zeros_like(north)], axis=1)), tolerance_m=2.0)
-    assert places(route)[:, 0] == pytest.approx([0, 100, 40, 200])
+    assert places(route)[:, 0] == pytest.approx([0, 100, 40, 200], abs=0.01)
 
 
 def test_standing_still_is_a_stay_at_one_waypoint() -> None:
@@ -90,7 +91,8 @@ def test_standing_still_is_a_stay_at_one_waypoint() -> None:
         Leg(kind="primitive", name="on", first=140, last=last),
     )
     route = build_route(track_along(np.stack([north, np.zeros_like(north)], axis=1), legs=legs), tolerance_m=2.0)
-    assert [(w.time_s, w.stay_s, w.north_m) for w in route.waypoints] == [(0, 60, 0), (110, 30, 100), (last, 0, 200)]
+    assert [(w.time_s, w.stay_s) for w in route.waypoints] == [(0, 60), (110, 30), (last, 0)]
+    assert [w.north_m for w in route.waypoints] == pytest.approx([0, 100, 200], abs=0.01)
     assert [w.leg_name for w in route.waypoints[1:]] == ["out", "on"]
     assert [w.speed_mps for w in route.waypoints] == pytest.approx([0.0, 2.0, 2.0], rel=0.02)
 
@@ -148,8 +150,45 @@ def test_longitude_180_is_written_as_minus_180() -> None:
     points = np.stack([np.zeros(3), np.array([-1000.0, 0.0, 1000.0])], axis=1)
     legs = (Leg(kind="primitive", name="a", first=0, last=1), Leg(kind="primitive", name="b", first=1, last=2))
     route = build_route(replace(track_along(points, legs=legs), frame=frame))
-    assert [point.lon_deg for point in route.waypoints] == pytest.approx([-east, -180.0, east], abs=1e-8)
+    assert [point.lon_deg for point in route.waypoints] == pytest.approx([-east, -180.0, east], abs=1e-7)
     assert all(-180.0 <= point.lon_deg < 180.0 for point in route.waypoints)
+
+
+def test_the_stated_distance_bounds_what_is_measured_on_the_files_own_positions() -> None:
+    """The track lies within the cross-track distance of straight lines, rhumb lines and geodesics alike."""
+    track = case.planned()
+    route = build_route(track, tolerance_m=1.0, safe_water=case.plan().area.water)
+    geod = pyproj.Geod(ellps="WGS84")
+    worst = 0.0
+    for one, two in pairwise(route.waypoints):
+        line = geod.npts(one.lon_deg, one.lat_deg, two.lon_deg, two.lat_deg, 20, initial_idx=0, terminus_idx=0)
+        sailed = shapely.LineString(track.frame.to_metres(np.array(line)[:, ::-1]))
+        first, last = round(one.time_s), round(two.time_s + two.stay_s)
+        samples = shapely.points(track.trajectory.pose[first : last + 1, :2])
+        worst = max(worst, float(shapely.distance(samples, sailed).max()))
+    assert worst <= route.fit.largest_m <= route.xtd_m
+    assert route.fit.in_water is True
+    assert max(route.fit.loxodrome_m, route.fit.orthodrome_m) < 0.01
+
+
+def test_a_long_leg_shows_how_far_a_rhumb_line_strays_from_a_great_circle() -> None:
+    """By d^2 tan(lat) / (8 R) in the middle of an east-west leg."""
+    points = np.stack([np.zeros(2), np.array([-5000.0, 5000.0])], axis=1)
+    fit = build_route(track_along(points), tolerance_m=20.0).fit
+    expected = 10_000.0**2 * np.tan(np.radians(case.plan().area.frame.lat_deg)) / (8 * 6.38e6)
+    assert fit.loxodrome_m == pytest.approx(expected, rel=0.02)
+    assert fit.orthodrome_m < 0.01
+
+
+def test_the_fence_holds_the_track_and_lies_in_the_allowed_water() -> None:
+    plan = case.plan()
+    route = build_route(case.planned(), safe_water=plan.area.water)
+    fence = fence_polygon(route.fence, plan.area.frame)
+    assert plan.area.water.covers(fence)
+    assert fence.covers(shapely.LineString(plan.trajectory.pose[:, 1::-1]))
+    assert fence.boundary.distance(plan.area.water.boundary) >= case.tug().beam_m / 2 - 0.05
+    assert len(route.fence.outside) >= 1  # the island is fenced out
+    assert build_route(case.planned()).fence is None
 
 
 @pytest.mark.parametrize("tolerance_m", [0.0, -1.0, float("nan"), float("inf")])

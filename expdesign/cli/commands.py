@@ -141,7 +141,7 @@ def plan(
 def export(
     plan: PlanFile,
     formats: Annotated[
-        list[str], typer.Option("--format", "-f", metavar="F ...", help="One or more of: csv geojson gpx rtz.")
+        list[str], typer.Option("--format", "-f", metavar="F ...", help="One or more of: rtz rtz-1.0 rtz-1.1 gpx kml geojson qgc ardupilot csv.")
     ],
     out: OutBeside = None,
     quiet: Quiet = False,

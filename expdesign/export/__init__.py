@@ -10,7 +10,7 @@ from expdesign.export.estimates import (
     parameter_table,
 )
 from expdesign.export.folder import write_files
-from expdesign.export.formats import FORMATS, Format, find_format, route_files
+from expdesign.export.formats import FORMATS, STANDARD, Format, find_format, route_files
 from expdesign.export.planned import PlannedTrack, planned_track
 from expdesign.export.read_plan import read_plan
 from expdesign.export.results import commands_csv, dictionary_json, durations_json, plan_json, track_csv
@@ -19,6 +19,7 @@ from expdesign.export.vessel_file import vessel_toml
 
 __all__ = [
     "FORMATS",
+    "STANDARD",
     "Format",
     "PlannedTrack",
     "Route",

@@ -13,14 +13,18 @@ import numpy as np
 import shapely
 
 from expdesign.conventions import METRES_PER_NAUTICAL_MILE
-from expdesign.errors import InputError
+from expdesign.errors import InputError, NoPlan
 from expdesign.export.chords import cut_into_chords, merge_standing
+from expdesign.export.fence import Fence, build_fence
 from expdesign.export.planned import PlannedTrack
+from expdesign.export.route_fit import RouteFit, fit_route
 from expdesign.plan.area import LocalFrame
+from expdesign.values import Array
 
 ROUTE_NAME = "route"
 """Stem of the file names; ECDIS expect it as the name inside the file too."""
-DEGREE_DECIMALS = 9
+DEGREE_DECIMALS = 7
+"""Of every file, 11 mm: what autopilots store. Routes are checked after rounding to it."""
 XTD_STEP_M = METRES_PER_NAUTICAL_MILE / 10_000
 LARGEST_XTD_M = 10 * METRES_PER_NAUTICAL_MILE
 
@@ -68,6 +72,8 @@ class Route:
         waypoints: two or more.
         xtd_m: cross-track distance within which the track stays, to both sides [m].
         frame: relates north/east metres to latitude and longitude.
+        fit: what was measured of the legs, as written, against the track.
+        fence: allowed water around the track, or None when the chart is not at hand.
         departure: UTC time of the first waypoint, or None when not fixed.
     """
 
@@ -77,6 +83,8 @@ class Route:
     waypoints: tuple[Waypoint, ...]
     xtd_m: float
     frame: LocalFrame
+    fit: RouteFit
+    fence: Fence | None = None
     departure: datetime | None = None
 
     def __post_init__(self) -> None:
@@ -128,25 +136,54 @@ def build_route(
 
     Raises:
         InputError: no positive tolerance, or the plan stays in one place.
-        NoPlan: the track itself leaves the safe water.
+        NoPlan: the track itself leaves the safe water, or its legs do once rounded.
     """
     tolerance = _tolerance(track, tolerance_m)
     if safe_water is not None:
         shapely.prepare(safe_water)
     points = track.trajectory.pose[:, :2]
-    standing_m = tolerance / 10
+    standing_m, rounding_m = tolerance / 10, min(0.02, tolerance / 10)
     boundaries = [*(leg.first for leg in track.legs), track.legs[-1].last]
-    ends = cut_into_chords(points, boundaries=boundaries, tolerance_m=tolerance - standing_m, water=safe_water)
+    cut_m = tolerance - standing_m - rounding_m
+    ends = cut_into_chords(points, boundaries=boundaries, tolerance_m=cut_m, water=safe_water)
     groups = merge_standing(points, ends, distance_m=standing_m, water=safe_water)
+    places = _written_places(track, groups)
+    if len(groups) < 2:
+        raise InputError(f"the route has {len(groups)} distinct waypoints, expected 2 or more")
+    fit = fit_route(points, groups, places, frame=track.frame, water=safe_water)
+    if fit.in_water is False:
+        raise NoPlan("the route leaves the allowed water once its waypoints are rounded: give a smaller tolerance")
     return Route(
         name=ROUTE_NAME,
         scenario=track.scenario,
         vessel=track.vessel,
-        waypoints=_waypoints(track, groups),
-        xtd_m=math.ceil(tolerance / XTD_STEP_M - 1e-9) * XTD_STEP_M,
+        waypoints=_waypoints(track, groups, places),
+        xtd_m=math.ceil(max(tolerance, fit.largest_m) / XTD_STEP_M - 1e-9) * XTD_STEP_M,
         frame=track.frame,
+        fit=fit,
+        fence=_fence(track, safe_water),
         departure=departure,
     )
+
+
+def _fence(track: PlannedTrack, water: shapely.MultiPolygon | None) -> Fence | None:
+    if water is None:
+        return None
+    return build_fence(
+        track.trajectory.pose[:, :2],
+        water=water,
+        beam_m=track.beam_m,
+        clearance_m=track.clearance_m,
+        frame=track.frame,
+    )
+
+
+def _written_places(track: PlannedTrack, groups: list[tuple[int, int]]) -> Array:
+    """(n, 2) latitude and longitude [deg] with the decimals of the files, longitude in [-180, 180)."""
+    arrivals = [arrival for arrival, _ in groups]
+    degrees = track.frame.to_degrees(track.trajectory.pose[arrivals, :2]).round(DEGREE_DECIMALS) + 0.0
+    degrees[:, 1] = np.where(np.abs(degrees[:, 1]) >= 180.0, (degrees[:, 1] + 180.0) % 360.0 - 180.0, degrees[:, 1])
+    return np.asarray(degrees)
 
 
 def _tolerance(track: PlannedTrack, tolerance_m: float | None) -> float:
@@ -156,24 +193,22 @@ def _tolerance(track: PlannedTrack, tolerance_m: float | None) -> float:
     return value
 
 
-def _waypoints(track: PlannedTrack, groups: list[tuple[int, int]]) -> tuple[Waypoint, ...]:
-    points = track.trajectory.pose[:, :2]
+def _waypoints(track: PlannedTrack, groups: list[tuple[int, int]], places_deg: Array) -> tuple[Waypoint, ...]:
     sample_time = track.commands.sample_time_s
+    places = track.frame.to_metres(places_deg)
     leg_of = track.sample_leg
     waypoints: list[Waypoint] = []
     left = groups[0][0]
     for number, (arrival, departure) in enumerate(groups):
         index = int(leg_of[max(arrival - 1, 0)])
-        place = points[arrival]
-        lat, lon = track.frame.to_degrees(place).round(DEGREE_DECIMALS).tolist()
-        sailed = math.dist(place, points[groups[number - 1][0]]) if number else 0.0
+        sailed = math.dist(places[number], places[number - 1]) if number else 0.0
         waypoints.append(
             Waypoint(
                 name=f"WP{number + 1:03d}",
-                lat_deg=lat,
-                lon_deg=(lon + 180.0) % 360.0 - 180.0 if abs(lon) >= 180.0 else lon,
-                north_m=float(place[0]),
-                east_m=float(place[1]),
+                lat_deg=float(places_deg[number, 0]),
+                lon_deg=float(places_deg[number, 1]),
+                north_m=float(places[number, 0]),
+                east_m=float(places[number, 1]),
                 time_s=round(arrival * sample_time, 9),
                 stay_s=round((departure - arrival) * sample_time, 9),
                 speed_mps=sailed / ((arrival - left) * sample_time) if number else 0.0,

@@ -9,7 +9,7 @@ from expdesign import __version__
 from expdesign.dictionary import build_dictionary
 from expdesign.durations import DurationDesign, build_durations, solve_durations, with_repeats
 from expdesign.export import (
-    FORMATS,
+    STANDARD,
     build_route,
     commands_csv,
     dictionary_json,
@@ -178,7 +178,7 @@ def _route_files(case: Scenario, plan: Plan) -> dict[str, bytes]:
         clearance_m=case.plan.clearance_m,
     )
     route = build_route(track, safe_water=case.area.water)
-    return route_files(route, [item.name for item in FORMATS])
+    return route_files(route, STANDARD)
 
 
 def _report(

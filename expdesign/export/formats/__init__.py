@@ -5,11 +5,22 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from expdesign.errors import UnknownName
-from expdesign.export.formats import geojson, gpx, route_csv, rtz
+from expdesign.export.formats import ardupilot, geojson, gpx, kml, qgc, route_csv, rtz
 from expdesign.export.formats.format import Format
 from expdesign.export.route import Route
 
-FORMATS: tuple[Format, ...] = (route_csv.FORMAT, geojson.FORMAT, gpx.FORMAT, rtz.FORMAT)
+FORMATS: tuple[Format, ...] = (
+    route_csv.FORMAT,
+    geojson.FORMAT,
+    gpx.FORMAT,
+    kml.FORMAT,
+    rtz.FORMAT,
+    *rtz.OLDER,
+    qgc.FORMAT,
+    ardupilot.FORMAT,
+)
+STANDARD = ("rtz", "gpx", "kml", "geojson", "qgc", "ardupilot", "csv")
+"""Formats that every plan is written in."""
 
 
 def find_format(name: str) -> Format:
@@ -34,4 +45,4 @@ def route_files(route: Route, formats: Sequence[str]) -> dict[str, bytes]:
     return {known.file_name: known.write(route) for known in chosen}
 
 
-__all__ = ["FORMATS", "Format", "find_format", "route_files"]
+__all__ = ["FORMATS", "STANDARD", "Format", "find_format", "route_files"]

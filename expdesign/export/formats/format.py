@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from expdesign.export.route import ROUTE_NAME, Route, Waypoint
+from expdesign.export.route import DEGREE_DECIMALS, ROUTE_NAME, Route, Waypoint
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,6 +28,11 @@ class Format:
 def route_file(extension: str) -> str:
     """File name of the route with an extension."""
     return f"{ROUTE_NAME}.{extension}"
+
+
+def degrees(angle_deg: float) -> str:
+    """A latitude or longitude with the decimals that the route was checked with."""
+    return f"{angle_deg:.{DEGREE_DECIMALS}f}"
 
 
 def xml_text(text: str) -> str:

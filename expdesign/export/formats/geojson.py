@@ -5,6 +5,7 @@ Source: RFC 7946 (2016): WGS84, longitude first, lines cut at the antimeridian (
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import groupby, pairwise
 from typing import Any
 
@@ -16,10 +17,10 @@ Position = tuple[float, float]
 
 
 def write(route: Route) -> bytes:
-    """A feature collection: one line for each leg that moves the ship, one point for each waypoint."""
+    """A feature collection: a line for each leg that moves the ship, a point for each waypoint, and the fence."""
     collection = {
         "type": "FeatureCollection",
-        "features": [*_lines(route), *(_point(route, waypoint) for waypoint in route.waypoints)],
+        "features": [*_lines(route), *(_point(route, waypoint) for waypoint in route.waypoints), *_water(route)],
     }
     return strict_json(collection).encode()
 
@@ -53,6 +54,20 @@ def _point(route: Route, waypoint: Waypoint) -> dict[str, Any]:
     }
     geometry = {"type": "Point", "coordinates": list(_position(waypoint))}
     return {"type": "Feature", "geometry": geometry, "properties": properties}
+
+
+def _water(route: Route) -> list[dict[str, Any]]:
+    """The fence as a polygon: outer ring counter-clockwise, holes clockwise (RFC 7946, 3.1.6)."""
+    if route.fence is None or crosses_antimeridian(route.fence.inside):
+        return []
+    rings = [[[lon, lat] for lat, lon in (*ring, ring[0])] for ring in (route.fence.inside, *route.fence.outside)]
+    properties = {"name": "allowed water around the track, simplified to its safe side"}
+    return [{"type": "Feature", "geometry": {"type": "Polygon", "coordinates": rings}, "properties": properties}]
+
+
+def crosses_antimeridian(ring: Sequence[Position]) -> bool:
+    """Whether a ring of (latitude, longitude) [deg] jumps from 180 to -180."""
+    return any(abs(two[1] - one[1]) > 180.0 for one, two in pairwise((*ring, ring[0])))
 
 
 def _position(waypoint: Waypoint) -> Position:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from lxml import etree
 
 from expdesign.conventions import KNOTS_PER_MPS, METRES_PER_NAUTICAL_MILE
-from expdesign.export.formats.format import Format, leg_sentence, route_file, xml_text
+from expdesign.export.formats.format import Format, degrees, leg_sentence, route_file, xml_text
 from expdesign.export.route import Route, Waypoint
 
 GPX = "http://www.topografix.com/GPX/1/1"
@@ -33,7 +33,7 @@ def write(route: Route) -> bytes:
 
 
 def _add_point(line: etree._Element, route: Route, waypoint: Waypoint) -> None:
-    place = {"lat": f"{waypoint.lat_deg:.9f}", "lon": f"{waypoint.lon_deg:.9f}"}
+    place = {"lat": degrees(waypoint.lat_deg), "lon": degrees(waypoint.lon_deg)}
     point = etree.SubElement(line, f"{{{GPX}}}rtept", place)
     time = route.utc(waypoint.time_s)
     if time is not None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 
-from expdesign.export.formats.format import Format, route_file
+from expdesign.export.formats.format import Format, degrees, route_file
 from expdesign.export.route import Route
 
 COLUMNS = (
@@ -33,8 +33,8 @@ def write(route: Route) -> bytes:
         table.writerow(
             (
                 point.name,
-                f"{point.lat_deg:.9f}",
-                f"{point.lon_deg:.9f}",
+                degrees(point.lat_deg),
+                degrees(point.lon_deg),
                 f"{point.north_m:.4f}",
                 f"{point.east_m:.4f}",
                 f"{point.time_s:.10g}",
