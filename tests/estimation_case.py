@@ -5,9 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
+from expdesign.errors import NoAnswer
+from expdesign.estimation.methods import estimate
 from expdesign.scenario import load_vessel
 from expdesign.signals import Batch, Record
-from expdesign.simulation import Environment, simulate_ensemble
+from expdesign.simulation import Environment, Variation, simulate_ensemble
 from expdesign.vessel import Sensors, Vessel
 
 ROOT = Path(__file__).parent.parent
@@ -48,3 +50,40 @@ def measured(
 
 def record(*batches: Batch) -> Record:
     return Record(batches=batches)
+
+
+CALM_CURRENT = Environment(current_variation=Variation(std_mps=0.03))
+STEADY_CURRENT = Environment(current_to=CURRENT, current_variation=Variation(std_mps=0.03))
+MERGED = {"X_abs_u_u": "W_abs_u_u", "Y_abs_v_v": "W_abs_v_v", "N_uv": "W_uv"}
+
+
+def truth(names: tuple[str, ...]) -> np.ndarray:
+    """(p,) what an estimator with these parameters estimates; without wind, air and water terms fall together."""
+    values = dict(zip(TRUE.model.names, TRUE.model.parameters.tolist(), strict=True))
+    return np.array(
+        [values[name] + (values[MERGED[name]] if MERGED.get(name, name) not in names else 0.0) for name in names]
+    )
+
+
+def errors_and_std(
+    trials: int, samples: int, method: str, weather: Environment, *, seed: int
+) -> tuple[tuple[str, ...], np.ndarray, np.ndarray, int]:
+    """Names, errors (t, p) and predicted standard deviations (t, p) of trials, each with its own input and noise.
+
+    The last number counts trials whose refinement stopped or that gave no estimate; they are left out.
+    """
+    rng = np.random.default_rng(seed)
+    errors, std, failed = [], [], 0
+    for _ in range(trials):
+        inputs = commands(samples, rng)
+        many = simulate_ensemble(TRUE, inputs, runs=1, environment=weather, rng=rng, velocity=(1.7, 0.7, 0.0))
+        try:
+            found = estimate(Record(batches=(many.batch(0),)), NOMINAL, method=method)
+        except NoAnswer:
+            failed += 1
+            continue
+        failed += (stopped := any("Refinement stopped" in warning for warning in found.warnings))
+        if not stopped:
+            errors.append(found.values - truth(found.names))
+            std.append(found.std)
+    return found.names, np.array(errors), np.array(std), failed
