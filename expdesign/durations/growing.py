@@ -74,9 +74,13 @@ def grow_dictionary(
     while True:
         tell = _within(progress, len(rounds), settings.rounds)
         spec, found = search.best(best.inverse, lambda share, tell=tell: tell(SEARCHING, share))
-        if spec is None or found <= best.dimension * (1 + settings.tolerance) or len(rounds) == settings.rounds:
+        left = found
+        if spec is None or len(rounds) == settings.rounds:
             break
         item, spec = _addition(case, best, spec, settings, tell)
+        left = sensitivity(best, item, mean_subtraction)
+        if left <= best.dimension * (1 + settings.tolerance):
+            break
         name = _unused(len(rounds) + 1, spec.family, grown)
         spec, item = replace(spec, name=name), replace(item, primitive=replace(item.primitive, name=name))
         before, best = best, optimum([*grown, item], mean_subtraction)
@@ -84,10 +88,10 @@ def grow_dictionary(
         specs.append(spec)
         rounds.append(
             GrowRound(
-                name=spec.name,
+                name=name,
                 family=spec.family,
                 settings=spec.settings,
-                sensitivity=sensitivity(before, item, mean_subtraction),
+                sensitivity=left,
                 searched=found,
                 log_det_gain=best.log_det - before.log_det,
                 efficiency=float(np.exp((best.log_det - first.log_det) / len(case.names))),
@@ -102,7 +106,7 @@ def grow_dictionary(
         evaluated=search.evaluated,
         dimension=best.dimension,
         parameters=len(case.names),
-        best_left=found,
+        best_left=left,
     )
 
 

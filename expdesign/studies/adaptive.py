@@ -1,0 +1,268 @@
+"""What a grown dictionary is worth: `python -m expdesign.studies.adaptive [--runs N] [--rounds N] [--seed N]`.
+
+1. The model ship. The dictionary tau1 to tau11 is grown within the velocities that it spans itself: once by the
+   families alone, once with commands optimised freely, and once by the families with no more force than tau1 to tau11
+   use either. The optimal design of each is compared with the optimal design of tau1 to tau11: by the nominal
+   model, and by the covariance of instrumental-variable estimates from simulated trials of the true ship.
+2. The 30 m ship. How many minutes of informative time give the information of one set of standard trials (turning
+   circles, zig-zags 10/10 and 20/20 and pull-outs to both sides, stopping), repositioning not counted.
+
+Efficiencies are ratios of determinants to the power 1/p: how many times less time the same accuracy takes.
+
+Source of ship, dictionary and noise: F. Ljungberg, doctoral thesis, Linköping University, chapter 9.1; of the trials:
+IMO MSC.137(76).
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+
+from expdesign.dictionary import Primitive, build_dictionary
+from expdesign.durations import bordered
+from expdesign.durations.growing import grow_dictionary, optimum
+from expdesign.durations.growing_values import GrowSettings, Growth
+from expdesign.information import PrimitiveInformation, score_primitives
+from expdesign.scenario import load_dictionary, load_vessel
+from expdesign.simulation import Conduct, Environment, pull_out, steady_ahead, stopping, turning_circle, zigzag
+from expdesign.studies.adaptive_monte_carlo import Trials, simulate_trials
+from expdesign.values import Array
+from expdesign.vessel import Vessel
+
+SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
+WIND = Environment(wind_to=np.array([3.0, 2.0]))
+"""As in scenarios/helsinki.toml: without wind its parameters cannot be estimated."""
+RUN_S = 120.0
+"""Length of runs added to the standard trials."""
+BOOTSTRAPS = 200
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Comparison:
+    """A dictionary grown from tau1 to tau11, and what it is worth.
+
+    Attributes:
+        name: how it was grown.
+        growth: the dictionary.
+        nominal: efficiency relative to the optimal design of tau1 to tau11, by the nominal model.
+        base, grown: estimates from simulated trials of both designs.
+    """
+
+    name: str
+    growth: Growth
+    nominal: float
+    base: Trials
+    grown: Trials
+
+    @property
+    def measured(self) -> float:
+        """The same efficiency by the covariances of the estimates."""
+        return measured_efficiency(self.base, self.grown)
+
+    @property
+    def measured_error(self) -> float:
+        """Its standard error, by drawing the trials again."""
+        rng = np.random.default_rng(0)
+        draws = [measured_efficiency(_redrawn(self.base, rng), _redrawn(self.grown, rng)) for _ in range(BOOTSTRAPS)]
+        return float(np.std(draws, ddof=1))
+
+    @property
+    def std_ratios(self) -> Array:
+        """(p,) standard deviation with tau1 to tau11 over that with the grown dictionary."""
+        return np.asarray(self.base.std / self.grown.std)
+
+
+def measured_efficiency(base: Trials, other: Trials) -> float:
+    """Ratio of the determinants of two covariances to the power 1/p."""
+    return float(np.exp((base.log_det - other.log_det) / len(base.truth)))
+
+
+def _redrawn(trials: Trials, rng: np.random.Generator) -> Trials:
+    count = len(trials.estimates)
+    return replace(trials, estimates=trials.estimates[rng.integers(0, count, size=count)])
+
+
+def model_ship(name: str = "model-ship") -> tuple[Vessel, tuple[PrimitiveInformation, ...]]:
+    """The nominal model ship and tau1 to tau11, scored."""
+    ship = load_vessel(SCENARIOS / "vessels" / f"{name}.toml")
+    primitives = build_dictionary(ship, load_dictionary(SCENARIOS / "dictionaries" / "model-ship.toml"))
+    return ship, score_primitives(ship, primitives)
+
+
+def same_forces(ship: Vessel, primitives: Sequence[Primitive]) -> Vessel:
+    """The ship with no more force than these primitives use."""
+    used = np.concatenate([primitive.commands.values for primitive in primitives])
+    (actuator,) = ship.actuators
+    limits = tuple(
+        replace(limit, low=float(low), high=float(high))
+        for limit, low, high in zip(actuator.limits, used.min(axis=0), used.max(axis=0), strict=True)
+    )
+    return replace(ship, model=replace(ship.model, actuators=(replace(actuator, limits=limits),)))
+
+
+def compare(
+    name: str, settings: GrowSettings, *, runs: int, seed: int = 0, narrow: bool = False, samples: int = 1000
+) -> Comparison:
+    """Grow tau1 to tau11 and try both optimal designs on the true ship."""
+    ship, information = model_ship()
+    truth = load_vessel(SCENARIOS / "vessels" / "model-ship-true.toml")
+    searched = same_forces(ship, [item.primitive for item in information]) if narrow else ship
+    growth = grow_dictionary(searched, information, settings=settings)
+    first, last = (optimum(items, "complete") for items in (information, growth.information))
+    base, grown = (
+        simulate_trials(
+            truth,
+            ship,
+            [item.primitive for item in items],
+            best.fractions,
+            runs=runs,
+            rng=np.random.default_rng([seed, stage]),
+            samples=samples,
+        )
+        for stage, (items, best) in enumerate(((information, first), (growth.information, last)))
+    )
+    efficiency = float(np.exp((last.log_det - first.log_det) / growth.parameters))
+    return Comparison(name=name, growth=growth, nominal=efficiency, base=base, grown=grown)
+
+
+def standard_trials(ship: Vessel) -> tuple[Primitive, ...]:
+    """Turning circles, zig-zags 10/10 and 20/20 and pull-outs to both sides, and stopping, at service speed."""
+    entry, ten, twenty = steady_ahead(ship).inputs, np.radians(10.0), np.radians(20.0)
+    trials = {}
+    for side in ("starboard", "port"):
+        trials[f"turning circle {side}"] = turning_circle(ship, side=side)
+        trials[f"zig-zag 10/10 {side}"] = zigzag(ship, heading_rad=ten, helm_rad=ten, side=side)
+        trials[f"zig-zag 20/20 {side}"] = zigzag(ship, heading_rad=twenty, helm_rad=twenty, side=side)
+        trials[f"pull-out {side}"] = pull_out(ship, side=side)
+    trials["stopping"] = stopping(ship, conduct=Conduct())
+    return tuple(
+        Primitive(
+            name=name, family="standard trial", settings={}, commands=commands, entry_inputs=entry, trajectory=run
+        )
+        for name, (commands, run) in trials.items()
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Minutes:
+    """Informative time that gives the information of one set of standard trials.
+
+    Attributes:
+        trials: the set itself.
+        optimal: the same trials, time shared out optimally.
+        dictionary: optimal design of the ship's dictionary.
+        grown: optimal design of the dictionary of trials grown within their own velocities.
+        free: the same with commands optimised freely.
+    """
+
+    trials: float
+    optimal: float
+    dictionary: float
+    grown: float
+    free: float
+
+
+def minutes_for_the_same(wish: GrowSettings) -> tuple[Minutes, dict[str, Growth]]:
+    """The 30 m ship's standard trials against designed ones, in wind, for all parameters of its model."""
+    ship = load_vessel(SCENARIOS / "vessels" / "azimuth-30m.toml")
+    trials = score_primitives(ship, standard_trials(ship), environment=WIND)
+    length_s = np.array([item.primitive.duration_s for item in trials])
+    total = np.tensordot(length_s / length_s.sum(), np.array([bordered(item, "complete") for item in trials]), axes=1)
+    scale = np.sqrt(np.diag(total))
+    once = float(np.linalg.slogdet(total / np.outer(scale, scale))[1] + 2 * np.log(scale).sum())
+    p, whole = len(ship.model.names), float(length_s.sum()) / 60
+
+    def needed(information: Sequence[PrimitiveInformation]) -> float:
+        return whole * float(np.exp((once - optimum(information, "complete").log_det) / p))
+
+    growths = {
+        name: grow_dictionary(ship, trials, settings=replace(wish, free_form=free, run_s=RUN_S), environment=WIND)
+        for name, free in (("families", False), ("free form", True))
+    }
+    specs = load_dictionary(SCENARIOS / "dictionaries" / "standard.toml")
+    own = score_primitives(ship, build_dictionary(ship, specs), environment=WIND)
+    found = Minutes(
+        trials=whole,
+        optimal=needed(trials),
+        dictionary=needed(own),
+        grown=needed(growths["families"].information),
+        free=needed(growths["free form"].information),
+    )
+    return found, growths
+
+
+def growth_table(growth: Growth) -> str:
+    """What was added, and what each addition brought."""
+    lines = [f"{'round':>5}  {'family':<20} {'d before':>9} {'log det':>8} {'efficiency':>10}  settings"]
+    for number, row in enumerate(growth.rounds, start=1):
+        settings = " ".join(f"{key}={value:.4g}" for key, value in row.settings.items() if key != "duration_s")
+        lines.append(
+            f"{number:>5}  {row.family:<20} {row.sensitivity:>9.2f} {row.log_det_gain:>+8.3f} {row.efficiency:>10.3f}  "
+            f"{settings}"
+        )
+    lines.append(
+        f"dimension {growth.dimension}; {growth.evaluated} candidates looked at; best left {growth.best_left:.3f}, so "
+        f"at least {100 * growth.efficiency_left:.1f} % of what those candidates allow"
+    )
+    return "\n".join(lines)
+
+
+def comparison_table(found: Sequence[Comparison], names: Sequence[str]) -> str:
+    """Efficiencies, and the standard deviations of every parameter relative to its true value."""
+    lines = [f"{'grown by':<28} {'nominal':>8} {'simulated trials':>18} {'time for the same':>18}"]
+    for item in found:
+        simulated = f"{item.measured:.2f} +- {item.measured_error:.2f}"
+        lines.append(f"{item.name:<28} {item.nominal:>8.2f} {simulated:>18} {100 / item.measured:>16.0f} %")
+    truth = np.abs(found[0].base.truth)
+    heads = "".join(f"{item.name:>28}" for item in found)
+    lines += ["", f"std / |true| (times smaller)   {'tau1-tau11':>10}{heads}"]
+    for place, name in enumerate(names):
+        cells = (f"{item.grown.std[place] / truth[place]:.3f} ({item.std_ratios[place]:.2f})" for item in found)
+        base = found[0].base.std[place] / truth[place]
+        lines.append(f"{name:<30} {base:>10.3f}" + "".join(f"{cell:>28}" for cell in cells))
+    return "\n".join(lines)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Print both parts."""
+    parser = argparse.ArgumentParser(prog="python -m expdesign.studies.adaptive", description=__doc__)
+    parser.add_argument("--runs", type=int, default=800, help="simulated trials of each design")
+    parser.add_argument("--rounds", type=int, default=12, help="most additions")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--part", choices=("ship", "trials", "both"), default="both")
+    chosen = parser.parse_args(arguments)
+    console = Console(highlight=False, markup=False, soft_wrap=True)
+    wish = GrowSettings(rounds=chosen.rounds, seed=chosen.seed)
+    if chosen.part != "trials":
+        console.print(_ship_part(wish, chosen.runs))
+    if chosen.part != "ship":
+        console.print(_trials_part(wish))
+
+
+def _ship_part(wish: GrowSettings, runs: int) -> str:
+    cases = (
+        ("families", wish, False),
+        ("families and free form", replace(wish, free_form=True), False),
+        ("families, same forces", wish, True),
+    )
+    found = [compare(name, settings, runs=runs, seed=wish.seed, narrow=narrow) for name, settings, narrow in cases]
+    parts = [f"tau1 to tau11 grown by {item.name}\n{growth_table(item.growth)}" for item in found]
+    return "\n\n".join([*parts, comparison_table(found, model_ship()[0].model.names), ""])
+
+
+def _trials_part(wish: GrowSettings) -> str:
+    minutes, growths = minutes_for_the_same(wish)
+    parts = [
+        f"Standard trials of the 30 m ship grown by {name}\n{growth_table(item)}" for name, item in growths.items()
+    ]
+    rows = [f"{label:<12} {value:>7.2f}" for label, value in vars(minutes).items()]
+    return "\n\n".join([*parts, "\n".join(["Minutes for the information of one set of standard trials", *rows])])
+
+
+if __name__ == "__main__":
+    main()
