@@ -269,6 +269,63 @@ def estimate(
     )
 
 
+@app.command()
+def diagnose(
+    data: Annotated[
+        list[Path], typer.Argument(metavar="DATA.csv ...", help="Measured runs; what is read is told in the README.")
+    ],
+    vessel: Annotated[
+        Path,
+        typer.Option("--vessel", metavar="VESSEL.toml", help="The simulation model in use; parameter_std says how sure."),
+    ],
+    scenario: Annotated[
+        Path | None,
+        typer.Option(
+            "--scenario",
+            metavar="SCENARIO.toml",
+            help="Whose dictionary to search for manoeuvres that tell causes apart; standard ones when not given.",
+        ),
+    ] = None,
+    velocity: Annotated[
+        str,
+        typer.Option(
+            metavar="HOW",
+            help="Where u, v, r come from: measured; difference or smoothed from the pose; auto: measured where they "
+            "stand, else differences.",
+        ),
+    ] = "auto",
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", metavar="FOLDER", help="Where to write; runs/<first data file> when not given."),
+    ] = None,
+    seed: Seed = 0,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> None:
+    """Show what the simulation gets wrong, name the cause, extend the model.
+
+    Writes diagnosis.json, diagnosis.html and vessel-extended.toml.
+
+    Example: expdesign diagnose zigzag.csv circle.csv --vessel ship.toml
+    """
+    from expdesign import workflows
+
+    _carry_out(
+        "diagnose",
+        lambda tell: workflows.diagnose(
+            tuple(data),
+            check_out(out),
+            vessel=vessel,
+            scenario=scenario,
+            velocity=velocity,
+            seed=seed,
+            progress=tell,
+        ),
+        quiet,
+        json,
+    )
+
+
 def _carry_out(name: str, work: Callable[[Progress], Outcome], quiet: bool, json: bool) -> None:
     """Do the work of one command and say what came of it."""
     with shown_progress(quiet=quiet) as progress:

@@ -5,6 +5,7 @@ between (`scored`, `designed`, `planned`) are for notebooks: value in, value out
 """
 
 from expdesign.workflows.after import estimate, export, measured, simulate
+from expdesign.workflows.diagnosed import diagnose
 from expdesign.workflows.outcome import Outcome, Progress, TextTable
 from expdesign.workflows.trial import designed, durations, plan, planned, run, score, scored
 
@@ -13,6 +14,7 @@ __all__ = [
     "Progress",
     "TextTable",
     "designed",
+    "diagnose",
     "durations",
     "estimate",
     "export",

@@ -1,0 +1,23 @@
+"""Right structure, wrong values: parameters off by more than their stated standard deviations."""
+
+from __future__ import annotations
+
+from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
+from expdesign.diagnosis.causes.words import rounded
+
+
+def _candidates(situation: Situation) -> tuple[Candidate, ...]:
+    model = situation.ship.model
+    groups = [(f"theta:{term.name}",) for term in model.terms if not situation.has(f"theta:{term.name}")]
+    for equation in model.outputs:
+        groups.append(tuple(f"theta:{term.name}" for term in model.terms if term.equation == equation))
+    groups.append(tuple(f"theta:{name}" for name in model.names))
+    return tuple(Candidate(cause="parameters", free=dict.fromkeys(group, 0.0)) for group in dict.fromkeys(groups))
+
+
+def _explain(values: Values) -> str:
+    changes = ", ".join(f"{key[6:]} by {rounded(value, std)}" for key, (value, std) in values.items())
+    return f"The structure fits, its numbers do not: the data want parameters changed ({changes})."
+
+
+PARAMETERS = Cause(name="parameters", candidates=_candidates, explain=_explain, suspect="input")

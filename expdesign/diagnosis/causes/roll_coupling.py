@@ -1,0 +1,34 @@
+"""Roll that shows in sway and yaw: a lightly damped mode driven by the side acceleration."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
+from expdesign.diagnosis.causes.words import listed
+
+COUNT = 9
+DAMPING = 0.08
+
+
+def _candidates(situation: Situation) -> tuple[Candidate, ...]:
+    outputs = set(situation.ship.model.outputs)
+    if situation.ship.has_roll or not {"v", "r"} <= outputs:
+        return ()
+    shortest = 4.0 * situation.windows.sample_s
+    periods = np.geomspace(shortest, max(30.0 * shortest / 4, 2 * shortest), COUNT)
+    return tuple(
+        Candidate(
+            cause="roll_coupling",
+            free={"roll:sway": 0.0, "roll:yaw": 0.0},
+            fixed={"roll:period": float(period), "roll:damping": DAMPING},
+        )
+        for period in periods
+    )
+
+
+def _explain(values: Values) -> str:
+    return f"Sway or yaw oscillate at one period as a rolling ship makes them: {listed(values)}."
+
+
+ROLL_COUPLING = Cause(name="roll_coupling", candidates=_candidates, explain=_explain, suspect="time")

@@ -1,0 +1,28 @@
+"""Shallow water: damping and inertia grow with draught over depth."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
+from expdesign.diagnosis.causes.words import listed
+
+LEAST_VARIATION = 0.01
+
+
+def _candidates(situation: Situation) -> tuple[Candidate, ...]:
+    windows = situation.windows
+    if not windows.has_depth or any(key.startswith("shallow:") for key in situation.ship.effects):
+        return ()
+    shoal = situation.ship.draught_m / windows.depth_m
+    if np.ptp(shoal) < LEAST_VARIATION:
+        return ()
+    groups = (("damping",), ("inertia",), ("damping", "inertia"))
+    return tuple(Candidate(cause="shallow_water", free={f"shallow:{n}": 0.0 for n in group}) for group in groups)
+
+
+def _explain(values: Values) -> str:
+    return f"The ship is slower where the water is shallow: growth per unit of draught over depth: {listed(values)}."
+
+
+SHALLOW_WATER = Cause(name="shallow_water", candidates=_candidates, explain=_explain, suspect="depth")

@@ -1,0 +1,34 @@
+"""A ship that turns at zero angle: thrust off the centre line, or angles that are not what they are said to be."""
+
+from __future__ import annotations
+
+from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
+from expdesign.diagnosis.causes.words import first, rounded
+from expdesign.diagnosis.extended import ANGLE_STEMS
+
+
+def _candidates(situation: Situation) -> tuple[Candidate, ...]:
+    ship = situation.ship
+    if any(key.startswith(("offset", "asymmetry")) for key in ship.effects) or "r" not in ship.model.outputs:
+        return ()
+    angles = [name for name in ship.model.inputs if name.rstrip("0123456789") in ANGLE_STEMS]
+    stems = {name.rstrip("0123456789") for name in angles}
+    groups = [*sorted(stems), *(angles if len(angles) > 1 else [])]
+    lean = Candidate(cause="thruster_asymmetry", free={"asymmetry": 0.0})
+    return (lean, *(Candidate(cause="thruster_asymmetry", free={f"offset:{group}": 0.0}) for group in groups))
+
+
+def _explain(values: Values) -> str:
+    key, value, std = first(values)
+    if key == "asymmetry":
+        return (
+            f"A yaw moment in proportion to the ahead thrust: {rounded(value, std)} per unit of thrust, as if the "
+            f"thrust acted that far to {'port' if value > 0 else 'starboard'}. The ship turns at zero angle."
+        )
+    return (
+        f"The angle of {key.split(':')[1]} is off by {rounded(57.29578 * value, 57.29578 * std)} degrees: the ship turns "
+        f"when it is commanded straight."
+    )
+
+
+THRUSTER_ASYMMETRY = Cause(name="thruster_asymmetry", candidates=_candidates, explain=_explain, suspect="thrust")

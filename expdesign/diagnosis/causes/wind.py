@@ -1,0 +1,45 @@
+"""Wind: drag of the air on hull and superstructure, with measured wind or with an unknown mean one."""
+
+from __future__ import annotations
+
+from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
+from expdesign.diagnosis.causes.missing_term import lacking
+from expdesign.diagnosis.causes.words import listed
+
+SPEEDS_MPS = (3.0, 8.0)
+DIRECTIONS = ((1.0, 0.0), (0.7, 0.7), (0.0, 1.0), (-0.7, 0.7), (-1.0, 0.0), (-0.7, -0.7), (0.0, -1.0), (0.7, -0.7))
+
+
+def _candidates(situation: Situation) -> tuple[Candidate, ...]:
+    ship, windows = situation.ship, situation.windows
+    terms = [name for name in lacking(situation, air=True) if f"term:{name}" not in ship.effects]
+    reads_air = [
+        term.name
+        for term, expression in zip(ship.model.terms, ship.model.expressions, strict=True)
+        if {"u_q", "v_q"} & set(expression.signals)
+    ]
+    found: list[Candidate] = []
+    if windows.has_wind:
+        if terms:
+            found.append(Candidate(cause="wind", free={f"term:{name}": 0.0 for name in terms}))
+            found += [Candidate(cause="wind", free={f"term:{name}": 0.0}) for name in terms if len(terms) > 1]
+        if reads_air and not terms:
+            found.append(Candidate(cause="wind", free={f"theta:{name}": 0.0 for name in reads_air}))
+    elif windows.has_heading and reads_air and not situation.has("wind:north"):
+        found += [
+            Candidate(cause="wind", free={"wind:north": speed * n, "wind:east": speed * e}, finite=True)
+            for speed in SPEEDS_MPS
+            for n, e in DIRECTIONS
+        ]
+    return tuple(found)
+
+
+def _explain(values: Values) -> str:
+    if "wind:north" in values:
+        return f"Air drag as of a mean wind blowing to {listed(values, ' m/s')} explains the error."
+    return (
+        f"The error grows with the wind over the deck: the hull has air drag that the model lacks ({listed(values)})."
+    )
+
+
+WIND = Cause(name="wind", candidates=_candidates, explain=_explain, suspect="wind")

@@ -1,0 +1,225 @@
+"""The diagnosis from data and vessel to findings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from expdesign.conventions import OUTPUTS
+from expdesign.diagnosis.accuracy import accuracy, first_states, simulate_from_first
+from expdesign.diagnosis.candidate import Cause, Values
+from expdesign.diagnosis.causes import CAUSES
+from expdesign.diagnosis.extended import Extended
+from expdesign.diagnosis.extension import as_extended, extend, public_name
+from expdesign.diagnosis.gain import HeldOut, gained, held_out
+from expdesign.diagnosis.joint import Fit
+from expdesign.diagnosis.search import Search, Step, search
+from expdesign.diagnosis.tell_apart import Proposal, most_telling, standard_proposals
+from expdesign.diagnosis.values import Accuracy, Diagnosis, Estimated, Finding
+from expdesign.diagnosis.windows import Windows, cut_windows
+from expdesign.errors import Diverged, NotInformative
+from expdesign.signals import Record
+from expdesign.values import Array
+from expdesign.vessel import Vessel
+
+Progress = Callable[[str, float], None]
+FEWEST_SAMPLES = 100
+UNITS = 4
+
+
+def diagnose(
+    vessel: Vessel,
+    record: Record,
+    *,
+    seed: int = 0,
+    proposals: Sequence[Proposal] = (),
+    progress: Progress = lambda what, share: None,
+) -> Diagnosis:
+    """Show what the simulation gets wrong, name the causes, extend the model, measure the gain.
+
+    Args:
+        vessel: the model in use; parameters with a standard deviation are re-estimated within it, others are known.
+        record: measured data; velocities over ground, inputs, perhaps pose, wind and depth.
+        seed: of the draws behind corrected p-values and gain intervals.
+        proposals: manoeuvres to choose from for telling causes apart; standard ones when empty.
+        progress: told what is being done and the share of it done.
+
+    Raises:
+        NotInformative: the data cannot support a diagnosis; the message says what is missing.
+        Diverged: the model in use cannot be simulated over the data.
+    """
+    rng = np.random.default_rng(seed)
+    progress("simulating the model in use", 0.0)
+    ship = as_extended(vessel, record)
+    windows = _windows(ship, record)
+    _check(ship, windows, record)
+    before = accuracy(ship, record)
+    motion = simulate_from_first(ship, windows)
+    if motion.diverged:
+        raise Diverged(f"vessel {vessel.name!r}: its simulation of the data diverges; the model is unstable")
+    found = search(ship, windows, first_states(windows), rng, lambda what, share: progress(what, 0.05 + 0.6 * share))
+    held = _held_out(found, ship, windows, lambda share: progress("measuring the gain on held-out runs", share))
+    progress("looking for manoeuvres that tell causes apart", 0.92)
+    proposed = proposals or standard_proposals(windows, ship.model.inputs, windows.sample_s)
+    findings = tuple(
+        _finding(step, held[index], held[index + 1], windows, proposed, rng) for index, step in enumerate(found.steps)
+    )
+    last = found.last if found.steps else found.first
+    final = last.ship if found.steps else ship
+    extended, missing = extend(vessel, final, _stds(last) if found.steps else {})
+    after = accuracy(final, record)
+    order = sorted(range(len(findings)), key=lambda index: -findings[index].gain)
+    return Diagnosis(
+        vessel=vessel,
+        extended=extended,
+        record=record,
+        windows=windows,
+        before=before,
+        after=after,
+        findings=tuple(findings[index] for index in order),
+        verdict=_verdict([findings[index] for index in order], before),
+        simulated_before=motion.shown,
+        simulated_after=simulate_from_first(final, windows).shown,
+        errors={step.chosen.candidate.cause: step.before.linear.motion.error for step in found.steps},
+        notes=(*_notes(windows, vessel), *missing),
+        screened=_screened(found),
+    )
+
+
+def _windows(ship: Extended, record: Record) -> Windows:
+    """As long as may be, but at least four, and no longer than the model's errors stay linear."""
+    total = sum(len(batch) * batch.sample_time_s for batch in record.batches)
+    windows = cut_windows(ship.model, record)
+    if len(windows.batch) < UNITS:
+        windows = cut_windows(ship.model, record, longest_s=total / UNITS)
+    return windows
+
+
+def _check(ship: Extended, windows: Windows, record: Record) -> None:
+    samples = int(np.isfinite(windows.measured[..., :3]).any(axis=2).sum())
+    if samples < FEWEST_SAMPLES:
+        seconds = samples * windows.sample_s
+        raise NotInformative(
+            f"the data are too short for a diagnosis: {samples} samples of {windows.sample_s:g} s ({seconds:.0f} s), "
+            f"expected {FEWEST_SAMPLES} or more"
+        )
+    rows = np.concatenate(windows.batch_inputs)
+    still = [n for n, low, high in zip(ship.model.inputs, rows.min(0), rows.max(0), strict=True) if high - low <= 1e-9]
+    if len(still) == rows.shape[1]:
+        raise NotInformative(
+            f"the data cannot support a diagnosis: no input changes ({', '.join(still)}), so a steady run is all there "
+            f"is; expected runs in which {', '.join(still)} vary",
+            parameters=tuple(still),
+        )
+    for name in ship.model.outputs:
+        column = windows.measured[..., OUTPUTS.index(name)]
+        if not np.isfinite(column).any():
+            raise NotInformative(f"the data cannot support a diagnosis: {name} is not measured")
+    del record
+
+
+def _held_out(found: Search, ship: Extended, windows: Windows, tell: Callable[[float], None]) -> list[HeldOut]:
+    """Of the model in use, then after every step."""
+    fits: list[Fit | None] = [None, *(step.chosen.fit for step in found.steps)]
+    results = []
+    for number, item in enumerate(fits):
+        share = (0.65 + 0.27 * number / len(fits), 0.27 / len(fits))
+        results.append(
+            held_out(
+                item, ship if item is None else item.ship, windows, lambda part, at=share: tell(at[0] + at[1] * part)
+            )  # type: ignore[misc]
+        )
+    return results
+
+
+def cause_of(name: str) -> Cause:
+    """The entry of the catalogue that a name belongs to."""
+    return next(cause for cause in CAUSES if cause.name == name.split(":")[0])
+
+
+def _finding(
+    step: Step, before: HeldOut, after: HeldOut, windows: Windows, proposals: Sequence[Proposal],
+    rng: np.random.Generator,
+) -> Finding:  # fmt: skip
+    chosen = step.chosen
+    gain, interval = gained(before, after, rng)
+    values: dict[str, tuple[float, float]] = {key: (chosen.fit.value(key), chosen.fit.std(key)) for key in chosen.keys}
+    if "change:time" in chosen.candidate.fixed and "change:time" not in values:
+        values["change:time"] = (chosen.fit.value("change:time"), chosen.time_std)
+    cause = cause_of(chosen.candidate.cause)
+    telling = None
+    if step.rivals:
+        std = np.where(np.isfinite(chosen.fit.noise.std), chosen.fit.noise.std, np.inf)
+        telling = most_telling(chosen.fit.ship, [rival.fit.ship for rival in step.rivals], proposals, std, windows)
+    return Finding(
+        cause=chosen.candidate.cause,
+        estimates=_estimates(values, chosen.fit.ship),
+        p_value=step.p_value,
+        fit_before=before.fit,
+        fit_after=after.fit,
+        gain=gain,
+        gain_interval=interval,
+        not_distinguishable_from=tuple(rival.candidate.cause for rival in step.rivals),
+        would_tell_apart=telling,
+        explanation=cause.explain(values),
+        suspect=cause.suspect,
+        worth=chosen.gain,
+    )
+
+
+def _estimates(values: Values, ship: Extended) -> tuple[Estimated, ...]:
+    result = []
+    for key, (value, std) in values.items():
+        name, factor, offset, unit = public_name(key, ship)
+        result.append(Estimated(name=name, value=offset + factor * value, std=abs(factor) * std, unit=unit))
+    return tuple(result)
+
+
+def _stds(found: Fit) -> dict[str, float]:
+    return {key: found.std(key) for key in found.keys}
+
+
+def _verdict(findings: Sequence[Finding], before: Accuracy) -> str:
+    fits = ", ".join(f"{name} {value:.0f} %" for name, value in zip(before.outputs, before.fit.tolist(), strict=True))
+    if not findings:
+        return f"Nothing is wrong that this data can show: the simulation fits with {fits}."
+    names = [finding.cause for finding in findings]
+    listed = names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+    after = float(sum(finding.gain for finding in findings))
+    sure = (
+        ""
+        if not findings[0].not_distinguishable_from
+        else (
+            f" ({findings[0].cause} cannot be told from {', '.join(findings[0].not_distinguishable_from)} on this data)"
+        )
+    )
+    return (
+        f"The simulation, which fits with {fits}, lacks {listed}{sure}; mending gains {after:.1f} points of fit on "
+        f"runs that were held out."
+    )
+
+
+def _notes(windows: Windows, vessel: Vessel) -> tuple[str, ...]:
+    notes = []
+    if not windows.has_heading:
+        notes.append("No heading is measured: current and wind cannot be told from what the ship does by itself.")
+    if not windows.has_depth:
+        notes.append("No depth is measured: shallow water was not tested.")
+    if windows.derived:
+        notes.append("Velocities are derived from the pose: the scale of a rate gyro was not tested.")
+    if not (vessel.model.parameter_std > 0).any():
+        notes.append("The vessel file states no parameter_std: its parameters count as known.")
+    return tuple(notes)
+
+
+def _screened(found: Search) -> tuple[tuple[str, float], ...]:
+    best: dict[str, float] = {}
+    for item in found.final_screening.scored:
+        p_value = min(1.0, item.p_value * found.final_screening.tests)
+        best[item.candidate.cause] = min(p_value, best.get(item.candidate.cause, 1.0))
+    return tuple(sorted(best.items(), key=lambda pair: pair[1]))
+
+
+__all__ = ["Array", "diagnose", "replace"]

@@ -1,0 +1,222 @@
+"""From a vessel to a model with effects, and back: everything found becomes part of a vessel file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from expdesign.diagnosis.causes.missing_term import library
+from expdesign.diagnosis.extended import Extended, is_coriolis, is_thrust, members, reads_rudder
+from expdesign.estimation.tables import model_for
+from expdesign.signals import Record
+from expdesign.vessel import Actuator, Mounting, Response, Sensors, Term, Vessel, VesselModel
+
+RESPONSES = {"lag": "lag_s", "delay": "delay_s", "deadband": "deadband", "offset": "offset"}
+
+
+def as_extended(vessel: Vessel, record: Record) -> Extended:
+    """The model in use, with the actuators, sensors and weather that its file states."""
+    model = model_for(vessel.model, record)
+    effects: dict[str, float] = {}
+    for actuator in model.actuators:
+        for signal, response in zip(actuator.signals, actuator.responses, strict=True):
+            for kind, name in RESPONSES.items():
+                effects[f"{kind}:{signal}"] = float(getattr(response, name))
+    sensors = vessel.sensors
+    effects |= {
+        "heading_bias": -sensors.heading_bias_rad,
+        "gyro": sensors.yaw_rate_scale - 1.0,
+        "lever:forward": sensors.velocity.forward_m,
+        "lever:starboard": sensors.velocity.starboard_m,
+        "late:u": sensors.velocity.delay_s,
+        "late:v": sensors.velocity.delay_s,
+        "late:r": sensors.yaw_rate.delay_s,
+        "late:psi": sensors.heading.delay_s,
+        "late:position": sensors.position.delay_s,
+    }
+    weather = vessel.environment
+    for name, flow in (("current", weather.current_to), ("wind", weather.wind_to)):
+        effects |= {f"{name}:north": float(flow[0]), f"{name}:east": float(flow[1])}
+    known = {key: value for key, value in effects.items() if value}
+    return Extended(model=model, library=library(model), draught_m=vessel.draught_m, effects=known)
+
+
+def extend(vessel: Vessel, ship: Extended, std: Mapping[str, float]) -> tuple[Vessel, tuple[str, ...]]:
+    """The vessel with everything in `ship`, and what could not be written into it, one sentence each.
+
+    Args:
+        vessel: the model in use.
+        ship: with effects found.
+        std: standard errors of effects.
+    """
+    model, missing = _model(vessel.model, ship, std)
+    actuators, more = _actuators(model.actuators, ship)
+    get = ship.get
+    weather = replace(
+        vessel.environment,
+        current_to=np.array([get("current:north"), get("current:east")]),
+        wind_to=np.array([get("wind:north"), get("wind:east")]),
+    )
+    return (
+        replace(
+            vessel,
+            model=replace(model, actuators=actuators),
+            sensors=_sensors(vessel.sensors, ship),
+            environment=weather,
+        ),
+        (*missing, *more),
+    )
+
+
+def _model(model: VesselModel, ship: Extended, std: Mapping[str, float]) -> tuple[VesselModel, tuple[str, ...]]:
+    get = ship.get
+    values, stds = [], []
+    for term, expression, value, known in zip(
+        model.terms, model.expressions, model.parameters.tolist(), model.parameter_std.tolist(), strict=True
+    ):
+        key = f"theta:{term.name}"
+        whole = value + get(key) + get(f"change:{key}")
+        factor = 1.0
+        if is_thrust(expression, ship.model):
+            factor *= (1 + get("gain")) * (1 + get("change:gain"))
+            factor *= 1.0 if reads_rudder(expression) else 1 + get("gain:propeller")
+        elif not (is_coriolis(term) or {"u_q", "v_q"} & set(expression.signals)):
+            factor *= 1 + get("change:damping") + get(f"change:damping_{term.equation}")
+        if not is_coriolis(term):
+            factor /= 1 + get(f"inertia:{term.equation}")
+        values.append(whole * factor)
+        stds.append(abs(factor) * (std.get(key, known)))
+    terms = list(model.terms)
+    for key, value in ship.effects.items():
+        if key.startswith("term:"):
+            term = ship.library[key[5:]]
+            terms.append(term)
+            values.append(value / (1 + get(f"inertia:{term.equation}")))
+            stds.append(std.get(key, 0.0))
+    lean = _lean(model, ship)
+    if lean is not None:
+        terms.append(lean[0])
+        values.append(lean[1])
+        stds.append(0.0)
+    missing = []
+    if any(key.startswith("shallow:") for key in ship.effects):
+        missing.append("The dependence on depth is not in the vessel file, which describes deep water.")
+    if ship.has_roll:
+        missing.append("The roll mode is not in the vessel file, which has three degrees of freedom.")
+    if "change:time" in ship.effects:
+        missing.append("The vessel file describes the ship after the change.")
+    extended = replace(
+        model, terms=tuple(terms), parameters=np.array(values, dtype=float), parameter_std=np.array(stds, dtype=float)
+    )
+    return extended, tuple(missing)
+
+
+def _lean(model: VesselModel, ship: Extended) -> tuple[Term, float] | None:
+    """The yaw moment of ahead thrust as a term of its own."""
+    lean = ship.get("asymmetry")
+    if not lean:
+        return None
+    for term, expression, value in zip(model.terms, model.expressions, model.parameters.tolist(), strict=True):
+        if expression.signals == ("tau_psi",):
+            name = _unused("N_tau_x", model)
+            gain = (value + ship.get(f"theta:{term.name}")) * (1 + ship.get("gain")) / (1 + ship.get("inertia:r"))
+            return Term("r", name, "tau_x"), lean * gain
+    speeds = [name for name in model.inputs if name.rstrip("0123456789") == "n"]
+    expression_text = " + ".join(f"abs({name})*{name}" for name in speeds)
+    return Term("r", _unused("N_thrust", model), expression_text), lean * model.time_scale_s
+
+
+def _unused(name: str, model: VesselModel) -> str:
+    return name if name not in model.names else f"{name}_found"
+
+
+def _actuators(actuators: tuple[Actuator, ...], ship: Extended) -> tuple[tuple[Actuator, ...], tuple[str, ...]]:
+    own = tuple(name for actuator in actuators for name in actuator.signals)
+    recorded = ship.model.inputs
+    changes: dict[str, dict[str, float]] = {}
+    lost = []
+    for key, value in ship.effects.items():
+        kind, _, group = key.partition(":")
+        if kind not in RESPONSES:
+            continue
+        for index in members(group, recorded):
+            if recorded[index] in own:
+                row = changes.setdefault(recorded[index], {})
+                row[RESPONSES[kind]] = row.get(RESPONSES[kind], 0.0) + value if ":" in key else value
+            else:
+                lost.append(
+                    f"{kind} of {recorded[index]} is not in the vessel file, whose actuators take other signals."
+                )
+    result = []
+    for actuator in actuators:
+        responses = tuple(
+            Response(**{**_plain(response), **changes.get(signal, {})})
+            for signal, response in zip(actuator.signals, actuator.responses, strict=True)
+        )
+        result.append(replace(actuator, responses=responses))
+    return tuple(result), tuple(dict.fromkeys(lost))
+
+
+def _plain(response: Response) -> dict[str, float]:
+    """Responses of the old file are part of the effects already."""
+    del response
+    return {}
+
+
+def _sensors(sensors: Sensors, ship: Extended) -> Sensors:
+    get = ship.get
+
+    def late(key: str) -> float:
+        return max(get(key), 0.0)
+
+    velocity = max(late("late:u"), late("late:v"))
+    mounted = replace(
+        sensors.velocity, forward_m=get("lever:forward"), starboard_m=get("lever:starboard"), delay_s=velocity
+    )
+    position: Mounting = replace(sensors.position, delay_s=late("late:position"))
+    return replace(
+        sensors,
+        heading_bias_rad=0.0 - get("heading_bias"),
+        yaw_rate_scale=1.0 + get("gyro"),
+        velocity=mounted,
+        position=position,
+        heading=replace(sensors.heading, delay_s=late("late:psi")),
+        yaw_rate=replace(sensors.yaw_rate, delay_s=late("late:r")),
+    )
+
+
+def public_name(key: str, ship: Extended) -> tuple[str, float, float, str]:
+    """(name, factor, offset, unit) that turn an effect into a number of the results: value = offset + factor effect."""
+    kind, _, rest = key.partition(":")
+    model = ship.model
+    if kind == "theta":
+        return rest, 1.0, float(model.parameters[model.names.index(rest)]), ""
+    if kind == "change" and rest.startswith("theta:"):
+        return f"{rest[6:]}_change", 1.0, 0.0, ""
+    fixed = {
+        "current": (f"{rest}_mps", "m/s"), "wind": (f"{rest}_mps", "m/s"), "offset": (f"angle_offset_{rest}_rad", "rad"),
+        "lag": (f"lag_{rest}_s", "s"), "delay": (f"delay_{rest}_s", "s"), "deadband": (f"deadband_{rest}", ""),
+        "lever": (f"{rest}_m", "m"), "late": (f"{rest}_delay_s", "s"), "heading_bias": ("heading_bias_rad", "rad"),
+        "shallow": (f"{rest}_growth", ""), "asymmetry": ("thrust_offset_m", "m"), "term": (rest, ""),
+    }  # fmt: skip
+    if kind in fixed:
+        name, unit = fixed[kind]
+        return name, 1.0, 0.0, unit
+    if kind in ("gain", "gyro"):
+        return "factor", 1.0, 1.0, ""
+    if kind == "inertia":
+        return f"inertia_factor_{rest}", 1.0, 1.0, ""
+    if key == "change:time":
+        return "time_s", 1.0, 0.0, "s"
+    if kind == "change":
+        return f"{rest}_factor", 1.0, 1.0, ""
+    unit = {"roll:period": "s"}.get(key, "")
+    return f"roll_{rest}" + (f"_{unit}" if unit else ""), 1.0, 0.0, unit
+
+
+def finite(value: float) -> float | None:
+    """A number or nothing."""
+    return value if math.isfinite(value) else None

@@ -1,0 +1,368 @@
+"""The joint linear model: candidate causes, uncertain parameters, wandering current and initial states together.
+
+Rows are whitened errors, columns what each number would do to them. Initial states of the windows are projected out
+(flat prior), uncertain parameters have their Gaussian prior, the wandering current is a random effect. What remains are
+Gram matrices per window, small enough for anything that is asked of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from expdesign.diagnosis.extended import Extended
+from expdesign.diagnosis.motion import Linear, Push, linearise, push_of, responses, simulate_windows, start_responses
+from expdesign.diagnosis.noise import Noise, fit_colour, hats, wander_covariance, whitened
+from expdesign.diagnosis.windows import Windows
+from expdesign.values import Array
+
+WANDER_MPS = (0.0, 0.005, 0.01, 0.02, 0.035, 0.06, 0.1, 0.2)
+WANDER_TIMES_S = (60.0, 150.0, 400.0, 1000.0)
+SPACING_S = 60.0
+MOST_HATS = 16
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Grams:
+    """Inner products of whitened columns, per window, initial states projected out.
+
+    Attributes:
+        XX: (w, c, c); Xe: (w, c); ee: (w,).
+        rows: whitened rows that count.
+        log_det_starts: of the projected initial states' Gram matrices.
+    """
+
+    XX: Array
+    Xe: Array
+    ee: Array
+    rows: int
+    log_det_starts: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Columns:
+    """Answers (c, w, s, 4) before whitening: c0 numbers, then the wandering current's hats; and the starts' (n, ...).
+
+    Attributes:
+        numbers: columns before the hats.
+        spacing_s: between hats.
+    """
+
+    values: Array
+    starts: Array
+    error: Array
+    numbers: int
+    spacing_s: float
+
+
+def build_columns(linear: Linear, pushes: list[Push], *, wander: bool) -> Columns:
+    """All answers along one simulation."""
+    motion = linear.motion
+    spacing = max(SPACING_S, motion.windows.steps * motion.windows.step_s / MOST_HATS)
+    extra: list[Push] = []
+    if wander:
+        shapes = hats(motion.windows.steps - 1, motion.windows.step_s, spacing)
+        for key in ("current:north", "current:east"):
+            push = push_of(linear, motion.ship.having({key: motion.ship.get(key) + 1e-3}), 1e-3)
+            force = push.force
+            extra += [Push(force=None if force is None else force * hat[:, None], sensor=None) for hat in shapes]
+    values = responses(linear, [*pushes, *extra])
+    return Columns(
+        values=values, starts=start_responses(linear), error=motion.error, numbers=len(pushes), spacing_s=spacing
+    )
+
+
+def grams(columns: Columns, noise: Noise) -> Grams:
+    """Whiten, leave out what is not measured, project the starts out."""
+    error = whitened(columns.error, noise)
+    w = error.shape[0]
+    seen = np.isfinite(error)
+    e = np.where(seen, error, 0.0).reshape(w, -1)
+    X = (whitened(columns.values, noise) * seen).reshape(len(columns.values), w, -1)
+    S = np.moveaxis((whitened(columns.starts, noise) * seen).reshape(len(columns.starts), w, -1), 0, -1)
+    SS = np.swapaxes(S, 1, 2) @ S
+    scale = np.trace(SS, axis1=1, axis2=2)[:, None, None] / SS.shape[1]
+    SS = SS + (1e-9 * scale + 1e-12) * np.eye(SS.shape[1])
+    XX, Xe, ee = [], [], []
+    for index in range(w):
+        A, b, B = X[:, index], e[index], S[index]
+        AB = A @ B
+        half = np.linalg.solve(SS[index], np.column_stack([AB.T, B.T @ b]))
+        XX.append(A @ A.T - AB @ half[:, :-1])
+        Xe.append(A @ b - AB @ half[:, -1])
+        ee.append(b @ b - (B.T @ b) @ half[:, -1])
+    return Grams(
+        XX=np.array(XX),
+        Xe=np.array(Xe),
+        ee=np.array(ee),
+        rows=int(seen.sum()),
+        log_det_starts=float(np.linalg.slogdet(SS)[1].sum()),
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Marginal:
+    """Information about the numbers once the wandering current is integrated out.
+
+    Attributes:
+        A: (c, c) information; s: (c,) scores; per window (w, c) scores in `each`.
+        quadratic: e' V^-1 e; log_det: of V beyond the white part.
+    """
+
+    A: Array
+    s: Array
+    each: Array
+    quadratic: float
+    log_det: float
+
+
+def marginal(found: Grams, columns: Columns, noise: Noise) -> Marginal:
+    """Integrate the wandering current out."""
+    c = columns.numbers
+    A, s = found.XX[:, :c, :c], found.Xe[:, :c]
+    hats_count = (found.XX.shape[1] - c) // 2
+    if noise.wander_mps == 0.0 or hats_count == 0:
+        return Marginal(A=A.sum(axis=0), s=s.sum(axis=0), each=s, quadratic=float(found.ee.sum()), log_det=0.0)
+    prior = noise.wander_mps**2 * wander_covariance(hats_count, columns.spacing_s, noise.wander_time_s)
+    precision = np.linalg.inv(prior)
+    ZZ, ZX, Ze = found.XX[:, c:, c:] + precision, found.XX[:, c:, :c], found.Xe[:, c:]
+    solved = np.linalg.solve(ZZ, np.concatenate([ZX, Ze[..., None]], axis=2))
+    each = s - np.einsum("wzc,wz->wc", ZX, solved[..., -1])
+    log_det = np.linalg.slogdet(ZZ)[1].sum() + len(ZZ) * np.linalg.slogdet(prior)[1]
+    return Marginal(
+        A=(A - np.swapaxes(ZX, 1, 2) @ solved[..., :-1]).sum(axis=0),
+        s=each.sum(axis=0),
+        each=each,
+        quadratic=float(found.ee.sum() - np.einsum("wz,wz->", Ze, solved[..., -1])),
+        log_det=float(log_det),
+    )
+
+
+def likeliest_wander(found: Grams, columns: Columns, noise: Noise, precision: Array) -> Noise:
+    """The wandering current that makes the data most likely, the numbers free within their prior precision (c,)."""
+    if found.XX.shape[1] == columns.numbers:
+        return noise
+    best = (np.inf, noise)
+    for size in WANDER_MPS:
+        for time_s in WANDER_TIMES_S if size else WANDER_TIMES_S[:1]:
+            trial = replace(noise, wander_mps=size, wander_time_s=time_s)
+            m = marginal(found, columns, trial)
+            A = m.A + np.diag(precision)
+            cost = m.log_det + m.quadratic - m.s @ np.linalg.lstsq(A, m.s, rcond=None)[0]
+            cost += np.linalg.slogdet(A + 1e-12 * np.diag(np.diag(A) + 1e-30))[1]
+            if cost < best[0] - 1e-9:
+                best = (cost, trial)
+    return best[1]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Fit:
+    """A model with effects fitted to all windows.
+
+    Attributes:
+        ship: with the fitted effects.
+        keys: the free numbers, in order; uncertain parameters last.
+        free: how many of them have no prior.
+        covariance: (c, c).
+        starts: (w, n) initial states.
+        noise: colour of the remainder.
+        cost: twice the negative log likelihood.
+        linear, columns: at the end.
+        precision: (c,) prior precision of the numbers.
+    """
+
+    ship: Extended
+    keys: tuple[str, ...]
+    free: int
+    covariance: Array
+    starts: Array
+    noise: Noise
+    cost: float
+    linear: Linear
+    columns: Columns
+    precision: Array
+
+    def value(self, key: str) -> float:
+        """Estimate."""
+        return self.ship.get(key)
+
+    def std(self, key: str) -> float:
+        """Standard error."""
+        index = self.keys.index(key)
+        return float(np.sqrt(max(self.covariance[index, index], 0.0)))
+
+
+def uncertain_keys(ship: Extended) -> tuple[str, ...]:
+    """Parameters that are not known exactly."""
+    model = ship.model
+    return tuple(f"theta:{n}" for n, std in zip(model.names, model.parameter_std, strict=True) if std > 0)
+
+
+def prior_precision(ship: Extended, keys: tuple[str, ...]) -> Array:
+    """(c,) of the numbers: 1 / std^2 of uncertain parameters, else zero."""
+    model = ship.model
+    std = {f"theta:{n}": s for n, s in zip(model.names, model.parameter_std.tolist(), strict=True)}
+    return np.array([1.0 / std[key] ** 2 if std.get(key, 0.0) > 0 else 0.0 for key in keys])
+
+
+def fit(
+    ship: Extended,
+    windows: Windows,
+    free: tuple[str, ...],
+    *,
+    starts: Array,
+    noise: Noise | None = None,
+    steps: int = 3,
+    colour_order: int | None = None,
+    flat: tuple[str, ...] = (),
+) -> Fit:
+    """Gauss-Newton with the colour found anew in every step.
+
+    Args:
+        ship: where to start; its effects not in `free` stay.
+        windows: data.
+        free: effects to estimate without a prior.
+        starts: (w, n) first guess of the initial states.
+        noise: first guess of the colour.
+        steps: Gauss-Newton steps.
+        colour_order: of the autoregressions, or None to choose.
+        flat: uncertain parameters whose prior is dropped.
+    """
+    uncertain = tuple(key for key in uncertain_keys(ship) if key not in free)
+    keys = (*free, *uncertain)
+    precision = prior_precision(ship, keys)
+    precision[: len(free)] = 0.0
+    precision[[key in flat for key in keys]] = 0.0
+    starts = _fitting_starts(starts, ship.states)
+    best: Fit | None = None
+    for step in range(steps + 1):
+        motion = simulate_windows(ship, windows, starts)
+        if motion.diverged:
+            if best is None:
+                raise FloatingPointError
+            ship, starts = _halfway(best, ship, starts)
+            continue
+        linear = linearise(motion)
+        pushes = [push_of(linear, ship.having({k: ship.get(k) + d}), d) for k in keys for d in [step_of(ship, k)]]
+        columns = build_columns(linear, pushes, wander=windows.has_heading)
+        noise = _colours(columns, noise, precision, ship, keys, colour_order)
+        found = marginal(g := grams(columns, noise), columns, noise)
+        A = found.A + np.diag(precision)
+        now = np.array([ship.get(key) for key in keys])
+        cost = found.quadratic + found.log_det + g.log_det_starts + float(precision @ now**2)
+        cost += _log_sizes(columns, noise)
+        covariance = np.linalg.pinv(A, rcond=1e-14, hermitian=True) if len(keys) else np.zeros((0, 0))
+        move = covariance @ (found.s - precision * now)
+        gained = float(move @ (found.s - precision * now))
+        here = Fit(
+            ship=ship, keys=keys, free=len(free), covariance=covariance, starts=starts, noise=noise,
+            cost=cost, linear=linear, columns=columns, precision=precision,
+        )  # fmt: skip
+        if best is not None and cost > best.cost + 2.0 and step < steps:
+            ship, starts = _halfway(best, ship, starts)
+            continue
+        best = here if best is None or cost < best.cost or not len(keys) else best
+        if step == steps:
+            break
+        ship = ship.having(limited(ship, dict(zip(keys, (now + move).tolist(), strict=True))))
+        starts = starts + _start_moves(columns, noise, move)
+        if gained < 0.01 and step > 0:
+            break
+    assert best is not None
+    return best
+
+
+def _fitting_starts(starts: Array, n: int) -> Array:
+    if starts.shape[1] < n:
+        return np.column_stack([starts, np.zeros((len(starts), n - starts.shape[1]))])
+    return starts[:, :n]
+
+
+def _halfway(best: Fit, ship: Extended, starts: Array) -> tuple[Extended, Array]:
+    middle = {key: (best.ship.get(key) + ship.get(key)) / 2 for key in best.keys}
+    return ship.having(middle), (best.starts + starts) / 2
+
+
+def limited(ship: Extended, effects: dict[str, float]) -> dict[str, float]:
+    """Times and widths stay positive, shares above minus nine tenths."""
+    result = {}
+    for key, value in effects.items():
+        kind = key.split(":")[0]
+        if kind in ("lag", "delay", "deadband") or key in ("roll:period", "roll:damping"):
+            before = ship.get(key)
+            value = min(max(value, before / 3, 1e-6), before * 3 + 1e-6)
+        elif kind in ("inertia", "gain", "gyro"):
+            value = max(value, -0.8)
+        result[key] = value
+    return result
+
+
+def step_of(ship: Extended, key: str) -> float:
+    """A step for differences: small, and for thresholds and times large enough to be felt."""
+    value = abs(ship.get(key))
+    kind = key.split(":")[0]
+    if kind in ("theta", "term"):
+        return 1e-4 * max(1e-4, _parameter_scale(ship, key))
+    if kind in ("lag", "delay", "deadband") or key.startswith("roll:"):
+        return max(0.05 * value, 1e-6)
+    return 1e-4
+
+
+def _parameter_scale(ship: Extended, key: str) -> float:
+    name = key.split(":")[1]
+    if name in ship.model.names:
+        return abs(float(ship.model.parameters[ship.model.names.index(name)])) + 1e-6
+    return 1e-2
+
+
+def _start_moves(columns: Columns, noise: Noise, move: Array) -> Array:
+    """(w, n) change of the initial states that goes with a change of the numbers."""
+    rest = columns.error - np.tensordot(move, columns.values[: columns.numbers], axes=(0, 0))
+    error = whitened(rest, noise)
+    seen = np.isfinite(error)
+    w = len(error)
+    e = np.where(seen, error, 0.0).reshape(w, -1)
+    S = np.moveaxis((whitened(columns.starts, noise) * seen).reshape(len(columns.starts), w, -1), 0, -1)
+    return np.stack([np.linalg.lstsq(B, b, rcond=None)[0] for B, b in zip(S, e, strict=True)])
+
+
+def _colours(columns: Columns, noise, precision, ship, keys, order) -> Noise:  # type: ignore[no-untyped-def]
+    """Colour of what is left after the best linear answer, twice."""
+    if noise is None:
+        spread = np.nanstd(columns.error, axis=(0, 1)) if columns.error.size else np.ones(4)
+        noise = Noise(filters=np.ones((4, 1)), std=np.where(np.isfinite(spread) & (spread > 0), spread, np.inf))
+        passes = 3
+    else:
+        passes = 2
+    now = np.array([ship.get(key) for key in keys])
+    for _ in range(passes):
+        g = grams(columns, noise)
+        noise = likeliest_wander(g, columns, noise, precision)
+        rest = remainder(columns, g, noise, precision, now)
+        colour = fit_colour(rest, order=order)
+        noise = replace(colour, wander_mps=noise.wander_mps, wander_time_s=noise.wander_time_s)
+    return noise
+
+
+def remainder(columns: Columns, g: Grams, noise: Noise, precision: Array, now: Array) -> Array:
+    """(w, s, 4) error less the best linear answer of numbers, wandering current and initial states."""
+    m = marginal(g, columns, noise)
+    c = columns.numbers
+    move = np.linalg.lstsq(m.A + np.diag(precision), m.s - precision * now, rcond=None)[0] if c else np.zeros(0)
+    rest = columns.error - np.tensordot(move, columns.values[:c], axes=(0, 0))
+    hats_count = (len(columns.values) - c) // 2
+    if noise.wander_mps > 0 and hats_count:
+        prior = noise.wander_mps**2 * wander_covariance(hats_count, columns.spacing_s, noise.wander_time_s)
+        ZZ = g.XX[:, c:, c:] + np.linalg.inv(prior)
+        b = np.linalg.solve(ZZ, (g.Xe[:, c:] - g.XX[:, c:, :c] @ move)[..., None])[..., 0]
+        rest = rest - np.einsum("wz,zwsn->wsn", b, columns.values[c:])
+    trimmed = replace(columns, error=rest)
+    starts = _start_moves(trimmed, noise, np.zeros(c))
+    return np.asarray(rest - np.einsum("wn,nwsk->wsk", starts, columns.starts))
+
+
+def _log_sizes(columns: Columns, noise: Noise) -> float:
+    seen = np.isfinite(whitened(columns.error, noise))
+    used = np.isfinite(noise.std)
+    return float((2 * np.log(noise.std[used]) * seen.sum(axis=(0, 1))[used]).sum())

@@ -1,0 +1,205 @@
+"""Simulation of all windows at once, and how small causes move it.
+
+The response to a small cause is that of the linearised motion to the change of acceleration that the cause makes along
+the simulated path; all causes share one linearisation, so hundreds of them cost little more than one simulation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from expdesign.diagnosis.extended import Extended, Surroundings, observed, rates, surroundings
+from expdesign.diagnosis.windows import Windows
+from expdesign.values import Array
+
+LARGEST_SPEED = 60.0
+NUDGE = 1e-5
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Motion:
+    """A simulation of all windows.
+
+    Attributes:
+        ship: what was simulated.
+        windows: the data it is set against.
+        around: inputs and surroundings.
+        states: (w, k, n) at integrator steps.
+        shown: (w, s, 4) what the sensors would show.
+    """
+
+    ship: Extended
+    windows: Windows
+    around: Surroundings
+    states: Array
+    shown: Array
+
+    @property
+    def error(self) -> Array:
+        """(w, s, 4) measured less simulated, nan where nothing is measured."""
+        return np.asarray(self.windows.measured - self.shown)
+
+    @property
+    def diverged(self) -> bool:
+        """A speed is out of all reason."""
+        return not bool(np.abs(self.states).max() < LARGEST_SPEED)
+
+
+def simulate_windows(ship: Extended, windows: Windows, start: Array) -> Motion:
+    """Runge-Kutta of order four with inputs held over every step.
+
+    Args:
+        ship: model and effects.
+        windows: w windows.
+        start: (w, n) initial states.
+    """
+    around = surroundings(ship, windows)
+    states = np.empty((len(start), windows.steps, ship.states))
+    states[:, 0] = start
+    x, h = tuple(start.T), windows.step_s
+    with np.errstate(over="ignore", invalid="ignore"):
+        for step in range(windows.steps - 1):
+            x = _rk4(ship, x, around.at(step), h)
+            states[:, step + 1] = np.stack(x, axis=-1)
+    states = np.nan_to_num(states, nan=1e3, posinf=1e3, neginf=-1e3)
+    return Motion(ship=ship, windows=windows, around=around, states=states, shown=observed(ship, states, windows))
+
+
+def _rk4(ship: Extended, x: tuple[Array, ...], around: Surroundings, h: float) -> tuple[Array, ...]:
+    def ahead(slope: tuple[Array, ...], share: float) -> tuple[Array, ...]:
+        return tuple(np.clip(a + share * h * b, -1e3, 1e3) for a, b in zip(x, slope, strict=True))
+
+    k1 = rates(ship, x, around)
+    k2 = rates(ship, ahead(k1, 0.5), around)
+    k3 = rates(ship, ahead(k2, 0.5), around)
+    k4 = rates(ship, ahead(k3, 1.0), around)
+    return tuple(a + h / 6 * (p + 2 * q + 2 * s + t) for a, p, q, s, t in zip(x, k1, k2, k3, k4, strict=True))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Linear:
+    """The linearised motion along a simulation.
+
+    Attributes:
+        motion: where.
+        onward: (w, k - 1, n, n) transition over each step.
+        driven: (w, k - 1, n, n) effect of a constant acceleration over each step.
+        slopes: (w, k, n) rates along the path, of both ends of every step with its inputs, stacked (2, w, k - 1, n).
+    """
+
+    motion: Motion
+    onward: Array
+    driven: Array
+    slopes: Array
+
+
+def linearise(motion: Motion) -> Linear:
+    """Transition matrices from finite differences of the rates, all steps at once."""
+    n, h = motion.ship.states, motion.windows.step_s
+    ends = (motion.states[:, :-1], motion.states[:, 1:])
+    around = motion.around.before_last()
+    slopes = np.stack([_rates(motion.ship, end, around) for end in ends])
+    jacobian = np.empty((*slopes.shape[1:], n))
+    for axis in range(n):
+        step = np.zeros(n)
+        step[axis] = NUDGE
+        pair = [_rates(motion.ship, end + step, around) - _rates(motion.ship, end - step, around) for end in ends]
+        jacobian[..., axis] = (pair[0] + pair[1]) / (4 * NUDGE)
+    A = jacobian * h
+    eye = np.eye(n)
+    A2 = A @ A
+    A3 = A2 @ A
+    onward = eye + A + A2 / 2 + A3 / 6 + A3 @ A / 24
+    driven = h * (eye + A / 2 + A2 / 6 + A3 / 24)
+    return Linear(motion=motion, onward=onward, driven=driven, slopes=slopes)
+
+
+def _rates(ship: Extended, states: Array, around: Surroundings) -> Array:
+    found = rates(ship, tuple(np.moveaxis(states, -1, 0)), around)
+    return np.stack([np.broadcast_to(part, states.shape[:2]) for part in found], axis=-1)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Push:
+    """A small cause along a path.
+
+    Attributes:
+        force: (w, k - 1, n) change of the rates per unit of the cause, or None.
+        sensor: (w, s, 4) change of what sensors show by themselves, or None.
+    """
+
+    force: Array | None
+    sensor: Array | None
+
+
+def push_of(linear: Linear, changed: Extended, per: float) -> Push:
+    """What a change of effects does along the path, divided by `per`."""
+    motion = linear.motion
+    windows = motion.windows
+    sensor = observed(changed, motion.states, windows) - motion.shown
+    around = surroundings(changed, windows).before_last()
+    ends = (motion.states[:, :-1], motion.states[:, 1:])
+    force = np.mean([_rates(changed, end, around) for end in ends], axis=0) - linear.slopes.mean(axis=0)
+    return Push(
+        force=force / per if np.any(force) else None,
+        sensor=sensor / per if np.any(sensor) else None,
+    )
+
+
+def responses(linear: Linear, pushes: Sequence[Push]) -> Array:
+    """(c, w, s, 4) how the shown channels answer each push, from undisturbed initial states."""
+    motion = linear.motion
+    _windows, n = motion.windows, motion.ship.states
+    w, k = motion.states.shape[:2]
+    moved = np.zeros((len(pushes), w, k, n))
+    driven = [index for index, push in enumerate(pushes) if push.force is not None]
+    if driven:
+        kicks = np.stack([np.einsum("wkij,wkj->wki", linear.driven, pushes[index].force) for index in driven], axis=-1)
+        x = np.zeros((w, n, len(driven)))
+        path = np.zeros((k, w, n, len(driven)))
+        for step in range(k - 1):
+            x = linear.onward[:, step] @ x + kicks[:, step]
+            path[step + 1] = x
+        moved[driven] = np.moveaxis(path, (3, 1, 0, 2), (0, 1, 2, 3))
+    result = _shown(linear, moved)
+    for index, push in enumerate(pushes):
+        if push.sensor is not None:
+            result[index] += push.sensor
+    return np.nan_to_num(result, nan=0.0, posinf=0.0, neginf=0.0)
+
+
+def start_responses(linear: Linear) -> Array:
+    """(n, w, s, 4) answers to unit initial states of every window."""
+    motion = linear.motion
+    w, k, n = motion.states.shape
+    x = np.broadcast_to(np.eye(n), (w, n, n)).copy()
+    path = np.empty((k, w, n, n))
+    path[0] = x
+    for step in range(k - 1):
+        x = linear.onward[:, step] @ x
+        path[step + 1] = x
+    return _shown(linear, np.moveaxis(path, (3, 1, 0, 2), (0, 1, 2, 3)))
+
+
+def _shown(linear: Linear, moved: Array) -> Array:
+    """Changes of the channels for changes of the states (c, w, k, n); sensors are nearly linear in the states."""
+    motion = linear.motion
+    sampled = motion.states[:, :: motion.windows.steps_per_sample]
+    if not any(key.startswith(("heading", "lever", "gyro", "late")) for key in motion.ship.effects):
+        values = moved[:, :, :: motion.windows.steps_per_sample, :3]
+        result = np.concatenate([values, values[..., 2:]], axis=-1)
+        return _averaged_all(result) if motion.windows.derived else result
+    del sampled
+    size = 1e-4
+    return np.stack(
+        [(observed(motion.ship, motion.states + size * part, motion.windows) - motion.shown) / size for part in moved]
+    )
+
+
+def _averaged_all(values: Array) -> Array:
+    result = values.copy()
+    result[:, :, 1:-1] = (values[:, :, :-2] + 2 * values[:, :, 1:-1] + values[:, :, 2:]) / 4
+    return result

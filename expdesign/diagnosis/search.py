@@ -1,0 +1,165 @@
+"""Forward search: add the cause that explains most, as long as chance does not explain as much."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from expdesign.diagnosis.candidate import Candidate, Situation
+from expdesign.diagnosis.causes import CAUSES
+from expdesign.diagnosis.extended import Extended
+from expdesign.diagnosis.joint import Fit, fit
+from expdesign.diagnosis.screening import LEVEL, Scored, Screening, screen
+from expdesign.diagnosis.windows import Windows
+from expdesign.values import Array
+
+Progress = Callable[[str, float], None]
+SHORTLIST = 7
+PER_CAUSE = 2
+PRICE = 5.0
+"""Of every estimated number, in units of twice the log likelihood: a cause with fewer numbers is to be preferred."""
+AS_GOOD = 5.0
+"""Twice the log likelihood by which the runner-up may trail and still count as not distinguishable: a wrong cause that
+truly trails by d comes out ahead by more than this with a probability below Phi(-sqrt(AS_GOOD))."""
+MOST_FINDINGS = 6
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Contender:
+    """A candidate fitted with everything that was found before.
+
+    Attributes:
+        candidate: which.
+        fit: of all windows.
+        gain: fall of twice the negative log likelihood.
+        worth: the same less the price of its numbers.
+        keys: its own free effects.
+    """
+
+    candidate: Candidate
+    fit: Fit
+    gain: float
+    worth: float
+    keys: tuple[str, ...]
+    time_std: float = float("nan")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Step:
+    """One round of the search.
+
+    Attributes:
+        chosen: what was added.
+        p_value: corrected for everything that was tried.
+        rivals: contenders of other causes that explain as much, best first.
+        before: the fit without it.
+        screening: all tests of the round.
+    """
+
+    chosen: Contender
+    p_value: float
+    rivals: tuple[Contender, ...]
+    before: Fit
+    screening: Screening
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Search:
+    """The whole search: its steps, the fit before and after, and the round that found nothing more."""
+
+    steps: tuple[Step, ...]
+    first: Fit
+    last: Fit
+    final_screening: Screening
+
+
+def search(ship: Extended, windows: Windows, starts: Array, rng: np.random.Generator, progress: Progress) -> Search:
+    """Add causes until nothing significant is left."""
+    base = fit(ship, windows, (), starts=starts)
+    first, steps = base, []
+    while True:
+        share = 1.0 - 0.7 ** (len(steps) + 1)
+        progress(f"testing causes, round {len(steps) + 1}", share)
+        found = screen(base, _candidates(base, windows), rng)
+        step = _step(base, windows, found, lambda what, part, at=share: progress(what, at + 0.2 * part * (1 - at)))
+        if step is None or len(steps) == MOST_FINDINGS:
+            return Search(steps=tuple(steps), first=first, last=base, final_screening=found)
+        steps.append(step)
+        base = step.chosen.fit
+
+
+def _candidates(base: Fit, windows: Windows) -> list[Candidate]:
+    situation = Situation(ship=base.ship, windows=windows)
+    return [
+        candidate
+        for cause in CAUSES
+        for candidate in cause.candidates(situation)
+        if not set(candidate.free) & set(base.keys[: base.free])
+    ]
+
+
+def _step(base: Fit, windows: Windows, found: Screening, progress: Progress) -> Step | None:
+    shortlist = _shortlist(found)
+    contenders: list[Contender] = []
+    for index, scored in enumerate(shortlist):
+        progress(f"fitting {scored.candidate.cause}", index / len(shortlist))
+        contender = contend(base, windows, scored)
+        if contender is not None:
+            contenders.append(contender)
+    contenders.sort(key=lambda item: -item.worth)
+    for chosen in contenders[:1]:
+        p_value = min(1.0, found.tests * float(chi2.sf(max(chosen.gain, 0.0), len(chosen.keys))))
+        if p_value > LEVEL:
+            return None
+        rivals: dict[str, Contender] = {}
+        for other in contenders[1:]:
+            apart = chosen.worth - other.worth
+            if other.candidate.cause != chosen.candidate.cause and apart < AS_GOOD:
+                rivals.setdefault(other.candidate.cause, other)
+        return Step(chosen=chosen, p_value=p_value, rivals=tuple(rivals.values()), before=base, screening=found)
+    return None
+
+
+def _shortlist(found: Screening) -> list[Scored]:
+    """The best candidates of the best causes."""
+    ranked = sorted(found.scored, key=lambda item: PRICE * item.candidate.size - item.statistic)
+    kept: list[Scored] = []
+    count: dict[str, int] = {}
+    for scored in ranked:
+        cause = scored.candidate.cause
+        if scored.p_value * found.tests > 1.0 and kept:
+            continue
+        if cause not in count and len(count) == SHORTLIST:
+            continue
+        if count.get(cause, 0) < PER_CAUSE:
+            kept.append(scored)
+            count[cause] = count.get(cause, 0) + 1
+    return kept
+
+
+def contend(base: Fit, windows: Windows, scored: Scored) -> Contender | None:
+    """Fit a candidate together with everything found before."""
+    candidate = scored.candidate
+    start = dict(candidate.free.items())
+    if not candidate.finite:
+        start = {key: base.ship.get(key) for key in candidate.free}
+    extra = tuple(key for key in ("roll:period",) if key in candidate.fixed)
+    keys = (*candidate.free, *extra)
+    ship = base.ship.having({**candidate.fixed, **start})
+    before = tuple(key for key in base.keys[: base.free] if key not in keys)
+    try:
+        found = fit(ship, windows, (*before, *keys), starts=base.starts, noise=base.noise,
+                    colour_order=base.noise.order)  # fmt: skip
+    except (FloatingPointError, np.linalg.LinAlgError):
+        return None
+    counted = len(keys) + (1 if candidate.grid and candidate.grid[0] not in keys else 0)
+    gain = base.cost - found.cost
+    return Contender(candidate=candidate, fit=found, gain=gain, worth=gain - PRICE * counted, keys=keys)
+
+
+def refined(step: Step, windows: Windows) -> Step:
+    """The same; kept for callers that refine further."""
+    return replace(step)

@@ -1,0 +1,117 @@
+"""The manoeuvre that tells two explanations apart: where the two extended models disagree most, per minute."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from expdesign.diagnosis.extended import Extended
+from expdesign.diagnosis.motion import simulate_windows
+from expdesign.diagnosis.windows import Windows
+from expdesign.values import Array
+
+HEADINGS = (0.0, np.pi / 2, np.pi, 3 * np.pi / 2)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Proposal:
+    """A manoeuvre that might tell causes apart.
+
+    Attributes:
+        name: of the primitive.
+        inputs: (k, m) commands in the model's order.
+        velocity: (3,) to start with.
+        sample_time_s: of the commands.
+    """
+
+    name: str
+    inputs: Array
+    velocity: Array
+    sample_time_s: float
+
+
+def most_telling(
+    one: Extended, others: Sequence[Extended], proposals: Sequence[Proposal], std: Array, like: Windows
+) -> str | None:
+    """Name of the proposal for which `one` and the nearest of the others disagree most per minute."""
+    best: tuple[float, str] | None = None
+    for proposal in proposals:
+        windows = _windows(proposal, like)
+        shown = [_shown(ship, windows, proposal) for ship in (one, *others)]
+        if any(values is None for values in shown):
+            continue
+        first, *rest = shown
+        minutes = len(proposal.inputs) * proposal.sample_time_s / 60
+        assert first is not None
+        apart = min(float(np.nansum(((first - other) / std) ** 2)) for other in rest if other is not None) / minutes
+        if best is None or apart > best[0]:
+            best = apart, proposal.name
+    return best[1] if best and best[0] > 0 else None
+
+
+def _shown(ship: Extended, windows: Windows, proposal: Proposal) -> Array | None:
+    start = np.zeros((len(HEADINGS), ship.states))
+    start[:, :3] = proposal.velocity
+    motion = simulate_windows(ship, windows, start)
+    return None if motion.diverged else motion.shown
+
+
+def _windows(proposal: Proposal, like: Windows) -> Windows:
+    """A window per heading; the heading is that of a straight track, which suffices to rank manoeuvres."""
+    substeps = max(1, int(np.ceil(proposal.sample_time_s / like.step_s - 1e-9)))
+    inputs = np.repeat(proposal.inputs, substeps, axis=0)
+    count, w = len(inputs), len(HEADINGS)
+    turn = proposal.velocity[2] * np.arange(count) * proposal.sample_time_s / substeps
+    return Windows(
+        step_s=proposal.sample_time_s / substeps,
+        steps_per_sample=substeps,
+        batch=np.zeros(w),
+        batch_inputs=(inputs,),
+        first=np.zeros(w),
+        measured=np.zeros((w, -(-count // substeps), 4)),
+        heading=np.array(HEADINGS)[:, None] + turn,
+        wind=np.zeros((w, count, 2)),
+        depth_m=np.full((w, count), float(np.median(like.depth_m))),
+        time_s=np.broadcast_to(1e9 + np.arange(count, dtype=float), (w, count)),
+        has_heading=True,
+        has_wind=False,
+        has_depth=False,
+        derived=like.derived,
+        names=(proposal.name,),
+    )
+
+
+def standard_proposals(like: Windows, inputs: tuple[str, ...], sample_time_s: float) -> tuple[Proposal, ...]:
+    """Manoeuvres of the standard families within the inputs that the data use: each for two minutes or so."""
+    rows = np.concatenate(like.batch_inputs)
+    middle, low, high = np.median(rows, axis=0), np.quantile(rows, 0.05, axis=0), np.quantile(rows, 0.95, axis=0)
+    velocity = np.nanmedian(like.measured[..., :3].reshape(-1, 3), axis=0)
+    velocity = np.array([velocity[0], 0.0, 0.0])
+    duration = 120.0 * like.sample_s if like.sample_s < 1.0 else 240.0
+    count = max(40, round(duration / sample_time_s))
+    time = np.arange(count) / count
+    steering = [i for i, n in enumerate(inputs) if n.rstrip("0123456789") in ("a", "rudder", "tau_psi", "tau_y")]
+    driving = [i for i in range(len(inputs)) if i not in steering]
+    rng = np.random.default_rng(0)
+    shapes: Mapping[str, tuple[list[int], Array]] = {
+        "zigzag": (steering, np.sign(np.sin(2 * np.pi * 4 * time))),
+        "zigzag_long": (steering, np.sign(np.sin(2 * np.pi * 2 * time))),
+        "turning_circle": (steering, np.ones(count)),
+        "turning_circle_port": (steering, -np.ones(count)),
+        "acceleration": (driving, np.where(time < 0.2, -1.0, 1.0)),
+        "deceleration": (driving, np.where(time < 0.2, 1.0, -1.0)),
+        "inward_spiral": (steering, time),
+        "telegraph": ([*steering, *driving], np.repeat(rng.choice([-1.0, 1.0], 13), -(-count // 13))[:count]),
+        "straight": ([], np.zeros(count)),
+    }
+    proposals = []
+    for name, (which, shape) in shapes.items():
+        commands = np.tile(middle, (count, 1))
+        for index in which:
+            span = np.where(shape > 0, high[index] - middle[index], middle[index] - low[index])
+            commands[:, index] = middle[index] + shape * span
+        if which or name == "straight":
+            proposals.append(Proposal(name=name, inputs=commands, velocity=velocity, sample_time_s=sample_time_s))
+    return tuple(proposals)

@@ -1,0 +1,104 @@
+"""What a diagnosis says."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from expdesign.diagnosis.windows import Windows
+from expdesign.signals import Record
+from expdesign.values import Array
+from expdesign.vessel import Vessel
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Accuracy:
+    """How well a model simulates: per output over all batches, each from its first state.
+
+    Attributes:
+        outputs: u, v, r, those that the model has.
+        fit, rmse, bias: (n,) fit [%], root mean square and mean of measured less simulated.
+        horizons_s: (h,) and growth (h, n): root mean square error that long after a start from a measured state.
+        per_batch: (b, n) fit of every batch.
+    """
+
+    outputs: tuple[str, ...]
+    fit: Array
+    rmse: Array
+    bias: Array
+    horizons_s: Array
+    growth: Array
+    per_batch: Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Estimated:
+    """One number of a finding: its name in results, value, standard error and unit."""
+
+    name: str
+    value: float
+    std: float
+    unit: str
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Finding:
+    """One thing that the simulation gets wrong.
+
+    Attributes:
+        cause: name in the catalogue.
+        estimates: its numbers.
+        p_value: corrected for all causes tried.
+        fit_before, fit_after: (n,) simulated fit [%] of batches that were not used to estimate, without and with it.
+        gain: mean over outputs of the difference; gain_interval: 95 %, bootstrap over batches.
+        not_distinguishable_from: causes that explain the data as well.
+        would_tell_apart: the manoeuvre for which they and this cause disagree most per minute, or None.
+        explanation: a sentence or two.
+        suspect: what the error is drawn against.
+        worth: twice the log likelihood gained.
+    """
+
+    cause: str
+    estimates: tuple[Estimated, ...]
+    p_value: float
+    fit_before: Array
+    fit_after: Array
+    gain: float
+    gain_interval: tuple[float, float]
+    not_distinguishable_from: tuple[str, ...]
+    would_tell_apart: str | None
+    explanation: str
+    suspect: str
+    worth: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Diagnosis:
+    """Everything found.
+
+    Attributes:
+        vessel: the model in use; extended: with all findings.
+        record: the data.
+        windows: the data as compared.
+        before, after: accuracy of both on all batches, in sample.
+        findings: by gain.
+        verdict: one sentence.
+        simulated_before, simulated_after: (w, s, 4) channels beside `windows.measured`.
+        errors: per finding, (w, s, 4) remaining error without it, all other findings in the model.
+        notes: what a reader must know: what was left out, what could not be tested.
+        screened: (cause, p) of the last round, the smallest p per cause, corrected.
+    """
+
+    vessel: Vessel
+    extended: Vessel
+    record: Record
+    windows: Windows
+    before: Accuracy
+    after: Accuracy
+    findings: tuple[Finding, ...]
+    verdict: str
+    simulated_before: Array
+    simulated_after: Array
+    errors: Mapping[str, Array]
+    notes: tuple[str, ...]
+    screened: tuple[tuple[str, float], ...]

@@ -1,0 +1,231 @@
+"""Measured batches cut into windows that are simulated side by side, each from a free initial state.
+
+Data sampled much faster than the ship moves are averaged over several samples first; data sampled too coarsely for an
+integrator get steps in between, with inputs held. Windows are as long as a batch unless the model is unstable, so that
+slow disturbances show as what they are.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from expdesign.conventions import OUTPUTS
+from expdesign.estimation.tables import inputs_of
+from expdesign.signals import Batch, Record
+from expdesign.values import Array
+from expdesign.vessel import VesselModel
+
+CHANNELS = (*OUTPUTS, "psi_rate")
+"""What is compared: u, v, r as measured, and the rate of the measured heading where r is a measurement of its own."""
+COARSEST_S, SHARE_OF_TIME_CONSTANT = 1.0, 0.4
+LONGEST = 700
+"""Samples per window, at most."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Windows:
+    """Windows of equal shape; shorter ones are filled up and their measurements are nan there.
+
+    Attributes:
+        step_s: integrator step [s].
+        steps_per_sample: integrator steps from one compared sample to the next.
+        batch: (w,) batch number of each window.
+        batch_inputs: one (k_b, m) array per batch, held inputs at integrator steps.
+        first: (w,) first integrator step of each window in its batch.
+        measured: (w, s, 4) channels; nan where not measured.
+        heading: (w, k) measured heading at integrator steps, continuous; zero where there is none.
+        wind: (w, k, 2) wind in the b-frame from measured relative wind, nan where not measured.
+        depth_m: (w, k), inf where not known.
+        time_s: (w, k) time since the first batch began, batches laid end to end.
+        has_heading, has_wind, has_depth: whether these are measured.
+        derived: velocities are central differences of the pose.
+        names: of the batches.
+    """
+
+    step_s: float
+    steps_per_sample: int
+    batch: Array
+    batch_inputs: tuple[Array, ...]
+    first: Array
+    measured: Array
+    heading: Array
+    wind: Array
+    depth_m: Array
+    time_s: Array
+    has_heading: bool
+    has_wind: bool
+    has_depth: bool
+    derived: bool
+    names: tuple[str, ...]
+
+    @property
+    def sample_s(self) -> float:
+        """Time between compared samples [s]."""
+        return self.step_s * self.steps_per_sample
+
+    @property
+    def steps(self) -> int:
+        """Integrator steps per window."""
+        return int(self.heading.shape[1])
+
+    @property
+    def duration_s(self) -> float:
+        """Time covered by all windows [s]."""
+        return float(np.isfinite(self.measured).any(axis=2).sum() * self.sample_s)
+
+    @cached_property
+    def places(self) -> Array:
+        """(w, k) integrator steps of each window in its batch, the last one repeated where the window is filled up."""
+        ends = np.array([len(rows) for rows in self.batch_inputs])[self.batch.astype(int)]
+        return np.minimum(self.first[:, None] + np.arange(self.steps), ends[:, None] - 1).astype(int)
+
+    def gather(self, batches: tuple[Array, ...]) -> Array:
+        """(w, k, ...) rows of per-batch arrays at the steps of every window."""
+        return np.stack([batches[int(b)][rows] for b, rows in zip(self.batch, self.places, strict=True)])
+
+    def picked(self, keep: Array) -> Windows:
+        """Only some of the windows, by a mask (w,)."""
+        parts = {name: getattr(self, name)[keep] for name in ROWS}
+        others = {name: getattr(self, name) for name in self.__dataclass_fields__ if name not in ROWS}
+        return Windows(**parts, **others)
+
+
+ROWS = ("batch", "first", "measured", "heading", "wind", "depth_m", "time_s")
+
+
+def fastest_rate(model: VesselModel, record: Record) -> float:
+    """Largest linear damping rate of the model at the measured speeds [1/s]."""
+    speed = np.nanmean([np.nanmean(np.abs(batch.velocity), axis=0) for batch in record.batches], axis=0)
+    base = np.where(np.isfinite(speed), speed, 0.0)
+    inputs = np.concatenate([inputs_of(model, batch) for batch in record.batches]).mean(axis=0)
+    rates = []
+    for axis in range(3):
+        high, low = base.copy(), base.copy()
+        high[axis] += 1e-4
+        low[axis] -= 1e-4
+        push = [np.array(model.accelerations(x, (x[0], x[1]), inputs), dtype=float) for x in (high, low)]
+        rates.append(abs(float(push[0][axis] - push[1][axis])) / 2e-4)
+    return max(*rates, 1e-6)
+
+
+def cut_windows(model: VesselModel, record: Record, *, longest_s: float | None = None) -> Windows:
+    """Windows of a record for a model driven by its inputs (`estimation.tables.model_for`)."""
+    sample_s = record.batches[0].sample_time_s
+    step_s = min(COARSEST_S, SHARE_OF_TIME_CONSTANT / fastest_rate(model, record))
+    merged = max(1, int(step_s / sample_s + 1e-9))
+    between = max(1, int(np.ceil(merged * sample_s / step_s - 1e-9)))
+    parts = [_Part(model, batch, merged, between) for batch in record.batches]
+    limit = LONGEST if longest_s is None else max(12, round(longest_s / (merged * sample_s)))
+    pieces = [(b, low, high) for b, part in enumerate(parts) for low, high in _cut(part.samples, limit)]
+    size = max(high - low for _, low, high in pieces)
+    derived = all(_is_derived(batch) for batch in record.batches)
+    starts = np.concatenate([[0.0], np.cumsum([len(batch) * sample_s for batch in record.batches])])
+    rows: dict[str, list[Array]] = {name: [] for name in ROWS}
+    for b, low, high in pieces:
+        part = parts[b]
+        index = np.minimum(np.arange(low * between, (low + size) * between), high * between - 1)
+        rows["batch"].append(np.array(float(b)))
+        rows["first"].append(np.array(float(low * between)))
+        rows["measured"].append(_filled(part.measured(derived)[low:high], size))
+        rows["heading"].append(part.heading[index])
+        rows["wind"].append(part.wind[index])
+        rows["depth_m"].append(part.depth[index])
+        rows["time_s"].append(starts[b] + part.step_s * np.arange(low * between, (low + size) * between))
+    return Windows(
+        step_s=parts[0].step_s,
+        steps_per_sample=between,
+        batch_inputs=tuple(part.inputs for part in parts),
+        has_heading=all(batch.pose is not None and np.isfinite(batch.pose[:, 2]).all() for batch in record.batches),
+        has_wind=all(batch.wind is not None for batch in record.batches),
+        has_depth=all(batch.depth_m is not None for batch in record.batches),
+        derived=derived,
+        names=tuple(batch.name for batch in record.batches),
+        **{name: np.stack(values) for name, values in rows.items()},
+    )
+
+
+def _cut(samples: int, limit: int) -> list[tuple[int, int]]:
+    count = -(-samples // limit)
+    edges = np.linspace(0, samples, count + 1).round().astype(int).tolist()
+    return [(low, high) for low, high in itertools.pairwise(edges) if high - low >= 4]
+
+
+def _filled(values: Array, size: int) -> Array:
+    result = np.full((size, values.shape[1]), np.nan)
+    result[: len(values)] = values
+    return result
+
+
+class _Part:
+    """One batch on the grids of comparison and integration."""
+
+    def __init__(self, model: VesselModel, batch: Batch, merged: int, between: int) -> None:
+        self.batch, self.merged, self.between = batch, merged, between
+        self.samples = (len(batch) - 1) // merged + 1
+        self.step_s = batch.sample_time_s * merged / between
+        raw = inputs_of(model, batch)
+        self.inputs = np.repeat(self._blocks(raw), between, axis=0)
+        heading = np.zeros(len(batch)) if batch.pose is None else batch.pose[:, 2]
+        if not np.isfinite(heading).all():
+            heading = np.cumsum(np.nan_to_num(batch.velocity[:, 2])) * batch.sample_time_s
+        self.heading = self._between(self._centred(heading))
+        wind = np.full((len(batch), 2), np.nan) if batch.wind is None else batch.velocity[:, :2] - batch.wind
+        self.wind = self._between(self._centred(wind))
+        depth = np.full(len(batch), np.inf) if batch.depth_m is None else batch.depth_m
+        self.depth = self._between(self._centred(depth))
+
+    def measured(self, derived: bool) -> Array:
+        """(s, 4) channels."""
+        velocity = self._centred(self.batch.velocity)
+        rate = np.full(len(self.batch), np.nan)
+        if not derived and self.batch.pose is not None and len(self.batch) > 2:
+            rate[1:-1] = (self.batch.pose[2:, 2] - self.batch.pose[:-2, 2]) / (2 * self.batch.sample_time_s)
+        return np.column_stack([velocity, self._centred(rate)])
+
+    def _blocks(self, values: Array) -> Array:
+        """Held inputs averaged over the samples that one step of comparison takes."""
+        if self.merged == 1:
+            return values
+        padded = np.concatenate([values, np.repeat(values[-1:], self.samples * self.merged - len(values), axis=0)])
+        return padded.reshape(self.samples, self.merged, -1).mean(axis=1)
+
+    def _centred(self, values: Array) -> Array:
+        """Values at the instants of comparison, averaged over the samples around them."""
+        if self.merged == 1:
+            return np.asarray(values, dtype=float)
+        half = self.merged // 2
+        padded = np.concatenate([np.repeat(values[:1], half, axis=0), values, np.repeat(values[-1:], half, axis=0)])
+        total = np.cumsum(np.concatenate([np.zeros_like(padded[:1]), np.nan_to_num(padded, posinf=1e6)]), axis=0)
+        width = 2 * half + 1
+        mean = (total[width:] - total[:-width]) / width
+        bad = ~np.isfinite(padded)
+        seen = np.cumsum(np.concatenate([np.zeros_like(bad[:1]), bad]).astype(int), axis=0)
+        mean[(seen[width:] - seen[:-width]) > 0] = np.nan
+        exact = values.copy().astype(float)
+        exact[half : len(values) - half] = mean[half : len(values) - half]  # ends keep their single samples
+        return np.asarray(exact[:: self.merged][: self.samples])
+
+    def _between(self, values: Array) -> Array:
+        """Straight lines between the instants of comparison."""
+        if self.between == 1:
+            return values
+        following = np.concatenate([values[1:], values[-1:]])
+        share = (np.arange(self.between) / self.between).reshape(1, -1, *([1] * (values.ndim - 1)))
+        with np.errstate(invalid="ignore"):
+            mixed = values[:, None] * (1 - share) + following[:, None] * share
+        mixed[:, 0] = values
+        return np.asarray(mixed.reshape(-1, *values.shape[1:]))
+
+
+def _is_derived(batch: Batch) -> bool:
+    """Velocities that agree with central differences of the pose far better than noise would let them."""
+    if batch.pose is None or len(batch) < 8:
+        return False
+    rate = (batch.pose[2:, 2] - batch.pose[:-2, 2]) / (2 * batch.sample_time_s)
+    apart = np.nanmedian(np.abs(rate - batch.velocity[1:-1, 2]))
+    jitter = np.nanmedian(np.abs(np.diff(rate, 2)))
+    return bool(apart < 1e-6 * (jitter + 1e-12) or apart < 1e-9)

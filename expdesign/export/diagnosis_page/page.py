@@ -1,0 +1,107 @@
+"""The page about a diagnosis."""
+
+from __future__ import annotations
+
+import numpy as np
+from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
+
+from expdesign.diagnosis import Diagnosis, Finding
+from expdesign.export.diagnosis_page.figures import growth_figure, suspect_figure, window_figure
+from expdesign.export.estimates import plus_minus
+from expdesign.export.formats.format import xml_text
+from expdesign.export.report import words
+from expdesign.export.report.figures.style import report_style
+
+SHOWN = 4
+"""Stretches of data drawn."""
+
+
+def diagnosis_html(found: Diagnosis, *, command: str, version: str) -> str:
+    """One HTML page without any outside reference."""
+    loaders = [PackageLoader(f"expdesign.export.{name}") for name in ("diagnosis_page", "report")]
+    templates = Environment(
+        loader=ChoiceLoader(loaders),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        finalize=lambda value: xml_text(value) if type(value) is str else value,
+    )
+    with report_style():
+        figures = {
+            "windows": [
+                (found.windows.names[int(found.windows.batch[i])], window_figure(found, i)) for i in drawn(found)
+            ],
+            "growth": growth_figure(found),
+            "suspects": [suspect_figure(found, item, f"suspect{i}") for i, item in enumerate(found.findings)],
+        }
+    return templates.get_template("diagnosis.html").render(
+        found=found,
+        findings=[_finding(item, found) for item in found.findings],
+        accuracy=_accuracy(found),
+        data=_data(found),
+        figures=figures,
+        command=command,
+        version=version,
+    )
+
+
+def drawn(found: Diagnosis) -> list[int]:
+    """Windows to draw: where the model in use is most wrong."""
+    error = np.nan_to_num(found.windows.measured - found.simulated_before)[..., :3]
+    scale = np.maximum(np.nanstd(found.windows.measured[..., :3], axis=(0, 1)), 1e-12)
+    size = np.clip((error / scale) ** 2, 0, 1e6).sum(axis=(1, 2))
+    return [int(index) for index in np.sort(np.argsort(-size)[:SHOWN])]
+
+
+def _accuracy(found: Diagnosis) -> list[tuple[str, ...]]:
+    rows = []
+    for index, name in enumerate(found.before.outputs):
+        unit, factor = ("\N{DEGREE SIGN}/s", float(np.degrees(1.0))) if name == "r" else ("m/s", 1.0)
+        cells = [f"{name} [{unit}]"]
+        for item in (found.before, found.after):
+            cells += [
+                f"{words.number(float(item.fit[index]), 1)}{words.NB}%",
+                words.significant(factor * float(item.rmse[index])),
+                words.significant(factor * float(item.bias[index])),
+            ]
+        rows.append(tuple(cells))
+    return rows
+
+
+def _finding(item: Finding, found: Diagnosis) -> dict[str, object]:
+    low, high = item.gain_interval
+    fits = [
+        f"{name} {words.number(float(a), 1)} \N{RIGHTWARDS ARROW} {words.number(float(b), 1)}{words.NB}%"
+        for name, a, b in zip(found.before.outputs, item.fit_before, item.fit_after, strict=True)
+    ]
+    return {
+        "cause": item.cause,
+        "title": item.cause.replace("_", " ").replace(":", ": "),
+        "explanation": item.explanation,
+        "estimates": [
+            (one.name, plus_minus(one.value, one.std).replace("-", words.MINUS), one.unit) for one in item.estimates
+        ],
+        "chance": _chance(item.p_value),
+        "gain": words.number(item.gain, 1),
+        "interval": f"{words.number(low, 1)} to {words.number(high, 1)}",
+        "fits": fits,
+        "rivals": item.not_distinguishable_from,
+        "telling": item.would_tell_apart,
+    }
+
+
+def _chance(p_value: float) -> str:
+    if p_value < 1e-12:
+        return "less than one in a million million"
+    if p_value < 1e-6:
+        return "less than one in a million"
+    return f"about 1 in {round(1 / p_value)}" if p_value < 0.5 else "large"
+
+
+def _data(found: Diagnosis) -> str:
+    windows = found.windows
+    return (
+        f"{words.counted(len(windows.names), 'run')}, {words.duration(windows.duration_s)} in all, compared every "
+        f"{windows.sample_s:g}{words.NB}s"
+    )

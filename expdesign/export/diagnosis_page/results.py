@@ -1,0 +1,86 @@
+"""Diagnosis as diagnosis.json, as tables for a terminal, and as a vessel file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from expdesign.diagnosis import Accuracy, Diagnosis, Finding
+from expdesign.export.estimates import plus_minus
+from expdesign.export.results import strict_json
+from expdesign.export.vessel_file import vessel_toml
+from expdesign.values import Array
+
+
+def diagnosis_json(found: Diagnosis) -> str:
+    """The whole diagnosis; what is not a number is null."""
+    return strict_json(
+        {
+            "baseline": accuracy_entry(found.before),
+            "extended": accuracy_entry(found.after),
+            "findings": [finding_entry(item, found.before.outputs) for item in found.findings],
+            "verdict": found.verdict,
+            "tested": [{"cause": cause, "p_value": _finite(p_value)} for cause, p_value in found.screened],
+            "notes": [*found.notes, *found.record.notes],
+        }
+    )
+
+
+def accuracy_entry(item: Accuracy) -> dict[str, Any]:
+    """Fit, rmse, bias and growth of a model."""
+    return {
+        "fit": _named(item.outputs, item.fit),
+        "rmse": _named(item.outputs, item.rmse),
+        "bias": _named(item.outputs, item.bias),
+        "growth": [
+            {"horizon_s": horizon, "rmse": _named(item.outputs, row)}
+            for horizon, row in zip(item.horizons_s.tolist(), item.growth, strict=True)
+        ],
+        "fit_per_batch": [_named(item.outputs, row) for row in item.per_batch],
+    }
+
+
+def finding_entry(item: Finding, outputs: Sequence[str]) -> dict[str, Any]:
+    """One finding."""
+    return {
+        "cause": item.cause,
+        "estimate": {one.name: {"value": _finite(one.value), "std": _finite(one.std)} for one in item.estimates},
+        "p_value": _finite(item.p_value),
+        "fit_before": _named(outputs, item.fit_before),
+        "fit_after": _named(outputs, item.fit_after),
+        "gain": _finite(item.gain),
+        "gain_interval": [_finite(value) for value in item.gain_interval],
+        "not_distinguishable_from": list(item.not_distinguishable_from),
+        "would_tell_apart": item.would_tell_apart,
+        "explanation": item.explanation,
+    }
+
+
+def diagnosis_tables(found: Diagnosis) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Header and rows: one finding each."""
+    rows = [
+        (
+            item.cause,
+            ", ".join(f"{one.name} {plus_minus(one.value, one.std)}" for one in item.estimates),
+            f"{item.p_value:.1e}",
+            f"{item.gain:.1f} ({item.gain_interval[0]:.1f} to {item.gain_interval[1]:.1f})",
+            ", ".join(item.not_distinguishable_from) or "-",
+        )
+        for item in found.findings
+    ]
+    return ("cause", "estimate", "p", "gain of fit [points]", "cannot be told from"), rows
+
+
+def extended_vessel(found: Diagnosis, *, command: str) -> str:
+    """The vessel file with everything found."""
+    comments = [f"Extended by a diagnosis: {found.verdict}", *(item.explanation for item in found.findings)]
+    return vessel_toml(found.extended, comments=[*comments, *found.notes, f"Made by: {command}"])
+
+
+def _named(outputs: Sequence[str], values: Array) -> dict[str, float | None]:
+    return {name: _finite(value) for name, value in zip(outputs, values.tolist(), strict=True)}
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -1,0 +1,94 @@
+"""From measured data to what the simulation gets wrong."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+
+from expdesign import __version__
+from expdesign.diagnosis import Diagnosis, Proposal
+from expdesign.diagnosis import diagnose as diagnose_record
+from expdesign.dictionary import build_dictionary
+from expdesign.errors import InputError
+from expdesign.export import write_files
+from expdesign.export.diagnosis_page import diagnosis_html, diagnosis_json, diagnosis_tables, extended_vessel
+from expdesign.export.diagnosis_page.results import accuracy_entry, finding_entry
+from expdesign.scenario import load_scenario, load_vessel
+from expdesign.workflows.after import measured
+from expdesign.workflows.outcome import Outcome, Progress, TextTable, silent, within
+
+
+def diagnose(
+    data: Sequence[Path],
+    out: Path | None,
+    *,
+    vessel: Path,
+    scenario: Path | None = None,
+    velocity: str = "auto",
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Outcome:
+    """What the simulation gets wrong, why, and what mending gains, into `out` or runs/<first data file>.
+
+    Args:
+        data: CSV files.
+        out: folder, or None.
+        vessel: the model in use.
+        scenario: whose dictionary is searched for manoeuvres that tell causes apart; standard ones without.
+        velocity: where velocities come from, as in `estimate`.
+        seed: of all chance.
+        progress: told what is done.
+    """
+    if not data:
+        raise InputError("no data files are given, expected one or more CSV files")
+    progress("reading the data", 0.02)
+    ship = load_vessel(vessel)
+    record = measured(data, ship, velocity=velocity)
+    proposals = _proposals(scenario) if scenario else ()
+    found = diagnose_record(ship, record, seed=seed, proposals=proposals, progress=within(progress, 0.05, 0.9))
+    progress("drawing the page", 0.9)
+    command = _command(data, vessel, scenario, velocity, seed)
+    files = {
+        "diagnosis.json": diagnosis_json(found),
+        "diagnosis.html": diagnosis_html(found, command=command, version=__version__),
+        "vessel-extended.toml": extended_vessel(found, command=command),
+    }
+    written = write_files(out or Path("runs") / data[0].stem, files)
+    progress("done", 1.0)
+    return Outcome(files=written, summary=_summary(found), tables=_tables(found))
+
+
+def _proposals(scenario: Path) -> tuple[Proposal, ...]:
+    case = load_scenario(scenario)
+    return tuple(
+        Proposal(
+            name=primitive.name,
+            inputs=primitive.commands.values,
+            velocity=primitive.entry_velocity,
+            sample_time_s=primitive.commands.sample_time_s,
+        )
+        for primitive in build_dictionary(case.vessel, case.dictionary)
+    )
+
+
+def _command(data: Sequence[Path], vessel: Path, scenario: Path | None, velocity: str, seed: int) -> str:
+    words = ["expdesign", "diagnose", *map(str, data), "--vessel", str(vessel)]
+    words += ["--scenario", str(scenario)] if scenario else []
+    words += ["--velocity", velocity] if velocity != "auto" else []
+    return shlex.join([*words, "--seed", str(seed)])
+
+
+def _summary(found: Diagnosis) -> dict[str, object]:
+    return {
+        "verdict": found.verdict,
+        "baseline": accuracy_entry(found.before),
+        "findings": {item.cause: finding_entry(item, found.before.outputs) for item in found.findings},
+    }
+
+
+def _tables(found: Diagnosis) -> tuple[TextTable, ...]:
+    if not found.findings:
+        return ()
+    header, rows = diagnosis_tables(found)
+    return (TextTable(title="What the simulation gets wrong", header=header, rows=tuple(rows)),)

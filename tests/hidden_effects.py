@@ -1,0 +1,253 @@
+"""Trials with an effect hidden in them, from a simulator of its own: nothing of the package makes this data.
+
+Ships are written out as equations, integrated by Runge-Kutta at a fifth of the sample time, in current and wind that
+vary as Gauss-Markov processes, and measured with white noise. All trials of a call are sailed side by side; every
+effect is neutral unless a trial sets it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+TUG = {
+    "X_u": -0.05, "X_vr": 1.0, "X_abs_u_u": -0.05, "W_abs_u_u": -0.0005, "X_mu": 0.02, "X_kappa": -0.0025,
+    "Y_v": -0.2, "Y_ur": -0.65, "Y_abs_v_v": -0.2, "Y_abs_v_r": -0.1, "W_abs_v_v": -0.0015, "Y_mu": 0.02,
+    "N_r": -0.1, "N_uv": -0.0015, "N_abs_v_v": -0.001, "N_abs_v_r": -0.04, "W_uv": -0.00003, "N_mu": 0.0003,
+}  # fmt: skip
+"""Continuous coefficients of a 30 m ship with azimuths 9 m fore and aft (Ljungberg, Table 6.1, sampled at 1 s)."""
+BARGE = {
+    "X_u": -0.08, "X_abs_u_u": -0.03, "X_vr": 0.9, "X_mu": 0.02, "Y_v": -0.15, "Y_ur": -0.6, "Y_mu": 0.02,
+    "N_r": -0.12, "N_uv": -0.004, "N_mu": 0.0004,
+}  # fmt: skip
+"""A ship of the ten-parameter structure, driven by generalised forces."""
+COASTER = {
+    "X_u": -0.004, "X_abs_u_u": -0.003, "X_vr": 0.9, "X_nn": 0.0035, "X_dd": -0.004, "Y_v": -0.06, "Y_ur": -0.35,
+    "Y_rud": 0.006, "N_r": -0.09, "N_uv": -0.0012, "N_rud": -0.0009,
+}  # fmt: skip
+"""A ship with one propeller and one rudder: thrust goes with n |n|, rudder forces with u |u| delta."""
+SHIPS = {"tug": TUG, "barge": BARGE, "coaster": COASTER}
+INPUTS = {"tug": ("n1", "a1", "n2", "a2"), "barge": ("tau_x", "tau_y", "tau_psi"), "coaster": ("n1", "rudder1")}
+TERMS = {
+    "X_vr": lambda u, v, r: v * r, "X_abs_u_u": lambda u, v, r: abs(u) * u, "Y_abs_v_v": lambda u, v, r: abs(v) * v,
+    "Y_abs_v_r": lambda u, v, r: abs(v) * r, "N_uv": lambda u, v, r: u * v, "N_abs_v_v": lambda u, v, r: abs(v) * v,
+    "N_abs_v_r": lambda u, v, r: abs(v) * r, "Y_ur": lambda u, v, r: u * r,
+}  # fmt: skip
+"""Terms that may be hidden: regressors by name; the first letter tells the equation."""
+SUBSTEPS = 5
+
+
+@dataclass
+class Weather:
+    """Means are those of every trial; the varying part has these standard deviations and correlation times."""
+
+    current_std: float = 0.03
+    current_time_s: float = 200.0
+    wind_std: float = 0.5
+    wind_time_s: float = 60.0
+
+
+@dataclass
+class Sensors:
+    position: float = 0.5
+    heading: float = 0.01
+    velocity: float = 0.014
+    yaw_rate: float = 0.003
+    wind: float = 0.05
+
+
+@dataclass
+class Trial:
+    """One trial to sail: which ship, how, with what hidden in it; effects are listed in `sail`."""
+
+    ship: str
+    parameters: dict[str, float]
+    effects: dict[str, float] = field(default_factory=dict)
+    current: tuple[float, float] = (0.0, 0.0)
+    wind: tuple[float, float] = (0.0, 0.0)
+
+
+def commands(ship: str, batches: int, samples: int, step_s: float, rng: np.random.Generator) -> np.ndarray:
+    """(batches, samples, m) a helmsman's orders: levels held for 10 to 90 s, now and then a pause."""
+
+    def held(low: float, high: float) -> np.ndarray:
+        rows = []
+        for _ in range(batches):
+            count = samples
+            lengths = rng.integers(max(1, round(10 / step_s)), max(3, round(90 / step_s)), count)
+            rows.append(np.repeat(rng.uniform(low, high, count), lengths)[:count])
+        return np.array(rows)
+
+    if ship == "tug":
+        speed = held(4, 12)
+        one, two = held(-0.9, 0.9), held(-0.9, 0.9)
+        return np.stack([speed, one, np.clip(speed + held(-2, 2), 1, 14), two], axis=-1)
+    if ship == "barge":
+        return np.stack([held(6, 20), held(-6, 6), held(-60, 60)], axis=-1)
+    return np.stack([held(2.5, 6.0), held(-0.6, 0.6)], axis=-1)
+
+
+def sail(trials: list[Trial], orders: np.ndarray, step_s: float, weather: Weather, rng: np.random.Generator,
+         depth: np.ndarray | None = None) -> dict[str, np.ndarray]:  # fmt: skip
+    """True motion of every trial and batch.
+
+    Args:
+        trials: n, all of one ship.
+        orders: (n, b, k, m).
+        depth: (n, b, k) water depth, or None for deep water.
+
+    Effects: gain, kappa, asymmetry (yaw moment per ahead force), angle_offset (all azimuths or the rudder), lag_s,
+    delay_s, deadband (of the first input of every actuator), load_u load_v load_r, shallow_damping shallow_inertia
+    (times draught/depth, draught 2.5 m), roll_period_s roll_damping roll_sway roll_yaw, change_s with change_gain
+    change_damping, and any name of TERMS. lag, delay and deadband act on the inputs named by `acts_on` (bit mask).
+    """
+    ship = trials[0].ship
+    n, b, k, m = orders.shape
+    e = {name: np.array([t.effects.get(name, 0.0) for t in trials])[:, None] for name in EFFECTS}
+    th = {name: np.array([t.parameters[name] for t in trials])[:, None] for name in SHIPS[ship]}
+    acts = e["acts_on"].astype(int)
+    mask = np.stack([(acts >> j) & 1 for j in range(m)], axis=-1).astype(bool)  # (n, 1, m)
+    h = step_s / SUBSTEPS
+    mean_c = np.array([t.current for t in trials]).T[:, :, None]
+    mean_w = np.array([t.wind for t in trials]).T[:, :, None]
+    vary_c, vary_w = (rng.standard_normal((2, n, b)) * s for s in (weather.current_std, weather.wind_std))
+    fade_c, fade_w = np.exp(-h / weather.current_time_s), np.exp(-h / weather.wind_time_s)
+    psi0 = rng.uniform(-np.pi, np.pi, (n, b))
+    u0 = {"tug": 1.8, "barge": 1.9, "coaster": 3.0}[ship] * rng.uniform(0.7, 1.1, (n, b))
+    x = np.stack([np.zeros((n, b)), np.zeros((n, b)), psi0, u0, np.zeros((n, b)), np.zeros((n, b)),
+                  np.zeros((n, b)), np.zeros((n, b))])  # fmt: skip
+    held = orders[:, :, 0].copy()
+    out = {name: np.zeros((n, b, k)) for name in ("north", "east", "heading", "u", "v", "r", "u_q", "v_q")}
+    rows = np.arange(n)[:, None, None], np.arange(b)[None, :, None], np.arange(m)[None, None, :]
+    for i in range(k):
+        for part in range(SUBSTEPS):
+            t = i * step_s + part * h
+            late = np.where(mask, e["delay_s"][..., None], 0.0) * np.ones((n, b, 1))
+            index = np.clip(np.floor((t - late + 1e-9) / step_s).astype(int), 0, k - 1)
+            order = orders[rows[0], rows[1], index, rows[2]]
+            order = np.where(mask & (np.abs(order) < e["deadband"][..., None]), 0.0, order)
+            lag = np.where(mask, e["lag_s"][..., None], 0.0)
+            fade = np.where(lag > 0, np.exp(-h / np.maximum(lag, 1e-9)), 0.0)
+            middle = np.where(lag > 0, np.exp(-h / 2 / np.maximum(lag, 1e-9)), 0.0)
+            acting = order + (held - order) * middle
+            held = order + (held - order) * fade
+            if part == 0:
+                c, s = np.cos(x[2]), np.sin(x[2])
+                wind = mean_w + vary_w
+                for name, value in zip(("north", "east", "heading", "u", "v", "r"), x[:6], strict=True):
+                    out[name][:, :, i] = value
+                out["u_q"][:, :, i] = x[3] - (c * wind[0] + s * wind[1])
+                out["v_q"][:, :, i] = x[4] - (c * wind[1] - s * wind[0])
+            shoal = np.zeros((n, b)) if depth is None else 2.5 / depth[:, :, i]
+            after = (t >= e["change_s"]) & (e["change_s"] > 0)
+            current, wind = mean_c + vary_c, mean_w + vary_w
+
+            def rates(x, acting=acting, shoal=shoal, after=after, current=current, wind=wind):
+                return _rates(ship, x, acting, th, e, shoal, after, current, wind)
+
+            k1 = rates(x)
+            k2 = rates(x + h / 2 * k1)
+            k3 = rates(x + h / 2 * k2)
+            x = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + rates(x + h * k3))
+            vary_c = fade_c * vary_c + weather.current_std * np.sqrt(1 - fade_c**2) * rng.standard_normal((2, n, b))
+            vary_w = fade_w * vary_w + weather.wind_std * np.sqrt(1 - fade_w**2) * rng.standard_normal((2, n, b))
+    return out
+
+
+EFFECTS = (
+    "gain", "kappa", "asymmetry", "angle_offset", "lag_s", "delay_s", "deadband", "acts_on", "load_u", "load_v",
+    "load_r", "shallow_damping", "shallow_inertia", "roll_period_s", "roll_damping", "roll_sway", "roll_yaw",
+    "change_s", "change_gain", "change_damping", *(name for name in TERMS),
+)  # fmt: skip
+
+
+def _rates(ship, x, acting, th, e, shoal, after, current, wind):
+    _, _, psi, u, v, r, phi, p = x
+    c, s = np.cos(psi), np.sin(psi)
+    ur, vr = u - (c * current[0] + s * current[1]), v - (c * current[1] - s * current[0])
+    uq, vq = u - (c * wind[0] + s * wind[1]), v - (c * wind[1] - s * wind[0])
+    gain = (1 + e["gain"]) * np.where(after, 1 + e["change_gain"], 1.0)
+    damp = np.where(after, 1 + e["change_damping"], 1.0) * (1 + e["shallow_damping"] * shoal)
+    heavy = 1 + e["shallow_inertia"] * shoal
+    if ship == "coaster":
+        n, rudder = acting[..., 0], acting[..., 1] + e["angle_offset"]
+        push, side, turn = np.abs(n) * n, ur * np.abs(ur) * rudder, ur * np.abs(ur) * rudder
+        fx = th["X_nn"] * push + th["X_dd"] * ur * np.abs(ur) * rudder * rudder
+        fy, fn = th["Y_rud"] * side, th["N_rud"] * turn
+        kx = e["kappa"] * ur * push
+        fn = fn + e["asymmetry"] * push
+    else:
+        if ship == "tug":
+            n1, a1, n2, a2 = np.moveaxis(acting, -1, 0)
+            a1, a2 = a1 + e["angle_offset"], a2 + e["angle_offset"]
+            tx, ty = n1 * np.cos(a1) + n2 * np.cos(a2), n1 * np.sin(a1) + n2 * np.sin(a2)
+            tn = 9 * n1 * np.sin(a1) - 9 * n2 * np.sin(a2)
+        else:
+            tx, ty, tn = np.moveaxis(acting, -1, 0)
+        tn = tn + e["asymmetry"] * tx
+        fx, fy, fn = th["X_mu"] * tx, th["Y_mu"] * ty, th["N_mu"] * tn
+        kx = (th.get("X_kappa", 0.0) + e["kappa"]) * ur * tx
+    if ship == "tug":
+        fx = fx + th["W_abs_u_u"] * np.abs(uq) * uq
+        fy = fy + th["W_abs_v_v"] * np.abs(vq) * vq
+        fn = fn + th["W_uv"] * uq * vq
+    dx = th["X_u"] * ur + th["X_abs_u_u"] * np.abs(ur) * ur
+    dy = th["Y_v"] * vr + th.get("Y_abs_v_v", 0.0) * np.abs(vr) * vr + th.get("Y_abs_v_r", 0.0) * np.abs(vr) * r
+    dn = th["N_r"] * r + th.get("N_abs_v_v", 0.0) * np.abs(vr) * vr + th.get("N_abs_v_r", 0.0) * np.abs(vr) * r
+    dn = dn + th["N_uv"] * ur * vr
+    extra = {"X": 0.0, "Y": 0.0, "N": 0.0}
+    for name, term in TERMS.items():
+        if np.any(e[name]):
+            extra[name[0]] = extra[name[0]] + e[name] * term(ur, vr, r)
+    du = th["X_vr"] * vr * r + (damp * dx + gain * (fx + kx) + extra["X"]) / (1 + e["load_u"]) / heavy
+    dv = th["Y_ur"] * ur * r + (damp * dy + gain * fy + extra["Y"]) / (1 + e["load_v"]) / heavy
+    dr = (damp * dn + gain * fn + extra["N"]) / (1 + e["load_r"]) / heavy
+    w0 = 2 * np.pi / np.where(e["roll_period_s"] > 0, e["roll_period_s"], 1.0)
+    on = e["roll_period_s"] > 0
+    dp = np.where(on, -2 * e["roll_damping"] * w0 * p - w0**2 * phi + w0**2 * ur * r, 0.0)
+    dv, dr = dv + e["roll_sway"] * phi, dr + e["roll_yaw"] * phi
+    return np.stack([u * c - v * s, u * s + v * c, r, du, dv, dr, p, dp])
+
+
+def measure(true: dict[str, np.ndarray], step_s: float, sensors: Sensors, rng: np.random.Generator,
+            faults: list[dict[str, float]]) -> dict[str, np.ndarray]:  # fmt: skip
+    """What the instruments record, (n, b, k) by column name.
+
+    Faults: heading_bias (v_meas = v + u sin(bias)), lever_m (v_meas = v + lever r), gyro (r_meas = (1 + gyro) r),
+    late_u, late_v, late_r (seconds).
+    """
+    n, b, k = true["u"].shape
+
+    def of(name: str) -> np.ndarray:
+        return np.array([fault.get(name, 0.0) for fault in faults])[:, None, None]
+
+    def noisy(values: np.ndarray, std: float) -> np.ndarray:
+        return values + std * rng.standard_normal(values.shape)
+
+    lever = of("lever_m")
+    u, v, r = true["u"], true["v"] + lever * true["r"], true["r"]
+    bias = of("heading_bias")
+    u, v = u * np.cos(bias) - v * np.sin(bias), v * np.cos(bias) + u * np.sin(bias)
+    u, v = (late(values, of(f"late_{name}"), step_s) for name, values in (("u", u), ("v", v)))
+    heading = true["heading"] - bias
+    return {
+        "north_m": noisy(true["north"] - lever * np.sin(true["heading"]), sensors.position),
+        "east_m": noisy(true["east"] + lever * np.cos(true["heading"]), sensors.position),
+        "heading_rad": noisy(heading, sensors.heading),
+        "u_mps": noisy(u, sensors.velocity),
+        "v_mps": noisy(v, sensors.velocity),
+        "r_radps": noisy(late((1 + of("gyro")) * r, of("late_r"), step_s), sensors.yaw_rate),
+        "wind_u_mps": noisy(true["u_q"], sensors.wind),
+        "wind_v_mps": noisy(true["v_q"], sensors.wind),
+    }
+
+
+def late(values: np.ndarray, delay_s: np.ndarray, step_s: float) -> np.ndarray:
+    """(n, b, k) the same, late by (n, 1, 1) seconds, straight between samples."""
+    k = values.shape[-1]
+    place = np.clip(np.arange(k) - delay_s / step_s, 0, k - 1) * np.ones_like(values)
+    low = np.floor(place).astype(int)
+    high = np.minimum(low + 1, k - 1)
+    share = place - low
+    return np.take_along_axis(values, low, -1) * (1 - share) + np.take_along_axis(values, high, -1) * share
