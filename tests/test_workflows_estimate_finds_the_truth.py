@@ -49,7 +49,7 @@ def trial(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("trial")
     one = write_run(folder / "one.csv", MODEL_SHIP_TRUE, model_ship_commands(), **EULER)
     two = write_run(folder / "two.csv", MODEL_SHIP_TRUE, model_ship_commands(1000, seed=1), seed=1, **EULER)
-    workflows.estimate([one], folder / "out", vessel=MODEL_SHIP, tests=[two])
+    workflows.estimate([one], folder / "out", vessel=MODEL_SHIP, tests=[two], motion="euler")
     return folder / "out"
 
 
@@ -62,20 +62,35 @@ def test_instruments_find_the_truth_and_least_squares_does_not(trial: Path) -> N
 
 def test_a_trial_without_noise_gives_the_parameters_exactly(tmp_path: Path) -> None:
     path = write_run(tmp_path / "one.csv", quiet(MODEL_SHIP_TRUE), model_ship_commands(1500), **EULER)
-    workflows.estimate([path], tmp_path / "out", vessel=MODEL_SHIP)
+    workflows.estimate([path], tmp_path / "out", vessel=MODEL_SHIP, motion="euler")
     for entry in estimates(tmp_path / "out").values():
         values = {name: item["value"] for name, item in entry["parameters"].items()}
         assert values == pytest.approx(TRUTH, rel=1e-5)  # the file holds ten digits
         assert min(entry["fit"]["estimation"]["one.csv"].values()) > 99.99
 
 
-def test_the_sampled_ship_has_the_damping_of_its_sampled_motion(tmp_path: Path) -> None:
+def decay_of(folder: Path, file: Path, method: str, motion: str) -> dict[str, float]:
+    workflows.estimate([file], folder / motion / method, vessel=MODEL_SHIP, methods=[method], motion=motion)
+    return estimates(folder / motion / method)[method]["parameters"]["N_r"]
+
+
+def test_eulers_map_has_the_decay_that_samples_show_and_the_motion_its_own(tmp_path: Path) -> None:
     """Between samples the true yaw rate decays as exp(N_r t / T): Euler's map of it has exp(N_r) - 1 instead of N_r."""
     path = write_run(tmp_path / "one.csv", MODEL_SHIP_TRUE, model_ship_commands())
-    workflows.estimate([path], tmp_path / "out", vessel=MODEL_SHIP, methods=["iv"])
-    item = estimates(tmp_path / "out")["iv"]["parameters"]["N_r"]
-    assert abs(item["value"] - np.expm1(TRUTH["N_r"])) < 4 * item["std"]
-    assert abs(item["value"] - TRUTH["N_r"]) > 4 * item["std"]
+    euler, motion = (decay_of(tmp_path, path, "iv", name) for name in ("euler", "continuous"))
+    assert abs(euler["value"] - np.expm1(TRUTH["N_r"])) < 4 * euler["std"]
+    assert abs(euler["value"] - TRUTH["N_r"]) > 4 * euler["std"]
+    assert abs(motion["value"] - TRUTH["N_r"]) < 4 * motion["std"]
+
+
+def test_without_noise_the_trapezoid_leaves_its_own_error_and_output_error_none(tmp_path: Path) -> None:
+    """A decay a per sample shows as 2 tanh(a / 2) under the trapezoidal rule, 1 - exp(-a) under Euler's."""
+    path = write_run(tmp_path / "one.csv", quiet(MODEL_SHIP_TRUE), model_ship_commands(2000), substeps=8)
+    euler, trapezoid = (decay_of(tmp_path, path, "iv", name)["value"] for name in ("euler", "continuous"))
+    assert euler == pytest.approx(np.expm1(TRUTH["N_r"]), rel=1e-3)
+    assert trapezoid == pytest.approx(2 * np.tanh(TRUTH["N_r"] / 2), rel=1e-3)
+    exact = decay_of(tmp_path, path, "oe", "continuous")["value"]
+    assert exact == pytest.approx(TRUTH["N_r"], rel=2e-4)  # one Runge-Kutta step per sample
 
 
 def test_white_velocity_noise_leaves_residuals_with_correlation_minus_a_half(trial: Path) -> None:
@@ -87,7 +102,7 @@ def test_runs_kept_apart_are_simulated_but_not_used(trial: Path, tmp_path: Path)
     found = estimates(trial)["iv"]
     assert list(found["fit"]["estimation"]) == ["one.csv"]
     assert list(found["fit"]["test"]) == ["two.csv"]
-    workflows.estimate([trial.parent / "one.csv"], tmp_path, vessel=MODEL_SHIP)
+    workflows.estimate([trial.parent / "one.csv"], tmp_path, vessel=MODEL_SHIP, motion="euler")
     assert estimates(tmp_path)["iv"]["parameters"] == found["parameters"]
 
 
@@ -217,7 +232,7 @@ def test_the_mean_current_is_read_out_of_an_augmented_estimate(tmp_path: Path) -
     path = write_run(
         tmp_path / "one.csv", TUG_TRUE, tug_commands(), velocity=(1.7, 0.7, 0), environment=current, **EULER
     )
-    workflows.estimate([path], tmp_path / "out", vessel=TUG, methods=["iv-augmented", "ls"])
+    workflows.estimate([path], tmp_path / "out", vessel=TUG, methods=["iv-augmented", "ls"], motion="euler")
     found = estimates(tmp_path / "out")
     read = [found["iv-augmented"]["current_to"][name] for name in ("north_mps", "east_mps")]
     for item, truth in zip(read, (0.2, -0.2), strict=True):
@@ -232,7 +247,9 @@ def test_a_vessel_file_without_values_starts_from_least_squares(trial: Path, tmp
     head, _, rest = text.partition("[model.parameters]")
     zeros = "".join(f"{name} = 0.0\n" for name in TRUTH)
     (tmp_path / "zero.toml").write_text(f"{head}[model.parameters]\n{zeros}\n[sensors]{rest.partition('[sensors]')[2]}")
-    workflows.estimate([trial.parent / "one.csv"], tmp_path / "out", vessel=tmp_path / "zero.toml", methods=["iv"])
+    workflows.estimate(
+        [trial.parent / "one.csv"], tmp_path / "out", vessel=tmp_path / "zero.toml", methods=["iv"], motion="euler"
+    )
     entry, usual = estimates(tmp_path / "out")["iv"], estimates(trial)["iv"]
     assert (entry["instruments"]["start"], usual["instruments"]["start"]) == ("ls", "nominal")
     assert any("all zero" in text for text in entry["warnings"])

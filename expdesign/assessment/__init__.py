@@ -1,6 +1,7 @@
 """Assessment: estimates put to the test, on the runs they come from and on runs kept apart."""
 
 from expdesign.assessment.assess import NO_TESTS, Wish, assess, default_methods
+from expdesign.assessment.limits import Limits, sentence, what_limits
 from expdesign.assessment.residuals import OneStep, one_step
 from expdesign.assessment.runs import RunCheck, check_run
 from expdesign.assessment.values import Assessed, Assessment, Current
@@ -10,6 +11,7 @@ __all__ = [
     "Assessed",
     "Assessment",
     "Current",
+    "Limits",
     "OneStep",
     "RunCheck",
     "Wish",
@@ -17,4 +19,6 @@ __all__ = [
     "check_run",
     "default_methods",
     "one_step",
+    "sentence",
+    "what_limits",
 ]

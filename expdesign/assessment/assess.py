@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+from expdesign.assessment.limits import Limits, what_limits
 from expdesign.assessment.residuals import one_step
 from expdesign.assessment.runs import ESTIMATION, TEST, check_run
 from expdesign.assessment.values import INSTRUMENTAL, Assessed, Assessment, Current
@@ -13,6 +14,7 @@ from expdesign.estimation.disturbance import COLUMNS, DAMPING, mean_current
 from expdesign.estimation.excitation import check_excitation, worst_case
 from expdesign.estimation.methods import STARTS, Method, Settings, estimate, method_named
 from expdesign.estimation.predictors import PREDICTORS
+from expdesign.estimation.replay import Integration
 from expdesign.estimation.solution import Weighting
 from expdesign.estimation.tables import AIR
 from expdesign.estimation.values import Estimate
@@ -22,6 +24,8 @@ from expdesign.vessel import Vessel
 
 Progress = Callable[[str, float], None]
 AUTO = "auto"
+CONTINUOUS, EULER = "continuous", "euler"
+MOTIONS = (CONTINUOUS, EULER)
 NO_TESTS = Record(batches=())
 USES_WIND = {item.name: item.wind for item in PREDICTORS}
 
@@ -36,17 +40,40 @@ class Wish:
         mean: subtracted from the instruments: "none", "batch" or "complete".
         start: of the first instruments: "nominal" for the vessel's values, "ls" for the least-squares estimate, "auto"
             for the vessel's values unless they are all zero or fail.
+        motion: what the parameters describe: "continuous" the motion between samples too, which is what plans are made
+            from; "euler" Euler's map at the sample time.
+        horizon_s: how far output error simulates before it starts anew from the data [s], None for whole runs.
+        constant: whether output error gives every run a constant force of its own.
     """
 
     methods: tuple[str, ...] = ()
     fixed: tuple[str, ...] = ()
     mean: str = "complete"
     start: str = AUTO
+    motion: str = CONTINUOUS
+    horizon_s: float | None = None
+    constant: bool = False
 
     def __post_init__(self) -> None:
-        for what, value, known in (("instrument mean", self.mean, MEANS), ("start", self.start, (AUTO, *STARTS))):
+        for what, value, known in (
+            ("instrument mean", self.mean, MEANS),
+            ("start", self.start, (AUTO, *STARTS)),
+            ("motion", self.motion, MOTIONS),
+        ):
             if value not in known:
                 raise UnknownName(what, value, known=known)
+        if self.horizon_s is not None and not 0 < self.horizon_s < float("inf"):
+            raise InputError(f"horizon is {self.horizon_s:g} s, expected more than 0")
+
+    @property
+    def integration(self) -> Integration:
+        """How models are simulated."""
+        return Integration("rk4", 1) if self.motion == CONTINUOUS else Integration()
+
+    @property
+    def quadrature(self) -> str:
+        """How regressors stand for an interval."""
+        return "trapezoid" if self.motion == CONTINUOUS else "euler"
 
 
 def default_methods(vessel: Vessel, record: Record) -> tuple[str, ...]:
@@ -94,15 +121,25 @@ def assess(
             if named or not USES_WIND[method.predictor]:
                 raise _told(error, method) from None
             left_out.append(f"Method {method.name} gave no estimate: {error}.")
+    chosen_one = preferred(done)
+    progress("finding what limits the fit", 1.0)
     return Assessment(
         record=record,
         tests=tests,
         methods=tuple(done),
         left_out=tuple(left_out),
-        chosen=preferred(done),
+        chosen=chosen_one,
         mean=wish.mean,
         fixed=wish.fixed,
+        motion=wish.motion,
+        limits=limits_of(done[chosen_one], wish.integration),
     )
+
+
+def limits_of(item: Assessed, integration: Integration) -> tuple[Limits, ...]:
+    """What limits the fit of every run simulated with an estimate."""
+    wind = USES_WIND[item.method.predictor]
+    return tuple(what_limits(item.model, run, item.estimate, wind=wind, integration=integration) for run in item.runs)
 
 
 def preferred(found: Sequence[Assessed]) -> int:
@@ -128,7 +165,7 @@ def _assessed(vessel: Vessel, record: Record, tests: Record, method: Method, wis
     wind = USES_WIND[method.predictor]
     model = found.model(vessel.model)
     runs = [
-        check_run(model, batch, use=use, wind=wind)
+        check_run(model, batch, use=use, wind=wind, integration=wish.integration)
         for use, part in ((ESTIMATION, record), (TEST, tests))
         for batch in part.batches
     ]
@@ -139,7 +176,7 @@ def _assessed(vessel: Vessel, record: Record, tests: Record, method: Method, wis
         start=start,
         model=model,
         runs=tuple(runs),
-        one_step=one_step(record, vessel.model, found, fixed=wish.fixed),
+        one_step=one_step(record, vessel.model, found, fixed=wish.fixed, quadrature=wish.quadrature),
         breaches=breaches,
         current=_current(found, vessel),
     )
@@ -157,7 +194,15 @@ def _estimated(vessel: Vessel, record: Record, method: Method, wish: Wish) -> tu
 
     def attempt(start: str) -> Estimate:
         weighting = Weighting(mean=wish.mean)
-        settings = Settings(fixed=wish.fixed, weighting=weighting, start=start)
+        settings = Settings(
+            fixed=wish.fixed,
+            weighting=weighting,
+            start=start,
+            integration=wish.integration,
+            quadrature=wish.quadrature,
+            horizon_s=wish.horizon_s,
+            constant=wish.constant,
+        )
         return estimate(record, vessel.model, method=method.name, settings=settings)
 
     nominal, ls = STARTS

@@ -53,7 +53,9 @@ class OneStep:
         return 1.96 / float(np.sqrt(max(1, len(self.residuals))))
 
 
-def one_step(record: Record, model: VesselModel, found: Estimate, *, fixed: Sequence[str] = ()) -> OneStep:
+def one_step(
+    record: Record, model: VesselModel, found: Estimate, *, fixed: Sequence[str] = (), quadrature: str = "euler"
+) -> OneStep:
     """The residuals of an estimate on the record it comes from.
 
     Args:
@@ -61,9 +63,12 @@ def one_step(record: Record, model: VesselModel, found: Estimate, *, fixed: Sequ
         model: the one the estimation began with; its values are those of the parameters held fixed.
         found: the estimate.
         fixed: parameters held fixed.
+        quadrature: one of `predictors.QUADRATURES`.
     """
     predictor = method_named(found.method).predictor
-    layout = build_layout(model_for(model, record), record, predictor=predictor, fixed=tuple(fixed))
+    layout = build_layout(
+        model_for(model, record), record, predictor=predictor, fixed=tuple(fixed), quadrature=quadrature
+    )
     regression = build_regression(layout, record).regression
     names, values = (*found.names, *found.nuisance_names), np.concatenate([found.values, found.nuisance_values])
     residuals = regression.residuals(values[[names.index(name) for name in regression.parameters]])

@@ -10,13 +10,10 @@ from expdesign.conventions import OUTPUTS
 from expdesign.errors import Diverged
 from expdesign.estimation.fit import fit_percent
 from expdesign.estimation.instruments import instrument_wind
-from expdesign.estimation.replay import simulate_batch, start_state
-from expdesign.estimation.tables import inputs_of, model_for
-from expdesign.signals import Batch, Record
-from expdesign.simulation import euler_step, motion_rates
-from expdesign.simulation.run import LARGEST_SPEED
+from expdesign.estimation.replay import Integration, simulate_batch
+from expdesign.signals import Batch
 from expdesign.values import Array, seal
-from expdesign.vessel import SCALAR, VesselModel
+from expdesign.vessel import VesselModel
 
 ESTIMATION, TEST = "estimation", "test"
 
@@ -47,7 +44,10 @@ class RunCheck:
         seal(self, fit_percent="n", rmse="n", **({} if self.simulated is None else {"simulated": "k 3"}))
 
 
-def check_run(model: VesselModel, batch: Batch, *, use: str, wind: bool) -> RunCheck:
+EULER = Integration()
+
+
+def check_run(model: VesselModel, batch: Batch, *, use: str, wind: bool, integration: Integration = EULER) -> RunCheck:
     """Simulate a run and compare.
 
     Args:
@@ -55,9 +55,10 @@ def check_run(model: VesselModel, batch: Batch, *, use: str, wind: bool) -> RunC
         batch: the run.
         use: "estimation" or "test".
         wind: simulate in the wind that was measured; otherwise in still air. The water is still in both.
+        integration: Euler's map at the sample time when left out.
     """
     try:
-        simulated, problem = _simulated(model, batch, wind=wind), ""
+        simulated, problem = _simulated(model, batch, wind=wind, integration=integration), ""
     except Diverged as error:
         simulated, problem = None, str(error)
     columns = [OUTPUTS.index(name) for name in model.outputs]
@@ -71,23 +72,7 @@ def check_run(model: VesselModel, batch: Batch, *, use: str, wind: bool) -> RunC
     )
 
 
-def _simulated(model: VesselModel, batch: Batch, *, wind: bool) -> Array:
-    """(k, 3) by Euler's map at the sample time, the map that the parameters were estimated for."""
-    return _in_wind(model, batch) if wind else simulate_batch(model, batch).velocity
-
-
-def _in_wind(model: VesselModel, batch: Batch) -> Array:
-    """In the n-frame wind that anemometer, velocity and heading give at each sample."""
-    driven = model_for(model, Record(batches=(batch,)))
-    inputs, wind = inputs_of(driven, batch).tolist(), instrument_wind(batch, "lagged").T.tolist()
-    theta = driven.parameters.tolist()
-    state: tuple[float, ...] = tuple(start_state(driven, batch).tolist())
-    rows = [state]
-    for held, air in zip(inputs[:-1], wind[:-1], strict=True):
-        rates = motion_rates(driven, state, held, wind_to=air, ops=SCALAR, parameters=theta)
-        state = euler_step(lambda _, rates=rates: rates, state, batch.sample_time_s)  # type: ignore[misc]
-        if not all(abs(speed) < LARGEST_SPEED for speed in state[3:]):
-            seconds = len(rows) * batch.sample_time_s
-            raise Diverged(f"{batch.name}: the model's simulation diverges after {seconds:.1f} s")
-        rows.append(state)
-    return np.array(rows)[:, 3:]
+def _simulated(model: VesselModel, batch: Batch, *, wind: bool, integration: Integration) -> Array:
+    """(k, 3); in wind that is the n-frame one which anemometer, velocity and heading give at each sample."""
+    air = instrument_wind(batch, "lagged").T if wind else None
+    return simulate_batch(model, batch, integration=integration, wind_to=air).velocity

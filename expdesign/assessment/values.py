@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from expdesign.assessment.limits import Limits
 from expdesign.assessment.residuals import OneStep
 from expdesign.assessment.runs import RunCheck
 from expdesign.estimation.excitation import Breach
@@ -80,6 +81,8 @@ class Assessment:
         chosen: index of the method whose estimate goes into the vessel file.
         mean: how the mean was subtracted from instruments.
         fixed: parameters held at the vessel file's values.
+        motion: "continuous" or "euler", what the parameters describe.
+        limits: what limits the fit of every run of the chosen estimate.
     """
 
     record: Record
@@ -89,6 +92,8 @@ class Assessment:
     chosen: int
     mean: str
     fixed: tuple[str, ...]
+    motion: str
+    limits: tuple[Limits, ...]
 
     @property
     def best(self) -> Assessed:

@@ -199,8 +199,8 @@ def estimate(
         typer.Option(
             "--method",
             metavar="M ...",
-            help="One or more of: ls ls-air ls-augmented ls-wind iv iv-air iv-augmented iv-wind oe. When not given: ls "
-            "and iv, and those with wind where wind is measured and the model has terms for it.",
+            help="One or more of: ls ls-air ls-augmented ls-wind iv iv-air iv-augmented iv-wind oe oe-air. When not "
+            "given: ls and iv, and those with wind where wind is measured and the model has terms for it.",
         ),
     ] = None,
     fixed: Annotated[
@@ -235,6 +235,25 @@ def estimate(
             "nominal, unless they are all zero or fail.",
         ),
     ] = "auto",
+    motion: Annotated[
+        str,
+        typer.Option(
+            metavar="WHAT",
+            help="What the parameters describe: continuous, the motion between samples too, as plans are made from; "
+            "euler, Euler's map at the sample time.",
+        ),
+    ] = "continuous",
+    horizon: Annotated[
+        float | None,
+        typer.Option(
+            metavar="SECONDS",
+            help="How far output error simulates before it starts anew from the data; whole runs when not given. For "
+            "ships unstable on their course and for weather that is not measured.",
+        ),
+    ] = None,
+    constant: Annotated[
+        bool, typer.Option("--constant", help="Give every run a constant force of its own in output error.")
+    ] = False,
     out: Annotated[
         Path | None,
         typer.Option("--out", "-o", metavar="FOLDER", help="Where to write; runs/<first data file> when not given."),
@@ -261,6 +280,9 @@ def estimate(
             velocity=velocity,
             mean=mean,
             start=start,
+            motion=motion,
+            horizon_s=horizon,
+            constant=constant,
             tests=tuple(tests or ()),
             progress=tell,
         ),

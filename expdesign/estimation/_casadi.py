@@ -1,9 +1,8 @@
-"""The only door to CasADi on this floor: fast simulation of batches, and least simulation error by multiple shooting.
+"""The only door to CasADi on this floor: fast simulation of batches, and the slopes that least simulation error needs.
 
-Both are made from the model's own terms, with exact derivatives.
+Both are made from the model's own terms; derivatives are exact.
 
-Source: H. G. Bock, in Modelling of Chemical Reaction Systems (1981), 102-125;
-J. A. E. Andersson et al., CasADi, Mathematical Programming Computation 11 (2019), 1-36.
+Source: J. A. E. Andersson et al., CasADi, Mathematical Programming Computation 11 (2019), 1-36.
 """
 
 from __future__ import annotations
@@ -14,7 +13,6 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from expdesign.simulation import euler_step, motion_rates, rk4_step
 from expdesign.values import Array
@@ -23,30 +21,25 @@ from expdesign.vessel import Operators, VesselModel
 CASADI = Operators(ca.fabs, ca.sin, ca.cos)
 STEPS = {"euler": euler_step, "rk4": rk4_step}
 Simulate = Callable[[Array, Array, Array], Array]
-"""(parameters (p,), start state (6,), inputs (k, m)) -> states (k, 6); calm water and air."""
-
-
-def step_function(model: VesselModel, *, sample_time_s: float, integrator: str, substeps: int) -> ca.Function:
-    """One sample: (state (6,), inputs (m,), parameters (p,)) -> state."""
-    x, inputs, theta = ca.SX.sym("x", 6), ca.SX.sym("i", len(model.inputs)), ca.SX.sym("p", len(model.terms))
-
-    def rates(state: tuple[Any, ...]) -> tuple[Any, ...]:
-        return motion_rates(model, state, ca.vertsplit(inputs), ops=CASADI, parameters=theta)
-
-    state: tuple[Any, ...] = tuple(ca.vertsplit(x))
-    for _ in range(substeps):
-        state = STEPS[integrator](rates, state, sample_time_s / substeps)
-    return ca.Function("sample", [x, inputs, theta], [ca.vertcat(*state)])
+"""(parameters (p,), start state (6,), inputs (k, m)) -> states (k, 6); calm water."""
 
 
 def batch_simulator(
-    model: VesselModel, *, samples: int, sample_time_s: float, integrator: str, substeps: int
+    model: VesselModel, *, samples: int, sample_time_s: float, integrator: str, substeps: int, windy: bool = False
 ) -> Simulate:
-    """A function that simulates batches of so many samples; numbers that run away come back as inf or nan."""
-    step = step_function(model, sample_time_s=sample_time_s, integrator=integrator, substeps=substeps)
-    p = len(model.terms)
-    x, theta, inputs = ca.SX.sym("x", 6), ca.SX.sym("p", p), ca.SX.sym("i", len(model.inputs))
-    held = ca.Function("held", [ca.vertcat(x, theta), inputs], [ca.vertcat(step(x, inputs, theta), theta)])
+    """A function that simulates batches of so many samples; numbers that run away come back as inf or nan.
+
+    Where `windy`, two columns follow the model's inputs: the n-frame wind to north and east [m/s].
+    """
+    m, p = len(model.inputs), len(model.terms)
+    x, theta, drive = ca.SX.sym("x", 6), ca.SX.sym("p", p), ca.SX.sym("i", m + 2 * windy)
+    wind = (drive[m], drive[m + 1]) if windy else (0.0, 0.0)
+
+    def rates(state: tuple[Any, ...]) -> tuple[Any, ...]:
+        return motion_rates(model, state, ca.vertsplit(drive[:m]), wind_to=wind, ops=CASADI, parameters=theta)
+
+    after = _stepped(rates, x, sample_time_s, integrator, substeps)
+    held = ca.Function("held", [ca.vertcat(x, theta), drive], [ca.vertcat(after, theta)])
     run = held.mapaccum("batch", max(1, samples - 1))
 
     def simulate(parameters: Array, start: Array, values: Array) -> Array:
@@ -58,113 +51,112 @@ def batch_simulator(
     return simulate
 
 
-@dataclass(frozen=True, eq=False)
-class OutputErrorProblem:
-    """Least simulation error over batches, with a shooting node at every sample.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Stretches:
+    """W stretches of data of L samples each, simulated side by side; the shorter ones are filled up and not compared.
 
     Attributes:
         model: structure; gives the values of parameters not sought.
         sought: (p,) places of the parameters to find, among the model's.
         states: (n,) places of the velocities that have an equation, among u, v, r.
-        inputs: (k, m) of all batches, one after the other.
-        measured: (k, n) velocities, nan where missing.
-        weights: (n,) one over the variance of each output's noise.
-        last: (k,) True at the last sample of each batch.
-        sample_time_s: of all batches.
+        drive: (L, W, m) inputs; two columns more, the wind's velocity in the b-frame, where `windy`.
+        windy: whether air velocities are those of that wind.
+        sample_time_s: of all stretches.
         integrator, substeps: how the model is integrated.
-        start: (p,) first guess.
-        scale: (p,) typical sizes.
     """
 
     model: VesselModel
     sought: tuple[int, ...]
     states: tuple[int, ...]
-    inputs: Array
-    measured: Array
-    weights: Array
-    last: NDArray[np.bool_]
+    drive: Array
+    windy: bool
     sample_time_s: float
     integrator: str
     substeps: int
-    start: Array
-    scale: Array
 
 
-def solve_output_error(problem: OutputErrorProblem) -> tuple[Array, Array] | None:
-    """Parameters (p,) and states (k, n), or None when IPOPT finds no optimum. Derivatives are exact."""
-    step, (k, n) = _velocity_step(problem), problem.measured.shape
-    sigma = 1.0 / np.sqrt(problem.weights)
-    theta, x = ca.MX.sym("theta", len(problem.sought)), ca.MX.sym("x", n, k)
-    states = ca.DM(sigma) * x
-    inner = np.flatnonzero(~problem.last)
-    after = step.map(len(inner))(
-        states[:, inner.tolist()],
-        problem.inputs[inner].T,
-        ca.repmat(theta * ca.DM(problem.scale), 1, len(inner)),
-    )
-    defects = ca.vec((after - states[:, (inner + 1).tolist()]) / ca.DM(sigma))
-    seen = np.isfinite(problem.measured)
-    target = np.where(seen, problem.measured / sigma, 0.0)
-    cost = 0.5 * ca.sumsqr(ca.DM(seen.T.astype(float)) * (x - ca.DM(target.T)))
-    options: dict[str, Any] = {"ipopt.print_level": 0, "print_time": False, "ipopt.sb": "yes", "ipopt.max_iter": 200}
-    nlp: Any = {"x": ca.vertcat(theta, ca.vec(x)), "f": cost, "g": defects}
-    solver = ca.nlpsol("output_error", "ipopt", nlp, options)
-    filled = _filled(target, seen)
-    answer = solver(x0=np.concatenate([problem.start / problem.scale, filled.ravel()]), lbg=0.0, ubg=0.0)
-    if not solver.stats()["success"]:
-        return None
-    values = np.asarray(answer["x"]).ravel()
-    p = len(problem.sought)
-    return values[:p] * problem.scale, values[p:].reshape(k, n) * sigma
+@dataclass(frozen=True, eq=False)
+class Compiled:
+    """Stretches made ready to be simulated with any values.
+
+    Attributes:
+        stretches: what is simulated.
+        run: (starts, drives, values) -> states after each sample.
+        slopes: (states, drives, values) -> derivatives of the next state by state and by values.
+    """
+
+    stretches: Stretches
+    run: ca.Function
+    slopes: ca.Function
+
+    def states(self, values: Array, start: Array) -> Array:
+        """(L, W, n) velocities from start velocities (W, n) and values (W, p + n): parameters, then accelerations.
+
+        A constant acceleration [unit of the output per second] stands for whatever steady force acts beside the model.
+        """
+        (length, count, m), n = self.stretches.drive.shape, start.shape[1]
+        if length == 1:
+            return start[None].copy()
+        drive = self.stretches.drive[:-1].transpose(1, 0, 2).reshape(-1, m)
+        states = self.run(start.T, drive.T, np.repeat(values, length - 1, axis=0).T)
+        return np.concatenate([start[None], states.full().T.reshape(count, length - 1, n).transpose(1, 0, 2)])
+
+    def sensitivities(self, values: Array, states: Array) -> tuple[Array, Array]:
+        """Derivatives of simulated states (L, W, n): by the values (L, W, n, p + n), by the start (L, W, n, n)."""
+        (length, count, n), q = states.shape, values.shape[1]
+        by_values, by_start = np.zeros((length, count, n, q)), np.zeros((length, count, n, n))
+        by_start[0] = np.eye(n)
+        flat = (length - 1) * count
+        if not flat:
+            return by_values, by_start
+        held = np.broadcast_to(values, (length - 1, count, q)).reshape(flat, q)
+        drive = self.stretches.drive[:-1].reshape(flat, -1)
+        A, B = (
+            part.full().reshape(n, flat, -1).transpose(1, 0, 2).reshape(length - 1, count, n, -1)
+            for part in self.slopes(states[:-1].reshape(flat, n).T, drive.T, held.T)
+        )
+        for index in range(1, length):
+            by_start[index] = A[index - 1] @ by_start[index - 1]
+            by_values[index] = A[index - 1] @ by_values[index - 1] + B[index - 1]
+        return by_values, by_start
 
 
-def sensitivities(problem: OutputErrorProblem, parameters: Array, states: Array) -> Array:
-    """(k, n, p + n) derivatives of the simulated states by the parameters and by the batch's first state."""
-    step, (k, n) = _velocity_step(problem), states.shape
-    x, u, theta = ca.MX.sym("x", n), ca.MX.sym("u", problem.inputs.shape[1]), ca.MX.sym("t", len(parameters))
-    after = step(x, u, theta)
-    slopes = ca.Function("slopes", [x, u, theta], [ca.jacobian(after, x), ca.jacobian(after, theta)]).map(k)
-    A, B = (
-        np.asarray(part).reshape(n, k, -1).transpose(1, 0, 2)
-        for part in slopes(states.T, problem.inputs.T, np.repeat(parameters[:, None], k, axis=1))
-    )
-    p = len(parameters)
-    first = np.concatenate([np.zeros((n, p)), np.eye(n)], axis=1)
-    result, fresh = np.empty((k, n, p + n)), True
-    for index in range(k):
-        result[index] = first if fresh else A[index - 1] @ result[index - 1]
-        if not fresh:
-            result[index, :, :p] += B[index - 1]
-        fresh = bool(problem.last[index])
-    return result
+def compiled(stretches: Stretches) -> Compiled:
+    """Everything that does not depend on the values, done once."""
+    (length, count, m), n = stretches.drive.shape, len(stretches.states)
+    steps = max(1, length - 1)
+    step = velocity_step(stretches)
+    x, u, values = ca.SX.sym("x", n), ca.SX.sym("u", m), ca.SX.sym("t", len(stretches.sought) + n)
+    after = step(x, u, values)
+    slopes = ca.Function("slopes", [x, u, values], [ca.jacobian(after, x), ca.jacobian(after, values)])
+    return Compiled(stretches, step.mapaccum("stretch", steps).map(count), slopes.map(steps * count))
 
 
-def _velocity_step(problem: OutputErrorProblem) -> ca.Function:
-    """One sample of the modelled velocities: (state (n,), inputs (m,), sought parameters (p,)) -> state."""
-    full = step_function(
-        problem.model,
-        sample_time_s=problem.sample_time_s,
-        integrator=problem.integrator,
-        substeps=problem.substeps,
-    )
-    n = len(problem.states)
-    x, u, sought = ca.SX.sym("x", n), ca.SX.sym("i", problem.inputs.shape[1]), ca.SX.sym("p", len(problem.sought))
-    state, theta = ca.SX.zeros(6), ca.SX(problem.model.parameters)
-    for index, place in enumerate(problem.states):
-        state[3 + place] = x[index]
+def velocity_step(problem: Stretches) -> ca.Function:
+    """One sample of the modelled velocities: (state (n,), drive (m,), values (p + n,)) -> state."""
+    model, n, p = problem.model, len(problem.states), len(problem.sought)
+    m = len(model.inputs)
+    x, drive, values = ca.SX.sym("x", n), ca.SX.sym("i", problem.drive.shape[2]), ca.SX.sym("p", p + n)
+    theta = ca.SX(model.parameters)
     for index, place in enumerate(problem.sought):
-        theta[place] = sought[index]
-    after = full(state, u, theta)
-    return ca.Function("velocities", [x, u, sought], [after[[3 + place for place in problem.states]]])
+        theta[place] = values[index]
+
+    def rates(state: tuple[Any, ...]) -> tuple[Any, ...]:
+        water: list[Any] = [0.0, 0.0, 0.0]
+        for index, place in enumerate(problem.states):
+            water[place] = state[index]
+        wind = (drive[m], drive[m + 1]) if problem.windy else (0.0, 0.0)
+        air = (water[0] - wind[0], water[1] - wind[1])
+        all_rates = model.accelerations(water, air, ca.vertsplit(drive[:m]), CASADI, theta)
+        return tuple(all_rates[place] + values[p + index] for index, place in enumerate(problem.states))
+
+    after = _stepped(rates, x, problem.sample_time_s, problem.integrator, problem.substeps)
+    return ca.Function("velocities", [x, drive, values], [after])
 
 
-def _filled(values: Array, seen: NDArray[np.bool_]) -> Array:
-    """Gaps in columns filled linearly, for a first guess."""
-    places = np.arange(len(values))
-    return np.stack(
-        [
-            np.interp(places, places[ok], column[ok]) if ok.any() else column
-            for column, ok in zip(values.T, seen.T, strict=True)
-        ],
-        axis=1,
-    )
+def _stepped(rates: Any, x: ca.SX, sample_time_s: float, integrator: str, substeps: int) -> ca.SX:
+    state: tuple[Any, ...] = tuple(ca.vertsplit(x))
+    for _ in range(substeps):
+        state = STEPS[integrator](rates, state, sample_time_s / substeps)
+    after: ca.SX = ca.vertcat(*state)
+    return after

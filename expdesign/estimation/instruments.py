@@ -1,15 +1,18 @@
 """Instruments: the regressors of a noise-free simulation with the same inputs.
 
-Velocities come from the simulated model, in calm water and air. Heading is the measured one of the sample before,
-carried on by the simulated yaw rate: a simulated heading alone drifts away within minutes, while the measured one of
-the same sample shares its noise with the regressors. Relative wind is, by choice,
+Velocities come from the simulated model in calm water; where wind is used in the wind below, else in calm air. (A ship
+that drifts in the wind more than she sails is not followed by a model in calm air, and what does not follow her is a
+weak instrument.) Heading is the measured one of the sample before, carried on by the simulated yaw rate: a simulated
+heading alone drifts away within minutes, while the measured one of the same sample shares its noise with the
+regressors. Relative wind is, by choice,
 
 - "lagged": the simulated velocity less the n-frame wind measured a sample before, whose noise the regressors do not
   share. Right for real winds, which last.
 - "mean": the simulated velocity less the mean n-frame wind of the batch. A steady wind lets air terms be seen only
   where a modulus changes its sign, and their product not at all.
-- "measured": the measured relative wind itself. What only the wind's variation shows is then biased towards zero, by
-  the anemometer's share of that variation; for winds white from sample to sample there is nothing else.
+- "measured": the measured relative wind itself, beside velocities of a model in calm air. What only the wind's
+  variation shows is then biased towards zero, by the anemometer's share of that variation; for winds white from sample
+  to sample there is nothing else.
 
 Source: F. Ljungberg, doctoral thesis, Linköping University, (4.37)-(4.39), for velocities.
 """
@@ -79,7 +82,9 @@ class InstrumentModel:
 
     def _batch(self, index: int, parameters: Array) -> Array:
         batch, wind = self.record.batches[index], self.layout.predictor.wind
-        states = self.replay.states(batch, parameters)
+        blown = wind and self.wind != "measured"
+        air_n = instrument_wind(batch, self.wind) if blown else None
+        states = self.replay.states(batch, parameters, None if air_n is None else air_n.T)
         psi = states[:, 2] if self.heading == "simulated" else carried_heading(heading_of(batch), states[:, 2])
         u, v, r = states[:, 3:].T
         air = u, v

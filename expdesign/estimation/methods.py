@@ -10,7 +10,7 @@ import numpy as np
 from expdesign.errors import Diverged, UnknownName
 from expdesign.estimation.instruments import InstrumentModel
 from expdesign.estimation.null_space import NullSpace
-from expdesign.estimation.output_error import minimise_output_error
+from expdesign.estimation.output_error import Fitting, minimise_output_error
 from expdesign.estimation.predictors import Layout, Rows, build_layout, build_regression
 from expdesign.estimation.refine import MOST_REFINEMENTS, Refined, refine_iv
 from expdesign.estimation.regression import Regression
@@ -49,7 +49,8 @@ METHODS = (
     Method("iv-air", "instrumental variables with measured wind", "basic-wind", solver="iv"),
     Method("iv-augmented", "instrumental variables, augmented", "augmented", solver="iv"),
     Method("iv-wind", "instrumental variables, augmented, with measured wind", "wind", solver="iv"),
-    Method("oe", "output error, for calm weather", "basic", solver="oe"),
+    Method("oe", "output error", "basic", solver="oe"),
+    Method("oe-air", "output error with measured wind", "basic-wind", solver="oe"),
 )
 
 
@@ -64,7 +65,10 @@ class Settings:
         most_refinements: 0 for instruments of the first model only.
         heading: of the instruments, "measured" or "simulated".
         wind: of the instruments, "lagged", "mean" or "measured".
-        integration: how instrument models are simulated.
+        integration: how models are simulated, for instruments and for output error.
+        horizon_s: of output error [s], None for whole runs.
+        constant: whether output error gives each run a constant acceleration of its own.
+        quadrature: of regressors and instruments over a sample interval, "euler" or "trapezoid".
     """
 
     fixed: tuple[str, ...] = ()
@@ -74,6 +78,9 @@ class Settings:
     heading: str = "measured"
     wind: str = "lagged"
     integration: Integration = field(default_factory=Integration)
+    horizon_s: float | None = None
+    constant: bool = False
+    quadrature: str = "euler"
 
     def __post_init__(self) -> None:
         if self.start not in STARTS:
@@ -110,16 +117,26 @@ def estimate(record: Record, model: VesselModel, *, method: str = "iv", settings
         Diverged: the model that the first instruments come from is unstable.
     """
     chosen, choices = method_named(method), settings or Settings()
-    layout = build_layout(model_for(model, record), record, predictor=chosen.predictor, fixed=choices.fixed)
+    layout = build_layout(
+        model_for(model, record),
+        record,
+        predictor=chosen.predictor,
+        fixed=choices.fixed,
+        quadrature=choices.quadrature,
+    )
     rows = build_regression(layout, record)
     refined = _instrumental(layout, record, rows, choices) if chosen.solver == "iv" else _least_squares(rows, choices)
     if chosen.solver == "oe":
-        solution, regression = minimise_output_error(layout, record, refined.solution, choices.integration)
+        solution, regression = minimise_output_error(layout, record, refined.solution, _fitting(choices))
         left_out = sum(map(len, record.batches)) - len(regression)
         return _estimate(
             chosen, layout, Rows(regression=regression, used=(), left_out=left_out), Refined(solution, 0, ())
         )
     return _estimate(chosen, layout, rows, refined)
+
+
+def _fitting(choices: Settings) -> Fitting:
+    return Fitting(integration=choices.integration, horizon_s=choices.horizon_s, constant=choices.constant)
 
 
 def _least_squares(rows: Rows, choices: Settings) -> Refined:
@@ -128,7 +145,8 @@ def _least_squares(rows: Rows, choices: Settings) -> Refined:
 
 
 def _instrumental(layout: Layout, record: Record, rows: Rows, choices: Settings) -> Refined:
-    replay = build_replay(layout.model, record, choices.integration)
+    windy = layout.predictor.wind and choices.wind != "measured"
+    replay = build_replay(layout.model, record, choices.integration, windy=windy)
     simulation = InstrumentModel(layout, record, rows, replay, choices.heading, choices.wind)
     start = layout.model.parameters
     if choices.start == "ls":

@@ -43,13 +43,20 @@ class Replay:
     Attributes:
         model: driven by the recorded inputs.
         simulators: (samples, sample time) of a batch -> compiled simulation.
+        windy: whether simulations are given wind.
     """
 
     model: VesselModel
     simulators: Mapping[tuple[int, float], Simulate]
+    windy: bool = False
 
-    def states(self, batch: Batch, parameters: Array) -> Array:
+    def states(self, batch: Batch, parameters: Array, wind_to: Array | None = None) -> Array:
         """(k, 6) pose and velocity from the batch's first state; outputs without an equation stay zero.
+
+        Args:
+            batch: gives inputs and start.
+            parameters: all (all,) of the model.
+            wind_to: (k, 2) wind to north and east [m/s], where the replay is windy.
 
         Raises:
             Diverged: a speed passed what ships reach, or stopped being a number.
@@ -57,6 +64,8 @@ class Replay:
         """
         start = start_state(self.model, batch)
         inputs = inputs_of(self.model, batch)
+        if self.windy:
+            inputs = np.concatenate([inputs, np.zeros((len(batch), 2)) if wind_to is None else wind_to], axis=1)
         if not np.isfinite(inputs).all():
             raise InputError(f"{batch.name} has inputs that are not numbers, which cannot be simulated")
         states = self.simulators[len(batch), batch.sample_time_s](parameters, start, inputs)
@@ -67,7 +76,9 @@ class Replay:
         return states
 
 
-def build_replay(model: VesselModel, record: Record, integration: Integration | None = None) -> Replay:
+def build_replay(
+    model: VesselModel, record: Record, integration: Integration | None = None, *, windy: bool = False
+) -> Replay:
     """Compile the simulation of every length of batch in a record, for a model from `tables.model_for`."""
     how = integration or Integration()
     kinds = {(len(batch), batch.sample_time_s) for batch in record.batches}
@@ -75,27 +86,38 @@ def build_replay(model: VesselModel, record: Record, integration: Integration | 
         model,
         {
             (samples, time_s): batch_simulator(
-                model, samples=samples, sample_time_s=time_s, integrator=how.integrator, substeps=how.substeps
+                model,
+                samples=samples,
+                sample_time_s=time_s,
+                integrator=how.integrator,
+                substeps=how.substeps,
+                windy=windy,
             )
             for samples, time_s in kinds
         },
+        windy,
     )
 
 
-def simulate_batch(model: VesselModel, batch: Batch, *, integration: Integration | None = None) -> Trajectory:
+def simulate_batch(
+    model: VesselModel, batch: Batch, *, integration: Integration | None = None, wind_to: Array | None = None
+) -> Trajectory:
     """Motion of a model under a batch's inputs, from the batch's first measured state.
 
     Args:
         model: with its parameters, e.g. `Estimate.model`.
         batch: gives inputs and start; its pose may be missing, then the run starts at the origin heading north.
         integration: Euler's map when left out.
+        wind_to: (k, 2) wind to north and east [m/s], still air when left out.
 
     Raises:
         Diverged: the model is unstable.
         InputError: the batch lacks inputs or its first velocity.
     """
-    driven = model_for(model, Record(batches=(batch,)))
-    states = build_replay(driven, Record(batches=(batch,)), integration).states(batch, driven.parameters)
+    record = Record(batches=(batch,))
+    driven = model_for(model, record)
+    replay = build_replay(driven, record, integration, windy=wind_to is not None)
+    states = replay.states(batch, driven.parameters, wind_to)
     return Trajectory(sample_time_s=batch.sample_time_s, pose=states[:, :3], velocity=states[:, 3:])
 
 

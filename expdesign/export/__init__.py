@@ -6,6 +6,8 @@ from expdesign.export.estimates import (
     estimated_vessel,
     fit_entries,
     fit_table,
+    limit_entries,
+    limit_table,
     parameter_entries,
     parameter_table,
 )
@@ -34,6 +36,8 @@ __all__ = [
     "find_format",
     "fit_entries",
     "fit_table",
+    "limit_entries",
+    "limit_table",
     "parameter_entries",
     "parameter_table",
     "plan_json",

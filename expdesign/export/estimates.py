@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from expdesign.assessment import Assessed, Assessment, RunCheck
+from expdesign.assessment import Assessed, Assessment, RunCheck, sentence
+from expdesign.assessment.limits import AHEAD_S
 from expdesign.assessment.runs import ESTIMATION, TEST
 from expdesign.estimation.excitation import Breach
 from expdesign.estimation.null_space import Direction
@@ -39,6 +40,7 @@ def _method_entry(found: Assessment, item: Assessed, vessel: Vessel) -> dict[str
         ),
         "current_to": _current(item),
         "form": model.form,
+        "parameters_of": found.motion,
         "sample_time_s": found.record.batches[0].sample_time_s,
         "fit": fit_entries(item),
         "rmse": _per_run(item.runs, "rmse"),
@@ -53,6 +55,7 @@ def _method_entry(found: Assessment, item: Assessed, vessel: Vessel) -> dict[str
         "instruments": _instruments(found, item),
         "warnings": list(estimate_warnings(found, item)),
         "in_vessel_file": item is found.best,
+        "what_limits_the_fit": limit_entries(found) if item is found.best else None,
         "data": _data(found),
     }
 
@@ -70,7 +73,22 @@ def fit_entries(item: Assessed) -> dict[str, Any]:
 def estimate_warnings(found: Assessment, item: Assessed) -> tuple[str, ...]:
     """Everything that a user of an estimate must hear, one sentence each."""
     diverged = [f"Simulation fails: {run.problem}." for run in item.runs if run.problem]
-    return (*item.estimate.warnings, *diverged, *breach_sentences(item.breaches, len(found.record.batches)))
+    unstable = unstable_warning(found) if item is found.best else ()
+    breaches = breach_sentences(item.breaches, len(found.record.batches))
+    return (*item.estimate.warnings, *diverged, *unstable, *breaches)
+
+
+def unstable_warning(found: Assessment) -> tuple[str, ...]:
+    """A sentence where the ship is unstable under recorded inputs, so that its simulated fit says little."""
+    runs = [run.batch.name for limits, run in zip(found.limits, found.best.runs, strict=True) if limits.unstable]
+    if not runs:
+        return ()
+    worst = max(limits.growth for limits in found.limits if limits.unstable)
+    return (
+        f"In {', '.join(runs)} the ship is unstable under the inputs recorded: a simulation's error grows up to "
+        f"{worst:.2g}-fold whatever the model. Judge these by predictions {AHEAD_S:g} s ahead; output error needs a "
+        "horizon (--horizon) with them.",
+    )
 
 
 def breach_sentences(breaches: Sequence[Breach], runs: int) -> list[str]:
@@ -101,7 +119,7 @@ def estimated_vessel(found: Assessment, vessel: Vessel, *, command: str) -> str:
         "Of the methods asked for this is the first with instruments whose model can simulate every run, or the first",
         "that can where none has instruments: with noisy regressors least squares is biased. The others are in",
         "estimate.json. parameter_std holds standard deviations of the estimates.",
-        "The values are those of Euler's map at the sample time of the data.",
+        motion_words(found),
         *([f"Not estimated, hence without a standard deviation: {held}."] if held else []),
         f"Made by: {command}",
     ]
@@ -123,6 +141,33 @@ def fit_table(found: Assessment) -> tuple[tuple[str, ...], list[tuple[str, ...]]
         for index, run in enumerate(found.best.runs)
     ]
     return ("run", "use", *(f"{item.method.name}: {outputs}" for item in found.methods)), rows
+
+
+def limit_entries(found: Assessment) -> dict[str, Any]:
+    """Run -> what limits the fit of its simulation with the chosen estimate: numbers, and a sentence."""
+    shares = ("constant", "slow", "quick", "parameters", "ceiling_percent", "ahead_rms", "ahead_share")
+    return {
+        run.batch.name: {
+            "sentence": sentence(limits, run),
+            **{name: _named(limits.outputs, getattr(limits, name)) for name in shares},
+            "growth_of_an_error": _finite(limits.growth),
+            "doubling_s": _finite(limits.doubling_s),
+        }
+        for limits, run in zip(found.limits, found.best.runs, strict=True)
+    }
+
+
+def limit_table(found: Assessment) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Header and rows: one sentence for each run."""
+    pairs = zip(found.limits, found.best.runs, strict=True)
+    return ("run", "why"), [(run.batch.name, sentence(limits, run)) for limits, run in pairs]
+
+
+def motion_words(found: Assessment) -> str:
+    """Whose parameters the values are."""
+    if found.motion == "euler":
+        return "The values are those of Euler's map at the sample time of the data."
+    return "The values are those of the continuous motion, with inputs held between samples."
 
 
 def plus_minus(value: float, std: float) -> str:

@@ -22,6 +22,8 @@ from expdesign.export import (
     find_format,
     fit_entries,
     fit_table,
+    limit_entries,
+    limit_table,
     parameter_entries,
     parameter_table,
     read_plan,
@@ -92,6 +94,9 @@ def estimate(
     velocity: str = "auto",
     mean: str = "complete",
     start: str = "auto",
+    motion: str = "continuous",
+    horizon_s: float | None = None,
+    constant: bool = False,
     tests: Sequence[Path] = (),
     progress: Progress = silent,
 ) -> Outcome:
@@ -103,7 +108,15 @@ def estimate(
             raise InputError(f"{path} is given for estimation and for testing, expected one of the two")
     progress("reading the data", 0.02)
     ship = load_vessel(vessel)
-    wish = Wish(methods=tuple(methods), fixed=tuple(fixed), mean=mean, start=start)
+    wish = Wish(
+        methods=tuple(methods),
+        fixed=tuple(fixed),
+        mean=mean,
+        start=start,
+        motion=motion,
+        horizon_s=horizon_s,
+        constant=constant,
+    )
     record = measured(data, ship, velocity=velocity)
     apart = measured(tests, ship, velocity=velocity) if tests else NO_TESTS
     found = assess(ship, record, wish, tests=apart, progress=within(progress, 0.1, 0.8))
@@ -149,8 +162,15 @@ def _header(path: Path) -> set[str]:
 def _estimate_command(data: Sequence[Path], vessel: Path, wish: Wish, velocity: str, tests: Sequence[Path]) -> str:
     options = [("--method", wish.methods), ("--fixed", wish.fixed), ("--test", tests)]
     spelled = [part for option, values in options if values for part in (option, *map(str, values))]
-    chosen = [("--velocity", velocity, "auto"), ("--mean", wish.mean, "complete"), ("--start", wish.start, "auto")]
+    chosen = [
+        ("--velocity", velocity, "auto"),
+        ("--mean", wish.mean, "complete"),
+        ("--start", wish.start, "auto"),
+        ("--motion", wish.motion, "continuous"),
+        ("--horizon", "" if wish.horizon_s is None else f"{wish.horizon_s:g}", ""),
+    ]
     spelled += [part for option, value, usual in chosen if value != usual for part in (option, value)]
+    spelled += ["--constant"] if wish.constant else []
     return shlex.join(["expdesign", "estimate", *map(str, data), "--vessel", str(vessel), *spelled])
 
 
@@ -161,6 +181,8 @@ def _estimate_summary(found: Assessment) -> dict[str, object]:
         "samples": sum(len(batch) for batch in batches),
         "runs_kept_apart": len(found.tests.batches),
         "vessel_file_holds": found.best.method.name,
+        "parameters_of": found.motion,
+        "what_limits_the_fit": limit_entries(found),
         "methods_left_out": list(found.left_out),
         "methods": {
             item.method.name: {
@@ -177,6 +199,7 @@ def _estimate_tables(found: Assessment) -> tuple[TextTable, ...]:
     tables = (
         ("Estimates, with standard deviations", parameter_table(found)),
         ("Fit of the simulated output to the measured one, in per cent", fit_table(found)),
+        (f"What limits the fit of {found.best.method.name}", limit_table(found)),
     )
     return tuple(TextTable(title=title, header=header, rows=tuple(rows)) for title, (header, rows) in tables)
 

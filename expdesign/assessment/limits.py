@@ -1,0 +1,226 @@
+"""What limits the fit of a simulated run: the misfit taken apart into what makes it, in numbers.
+
+With y measured, x simulated, f one sample of the model, the misfit e = y - x obeys
+
+    e(k+1) = A(k) e(k) + eps(k)        eps(k) = y(k+1) - f(y(k)), A(k) the slope of f half-way between y(k) and x(k)
+
+so it is a sum of what each part of the one-step residuals eps has grown into: their mean over the run (a constant force
+outside the model, or a wrong parameter that acts like one), their slow part (gusts, current, missing terms), and the
+rest (measurement noise, quick disturbances). Shares are projections on the misfit and add up to one less what a slope
+half-way cannot tell. The same slopes say how an error grows on its own: where it does, the ship is unstable under the
+inputs that were recorded, however good the model. A helmsman or an autopilot held her; the steering is in the data, its
+reaction to the motion is not in the simulation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.fft import dct, idct
+
+from expdesign.assessment.runs import RunCheck
+from expdesign.conventions import OUTPUTS
+from expdesign.estimation._casadi import Compiled, Stretches, compiled
+from expdesign.estimation.replay import Integration
+from expdesign.estimation.tables import inputs_of, model_for
+from expdesign.estimation.values import Estimate
+from expdesign.signals import Batch, Record
+from expdesign.values import Array, seal
+from expdesign.vessel import VesselModel
+
+SLOW_S = 20.0
+"""Periods longer than this [s], or than 40 samples, count as slow."""
+AHEAD_S = 30.0
+"""How far predictions from measured states go [s]."""
+UNSTABLE = 5.0
+"""Growth of an error over a run that counts as unstable."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Limits:
+    """The misfit of one run taken apart.
+
+    Attributes:
+        outputs: names.
+        constant, slow, quick: (n,) shares of the squared misfit by the kind of one-step residual that they grew from.
+        parameters: (n,) squared misfit that the parameters' covariance leads to expect, over the one found.
+        ceiling_percent: (n,) fit that measurement noise alone would leave; its size is read from third differences.
+        ahead_rms: (n,) of predictions `AHEAD_S` ahead from measured velocities [m/s, rad/s].
+        ahead_share: (n,) the same over the standard deviation of the measured output.
+        growth: how many times an error of the first velocity is larger at the end of the run, at worst.
+        duration_s: of the run.
+    """
+
+    outputs: tuple[str, ...]
+    constant: Array
+    slow: Array
+    quick: Array
+    parameters: Array
+    ceiling_percent: Array
+    ahead_rms: Array
+    ahead_share: Array
+    growth: float
+    duration_s: float
+
+    def __post_init__(self) -> None:
+        names = ("constant", "slow", "quick", "parameters", "ceiling_percent", "ahead_rms", "ahead_share")
+        seal(self, **dict.fromkeys(names, "n"))
+
+    @property
+    def unstable(self) -> bool:
+        """Whether errors grow by themselves."""
+        return self.growth > UNSTABLE
+
+    @property
+    def doubling_s(self) -> float:
+        """Time in which an error doubles, infinite where it does not grow [s]."""
+        return self.duration_s * float(np.log(2) / np.log(self.growth)) if self.growth > 1 else float("inf")
+
+
+def what_limits(model: VesselModel, run: RunCheck, found: Estimate, *, wind: bool, integration: Integration) -> Limits:
+    """Take the misfit of a run apart.
+
+    Args:
+        model: with the estimate.
+        run: its simulation; where that diverged shares are nan.
+        found: the estimate, for its covariance.
+        wind: whether the model is simulated in the measured wind.
+        integration: how it is simulated.
+    """
+    places = [OUTPUTS.index(name) for name in model.outputs]
+    measured = _whole(run.batch.velocity[:, places])
+    stretches = _stretches(model, run.batch, wind, integration, found)
+    values = np.concatenate([found.values, np.zeros(len(places))])[None]
+    n, unknown = len(places), np.full(len(places), np.nan)
+    shares, growth, uncertain = np.tile(unknown, (3, 1)), float("nan"), unknown
+    if run.simulated is not None:
+        misfit = measured - run.simulated[:, places]
+        shares, growth = _shares(stretches, values, measured, misfit)
+        by_values, _ = compiled(stretches).sensitivities(values, run.simulated[:, None, places])
+        slopes = by_values[:, 0, :, : len(found.values)]
+        expected = np.einsum("knp,pq,knq->n", slopes, found.covariance, slopes)
+        uncertain = expected / np.maximum((misfit**2).sum(axis=0), 1e-300)
+    spread = measured.std(axis=0)
+    spread = np.where(spread > 0, spread, np.nan)
+    ahead = _ahead(stretches, values, measured, run.batch.sample_time_s)
+    noise = np.diff(measured, 3, axis=0).std(axis=0) / np.sqrt(20) if len(measured) > 4 else np.zeros(n)
+    return Limits(
+        outputs=model.outputs,
+        constant=shares[0],
+        slow=shares[1],
+        quick=shares[2],
+        parameters=uncertain,
+        ceiling_percent=100 * (1 - noise / spread),
+        ahead_rms=ahead,
+        ahead_share=ahead / spread,
+        growth=growth,
+        duration_s=len(measured) * run.batch.sample_time_s,
+    )
+
+
+def _stretches(model: VesselModel, batch: Batch, wind: bool, integration: Integration, found: Estimate) -> Stretches:
+    """The run as one stretch."""
+    driven = model_for(model, Record(batches=(batch,)))
+    drive = inputs_of(driven, batch)
+    if wind and batch.wind is not None:
+        drive = np.concatenate([drive, _whole(batch.velocity[:, :2] - batch.wind)], axis=1)
+    return Stretches(
+        model=driven,
+        sought=tuple(driven.names.index(name) for name in found.names),
+        states=tuple(OUTPUTS.index(name) for name in driven.outputs),
+        drive=drive[:, None],
+        windy=wind and batch.wind is not None,
+        sample_time_s=batch.sample_time_s,
+        integrator=integration.integrator,
+        substeps=integration.substeps,
+    )
+
+
+def _shares(stretches: Stretches, values: Array, measured: Array, misfit: Array) -> tuple[Array, float]:
+    """(3, n) of constant, slow and quick residuals, and the growth of an error over the run."""
+    one_step = _one_step(stretches)
+    held = np.repeat(values, len(measured) - 1, axis=0)
+    eps = measured[1:] - one_step.states(held, measured[:-1])[1]
+    half_way = np.stack([measured[:-1] - misfit[:-1] / 2, measured[1:]])
+    A = one_step.sensitivities(held, half_way)[1][1]  # (k, n, n)
+    mean = np.broadcast_to(eps.mean(axis=0), eps.shape)
+    slow = _slow_part(eps - mean, stretches.sample_time_s)
+    parts = np.stack([mean, slow, eps - mean - slow], axis=2)
+    grown, error = np.zeros((len(eps) + 1, *parts.shape[1:])), np.eye(eps.shape[1])
+    for k in range(len(eps)):
+        grown[k + 1] = A[k] @ grown[k] + parts[k]
+        error = A[k] @ error
+    scale = np.where(measured.std(axis=0) > 0, measured.std(axis=0), 1.0)
+    growth = float(np.linalg.norm(error * scale / scale[:, None], ord=2))
+    return np.einsum("knc,kn->cn", grown, misfit) / np.maximum((misfit**2).sum(axis=0), 1e-300), growth
+
+
+def _one_step(stretches: Stretches) -> Compiled:
+    """Every sample a stretch of its own, one step long."""
+    drive = np.repeat(stretches.drive[:-1].transpose(1, 0, 2), 2, axis=0)
+    return compiled(replace(stretches, drive=drive))
+
+
+def _slow_part(values: Array, sample_time_s: float) -> Array:
+    """What varies with periods over `SLOW_S` or 40 samples; cosines do not wrap one end round to the other."""
+    spectrum = dct(values, axis=0, norm="ortho")
+    period_s = max(SLOW_S, 40 * sample_time_s)
+    spectrum[int(2 * len(values) * sample_time_s / period_s) + 1 :] = 0.0
+    return np.asarray(idct(spectrum, axis=0, norm="ortho"))
+
+
+def _ahead(stretches: Stretches, values: Array, measured: Array, sample_time_s: float) -> Array:
+    """(n,) RMS of predictions from measured states, over windows that lie end to end; the run when it is shorter."""
+    length = min(len(measured), round(AHEAD_S / sample_time_s) + 1)
+    firsts = np.arange(0, len(measured) - length + 1, max(1, length - 1))
+    rows = firsts + np.arange(length)[:, None]
+    windows = compiled(replace(stretches, drive=stretches.drive[:, 0][rows]))
+    with np.errstate(over="ignore", invalid="ignore"):
+        states = windows.states(np.repeat(values, len(firsts), axis=0), measured[firsts])
+        return np.asarray(np.sqrt(np.mean((measured[rows] - states) ** 2, axis=(0, 1))))
+
+
+def _whole(values: Array) -> Array:
+    """Gaps filled linearly; zero in columns that hold nothing."""
+    places, filled = np.arange(len(values)), np.zeros_like(values)
+    for index, column in enumerate(values.T):
+        seen = np.isfinite(column)
+        if seen.any():
+            filled[:, index] = np.interp(places, places[seen], column[seen])
+    return filled
+
+
+def sentence(limits: Limits, run: RunCheck) -> str:
+    """What limits the fit of a run, in words with the numbers that say so."""
+    ahead = _listed(limits, 100 * limits.ahead_share)
+    tail = f"{AHEAD_S:g} s ahead from measured velocities the error is {ahead} of the motion's spread."
+    if run.problem:
+        return f"The simulation runs away. {tail}"
+    if limits.unstable:
+        return (
+            f"An error grows {limits.growth:.2g}-fold over the run (doubles every {limits.doubling_s:.2g} s): the ship "
+            "is unstable under the inputs recorded, and what held her, helmsman or autopilot, does not act in the "
+            f"simulation. {tail}"
+        )
+    if not np.isfinite(run.fit_percent).any():
+        return f"No output varies. {tail}"
+    worst = int(np.nanargmin(run.fit_percent))
+    causes = (
+        ("a constant force outside the model", limits.constant[worst]),
+        (f"slow ones (periods over {SLOW_S:g} s)", limits.slow[worst]),
+        ("quick ones and measurement noise", limits.quick[worst]),
+    )
+    parts = ", ".join(f"{100 * share:.0f} % from {what}" for what, share in sorted(causes, key=lambda c: -c[1]))
+    uncertain = f" Uncertain parameters would account for {100 * limits.parameters[worst]:.0f} %."
+    ceiling = limits.ceiling_percent[worst]
+    quiet = f" Noise alone would hold this fit to {ceiling:.0f} %." if ceiling < 95 else ""
+    return f"{limits.outputs[worst]} fits worst; of its squared error {parts}.{uncertain}{quiet} {tail}"
+
+
+def _listed(limits: Limits, values: Array) -> str:
+    texts = (
+        f"{name} {value:.0f} %" if np.isfinite(value) else f"{name} -"
+        for name, value in zip(limits.outputs, values.tolist(), strict=True)
+    )
+    return ", ".join(texts)
