@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from expdesign.information.moments import HEADINGS
-from expdesign.simulation import Environment, relative_velocity, simulate_many, to_body
+from expdesign.information.moments import HEADINGS, rows_of, signals_of
+from expdesign.simulation import Environment, simulate_many, to_body
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, Vessel
 
@@ -69,11 +69,8 @@ def _matrices(
 ) -> Array:
     model = vessel.model
     with np.errstate(invalid="ignore", over="ignore"):
-        water, air = relative_velocity(
-            tuple(np.moveaxis(states[:-1], -1, 0)), environment.current_to, environment.wind_to, NUMPY
-        )
-        values = model.regressors(water, air, commands.transpose(2, 1, 0))
-        rows = np.stack([np.broadcast_to(value, states[:-1, :, 0].shape) for value in values])  # (all, k, n)
+        table = signals_of(model, tuple(np.moveaxis(states[:-1], -1, 0)), commands.transpose(2, 1, 0), environment)
+        rows = rows_of(model, table, (len(states) - 1, states.shape[1]))  # (all, k, n)
         chosen = [model.names.index(name) for name in names]
         equations = [model.terms[index].equation for index in chosen]
         kept = rows[chosen].transpose(2, 0, 1)  # (n, p, k)
