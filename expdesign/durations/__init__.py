@@ -3,6 +3,9 @@
 from expdesign.durations.certificate import log_det, sensitivities
 from expdesign.durations.constraints import NO_CONSTRAINTS, Budget, Constraints
 from expdesign.durations.criteria import CRITERIA, Aim, Criterion
+from expdesign.durations.efficiency import Efficiencies, efficiencies
+from expdesign.durations.fused import build_fused, monte_carlo_covariance
+from expdesign.durations.mining import Subset, best_subset
 from expdesign.durations.solve import bordered, build_durations, optimal_shares, solve_durations, with_repeats
 from expdesign.durations.values import ROBUST, Certificate, DurationDesign, DurationProblem
 from expdesign.information import MEAN_SUBTRACTIONS
@@ -19,9 +22,15 @@ __all__ = [
     "Criterion",
     "DurationDesign",
     "DurationProblem",
+    "Efficiencies",
+    "Subset",
+    "best_subset",
     "bordered",
     "build_durations",
+    "build_fused",
+    "efficiencies",
     "log_det",
+    "monte_carlo_covariance",
     "optimal_shares",
     "sensitivities",
     "solve_durations",

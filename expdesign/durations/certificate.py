@@ -96,7 +96,7 @@ def _certified(task: Task, found: Interior, blur: float, kind: str) -> tuple[Cer
     net = slope - polytope.rows.T @ prices
     level = _level(task, w, net)
     net = np.where(w >= polytope.most - 1e-9, np.minimum(net, level), net)
-    names = (*polytope.labels, *(f"balance {number}" for number in range(1, len(task.floors) + 1)))
+    names = (*polytope.labels, *task.floor_names)
     certificate = Certificate(
         kind=kind,
         value=task.objective.value(w),

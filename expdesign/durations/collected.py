@@ -20,10 +20,12 @@ class Collected:
     Attributes:
         pieces: one for each model.
         worst: the least over models instead of the average.
+        symmetric: whether matrices are; the determinant of others may have either sign, and its magnitude counts.
     """
 
     pieces: tuple[Piece, ...]
     worst: bool
+    symmetric: bool = True
 
     @staticmethod
     def of(problem: DurationProblem, name: str | None = None) -> Collected:
@@ -33,7 +35,10 @@ class Collected:
             UnknownName, InputError: no such criterion, or the aim does not say enough for it.
             NotInformative: equal shares do not inform about every parameter.
         """
-        objective = objective_of(problem, collected_measure(problem, name or problem.aim.criterion))
+        measure = collected_measure(problem, name or problem.aim.criterion)
+        if not problem.symmetric:
+            return Collected(pieces=(_unsymmetric(problem, measure),), worst=False, symmetric=False)
+        objective = objective_of(problem, measure)
         return Collected(pieces=objective.pieces, worst=objective.worst)
 
     @property
@@ -47,6 +52,8 @@ class Collected:
 
     def worth(self, totals: tuple[Array, ...]) -> Array:
         """(c,) values of (c, d, d) for each model, -inf where one is singular."""
+        if not self.symmetric:
+            return self.compared(totals)
         return self._over_models(
             [stacked_values(piece.measure, total) for piece, total in zip(self.pieces, totals, strict=True)]
         )
@@ -76,3 +83,10 @@ def collected_measure(problem: DurationProblem, name: str) -> Measure:
     if name == "D":
         return LogDet(problem.picked.columns(problem.parameters))
     return criterion(name).measure(problem.picked)
+
+
+def _unsymmetric(problem: DurationProblem, measure: Measure) -> Piece:
+    """Recorded primitives, scaled to unit mean squares; only the log of the determinant's magnitude makes sense."""
+    diagonal = np.abs(np.diagonal(problem.matrices, axis1=1, axis2=2)).mean(axis=0) + np.abs(np.diag(problem.prior))
+    T = np.diag(1.0 / np.sqrt(np.where(diagonal > 0, diagonal, 1.0)))
+    return Piece(T @ problem.matrices @ T, T @ problem.prior @ T, measure.transformed(T), T)

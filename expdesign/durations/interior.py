@@ -43,11 +43,13 @@ class Task:
         objective: what is maximised.
         polytope: linear limits, upper bounds of single fractions among the rows.
         floors: concave functions that must stay above zero.
+        floor_names: of the floors.
     """
 
     objective: Objective
     polytope: Polytope
     floors: tuple[Objective, ...] = ()
+    floor_names: tuple[str, ...] = ()
 
     @property
     def uppers(self) -> Indices:

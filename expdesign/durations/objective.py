@@ -54,13 +54,13 @@ class Piece:
     transformation: Array
 
     @staticmethod
-    def of(matrices: Array, prior: Array, measure: Measure) -> Piece:
-        """Whitened so that equal shares give the identity; a congruence changes neither designs nor values.
+    def of(matrices: Array, prior: Array, measure: Measure, *, within: Array | None = None) -> Piece:
+        """Whitened so that equal shares, or those given, have the identity; a congruence changes no design or value.
 
         Raises:
             NotInformative: the sum is singular to working precision.
         """
-        T = whitening(matrices, prior)
+        T = whitening(matrices, prior, within)
         return Piece(congruent(T, matrices), congruent(T, prior), measure.transformed(T), T)
 
     def matrix(self, w: Array) -> Array:
@@ -176,13 +176,13 @@ def congruent(T: Array, matrices: Array) -> Array:
     return np.asarray((moved + np.swapaxes(moved, -1, -2)) / 2)
 
 
-def whitening(matrices: Array, prior: Array) -> Array:
-    """(d, d) T that takes the prior plus the mean of (q, d, d) to the identity, in two steps for accuracy.
+def whitening(matrices: Array, prior: Array, shares: Array | None = None) -> Array:
+    """(d, d) T that takes the prior plus the shares of (q, d, d) to the identity, in two steps for accuracy.
 
     Raises:
         NotInformative: that sum is singular to working precision.
     """
-    mean = prior + matrices.mean(axis=0)
+    mean = prior + (matrices.mean(axis=0) if shares is None else np.tensordot(shares, matrices, axes=1))
     size = np.sqrt(np.clip(np.diag(mean), 0.0, None))
     size = np.where(size > 0, size, 1.0)
     try:
@@ -193,6 +193,10 @@ def whitening(matrices: Array, prior: Array) -> Array:
         ) from None
 
 
-def pieces_of(stacks: Iterable[Array], priors: Sequence[Array], measures: Sequence[Measure]) -> tuple[Piece, ...]:
+def pieces_of(
+    stacks: Iterable[Array], priors: Sequence[Array], measures: Sequence[Measure], *, within: Array | None = None
+) -> tuple[Piece, ...]:
     """Pieces of several models."""
-    return tuple(Piece.of(B, B0, measure) for B, B0, measure in zip(stacks, priors, measures, strict=True))
+    return tuple(
+        Piece.of(B, B0, measure, within=within) for B, B0, measure in zip(stacks, priors, measures, strict=True)
+    )

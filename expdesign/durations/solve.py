@@ -7,20 +7,21 @@ from dataclasses import replace
 
 import numpy as np
 
+from expdesign.durations.asymmetric import definite_start, improved, log_abs_det
 from expdesign.durations.certificate import certify
 from expdesign.durations.constraints import NO_CONSTRAINTS, Constraints
 from expdesign.durations.criteria import Aim
 from expdesign.durations.interior import climb
 from expdesign.durations.rounding import efficiency_of_runs, efficiency_of_shares, whole_runs
-from expdesign.durations.task import start_of, task_of
-from expdesign.durations.values import DurationDesign, DurationProblem
-from expdesign.errors import NoAnswer, NotInformative, UnknownName
+from expdesign.durations.task import polytope_of, start_of, task_of
+from expdesign.durations.values import Certificate, DurationDesign, DurationProblem
+from expdesign.errors import InputError, NoAnswer, NotInformative, UnknownName
 from expdesign.information import MEAN_SUBTRACTIONS, PrimitiveInformation, check_informative
 from expdesign.values import Array
 
 LARGEST_GAP = 1e-6
 """Certificates above this, per degree, are not given out as optimal designs."""
-TOLERANCES = {"smooth": (1e-10, 1e-8), "cornered": (1e-7, 1e-8)}
+TOLERANCES = {"smooth": (1e-10, 1e-8), "cornered": (1e-7, 1e-8, 1e-9)}
 """What the solver aims at, per degree, one after the other until the certificate holds."""
 THEOREMS = {
     "D": "Kiefer and Wolfowitz 1960",
@@ -29,6 +30,15 @@ THEOREMS = {
     "E": "Pukelsheim 2006, general equivalence theorem with a mixture of eigenvectors",
     "V": "Pukelsheim 2006, general equivalence theorem",
 }
+
+NO_THEOREM = (
+    "none: recorded primitives make the problem non-convex; the guaranteed value is that of the symmetric part "
+    "(Ostrowski and Taussky 1951), the rest was found by local search"
+)
+NOTHING_DEFINITE = (
+    "none: recorded primitives make the problem non-convex, and no sharing makes the symmetric part positive definite; "
+    "found by local search from random starts"
+)
 
 
 def build_durations(
@@ -110,8 +120,20 @@ def solve_durations(problem: DurationProblem) -> DurationDesign:
 
 def optimal_shares(problem: DurationProblem) -> DurationDesign:
     """As `solve_durations`, but without whole runs: `repeats` are all zero and their efficiency is nan."""
-    task = task_of(problem)
-    start, best = start_of(task), None
+    if not problem.symmetric:
+        return _improved_shares(problem)
+    return _certified_shares(problem, None)
+
+
+def _certified_shares(problem: DurationProblem, within: Array | None) -> DurationDesign:
+    """The optimum of the concave problem.
+
+    Args:
+        problem: whose symmetric parts count.
+        within: (q,) fractions at which the information is positive definite, where equal ones are not known to be.
+    """
+    task = task_of(problem, within=within)
+    start, best = start_of(task, within=within), None
     cornered = problem.aim.criterion == "E" or problem.robust == "worst"
     for tolerance in TOLERANCES["cornered" if cornered else "smooth"]:
         found = climb(task, start, tolerance=tolerance)
@@ -133,14 +155,54 @@ def optimal_shares(problem: DurationProblem) -> DurationDesign:
         problem=problem,
         fractions=found.fractions,
         sensitivities=slope,
-        log_det=_log_det(problem, found.fractions),
+        log_det=log_abs_det(problem, found.fractions, symmetric=within is not None),
         gap=gap,
         repeats=(0,) * len(problem.names),
         efficiency_repeats=float("nan"),
-        efficiency_uniform=efficiency_of_shares(
-            problem, found.fractions, np.full(len(problem.names), 1.0 / len(problem.names))
-        ),
+        efficiency_uniform=_uniform_efficiency(problem, found.fractions),
         certificate=certificate,
+    )
+
+
+def _improved_shares(problem: DurationProblem) -> DurationDesign:
+    """Recorded primitives: the best guaranteed value first, where there is one, then a local search from it."""
+    if problem.aim.criterion != "D" or len(problem.sampled):
+        raise InputError(
+            "recorded primitives (regressors measured, instruments simulated) can only be shared out by criterion D "
+            "for the nominal model; simulate their commands for the others"
+        )
+    if problem.constraints.balance:
+        raise InputError("design.balance needs primitives that are simulated, not recorded ones")
+    polytope = polytope_of(problem)
+    within, _ = definite_start(problem, polytope)
+    guaranteed = None if within is None else _certified_shares(problem, within)
+    fractions = improved(problem, polytope, None if guaranteed is None else guaranteed.fractions)
+    value = log_abs_det(problem, fractions)
+    slope = np.einsum(
+        "ij,qji->q",
+        np.linalg.inv(problem.prior + np.tensordot(fractions, problem.matrices, axes=1)),
+        problem.matrices,
+    )
+    return DurationDesign(
+        problem=problem,
+        fractions=fractions,
+        sensitivities=slope,
+        log_det=value,
+        gap=float("inf"),
+        repeats=(0,) * len(problem.names),
+        efficiency_repeats=float("nan"),
+        efficiency_uniform=_uniform_efficiency(problem, fractions),
+        certificate=Certificate(
+            kind=NO_THEOREM if guaranteed is not None else NOTHING_DEFINITE,
+            value=value,
+            bound=float("inf"),
+            degree=problem.dimension,
+            level=float(fractions @ slope),
+            mixture=np.ones(1),
+            prices=np.zeros(len(problem.names)),
+            multipliers={},
+            guaranteed=-np.inf if guaranteed is None else guaranteed.log_det,
+        ),
     )
 
 
@@ -163,8 +225,5 @@ def _with_runs(design: DurationDesign, repeats: tuple[int, ...]) -> DurationDesi
     return replace(design, repeats=repeats, efficiency_repeats=efficiency)
 
 
-def _log_det(problem: DurationProblem, fractions: Array) -> float:
-    """log |det B| of the nominal model."""
-    matrix = problem.prior + np.tensordot(fractions, problem.matrices, axes=1)
-    size = np.sqrt(np.where(np.diag(matrix) > 0, np.diag(matrix), 1.0))
-    return float(np.linalg.slogdet(matrix / np.outer(size, size))[1] + 2 * np.log(size).sum())
+def _uniform_efficiency(problem: DurationProblem, fractions: Array) -> float:
+    return efficiency_of_shares(problem, fractions, np.full(len(problem.names), 1.0 / len(problem.names)))

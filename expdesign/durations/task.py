@@ -18,15 +18,20 @@ def symmetric_part(matrices: Array) -> Array:
     return np.asarray((matrices + np.swapaxes(matrices, -1, -2)) / 2)
 
 
-def objective_of(problem: DurationProblem, measure: Measure) -> Objective:
+def objective_of(problem: DurationProblem, measure: Measure, *, within: Array | None = None) -> Objective:
     """A measure over the models that the problem asks to be robust against.
+
+    Args:
+        problem: whose symmetric parts count.
+        measure: of the information matrix.
+        within: (q,) fractions where the information is positive definite; equal ones when not given.
 
     Raises:
         NotInformative: equal shares do not inform about every parameter.
     """
     stacks = problem.sampled if len(problem.sampled) else problem.matrices[None]
     stacks, prior = symmetric_part(stacks), symmetric_part(problem.prior)
-    pieces = pieces_of(stacks, [prior] * len(stacks), [measure] * len(stacks))
+    pieces = pieces_of(stacks, [prior] * len(stacks), [measure] * len(stacks), within=within)
     return Objective(pieces, np.zeros(len(stacks)), worst=problem.robust == "worst")
 
 
@@ -39,20 +44,27 @@ def polytope_of(problem: DurationProblem) -> Polytope:
     return feasible_set(problem.constraints, problem.names, run_s=problem.run_s, total_s=problem.total_s)
 
 
-def task_of(problem: DurationProblem, measure: Measure | None = None) -> Task:
-    """The concave task of a problem, for its own criterion or another measure.
+def task_of(problem: DurationProblem, *, within: Array | None = None) -> Task:
+    """The concave task of a problem; `within` as in `objective_of`.
 
     Raises:
         UnknownName, InputError: the aim or the limits are wrong.
         NotInformative: equal shares do not inform about every parameter.
         NoAnswer: no sharing meets the limits.
     """
-    measure = measure or criterion(problem.aim.criterion).measure(problem.picked)
-    return Task(objective=objective_of(problem, measure), polytope=polytope_of(problem), floors=_floors(problem))
+    measure = criterion(problem.aim.criterion).measure(problem.picked)
+    objective = objective_of(problem, measure, within=within)
+    floors = _floors(problem)
+    return Task(
+        objective=objective,
+        polytope=polytope_of(problem),
+        floors=tuple(floors.values()),
+        floor_names=tuple(f"balance of equation {equation}" for equation in floors),
+    )
 
 
-def start_of(task: Task) -> Array:
-    """(q,) fractions strictly inside the limits.
+def start_of(task: Task, *, within: Array | None = None) -> Array:
+    """(q,) fractions strictly inside the limits, near `within` where that is given.
 
     Raises:
         NoAnswer: the floors cannot all be kept.
@@ -65,6 +77,9 @@ def start_of(task: Task) -> Array:
         start = task.polytope.loosened().inside()
     if start is None:
         start = np.array(task.polytope.least)
+    if within is not None:
+        nearer = (within + share * (start - within) for share in 0.5 ** np.arange(1, 60))
+        return next((w for w in nearer if np.isfinite(task.objective.value(w))), within)
     if not task.floors:
         return warmed(task, start)
     least = Objective(
@@ -75,22 +90,22 @@ def start_of(task: Task) -> Array:
     best = climb(Task(objective=least, polytope=task.polytope), start, tolerance=1e-6).fractions
     inside = 0.99 * best + 0.01 * start if least.value(0.99 * best + 0.01 * start) > 0 else best
     if not least.value(inside) > 0:
-        share = float(np.exp(least.value(best) / least.pieces[0].measure.degree))
+        kept = min(float(np.exp(floor.value(best) / floor.pieces[0].measure.degree)) for floor in task.floors)
         raise NoAnswer(
-            "design.balance cannot be met: no sharing within the other limits informs about every equation as well; "
-            f"about {share:.2g} of it can be had"
+            "design.balance cannot be met: no sharing within the other limits informs so well about every equation; "
+            f"{kept:.3g} times the asked share was found"
         )
     return inside
 
 
-def _floors(problem: DurationProblem) -> tuple[Objective, ...]:
+def _floors(problem: DurationProblem) -> dict[str, Objective]:
     """One concave function per equation: its log det above the balanced share of the best for it alone."""
     balance = problem.constraints.balance
     if not balance > 0:
-        return ()
+        return {}
     if len(problem.equations) != len(problem.parameters):
         raise InputError("design.balance needs the equation of every parameter")
-    return tuple(_floor(problem, equation, balance) for equation in dict.fromkeys(problem.equations))
+    return {equation: _floor(problem, equation, balance) for equation in dict.fromkeys(problem.equations)}
 
 
 def _floor(problem: DurationProblem, equation: str, balance: float) -> Objective:

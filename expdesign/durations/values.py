@@ -108,6 +108,8 @@ class Certificate:
         mixture: (m,) weights of the sampled models.
         prices: (q,) what the limits take off each sensitivity.
         multipliers: price of every limit by name; a limit whose price is zero does not matter.
+        guaranteed: for recorded primitives, the log det that the symmetric part guarantees; -inf when it is nowhere
+            positive definite; nan where the problem is convex.
     """
 
     kind: str
@@ -118,6 +120,7 @@ class Certificate:
     mixture: Array
     prices: Array
     multipliers: Mapping[str, float]
+    guaranteed: float = float("nan")
 
     def __post_init__(self) -> None:
         seal(self, mixture="m", prices="q")

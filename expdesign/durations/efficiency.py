@@ -1,0 +1,81 @@
+"""Every design under every criterion: what the choice of one costs by the others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from expdesign.durations.collected import Collected
+from expdesign.durations.criteria import CRITERIA
+from expdesign.durations.solve import optimal_shares
+from expdesign.durations.values import DurationDesign, DurationProblem
+from expdesign.errors import InputError, NoAnswer
+from expdesign.values import Array
+
+DESIGNS = ("continuous", "repeats", "uniform")
+"""The optimal sharing, its whole runs, and equal time on every primitive."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Efficiencies:
+    """Efficiency of designs by one criterion, against the optimum under the same limits.
+
+    An efficiency of 0.8 means that the optimum reaches the same with 80 % of the time, when nothing is known before.
+
+    Attributes:
+        criterion: its name.
+        title: what it makes best.
+        of: design -> efficiency; empty when the criterion cannot be had.
+        missing: why it cannot, or "".
+    """
+
+    criterion: str
+    title: str
+    of: Mapping[str, float]
+    missing: str = ""
+
+
+def efficiencies(design: DurationDesign) -> tuple[Efficiencies, ...]:
+    """The design, its whole runs, equal shares and every other criterion's optimum under every criterion.
+
+    A criterion that the aim does not say enough for is listed with the reason. D_s is listed when it differs from D.
+    """
+    problem = design.problem
+    named = {"continuous": design.fractions}
+    if any(design.repeats):
+        named["repeats"] = np.array(design.repeats) * problem.run_s / problem.total_s
+    named["uniform"] = np.full(len(problem.names), 1.0 / len(problem.names))
+    found: dict[str, Array] = {}
+    missing: dict[str, str] = {}
+    for item in CRITERIA:
+        try:
+            found[item.name] = _optimum(design, problem, item.name)
+        except (InputError, NoAnswer) as error:
+            missing[item.name] = str(error)
+    named |= {f"optimal by {name}": fractions for name, fractions in found.items() if name != problem.aim.criterion}
+    return tuple(
+        Efficiencies(
+            criterion=item.name,
+            title=item.title,
+            of=_of(problem, item.name, named, found[item.name]) if item.name in found else {},
+            missing=missing.get(item.name, ""),
+        )
+        for item in CRITERIA
+    )
+
+
+def _optimum(design: DurationDesign, problem: DurationProblem, name: str) -> Array:
+    if name == problem.aim.criterion:
+        return design.fractions
+    if not problem.symmetric:
+        raise InputError(f"criterion {name} needs primitives that are simulated, not recorded ones")
+    if name == "D_s" and not problem.aim.interest:
+        raise InputError("criterion D_s needs parameters of interest; without, it is D")
+    return optimal_shares(replace(problem, aim=replace(problem.aim, criterion=name))).fractions
+
+
+def _of(problem: DurationProblem, name: str, designs: Mapping[str, Array], best: Array) -> dict[str, float]:
+    collected = Collected.of(problem, name)
+    return {design: collected.efficiency(shares, best) for design, shares in designs.items()}

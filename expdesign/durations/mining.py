@@ -1,0 +1,170 @@
+"""Which recorded batches to estimate from again: the k that tell most together (thesis 7.3).
+
+Choosing k of N batches is the design problem with fractions of 0 or their share; letting them take anything between 0
+and that share gives an upper bound with a certificate, so every answer says how far from the best it may be.
+
+Source: F. Ljungberg, doctoral thesis, Linköping University, 7.3; relaxation: S. Joshi and S. Boyd, Sensor selection via
+convex optimization, IEEE Trans. Signal Process. 57 (2009), 451-462.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from math import comb
+
+import numpy as np
+
+from expdesign.durations.collected import Collected
+from expdesign.durations.constraints import Constraints
+from expdesign.durations.criteria import Aim
+from expdesign.durations.solve import optimal_shares
+from expdesign.durations.task import symmetric_part
+from expdesign.durations.values import DurationProblem
+from expdesign.errors import InputError, NotInformative
+from expdesign.information.recorded import BatchInformation
+from expdesign.values import Array
+
+LARGEST_EXACT = 20_000
+"""Subsets up to this number are all tried."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Subset:
+    """The chosen batches.
+
+    Attributes:
+        names: of all batches, most informative first: in the order in which greedy choice would take them.
+        chosen: of those to estimate from.
+        efficiency: against all batches together, by the criterion.
+        bound: no subset of that size has a higher efficiency; the same as `efficiency` where all were tried.
+        exact: whether all were tried.
+    """
+
+    names: tuple[str, ...]
+    chosen: tuple[str, ...]
+    efficiency: float
+    bound: float
+    exact: bool
+
+
+def best_subset(
+    batches: Sequence[BatchInformation],
+    parameters: Sequence[str],
+    *,
+    size: int,
+    mean_subtraction: str = "complete",
+    aim: Aim | None = None,
+) -> Subset:
+    """Rank recorded batches and choose `size` of them for re-estimation.
+
+    The symmetric part of each batch's matrix counts, which is a guaranteed part of its information.
+
+    Args:
+        batches: measured or simulated, see `information.recorded_information`.
+        parameters: names in the order of their matrices.
+        size: how many to choose.
+        mean_subtraction: "none", "batch" or "complete".
+        aim: criterion; D when not given.
+
+    Raises:
+        InputError: a size that cannot be.
+        NotInformative: all batches together, or no subset of that size that was tried, inform about every parameter.
+    """
+    if not 1 <= size <= len(batches):
+        raise InputError(f"{size} of {len(batches)} batches cannot be chosen, expected 1 to {len(batches)}")
+    problem = _pool(batches, parameters, mean_subtraction, aim or Aim())
+    collected, shares = Collected.of(problem), problem.run_s / problem.total_s
+    order = _greedy(collected, shares)
+    exact = comb(len(batches), size) <= LARGEST_EXACT
+    if exact:
+        chosen = max(combinations(range(len(batches)), size), key=lambda picked: _value(collected, shares, picked))
+    else:
+        chosen = _exchanged(collected, shares, tuple(order[:size]))
+    if not np.isfinite(_value(collected, shares, chosen)):
+        raise NotInformative(
+            f"no {size} batches that were tried inform about every parameter", parameters=tuple(parameters)
+        )
+    efficiency = collected.efficiency(_indicator(shares, chosen), shares)
+    return Subset(
+        names=tuple(problem.names[index] for index in order),
+        chosen=tuple(problem.names[index] for index in sorted(chosen)),
+        efficiency=efficiency,
+        bound=efficiency if exact else max(_relaxed(problem, collected, size), efficiency),
+        exact=exact,
+    )
+
+
+def _pool(
+    batches: Sequence[BatchInformation], parameters: Sequence[str], mean_subtraction: str, aim: Aim
+) -> DurationProblem:
+    """All batches as primitives of one run each, in a time that holds them all."""
+    matrices = symmetric_part(np.array([batch.bordered(mean_subtraction) for batch in batches]))
+    samples = np.array([float(batch.samples) for batch in batches])
+    return DurationProblem(
+        names=tuple(batch.name for batch in batches),
+        parameters=tuple(parameters),
+        mean_subtraction=mean_subtraction,
+        matrices=matrices,
+        run_s=samples,
+        total_s=float(samples.sum()),
+        aim=aim,
+    )
+
+
+def _indicator(shares: Array, chosen: Sequence[int]) -> Array:
+    taken = np.zeros_like(shares)
+    taken[list(chosen)] = shares[list(chosen)]
+    return taken
+
+
+def _value(collected: Collected, shares: Array, chosen: Sequence[int]) -> float:
+    return collected.value(_indicator(shares, chosen))
+
+
+def _greedy(collected: Collected, shares: Array) -> list[int]:
+    """All batches, each time the one that adds most; a little of all is lent so that few can be compared too."""
+    lent = 1e-6 * shares
+    order: list[int] = []
+    left = list(range(len(shares)))
+    while left:
+        values = [collected.value(_indicator(shares, [*order, index]) + lent) for index in left]
+        order.append(left.pop(int(np.argmax(values))))
+    return order
+
+
+def _exchanged(collected: Collected, shares: Array, chosen: tuple[int, ...]) -> tuple[int, ...]:
+    """Swaps of one batch for another while one helps."""
+    best = _value(collected, shares, chosen)
+    while True:
+        swaps = [
+            (*(index for index in chosen if index != out), into)
+            for out in chosen
+            for into in range(len(shares))
+            if into not in chosen
+        ]
+        values = [_value(collected, shares, swap) for swap in swaps]
+        if not values or max(values) <= best + 1e-12:
+            return chosen
+        best, chosen = max(values), swaps[int(np.argmax(values))]
+
+
+def _relaxed(problem: DurationProblem, collected: Collected, size: int) -> float:
+    """Upper bound on the efficiency of any subset of that size: every batch may be taken in part, z_q from 0 to 1.
+
+    With v = z / size the information is sum v_q (size x share_q x B_q), the v sum to one, and each is at most 1 / size.
+    Means are eliminated, not counted, because the time taken is not fixed: for D that is D_s of all parameters.
+    """
+    shares = problem.run_s / problem.total_s
+    aim = replace(problem.aim, criterion="D_s") if problem.aim.criterion == "D" else problem.aim
+    relaxed = replace(
+        problem,
+        matrices=size * shares[:, None, None] * problem.matrices,
+        run_s=np.ones(len(shares)),
+        total_s=1.0,
+        aim=aim,
+        constraints=Constraints(most_s=dict.fromkeys(problem.names, 1.0 / size)),
+    )
+    certificate = optimal_shares(relaxed).certificate
+    return min(1.0, float(np.exp((certificate.bound - collected.value(shares)) / collected.degree)))

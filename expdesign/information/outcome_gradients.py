@@ -1,0 +1,100 @@
+"""How predicted outcomes of standard trials move with the parameters: central differences of the simulated trials."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from expdesign.errors import NoAnswer
+from expdesign.indices import outcomes
+from expdesign.simulation.helm import steady_ahead
+from expdesign.values import Array, seal
+from expdesign.vessel import Vessel
+
+STEP = 1e-3
+"""Relative change of each parameter, small against its uncertainty and large against the simulation's rounding."""
+AGREEMENT = 0.05
+"""How much halving the step may change a gradient, relative to the largest effect of a relative change."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class OutcomeGradients:
+    """Outcomes and their slopes.
+
+    Attributes:
+        names: of the outcomes.
+        values: (o,) at the nominal parameters.
+        gradients: (o, p) slope with each parameter.
+    """
+
+    names: tuple[str, ...]
+    values: Array
+    gradients: Array
+
+    def __post_init__(self) -> None:
+        seal(self, values="o", gradients="o p")
+
+
+def outcome_gradients(
+    vessel: Vessel,
+    names: Sequence[str],
+    parameters: Sequence[str],
+    *,
+    speed_mps: float | None = None,
+    side: str = "starboard",
+    progress: Callable[[float], None] = lambda share: None,
+) -> OutcomeGradients:
+    """Slopes of named outcomes with named parameters, at the nominal model.
+
+    Args:
+        vessel: nominal.
+        names: keys of `indices.OUTCOMES`.
+        parameters: p names.
+        speed_mps: approach speed, the same whatever the parameters; that of the nominal model when not given.
+        side: of the first turn.
+        progress: told the share done.
+
+    Raises:
+        InputError: the vessel cannot run a trial, or a name is not an outcome.
+        NoAnswer: a trial does not come to its end, or an outcome jumps with a parameter.
+    """
+    speed = float(steady_ahead(vessel, speed_mps).velocity[0])
+    theta = vessel.model.parameters
+
+    def found(values: Array) -> Array:
+        table = outcomes(vessel, speed_mps=speed, parameters=values, names=tuple(names), side=side)
+        return np.array([table[name] for name in names])
+
+    base = found(theta)
+    slopes, sizes = [], []
+    for number, name in enumerate(parameters):
+        progress(number / len(parameters))
+        index = vessel.model.names.index(name)
+        sizes.append(abs(float(theta[index])) or float(np.median(np.abs(theta[theta != 0]))))
+        slopes.append(_slopes(found, theta, index, sizes[-1]))
+    coarse, fine = np.array(slopes).transpose(1, 2, 0)  # (o, p) each
+    _check_smooth(coarse * sizes, fine * sizes, names, parameters)
+    return OutcomeGradients(names=tuple(names), values=base, gradients=(4 * fine - coarse) / 3)
+
+
+def _slopes(found: Callable[[Array], Array], theta: Array, index: int, size: float) -> list[Array]:
+    """Central differences (o,) in one parameter, with the step and with half of it."""
+    slopes = []
+    for step in (STEP * size, STEP * size / 2):
+        moved = np.zeros_like(theta)
+        moved[index] = step
+        slopes.append((found(theta + moved) - found(theta - moved)) / (2 * step))
+    return slopes
+
+
+def _check_smooth(coarse: Array, fine: Array, names: Sequence[str], parameters: Sequence[str]) -> None:
+    """Refuse slopes (o, p), as effects of relative changes, that depend on the step."""
+    jumps = np.argwhere(np.abs(coarse - fine) > AGREEMENT * np.abs(fine).max(axis=1, keepdims=True))
+    if len(jumps):
+        o, p = jumps[0]
+        raise NoAnswer(
+            f"outcome {names[o]} does not vary smoothly with {parameters[p]}: a relative change moves it by "
+            f"{coarse[o, p]:.3g} per one over {STEP:g} and by {fine[o, p]:.3g} over half of that"
+        )

@@ -1,0 +1,110 @@
+"""What is known before the trial: as models to be robust against, and as information that the trial only adds to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from expdesign.dictionary import Primitive
+from expdesign.errors import InputError, NoAnswer
+from expdesign.information.moments import estimated_parameters
+from expdesign.information.primitive_information import PrimitiveInformation
+from expdesign.information.scoring import score_models
+from expdesign.simulation import CALM, Environment
+from expdesign.values import Array
+from expdesign.vessel import Vessel, VesselModel
+
+REDRAWS = 5
+"""How many times as many models may be drawn as are wanted, because some are unstable."""
+
+
+def equation_noise(vessel: Vessel, parameters: Sequence[str]) -> Array:
+    """(p,) standard deviation of the one-step residual of each parameter's equation, zero where a sensor is ideal.
+
+    The residual is the difference of two samples, each with the sensor's noise; it is counted in the units in which
+    regressors stand in X, so that X over its square is information per sample about the parameters.
+    """
+    sensors, model = vessel.sensors, vessel.model
+    spread = {"u": sensors.velocity_mps, "v": sensors.velocity_mps, "r": sensors.yaw_rate_radps}
+    ratio = vessel.sample_time_s / model.time_scale_s
+    equation = {term.name: term.equation for term in model.terms}
+    return np.array([np.sqrt(2.0) * spread[equation[name]] / ratio for name in parameters])
+
+
+def stated_information(std: Array, noise: Array, *, dimension: int, samples: float) -> Array:
+    """(d, d) information of independent prior standard deviations (p,), per sample of the total time.
+
+    A standard deviation of zero or infinity says nothing: what counts as known should be fixed, not estimated.
+
+    Args:
+        std: (p,) of the parameters.
+        noise: (p,) as from `equation_noise`.
+        dimension: d, p or p plus the number of means, of which nothing is known.
+        samples: in the time to share out.
+
+    Raises:
+        InputError: a parameter with a prior whose equation's noise is not stated.
+    """
+    told = (std > 0) & np.isfinite(std)
+    if not (noise[told] > 0).all():
+        raise InputError("a prior from standard deviations needs the sensors' noise of every equation")
+    prior = np.zeros((dimension, dimension))
+    index = np.flatnonzero(told)
+    prior[index, index] = (noise[told] / std[told]) ** 2 / samples
+    return prior
+
+
+def drawn_parameters(model: VesselModel, parameters: Sequence[str], count: int, rng: np.random.Generator) -> Array:
+    """(count, all) parameter vectors, normal around the nominal ones where a standard deviation is stated.
+
+    Raises:
+        InputError: none of the parameters has one.
+    """
+    std = np.array([s if n in parameters else 0.0 for n, s in zip(model.names, model.parameter_std, strict=True)])
+    if not std.any():
+        raise InputError("robust durations need model.parameter_std of the parameters, found none")
+    return np.asarray(model.parameters + std * rng.standard_normal((count, len(model.names))))
+
+
+def score_prior(
+    vessel: Vessel,
+    primitives: Sequence[Primitive],
+    *,
+    samples: int,
+    rng: np.random.Generator,
+    environment: Environment = CALM,
+    fixed_parameters: Sequence[str] = (),
+    mean_subtraction: str = "complete",
+) -> tuple[tuple[tuple[PrimitiveInformation, ...], ...], int]:
+    """The dictionary scored with models drawn from the prior, under the commands made for the nominal one.
+
+    Returns:
+        Information by model, and how many unstable models were drawn besides.
+
+    Raises:
+        InputError: no standard deviations are stated.
+        NoAnswer: too many models are unstable.
+    """
+    names = estimated_parameters(vessel.model, fixed_parameters)
+    stable: list[tuple[PrimitiveInformation, ...]] = []
+    unstable = 0
+    while len(stable) < samples:
+        wanted = samples - len(stable)
+        scored = score_models(
+            vessel,
+            primitives,
+            drawn_parameters(vessel.model, names, wanted, rng),
+            environment=environment,
+            fixed_parameters=fixed_parameters,
+            mean_subtraction=mean_subtraction,
+            unstable="mark",
+        )
+        stable += [items for items, is_stable in scored if is_stable]
+        unstable += sum(not is_stable for _, is_stable in scored)
+        if unstable > REDRAWS * samples:
+            raise NoAnswer(
+                f"design.robust: {unstable} of {unstable + len(stable)} models drawn from the prior are unstable; "
+                "state smaller model.parameter_std"
+            )
+    return tuple(stable), unstable
