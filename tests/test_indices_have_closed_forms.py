@@ -54,7 +54,7 @@ def test_the_first_overshoot_is_the_closed_form(angle: float) -> None:
     rest = LAG * rate - GAIN * angle * LAG * math.log(1 + rate / (GAIN * angle))
     assert found.overshoots_rad[0] == pytest.approx(rest, rel=2e-3)
     assert found.executes[1].time_s == pytest.approx(time, rel=1e-4)
-    assert found.initial_turning_m == pytest.approx(SPEED * time, rel=1e-4)
+    assert found.initial_turning_m == pytest.approx(SPEED * turned(angle, TEN), rel=1e-4)
 
 
 def test_the_stop_is_that_of_quadratic_resistance_and_constant_thrust() -> None:

@@ -141,7 +141,13 @@ def plan(
 def export(
     plan: PlanFile,
     formats: Annotated[
-        list[str], typer.Option("--format", "-f", metavar="F ...", help="One or more of: rtz rtz-1.0 rtz-1.1 gpx kml geojson qgc ardupilot csv.")
+        list[str],
+        typer.Option(
+            "--format",
+            "-f",
+            metavar="F ...",
+            help="One or more of: rtz rtz-1.0 rtz-1.1 gpx kml geojson qgc ardupilot csv.",
+        ),
     ],
     out: OutBeside = None,
     quiet: Quiet = False,
@@ -298,7 +304,9 @@ def diagnose(
     ],
     vessel: Annotated[
         Path,
-        typer.Option("--vessel", metavar="VESSEL.toml", help="The simulation model in use; parameter_std says how sure."),
+        typer.Option(
+            "--vessel", metavar="VESSEL.toml", help="The simulation model in use; parameter_std says how sure."
+        ),
     ],
     scenario: Annotated[
         Path | None,
@@ -346,6 +354,70 @@ def diagnose(
         quiet,
         json,
     )
+
+
+@app.command()
+def indices(
+    vessel: Annotated[
+        Path, typer.Option("--vessel", metavar="VESSEL.toml", help="Model, length and actuators of the ship.")
+    ],
+    data: Annotated[
+        list[Path] | None, typer.Argument(metavar="[DATA.csv ...]", help="Measured zig-zags, turning circles, stops.")
+    ] = None,
+    speed: Annotated[
+        float | None,
+        typer.Option(
+            "--speed-mps", metavar="V", help="Approach speed of the simulated trials; 85 % power when not given."
+        ),
+    ] = None,
+    scale: Annotated[
+        float, typer.Option("--scale", metavar="S", help="Ship length by model length, for trials of a model.")
+    ] = 1.0,
+    antenna: Annotated[
+        float,
+        typer.Option("--antenna-forward-m", metavar="X", help="How far forward of amidships the positions are."),
+    ] = 0.0,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", metavar="FOLDER", help="Where to write; runs/<vessel>-indices when not given."),
+    ] = None,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> None:
+    """Turning, zig-zag and stopping indices beside their IMO limits, simulated and measured.
+
+    Writes indices.json and indices.html.
+
+    Example: expdesign indices zigzag.csv circle.csv --vessel ship.toml
+    """
+    from expdesign import workflows
+
+    _carry_out(
+        "indices",
+        lambda tell: workflows.indices(
+            tuple(data or ()),
+            check_out(out),
+            vessel=vessel,
+            speed_mps=speed,
+            scale=scale,
+            antenna_forward_m=antenna,
+            progress=tell,
+        ),
+        quiet,
+        json,
+    )
+
+
+@app.command("check-route")
+def check_route(
+    files: Annotated[list[Path], typer.Argument(metavar="ROUTE.rtz ...", help="RTZ or GPX files of any origin.")],
+    quiet: Quiet = False,
+    json: Json = False,
+) -> None:
+    """Check route files beyond what their schemas can: ids, names, order of schedules, ranges, size."""
+    from expdesign import workflows
+
+    _carry_out("check-route", lambda tell: workflows.check_routes(tuple(files)), quiet, json)
 
 
 def _carry_out(name: str, work: Callable[[Progress], Outcome], quiet: bool, json: bool) -> None:

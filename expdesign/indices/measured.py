@@ -91,7 +91,7 @@ def _watched(vessel: Vessel, batch: Batch, helm: Helm, forward_m: float) -> Watc
         time_s=batch.time_s,
         pose=pose,
         velocity=velocity,
-        order_time_s=batch.time_s,
+        order_time_s=batch.time_s + batch.sample_time_s / 2,  # inputs are held: a value belongs to its sample's middle
         **orders(helm, batch.input_names, batch.inputs),
     )
 

@@ -130,7 +130,9 @@ def read_zigzag(
         speed_mps=speed_mps,
         executes=executes,
         overshoots_rad=tuple(overshoots),
-        initial_turning_m=sailed_to(run, order_s=orders_s[0], course_rad=course_rad, change_rad=side * nominal),
+        initial_turning_m=sailed_to(
+            run, order_s=orders_s[0], course_rad=course_rad, change_rad=side * min(nominal, TEN)
+        ),
     )
 
 

@@ -59,7 +59,8 @@ class ZigZag:
         speed_mps: approach speed.
         executes: rudder orders, the first included.
         overshoots_rad: additional change of heading after the second, third, ... execute, positive.
-        initial_turning_m: distance sailed from the first execute until the heading has changed by `heading_rad`.
+        initial_turning_m: distance sailed from the first execute until the heading has changed by 10 degrees, or by
+            `heading_rad` where that is less.
     """
 
     name: str

@@ -6,6 +6,7 @@ between (`scored`, `designed`, `planned`) are for notebooks: value in, value out
 
 from expdesign.workflows.after import estimate, export, measured, simulate
 from expdesign.workflows.diagnosed import diagnose
+from expdesign.workflows.indices import check_routes, indices
 from expdesign.workflows.outcome import Outcome, Progress, TextTable
 from expdesign.workflows.trial import designed, durations, plan, planned, run, score, scored
 
@@ -13,11 +14,13 @@ __all__ = [
     "Outcome",
     "Progress",
     "TextTable",
+    "check_routes",
     "designed",
     "diagnose",
     "durations",
     "estimate",
     "export",
+    "indices",
     "measured",
     "plan",
     "planned",

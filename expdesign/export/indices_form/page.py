@@ -1,0 +1,64 @@
+"""The form as one page that prints on paper."""
+
+from __future__ import annotations
+
+import math
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from expdesign.export.formats.format import xml_text
+from expdesign.export.indices_form.form import IndicesContent, shown, verdict_rows
+from expdesign.indices import Circle, NotStandard, Stop, ZigZag
+
+
+def indices_html(content: IndicesContent) -> str:
+    """One HTML page without outside references."""
+    templates = Environment(
+        loader=PackageLoader("expdesign.export.indices_form"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        finalize=lambda value: xml_text(value) if type(value) is str else value,
+    )
+    unmet = sum(verdict.met is False for _, verdict in content.verdicts)
+    return templates.get_template("indices.html").render(
+        content=content,
+        rows=verdict_rows(content),
+        unmet=unmet,
+        circles=[_circle(source, trial) for source, trial in content.trials if isinstance(trial, Circle)],
+        zigzags=[_zigzag(source, trial) for source, trial in content.trials if isinstance(trial, ZigZag)],
+        stops=[_stop(source, trial) for source, trial in content.trials if isinstance(trial, Stop)],
+        others=[item for item in content.measured if isinstance(item, NotStandard)],
+    )
+
+
+def _degrees(angle_rad: float) -> str:
+    return f"{round(math.degrees(angle_rad), 1) + 0.0:.1f}"
+
+
+def _metres(value: float | None) -> str:
+    return "" if value is None else f"{value:.4g}"
+
+
+def _circle(source: str, trial: Circle) -> tuple[str, ...]:
+    ways = (trial.advance_m, trial.transfer_m, trial.tactical_diameter_m, trial.steady_diameter_m)
+    current = ""
+    if trial.current_north_mps is not None and trial.current_east_mps is not None:
+        current = f"{trial.current_north_mps:.3f}, {trial.current_east_mps:.3f}"
+    head = (source, trial.name, trial.side, _degrees(trial.helm_rad), f"{trial.speed_mps:.3g}")
+    return (*head, *(_metres(way) for way in ways), current)
+
+
+def _zigzag(source: str, trial: ZigZag) -> tuple[str, ...]:
+    overshoots = ", ".join(_degrees(angle) for angle in trial.overshoots_rad)
+    executes = ", ".join(f"{order.time_s:.1f} s at {_degrees(order.heading_rad)}" for order in trial.executes[:4])
+    more = ", ..." if len(trial.executes) > 4 else ""
+    head = (source, trial.name, trial.side, f"{_degrees(trial.heading_rad)} / {_degrees(trial.helm_rad)}")
+    return (*head, f"{trial.speed_mps:.3g}", overshoots, _metres(trial.initial_turning_m), executes + more)
+
+
+def _stop(source: str, trial: Stop) -> tuple[str, ...]:
+    ways = (trial.track_reach_m, trial.head_reach_m, trial.lateral_m)
+    times = (_degrees(trial.heading_change_rad), f"{trial.time_s:.0f}")
+    return (source, trial.name, f"{trial.speed_mps:.3g}", *(shown("_m", way) for way in ways), *times)

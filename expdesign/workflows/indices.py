@@ -1,0 +1,133 @@
+"""Manoeuvring indices of a vessel, from its model and from measured runs; and checks of route files."""
+
+from __future__ import annotations
+
+import math
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+
+from expdesign import __version__
+from expdesign.errors import FileError, InputError
+from expdesign.export import write_files
+from expdesign.export.formats.check import check_route_file
+from expdesign.export.indices_form import IndicesContent, indices_html, indices_json, verdict_rows
+from expdesign.indices import StandardResults, ZigZag, measured_trial, standard_results
+from expdesign.indices.measured import Found
+from expdesign.scenario import load_vessel
+from expdesign.vessel import Vessel
+from expdesign.workflows.after import measured
+from expdesign.workflows.outcome import Outcome, Progress, TextTable, silent
+
+HEADER = ("From", "Run", "Index", "Result", "", "Limit", "Rule", "Verdict")
+
+
+def indices(
+    data: Sequence[Path],
+    out: Path | None,
+    *,
+    vessel: Path,
+    speed_mps: float | None = None,
+    scale: float = 1.0,
+    antenna_forward_m: float = 0.0,
+    progress: Progress = silent,
+) -> Outcome:
+    """Turning, zig-zag and stopping indices with the limits of MSC.137(76), into `out` or runs/<vessel>-indices."""
+    if not scale >= 1:
+        raise InputError(f"--scale is {scale:g}, expected ship length by model length, 1 or more")
+    progress("reading the vessel", 0.0)
+    ship = load_vessel(vessel)
+    seen, notes = _measured(data, ship, antenna_forward_m, progress)
+    progress("sailing the model's standard trials", 0.6)
+    found, why_not = _simulated(ship, speed_mps, needed=not data)
+    content = IndicesContent(
+        vessel=ship,
+        scale=scale,
+        simulated=found,
+        simulated_why_not=why_not,
+        measured=seen,
+        notes=notes,
+        command=_command(data, vessel, speed_mps, scale, antenna_forward_m),
+        version=__version__,
+    )
+    files = {"indices.json": indices_json(content), "indices.html": indices_html(content)}
+    written = write_files(out or Path("runs") / f"{vessel.stem}-indices", files)
+    progress("done", 1.0)
+    return Outcome(files=written, summary=_summary(content), tables=_tables(content))
+
+
+def check_routes(files: Sequence[Path]) -> Outcome:
+    """Whether RTZ and GPX files are fit to be loaded.
+
+    Raises:
+        FileError: the first problem of the first file that has one, and how many more there are.
+    """
+    for path in files:
+        problems = check_route_file(path)
+        if problems:
+            more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
+            raise FileError(path, "", problems[0] + more)
+    return Outcome(files=(), summary={"files": len(files), "problems": 0})
+
+
+def _measured(
+    data: Sequence[Path], ship: Vessel, forward_m: float, progress: Progress
+) -> tuple[tuple[Found, ...], tuple[str, ...]]:
+    """Each file by itself: trials need not share a sample time."""
+    seen: list[Found] = []
+    notes: list[str] = []
+    for number, path in enumerate(data):
+        progress(f"reading {path.name}", 0.6 * number / len(data))
+        record = measured([path], ship)
+        seen += [measured_trial(ship, batch, reference_forward_m=forward_m) for batch in record.batches]
+        notes += record.notes
+    return tuple(seen), tuple(notes)
+
+
+def _simulated(ship: Vessel, speed_mps: float | None, *, needed: bool) -> tuple[StandardResults | None, str]:
+    """The model's trials; where measured ones are at hand, why there are none."""
+    try:
+        return standard_results(ship, speed_mps=speed_mps), ""
+    except InputError as error:
+        if needed:
+            raise
+        return None, str(error)
+
+
+def _command(data: Sequence[Path], vessel: Path, speed_mps: float | None, scale: float, forward_m: float) -> str:
+    options = [("--speed-mps", speed_mps, None), ("--scale", scale, 1.0), ("--antenna-forward-m", forward_m, 0.0)]
+    spelled = [part for option, value, usual in options if value != usual for part in (option, f"{value:g}")]
+    return shlex.join(["expdesign", "indices", *map(str, data), "--vessel", str(vessel), *spelled])
+
+
+def _summary(content: IndicesContent) -> dict[str, object]:
+    verdicts = content.verdicts
+    return {
+        "vessel": content.vessel.name,
+        "measured_runs": len(content.measured),
+        "results": {
+            f"{source} {v.run}: {v.criterion.key}": {"value": v.value, "limit": v.criterion.limit, "met": v.met}
+            for source, v in verdicts
+        },
+        "criteria_met": sum(verdict.met is True for _, verdict in verdicts),
+        "criteria_not_met": sum(verdict.met is False for _, verdict in verdicts),
+    }
+
+
+def _tables(content: IndicesContent) -> tuple[TextTable, ...]:
+    rows = verdict_rows(content)
+    shown = [TextTable(title=f"MSC.137(76): {content.vessel.name}", header=HEADER, rows=tuple(rows))] if rows else []
+    zigzags = [
+        (source, trial.name, *_swings(trial.heading_rad, trial.helm_rad, trial.overshoots_rad))
+        for source, trial in content.trials
+        if isinstance(trial, ZigZag)
+    ]
+    if zigzags:
+        header = ("From", "Run", "Heading / helm, deg", "Overshoots, deg")
+        shown.append(TextTable(title="Zig-zags", header=header, rows=tuple(zigzags)))
+    return tuple(shown)
+
+
+def _swings(heading_rad: float, helm_rad: float, overshoots_rad: Sequence[float]) -> tuple[str, str]:
+    angles = f"{math.degrees(heading_rad):.1f} / {math.degrees(helm_rad):.1f}"
+    return angles, ", ".join(f"{math.degrees(angle):.1f}" for angle in overshoots_rad)

@@ -1,0 +1,54 @@
+"""`expdesign indices` prints and writes indices of model and records; `expdesign check-route` judges route files."""
+
+import json
+import math
+from pathlib import Path
+
+import pytest
+from measured_trials import TUG, TUG_TRUE, quiet, write_run
+
+from expdesign.cli import main
+from expdesign.indices import standard_results
+from expdesign.simulation import Conduct, zigzag
+
+TWENTY = math.radians(20)
+
+
+def test_the_models_indices_are_those_of_the_library(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["indices", "--vessel", str(TUG), "--speed-mps", "1.2", "--out", str(tmp_path), "--quiet"]) == 0
+    written = json.loads((tmp_path / "indices.json").read_text())
+    from expdesign.scenario import load_vessel
+
+    expected = standard_results(load_vessel(TUG), speed_mps=1.2)
+    assert [trial["name"] for trial in written["simulated"]["trials"]] == [trial.name for trial in expected.trials]
+    assert written["simulated"]["trials"][0]["advance_m"] == expected.circles[0].advance_m
+    assert {row["source"] for row in written["verdicts"]} == {"simulated"}
+    assert all(row["met"] == (row["value"] <= row["limit"]) for row in written["verdicts"])
+    assert capsys.readouterr().out == ""
+
+
+def test_a_recorded_zigzag_stands_beside_the_models(tmp_path: Path) -> None:
+    ship = quiet(TUG_TRUE)
+    commands, motion = zigzag(
+        ship, heading_rad=TWENTY, helm_rad=TWENTY, side="port", conduct=Conduct(speed_mps=2.0, approach_s=40.0)
+    )
+    path = write_run(tmp_path / "swing.csv", ship, commands, velocity=tuple(motion.velocity[0]))
+    assert main(["indices", str(path), "--vessel", str(TUG), "--out", str(tmp_path / "out")]) == 0
+    written = json.loads((tmp_path / "out" / "indices.json").read_text())
+    expected = standard_results(ship, speed_mps=2.0, sides=("port",)).zigzags[1]
+    (found,) = written["measured"]
+    assert (found["kind"], found["side"]) == ("zig-zag", "port")
+    assert found["overshoots_rad"] == pytest.approx(expected.overshoots_rad, abs=math.radians(2.5))
+    page = (tmp_path / "out" / "indices.html").read_text()
+    assert "swing.csv" in page
+    assert "http" not in page
+
+
+def test_what_is_wrong_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["indices", "--vessel", str(TUG), "--speed-mps", "30", "--out", str(tmp_path)]) == 2
+    assert "cannot hold 30 m/s" in capsys.readouterr().err
+    assert main(["indices", "--vessel", str(TUG), "--scale", "0.5"]) == 2
+    assert "--scale is 0.5" in capsys.readouterr().err
+    (tmp_path / "bad.gpx").write_text("<gpx/>")
+    assert main(["check-route", str(tmp_path / "bad.gpx")]) == 2
+    assert "expected gpx 1.1" in capsys.readouterr().err
