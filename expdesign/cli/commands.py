@@ -98,16 +98,27 @@ def score(scenario: ScenarioFile, out: Out = None, seed: Seed = 0, quiet: Quiet 
 
 @app.command()
 def durations(
-    scenario: ScenarioFile, out: Out = None, seed: Seed = 0, quiet: Quiet = False, json: Json = False
+    scenario: ScenarioFile,
+    out: Out = None,
+    grow: Annotated[
+        bool,
+        typer.Option("--grow", help="Search for manoeuvres that add most, also where the scenario has no design.grow."),
+    ] = False,
+    seed: Seed = 0,
+    quiet: Quiet = False,
+    json: Json = False,
 ) -> None:
     """Choose how long to run each manoeuvre, and prove how close to the best that is.
 
-    Writes durations.json.
+    Writes durations.json; with --grow also growth.json and dictionary-grown.toml, which any scenario can name.
     """
     from expdesign import workflows
 
     _carry_out(
-        "durations", lambda tell: workflows.durations(scenario, check_out(out), seed=seed, progress=tell), quiet, json
+        "durations",
+        lambda tell: workflows.durations(scenario, check_out(out), grow=grow, seed=seed, progress=tell),
+        quiet,
+        json,
     )
 
 

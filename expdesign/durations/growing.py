@@ -240,7 +240,7 @@ def _search(case: _Case, information: Sequence[PrimitiveInformation], settings: 
         mean_subtraction=case.mean_subtraction,
         limits=case.limits,
     )
-    return CandidateSearch(spaces, measure, pool=settings.pool, seed=settings.seed)
+    return CandidateSearch(spaces, measure, pool=settings.pool, seed=settings.seed or 0)
 
 
 def _unused(number: int, kind: str, grown: Sequence[PrimitiveInformation]) -> str:

@@ -26,7 +26,7 @@ class GrowSettings:
         free_form: whether the commands of the best candidate are themselves optimised.
         run_s: length of an added run, or None for the middle length of the present runs.
         pool: candidates of every family that the search begins with.
-        seed: of all chance.
+        seed: of all chance; None for the command's.
     """
 
     families: tuple[str, ...] = ()
@@ -36,7 +36,7 @@ class GrowSettings:
     free_form: bool = False
     run_s: float | None = None
     pool: int = 256
-    seed: int = 0
+    seed: int | None = None
 
     def __post_init__(self) -> None:
         if self.rounds < 1:

@@ -5,8 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 
+import numpy as np
+
 from expdesign.dictionary.spec import PrimitiveSpec
-from expdesign.export.results import csv_text, sample_seconds
+from expdesign.durations.growing_values import Growth
+from expdesign.export.results import csv_text, sample_seconds, strict_json
 from expdesign.signals import Commands
 from expdesign.vessel import column_name
 
@@ -34,6 +37,34 @@ def dictionary_files(
             del settings["duration_s"]
         lines += [f"{key} = {value!r}" for key, value in settings.items()]
     return {f"{stem}.toml": "\n".join(lines) + "\n", **files}
+
+
+def growth_json(growth: Growth) -> str:
+    """What was added to a dictionary, what each addition brought, and what the search guarantees, as growth.json."""
+    velocities = zip(("u_mps", "v_mps", "r_radps"), growth.limits.tolist(), strict=True)
+    return strict_json(
+        {
+            "criterion": "D",
+            "dimension": growth.dimension,
+            "limits": dict(velocities),
+            "candidates": growth.evaluated,
+            "best_sensitivity_left": growth.best_left if np.isfinite(growth.best_left) else None,
+            "efficiency_at_least_among_candidates": growth.efficiency_left,
+            "rounds": [
+                {
+                    "name": row.name,
+                    "family": row.family,
+                    "settings": dict(row.settings),
+                    "sensitivity_before": row.sensitivity,
+                    "sensitivity_of_family_member": row.searched,
+                    "log_det_gain": row.log_det_gain,
+                    "efficiency_so_far": row.efficiency,
+                    "excitation_condition": row.excitation_condition,
+                }
+                for row in growth.rounds
+            ],
+        }
+    )
 
 
 def recorded_csv(commands: Commands) -> str:

@@ -16,6 +16,7 @@ from expdesign.scenario.area_tables import Latitude, Longitude
 from expdesign.scenario.berth import berth_problem
 from expdesign.scenario.dictionary_file import NAME, NAME_RULE, load_dictionary
 from expdesign.scenario.environment_table import EnvironmentTable, build_environment
+from expdesign.scenario.grow_table import GrowTable, build_grow
 from expdesign.scenario.tables import (
     Entry,
     NonNegative,
@@ -52,6 +53,7 @@ class DesignTable(Table):
     criterion: Literal["D"] = "D"
     mean_subtraction: Literal["none", "batch", "complete"] = "complete"
     fixed_parameters: list[Text] = Field(default=[])
+    grow: GrowTable | None = None
 
 
 class PoseTable(Table):
@@ -148,6 +150,7 @@ def _design(table: DesignTable, vessel: Vessel, entry: Entry) -> DesignSettings:
         criterion=table.criterion,
         mean_subtraction=table.mean_subtraction,
         fixed_parameters=tuple(fixed),
+        grow=None if table.grow is None else build_grow(table.grow, entry.at("grow")),
     )
 
 

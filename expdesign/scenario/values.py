@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from expdesign.dictionary.spec import PrimitiveSpec
+from expdesign.durations.growing_values import GrowSettings
 from expdesign.plan.area import SeaArea
 from expdesign.plan.values import PlanSettings
 from expdesign.simulation.environment import Environment
@@ -22,12 +23,14 @@ class DesignSettings:
         criterion: name of a design criterion; "D".
         mean_subtraction: "none", "batch" or "complete".
         fixed_parameters: parameters held at the vessel file's values and not estimated.
+        grow: how to add manoeuvres to the dictionary, or None to leave it as it is.
     """
 
     total_s: float
     criterion: str = "D"
     mean_subtraction: str = "complete"
     fixed_parameters: tuple[str, ...] = ()
+    grow: GrowSettings | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -250,7 +250,7 @@ def _ship_part(wish: GrowSettings, runs: int) -> str:
         ("families and free form", replace(wish, free_form=True), False),
         ("families, same forces", wish, True),
     )
-    found = [compare(name, settings, runs=runs, seed=wish.seed, narrow=narrow) for name, settings, narrow in cases]
+    found = [compare(name, settings, runs=runs, seed=wish.seed or 0, narrow=narrow) for name, settings, narrow in cases]
     parts = [f"tau1 to tau11 grown by {item.name}\n{growth_table(item.growth)}" for item in found]
     return "\n\n".join([*parts, comparison_table(found, model_ship()[0].model.names), ""])
 

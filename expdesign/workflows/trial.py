@@ -8,6 +8,7 @@ from pathlib import Path
 from expdesign import __version__
 from expdesign.dictionary import build_dictionary
 from expdesign.durations import DurationDesign, build_durations, solve_durations, with_repeats
+from expdesign.durations.growing_values import Growth
 from expdesign.export import (
     STANDARD,
     build_route,
@@ -25,25 +26,28 @@ from expdesign.information import PrimitiveInformation, estimated_parameters, sc
 from expdesign.plan.solve import PlanProblem, plan_trial
 from expdesign.plan.values import Plan
 from expdesign.scenario import Scenario, load_repeats, load_scenario
-from expdesign.workflows.outcome import Outcome, Progress, silent, within
+from expdesign.workflows.grown import grown, growth_files, growth_summary, growth_tables
+from expdesign.workflows.outcome import Outcome, Progress, TextTable, silent, within
 
 
 def run(scenario: Path, out: Path | None, *, seed: int = 0, progress: Progress = silent) -> Outcome:
     """The main job: score, durations, plan, verification, route files and report, into `out` or runs/<scenario>."""
     case = _load(scenario, progress)
-    information = scored(case, progress=within(progress, 0.02, 0.08))
-    progress("sharing out time", 0.08)
+    information, growth = _ready(case, seed=seed, progress=within(progress, 0.02, 0.1))
+    progress("sharing out time", 0.1)
     design = designed(case, information)
     plan = planned(case, information, design, seed=seed, progress=within(progress, 0.1, 0.85))
     progress("writing routes and report", 0.85)
     files = {
         **_dictionary_files(case, information),
+        **growth_files(case, growth),
         "durations.json": durations_json(design, criterion=case.design.criterion),
         **_plan_files(case, plan),
         **_route_files(case, plan),
         "report.html": report_html(_report(case, information, design, plan, seed)),
     }
-    return _written(case, out, files, {**_design_summary(design), **_plan_summary(plan)}, progress)
+    summary = {**growth_summary(growth), **_design_summary(design), **_plan_summary(plan)}
+    return _written(case, out, files, summary, progress)
 
 
 def score(scenario: Path, out: Path | None, *, seed: int = 0, progress: Progress = silent) -> Outcome:
@@ -59,13 +63,19 @@ def score(scenario: Path, out: Path | None, *, seed: int = 0, progress: Progress
     return _written(case, out, _dictionary_files(case, information), summary, progress)
 
 
-def durations(scenario: Path, out: Path | None, *, seed: int = 0, progress: Progress = silent) -> Outcome:
-    """How long to run each primitive, with its certificate."""
+def durations(
+    scenario: Path, out: Path | None, *, grow: bool = False, seed: int = 0, progress: Progress = silent
+) -> Outcome:
+    """How long to run each primitive, with its certificate; with `grow` also of manoeuvres found to add most."""
     case = _load(scenario, progress)
-    information = scored(case, progress=within(progress, 0.05, 0.9))
+    information, growth = _ready(case, grow=grow, seed=seed, progress=within(progress, 0.05, 0.9))
     design = designed(case, information)
-    files = {"durations.json": durations_json(design, criterion=case.design.criterion)}
-    return _written(case, out, files, _design_summary(design), progress)
+    files = {
+        "durations.json": durations_json(design, criterion=case.design.criterion),
+        **growth_files(case, growth),
+    }
+    summary = {**growth_summary(growth), **_design_summary(design)}
+    return _written(case, out, files, summary, progress, growth_tables(growth))
 
 
 def plan(
@@ -73,7 +83,7 @@ def plan(
 ) -> Outcome:
     """One verified trajectory with the runs of a durations file, or of the optimal durations."""
     case = _load(scenario, progress)
-    information = scored(case, progress=within(progress, 0.02, 0.08))
+    information, _ = _ready(case, seed=seed, progress=within(progress, 0.02, 0.1))
     design = designed(case, information)
     if durations is not None:
         design = with_repeats(design, load_repeats(durations, names=design.problem.names))
@@ -93,6 +103,15 @@ def scored(case: Scenario, *, progress: Progress = silent) -> tuple[PrimitiveInf
         fixed_parameters=case.design.fixed_parameters,
         mean_subtraction=case.design.mean_subtraction,
     )
+
+
+def _ready(
+    case: Scenario, *, grow: bool = False, seed: int, progress: Progress
+) -> tuple[tuple[PrimitiveInformation, ...], Growth | None]:
+    """The scored dictionary, grown where that is wished."""
+    information = scored(case, progress=within(progress, 0.0, 0.2 if grow or case.design.grow else 1.0))
+    growth = grown(case, information, always=grow, seed=seed, progress=within(progress, 0.2, 1.0))
+    return (information if growth is None else growth.information), growth
 
 
 def designed(case: Scenario, information: Sequence[PrimitiveInformation]) -> DurationDesign:
@@ -145,10 +164,11 @@ def _written(
     files: Mapping[str, str | bytes],
     summary: Mapping[str, object],
     progress: Progress,
+    tables: tuple[TextTable, ...] = (),
 ) -> Outcome:
     written = write_files(out or Path("runs") / case.name, files)
     progress("done", 1.0)
-    return Outcome(files=written, summary={"scenario": case.name, **summary})
+    return Outcome(files=written, summary={"scenario": case.name, **summary}, tables=tables)
 
 
 def _dictionary_files(case: Scenario, information: Sequence[PrimitiveInformation]) -> dict[str, str | bytes]:

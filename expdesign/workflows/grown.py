@@ -1,0 +1,94 @@
+"""Growing a scenario's dictionary, and what is told and written of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from expdesign.durations.growing import grow_dictionary
+from expdesign.durations.growing_values import GrowSettings, Growth
+from expdesign.export.dictionary_file import dictionary_files, growth_json
+from expdesign.information import PrimitiveInformation
+from expdesign.scenario import Scenario
+from expdesign.workflows.outcome import Progress, TextTable, silent
+
+STEM = "dictionary-grown"
+
+
+def grown(
+    case: Scenario,
+    information: Sequence[PrimitiveInformation],
+    *,
+    always: bool = False,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Growth | None:
+    """The scored dictionary with additions as the scenario wishes; None where it wishes none.
+
+    Args:
+        case: the scenario; its key design.grow says how.
+        information: of its dictionary.
+        always: grow it by the usual settings also without that key.
+        seed: of all chance, unless the key has its own.
+        progress: told about the search.
+    """
+    settings = case.design.grow or (GrowSettings() if always else None)
+    if settings is None:
+        return None
+    return grow_dictionary(
+        case.vessel,
+        information,
+        settings=settings if settings.seed is not None else replace(settings, seed=seed),
+        environment=case.environment,
+        fixed_parameters=case.design.fixed_parameters,
+        mean_subtraction=case.design.mean_subtraction,
+        progress=progress,
+    )
+
+
+def growth_files(case: Scenario, growth: Growth | None) -> dict[str, str | bytes]:
+    """The grown dictionary as a file that every command takes, and what was added."""
+    if growth is None:
+        return {}
+    comments = (
+        f"The dictionary of scenario {case.name!r} and {len(growth.rounds)} manoeuvres added to it.",
+        f"They were found for vessel {case.vessel.name!r}.",
+    )
+    specs = [*case.dictionary, *growth.specs]
+    return {
+        **dictionary_files(specs, name=f"{case.name}-grown", stem=STEM, comments=comments),
+        "growth.json": growth_json(growth),
+    }
+
+
+def growth_summary(growth: Growth | None) -> dict[str, object]:
+    """Key numbers."""
+    if growth is None:
+        return {}
+    return {
+        "manoeuvres_added": len(growth.rounds),
+        "efficiency_of_grown_dictionary": growth.rounds[-1].efficiency if growth.rounds else 1.0,
+        "candidates_looked_at": growth.evaluated,
+        "efficiency_at_least_among_candidates": growth.efficiency_left,
+    }
+
+
+def growth_tables(growth: Growth | None) -> tuple[TextTable, ...]:
+    """What each addition brought."""
+    if growth is None:
+        return ()
+    rows = tuple(
+        (
+            str(number),
+            row.name,
+            f"{row.sensitivity:.2f}",
+            f"{row.log_det_gain:+.3f}",
+            f"{row.efficiency:.3f}",
+            "yes" if row.excitation_condition else "no",
+            " ".join(f"{key} {value:.4g}" for key, value in row.settings.items()),
+        )
+        for number, row in enumerate(growth.rounds, start=1)
+    )
+    header = ("round", "added", "d before", "log det", "D-efficiency", "excites", "settings")
+    title = f"Manoeuvres added; one helps where d is above {growth.dimension}"
+    return (TextTable(title=title, header=header, rows=rows),) if rows else ()
