@@ -1,0 +1,209 @@
+"""The covariance that instrumental-variable estimates will have, before any data are taken.
+
+    y(k+1) - y(k) = Phi(y(k))^T theta + eps(k)
+    eps(k) = e(k+1) - (I + J(k)) e(k) - Ja(k) a(k) - Jc(k) c(k)
+
+e is the noise of the velocity sensors, which enters at both ends of a sample and, through J = d(Phi^T theta)/d nu, the
+regressors; a is the noise of the wind sensor and c the white part of the current, each with its own derivative. Summed
+against instruments Z, every noise sample meets a known matrix, so the covariance of sum Z eps is exact to first order:
+no autocorrelation has to be estimated. With G = sum Z Phi^T the estimate has covariance G^-1 Omega G^-T.
+
+It holds while noise is small enough for one derivative to describe it, and nothing inside a modulus changes its sign
+with it. What stays constant for a whole trial, such as a mean current, is a bias and not in it.
+
+Source: F. Ljungberg, doctoral thesis, Linköping University, (2.21), (5.3), (5.61), (7.9); the first-order form is derived
+here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from expdesign.errors import NotInformative
+from expdesign.information.moments import regressor_rows
+from expdesign.signals import Commands, Trajectory
+from expdesign.simulation import CALM, Environment, relative_velocity, simulate
+from expdesign.simulation.run import SUBSTEPS
+from expdesign.values import Array, seal
+from expdesign.vessel import NUMPY, Vessel, VesselModel
+
+STEP = 1e-6
+"""Of central differences, relative to the larger of 1 and the signal [m/s, rad/s]."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TrialPart:
+    """Consecutive samples of a trial: commands run from a velocity.
+
+    Attributes:
+        commands: k samples.
+        velocity: (3,) over ground at the first sample.
+        heading_rad: at the first sample; matters in wind or current.
+        standing: (m,) commands that stood before, or None for those of the first sample.
+        repeats: how often it is run, each with noise of its own.
+    """
+
+    commands: Commands
+    velocity: Array
+    heading_rad: float = 0.0
+    standing: Array | None = None
+    repeats: int = 1
+
+    def __post_init__(self) -> None:
+        seal(self, velocity="3")
+
+
+def expected_covariance(
+    vessel: Vessel,
+    parts: Sequence[TrialPart],
+    parameters: Sequence[str],
+    *,
+    environment: Environment = CALM,
+    mean_subtraction: str = "complete",
+    instruments: VesselModel | None = None,
+    integrator: str = "rk4",
+) -> Array:
+    """(p, p) covariance of the estimates of the named parameters from a trial.
+
+    Args:
+        vessel: whose motion and sensors the trial has.
+        parts: what is run; noise is independent between parts.
+        parameters: estimated ones, in the order of the result.
+        environment: mean current and wind, and the current's variation (white) from sample to sample.
+        mean_subtraction: taken off the instruments: "none", "batch" (each part's own) or "complete".
+        instruments: model that simulates the instruments; the vessel's own by default, as after refining.
+        integrator: "rk4" for the motion of a ship, "euler" for the map that the discrete parameters are defined by.
+
+    Raises:
+        NotInformative: the trial does not inform about every parameter.
+    """
+    rows = [_rows(vessel, part, parameters, environment, instruments or vessel.model, integrator) for part in parts]
+    weights = np.array([part.repeats for part in parts], dtype=float)
+    means = [item.instruments.mean(axis=0) for item in rows]
+    counts = np.array([len(item.instruments) for item in rows]) * weights
+    if mean_subtraction == "complete":
+        means = [np.average(means, axis=0, weights=counts)] * len(rows)
+    elif mean_subtraction == "none":
+        means = [np.zeros_like(means[0])] * len(rows)
+    size = len(parameters)
+    G, Omega = np.zeros((size, size)), np.zeros((size, size))
+    for item, mean, weight in zip(rows, means, weights, strict=True):
+        Z = item.instruments - mean
+        G += weight * np.einsum("kpo,kqo->pq", Z, item.regressors)
+        Omega += weight * _score_covariance(Z, item)
+    return _sandwich(G, Omega, parameters)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Rows:
+    """Regressors and instruments (k, p, n), derivatives and variances of what disturbs the residual."""
+
+    regressors: Array
+    instruments: Array
+    by_velocity: Array
+    by_air: Array
+    by_current: Array
+    sensor: Array
+    air: float
+    current: float
+
+
+def _rows(
+    vessel: Vessel,
+    part: TrialPart,
+    parameters: Sequence[str],
+    environment: Environment,
+    instruments: VesselModel,
+    integrator: str,
+) -> _Rows:
+    model, outputs = vessel.model, vessel.model.outputs
+
+    def sailed(which: Vessel) -> Trajectory:
+        return simulate(
+            which,
+            part.commands,
+            pose=np.array([0.0, 0.0, part.heading_rad]),
+            velocity=part.velocity,
+            environment=environment,
+            standing=part.standing,
+            integrator=integrator,
+            substeps=1 if integrator == "euler" else SUBSTEPS,
+        )
+
+    own = sailed(vessel)
+    other = own if instruments is model else sailed(replace(vessel, model=instruments))
+    by_water, by_air = _derivatives(model, own, part.commands, environment)
+    noise = vessel.sensors
+    chosen = [("u", "v", "r").index(name) for name in outputs]
+    return _Rows(
+        regressors=_blocks(model, own, part.commands, environment, parameters),
+        instruments=_blocks(instruments, other, part.commands, environment, parameters),
+        by_velocity=by_water[:, chosen][:, :, chosen],
+        by_air=by_air[:, chosen],
+        by_current=by_water[:, chosen, :2],
+        sensor=np.array([noise.velocity_mps, noise.velocity_mps, noise.yaw_rate_radps])[chosen] ** 2,
+        air=noise.wind_mps**2,
+        current=environment.current_variation.std_mps**2,
+    )
+
+
+def _blocks(
+    model: VesselModel, trajectory: Trajectory, commands: Commands, environment: Environment, parameters: Sequence[str]
+) -> Array:
+    """(k, p, n) regressor matrices: each parameter's term in the column of its equation, times the sample time."""
+    chosen = [model.names.index(name) for name in parameters]
+    values = regressor_rows(model, trajectory, commands, environment)[:, chosen]
+    member = np.array([[model.terms[index].equation == output for output in model.outputs] for index in chosen])
+    return np.asarray(values[:, :, None] * member * (commands.sample_time_s / model.time_scale_s))
+
+
+def _derivatives(
+    model: VesselModel, trajectory: Trajectory, commands: Commands, environment: Environment
+) -> tuple[Array, Array]:
+    """(k, 3, 3) and (k, 3, 2): of Phi^T theta by the velocity through water, and by that through air."""
+    k = len(commands)
+    state = (*trajectory.pose[:k].T, *trajectory.velocity[:k].T)
+    water, air = relative_velocity(state, environment.current_to, environment.wind_to, NUMPY)
+    signals = np.array([np.broadcast_to(value, k) for value in (*water, *air)])
+    inputs = tuple(commands.values.T)
+
+    def change(values: Array) -> Array:
+        rates = model.accelerations(tuple(values[:3]), tuple(values[3:]), inputs, NUMPY)
+        return np.stack([np.broadcast_to(rate, k) for rate in rates], axis=1) * commands.sample_time_s
+
+    columns = []
+    for index in range(5):
+        step = np.zeros_like(signals)
+        step[index] = STEP * np.maximum(1.0, np.abs(signals[index]))
+        columns.append((change(signals + step) - change(signals - step)) / (2 * step[index])[:, None])
+    table = np.stack(columns, axis=2)
+    return table[:, :, :3], table[:, :, 3:]
+
+
+def _score_covariance(Z: Array, rows: _Rows) -> Array:
+    """(p, p) covariance of sum Z(k) eps(k)."""
+    eye = np.eye(Z.shape[2])
+    leaving = Z @ (eye + rows.by_velocity)  # what multiplies -e(k)
+    meets = np.concatenate([np.zeros_like(Z[:1]), Z]) - np.concatenate([leaving, np.zeros_like(Z[:1])])
+    parts = (
+        (meets, rows.sensor),
+        (Z @ rows.by_air, np.full(2, rows.air)),
+        (Z @ rows.by_current, np.full(2, rows.current)),
+    )
+    return np.asarray(sum(np.einsum("kpo,o,kqo->pq", matrix, variance, matrix) for matrix, variance in parts))
+
+
+def _sandwich(G: Array, Omega: Array, parameters: Sequence[str]) -> Array:
+    scale = np.sqrt(np.abs(np.diag(G)))
+    blind = tuple(name for name, size in zip(parameters, scale, strict=True) if not size > 0)
+    scaled = G / np.outer(np.where(scale > 0, scale, 1.0), np.where(scale > 0, scale, 1.0))
+    if blind or np.linalg.cond(scaled) > 1e12:
+        raise NotInformative(
+            f"the trial does not inform about every parameter{': ' + ', '.join(blind) if blind else ''}",
+            parameters=blind or tuple(parameters),
+        )
+    inverse = np.linalg.inv(scaled) / np.outer(scale, scale)
+    return np.asarray(inverse @ Omega @ inverse.T)

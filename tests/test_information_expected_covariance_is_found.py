@@ -1,0 +1,133 @@
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from expdesign.dictionary import build_dictionary
+from expdesign.errors import NotInformative
+from expdesign.information.expected import TrialPart, expected_covariance
+from expdesign.scenario import load_vessel
+from expdesign.scenario.dictionary_file import load_dictionary
+from expdesign.signals import Commands
+from expdesign.simulation import Environment, Variation
+from expdesign.studies.validation import Rehearsal, trial_parts, validate
+from expdesign.vessel import Actuator, Limit, Sensors, Term, Vessel, VesselModel
+
+SCENARIOS = Path(__file__).parents[1] / "scenarios"
+TRUE = load_vessel(SCENARIOS / "vessels" / "model-ship-true.toml")
+NOMINAL = load_vessel(SCENARIOS / "vessels" / "model-ship.toml")
+QUIET = replace(TRUE, sensors=Sensors(velocity_mps=0.02, yaw_rate_radps=0.02))
+PRIMITIVES = build_dictionary(NOMINAL, load_dictionary(SCENARIOS / "dictionaries" / "model-ship.toml"))
+NAMES = TRUE.model.names
+CURRENT = Environment(current_variation=Variation(std_mps=0.02))
+RUNS = (1, 1, 0, 0, 1, 1, 0, 1, 0, 0, 1)
+
+
+def surge_ship(damping: float, noise: float) -> Vessel:
+    """u(k+1) = u(k) + X_u u(k) + tau: one parameter is estimated, the other known."""
+    force = Actuator(kind="force", number=1, limits=(Limit(),) * 3)
+    model = VesselModel(
+        terms=(Term("u", "X_u", "u"), Term("u", "X_mu", "tau_x")),
+        parameters=np.array([damping, 1.0]),
+        parameter_std=np.zeros(2),
+        form="discrete",
+        sample_time_s=1.0,
+        actuators=(force,),
+    )
+    return Vessel(
+        name="surge",
+        length_m=1.0,
+        beam_m=0.3,
+        draught_m=0.1,
+        sample_time_s=1.0,
+        model=model,
+        sensors=Sensors(velocity_mps=noise),
+    )
+
+
+@pytest.mark.parametrize("mean", ["none", "complete"])
+def test_one_parameter_has_a_closed_form(mean):
+    a, noise, k = -0.2, 0.1, 60
+    force = np.sin(0.3 * np.arange(k)) + 1.5
+    commands = Commands(
+        sample_time_s=1.0, names=("tau_x", "tau_y", "tau_psi"), values=np.column_stack([force, 0 * force, 0 * force])
+    )
+    u = np.zeros(k + 1)
+    for step in range(k):
+        u[step + 1] = u[step] + a * u[step] + force[step]
+    z = u[:-1] - (u[:-1].mean() if mean == "complete" else 0.0)
+    # sum z eps = sum over noise samples e(j) of (z(j-1) - (1 + a) z(j)) e(j)
+    meets = np.r_[0.0, z] - (1 + a) * np.r_[z, 0.0]
+    expected = noise**2 * (meets**2).sum() / (z @ u[:-1]) ** 2
+    part = TrialPart(commands=commands, velocity=np.zeros(3))
+    found = expected_covariance(surge_ship(a, noise), [part], ("X_u",), mean_subtraction=mean, integrator="euler")
+    assert found[0, 0] == pytest.approx(expected, rel=1e-8)
+
+
+def test_more_runs_and_less_noise_act_as_they_must():
+    parts = trial_parts(PRIMITIVES, RUNS)
+    once = expected_covariance(QUIET, parts, NAMES, environment=CURRENT)
+    thrice = expected_covariance(QUIET, [replace(part, repeats=3) for part in parts], NAMES, environment=CURRENT)
+    assert np.allclose(3 * thrice, once, rtol=1e-9)
+    louder = replace(QUIET, sensors=Sensors(velocity_mps=0.06, yaw_rate_radps=0.06))
+    strong = Environment(current_variation=Variation(std_mps=0.06))
+    assert np.allclose(expected_covariance(louder, parts, NAMES, environment=strong), 9 * once, rtol=1e-9)
+    assert (np.linalg.eigvalsh(once / np.sqrt(np.outer(np.diag(once), np.diag(once)))) > 0).all()
+
+
+def test_repeats_are_the_same_as_parts_written_out():
+    parts = trial_parts(PRIMITIVES, RUNS)
+    twice = [replace(part, repeats=2) for part in parts]
+    for mean in ("none", "batch", "complete"):
+        written_out = expected_covariance(QUIET, [*parts, *parts], NAMES, mean_subtraction=mean)
+        assert np.allclose(expected_covariance(QUIET, twice, NAMES, mean_subtraction=mean), written_out, rtol=1e-9)
+
+
+def test_what_nothing_excites_is_named():
+    straight = trial_parts(PRIMITIVES, (1,) + (0,) * 10)
+    with pytest.raises(NotInformative, match="Y_v"):
+        expected_covariance(QUIET, straight, NAMES, mean_subtraction="none")
+
+
+@pytest.mark.parametrize("trials", [pytest.param(1000, marks=pytest.mark.slow), 100])
+def test_predicted_standard_deviations_are_those_of_simulated_trials(trials):
+    rehearsal = Rehearsal(
+        truth=QUIET,
+        nominal=NOMINAL,
+        primitives=PRIMITIVES,
+        designs={"mixed": RUNS},
+        total_s=200.0,
+        environment=CURRENT,
+        parameters=NAMES,
+        integrator="euler",
+        trials=trials,
+    )
+    (result,) = validate(rehearsal)
+    assert result.failed == 0
+    ratio = result.found / result.theory
+    # a standard deviation from n trials is known to 1 / sqrt(2 n); ten parameters share the chance
+    allowed = 0.10 + 2.8 / np.sqrt(2 * trials)
+    assert (np.abs(ratio - 1.0) < allowed).all(), dict(zip(NAMES, ratio.round(3), strict=True))
+
+
+def test_any_number_of_processes_and_any_interruption_give_the_same():
+    rehearsal = Rehearsal(
+        truth=QUIET,
+        nominal=NOMINAL,
+        primitives=PRIMITIVES,
+        designs={"mixed": RUNS, "random": None},
+        total_s=120.0,
+        environment=CURRENT,
+        parameters=NAMES,
+        integrator="euler",
+        trials=22,
+    )
+    kept: dict[str, np.ndarray] = {}
+    whole = validate(rehearsal, keep=kept.__setitem__)
+    half = {key: rows for key, rows in kept.items() if key.endswith("/0")}
+    assert 0 < len(half) < len(kept)
+    resumed = validate(rehearsal, jobs=2, done=half)
+    for one, other in zip(whole, resumed, strict=True):
+        assert np.array_equal(one.estimates, other.estimates)
+        assert np.array_equal(one.stated, other.stated)
