@@ -20,7 +20,7 @@ from expdesign.plan.values import Leg
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation.environment import Environment
 from expdesign.values import Array
-from expdesign.vessel import column_name
+from expdesign.vessel import Variation, column_name
 
 TRACK_COLUMNS = ("time_s", *POSE_COLUMNS, *VELOCITY_COLUMNS, "leg", "lat_deg", "lon_deg")
 STATE_TOLERANCE = 1e-5
@@ -53,6 +53,8 @@ class _Medium(_Entry):
     north_mps: float
     east_mps: float
     std_mps: float = Field(ge=0)
+    variation_std_mps: float = Field(default=0.0, ge=0)
+    correlation_s: float = Field(default=0.0, ge=0)
 
 
 class _Environment(_Entry):
@@ -237,4 +239,6 @@ def _environment(file: _Environment) -> Environment:
         wind_to=np.array([wind.north_mps, wind.east_mps]),
         current_std_mps=current.std_mps,
         wind_std_mps=wind.std_mps,
+        current_variation=Variation(std_mps=current.variation_std_mps, correlation_s=current.correlation_s),
+        wind_variation=Variation(std_mps=wind.variation_std_mps, correlation_s=wind.correlation_s),
     )

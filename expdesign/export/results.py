@@ -22,7 +22,7 @@ from expdesign.information.primitive_information import PrimitiveInformation
 from expdesign.plan.values import Leg, Plan
 from expdesign.simulation.environment import Environment
 from expdesign.values import Array
-from expdesign.vessel import Vessel, column_name
+from expdesign.vessel import Variation, Vessel, column_name
 
 FRAME_SENTENCE = (
     "north_m and east_m are the northing and easting of the projection, in metres from the origin; "
@@ -136,8 +136,10 @@ def plan_json(plan: Plan, *, scenario: str, vessel: Vessel, environment: Environ
                 "meaning": FRAME_SENTENCE,
             },
             "environment": {
-                "current_to": _wind_or_current(environment.current_to, environment.current_std_mps),
-                "wind_to": _wind_or_current(environment.wind_to, environment.wind_std_mps),
+                "current_to": _wind_or_current(
+                    environment.current_to, environment.current_std_mps, environment.current_variation
+                ),
+                "wind_to": _wind_or_current(environment.wind_to, environment.wind_std_mps, environment.wind_variation),
             },
             "legs": [_leg_entry(plan, index, leg) for index, leg in enumerate(plan.legs)],
             "informative_s": plan.seconds("primitive"),
@@ -241,8 +243,11 @@ def _named(columns: Sequence[str], values: Array) -> dict[str, float]:
     return dict(zip(columns, values.tolist(), strict=True))
 
 
-def _wind_or_current(velocity: Array, std_mps: float) -> dict[str, float]:
-    return {"north_mps": float(velocity[0]), "east_mps": float(velocity[1]), "std_mps": std_mps}
+def _wind_or_current(velocity: Array, std_mps: float, variation: Variation) -> dict[str, float]:
+    entry = {"north_mps": float(velocity[0]), "east_mps": float(velocity[1]), "std_mps": std_mps}
+    if variation.std_mps:
+        entry |= {"variation_std_mps": variation.std_mps, "correlation_s": variation.correlation_s}
+    return entry
 
 
 def _finite(value: float) -> float | None:

@@ -1,4 +1,4 @@
-"""Rates of motion of many runs at once, as a flat list of NumPy calls into memory that is set aside beforehand.
+"""Motion of many runs at once: rates as a flat list of NumPy calls into memory that is set aside beforehand.
 
 What depends on commands and constants alone, such as the generalised force, is worked out for a whole stretch of
 samples at once; a step then only does what depends on the motion. The operations are those of `motion_rates`, so the
@@ -7,33 +7,44 @@ result is that of a plain simulation to rounding.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
-from expdesign.simulation.motion import motion_rates
+from expdesign.errors import UnknownName
+from expdesign.simulation._numba import BINARY, OPERATIONS, kernels
+from expdesign.simulation.motion import State, Step, euler_step, motion_rates, relative_velocity
 from expdesign.simulation.tape import SYMBOLIC, Symbol, Tape
 from expdesign.values import Array
 from expdesign.vessel import VesselModel
 
 STATES = 6
+OUT = STATES + 4
+OWN = OUT + STATES + 2
+"""Rows of memory: state, sea, results (rates and relative wind), then parameters of the runs' own, inputs and more."""
 
 
 class RatesProgram:
     """Rates of motion of n runs: `hold` inputs, `select` a row of them, then call `rates`, as often as need be.
 
+    All memory is one table with a row of n numbers for each value.
+
     Attributes:
         sea: (4, n) n-frame current and wind to north and east [m/s]; write into it.
+        air: (2, n) where the next call of `rates` leaves the relative wind (u_q, v_q), or None.
     """
 
-    def __init__(self, model: VesselModel, *, runs: int, own_inputs: bool, parameters: Array | None = None) -> None:
+    def __init__(
+        self, model: VesselModel, *, runs: int, parameters: Array | None = None, engine: str = "numpy"
+    ) -> None:
         """Write the equations down and set memory aside.
 
         Args:
             model: structure and actuators.
             runs: n.
-            own_inputs: every run has inputs of its own; otherwise all share them.
             parameters: (p,) for all runs alike or (n, p), in the model's own form; None for the model's.
+            engine: "numpy", or "numba" which does the calls of a step in compiled code.
         """
         theta = model.parameters if parameters is None else parameters
         self._tape = tape = Tape()
@@ -41,14 +52,22 @@ class RatesProgram:
         inputs = tape.given("input", len(model.inputs))
         values = theta.tolist() if theta.ndim == 1 else tape.given("parameter", len(model.terms))
         rates = motion_rates(model, state, inputs, current_to=sea[:2], wind_to=sea[2:], ops=SYMBOLIC, parameters=values)
-        results = [rate if isinstance(rate, Symbol) else tape.constant(rate) for rate in rates]
+        _, air = relative_velocity(state, sea[:2], sea[2:], SYMBOLIC)
+        results = [value if isinstance(value, Symbol) else tape.constant(value) for value in (*rates, *air)]
         self._places = tape.needed(results)
         self._rested, self._held = self._split()
-        self.sea = np.zeros((4, runs))
-        self._state, self._rates = np.zeros((STATES, runs)), np.zeros((STATES, runs))
-        self._current = np.zeros((len(self._held), runs if own_inputs else 1))
-        self._table = np.zeros((0, *self._current.shape))
-        self._calls = self._bound(np.ascontiguousarray(theta.T), [result.place for result in results])
+        self._own = len(model.terms) if theta.ndim == 2 else 0
+        codes, rows, constants = self._laid_out([result.place for result in results])
+        memory = np.zeros((rows, runs))
+        for row, number in constants.items():
+            memory[row] = number
+        if self._own:
+            memory[OWN : OWN + self._own] = theta.T
+        self._state, self.sea, self._results = memory[:STATES], memory[STATES:OUT], memory[OUT:OWN]
+        self.air: Array | None = None
+        first = OWN + self._own
+        self._current, self._table = memory[first : first + len(self._held)], np.zeros((0, 0, 0))
+        self._run = prepared(codes, memory, constants, engine)
 
     def hold(self, inputs: Array) -> None:
         """Take delivered inputs (k, m, n), or (k, m, 1) where all runs share them."""
@@ -61,7 +80,7 @@ class RatesProgram:
                 values[place] = inputs[:, int(entry.number)]
             elif place in self._rested:
                 values[place] = getattr(np, entry.name)(*(values[argument] for argument in entry.arguments))
-        self._table = np.empty((len(inputs), *self._current.shape))
+        self._table = np.empty((len(inputs), len(self._held), inputs.shape[-1]))
         for index, place in enumerate(self._held):
             self._table[:, index] = values[place]
 
@@ -70,11 +89,15 @@ class RatesProgram:
         self._current[...] = self._table[row]
 
     def rates(self, state: tuple[Array, ...]) -> tuple[Array, ...]:
-        """Time derivative of the state, (6, n) each, packed as one entry so that every integrator takes them."""
+        """Time derivative of the state, (6, n) each, packed as one entry so that every integrator takes them.
+
+        The next call overwrites it.
+        """
         self._state[...] = state[0]
-        for call, arguments in self._calls:
-            call(*arguments)
-        return (self._rates.copy(),)
+        self._run()
+        if self.air is not None:
+            self.air[...], self.air = self._results[STATES:], None
+        return (self._results[:STATES],)
 
     def _split(self) -> tuple[set[int], list[int]]:
         """Places that rest on inputs and constants alone, and those among them that the motion reads."""
@@ -86,27 +109,91 @@ class RatesProgram:
         read = {argument for place in self._places if place not in rested for argument in entries[place].arguments}
         return rested, sorted(place for place in rested & read if entries[place].name != "constant")
 
-    def _bound(self, theta: Array, results: list[int]) -> list[tuple[Any, tuple[Any, ...]]]:
-        """Every operation with its operands and where its value goes; memory is used again once nobody reads it."""
-        entries = self._tape.entries
-        given = {"state": self._state, "sea": self.sea, "parameter": theta}
-        where: dict[int, Any] = {place: self._current[index] for index, place in enumerate(self._held)}
+    def _laid_out(self, results: list[int]) -> tuple[Array, int, dict[int, float]]:
+        """Operations as (operation, operand, operand, result) rows of memory, the number of rows, and constant rows.
+
+        A row is used again once nobody reads what it holds.
+        """
+        entries, begins = self._tape.entries, {"state": 0, "sea": STATES, "parameter": OWN}
+        first = OWN + self._own
+        where = {place: first + index for index, place in enumerate(self._held)}
+        rows, constants = first + len(self._held), dict[int, float]()
         last = {argument: place for place in self._places for argument in entries[place].arguments}
-        calls, free, temporary = [], list[Array](), set[int]()
+        codes, free, temporary = [], list[int](), set[int]()
         for place in self._places:
             entry = entries[place]
-            if entry.name == "constant":
-                where[place] = np.asarray(entry.number)
-            elif entry.name in given:
-                where[place] = given[entry.name][int(entry.number)]
+            if entry.name in begins:
+                where[place] = begins[entry.name] + int(entry.number)
+            elif entry.name == "constant":
+                where[place], constants[rows], rows = rows, entry.number, rows + 1
             elif place not in self._rested:
                 operands = [where[argument] for argument in entry.arguments]
                 free += [where[a] for a in {*entry.arguments} & temporary if last[a] == place]
                 if place in results:
-                    where[place] = self._rates[results.index(place)]
+                    where[place] = OUT + results.index(place)
+                elif free:
+                    where[place] = free.pop()
                 else:
-                    where[place] = free.pop() if free else np.empty(self._state.shape[1])
+                    where[place], rows = rows, rows + 1
+                if place not in results:
                     temporary.add(place)
-                calls.append((getattr(np, entry.name), (*operands, where[place])))
-        copies = [(np.positive, (where[place], row)) for place, row in zip(results, self._rates, strict=True)]
-        return calls + [copy for copy in copies if not np.shares_memory(*copy[1])]
+                codes.append((OPERATIONS.index(entry.name), operands[0], operands[-1], where[place]))
+        for row, place in enumerate(results, start=OUT):
+            if where[place] != row:
+                codes.append((OPERATIONS.index("positive"), where[place], where[place], row))
+        return np.array(codes), rows, constants
+
+
+def prepared(codes: Array, memory: Array, constants: Mapping[int, float], engine: str) -> Callable[[], None]:
+    """A function that does the operations on the memory.
+
+    Raises:
+        UnknownName: no such engine.
+        InputError: numba is not installed.
+    """
+    if engine == "numba":
+        return kernels().execute(codes, memory)
+    if engine != "numpy":
+        raise UnknownName("engine", engine, known=("numpy", "numba"))
+    rows = [np.asarray(constants[row]) if row in constants else memory[row] for row in range(len(memory))]
+    calls = [
+        (getattr(np, OPERATIONS[code]), (rows[a], rows[b], rows[out]) if code in BINARY else (rows[a], rows[out]))
+        for code, a, b, out in codes.tolist()
+    ]
+
+    def run() -> None:
+        for call, arguments in calls:
+            call(*arguments)
+
+    return run
+
+
+def march(
+    program: RatesProgram, given: Array, state: Array, *, step: Step, step_s: float, substeps: int
+) -> Iterator[Array]:
+    """The state (6, n) at every sample, then at the end of the last one.
+
+    While it stands at a sample, the caller may set the program's `sea` and `air`.
+
+    Args:
+        program: of the runs.
+        given: (k, substeps, m, n), or 1 in place of substeps where inputs are held over a sample, or in place of n
+            where runs share them.
+        state: (6, n) at the first sample.
+        step: of the integrator.
+        step_s: its length [s].
+        substeps: steps per sample.
+    """
+
+    def kept(x: State) -> State:
+        return (program.rates(x)[0].copy(),)
+
+    rows, rates = given.shape[1], program.rates if step is euler_step else kept
+    program.hold(given.reshape(-1, *given.shape[2:]))
+    for k in range(len(given)):
+        yield state
+        for part in range(substeps):
+            if part < rows:
+                program.select(k * rows + part)
+            (state,) = step(rates, (state,), step_s)
+    yield state

@@ -12,8 +12,9 @@ from expdesign.signals import Commands, Trajectory
 from expdesign.simulation.actuation import deliver
 from expdesign.simulation.environment import CALM, Environment, WeatherSeries, weather_rows
 from expdesign.simulation.motion import State, integrator_step, motion_rates, rk4_step
+from expdesign.simulation.program import STATES, RatesProgram, march
 from expdesign.values import Array
-from expdesign.vessel import NUMPY, SCALAR, Vessel
+from expdesign.vessel import SCALAR, Vessel
 
 SUBSTEPS = 2
 """Runge-Kutta steps per sample; a step is at most a fifth of the fastest time constant of the reference vessels."""
@@ -80,6 +81,7 @@ def simulate_many(
     current_to: Array,
     wind_to: Array,
     parameters: Array,
+    standing: Array | None = None,
     substeps: int = SUBSTEPS,
 ) -> Array:
     """Many runs at once: the same commands for n truths, or commands of their own for each.
@@ -90,6 +92,8 @@ def simulate_many(
         pose, velocity: (n, 3) start states.
         current_to, wind_to: (n, 2) steady n-frame velocities.
         parameters: (n, p) in the model's own form.
+        standing: commands that stood before the first sample, (m,) or with commands of their own (n, m); None for those
+            of the first sample.
         substeps: Runge-Kutta steps per sample.
 
     Returns:
@@ -97,25 +101,19 @@ def simulate_many(
     """
     if isinstance(commands, Commands):
         _check_inputs(vessel, commands)
-        held_rows, sample_time_s = commands.values, commands.sample_time_s
+        told, sample_time_s = commands.values[..., None], commands.sample_time_s
     else:
-        held_rows, sample_time_s = commands.transpose(1, 2, 0), vessel.sample_time_s
-    state: State = tuple(np.asarray(column, dtype=float) for column in (*pose.T, *velocity.T))
-    rows = [np.stack(state, axis=-1)]
-    theta, current, wind = parameters.T, current_to.T, wind_to.T
-    step_s = sample_time_s / substeps
+        told, sample_time_s = commands.transpose(1, 2, 0), vessel.sample_time_s
+    before = None if standing is None else np.asarray(standing, dtype=float).T.reshape(told.shape[1], -1)
+    given = deliver(vessel.responses, told, sample_time_s=sample_time_s, substeps=substeps, standing=before)
+    runs = len(pose)
+    program = RatesProgram(vessel.model, runs=runs, parameters=parameters)
+    program.sea[...] = np.concatenate([current_to.T, wind_to.T])
+    start, result = np.concatenate([pose.T, velocity.T]), np.empty((len(told) + 1, runs, STATES))
+    states = march(program, given, start, step=rk4_step, step_s=sample_time_s / substeps, substeps=substeps)
     with np.errstate(over="ignore", invalid="ignore"):
-        for inputs in held_rows:
-
-            def rates(x: State, held: Array = inputs) -> State:
-                return motion_rates(
-                    vessel.model, x, held, current_to=current, wind_to=wind, ops=NUMPY, parameters=theta
-                )
-
-            for _ in range(substeps):
-                state = rk4_step(rates, state, step_s)
-            rows.append(np.stack(state, axis=-1))
-    result = np.array(rows)
+        for row, state in zip(result, states, strict=True):
+            row[...] = state.T
     settled = np.abs(result[..., 3:]).max(axis=(0, 2)) < LARGEST_SPEED
     result[:, ~settled] = np.nan
     return result

@@ -28,12 +28,17 @@ def noise_std(sensors: Sensors) -> Array:
     )
 
 
-def observe(sensors: Sensors, states: Array, wind_to: Array, noise: Array, *, sample_time_s: float) -> Array:
+def prompt(sensors: Sensors) -> bool:
+    """True when every sample tells of itself: no delays, no repeated readings."""
+    return not any(getattr(sensors, name).delay_s or getattr(sensors, name).interval_s for name in OWNERS)
+
+
+def observe(sensors: Sensors, states: Array, air: Array, noise: Array, *, sample_time_s: float) -> None:
     """What sensors tell of a motion.
 
         position = north/east + R(heading) (forward, starboard)       heading = heading + bias
         u = u - r starboard     v = v + r forward                      r = scale r
-        (u_q, v_q) = (u, v) - wind, and the same lever arm for a wind sensor of its own place
+        (u_q, v_q) likewise for the place of the wind sensor
 
     all late by each sensor's delay, held over its interval, plus noise; a vane's noise is on speed and angle, and
     (u_q, v_q) = V (cos angle, sin angle). Before the first sample all was as at the first sample.
@@ -41,33 +46,29 @@ def observe(sensors: Sensors, states: Array, wind_to: Array, noise: Array, *, sa
     Args:
         sensors: noise, places, timing, faults.
         states: (k, 6, ...) pose, heading continuous, and velocity over ground at the samples.
-        wind_to: (k, 2, ...) n-frame wind at the samples.
-        noise: (k, 8, ...) with the deviations of `noise_std`.
+        air: (k, 2, ...) velocity through air (u_q, v_q) of the origin at the samples.
+        noise: (k, 8, ...) with the deviations of `noise_std`; becomes the measured rows.
         sample_time_s: time between samples [s].
-
-    Returns:
-        (k, 8, ...) measured rows.
 
     Source: F. Ljungberg, doctoral thesis, Linköping University, (5.39)-(5.50), with the angle counted clockwise from
     the bow; T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control (2011), (2.28) for lever arms.
     """
-    told = np.empty_like(noise)
     for name, rows in OWNERS.items():
-        mounting: Mounting = getattr(sensors, name)
-        signals = np.stack(_SIGNALS[name](sensors, states, wind_to), axis=1)
-        time, origin = _readings(mounting, len(states), sample_time_s)
-        seen, error = _late(signals, time), noise[:, list(rows)]
-        if origin is not None:
-            error = error[origin]
+        time, origin = _readings(getattr(sensors, name), len(states), sample_time_s)
+        for row, signal in zip(rows, _SIGNALS[name](sensors, states, air), strict=True):
+            if origin is not None:
+                noise[:, row] = noise[origin, row]
+            if name != "wind" or sensors.wind_sensor != "vane":
+                noise[:, row] += _late(signal, time)
         if name == "wind" and sensors.wind_sensor == "vane":
-            told[:, list(rows)] = _vane(seen, error)
-        else:
-            told[:, list(rows)] = seen + error
-    return told
+            seen = (_late(signal, time) for signal in _wind(sensors, states, air))
+            noise[:, 6], noise[:, 7] = _vane(*seen, noise[:, 6], noise[:, 7])
 
 
-def _position(sensors: Sensors, states: Array, wind_to: Array) -> tuple[Array, ...]:
+def _position(sensors: Sensors, states: Array, air: Array) -> tuple[Array, ...]:
     place = sensors.position
+    if not (place.forward_m or place.starboard_m):
+        return states[:, 0], states[:, 1]
     c, s = np.cos(states[:, 2]), np.sin(states[:, 2])
     return (
         states[:, 0] + c * place.forward_m - s * place.starboard_m,
@@ -75,22 +76,20 @@ def _position(sensors: Sensors, states: Array, wind_to: Array) -> tuple[Array, .
     )
 
 
-def _heading(sensors: Sensors, states: Array, wind_to: Array) -> tuple[Array, ...]:
+def _heading(sensors: Sensors, states: Array, air: Array) -> tuple[Array, ...]:
     return (states[:, 2] + sensors.heading_bias_rad,)
 
 
-def _velocity(sensors: Sensors, states: Array, wind_to: Array) -> tuple[Array, ...]:
-    return _at(sensors.velocity, states)
+def _velocity(sensors: Sensors, states: Array, air: Array) -> tuple[Array, ...]:
+    return _moved(sensors.velocity, states[:, 3], states[:, 4], states[:, 5])
 
 
-def _yaw_rate(sensors: Sensors, states: Array, wind_to: Array) -> tuple[Array, ...]:
-    return (sensors.yaw_rate_scale * states[:, 5],)
+def _yaw_rate(sensors: Sensors, states: Array, air: Array) -> tuple[Array, ...]:
+    return (states[:, 5] if sensors.yaw_rate_scale == 1.0 else sensors.yaw_rate_scale * states[:, 5],)
 
 
-def _wind(sensors: Sensors, states: Array, wind_to: Array) -> tuple[Array, ...]:
-    u, v = _at(sensors.wind, states)
-    u_w, v_w = to_body((wind_to[:, 0], wind_to[:, 1]), states[:, 2], NUMPY)
-    return u - u_w, v - v_w
+def _wind(sensors: Sensors, states: Array, air: Array) -> tuple[Array, ...]:
+    return _moved(sensors.wind, air[:, 0], air[:, 1], states[:, 5])
 
 
 _SIGNALS: dict[str, Any] = {
@@ -102,10 +101,11 @@ _SIGNALS: dict[str, Any] = {
 }
 
 
-def _at(place: Mounting, states: Array) -> tuple[Array, Array]:
-    """Velocity over ground of a place on the ship, in the b-frame."""
-    r = states[:, 5]
-    return states[:, 3] - r * place.starboard_m, states[:, 4] + r * place.forward_m
+def _moved(place: Mounting, u: Array, v: Array, r: Array) -> tuple[Array, Array]:
+    """Velocity of a place on the ship, from that of the origin, in the b-frame."""
+    if not (place.forward_m or place.starboard_m):
+        return u, v
+    return u - r * place.starboard_m, v + r * place.forward_m
 
 
 def _readings(mounting: Mounting, count: int, sample_time_s: float) -> tuple[Array | None, Any]:
@@ -129,11 +129,10 @@ def _late(signals: Array, time: Array | None) -> Array:
     return np.asarray((1.0 - share) * signals[before] + share * signals[after])
 
 
-def _vane(seen: Array, error: Array) -> Array:
-    """Components (k, 2, ...) as a vane's noisy speed and angle give them."""
-    speed = np.hypot(seen[:, 0], seen[:, 1]) + error[:, 0]
-    angle = np.arctan2(seen[:, 1], seen[:, 0]) + error[:, 1]
-    return np.stack([speed * np.cos(angle), speed * np.sin(angle)], axis=1)
+def _vane(u_q: Array, v_q: Array, speed_noise: Array, angle_noise: Array) -> tuple[Array, Array]:
+    """Components as a vane's noisy speed and angle give them."""
+    speed, angle = np.hypot(u_q, v_q) + speed_noise, np.arctan2(v_q, u_q) + angle_noise
+    return speed * np.cos(angle), speed * np.sin(angle)
 
 
 def measure(
@@ -159,9 +158,11 @@ def measure(
     """
     count = len(commands)
     states = np.concatenate([trajectory.pose[:count], trajectory.velocity[:count]], axis=1)
-    noise = (noise_std(vessel.sensors)[:, None] * rng.standard_normal((len(ROWS), count))).T
     _, wind = weather_rows(environment, count)
-    told = observe(vessel.sensors, states, wind, noise, sample_time_s=commands.sample_time_s).T
+    u_w, v_w = to_body(wind.T, states[:, 2], NUMPY)
+    air = np.stack([states[:, 3] - u_w, states[:, 4] - v_w], axis=1)
+    told = noise_std(vessel.sensors)[:, None] * rng.standard_normal((len(ROWS), count))
+    observe(vessel.sensors, states, air, told.T, sample_time_s=commands.sample_time_s)
     columns = {
         "time_s": trajectory.time_s[:count],
         "north_m": told[0],

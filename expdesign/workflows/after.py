@@ -33,8 +33,8 @@ from expdesign.export import (
 from expdesign.export.estimate_page import EstimateContent, estimate_html
 from expdesign.records import load_records
 from expdesign.scenario import load_vessel
-from expdesign.signals import Record
-from expdesign.simulation import draw_environment, measure
+from expdesign.signals import Commands, Record
+from expdesign.simulation import Environment, WeatherSeries, draw_environment, draw_weather, measure
 from expdesign.simulation import simulate as simulate_run
 from expdesign.vessel import Vessel, column_name
 from expdesign.vessel.structures import FORCE_SIGNALS
@@ -54,7 +54,10 @@ def export(plan: Path, out: Path | None, *, formats: Sequence[str], progress: Pr
 
 
 def simulate(plan: Path, out: Path | None, *, truth: Path, seed: int = 0, progress: Progress = silent) -> Outcome:
-    """The commands of a plan run open loop on another vessel in drawn weather, and what its sensors record."""
+    """The commands of a plan run open loop on another vessel in drawn weather, and what its sensors record.
+
+    Mean current and wind are drawn around the plan's forecast, and vary from sample to sample as the forecast says.
+    """
     progress("reading the plan", 0.05)
     track, vessel = read_plan(plan), load_vessel(truth)
     if (vessel.model.inputs, vessel.sample_time_s) != (track.commands.names, track.commands.sample_time_s):
@@ -67,9 +70,9 @@ def simulate(plan: Path, out: Path | None, *, truth: Path, seed: int = 0, progre
     rng = np.random.default_rng(seed)
     weather = draw_environment(track.environment, rng)
     progress("simulating the trial", 0.2)
-    begin = track.trajectory
-    sailed = simulate_run(vessel, track.commands, pose=begin.pose[0], velocity=begin.velocity[0], environment=weather)
-    columns = measure(vessel, track.commands, sailed, environment=weather, rng=rng)
+    begin, met = track.trajectory, _met(weather, track.commands, rng)
+    sailed = simulate_run(vessel, track.commands, pose=begin.pose[0], velocity=begin.velocity[0], environment=met)
+    columns = measure(vessel, track.commands, sailed, environment=met, rng=rng)
     apart = np.hypot(*(sailed.pose - begin.pose)[:, :2].T)
     files = write_files(out or plan.parent, {"measured.csv": _csv(columns)})
     summary = {
@@ -82,6 +85,13 @@ def simulate(plan: Path, out: Path | None, *, truth: Path, seed: int = 0, progre
         "wind_to_east_mps": float(weather.wind_to[1]),
     }
     return Outcome(files=files, summary=summary)
+
+
+def _met(weather: Environment, commands: Commands, rng: np.random.Generator) -> Environment | WeatherSeries:
+    """Weather that does not vary needs no numbers for every sample."""
+    if weather.steady:
+        return weather
+    return draw_weather(weather, len(commands), sample_time_s=commands.sample_time_s, rng=rng)
 
 
 def estimate(

@@ -1,0 +1,194 @@
+"""Lag, dead time, dead band and misalignment: closed forms, a fine independent integration, one answer everywhere."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from design_case import vessel
+from scipy.integrate import solve_ivp
+
+from expdesign.errors import InputError
+from expdesign.signals import Commands
+from expdesign.simulation import (
+    CALM,
+    Environment,
+    deliver,
+    delivered,
+    delivered_at_samples,
+    sample_map,
+    simulate,
+    simulate_ensemble,
+    simulate_many,
+)
+from expdesign.vessel import IDEAL, Response, Sensors, Vessel
+
+SHIP = replace(vessel("azimuth-30m-true"), sensors=Sensors())
+SPEED = Response(lag_s=3.0, delay_s=1.4, deadband=0.5)
+ANGLE = Response(lag_s=1.2, delay_s=0.3, offset=0.04)
+SEA = Environment(current_to=np.array([0.2, -0.1]), wind_to=np.array([-3.0, 5.0]))
+STANDING = np.array([4.0, 0.2, 6.0, -0.1])
+
+
+def sluggish(*responses: Response) -> Vessel:
+    """The ship with these responses for n1, a1, n2, a2."""
+    fore, aft = SHIP.actuators
+    actuators = (replace(fore, responses=responses[:2]), replace(aft, responses=responses[2:]))
+    return replace(SHIP, model=replace(SHIP.model, actuators=actuators))
+
+
+def random_commands(count: int, seed: int = 0) -> Commands:
+    rng = np.random.default_rng(seed)
+    values = rng.uniform([-10, -1, -10, -1], [10, 1, 10, 1], (count, 4))
+    return Commands(sample_time_s=1.0, names=SHIP.model.inputs, values=values)
+
+
+def test_a_step_is_answered_by_the_exponential():
+    lag, step_s, count = 2.5, 0.25, 40
+    values = np.ones((count, 1))
+    response = (Response(lag_s=lag),)
+    ends = delivered_at_samples(response, values, sample_time_s=step_s, standing=np.zeros(1))[:, 0]
+    time_s = step_s * np.arange(count + 1)
+    np.testing.assert_allclose(ends, 1 - np.exp(-time_s / lag), atol=1e-14)
+    means = deliver(response, values, sample_time_s=step_s, substeps=5, standing=np.zeros(1))[..., 0].ravel()
+    begins = step_s / 5 * np.arange(5 * count)
+    integral = begins[1] + lag * np.exp(-begins / lag) * np.expm1(-begins[1] / lag)
+    np.testing.assert_allclose(means, integral / begins[1], atol=1e-12)
+
+
+@pytest.mark.parametrize("delay", [0.3, 1.0, 2.75])
+def test_dead_time_shifts_what_was_commanded(delay: float):
+    values = np.arange(1.0, 9.0)[:, None]
+    means = deliver((Response(delay_s=delay),), values, sample_time_s=1.0, standing=np.zeros(1))[:, 0, 0]
+    whole, part = int(delay), delay % 1
+    held = np.concatenate([np.zeros(whole + 1), values[:, 0]])
+    np.testing.assert_allclose(means, part * held[:8] + (1 - part) * held[1:9], atol=1e-14)
+
+
+def test_commands_inside_the_dead_band_do_nothing_and_others_all_they_say():
+    values = np.array([[0.4], [-0.49], [0.5], [-3.0]])
+    means = deliver((Response(deadband=0.5),), values, sample_time_s=1.0)[:, 0, 0]
+    np.testing.assert_array_equal(means, [0.0, 0.0, 0.5, -3.0])
+
+
+def test_misalignment_is_added():
+    values = random_commands(5).values
+    given = deliver((IDEAL, Response(offset=0.1), IDEAL, IDEAL), values, sample_time_s=1.0)[:, 0]
+    np.testing.assert_allclose(given - values, np.tile([0.0, 0.1, 0.0, 0.0], (5, 1)), atol=1e-15)
+
+
+@pytest.mark.parametrize("response", [SPEED, ANGLE, Response(lag_s=0.05, delay_s=2.0), Response(delay_s=0.61)])
+def test_means_and_ends_are_those_of_a_fine_independent_integration(response: Response):
+    """The differential equation stepped ten thousand times a sample, from its own picture of delay and dead band."""
+    values, standing, fine = random_commands(6, seed=3).values[:, :1], 2.0, 10_000
+    time_s = (np.arange(6 * fine) + 0.5) / fine
+    asked = np.where(
+        time_s < response.delay_s,
+        standing,
+        values[np.maximum(time_s - response.delay_s, 0).astype(int), 0],
+    )
+    asked[np.abs(asked) < response.deadband] = 0.0
+    x, track = standing, []
+    for target in asked:
+        after = target + (x - target) * np.exp(-1 / fine / response.lag_s) if response.lag_s else target
+        track.append((x + after) / 2 if response.lag_s else target)
+        x = after
+    means = np.array(track).reshape(24, -1).mean(axis=1) + response.offset
+    given = deliver((response,), values, sample_time_s=1.0, substeps=4, standing=np.array([standing]))
+    np.testing.assert_allclose(given.ravel(), means, atol=1e-6)
+    last = delivered_at_samples((response,), values, sample_time_s=1.0, standing=np.array([standing]))[-1, 0]
+    assert last == pytest.approx(x + response.offset, abs=1e-9)
+
+
+def test_shares_of_what_is_delivered_sum_to_one_and_steps_make_up_the_sample():
+    for response in (SPEED, ANGLE, Response(lag_s=1e-9), Response(lag_s=1e9, delay_s=0.5), IDEAL):
+        many, one = (sample_map(response, sample_time_s=1.0, substeps=count) for count in (7, 1))
+        np.testing.assert_allclose(many.means.sum(axis=1), 1.0, rtol=1e-12)
+        assert many.end.sum() == pytest.approx(1.0)
+        np.testing.assert_allclose(many.means.mean(axis=0), one.means[0], atol=1e-9)
+        np.testing.assert_allclose(many.end, one.end, atol=1e-9)
+
+
+def test_ideal_actuators_change_no_bit():
+    commands = random_commands(50)
+    assert deliver(SHIP.responses, commands.values, sample_time_s=1.0)[:, 0].tobytes() == commands.values.tobytes()
+    same = sluggish(IDEAL, IDEAL, IDEAL, Response(lag_s=0.0))
+    plain, again = (simulate(ship, commands, environment=SEA, standing=STANDING) for ship in (SHIP, same))
+    assert plain.pose.tobytes() == again.pose.tobytes()
+    mixed = sluggish(SPEED, IDEAL, SPEED, IDEAL)
+    given = deliver(mixed.responses, commands.values, sample_time_s=1.0, substeps=2)
+    np.testing.assert_array_equal(given[:, 0, [1, 3]], commands.values[:, [1, 3]])
+
+
+def test_commands_that_have_stood_for_long_are_delivered():
+    values = np.tile([5.0, 0.3, 5.0, 0.3], (30, 1))
+    given = deliver((SPEED, ANGLE, SPEED, ANGLE), values, sample_time_s=1.0, substeps=3)
+    np.testing.assert_allclose(given, np.broadcast_to(values[0] + [0, 0.04, 0, 0.04], (30, 3, 4)), atol=1e-14)
+
+
+def test_a_run_is_that_of_the_ship_with_its_lags_as_states():
+    """An adaptive integrator on ten states, against the two-stage answer; second order."""
+    lags = np.array([3.0, 1.2, 3.0, 1.2])
+    ship = sluggish(*(Response(lag_s=lag) for lag in lags))
+    commands, state = random_commands(20, seed=5), np.concatenate([[0, 0, 0, 1.0, 0.1, 0.0], STANDING])
+    for row in commands.values:
+
+        def slope(_: float, x: np.ndarray, row: np.ndarray = row) -> np.ndarray:
+            c, s = np.cos(x[2]), np.sin(x[2])
+            moving = [x[3] * c - x[4] * s, x[3] * s + x[4] * c, x[5]]
+            rates = SHIP.model.accelerations(x[3:6], x[3:5], x[6:])
+            return np.concatenate([moving, rates, (row - x[6:]) / lags])
+
+        state = solve_ivp(slope, (0, 1), state, rtol=1e-11, atol=1e-12).y[:, -1]
+    errors = []
+    for substeps in (4, 8, 16):
+        run = simulate(ship, commands, velocity=(1.0, 0.1, 0.0), standing=STANDING, substeps=substeps)
+        errors.append(np.abs(np.concatenate([run.pose[-1], run.velocity[-1]]) - state[:6]).max())
+    assert errors[0] < 0.05
+    assert errors[1] < errors[0] / 3
+    assert errors[2] < errors[1] / 3
+
+
+@pytest.mark.parametrize(("integrator", "substeps"), [("rk4", 2), ("rk4", 1), ("euler", 1), ("euler", 3)])
+@pytest.mark.parametrize("responses", [(IDEAL,) * 4, (SPEED, ANGLE, IDEAL, ANGLE)])
+@pytest.mark.parametrize("engine", ["numpy", "numba"])
+def test_one_run_and_many_runs_agree(integrator: str, substeps: int, responses: tuple[Response, ...], engine: str):
+    if engine == "numba":
+        pytest.importorskip("numba")
+    ship = sluggish(*responses)
+    runs = [random_commands(70, seed) for seed in range(3)]
+    how = {"standing": STANDING, "substeps": substeps}
+    many = simulate_ensemble(
+        ship, np.stack([c.values for c in runs], axis=1), runs=3, environment=SEA, rng=np.random.default_rng(0),
+        velocity=(1.0, 0.2, 0.0), integrator=integrator, engine=engine, **how,
+    )  # fmt: skip
+    for index, commands in enumerate(runs):
+        alone = simulate(ship, commands, velocity=(1.0, 0.2, 0.0), environment=SEA, integrator=integrator, **how)
+        np.testing.assert_allclose(many.pose[:, index], alone.pose[:-1], rtol=1e-10, atol=1e-10)
+        np.testing.assert_allclose(many.velocity[:, index], alone.velocity[:-1], rtol=1e-10, atol=1e-12)
+
+
+def test_truths_and_commands_of_their_own_are_delivered_alike():
+    ship = sluggish(SPEED, ANGLE, IDEAL, ANGLE)
+    runs, still = [random_commands(40, seed) for seed in range(3)], np.zeros((3, 2))
+    rest = {"pose": np.zeros((3, 3)), "velocity": np.tile([1.0, 0.0, 0.0], (3, 1)), "current_to": still,
+            "wind_to": still, "parameters": np.tile(SHIP.model.parameters, (3, 1))}  # fmt: skip
+    own = simulate_many(ship, np.stack([c.values for c in runs]), standing=np.tile(STANDING, (3, 1)), **rest)
+    shared = simulate_many(ship, runs[1], standing=STANDING, **rest)
+    for index, commands in enumerate(runs):
+        alone = simulate(ship, commands, velocity=(1.0, 0.0, 0.0), standing=STANDING, environment=CALM)
+        np.testing.assert_allclose(own[:, index, :3], alone.pose, rtol=1e-10, atol=1e-10)
+    np.testing.assert_allclose(shared[:, 0], own[:, 1], rtol=1e-10, atol=1e-10)
+
+
+def test_what_is_delivered_can_be_asked_for():
+    ship, commands = sluggish(SPEED, ANGLE, IDEAL, IDEAL), random_commands(12)
+    given = delivered(ship, commands, standing=STANDING)
+    assert given.names == commands.names
+    fine = deliver(ship.responses, commands.values, sample_time_s=1.0, substeps=6, standing=STANDING)
+    np.testing.assert_allclose(given.values, fine.mean(axis=1), atol=1e-12)
+
+
+@pytest.mark.parametrize("wrong", [{"lag_s": -1.0}, {"delay_s": np.inf}, {"deadband": np.nan}, {"offset": np.nan}])
+def test_responses_that_mean_nothing_are_refused(wrong: dict[str, float]):
+    with pytest.raises(InputError, match=r"response\."):
+        Response(**wrong)
