@@ -21,6 +21,7 @@ from expdesign.export import (
     track_csv,
     write_files,
 )
+from expdesign.export.cards import cards_html
 from expdesign.export.report import ReportContent, report_html
 from expdesign.information import PrimitiveInformation, estimated_parameters, score_primitives
 from expdesign.plan.solve import PlanProblem, plan_trial
@@ -37,14 +38,16 @@ def run(scenario: Path, out: Path | None, *, seed: int = 0, progress: Progress =
     progress("sharing out time", 0.1)
     design = designed(case, information)
     plan = planned(case, information, design, seed=seed, progress=within(progress, 0.1, 0.85))
-    progress("writing routes and report", 0.85)
+    progress("writing routes, run cards and report", 0.85)
+    content = _report(case, information, design, plan, seed)
     files = {
         **_dictionary_files(case, information),
         **growth_files(case, growth),
         "durations.json": durations_json(design, criterion=case.design.criterion),
         **_plan_files(case, plan),
         **_route_files(case, plan),
-        "report.html": report_html(_report(case, information, design, plan, seed)),
+        "report.html": report_html(content),
+        "cards.html": cards_html(content),
     }
     summary = {**growth_summary(growth), **_design_summary(design), **_plan_summary(plan)}
     return _written(case, out, files, summary, progress)

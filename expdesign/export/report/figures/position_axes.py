@@ -20,13 +20,15 @@ def nice_step(span: float, most: int) -> float:
     return next(step * power for step in STEPS if span / (step * power) <= most)
 
 
-def draw_position_ticks(axes: Axes, frame: LocalFrame, box: tuple[float, float, float, float]) -> None:
-    """Ticks at round minutes: latitude on the left edge, longitude on the lower edge."""
+def draw_position_ticks(
+    axes: Axes, frame: LocalFrame, box: tuple[float, float, float, float], *, most_lon: int = 5
+) -> None:
+    """Ticks at round minutes: latitude on the left edge, longitude on the lower edge, as many there as have room."""
     west, south, east, north = box
     (lat_low, lon_low), (lat_high, _) = frame.to_degrees(np.array([[south, west], [north, west]])).tolist()
     lon_high = frame.to_degrees(np.array([south, east])).tolist()[1]
     lats, lat_decimals = _round_minutes(lat_low, lat_high, 6)
-    lons, lon_decimals = _round_minutes(lon_low, lon_high + 360.0 * (lon_high < lon_low), 5)
+    lons, lon_decimals = _round_minutes(lon_low, lon_high + 360.0 * (lon_high < lon_low), most_lon)
     ticks_north = [float(frame.to_metres(np.array([lat, lon_low]))[0]) for lat in lats]
     ticks_east = [float(frame.to_metres(np.array([lat_low, lon]))[1]) for lon in lons]
     axes.set_yticks(ticks_north, [words.latitude(lat, lat_decimals) for lat in lats], fontsize=8)

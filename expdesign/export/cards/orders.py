@@ -1,0 +1,65 @@
+"""Actuator commands condensed to the few moments between which they change evenly, as a helmsman can follow them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from expdesign.signals import Commands
+from expdesign.values import Array
+from expdesign.vessel import Vessel
+
+TOLERANCE = 0.02
+"""Of each signal's span over the run: what the condensed orders may miss at most, unless rows run out."""
+MOST_ROWS = 24
+UNITS = {"n": ("rpm", 60.0), "a": ("deg", 180.0 / math.pi), "rudder": ("deg", 180.0 / math.pi)}
+
+
+def condensed(values: Array) -> tuple[list[int], float]:
+    """Samples of (k, m) commands to be called out, and the largest miss of straight lines between them.
+
+    Returns:
+        indices, the first and the last sample among them; the miss as a share of each signal's span.
+
+    Source: D. H. Douglas and T. K. Peucker (1973), on all signals together.
+    """
+    span = np.ptp(values, axis=0)
+    scaled = (values - values.min(axis=0)) / np.where(span > 1e-9, span, np.inf)
+    kept = [0, len(values) - 1] if len(values) > 1 else [0]
+    while len(kept) < min(MOST_ROWS, len(values)):
+        worst, place = _worst(scaled, kept)
+        if worst <= TOLERANCE:
+            break
+        kept = sorted({*kept, place})
+    return kept, _worst(scaled, kept)[0] if len(kept) < len(values) else 0.0
+
+
+def _worst(values: Array, kept: list[int]) -> tuple[float, int]:
+    samples = np.arange(len(values))
+    lines = np.stack([np.interp(samples, kept, column[kept]) for column in values.T], axis=1)
+    missed = np.abs(values - lines).max(axis=1)
+    return float(missed.max()), int(missed.argmax())
+
+
+def order_columns(vessel: Vessel) -> list[tuple[str, str, float]]:
+    """(signal, unit shown, factor to it) in command order: rpm and degrees; forces in the model's own unit."""
+    stems = [(name, name.rstrip("0123456789")) for name in vessel.model.inputs]
+    return [(name, *UNITS.get(stem, ("", 1.0))) for name, stem in stems]
+
+
+def order_rows(vessel: Vessel, commands: Commands, first: int, last: int) -> tuple[list[tuple[str, ...]], float]:
+    """Time from the start of the run [s] and every signal, row by row; and the largest miss as a share of its span."""
+    values = commands.values[first:last]
+    kept, missed = condensed(values)
+    factors = np.array([factor for *_, factor in order_columns(vessel)])
+    rows = []
+    for index in kept:
+        shown = values[index] * factors
+        rows.append((f"{index * commands.sample_time_s:.4g}", *(_figure(value) for value in shown.tolist())))
+    return rows, missed
+
+
+def _figure(value: float) -> str:
+    text = f"{value:.0f}" if abs(value) >= 20 else f"{value:.1f}"
+    return "0" if float(text) == 0 else text.replace("-", "\N{MINUS SIGN}")
