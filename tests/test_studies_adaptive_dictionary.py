@@ -14,7 +14,7 @@ def comparison() -> Comparison:
     settings = GrowSettings(
         rounds=3, pool=32, run_s=18.75, free_form=True, families=("zigzag", "turning_circle", "multisine")
     )
-    return compare("small", settings, runs=300)
+    return compare("small", settings, runs=200)
 
 
 def test_the_grown_design_is_worth_two_and_a_half_times_the_first_by_the_nominal_model(comparison: Comparison):

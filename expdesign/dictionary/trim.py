@@ -66,4 +66,5 @@ def _direct_trim(vessel: Vessel, velocity: Array) -> Array:
     ahead = np.array([name.startswith(("n", "tau_x")) for name in vessel.model.inputs])
     tries = [np.clip(start * np.sign(velocity[0]) * ahead, low + 1e-9, high - 1e-9) for start in STARTS]
     found = [least_squares(excess, start, bounds=(low, high), xtol=1e-15, ftol=1e-15, gtol=1e-15) for start in tries]
-    return np.asarray(min(found, key=lambda item: float(item.cost)).x * scale)
+    best: Array = min(found, key=lambda item: float(item.cost)).x
+    return np.asarray(best * scale)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -73,7 +74,7 @@ def grow_dictionary(
     first = best = optimum(grown, mean_subtraction)
     while True:
         tell = _within(progress, len(rounds), settings.rounds)
-        spec, found = search.best(best.inverse, lambda share, tell=tell: tell(SEARCHING, share))
+        spec, found = search.best(best.inverse, partial(tell, SEARCHING))
         left = found
         if spec is None or len(rounds) == settings.rounds:
             break

@@ -79,9 +79,9 @@ def _matrices(
         X = np.where(same, kept @ kept.transpose(0, 2, 1) / kept.shape[2], 0.0)
         Y = np.where(member, kept.mean(axis=2)[:, :, None], 0.0)
     if mean_subtraction == "none":
-        return X
+        return np.asarray(X)
     if mean_subtraction == "batch":
-        return X - Y @ Y.transpose(0, 2, 1)
+        return np.asarray(X - Y @ Y.transpose(0, 2, 1))
     unit = np.broadcast_to(np.eye(len(model.outputs)), (len(X), len(model.outputs), len(model.outputs)))
     return np.concatenate(
         [np.concatenate([X, Y], axis=2), np.concatenate([Y.transpose(0, 2, 1), unit], axis=2)], axis=1

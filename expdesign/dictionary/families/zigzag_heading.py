@@ -9,8 +9,7 @@ import numpy as np
 
 from expdesign.dictionary.families.orders import APPROACH, DURATION, helm_setting
 from expdesign.dictionary.spec import Excitation, Family, PrimitiveSpec, Setting
-from expdesign.simulation.helm import steady_ahead
-from expdesign.simulation.standard_trials import Conduct, zigzag
+from expdesign.simulation import Conduct, steady_ahead, zigzag
 from expdesign.vessel import Vessel
 
 
