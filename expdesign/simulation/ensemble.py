@@ -9,7 +9,7 @@ Source: F. Ljungberg, doctoral thesis, Linköping University, (3.18), (5.3), (5.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -123,21 +123,9 @@ def simulate_ensemble(
         substeps=substeps,
         standing=standing,
     )
-    states, seen = (np.empty((len(commands), rows, runs)) for rows in (STATES, len(ROWS)))
-    state, how = _start(pose, velocity, runs), {"step": step, "step_s": vessel.sample_time_s / substeps}
-    late = not prompt(vessel.sensors)
-    air = np.empty((len(commands) if late else STRETCH, 2, runs))
-    with np.errstate(over="ignore", invalid="ignore"):
-        for part, sea in _stretches(vessel, environment, seen, rng, engine):
-            stops = march(program, given[part], state, **how, substeps=substeps)
-            winds = air[part] if late else air[: len(sea)]
-            for row, wind, now, stop in zip(states[part], winds, sea, stops, strict=False):
-                row[...], program.sea[...], program.air = stop, now, wind
-            (state,) = stops
-            if not late:
-                observe(vessel.sensors, states[part], winds, seen[part], sample_time_s=vessel.sample_time_s)
-        if late:
-            observe(vessel.sensors, states, air, seen, sample_time_s=vessel.sample_time_s)
+    marching = partial(march, program, step=step, step_s=vessel.sample_time_s / substeps, substeps=substeps)
+    draw = partial(_stretches, vessel, environment, rng=rng, engine=engine)
+    states, seen = _sailed(vessel, program, given, _start(pose, velocity, runs), marching=marching, draw=draw)
     return Ensemble(
         sample_time_s=vessel.sample_time_s,
         input_names=vessel.model.inputs,
@@ -148,6 +136,37 @@ def simulate_ensemble(
         measured_velocity=seen[:, 3:6].swapaxes(1, 2),
         measured_wind=seen[:, 6:].swapaxes(1, 2),
     )
+
+
+def _sailed(
+    vessel: Vessel,
+    program: RatesProgram,
+    given: Array,
+    state: Array,
+    *,
+    marching: Callable[[Array, Array], Iterator[Array]],
+    draw: Callable[[Array], Iterator[tuple[slice, Array]]],
+) -> tuple[Array, Array]:
+    """States (k, 6, n) at the samples and what the sensors tell of them (k, 8, n).
+
+    Prompt sensors tell of a stretch while it is at hand, late ones when all is known.
+    """
+    samples, runs = len(given), state.shape[1]
+    states, seen = np.empty((samples, STATES, runs)), np.empty((samples, len(ROWS), runs))
+    late = not prompt(vessel.sensors)
+    air = np.empty((samples if late else STRETCH, 2, runs))
+    with np.errstate(over="ignore", invalid="ignore"):
+        for part, sea in draw(seen):
+            stops = marching(given[part], state)
+            winds = air[part] if late else air[: len(sea)]
+            for row, wind, now in zip(states[part], winds, sea, strict=True):
+                row[...], program.sea[...], program.air = next(stops), now, wind
+            state = next(stops)
+            if not late:
+                observe(vessel.sensors, states[part], winds, seen[part], sample_time_s=vessel.sample_time_s)
+        if late:
+            observe(vessel.sensors, states, air, seen, sample_time_s=vessel.sample_time_s)
+    return states, seen
 
 
 def _commands(vessel: Vessel, inputs: Array, runs: int) -> Array:
@@ -167,7 +186,7 @@ def _start(pose: Any, velocity: Any, runs: int) -> Array:
 
 
 def _stretches(
-    vessel: Vessel, environment: Environment, noise: Array, rng: np.random.Generator, engine: str
+    vessel: Vessel, environment: Environment, noise: Array, *, rng: np.random.Generator, engine: str
 ) -> Iterator[tuple[slice, Array]]:
     """Stretch after stretch of samples with its sea (k, 4, n); fills in the sensor noise (all samples, 8, n).
 

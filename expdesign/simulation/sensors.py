@@ -61,8 +61,8 @@ def observe(sensors: Sensors, states: Array, air: Array, noise: Array, *, sample
             if name != "wind" or sensors.wind_sensor != "vane":
                 noise[:, row] += _late(signal, time)
         if name == "wind" and sensors.wind_sensor == "vane":
-            seen = (_late(signal, time) for signal in _wind(sensors, states, air))
-            noise[:, 6], noise[:, 7] = _vane(*seen, noise[:, 6], noise[:, 7])
+            u_q, v_q = (_late(signal, time) for signal in _wind(sensors, states, air))
+            noise[:, 6], noise[:, 7] = _vane(u_q, v_q, noise[:, 6], noise[:, 7])
 
 
 def _position(sensors: Sensors, states: Array, air: Array) -> tuple[Array, ...]:
