@@ -1,5 +1,6 @@
 """The 30 m ship, its crude nominal model, and measured trials of it, for the estimation tests."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -74,11 +75,9 @@ def errors_and_std(
     """
     rng = np.random.default_rng(seed)
     errors, std, failed = [], [], 0
-    for _ in range(trials):
-        inputs = commands(samples, rng)
-        many = simulate_ensemble(TRUE, inputs, runs=1, environment=weather, rng=rng, velocity=(1.7, 0.7, 0.0))
+    for batch in drawn_trials(trials, samples, weather, rng):
         try:
-            found = estimate(Record(batches=(many.batch(0),)), NOMINAL, method=method)
+            found = estimate(Record(batches=(batch,)), NOMINAL, method=method)
         except NoAnswer:
             failed += 1
             continue
@@ -87,3 +86,12 @@ def errors_and_std(
             errors.append(found.values - truth(found.names))
             std.append(found.std)
     return found.names, np.array(errors), np.array(std), failed
+
+
+def drawn_trials(trials: int, samples: int, weather: Environment, rng: np.random.Generator) -> Iterator[Batch]:
+    """Measured trials, simulated fifty at a time."""
+    for first in range(0, trials, 50):
+        runs = min(50, trials - first)
+        inputs = np.stack([commands(samples, rng) for _ in range(runs)], axis=1)
+        many = simulate_ensemble(TRUE, inputs, runs=runs, environment=weather, rng=rng, velocity=(1.7, 0.7, 0.0))
+        yield from (many.batch(run) for run in range(runs))

@@ -22,6 +22,8 @@ CASADI = Operators(ca.fabs, ca.sin, ca.cos)
 STEPS = {"euler": euler_step, "rk4": rk4_step}
 Simulate = Callable[[Array, Array, Array], Array]
 """(parameters (p,), start state (6,), inputs (k, m)) -> states (k, 6); calm water."""
+BLOCK_INSTRUCTIONS = 20_000
+"""Size of the flat functions that simulations are cut into."""
 
 
 def batch_simulator(
@@ -39,14 +41,34 @@ def batch_simulator(
         return motion_rates(model, state, ca.vertsplit(drive[:m]), wind_to=wind, ops=CASADI, parameters=theta)
 
     after = _stepped(rates, x, sample_time_s, integrator, substeps)
-    held = ca.Function("held", [ca.vertcat(x, theta), drive], [ca.vertcat(after, theta)])
-    run = held.mapaccum("batch", max(1, samples - 1))
+    return _chained(ca.Function("step", [x, drive, theta], [after]), samples)
+
+
+def _chained(step: ca.Function, samples: int) -> Simulate:
+    """Many samples of a step (state, inputs, parameters) -> state, a block of them as one flat function."""
+    n, m, p = (step.size1_in(index) for index in range(3))
+    length = max(1, min(samples - 1, BLOCK_INSTRUCTIONS // step.n_instructions()))
+    x, drive, theta = ca.SX.sym("x", n), ca.SX.sym("i", m, length), ca.SX.sym("p", p)
+    states = [x]
+    for sample in range(length):
+        states.append(step(states[-1], drive[:, sample], theta))
+    block = ca.Function("block", [x, drive, theta], [ca.densify(ca.horzcat(*states[1:]))])
+    blocks = -(-(samples - 1) // length)
 
     def simulate(parameters: Array, start: Array, values: Array) -> Array:
-        if samples == 1:
-            return np.asarray(start[None, :])
-        states = np.asarray(run(np.concatenate([start, parameters]), values[:-1].T)[:6, :]).T
-        return np.concatenate([start[None, :], states])
+        held = np.zeros((blocks * length, m))
+        held[: samples - 1] = values[: samples - 1]
+        result, theta = np.empty((blocks * length + 1, n)), np.array(parameters, dtype=float)
+        result[0] = start
+        buffer: Any
+        buffer, run = block.buffer()
+        buffer.set_arg(2, theta.data)
+        for first in range(0, blocks * length, length):
+            buffer.set_arg(0, result[first].data)
+            buffer.set_arg(1, held[first : first + length].data)
+            buffer.set_res(0, result[first + 1 : first + length + 1].data)
+            run()
+        return result[:samples]
 
     return simulate
 

@@ -51,8 +51,8 @@ class Nuisance:
         return f"{self.equation}: {' '.join([*parts, *([self.heading] if self.heading else [])])}"
 
     def evaluate(self, table: Table) -> Any:
-        """(k,) for a table of signals that includes the heading as "psi" and the signs of the batch."""
-        return self.factor.evaluate(table, self.algebra.functions) * _heading(self.heading, table["psi"])
+        """(k,) for a table of signals that includes the signs of the batch and what `headings` gives."""
+        return self.factor.evaluate(table, self.algebra.functions) * table[self.heading]
 
 
 def nuisance_regressors(
@@ -71,12 +71,13 @@ def nuisance_regressors(
     """
     algebra = Algebra()
     found: dict[tuple[str, str, str], Nuisance] = {}
+    signs: dict[str, set[float]] = {}
     for term, expression in zip(model.terms, model.expressions, strict=True):
         if term.name not in terms:
             continue
         polynomial = symbolic(expression, algebra, wind_measured=wind_measured)
         for factor, heading in _expansion(polynomial, term.name):
-            known = factor.substituted(_steady_signs(algebra, batches)).normalised()
+            known = factor.substituted(_steady_signs(algebra, batches, signs)).normalised()
             if known.constant and not heading:
                 continue  # a constant: zero-mean instruments do not see it
             found.setdefault((term.equation, str(known), heading), Nuisance(term.equation, known, heading, algebra))
@@ -106,10 +107,12 @@ def _expansion(polynomial: Polynomial, name: str) -> list[tuple[Polynomial, str]
     return result + [(item, heading) for item in second for heading in (*SECOND, "") if item.terms]
 
 
-def _steady_signs(algebra: Algebra, batches: Sequence[Table]) -> Mapping[str, float]:
-    """Signs that are the same in all batches."""
-    signs = {name: {_sign(algebra, name, table) for table in batches} for name in algebra.signs}
-    return {name: values.pop() for name, values in signs.items() if len(values) == 1}
+def _steady_signs(algebra: Algebra, batches: Sequence[Table], seen: dict[str, set[float]]) -> Mapping[str, float]:
+    """Signs that are the same in all batches; `seen` remembers those of every modulus met so far."""
+    for name in algebra.signs:
+        if name not in seen:
+            seen[name] = {_sign(algebra, name, table) for table in batches}
+    return {name: next(iter(values)) for name, values in seen.items() if len(values) == 1}
 
 
 def _sign(algebra: Algebra, name: str, table: Table) -> float:
@@ -117,14 +120,7 @@ def _sign(algebra: Algebra, name: str, table: Table) -> float:
     return -1.0 if np.nanmean(np.sign(inside)) < 0 else 1.0
 
 
-def _heading(name: str, psi: Any) -> Any:
-    match name:
-        case "cos psi":
-            return np.cos(psi)
-        case "sin psi":
-            return np.sin(psi)
-        case "cos^2 psi":
-            return np.cos(psi) ** 2
-        case "sin 2psi":
-            return np.sin(2.0 * psi)
-    return 1.0
+def headings(psi: Any) -> dict[str, Any]:
+    """Every function of heading that regressors are multiplied with, by name."""
+    c, s = np.cos(psi), np.sin(psi)
+    return {"cos psi": c, "sin psi": s, "cos^2 psi": c * c, "sin 2psi": 2.0 * s * c, "": 1.0}

@@ -26,7 +26,7 @@ import numpy as np
 
 from expdesign.conventions import OUTPUTS
 from expdesign.errors import InputError, NotInformative, UnknownName
-from expdesign.estimation.nuisance import Nuisance, batch_signs, nuisance_regressors, symbolic
+from expdesign.estimation.nuisance import Nuisance, batch_signs, headings, nuisance_regressors, symbolic
 from expdesign.estimation.polynomial import Algebra
 from expdesign.estimation.regression import Integers, Regression
 from expdesign.estimation.tables import AIR, Table, measured_table
@@ -104,8 +104,10 @@ class Layout:
     def _rows(self, table: Table, signs: dict[str, float], used: Integers | slice, scale: float) -> Array:
         places = {name: index for index, name in enumerate(self.model.names)}
         columns = [(self._term(places[name]), self._values(places[name], table)) for name in self.parameters]
-        columns += [(item.equation, item.evaluate({**table, **signs})) for item in self.nuisance]
-        rows = np.zeros((len(table["psi"][used]), len(self.model.outputs), len(columns)))
+        turned = {**table, **signs, **headings(table["psi"])} if self.nuisance else {}
+        columns += [(item.equation, item.evaluate(turned)) for item in self.nuisance]
+        count = len(table["psi"][used])
+        rows = np.zeros((len(self.model.outputs), len(columns), count)).transpose(2, 0, 1)  # columns lie in one piece
         row_of = {name: index for index, name in enumerate(self.model.outputs)}
         for index, (equation, values) in enumerate(columns):
             np.multiply(np.broadcast_to(values, table["psi"].shape)[used], scale, out=rows[:, row_of[equation], index])
@@ -223,7 +225,7 @@ def build_regression(layout: Layout, record: Record) -> Rows:
         raise NotInformative("no pair of successive samples has every signal the predictor needs")
     regression = Regression(
         parameters=layout.names,
-        Phi=np.concatenate([Phi for Phi, _ in parts]),
+        Phi=parts[0][0] if len(parts) == 1 else np.concatenate([Phi for Phi, _ in parts]),
         y=np.concatenate([y for _, y in parts]),
         batch=np.repeat(np.arange(len(used)), [len(rows) for rows in used]),
         step=np.concatenate(used),

@@ -46,7 +46,7 @@ class System:
 
     def cut(self, whole: Array) -> Array:
         """(k, n, p) of this part from (k, all, all)."""
-        return np.asarray(whole[:, self.outputs[:, None], self.columns])
+        return _cut(whole, self.outputs, self.columns)
 
 
 def occupied(rows: Array) -> Array:
@@ -67,7 +67,7 @@ def split(regression: Regression, uses: Array, mean: str) -> tuple[System, ...]:
 
 
 def _system(regression: Regression, columns: Integers, outputs: Integers, mean: str, parts: list[slice]) -> System:
-    Phi = regression.Phi[:, outputs[:, None], columns]
+    Phi = _cut(regression.Phi, outputs, columns)
     varying = subtract_mean(Phi, regression.batch_of, mean)
     size = _norm(varying)
     size[size <= 1e-11 * _norm(Phi)] = np.inf
@@ -82,6 +82,11 @@ def _system(regression: Regression, columns: Integers, outputs: Integers, mean: 
         batch=regression.batch_of,
         parts=parts,
     )
+
+
+def _cut(whole: Array, outputs: Integers, columns: Integers) -> Array:
+    """(k, n, p), every column in one piece of memory."""
+    return np.asarray(whole.transpose(1, 2, 0)[outputs[:, None], columns].transpose(2, 0, 1))
 
 
 def instruments_of(system: System, instruments: Array, weighting: Weighting) -> Array:
