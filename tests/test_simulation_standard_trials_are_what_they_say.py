@@ -20,6 +20,7 @@ from expdesign.simulation import (
     turning_circle,
     zigzag,
 )
+from expdesign.vessel import Response
 
 TEN, TWENTY = math.radians(10), math.radians(20)
 SHIPS = {"rudder": nomoto_ship(), "azimuth": TUG_TRUE, "force": MODEL_SHIP_TRUE}
@@ -47,6 +48,24 @@ def test_commands_keep_limits_and_rates_and_give_the_motion_again(kind: str, tri
         assert np.abs(steps[:, column]).max() <= limit.rate * (1 + 1e-9) + slack
     again = simulate(ship, commands, velocity=start.velocity)
     assert np.allclose(again.pose, motion.pose, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("trial", TRIALS)
+def test_slow_late_and_crooked_actuators_are_sailed_as_simulated(trial: str) -> None:
+    """Lag, dead time, dead band and misalignment: the helmsman sees the motion that `simulate` gives."""
+    plain = nomoto_ship()
+    propeller, rudder = plain.actuators
+    slow = (
+        replace(propeller, responses=(Response(lag_s=3.0, delay_s=0.7),)),
+        replace(rudder, responses=(Response(lag_s=1.5, delay_s=1.2, deadband=0.01, offset=0.02),)),
+    )
+    ship = replace(plain, model=replace(plain.model, actuators=slow))
+    start = steady_ahead(ship, 6.5)
+    assert start.angle_rad == pytest.approx(-0.02)
+    commands, motion = TRIALS[trial](ship, conduct=Conduct(speed_mps=6.5, approach_s=5.0))
+    again = simulate(ship, commands, velocity=start.velocity)
+    assert np.allclose(again.pose, motion.pose, rtol=0, atol=1e-9)
+    assert np.abs(motion.velocity[:10] - start.velocity).max() < 1e-9
 
 
 @pytest.mark.parametrize("sense", [1.0, -1.0])

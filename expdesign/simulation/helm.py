@@ -14,6 +14,7 @@ import numpy as np
 from scipy.optimize import brentq, root
 
 from expdesign.errors import InputError, UnknownName
+from expdesign.simulation.actuation import past_deadband
 from expdesign.values import Array, seal
 from expdesign.vessel import SCALAR, Actuator, Limit, Vessel
 
@@ -216,7 +217,11 @@ def _share(limit: Limit, drive: float) -> float:
 
 def _acceleration(helm: Helm, motion: tuple[float, float, float], drive: float, angle: float) -> list[float]:
     model = helm.vessel.model
-    return [float(a) for a in model.accelerations(motion, motion[:2], helm.inputs(drive, angle), SCALAR)]
+    given = [
+        float(past_deadband(command, response.deadband)) + response.offset
+        for command, response in zip(helm.inputs(drive, angle), helm.vessel.responses, strict=True)
+    ]
+    return [float(a) for a in model.accelerations(motion, motion[:2], given, SCALAR)]
 
 
 def _engine_order(helm: Helm, speed: float) -> float:
