@@ -3,7 +3,7 @@
 from expdesign.durations.certificate import log_det, sensitivities
 from expdesign.durations.constraints import NO_CONSTRAINTS, Budget, Constraints
 from expdesign.durations.criteria import CRITERIA, Aim, Criterion
-from expdesign.durations.efficiency import Efficiencies, efficiencies
+from expdesign.durations.efficiency import Efficiencies, Kept, efficiencies, limits_kept
 from expdesign.durations.fused import build_fused, monte_carlo_covariance
 from expdesign.durations.mining import Subset, best_subset
 from expdesign.durations.solve import bordered, build_durations, optimal_shares, solve_durations, with_repeats
@@ -23,12 +23,14 @@ __all__ = [
     "DurationDesign",
     "DurationProblem",
     "Efficiencies",
+    "Kept",
     "Subset",
     "best_subset",
     "bordered",
     "build_durations",
     "build_fused",
     "efficiencies",
+    "limits_kept",
     "log_det",
     "monte_carlo_covariance",
     "optimal_shares",

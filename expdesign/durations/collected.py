@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.durations.criteria import LogDet, Measure, criterion
-from expdesign.durations.objective import Piece, stacked_values
+from expdesign.durations.objective import Piece, congruent, stacked_values
 from expdesign.durations.task import objective_of
 from expdesign.durations.values import DurationProblem
 from expdesign.values import Array
@@ -76,6 +76,12 @@ class Collected:
     def efficiency(self, shares: Array, reference: Array) -> float:
         """Share of the reference's time in which it would collect the same, when nothing is known before."""
         return float(np.exp((self.value(shares) - self.value(reference)) / self.degree))
+
+    def efficiency_of(self, collected: Array, reference: Array) -> float:
+        """The same of information (d, d) that was collected otherwise, in physical parameter scale; one model only."""
+        piece = self.pieces[0]
+        total = piece.prior + congruent(piece.transformation, collected)
+        return float(np.exp((self.worth((total[None],))[0] - self.value(reference)) / self.degree))
 
 
 def collected_measure(problem: DurationProblem, name: str) -> Measure:

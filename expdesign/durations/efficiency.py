@@ -9,7 +9,9 @@ import numpy as np
 
 from expdesign.durations.collected import Collected
 from expdesign.durations.criteria import CRITERIA
+from expdesign.durations.objective import stacked_values
 from expdesign.durations.solve import optimal_shares
+from expdesign.durations.task import floors_of
 from expdesign.durations.values import DurationDesign, DurationProblem
 from expdesign.errors import InputError, NoAnswer
 from expdesign.values import Array
@@ -63,6 +65,52 @@ def efficiencies(design: DurationDesign) -> tuple[Efficiencies, ...]:
             missing=missing.get(item.name, ""),
         )
         for item in CRITERIA
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Kept:
+    """How a limit on the whole sharing is kept.
+
+    Attributes:
+        name: of the budget or the balance.
+        limit: what was asked, for a balance the least share.
+        continuous: what the optimal fractions use, or reach.
+        repeats: what the whole runs use, or reach; a balance may be missed, because runs come in whole numbers.
+        price: multiplier in the certificate; zero when the limit does not matter.
+    """
+
+    name: str
+    limit: float
+    continuous: float
+    repeats: float
+    price: float
+
+
+def limits_kept(design: DurationDesign) -> tuple[Kept, ...]:
+    """Every budget and every balance, by the optimal fractions and by the whole runs."""
+    problem = design.problem
+    runs = np.array(design.repeats) * problem.run_s / problem.total_s
+    found = []
+    for budget in problem.constraints.budgets:
+        cost = np.array([budget.cost_per_s.get(name, 0.0) for name in problem.names]) * problem.total_s
+        found.append((budget.name, budget.limit, float(cost @ design.fractions), float(cost @ runs)))
+    for equation, floor in floors_of(problem).items():
+        piece = floor.pieces[0]
+        value, at_runs = (
+            problem.constraints.balance
+            * float(
+                np.exp(
+                    (stacked_values(piece.measure, piece.matrix(w)[None])[0] - floor.levels[0]) / piece.measure.degree
+                )
+            )
+            for w in (design.fractions, runs)
+        )
+        found.append((f"balance of equation {equation}", problem.constraints.balance, value, at_runs))
+    prices = design.certificate.multipliers
+    return tuple(
+        Kept(name=name, limit=limit, continuous=continuous, repeats=repeats, price=prices.get(name, 0.0))
+        for name, limit, continuous, repeats in found
     )
 
 

@@ -54,7 +54,7 @@ def task_of(problem: DurationProblem, *, within: Array | None = None) -> Task:
     """
     measure = criterion(problem.aim.criterion).measure(problem.picked)
     objective = objective_of(problem, measure, within=within)
-    floors = _floors(problem)
+    floors = floors_of(problem)
     return Task(
         objective=objective,
         polytope=polytope_of(problem),
@@ -98,7 +98,7 @@ def start_of(task: Task, *, within: Array | None = None) -> Array:
     return inside
 
 
-def _floors(problem: DurationProblem) -> dict[str, Objective]:
+def floors_of(problem: DurationProblem) -> dict[str, Objective]:
     """One concave function per equation: its log det above the balanced share of the best for it alone."""
     balance = problem.constraints.balance
     if not balance > 0:

@@ -16,6 +16,7 @@ import numpy as np
 
 from expdesign.conventions import POSE_COLUMNS, VELOCITY_COLUMNS, to_b_frame, to_n_frame
 from expdesign.dictionary.primitive import Primitive
+from expdesign.durations import Efficiencies, limits_kept
 from expdesign.durations.values import DurationDesign
 from expdesign.export.planned import require_verified
 from expdesign.information.primitive_information import PrimitiveInformation
@@ -76,8 +77,13 @@ def footprint_radius(primitive: Primitive, vessel: Vessel) -> float:
     return float(np.hypot(*corners.T).max())
 
 
-def durations_json(design: DurationDesign, *, criterion: str = "D") -> str:
-    """The design with its certificate, as durations.json; the certificate is null where there is none."""
+def durations_json(design: DurationDesign, *, compared: Sequence[Efficiencies] = ()) -> str:
+    """The design with its certificate, as durations.json; bounds are null where there are none.
+
+    Args:
+        design: the durations.
+        compared: the design under every criterion.
+    """
     problem = design.problem
     columns = zip(
         problem.names,
@@ -85,12 +91,13 @@ def durations_json(design: DurationDesign, *, criterion: str = "D") -> str:
         design.durations_s.tolist(),
         design.repeats,
         design.sensitivities.tolist(),
+        design.certificate.prices.tolist(),
         strict=True,
     )
-    keys = ("name", "fraction", "duration_s", "repeats", "sensitivity")
+    keys = ("name", "fraction", "duration_s", "repeats", "sensitivity", "price")
     return strict_json(
         {
-            "criterion": criterion,
+            "criterion": problem.aim.criterion,
             "mean_subtraction": problem.mean_subtraction,
             "total_s": problem.total_s,
             "log_det": design.log_det,
@@ -105,8 +112,35 @@ def durations_json(design: DurationDesign, *, criterion: str = "D") -> str:
                 "repeats": design.efficiency_repeats,
                 "uniform": design.efficiency_uniform,
             },
+            "certificate": _certificate_entry(design),
+            "robust": problem.robust,
+            "models": len(problem.sampled),
+            "interest": list(problem.aim.interest or problem.parameters),
+            "outcomes": list(problem.aim.outcomes),
+            "prior_information": bool(problem.prior.any()),
+            "limits": [vars(kept) for kept in limits_kept(design)],
+            "efficiencies": {item.criterion: _efficiency_entry(item) for item in compared},
         }
     )
+
+
+def _certificate_entry(design: DurationDesign) -> dict[str, Any]:
+    """No feasible sharing has a criterion value above `bound`; sensitivity less price is at most `level`."""
+    proof = design.certificate
+    return {
+        "theorem": proof.kind,
+        "value": proof.value,
+        "bound": _finite(proof.bound),
+        "degree": proof.degree,
+        "level": proof.level,
+        "mixture_of_models": proof.mixture.tolist() if design.problem.robust != "nominal" else None,
+        "multipliers": dict(proof.multipliers),
+        "guaranteed_log_det": _finite(proof.guaranteed),
+    }
+
+
+def _efficiency_entry(item: Efficiencies) -> dict[str, Any]:
+    return {"title": item.title, "designs": dict(item.of), "missing": item.missing or None}
 
 
 def plan_json(plan: Plan, *, scenario: str, vessel: Vessel, environment: Environment, clearance_m: float) -> str:

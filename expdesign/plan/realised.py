@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from expdesign.durations import DurationDesign, log_det
-from expdesign.durations.certificate import scaled
+from expdesign.durations import DurationDesign
+from expdesign.durations.collected import Collected
 from expdesign.information import moments, regressor_rows
 from expdesign.plan.values import Leg
 from expdesign.signals import Commands, Trajectory
@@ -24,23 +25,26 @@ def realised_efficiency(
     commands: Commands,
     trajectory: Trajectory,
     legs: Sequence[Leg],
-) -> float:
-    """D-efficiency of the whole trial, legs included, against the optimal design in the time asked for.
+) -> float | None:
+    """Efficiency of the whole trial, legs included, against the optimal design in the time asked for.
 
-    (det I_trial / det I_optimal)^(1/p) with I the information collected, not per second: above 1 when what the legs
-    add outweighs what rounding and headings take.
+    By the design's criterion and the nominal model, of the information collected, not per second: above 1 when what the
+    legs add outweighs what rounding and headings take. None where the design has nuisance regressors or recorded
+    primitives, which the track alone says nothing about.
     """
-    problem = design.problem
+    problem = replace(design.problem, robust="nominal", sampled=np.zeros((0, 0, 0, 0)))
+    if not set(problem.parameters) <= set(vessel.model.names) or not problem.symmetric:
+        return None
     rows = regressor_rows(vessel.model, trajectory, commands, environment)
     batches = [rows[leg.first : leg.last] for leg in legs] if problem.mean_subtraction == "batch" else [rows]
-    matrix = sum(
-        (len(batch) / len(rows) * _bordered(vessel, batch, problem.parameters, problem.mean_subtraction))
-        for batch in batches
+    matrix = np.sum(
+        [
+            len(batch) / len(rows) * _bordered(vessel, batch, problem.parameters, problem.mean_subtraction)
+            for batch in batches
+        ],
+        axis=0,
     )
-    matrices, offset = scaled(np.array([matrix]))
-    gained = log_det(matrices, np.ones(1)) + offset
-    p = len(problem.parameters)
-    return float(np.exp((gained - design.log_det) / p + np.log(commands.duration_s / problem.total_s)))
+    return Collected.of(problem).efficiency_of(commands.duration_s / problem.total_s * matrix, design.fractions)
 
 
 def _bordered(vessel: Vessel, rows: Array, parameters: Sequence[str], mean_subtraction: str) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
@@ -14,9 +14,9 @@ from expdesign.plan.values import PlanSettings
 from expdesign.scenario.area_file import load_area
 from expdesign.scenario.area_tables import Latitude, Longitude
 from expdesign.scenario.berth import berth_problem
+from expdesign.scenario.design_file import DesignTable, design_settings
 from expdesign.scenario.dictionary_file import NAME, NAME_RULE, load_dictionary
 from expdesign.scenario.environment_table import EnvironmentTable, build_environment
-from expdesign.scenario.grow_table import GrowTable, build_grow
 from expdesign.scenario.tables import (
     Entry,
     NonNegative,
@@ -28,10 +28,9 @@ from expdesign.scenario.tables import (
     read_toml,
     shown,
 )
-from expdesign.scenario.values import DesignSettings, Scenario
+from expdesign.scenario.values import Scenario
 from expdesign.scenario.vessel_file import load_vessel
 from expdesign.values import Array
-from expdesign.vessel import Vessel
 
 Degrees = Annotated[float, Field(ge=-360, le=360)]
 POSITION_KEYS = ("lat_deg", "lon_deg", "north_m", "east_m")
@@ -44,16 +43,6 @@ class ScenarioTable(Table):
     vessel: Text = Field(description="the path of a vessel file")
     dictionary: Text = Field(description="the path of a dictionary file")
     area: Text = Field(description="the path of an area file")
-
-
-class DesignTable(Table):
-    """`[design]`."""
-
-    total_s: Positive = Field(description="the informative time to share out [s]")
-    criterion: Literal["D"] = "D"
-    mean_subtraction: Literal["none", "batch", "complete"] = "complete"
-    fixed_parameters: list[Text] = Field(default=[])
-    grow: GrowTable | None = None
 
 
 class PoseTable(Table):
@@ -117,7 +106,7 @@ def load_scenario(path: Path | str) -> Scenario:
         vessel=vessel,
         dictionary=dictionary,
         area=area,
-        design=_design(file.design, vessel, entry.at("design")),
+        design=design_settings(file.design, vessel, tuple(spec.name for spec in dictionary), entry.at("design")),
         plan=plan,
         environment=build_environment(file.environment),
         **poses,
@@ -130,28 +119,6 @@ def _name(given: str | None, entry: Entry) -> str:
     if not NAME.fullmatch(name):
         raise entry.at("scenario.name").error(f"is {shown(name)}, expected {NAME_RULE}")
     return name
-
-
-def _design(table: DesignTable, vessel: Vessel, entry: Entry) -> DesignSettings:
-    names, fixed = vessel.model.names, table.fixed_parameters
-    for index, name in enumerate(fixed, start=1):
-        place = entry.at("fixed_parameters").item(index)
-        if name not in names:
-            raise place.unknown(name, names)
-        if name in fixed[: index - 1]:
-            raise place.error(f"is {name!r} again, expected every parameter once")
-    if len(fixed) == len(names):
-        raise entry.at("fixed_parameters").error("names every parameter, expected at least one to be estimated")
-    if table.total_s < vessel.sample_time_s:
-        wish = f"at least the vessel's sample_time_s = {vessel.sample_time_s:g}"
-        raise entry.at("total_s").error(f"is {shown(table.total_s)}, expected {wish}")
-    return DesignSettings(
-        total_s=table.total_s,
-        criterion=table.criterion,
-        mean_subtraction=table.mean_subtraction,
-        fixed_parameters=tuple(fixed),
-        grow=None if table.grow is None else build_grow(table.grow, entry.at("grow")),
-    )
 
 
 def _check_position(place: PoseTable, entry: Entry) -> None:

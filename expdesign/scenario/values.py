@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from expdesign.dictionary.spec import PrimitiveSpec
@@ -15,14 +16,45 @@ from expdesign.vessel import Vessel
 
 
 @dataclass(frozen=True, kw_only=True)
+class BudgetWish:
+    """Something that is used up.
+
+    Attributes:
+        name: for reports.
+        limit: what there is for the whole informative time.
+        cost_per_s: use per second by primitive, where the user says it.
+        use: what the use is computed from otherwise: "cubed_propeller_speed", the mean over the run of the sum of
+            |n|^3 of all propellers and thrusters [rps3], which grows like shaft power.
+    """
+
+    name: str
+    limit: float
+    cost_per_s: Mapping[str, float]
+    use: str | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
 class DesignSettings:
     """Wishes for the durations.
 
     Attributes:
         total_s: informative time to share out [s].
-        criterion: name of a design criterion; "D".
+        criterion: name of a design criterion: "D", "D_s", "A", "E" or "V".
         mean_subtraction: "none", "batch" or "complete".
         fixed_parameters: parameters held at the vessel file's values and not estimated.
+        interest: parameters that D_s, A and E are about; empty for all.
+        relative_to: what errors of parameters are counted in for A and E: their "nominal" size or their prior
+            standard deviation, "parameter_std".
+        parameter_units: error of a parameter that counts as one, instead of that.
+        outcomes: what V predicts, keys of `indices.OUTCOMES`.
+        outcome_units: error of an outcome that counts as one; its nominal size where not given.
+        outcome_speed_mps: approach speed of the predicted trials, or None for the nominal one.
+        predictor: "model" for the model's terms, "augmented" or "wind" with nuisance regressors besides.
+        robust: "nominal", "average" or "worst".
+        prior_samples: models drawn from the prior.
+        prior: "none" or "parameter_std", what is known before.
+        prior_data: files of earlier trials, whose information is added.
+        least_s, most_s, required, excluded, budgets, balance: see `durations.Constraints`.
         grow: how to add manoeuvres to the dictionary, or None to leave it as it is.
     """
 
@@ -30,6 +62,23 @@ class DesignSettings:
     criterion: str = "D"
     mean_subtraction: str = "complete"
     fixed_parameters: tuple[str, ...] = ()
+    interest: tuple[str, ...] = ()
+    relative_to: str = "nominal"
+    parameter_units: Mapping[str, float] = field(default_factory=dict)
+    outcomes: tuple[str, ...] = ()
+    outcome_units: Mapping[str, float] = field(default_factory=dict)
+    outcome_speed_mps: float | None = None
+    predictor: str = "model"
+    robust: str = "nominal"
+    prior_samples: int = 0
+    prior: str = "none"
+    prior_data: tuple[Path, ...] = ()
+    least_s: Mapping[str, float] = field(default_factory=dict)
+    most_s: Mapping[str, float] = field(default_factory=dict)
+    required: tuple[str, ...] = ()
+    excluded: tuple[str, ...] = ()
+    budgets: tuple[BudgetWish, ...] = ()
+    balance: float = 0.0
     grow: GrowSettings | None = None
 
 

@@ -5,10 +5,11 @@ between (`scored`, `designed`, `planned`) are for notebooks: value in, value out
 """
 
 from expdesign.workflows.after import estimate, export, measured, simulate
+from expdesign.workflows.design import designed, duration_problem
 from expdesign.workflows.diagnosed import diagnose
 from expdesign.workflows.indices import check_routes, indices
 from expdesign.workflows.outcome import Outcome, Progress, TextTable
-from expdesign.workflows.trial import designed, durations, plan, planned, run, score, scored
+from expdesign.workflows.trial import durations, plan, planned, run, score, scored
 
 __all__ = [
     "Outcome",
@@ -17,6 +18,7 @@ __all__ = [
     "check_routes",
     "designed",
     "diagnose",
+    "duration_problem",
     "durations",
     "estimate",
     "export",

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from expdesign import __version__
 from expdesign.dictionary import build_dictionary
 from expdesign.dictionary.wishes import strayed
-from expdesign.durations import DurationDesign, build_durations, solve_durations, with_repeats
+from expdesign.durations import DurationDesign, efficiencies, with_repeats
 from expdesign.durations.growing_values import Growth
 from expdesign.export import (
     STANDARD,
@@ -28,6 +29,7 @@ from expdesign.information import PrimitiveInformation, estimated_parameters, sc
 from expdesign.plan.solve import PlanProblem, plan_trial
 from expdesign.plan.values import Plan
 from expdesign.scenario import Scenario, load_repeats, load_scenario
+from expdesign.workflows.design import design_summary, design_tables, designed
 from expdesign.workflows.grown import grown, growth_files, growth_summary, growth_tables
 from expdesign.workflows.outcome import Outcome, Progress, TextTable, silent, within
 
@@ -36,21 +38,21 @@ def run(scenario: Path, out: Path | None, *, seed: int = 0, progress: Progress =
     """The main job: score, durations, plan, verification, route files and report, into `out` or runs/<scenario>."""
     case = _load(scenario, progress)
     information, growth = _ready(case, seed=seed, progress=within(progress, 0.02, 0.1))
-    progress("sharing out time", 0.1)
-    design = designed(case, information)
-    plan = planned(case, information, design, seed=seed, progress=within(progress, 0.1, 0.85))
+    design = designed(case, information, seed=seed, progress=within(progress, 0.1, 0.13))
+    compared = efficiencies(design)
+    plan = planned(case, information, design, seed=seed, progress=within(progress, 0.14, 0.85))
     progress("writing routes, run cards and report", 0.85)
-    content = _report(case, information, design, plan, seed)
+    content = replace(_report(case, information, design, plan, seed), compared=compared)
     files = {
         **_dictionary_files(case, information),
         **growth_files(case, growth),
-        "durations.json": durations_json(design, criterion=case.design.criterion),
+        "durations.json": durations_json(design, compared=compared),
         **_plan_files(case, plan),
         **_route_files(case, plan),
         "report.html": report_html(content),
         "cards.html": cards_html(content),
     }
-    summary = {**growth_summary(growth), **_design_summary(design), **_plan_summary(plan)}
+    summary = {**growth_summary(growth), **design_summary(design), **_plan_summary(plan)}
     return _written(case, out, files, summary, progress)
 
 
@@ -73,14 +75,17 @@ def durations(
 ) -> Outcome:
     """How long to run each primitive, with its certificate; with `grow` also of manoeuvres found to add most."""
     case = _load(scenario, progress)
-    information, growth = _ready(case, grow=grow, seed=seed, progress=within(progress, 0.05, 0.9))
-    design = designed(case, information)
+    information, growth = _ready(case, grow=grow, seed=seed, progress=within(progress, 0.05, 0.6))
+    design = designed(case, information, seed=seed, progress=within(progress, 0.6, 0.9))
+    progress("comparing criteria", 0.9)
+    compared = efficiencies(design)
     files = {
-        "durations.json": durations_json(design, criterion=case.design.criterion),
+        "durations.json": durations_json(design, compared=compared),
         **growth_files(case, growth),
     }
-    summary = {**growth_summary(growth), **_design_summary(design)}
-    return _written(case, out, files, summary, progress, growth_tables(growth))
+    summary = {**growth_summary(growth), **design_summary(design)}
+    tables = (*growth_tables(growth), *design_tables(design, compared))
+    return _written(case, out, files, summary, progress, tables)
 
 
 def plan(
@@ -89,7 +94,7 @@ def plan(
     """One verified trajectory with the runs of a durations file, or of the optimal durations."""
     case = _load(scenario, progress)
     information, _ = _ready(case, seed=seed, progress=within(progress, 0.02, 0.1))
-    design = designed(case, information)
+    design = designed(case, information, seed=seed)
     if durations is not None:
         design = with_repeats(design, load_repeats(durations, names=design.problem.names))
     result = planned(case, information, design, seed=seed, progress=within(progress, 0.1, 0.95))
@@ -117,18 +122,6 @@ def _ready(
     information = scored(case, progress=within(progress, 0.0, 0.2 if grow or case.design.grow else 1.0))
     growth = grown(case, information, always=grow, seed=seed, progress=within(progress, 0.2, 1.0))
     return (information if growth is None else growth.information), growth
-
-
-def designed(case: Scenario, information: Sequence[PrimitiveInformation]) -> DurationDesign:
-    """The certified durations of a scored scenario."""
-    return solve_durations(
-        build_durations(
-            information,
-            _parameters(case),
-            total_s=case.design.total_s,
-            mean_subtraction=case.design.mean_subtraction,
-        )
-    )
 
 
 def planned(
@@ -225,16 +218,6 @@ def _report(
         command=f"expdesign run {case.path} --seed {seed}",
         version=__version__,
     )
-
-
-def _design_summary(design: DurationDesign) -> dict[str, object]:
-    chosen = {name: count for name, count in zip(design.problem.names, design.repeats, strict=True) if count}
-    return {
-        "runs": chosen,
-        "certificate_gap": design.gap_relative,
-        "efficiency_of_whole_runs": design.efficiency_repeats,
-        "efficiency_of_equal_shares": design.efficiency_uniform,
-    }
 
 
 def _plan_summary(plan: Plan) -> dict[str, object]:

@@ -77,7 +77,7 @@ class Picked:
         Raises:
             InputError: a unit or a noise is not stated.
         """
-        unit = self._stated(self.aim.unit, criterion, "a nominal value other than zero, or a unit", self.interest)
+        unit = self._stated(self.aim.unit, criterion, "a unit other than zero", self.interest)
         noise = self.noise(criterion, self.interest)
         return self.columns(self.interest) * (noise / unit)
 
@@ -87,7 +87,7 @@ class Picked:
         Raises:
             InputError: it is not stated.
         """
-        return self._stated(self.aim.noise, criterion, "the noise of its equation", names)
+        return self._stated(self.aim.noise, criterion, "the sensors' noise in its equation", names)
 
     def _stated(self, values: Array, criterion: str, what: str, names: tuple[str, ...]) -> Array:
         known: Mapping[str, float] = dict(zip(self.parameters, values.tolist(), strict=False))

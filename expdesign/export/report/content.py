@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from expdesign.durations import Efficiencies
 from expdesign.durations.values import DurationDesign
 from expdesign.information.primitive_information import PrimitiveInformation
 from expdesign.plan.values import Plan
@@ -32,6 +33,7 @@ class ReportContent:
         plan: the trial; a plan that failed its checks may be shown, and is called that.
         command: the command line that reproduces the result.
         version: of the program.
+        compared: the design under every criterion.
     """
 
     scenario: str
@@ -48,6 +50,7 @@ class ReportContent:
     plan: Plan
     command: str
     version: str
+    compared: tuple[Efficiencies, ...] = ()
 
     def __post_init__(self) -> None:
         seal(self, start="3", goal="3")

@@ -1,0 +1,168 @@
+"""The `[design]` table of a scenario: criterion, robustness, what is known already, and limits on the sharing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from expdesign.indices import OUTCOMES
+from expdesign.scenario.grow_table import GrowTable, build_grow
+from expdesign.scenario.tables import Entry, NonNegative, Positive, Table, Text, shown
+from expdesign.scenario.values import BudgetWish, DesignSettings
+from expdesign.vessel import Vessel
+
+MOST_SAMPLES = 500
+
+
+class BudgetTable(Table):
+    """One of `[[design.budgets]]`."""
+
+    name: Text = Field(description="a name for reports, e.g. 'energy'")
+    limit: NonNegative = Field(description="what there is for the whole informative time")
+    cost_per_s: dict[str, NonNegative] = Field(default={})
+    use: Literal["cubed_propeller_speed"] | None = None
+
+
+class DesignTable(Table):
+    """`[design]`."""
+
+    total_s: Positive = Field(description="the informative time to share out [s]")
+    criterion: Literal["D", "D_s", "A", "E", "V"] = "D"
+    mean_subtraction: Literal["none", "batch", "complete"] = "complete"
+    fixed_parameters: list[Text] = Field(default=[])
+    interest: list[Text] = Field(default=[])
+    relative_to: Literal["nominal", "parameter_std"] = "nominal"
+    parameter_units: dict[str, Positive] = Field(default={})
+    outcomes: list[Text] = Field(default=[])
+    outcome_units: dict[str, Positive] = Field(default={})
+    outcome_speed_mps: Positive | None = None
+    predictor: Literal["model", "augmented", "wind"] = "model"
+    robust: Literal["nominal", "average", "worst"] = "nominal"
+    prior_samples: Annotated[int, Field(ge=1, le=MOST_SAMPLES)] | None = None
+    prior: Literal["none", "parameter_std"] = "none"
+    prior_data: list[Text] = Field(default=[])
+    least_s: dict[str, NonNegative] = Field(default={})
+    most_s: dict[str, NonNegative] = Field(default={})
+    required: list[Text] = Field(default=[])
+    excluded: list[Text] = Field(default=[])
+    budgets: list[BudgetTable] = Field(default=[])
+    balance: Annotated[float, Field(ge=0, lt=1)] = 0.0
+    grow: GrowTable | None = None
+
+
+def design_settings(table: DesignTable, vessel: Vessel, primitives: tuple[str, ...], entry: Entry) -> DesignSettings:
+    """Checked wishes.
+
+    Args:
+        table: of the file.
+        vessel: whose parameters are named.
+        primitives: names in the dictionary.
+        entry: the table's place, for messages.
+
+    Raises:
+        FileError: a name that is not known or stands twice, or keys that do not go together.
+    """
+    names = vessel.model.names
+    _check_fixed(table, names, entry)
+    if table.total_s < vessel.sample_time_s:
+        wish = f"at least the vessel's sample_time_s = {vessel.sample_time_s:g}"
+        raise entry.at("total_s").error(f"is {shown(table.total_s)}, expected {wish}")
+    estimated = tuple(name for name in names if name not in table.fixed_parameters)
+    _check_list(table.interest, estimated, entry.at("interest"))
+    _check_keys(table.parameter_units, estimated, entry.at("parameter_units"))
+    _check_list(table.outcomes, OUTCOMES, entry.at("outcomes"))
+    _check_keys(table.outcome_units, table.outcomes, entry.at("outcome_units"))
+    for key in ("least_s", "most_s"):
+        _check_keys(getattr(table, key), primitives, entry.at(key))
+    for key in ("required", "excluded"):
+        _check_list(getattr(table, key), primitives, entry.at(key))
+    _check_together(table, vessel, entry)
+    return DesignSettings(
+        total_s=table.total_s,
+        criterion=table.criterion,
+        mean_subtraction=table.mean_subtraction,
+        fixed_parameters=tuple(table.fixed_parameters),
+        interest=tuple(table.interest),
+        relative_to=table.relative_to,
+        parameter_units=dict(table.parameter_units),
+        outcomes=tuple(table.outcomes),
+        outcome_units=dict(table.outcome_units),
+        outcome_speed_mps=table.outcome_speed_mps,
+        predictor=table.predictor,
+        robust=table.robust,
+        prior_samples=(table.prior_samples or 20) if table.robust != "nominal" else 0,
+        prior=table.prior,
+        prior_data=_files(table.prior_data, entry.at("prior_data")),
+        least_s=dict(table.least_s),
+        most_s=dict(table.most_s),
+        required=tuple(table.required),
+        excluded=tuple(table.excluded),
+        budgets=_budgets(table.budgets, primitives, entry.at("budgets")),
+        balance=table.balance,
+        grow=None if table.grow is None else build_grow(table.grow, entry.at("grow")),
+    )
+
+
+def _check_fixed(table: DesignTable, names: tuple[str, ...], entry: Entry) -> None:
+    _check_list(table.fixed_parameters, names, entry.at("fixed_parameters"))
+    if len(table.fixed_parameters) == len(names):
+        raise entry.at("fixed_parameters").error("names every parameter, expected at least one to be estimated")
+
+
+def _check_list(given: list[str], known: Iterable[str], entry: Entry) -> None:
+    allowed = tuple(known)
+    for index, name in enumerate(given, start=1):
+        place = entry.item(index)
+        if name not in allowed:
+            raise place.unknown(name, allowed)
+        if name in given[: index - 1]:
+            raise place.error(f"is {name!r} again, expected every name once")
+
+
+def _check_keys(given: Mapping[str, float], known: Iterable[str], entry: Entry) -> None:
+    allowed = tuple(known)
+    for name in given:
+        if name not in allowed:
+            raise entry.unknown(name, allowed)
+
+
+def _check_together(table: DesignTable, vessel: Vessel, entry: Entry) -> None:
+    """Keys without which others mean nothing."""
+    if table.criterion == "D_s" and not table.interest and table.predictor == "model":
+        raise entry.at("interest").error("is missing, criterion D_s needs the parameters of interest")
+    if table.criterion == "V" and not table.outcomes:
+        raise entry.at("outcomes").error(f"is missing, criterion V needs one or more of {', '.join(OUTCOMES)}")
+    if table.prior_samples is not None and table.robust == "nominal":
+        raise entry.at("prior_samples").error("says nothing while design.robust is 'nominal'")
+    uses_std = {"robust": table.robust != "nominal", "prior": table.prior != "none",
+                "relative_to": table.relative_to != "nominal"}  # fmt: skip
+    if any(uses_std.values()) and not np.any(vessel.model.parameter_std):
+        key = next(key for key, used in uses_std.items() if used)
+        raise entry.at(key).error("needs standard deviations in the vessel's [model.parameter_std], found none")
+    if table.predictor != "model" and (table.robust != "nominal" or table.prior_data):
+        raise entry.at("predictor").error("with nuisance regressors goes with neither design.robust nor prior_data")
+    for name in table.required:
+        if name in table.excluded:
+            raise entry.at("excluded").error(f"names {name!r}, which design.required names too")
+
+
+def _budgets(tables: list[BudgetTable], primitives: tuple[str, ...], entry: Entry) -> tuple[BudgetWish, ...]:
+    for index, table in enumerate(tables, start=1):
+        if table.name in [other.name for other in tables[: index - 1]]:
+            raise entry.item(index).at("name").error(f"is {table.name!r} again, expected a name not used before")
+    return tuple(_budget(table, primitives, entry.item(index)) for index, table in enumerate(tables, start=1))
+
+
+def _budget(table: BudgetTable, primitives: tuple[str, ...], entry: Entry) -> BudgetWish:
+    _check_keys(table.cost_per_s, primitives, entry.at("cost_per_s"))
+    if bool(table.cost_per_s) == bool(table.use):
+        raise entry.error("needs either cost_per_s by primitive or use = 'cubed_propeller_speed'")
+    return BudgetWish(name=table.name, limit=table.limit, cost_per_s=dict(table.cost_per_s), use=table.use)
+
+
+def _files(given: list[str], entry: Entry) -> tuple[Path, ...]:
+    return tuple(entry.item(index).file(name) for index, name in enumerate(given, start=1))

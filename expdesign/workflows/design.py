@@ -1,0 +1,263 @@
+"""From a scored scenario to a duration problem: criterion, robustness, what is known already, and limits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from expdesign.dictionary import Primitive
+from expdesign.durations import (
+    Aim,
+    Budget,
+    Constraints,
+    DurationDesign,
+    DurationProblem,
+    Efficiencies,
+    build_durations,
+    limits_kept,
+    solve_durations,
+)
+from expdesign.errors import InputError
+from expdesign.information import MEAN_SUBTRACTIONS, PrimitiveInformation, estimated_parameters
+from expdesign.information.augmented import score_augmented
+from expdesign.information.outcome_gradients import outcome_gradients
+from expdesign.information.prior import equation_noise, score_prior, stated_information
+from expdesign.information.recorded import pooled, recorded_information
+from expdesign.records import load_records
+from expdesign.scenario import Scenario
+from expdesign.scenario.values import BudgetWish
+from expdesign.values import Array
+from expdesign.workflows.outcome import Progress, TextTable, silent, within
+
+
+def designed(
+    case: Scenario, information: Sequence[PrimitiveInformation], *, seed: int = 0, progress: Progress = silent
+) -> DurationDesign:
+    """The certified durations of a scored scenario."""
+    problem = duration_problem(case, information, seed=seed, progress=within(progress, 0.0, 0.8))
+    progress("sharing out time", 0.8)
+    return solve_durations(problem)
+
+
+def duration_problem(
+    case: Scenario, information: Sequence[PrimitiveInformation], *, seed: int = 0, progress: Progress = silent
+) -> DurationProblem:
+    """Everything that the scenario's table [design] asks of the durations.
+
+    Args:
+        case: the scenario.
+        information: of its dictionary, by the nominal model.
+        seed: of the models drawn from the prior.
+        progress: told about long work.
+
+    Raises:
+        InputError, UnknownName: wishes that do not go together with the vessel or the data.
+        NoAnswer, NotInformative: no sharing meets them.
+    """
+    wish, vessel = case.design, case.vessel
+    parameters = estimated_parameters(vessel.model, wish.fixed_parameters)
+    equation = {term.name: term.equation for term in vessel.model.terms}
+    equations, interest = tuple(equation[name] for name in parameters), wish.interest
+    primitives = [item.primitive for item in information]
+    if wish.predictor != "model":
+        progress("simulating disturbances with the dictionary", 0.0)
+        wide = score_augmented(
+            vessel,
+            primitives,
+            predictor=wish.predictor,
+            environment=case.environment,
+            fixed_parameters=wish.fixed_parameters,
+            mean_subtraction=wish.mean_subtraction,
+        )
+        information, parameters, equations = wide.information, wide.parameters, wide.equations
+        interest = _still_estimated(interest or wide.interest, wide.interest, wish.predictor)
+    sampled: Sequence[Sequence[PrimitiveInformation]] = ()
+    if wish.robust != "nominal":
+        progress(f"simulating the dictionary with {wish.prior_samples} models of the prior", 0.1)
+        sampled, _ = score_prior(
+            vessel,
+            primitives,
+            samples=wish.prior_samples,
+            rng=np.random.default_rng(seed),
+            environment=case.environment,
+            fixed_parameters=wish.fixed_parameters,
+            mean_subtraction=wish.mean_subtraction,
+        )
+    return build_durations(
+        information,
+        parameters,
+        total_s=wish.total_s,
+        mean_subtraction=wish.mean_subtraction,
+        aim=_aim(case, parameters, interest, progress=within(progress, 0.4, 0.9)),
+        constraints=_constraints(case, primitives),
+        prior=_prior(case, parameters),
+        sampled=sampled,
+        robust=wish.robust,
+        equations=equations,
+    )
+
+
+def _still_estimated(interest: tuple[str, ...], estimated: tuple[str, ...], predictor: str) -> tuple[str, ...]:
+    lost = [name for name in interest if name not in estimated]
+    if lost:
+        raise InputError(
+            f"design.interest names {', '.join(lost)}, which predictor {predictor!r} does not estimate: without "
+            "measured wind the terms of air fall together with those of water"
+        )
+    return interest
+
+
+def _aim(case: Scenario, parameters: tuple[str, ...], interest: tuple[str, ...], *, progress: Progress) -> Aim:
+    wish, model = case.design, case.vessel.model
+    size = np.abs(model.parameters) if wish.relative_to == "nominal" else model.parameter_std
+    nominal = dict(zip(model.names, size.tolist(), strict=True))
+    own = [name for name in parameters if name in nominal]
+    noise = dict(zip(own, equation_noise(case.vessel, own).tolist(), strict=True))
+    names: tuple[str, ...] = ()
+    gradients = np.zeros((0, 0))
+    if wish.outcomes:
+        progress("simulating standard trials with other parameters", 0.0)
+        found = outcome_gradients(
+            case.vessel,
+            wish.outcomes,
+            own,
+            speed_mps=wish.outcome_speed_mps,
+            progress=lambda share: progress("simulating standard trials with other parameters", share),
+        )
+        units = np.array(
+            [wish.outcome_units.get(name, abs(value)) for name, value in zip(found.names, found.values, strict=True)]
+        )
+        if not (units > 0).all():
+            raise InputError(f"design.outcome_units needs a unit for {found.names[int(np.argmin(units))]}, which is 0")
+        names = found.names
+        gradients = np.zeros((len(names), len(parameters)))
+        gradients[:, [parameters.index(name) for name in own]] = found.gradients / units[:, None]
+    return Aim(
+        criterion=wish.criterion,
+        interest=interest,
+        unit=np.array([wish.parameter_units.get(name, nominal.get(name, 0.0)) for name in parameters]),
+        noise=np.array([noise.get(name, 0.0) for name in parameters]),
+        outcomes=names,
+        gradients=gradients,
+    )
+
+
+def _constraints(case: Scenario, primitives: Sequence[Primitive]) -> Constraints:
+    wish = case.design
+    return Constraints(
+        least_s=wish.least_s,
+        most_s=wish.most_s,
+        required=wish.required,
+        excluded=wish.excluded,
+        budgets=tuple(_budget(item, primitives) for item in wish.budgets),
+        balance=wish.balance,
+    )
+
+
+def _budget(wish: BudgetWish, primitives: Sequence[Primitive]) -> Budget:
+    cost = wish.cost_per_s or {item.name: cubed_propeller_speed(item) for item in primitives}
+    return Budget(name=wish.name, cost_per_s=cost, limit=wish.limit)
+
+
+def cubed_propeller_speed(primitive: Primitive) -> float:
+    """Mean over the run of the sum of |n|^3 of all propellers and thrusters [rps3], a proxy for shaft power.
+
+    Raises:
+        InputError: the vessel is not driven by propeller speeds.
+    """
+    names = [name for name in primitive.commands.names if name[0] == "n" and name[1:].isdigit()]
+    if not names:
+        raise InputError(
+            "design.budgets: use = 'cubed_propeller_speed' needs actuators with a propeller speed; give cost_per_s by "
+            "primitive instead"
+        )
+    return float(sum(np.mean(np.abs(primitive.commands.column(name)) ** 3) for name in names))
+
+
+def _prior(case: Scenario, parameters: tuple[str, ...]) -> Array | None:
+    """What is known before, per sample of the informative time; None when that is nothing."""
+    wish, model = case.design, case.vessel.model
+    means = len(model.outputs) if wish.mean_subtraction == MEAN_SUBTRACTIONS[-1] else 0
+    dimension, samples = len(parameters) + means, wish.total_s / case.vessel.sample_time_s
+    prior = np.zeros((dimension, dimension))
+    if wish.prior == "parameter_std":
+        std = dict(zip(model.names, model.parameter_std.tolist(), strict=True))
+        own = [name for name in parameters if name in std]
+        known = np.zeros(len(parameters))
+        noise = np.zeros(len(parameters))
+        index = [parameters.index(name) for name in own]
+        known[index], noise[index] = [std[name] for name in own], equation_noise(case.vessel, own)
+        prior += stated_information(known, noise, dimension=dimension, samples=samples)
+    if wish.prior_data:
+        record = load_records(wish.prior_data, vessel_inputs=model.inputs, outputs=model.outputs)
+        batches = recorded_information(
+            record,
+            model,
+            parameters,
+            predictor="basic-wind" if all(batch.wind is not None for batch in record.batches) else "basic",
+            regressors="simulated",
+        )
+        matrix, rows = pooled(batches, wish.mean_subtraction)
+        prior += matrix * rows * record.batches[0].sample_time_s / case.vessel.sample_time_s / samples
+    return prior if prior.any() else None
+
+
+def design_summary(design: DurationDesign) -> dict[str, object]:
+    """Key numbers."""
+    chosen = {name: count for name, count in zip(design.problem.names, design.repeats, strict=True) if count}
+    certified = design.gap_relative if np.isfinite(design.gap_relative) else None
+    guaranteed = design.certificate.guaranteed
+    return {
+        "criterion": design.problem.aim.criterion,
+        "runs": chosen,
+        "certificate_gap": certified,
+        **({} if np.isnan(guaranteed) else {"log_det": design.log_det, "log_det_guaranteed": guaranteed}),
+        "efficiency_of_whole_runs": design.efficiency_repeats,
+        "efficiency_of_equal_shares": design.efficiency_uniform,
+        **{f"price_of_{kept.name}": kept.price for kept in limits_kept(design)},
+    }
+
+
+def design_tables(design: DurationDesign, compared: Sequence[Efficiencies]) -> tuple[TextTable, ...]:
+    """How long to run each primitive, every design under every criterion, and how limits are kept."""
+    return (_shares_table(design), *_efficiency_tables(compared), *_limits_tables(design))
+
+
+def _shares_table(design: DurationDesign) -> TextTable:
+    proof = design.certificate
+    net = design.sensitivities - proof.prices
+    columns = zip(design.problem.names, design.fractions, design.durations_s, design.repeats, net, strict=True)
+    return TextTable(
+        title=f"How long to run each primitive; what is used has the sensitivity {proof.level:.6g}, no other more",
+        header=("primitive", "share", "seconds", "whole runs", "sensitivity"),
+        rows=tuple(
+            (name, f"{share:.4f}", f"{seconds:.1f}", str(runs), f"{sensitivity:.4f}")
+            for name, share, seconds, runs, sensitivity in columns
+        ),
+    )
+
+
+def _efficiency_tables(compared: Sequence[Efficiencies]) -> tuple[TextTable, ...]:
+    known = [item for item in compared if item.of]
+    columns = list(known[0].of) if known else []
+    tables = [
+        TextTable(
+            title="Efficiency of designs by every criterion, 1 for its own optimum",
+            header=("criterion", "makes least", *columns),
+            rows=tuple((item.criterion, item.title, *(f"{item.of[name]:.3f}" for name in columns)) for item in known),
+        )
+    ]
+    missing = tuple((item.criterion, item.missing) for item in compared if item.missing)
+    if missing:
+        tables.append(TextTable(title="Criteria not compared", header=("criterion", "because"), rows=missing))
+    return tuple(tables)
+
+
+def _limits_tables(design: DurationDesign) -> tuple[TextTable, ...]:
+    rows = tuple(
+        (item.name, f"{item.limit:.5g}", f"{item.continuous:.5g}", f"{item.repeats:.5g}", f"{item.price:.3g}")
+        for item in limits_kept(design)
+    )
+    header = ("limit", "asked", "optimal shares", "whole runs", "price")
+    return (TextTable(title="Limits on the sharing", header=header, rows=rows),) if rows else ()
