@@ -94,7 +94,8 @@ def assess(
 ) -> Assessment:
     """Estimate by every method and simulate every run with every estimate.
 
-    Methods that are named must succeed. Of the ones tried on our own account those with wind may fail, which is told.
+    Methods that are named must succeed. Of the ones tried on our own account those with wind may fail, and any whose
+    instruments run away, as long as one gives an estimate; that is told.
 
     Args:
         vessel: structure, start values and sensors.
@@ -118,7 +119,8 @@ def assess(
         try:
             done.append(_assessed(vessel, record, tests, method, wish))
         except (InputError, NoAnswer) as error:
-            if named or not USES_WIND[method.predictor]:
+            spare = USES_WIND[method.predictor] or isinstance(error, Diverged)
+            if named or not spare or (method is chosen[-1] and not done):
                 raise _told(error, method) from None
             left_out.append(f"Method {method.name} gave no estimate: {error}.")
     chosen_one = preferred(done)
@@ -143,12 +145,13 @@ def limits_of(item: Assessed, integration: Integration) -> tuple[Limits, ...]:
 
 
 def preferred(found: Sequence[Assessed]) -> int:
-    """The first with instruments whose model can simulate every run; the first such without; else the first of all.
+    """The first with instruments whose model can simulate every run; the first such without; else the best at that.
 
     Only instruments can be consistent when the regressors are noisy, and an unstable model is of no use.
     """
     stable = [index for index, item in enumerate(found) if item.stable]
-    return next((index for index in stable if found[index].uses_instruments), (stable or [0])[0])
+    fewest = min(range(len(found)), key=lambda index: sum(bool(run.problem) for run in found[index].runs))
+    return next((index for index in stable if found[index].uses_instruments), (stable or [fewest])[0])
 
 
 def _told(error: InputError | NoAnswer, method: Method) -> InputError | NoAnswer:

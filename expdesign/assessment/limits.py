@@ -45,7 +45,8 @@ class Limits:
         outputs: names.
         constant, slow, quick: (n,) shares of the squared misfit by the kind of one-step residual that they grew from.
         parameters: (n,) squared misfit that the parameters' covariance leads to expect, over the one found.
-        ceiling_percent: (n,) fit that measurement noise alone would leave; its size is read from third differences.
+        ceiling_percent: (n,) fit that measurement noise alone would leave, at least: the noise is read from third
+            differences, which count motion that is quick at the sample time as noise.
         ahead_rms: (n,) of predictions `AHEAD_S` ahead from measured velocities [m/s, rad/s].
         ahead_share: (n,) the same over the standard deviation of the measured output.
         growth: how many times an error of the first velocity is larger at the end of the run, at worst.
@@ -195,6 +196,8 @@ def sentence(limits: Limits, run: RunCheck) -> str:
     """What limits the fit of a run, in words with the numbers that say so."""
     ahead = _listed(limits, 100 * limits.ahead_share)
     tail = f"{AHEAD_S:g} s ahead from measured velocities the error is {ahead} of the motion's spread."
+    if not np.isfinite(limits.ahead_rms).all():
+        tail = f"Even {AHEAD_S:g} s ahead from measured velocities a prediction runs away."
     if run.problem:
         return f"The simulation runs away. {tail}"
     if limits.unstable:
@@ -211,7 +214,9 @@ def sentence(limits: Limits, run: RunCheck) -> str:
         (f"slow ones (periods over {SLOW_S:g} s)", limits.slow[worst]),
         ("quick ones and measurement noise", limits.quick[worst]),
     )
-    parts = ", ".join(f"{100 * share:.0f} % from {what}" for what, share in sorted(causes, key=lambda c: -c[1]))
+    if not np.isfinite([share for _, share in causes]).all():
+        return tail
+    parts = ", ".join(f"{round(100 * share)} % from {what}" for what, share in sorted(causes, key=lambda c: -c[1]))
     uncertain = f" Uncertain parameters would account for {100 * limits.parameters[worst]:.0f} %."
     ceiling = limits.ceiling_percent[worst]
     quiet = f" Noise alone would hold this fit to {ceiling:.0f} %." if ceiling < 95 else ""

@@ -85,9 +85,9 @@ def unstable_warning(found: Assessment) -> tuple[str, ...]:
         return ()
     worst = max(limits.growth for limits in found.limits if limits.unstable)
     return (
-        f"In {', '.join(runs)} the ship is unstable under the inputs recorded: a simulation's error grows up to "
-        f"{worst:.2g}-fold whatever the model. Judge these by predictions {AHEAD_S:g} s ahead; output error needs a "
-        "horizon (--horizon) with them.",
+        f"In {', '.join(runs)} the ship is unstable under the inputs recorded: by this estimate an error at the start "
+        f"of a simulation grows up to {worst:.2g}-fold. Judge these runs by predictions {AHEAD_S:g} s ahead; output "
+        "error needs a horizon (--horizon) with them.",
     )
 
 

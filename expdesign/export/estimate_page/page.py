@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
-from expdesign.assessment import Assessed
+from expdesign.assessment import Assessed, Assessment, sentence
+from expdesign.assessment.limits import AHEAD_S
 from expdesign.export.estimate_page.content import EstimateContent
 from expdesign.export.estimate_page.figures import autocorrelation_figure, interval_figure, residual_figure, run_figure
-from expdesign.export.estimates import breach_sentences, fit_table, plus_minus
+from expdesign.export.estimates import breach_sentences, fit_table, motion_words, plus_minus, unstable_warning
 from expdesign.export.formats.format import xml_text
 from expdesign.export.report import words
 from expdesign.export.report.figures.style import report_style
@@ -63,6 +64,10 @@ def estimate_html(content: EstimateContent) -> str:
         summary=summary(content),
         parameters=parameter_rows(content),
         fits=fit_table(found),
+        motion=motion_words(found),
+        limits=limit_rows(found),
+        why=[sentence(limits, run) for limits, run in zip(found.limits, found.best.runs, strict=True)],
+        ahead_s=AHEAD_S,
         methods=[_notes(content, item) for item in found.methods],
         conditions=_conditions(content),
         advice=advice(content),
@@ -152,6 +157,32 @@ def _cell(item: Assessed, name: str) -> tuple[str, str]:
     return plus_minus(value, std).replace("-", words.MINUS), f"{low} to {high}"
 
 
+def limit_rows(found: Assessment) -> list[tuple[str, ...]]:
+    """One row per run and output: fit, shares of the misfit, ceiling, growth, error ahead."""
+    rows = []
+    for limits, run in zip(found.limits, found.best.runs, strict=True):
+        for index, output in enumerate(limits.outputs):
+            shares = (limits.constant, limits.slow, limits.quick, limits.parameters)
+            rows.append(
+                (
+                    run.batch.name if index == 0 else "",
+                    output,
+                    _percent(run.fit_percent[index]),
+                    *(_percent(100 * share[index]) for share in shares),
+                    _percent(limits.ceiling_percent[index]),
+                    f"\N{MULTIPLICATION SIGN}{words.significant(limits.growth, 2)}"
+                    if index == 0 and math.isfinite(limits.growth)
+                    else "",
+                    _percent(100 * limits.ahead_share[index]),
+                )
+            )
+    return rows
+
+
+def _percent(value: float) -> str:
+    return f"{words.number(float(value), 0)}{words.NB}%" if math.isfinite(value) else "-"
+
+
 def _notes(content: EstimateContent, item: Assessed) -> MethodNotes:
     estimate, found = item.estimate, item.one_step
     how = "no instruments"
@@ -197,7 +228,7 @@ def advice(content: EstimateContent) -> list[str]:
     """Honest words on which estimate to believe when, the ones that these data call for first."""
     best = content.found.best
     lag = best.one_step.autocorrelation[1]
-    sentences = []
+    sentences = [*unstable_warning(content.found)]
     if (lag < -0.25).any():
         sentences.append(
             f"Successive residuals of {_names(best, lag < -0.25)} are negatively correlated, the mark of measurement "
@@ -209,7 +240,13 @@ def advice(content: EstimateContent) -> list[str]:
             "from the model, such as wind, current, waves or a term. No method is consistent for a model that "
             "lacks what moved the ship, and the standard deviations do not count that error."
         )
-    if not best.uses_instruments:
+    if not best.stable:
+        sentences.append(
+            "No estimate can simulate every run, so none is fit for use as it is. Output error with a horizon "
+            "(--method oe, or oe-air where wind is measured, --horizon 30) asks only for short simulations and often "
+            "gives a model that stays stable; runs with less of what is not modelled help too."
+        )
+    elif not best.uses_instruments and not best.method.name.startswith("oe"):
         sentences.append(
             f"No stable estimate by instruments is at hand, so the vessel file holds that of {best.method.title}."
         )
