@@ -431,6 +431,55 @@ def check_route(
     _carry_out("check-route", lambda tell: workflows.check_routes(tuple(files)), quiet, json)
 
 
+@app.command()
+def validate(
+    scenario: ScenarioFile,
+    truth: Annotated[
+        Path | None,
+        typer.Option(
+            "--truth", metavar="VESSEL.toml", help="The ship that sails; the scenario's own vessel when not given."
+        ),
+    ] = None,
+    trials: Annotated[int, typer.Option("--trials", metavar="N", help="Simulated trials of each design.")] = 100,
+    method: Annotated[str, typer.Option("--method", metavar="M", help="Estimator, as in `estimate`.")] = "iv",
+    integrator: Annotated[
+        str,
+        typer.Option(
+            "--integrator",
+            metavar="HOW",
+            help="How the ship moves between samples: rk4, or euler, the map that discrete parameters are defined by.",
+        ),
+    ] = "rk4",
+    jobs: Annotated[int, typer.Option("--jobs", metavar="N", help="Processes; 0 for one per core.")] = 0,
+    out: Out = None,
+    seed: Seed = 0,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> None:
+    """Try the design in simulated trials: predicted against found accuracy, beside equal shares and random runs.
+
+    Writes validation.json and validation.html. An interrupted call goes on where it stopped.
+    """
+    from expdesign import workflows
+
+    _carry_out(
+        "validate",
+        lambda tell: workflows.validate_design(
+            scenario,
+            check_out(out),
+            truth=truth,
+            trials=trials,
+            method=method,
+            integrator=integrator,
+            jobs=jobs,
+            seed=seed,
+            progress=tell,
+        ),
+        quiet,
+        json,
+    )
+
+
 def _carry_out(name: str, work: Callable[[Progress], Outcome], quiet: bool, json: bool) -> None:
     """Do the work of one command and say what came of it."""
     with shown_progress(quiet=quiet) as progress:

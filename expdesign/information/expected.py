@@ -43,14 +43,14 @@ class TrialPart:
         velocity: (3,) over ground at the first sample.
         heading_rad: at the first sample; matters in wind or current.
         standing: (m,) commands that stood before, or None for those of the first sample.
-        repeats: how often it is run, each with noise of its own.
+        repeats: how often it is run, each with noise of its own; may be a fraction, for what is run only sometimes.
     """
 
     commands: Commands
     velocity: Array
     heading_rad: float = 0.0
     standing: Array | None = None
-    repeats: int = 1
+    repeats: float = 1.0
 
     def __post_init__(self) -> None:
         seal(self, velocity="3")

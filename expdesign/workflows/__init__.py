@@ -10,6 +10,7 @@ from expdesign.workflows.diagnosed import diagnose
 from expdesign.workflows.indices import check_routes, indices
 from expdesign.workflows.outcome import Outcome, Progress, TextTable
 from expdesign.workflows.trial import durations, plan, planned, run, score, scored
+from expdesign.workflows.validated import validate_design
 
 __all__ = [
     "Outcome",
@@ -30,4 +31,5 @@ __all__ = [
     "score",
     "scored",
     "simulate",
+    "validate_design",
 ]

@@ -23,8 +23,9 @@ from expdesign.errors import InputError, NoAnswer
 from expdesign.estimation.methods import Settings, estimate
 from expdesign.estimation.solution import Weighting
 from expdesign.information.expected import TrialPart, expected_covariance
+from expdesign.information.moments import HEADINGS
 from expdesign.signals import Record
-from expdesign.simulation import Environment, simulate_ensemble
+from expdesign.simulation import CALM, Environment, simulate_ensemble
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
@@ -273,7 +274,7 @@ def _predicted(rehearsal: Rehearsal, design: str, vessel: Vessel) -> Array:
         return np.full(len(rehearsal.parameters), np.nan)
     covariance = expected_covariance(
         replace(vessel, sensors=rehearsal.truth.sensors),
-        trial_parts(rehearsal.primitives, runs),
+        trial_parts(rehearsal.primitives, runs, environment=rehearsal.environment),
         rehearsal.parameters,
         environment=rehearsal.environment,
         mean_subtraction=rehearsal.mean_subtraction,
@@ -282,15 +283,23 @@ def _predicted(rehearsal: Rehearsal, design: str, vessel: Vessel) -> Array:
     return np.asarray(np.sqrt(np.diag(covariance)))
 
 
-def trial_parts(primitives: Sequence[Primitive], runs: Sequence[int]) -> tuple[TrialPart, ...]:
-    """The parts of a trial of whole runs, in the dictionary's order."""
+def trial_parts(
+    primitives: Sequence[Primitive], runs: Sequence[int], *, environment: Environment = CALM
+) -> tuple[TrialPart, ...]:
+    """The parts of a trial of whole runs, in the dictionary's order.
+
+    Wind and current make information depend on the heading; a trial of unknown headings then counts as spread evenly
+    over `HEADINGS` of them.
+    """
+    count = 1 if environment.isotropic else HEADINGS
     return tuple(
         TrialPart(
             commands=primitive.commands,
             velocity=primitive.entry_velocity,
+            heading_rad=2 * np.pi * turn / count,
             standing=primitive.entry_inputs,
-            repeats=count,
+            repeats=number / count,
         )
-        for primitive, count in zip(primitives, runs, strict=True)
-        if count
+        for primitive, number in zip(primitives, runs, strict=True)
+        for turn in range(count if number else 0)
     )

@@ -11,7 +11,7 @@ from expdesign.scenario import load_vessel
 from expdesign.scenario.dictionary_file import load_dictionary
 from expdesign.signals import Commands
 from expdesign.simulation import Environment, Variation
-from expdesign.studies.validation import Rehearsal, trial_parts, validate
+from expdesign.durations.validation import Rehearsal, trial_parts, validate
 from expdesign.vessel import Actuator, Limit, Sensors, Term, Vessel, VesselModel
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"

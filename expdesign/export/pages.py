@@ -1,0 +1,27 @@
+"""Templates of self-contained pages: one set-up for all of them."""
+
+from __future__ import annotations
+
+from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
+
+from expdesign.export.formats.format import xml_text
+
+
+def page_templates(room: str) -> Environment:
+    """Templates of a room of `expdesign.export`, and the report's style sheet.
+
+    A name that a template uses and nobody gives is an error; text is escaped, and characters that no page may hold are
+    replaced.
+    """
+    return Environment(
+        loader=ChoiceLoader([PackageLoader(f"expdesign.export.{name}") for name in dict.fromkeys((room, "report"))]),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        finalize=_shown,
+    )
+
+
+def _shown(value: object) -> object:
+    return xml_text(value) if type(value) is str else value

@@ -1,0 +1,166 @@
+"""Designs in simulated trials as JSON, and in sentences: do predictions hold, and which assumption fails if not."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from expdesign.durations.validation import Rehearsal, Validated
+from expdesign.values import Array
+
+AGREES = 0.10
+"""Relative difference of standard deviations that still counts as agreement, chance aside."""
+BIASED = 0.5
+"""Bias over standard deviation beyond which an estimator does not count as consistent."""
+ERROR_LIMIT = 1.5
+"""Normalised error below which the thesis counts a trial as good."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ValidationContent:
+    """Everything that is told.
+
+    Attributes:
+        scenario: its name.
+        rehearsal: what was tried.
+        results: of every design.
+        noisy_moduli: primitives of the optimised design in which noise or weather may turn the sign of what stands
+            inside a modulus.
+        command, version: to reproduce it.
+    """
+
+    scenario: str
+    rehearsal: Rehearsal
+    results: tuple[Validated, ...]
+    noisy_moduli: tuple[str, ...]
+    command: str
+    version: str
+
+
+def chance(result: Validated) -> float:
+    """Relative standard error of a standard deviation found from so many trials."""
+    return float(1.0 / np.sqrt(2.0 * len(result.estimates)))
+
+
+def off_theory(result: Validated) -> list[str]:
+    """Parameters whose standard deviation is not the predicted one, chance allowed for; none without a prediction."""
+    allowed = AGREES + 2.0 * chance(result)
+    return _named(result, np.abs(result.found / result.theory - 1.0) > allowed)
+
+
+def biased(result: Validated) -> list[str]:
+    """Parameters whose bias matters beside their standard deviation, chance allowed for."""
+    allowed = BIASED + 2.0 / np.sqrt(len(result.estimates))
+    return _named(result, np.abs(result.bias) > allowed * result.found)
+
+
+def _named(result: Validated, chosen: Array) -> list[str]:
+    return [name for name, is_so in zip(result.parameters, chosen, strict=True) if is_so]
+
+
+def judgements(content: ValidationContent) -> tuple[str, ...]:
+    """What the trials show, in sentences."""
+    judged = [sentence for item in content.results for sentence in _judged(item)]
+    doubtful = any(biased(item) or off_theory(item) for item in content.results)
+    return (*_comparison(content), *judged, *(_assumptions(content) if doubtful else ()))
+
+
+def _comparison(content: ValidationContent) -> Iterator[str]:
+    best, *others = content.results
+    for other in others:
+        ratio = float(np.exp(np.mean(np.log(other.found / best.found))))
+        yield (
+            f"{best.design.capitalize()} against {other.design}: standard deviations of {other.design} are "
+            f"{ratio:.2f} times as large on (geometric) average; median normalised error "
+            f"{np.median(best.errors):.3g} against {np.median(other.errors):.3g}."
+        )
+
+
+def _judged(result: Validated) -> Iterator[str]:
+    trials = len(result.estimates) + result.failed
+    if result.failed:
+        yield f"{result.design.capitalize()}: {result.failed} of {trials} trials gave no estimate."
+    off, shifted = off_theory(result), biased(result)
+    if np.isfinite(result.theory).all() and not off:
+        yield (
+            f"{result.design.capitalize()}: every standard deviation found is within {AGREES:.0%} of the predicted "
+            f"one, chance of {2 * chance(result):.0%} allowed for."
+        )
+    if off:
+        yield f"{result.design.capitalize()}: predicted and found standard deviations differ for {', '.join(off)}."
+    if shifted:
+        yield f"{result.design.capitalize()}: biased by more than half a standard deviation: {', '.join(shifted)}."
+
+
+def _assumptions(content: ValidationContent) -> Iterator[str]:
+    """Which assumptions of the prediction do not hold here."""
+    rehearsal = content.rehearsal
+    if content.noisy_moduli:
+        yield (
+            "Assumption that fails: whatever stands inside a modulus keeps its sign under noise. It may turn in "
+            f"{', '.join(content.noisy_moduli)}."
+        )
+    if rehearsal.integrator == "rk4" and rehearsal.nominal.model.form == "discrete":
+        yield (
+            "Assumption that fails: the parameters in the file are those of Euler's map, the simulated ship moves "
+            "continuously between samples, so its map has other values; --integrator euler leaves this out."
+        )
+    weather = rehearsal.environment
+    constant = (weather.current_to.any(), weather.current_std_mps, weather.wind_to.any(), weather.wind_std_mps)
+    if any(constant) and rehearsal.method in ("iv", "ls"):
+        yield (
+            f"Assumption that fails: no current and wind. Method {rehearsal.method} only takes off a constant; "
+            "--method iv-augmented or iv-wind allows for weather."
+        )
+    if rehearsal.truth.model.names != rehearsal.nominal.model.names:
+        yield "Assumption that fails: the true ship has other terms than the model."
+
+
+def validation_json(content: ValidationContent) -> str:
+    """`validation.json`."""
+    rehearsal = content.rehearsal
+    described = {
+        "scenario": content.scenario,
+        "truth": rehearsal.truth.name,
+        "method": rehearsal.method,
+        "mean_subtraction": rehearsal.mean_subtraction,
+        "integrator": rehearsal.integrator,
+        "trials": rehearsal.trials,
+        "seed": rehearsal.seed,
+        "designs": {item.design: _entry(rehearsal, item) for item in content.results},
+        "judgements": list(judgements(content)),
+    }
+    return json.dumps(described, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _entry(rehearsal: Rehearsal, result: Validated) -> dict[str, object]:
+    runs = rehearsal.designs[result.design]
+    names = [primitive.name for primitive in rehearsal.primitives]
+    return {
+        "runs": None if runs is None else {name: count for name, count in zip(names, runs, strict=True) if count},
+        "failed": result.failed,
+        "normalised_error": {
+            "median": float(np.median(result.errors)),
+            "percentile_95": float(np.percentile(result.errors, 95)),
+            "share_below_1_5": float((result.errors < ERROR_LIMIT).mean()),
+        },
+        "parameters": {
+            name: {
+                "truth": _number(result.truth[index]),
+                "bias": _number(result.bias[index]),
+                "std_found": _number(result.found[index]),
+                "std_predicted_at_truth": _number(result.theory[index]),
+                "std_forecast_by_nominal": _number(result.forecast[index]),
+                "std_stated_mean": _number(result.stated[:, index].mean()),
+                "coverage_95": _number(result.coverage[index]),
+            }
+            for index, name in enumerate(result.parameters)
+        },
+    }
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

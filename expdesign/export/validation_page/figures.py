@@ -1,0 +1,57 @@
+"""How errors are spread for each design, and predicted against found standard deviations."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from expdesign.durations.validation import Validated
+from expdesign.export.report.figures.style import BLUE, GREY, LINES, VERMILION, light_grid, new_figure, plain, svg
+from expdesign.export.validation_page.content import ERROR_LIMIT, chance
+
+
+def error_figure(results: tuple[Validated, ...]) -> str:
+    """Share of trials below each normalised error, one line per design."""
+    figure = new_figure(8.0, 3.4)
+    axes = figure.subplots()
+    for result, colour in zip(results, LINES, strict=False):
+        errors = np.sort(result.errors)
+        share = np.arange(1, len(errors) + 1) / len(errors)
+        axes.step(errors, 100 * share, where="post", color=colour, label=plain(result.design))
+    axes.set_xscale("log")
+    low, high = axes.get_xlim()
+    if low < ERROR_LIMIT < high:
+        axes.axvline(ERROR_LIMIT, color=GREY, linewidth=0.8, linestyle="--", label=f"{ERROR_LIMIT:g}")
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.set_xlabel("root mean square of (estimate \N{MINUS SIGN} truth) / |truth| over the parameters")
+    axes.set_ylabel("trials below [%]")
+    axes.set_ylim(0, 101)
+    axes.legend(loc="lower right")
+    light_grid(axes)
+    return svg(figure, key="errors", label="Share of simulated trials below each normalised error, by design")
+
+
+def spread_figure(result: Validated) -> str:
+    """Found over predicted standard deviation for each parameter, with its chance error."""
+    names = [plain(name) for name in result.parameters]
+    figure = new_figure(8.0, 1.1 + 0.26 * len(names))
+    axes = figure.subplots()
+    rows = np.arange(len(names))
+    axes.axvline(1.0, color="black", linewidth=1.0)
+    error = 1.96 * chance(result)
+    for ratio, marker, colour, label in (
+        (result.found / result.theory, "o", BLUE, "predicted with the true ship"),
+        (result.found / result.forecast, "D", VERMILION, "forecast with the nominal ship"),
+    ):
+        shift = -0.12 if marker == "o" else 0.12
+        axes.errorbar(
+            ratio, rows + shift, xerr=error * ratio, fmt=marker, color=colour, markersize=5, label=label, linewidth=1
+        )
+    axes.set_yticks(rows, names)
+    axes.invert_yaxis()
+    axes.set_xscale("log")
+    axes.set_xticks([0.5, 0.7, 1.0, 1.5, 2.0], ["0.5", "0.7", "1", "1.5", "2"])
+    axes.minorticks_off()
+    axes.set_xlabel("standard deviation found in trials / predicted")
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, fontsize=9)
+    light_grid(axes, "x")
+    return svg(figure, key="spread", label="Standard deviation found over predicted, for each parameter")

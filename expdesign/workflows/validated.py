@@ -1,0 +1,153 @@
+"""Designs tried in simulated trials with a true ship."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import joblib
+import numpy as np
+
+from expdesign import __version__
+from expdesign.durations.validation import RANDOM, Rehearsal, equal_runs, validate
+from expdesign.errors import InputError
+from expdesign.export import write_files
+from expdesign.export.validation_page import ValidationContent, judgements, validation_html, validation_json
+from expdesign.information import estimated_parameters
+from expdesign.scenario import load_scenario, load_vessel
+from expdesign.values import Array
+from expdesign.workflows.design import designed
+from expdesign.workflows.outcome import Outcome, Progress, TextTable, silent, within
+from expdesign.workflows.trial import scored
+
+OPTIMISED, EQUAL = "optimised", "equal shares"
+INTEGRATORS = ("rk4", "euler")
+
+
+def validate_design(
+    scenario: Path,
+    out: Path | None,
+    *,
+    truth: Path | None = None,
+    trials: int = 100,
+    method: str = "iv",
+    integrator: str = "rk4",
+    jobs: int = 0,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Outcome:
+    """The optimised design beside equal shares and random runs, in trials of a true ship or of the scenario's own.
+
+    An interrupted call goes on where it stopped: finished chunks of trials are kept in the folder until all are done.
+    """
+    if integrator not in INTEGRATORS:
+        raise InputError(f"--integrator is {integrator}, expected one of {', '.join(INTEGRATORS)}")
+    case = load_scenario(scenario)
+    information = scored(case, progress=within(progress, 0.0, 0.05))
+    design = designed(case, information)
+    primitives = tuple(item.primitive for item in information)
+    rehearsal = Rehearsal(
+        truth=case.vessel if truth is None else load_vessel(truth),
+        nominal=case.vessel,
+        primitives=primitives,
+        designs={OPTIMISED: design.repeats, EQUAL: equal_runs(primitives, case.design.total_s), RANDOM: None},
+        total_s=case.design.total_s,
+        environment=case.environment,
+        parameters=estimated_parameters(case.vessel.model, case.design.fixed_parameters),
+        method=method,
+        mean_subtraction=case.design.mean_subtraction,
+        integrator=integrator,
+        trials=trials,
+        seed=seed,
+    )
+    folder = out or Path("runs") / case.name
+    done, keep, forget = _chunk_store(folder / f".validation-{joblib.hash(_identity(rehearsal))}")
+    results = validate(
+        rehearsal, jobs=jobs or os.cpu_count() or 1, done=done, keep=keep, progress=within(progress, 0.05, 0.95)
+    )
+    content = ValidationContent(
+        scenario=case.name,
+        rehearsal=rehearsal,
+        results=results,
+        noisy_moduli=tuple(
+            item.primitive.name
+            for item, count in zip(information, design.repeats, strict=True)
+            if count and not item.excitation_condition
+        ),
+        command=_command(scenario, truth, trials, method, integrator, seed),
+        version=__version__,
+    )
+    files = write_files(
+        folder, {"validation.json": validation_json(content), "validation.html": validation_html(content)}
+    )
+    forget()
+    progress("done", 1.0)
+    return Outcome(files=files, summary=_summary(content), tables=(_table(content),))
+
+
+def _identity(rehearsal: Rehearsal) -> tuple[object, ...]:
+    """Everything that the trials depend on."""
+    arrays = [(item.name, item.commands.values, item.entry_velocity) for item in rehearsal.primitives]
+    ships = [
+        (ship.model.names, ship.model.parameters, ship.sensors, ship.responses)
+        for ship in (rehearsal.truth, rehearsal.nominal)
+    ]
+    weather = rehearsal.environment
+    return (
+        __version__,
+        arrays,
+        ships,
+        (weather.current_to, weather.current_std_mps, weather.wind_to, weather.wind_std_mps),
+        (weather.current_variation, weather.wind_variation),
+        (dict(rehearsal.designs), rehearsal.total_s, rehearsal.parameters, rehearsal.method),
+        (rehearsal.mean_subtraction, rehearsal.integrator, rehearsal.trials, rehearsal.seed),
+    )
+
+
+def _chunk_store(folder: Path) -> tuple[dict[str, Array], Callable[[str, Array], None], Callable[[], None]]:
+    """Chunks that an earlier call left, how to keep one more, and how to forget them all."""
+    done = {path.stem.replace("+", "/"): np.load(path) for path in sorted(folder.glob("*.npy"))}
+
+    def keep(key: str, rows: Array) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        target = folder / f"{key.replace('/', '+')}.npy"
+        beside = target.with_suffix(".part")
+        with beside.open("wb") as file:
+            np.save(file, rows)
+        beside.replace(target)
+
+    return done, keep, lambda: shutil.rmtree(folder, ignore_errors=True)
+
+
+def _command(scenario: Path, truth: Path | None, trials: int, method: str, integrator: str, seed: int) -> str:
+    words = ["expdesign", "validate", str(scenario), *(["--truth", str(truth)] if truth else [])]
+    options = {"--trials": str(trials), "--method": method, "--integrator": integrator, "--seed": str(seed)}
+    return shlex.join([*words, *(word for pair in options.items() for word in pair)])
+
+
+def _summary(content: ValidationContent) -> dict[str, object]:
+    return {
+        "trials_of_each_design": content.rehearsal.trials,
+        "median_error": {item.design: float(np.median(item.errors)) for item in content.results},
+        "without_estimate": {item.design: item.failed for item in content.results},
+        "judgements": list(judgements(content)),
+    }
+
+
+def _table(content: ValidationContent) -> TextTable:
+    best = content.results[0]
+    rows = tuple(
+        (
+            name,
+            *(f"{item.found[index]:.3g}" for item in content.results),
+            f"{best.theory[index]:.3g}",
+            f"{best.forecast[index]:.3g}",
+            f"{100 * best.coverage[index]:.0f} %",
+        )
+        for index, name in enumerate(best.parameters)
+    )
+    header = ("Parameter", *(item.design for item in content.results), "predicted", "forecast", "interval holds truth")
+    return TextTable(title="Standard deviations found in simulated trials", header=header, rows=rows)

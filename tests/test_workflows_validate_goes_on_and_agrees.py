@@ -1,0 +1,69 @@
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from expdesign import workflows
+from expdesign.cli import main
+from expdesign.errors import InputError
+
+SCENARIOS = Path(__file__).parents[1] / "scenarios"
+MODEL_SHIP, TRUE = SCENARIOS / "model-ship.toml", SCENARIOS / "vessels" / "model-ship-true.toml"
+OPTIONS = {"truth": TRUE, "trials": 4, "integrator": "euler", "jobs": 1}
+
+
+def test_an_interrupted_call_goes_on_and_gives_the_same(tmp_path):
+    whole = workflows.validate_design(MODEL_SHIP, tmp_path / "whole", **OPTIONS)
+
+    def stop(what: str, share: float) -> None:
+        if what == "simulating trials" and share > 0.3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        workflows.validate_design(MODEL_SHIP, tmp_path / "parts", progress=stop, **OPTIONS)
+    (kept,) = (tmp_path / "parts").iterdir()
+    assert 0 < len(list(kept.glob("*.npy"))) < 3
+    resumed = workflows.validate_design(MODEL_SHIP, tmp_path / "parts", **OPTIONS)
+    assert [path.name for path in resumed.files] == ["validation.json", "validation.html"]
+    assert sorted(path.name for path in (tmp_path / "parts").iterdir()) == ["validation.html", "validation.json"]
+    assert resumed.files[0].read_text("utf-8") == whole.files[0].read_text("utf-8")
+
+
+def test_the_file_holds_what_the_page_tells(tmp_path):
+    outcome = workflows.validate_design(MODEL_SHIP, tmp_path, **OPTIONS)
+    content = json.loads(outcome.files[0].read_text("utf-8"))
+    page = outcome.files[1].read_text("utf-8")
+    assert set(content["designs"]) == {"optimised", "equal shares", "random"}
+    for design in content["designs"].values():
+        for entry in design["parameters"].values():
+            assert f"{entry['std_found']:.3g}" in page
+            assert 0 <= entry["coverage_95"] <= 1
+    random = content["designs"]["random"]
+    assert random["runs"] is None
+    assert all(entry["std_predicted_at_truth"] is None for entry in random["parameters"].values())
+    runs = content["designs"]["optimised"]["runs"]
+    assert all(count > 0 for count in runs.values())
+    assert "http" not in page.replace("http://www.w3.org", "")
+    assert np.isfinite(content["designs"]["optimised"]["normalised_error"]["median"])
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--trials", "1"), "trials is 1, expected 2 or more"),
+        (("--integrator", "heun"), "--integrator is heun, expected one of rk4, euler"),
+        (("--method", "magic"), "magic"),
+        (("--truth", str(SCENARIOS / "vessels" / "azimuth-30m.toml")), "expected the same actuators"),
+    ],
+)
+def test_wrong_wishes_are_one_line_and_leave_nothing(tmp_path, capsys, options, words):
+    assert main(["validate", str(MODEL_SHIP), "--out", str(tmp_path / "out"), "--jobs", "1", *options]) == 2
+    error = capsys.readouterr().err.strip().splitlines()[-1]
+    assert words in error
+    assert not (tmp_path / "out").exists()
+
+
+def test_another_method_is_named_at_once():
+    with pytest.raises(InputError):
+        workflows.validate_design(MODEL_SHIP, None, method="magic", trials=2, jobs=1)
