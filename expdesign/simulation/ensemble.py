@@ -1,8 +1,8 @@
 """Many simulated trials at once, with everything that disturbs a real one: for Monte Carlo studies.
 
-Every run has its own current and wind, white from sample to sample around a mean in the n-frame, its own sensor noise,
-and, if wished, its own commands and parameters. Arrays are (samples, runs, ...). Noise is drawn a stretch of samples at
-a time, so memory is that of the result.
+Every run has its own current and wind, varying around a mean of its own in the n-frame, its own sensor noise, and, if
+wished, its own commands and parameters. Arrays are (samples, runs, ...). Noise is drawn a stretch of samples at a time,
+so memory is that of the result.
 
 Source: F. Ljungberg, doctoral thesis, Linköping University, (3.18), (5.3), (5.61), (6.1)-(6.2).
 """
@@ -105,8 +105,8 @@ def simulate_ensemble(
         standing: (m,) commands that stood before the first sample; None for those of the first sample.
         integrator: "euler", the map of discrete parameters (with one substep), or "rk4".
         substeps: integrator steps per sample; current and wind are held over a sample.
-        engine: "numpy", or "numba" for compiled loops, several times as fast where numba is installed; the random
-            numbers are the same, the results agree to rounding.
+        engine: "numpy", or "numba" for compiled loops where numba is installed; the random numbers are the same, the
+            results agree to rounding.
 
     Raises:
         ShapeError: inputs that do not fit.
