@@ -100,7 +100,7 @@ def _certified(task: Task, found: Interior, blur: float, kind: str) -> tuple[Cer
     certificate = Certificate(
         kind=kind,
         value=task.objective.value(w),
-        bound=value - float(slope @ w) + min(bounds),
+        bound=float(value - slope @ w + min(bounds)),
         degree=task.objective.pieces[0].measure.degree,
         level=level,
         mixture=tangent.mixture,

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from expdesign.durations.criteria import LogDet, Measure, criterion
+from expdesign.durations.criteria import Measure
 from expdesign.durations.objective import Piece, congruent, stacked_values
-from expdesign.durations.task import objective_of
+from expdesign.durations.task import collected_measure, objective_of
 from expdesign.durations.values import DurationProblem
 from expdesign.values import Array
 
@@ -82,13 +82,6 @@ class Collected:
         piece = self.pieces[0]
         total = piece.prior + congruent(piece.transformation, collected)
         return float(np.exp((self.worth((total[None],))[0] - self.value(reference)) / self.degree))
-
-
-def collected_measure(problem: DurationProblem, name: str) -> Measure:
-    """The measure of a criterion that stays right when times do not sum to one: means are eliminated, not counted."""
-    if name == "D":
-        return LogDet(problem.picked.columns(problem.parameters))
-    return criterion(name).measure(problem.picked)
 
 
 def _unsymmetric(problem: DurationProblem, measure: Measure) -> Piece:

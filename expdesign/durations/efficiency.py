@@ -11,7 +11,7 @@ from expdesign.durations.collected import Collected
 from expdesign.durations.criteria import CRITERIA
 from expdesign.durations.objective import stacked_values
 from expdesign.durations.solve import optimal_shares
-from expdesign.durations.task import floors_of
+from expdesign.durations.task import floors_of, with_idle
 from expdesign.durations.values import DurationDesign, DurationProblem
 from expdesign.errors import InputError, NoAnswer
 from expdesign.values import Array
@@ -95,7 +95,8 @@ def limits_kept(design: DurationDesign) -> tuple[Kept, ...]:
     for budget in problem.constraints.budgets:
         cost = np.array([budget.cost_per_s.get(name, 0.0) for name in problem.names]) * problem.total_s
         found.append((budget.name, budget.limit, float(cost @ design.fractions), float(cost @ runs)))
-    for equation, floor in floors_of(problem).items():
+    idle = bool(problem.constraints.budgets)
+    for equation, floor in floors_of(with_idle(problem) if idle else problem).items():
         piece = floor.pieces[0]
         value, at_runs = (
             problem.constraints.balance
@@ -104,7 +105,7 @@ def limits_kept(design: DurationDesign) -> tuple[Kept, ...]:
                     (stacked_values(piece.measure, piece.matrix(w)[None])[0] - floor.levels[0]) / piece.measure.degree
                 )
             )
-            for w in (design.fractions, runs)
+            for w in (np.r_[design.fractions, [0.0] * idle], np.r_[runs, [0.0] * idle])
         )
         found.append((f"balance of equation {equation}", problem.constraints.balance, value, at_runs))
     prices = design.certificate.multipliers

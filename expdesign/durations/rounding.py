@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from expdesign.durations.collected import Collected
 from expdesign.durations.constraints import TIGHT, Polytope
-from expdesign.durations.task import polytope_of
+from expdesign.durations.task import limits_of
 from expdesign.durations.values import DurationProblem
 from expdesign.errors import NoAnswer
 from expdesign.values import Array
@@ -88,7 +88,7 @@ class _Search:
 
     @staticmethod
     def of(problem: DurationProblem, fractions: Array) -> _Search:
-        collected, polytope = Collected.of(problem), polytope_of(problem)
+        collected, polytope = Collected.of(problem), limits_of(problem)
         shares = np.asarray(problem.run_s / problem.total_s)
         most = np.where(polytope.most < 1.0, polytope.most, np.inf) / shares
         return _Search(

@@ -9,6 +9,7 @@ import numpy as np
 
 from expdesign.durations.asymmetric import definite_start, improved, log_abs_det
 from expdesign.durations.certificate import certify
+from expdesign.durations.collected import Collected
 from expdesign.durations.constraints import NO_CONSTRAINTS, Constraints
 from expdesign.durations.criteria import Aim
 from expdesign.durations.interior import climb
@@ -149,17 +150,21 @@ def _certified_shares(problem: DurationProblem, within: Array | None) -> Duratio
             f"the durations could not be certified: a design better by {certificate.gap / certificate.degree:.2g} "
             f"in {problem.aim.criterion}-efficiency is not excluded, at most {LARGEST_GAP:g} is accepted"
         )
-    gap = max(certificate.gap, 0.0)
-    certificate = replace(certificate, bound=certificate.value + gap)
+    gap, count = max(certificate.gap, 0.0), len(problem.names)
+    certificate = replace(certificate, bound=certificate.value + gap, prices=certificate.prices[:count])
+    fractions, own = found.fractions[:count], problem.aim.criterion == "D" and problem.robust == "nominal"
+    log_det = log_abs_det(problem, fractions, symmetric=within is not None)
+    if problem.constraints.budgets:  # unused time: what is collected counts, with means eliminated
+        log_det = certificate.value if own else Collected.of(problem, "D").value(fractions)
     return DurationDesign(
         problem=problem,
-        fractions=found.fractions,
-        sensitivities=slope,
-        log_det=log_abs_det(problem, found.fractions, symmetric=within is not None),
+        fractions=fractions,
+        sensitivities=slope[:count],
+        log_det=log_det,
         gap=gap,
         repeats=(0,) * len(problem.names),
         efficiency_repeats=float("nan"),
-        efficiency_uniform=_uniform_efficiency(problem, found.fractions),
+        efficiency_uniform=_uniform_efficiency(problem, fractions),
         certificate=certificate,
     )
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from expdesign.durations.constraints import Polytope, feasible_set
@@ -11,6 +13,8 @@ from expdesign.durations.objective import Objective, pieces_of
 from expdesign.durations.values import DurationProblem
 from expdesign.errors import InputError, NoAnswer
 from expdesign.values import Array
+
+IDLE = "(unused time)"
 
 
 def symmetric_part(matrices: Array) -> Array:
@@ -44,8 +48,21 @@ def polytope_of(problem: DurationProblem) -> Polytope:
     return feasible_set(problem.constraints, problem.names, run_s=problem.run_s, total_s=problem.total_s)
 
 
+def limits_of(problem: DurationProblem) -> Polytope:
+    """The linear limits of shares (q,) that need not take all the time.
+
+    Raises:
+        UnknownName, InputError, NoAnswer: see `feasible_set`.
+    """
+    whole, count = polytope_of(with_idle(problem)), len(problem.names)
+    return replace(whole, least=whole.least[:count], most=whole.most[:count], rows=whole.rows[:, :count])
+
+
 def task_of(problem: DurationProblem, *, within: Array | None = None) -> Task:
     """The concave task of a problem; `within` as in `objective_of`.
+
+    Where budgets limit what is used up, some of the time may be better left unused: the task then has one more
+    primitive at its end, idling, which informs about nothing and costs nothing.
 
     Raises:
         UnknownName, InputError: the aim or the limits are wrong.
@@ -53,6 +70,8 @@ def task_of(problem: DurationProblem, *, within: Array | None = None) -> Task:
         NoAnswer: no sharing meets the limits.
     """
     measure = criterion(problem.aim.criterion).measure(problem.picked)
+    if problem.constraints.budgets:
+        problem, measure = with_idle(problem), collected_measure(problem, problem.aim.criterion)
     objective = objective_of(problem, measure, within=within)
     floors = floors_of(problem)
     return Task(
@@ -61,6 +80,28 @@ def task_of(problem: DurationProblem, *, within: Array | None = None) -> Task:
         floors=tuple(floors.values()),
         floor_names=tuple(f"balance of equation {equation}" for equation in floors),
     )
+
+
+def with_idle(problem: DurationProblem) -> DurationProblem:
+    """The problem with a primitive of no information at its end."""
+    nothing = np.zeros((1, *problem.matrices.shape[1:]))
+    sampled = problem.sampled
+    if len(sampled):
+        sampled = np.concatenate([sampled, np.zeros((len(sampled), *nothing.shape))], axis=1)
+    return replace(
+        problem,
+        names=(*problem.names, IDLE),
+        matrices=np.concatenate([problem.matrices, nothing]),
+        run_s=np.r_[problem.run_s, problem.total_s],
+        sampled=sampled,
+    )
+
+
+def collected_measure(problem: DurationProblem, name: str) -> Measure:
+    """The measure of a criterion that stays right when times do not sum to one: means are eliminated, not counted."""
+    if name == "D":
+        return LogDet(problem.picked.columns(problem.parameters))
+    return criterion(name).measure(problem.picked)
 
 
 def start_of(task: Task, *, within: Array | None = None) -> Array:

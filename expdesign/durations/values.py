@@ -137,7 +137,7 @@ class DurationDesign:
 
     Attributes:
         problem: what was asked.
-        fractions: (q,) optimal time fractions, sum 1.
+        fractions: (q,) optimal time fractions, sum 1; less where budgets make it better to leave time unused.
         sensitivities: (q,) slope of the criterion; for D trace(B(w)^-1 B_q), at the optimum at most `dimension`, equal
             where w_q > 0.
         log_det: log det B at `fractions`, by the nominal model.
