@@ -9,13 +9,24 @@ from html.parser import HTMLParser
 import export_case as case
 import numpy as np
 import pytest
+import shapely
 from lxml import etree
 
 from expdesign.durations import MEAN_SUBTRACTIONS, build_durations, solve_durations
+from expdesign.export import build_route
 from expdesign.export.report import report_html, words
+from expdesign.export.report.admission import least_charted_depth
 from expdesign.export.report.content import information_rate, primitive_runs, relative_information
+from expdesign.export.report.figures.footprints import footprints
 from expdesign.export.report.figures.labels import place_labels
 from expdesign.export.report.figures.position_axes import nice_step
+from expdesign.export.report.tables import parameter_rows
+from expdesign.export.report.trust import chain
+from expdesign.export.report.uncertainty import expected
+from expdesign.information.expected import TrialPart, expected_covariance
+from expdesign.plan.footprint import hull_polygons
+from expdesign.simulation import CALM
+from expdesign.vessel import Sensors
 
 ODD = 'x <script>alert(1)</script> & "$\\alpha$" $ \x07 \N{SNOWMAN}'
 
@@ -199,3 +210,60 @@ def test_steps_are_round_and_few(span: float) -> None:
 )
 def test_numbers_are_said_as_people_say_them(said: str, wanted: str) -> None:
     assert said.replace("\N{NO-BREAK SPACE}", " ") == wanted
+
+
+def noisy_content() -> object:
+    """The case with sensors that have noise and with its route."""
+    vessel = replace(case.tug(), sensors=Sensors(velocity_mps=0.01, yaw_rate_radps=0.001))
+    route = build_route(case.planned(), safe_water=case.plan().area.water)
+    return case.report_content(vessel=vessel, route=route)
+
+
+def test_uncertainties_are_those_of_the_whole_track_and_of_the_runs() -> None:
+    content = noisy_content()
+    found = expected(content)
+    part = TrialPart(commands=content.plan.commands, velocity=np.zeros(3), heading_rad=0.0)
+    covariance = expected_covariance(content.vessel, [part], content.parameters, environment=content.environment)
+    assert found.track == pytest.approx(np.sqrt(np.diag(covariance)))
+    assert np.array_equal(found.before, content.parameter_std)
+    assert (found.runs >= 0.999 * found.track).all()  # more data never tell less
+    rows = parameter_rows(content, found)
+    assert [row.track for row in rows] == [words.significant(std, 2) for std in found.track]
+
+
+def test_the_chain_of_proofs_ends_at_the_route_that_was_written() -> None:
+    content = noisy_content()
+    links = chain(content, short_of_optimum="0.1 %")
+    steps = [link.step for link in links]
+    assert steps == ["Best sharing of the time", "Whole runs", "One stitched track", "Allowed water", "Exported route"]
+    assert words.number(content.route.xtd_m) in links[-1].found
+    assert "every leg in allowed water" in links[-1].found
+    assert (
+        "NOT"
+        in chain(
+            replace(content, route=replace(content.route, fit=replace(content.route.fit, in_water=False))),
+            short_of_optimum="",
+        )[-1].found
+    )
+
+
+def test_the_least_charted_depth_is_that_of_the_shallowest_water_under_the_track() -> None:
+    area, points = case.plan().area, np.array([[0.0, 0.0], [0.0, 50.0], [0.0, 90.0]])
+    deep = shapely.MultiPolygon([shapely.box(-10, -10, 100, 10)])
+    deeper = shapely.MultiPolygon([shapely.box(-10, -10, 60, 10)])
+    charted = replace(area, depths=((5.0, deep), (20.0, deeper)))
+    assert least_charted_depth(charted, points) == 5.0
+    assert least_charted_depth(charted, points[:2]) == 20.0
+    assert least_charted_depth(charted, np.array([[0.0, 200.0]])) is None
+    assert least_charted_depth(area, points) is None
+
+
+def test_footprints_hold_the_planned_hull_and_grow_with_what_is_unknown() -> None:
+    content = case.report_content()
+    known = replace(content, vessel=replace(content.vessel, model=replace(
+        content.vessel.model, parameter_std=np.zeros(len(content.parameters)))), environment=CALM)  # fmt: skip
+    legs = [leg for leg in content.plan.legs if leg.kind == "primitive"]
+    for leg, wide, tight in zip(legs, footprints(content), footprints(known), strict=True):
+        pose = content.plan.trajectory.pose[[leg.first, leg.last]]
+        assert all(wide.buffer(0.1).covers(hull) for hull in hull_polygons(pose, content.vessel.hull_b))
+        assert wide.area > tight.area

@@ -13,6 +13,7 @@ from expdesign.durations import DurationDesign, efficiencies, with_repeats
 from expdesign.durations.growing_values import Growth
 from expdesign.export import (
     STANDARD,
+    Route,
     build_route,
     commands_csv,
     dictionary_json,
@@ -42,13 +43,14 @@ def run(scenario: Path, out: Path | None, *, seed: int = 0, progress: Progress =
     compared = efficiencies(design)
     plan = planned(case, information, design, seed=seed, progress=within(progress, 0.14, 0.85))
     progress("writing routes, run cards and report", 0.85)
-    content = replace(_report(case, information, design, plan, seed), compared=compared)
+    route = _route(case, plan)
+    content = replace(_report(case, information, design, plan, seed), compared=compared, route=route)
     files = {
         **_dictionary_files(case, information),
         **growth_files(case, growth),
         "durations.json": durations_json(design, compared=compared),
         **_plan_files(case, plan),
-        **_route_files(case, plan),
+        **route_files(route, STANDARD),
         "report.html": report_html(content),
         "cards.html": cards_html(content),
     }
@@ -187,7 +189,7 @@ def _plan_files(case: Scenario, plan: Plan) -> dict[str, str | bytes]:
     }
 
 
-def _route_files(case: Scenario, plan: Plan) -> dict[str, bytes]:
+def _route(case: Scenario, plan: Plan) -> Route:
     track = planned_track(
         plan,
         scenario=case.name,
@@ -195,8 +197,7 @@ def _route_files(case: Scenario, plan: Plan) -> dict[str, bytes]:
         environment=case.environment,
         clearance_m=case.plan.clearance_m,
     )
-    route = build_route(track, safe_water=case.area.water)
-    return route_files(route, STANDARD)
+    return build_route(track, safe_water=case.area.water)
 
 
 def _report(

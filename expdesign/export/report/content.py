@@ -8,6 +8,7 @@ import numpy as np
 
 from expdesign.durations import Efficiencies
 from expdesign.durations.values import DurationDesign
+from expdesign.export.route import Route
 from expdesign.information.primitive_information import PrimitiveInformation
 from expdesign.plan.values import Plan
 from expdesign.simulation.environment import Environment
@@ -34,6 +35,7 @@ class ReportContent:
         command: the command line that reproduces the result.
         version: of the program.
         compared: the design under every criterion.
+        route: the waypoints as exported, or None when there are none.
     """
 
     scenario: str
@@ -51,6 +53,7 @@ class ReportContent:
     command: str
     version: str
     compared: tuple[Efficiencies, ...] = ()
+    route: Route | None = None
 
     def __post_init__(self) -> None:
         seal(self, start="3", goal="3")

@@ -9,13 +9,17 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from expdesign.export.formats.format import xml_text
 from expdesign.export.report import tables, words
+from expdesign.export.report.admission import conditions
 from expdesign.export.report.content import ReportContent, primitive_runs
 from expdesign.export.report.figures.chart import chart
 from expdesign.export.report.figures.design import durations_figure, information_figure
 from expdesign.export.report.figures.gallery import primitive_figure
 from expdesign.export.report.figures.style import report_style
 from expdesign.export.report.figures.timeline import timeline_figure
+from expdesign.export.report.figures.uncertainty import uncertainty_figure
 from expdesign.export.report.glossary import GLOSSARY
+from expdesign.export.report.trust import chain
+from expdesign.export.report.uncertainty import Expected, expected, measures_velocity
 
 SUBTRACTION = {
     "none": "nothing is subtracted from the regressors before estimation",
@@ -44,6 +48,7 @@ def report_html(content: ReportContent) -> str:
         lstrip_blocks=True,
         finalize=_shown,
     )
+    after = expected(content)
     return templates.get_template("report.html").render(
         content=content,
         plan=content.plan,
@@ -56,10 +61,13 @@ def report_html(content: ReportContent) -> str:
         assumptions=assumptions(content),
         agenda=tables.agenda(content),
         primitives=tables.primitive_rows(content),
-        parameters=tables.parameter_rows(content),
+        parameters=tables.parameter_rows(content, after),
+        noise=measures_velocity(content),
+        chain=chain(content, short_of_optimum=_short_of_optimum(content)),
+        conditions=conditions(content),
         checks=tables.checks(content),
         glossary=GLOSSARY,
-        figures=_figures(content),
+        figures=_figures(content, after),
         origin=_origin(content),
         percent=words.percent,
     )
@@ -70,7 +78,7 @@ def _shown(value: object) -> object:
     return xml_text(value) if type(value) is str else value
 
 
-def _figures(content: ReportContent) -> dict[str, object]:
+def _figures(content: ReportContent, after: Expected) -> dict[str, object]:
     hull = content.vessel.hull_b
     with report_style():
         return {
@@ -78,6 +86,7 @@ def _figures(content: ReportContent) -> dict[str, object]:
             "durations": durations_figure(content),
             "information": information_figure(content),
             "timeline": timeline_figure(content.plan),
+            "uncertainty": uncertainty_figure(content, after) if measures_velocity(content) else "",
             "primitives": [
                 primitive_figure(item.primitive, hull, number=number) for number, item in enumerate(content.information)
             ],

@@ -8,6 +8,7 @@ import numpy as np
 
 from expdesign.export.report import words
 from expdesign.export.report.content import ReportContent, primitive_runs
+from expdesign.export.report.uncertainty import Expected
 from expdesign.information.primitive_information import PrimitiveInformation
 from expdesign.plan.safety import DRAWS
 from expdesign.plan.values import Leg, Plan
@@ -178,15 +179,41 @@ def checks(content: ReportContent) -> list[Check]:
     return rows
 
 
-def parameter_rows(content: ReportContent) -> list[tuple[str, str, str, str]]:
-    """Name, regressor, nominal value and prior standard deviation of every parameter to be estimated."""
+@dataclass(frozen=True, kw_only=True)
+class ParameterRow:
+    """One parameter to be estimated: its term, its value, and how well it is known before and after."""
+
+    name: str
+    term: str
+    nominal: str
+    before: str
+    runs: str
+    track: str
+    gain: str
+
+
+def parameter_rows(content: ReportContent, found: Expected) -> list[ParameterRow]:
+    """Parameters in order; standard deviations in the parameter's own unit."""
     model = content.vessel.model
     nominal = dict(zip(model.names, model.parameters.tolist(), strict=True))
     terms = {term.name: f"d{term.equation}/dt = ... + {term.name} * {term.expression}" for term in model.terms}
+    columns = zip(content.parameters, found.before.tolist(), found.runs.tolist(), found.track.tolist(), strict=True)
     return [
-        (name, terms[name], words.significant(nominal[name]), words.significant(std) if std > 0 else "not stated")
-        for name, std in zip(content.parameters, content.parameter_std.tolist(), strict=True)
+        ParameterRow(
+            name=name,
+            term=terms[name],
+            nominal=words.significant(nominal[name]),
+            before=words.significant(before) if before > 0 else "not stated",
+            runs=_std(runs),
+            track=_std(track),
+            gain=f"{words.significant(before / track, 2)} times" if before > 0 and track > 0 else "",
+        )
+        for name, before, runs, track in columns
     ]
+
+
+def _std(value: float) -> str:
+    return "cannot be told" if np.isnan(value) else words.significant(value, 2)
 
 
 def _share_of_draws(probability: float) -> str:

@@ -13,6 +13,7 @@ from matplotlib.path import Path as Outline
 
 from expdesign.conventions import to_n_frame
 from expdesign.export.report.content import ReportContent, primitive_runs
+from expdesign.export.report.figures.footprints import footprints
 from expdesign.export.report.figures.labels import place_labels
 from expdesign.export.report.figures.position_axes import draw_position_ticks, draw_scale_and_north
 from expdesign.export.report.figures.style import (
@@ -50,6 +51,8 @@ def chart(content: ReportContent) -> str:
     axes.set_xlim(west, east)
     axes.set_ylim(south, north)
     draw_sea(axes, plan.area, box, content.clearance_m)
+    for covered in footprints(content):
+        axes.add_patch(_patch(covered, facecolor=PRIMITIVE, alpha=0.18, edgecolor="none"))
     _draw_track(axes, plan, content.vessel.hull_b, least_length_m=0.022 * (east - west))
     _draw_ends(axes, content)
     _draw_runs(axes, plan, metres_per_inch=(east - west) / map_width_in)
@@ -80,11 +83,20 @@ def draw_sea(axes: Axes, area: SeaArea, box: Box, clearance_m: float) -> None:
     detail = (box[2] - box[0]) / 2000
     near = as_multipolygon(shapely.intersection(area.water, around))
     axes.add_patch(_patch(shapely.simplify(near, detail), facecolor=WATER, edgecolor="#7aa6c2", linewidth=0.5))
+    for number, (_, polygons) in enumerate(area.depths):
+        deep = as_multipolygon(shapely.simplify(shapely.intersection(polygons, around), detail))
+        axes.add_patch(_patch(deep, facecolor=depth_colour(number, len(area.depths)), edgecolor="none", alpha=0.6))
     land = as_multipolygon(shapely.simplify(shapely.intersection(area.land, around), detail))
     axes.add_patch(_patch(land, facecolor=LAND, edgecolor="#8a7440", linewidth=0.5))
     if clearance_m > 0:
         safe = as_multipolygon(shapely.simplify(near.buffer(-clearance_m), detail))
         axes.add_patch(_patch(safe, facecolor="none", edgecolor=GREY, linewidth=0.7, linestyle=(0, (2, 2))))
+
+
+def depth_colour(number: int, count: int) -> str:
+    """Shallow to deep: from the blue of charts to white, as on paper charts."""
+    share = number / max(count - 1, 1)
+    return "#" + "".join(f"{round(low + share * (255 - low)):02x}" for low in (0xB7, 0xD7, 0xEE))
 
 
 def _patch(geometry: shapely.Geometry, **style: object) -> PathPatch:
@@ -142,8 +154,15 @@ def _draw_runs(axes: Axes, plan: Plan, *, metres_per_inch: float) -> None:
 def _legend(content: ReportContent) -> Sequence[Line2D | Patch]:
     reposition, primitive = KINDS["reposition"], KINDS["primitive"]
     clearance = f"{content.clearance_m:g} m from forbidden water"
+    covered = f"hull with {100 * content.confidence:g} % of drawn ships"
+    depths = content.plan.area.depths
+    shown = (
+        Patch(facecolor=depth_colour(number, len(depths)), edgecolor="#7aa6c2", alpha=0.6, label=f"{depth:g} m or more")
+        for number, (depth, _) in enumerate(depths)
+    )
     return (
         Line2D([], [], color=primitive[0], linewidth=primitive[1], label="informative run, numbered"),
+        Patch(facecolor=PRIMITIVE, alpha=0.18, label=covered),
         Line2D([], [], color=reposition[0], linewidth=reposition[1], label="repositioning"),
         Line2D([], [], color=BLACK, marker="x", linestyle="", markeredgewidth=2, label="least clearance"),
         Line2D([], [], color=GREEN, marker="o", linestyle="", markersize=9, label="start"),
@@ -152,4 +171,5 @@ def _legend(content: ReportContent) -> Sequence[Line2D | Patch]:
         Patch(facecolor=WATER, edgecolor="#7aa6c2", label="allowed water"),
         Patch(facecolor=LAND, edgecolor="#8a7440", label="land"),
         Patch(facecolor=FORBIDDEN, edgecolor=GREY, label="not allowed, or not charted"),
+        *shown,
     )
