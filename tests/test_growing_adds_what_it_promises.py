@@ -11,7 +11,8 @@ from test_dictionary_command_families import rudder_ship
 from expdesign.dictionary import FAMILIES, build_primitive, family
 from expdesign.dictionary.batch import excite_many
 from expdesign.durations import bordered, build_durations, solve_durations
-from expdesign.durations.growing import grow_dictionary, motion_limits, optimum, sensitivity
+from expdesign.durations.growing import grow_dictionary, motion_limits
+from expdesign.durations.growing_optimum import optimum, sensitivity
 from expdesign.durations.growing_search import violation
 from expdesign.durations.growing_space import family_spaces
 from expdesign.durations.growing_values import GrowSettings, Growth

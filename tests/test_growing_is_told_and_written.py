@@ -75,7 +75,7 @@ def test_recorded_additions_lie_beside_the_dictionary(grown):
         ('families = ["zigzagg"]', "design.grow.families[1]: is 'zigzagg', did you mean 'zigzag'"),
         ("limits = {u_mps = [1.0, 0.0]}", "design.grow.limits.u_mps: is [1, 0], expected low below high"),
         ("limits = {u_mps = [1.0]}", "design.grow.limits.u_mps: "),
-        ("limits = {u = [0.0, 1.0]}", "design.grow.limits.u: is not a known key, expected one of u_mps, v_mps, r_radps"),
+        ("limits = {u = [0.0, 1.0]}", "design.grow.limits.u: is not a known key, expected one of u_mps"),
         ("rounds = 0", "design.grow.rounds: is 0, expected at least 1"),
         ("tolerance = 0.0", "design.grow.tolerance: is 0, expected more than 0"),
         ("round = 3", "design.grow.round: is not a known key, did you mean 'rounds'"),

@@ -17,12 +17,10 @@ import numpy as np
 
 from expdesign.dictionary import FAMILIES, Primitive, PrimitiveSpec, build_primitive, family
 from expdesign.durations._casadi import FreeForm, optimise_commands
-from expdesign.durations.certificate import log_det, whitened
-from expdesign.durations.growing_search import CandidateSearch, Measure, violation
-from expdesign.durations.growing_space import family_spaces
+from expdesign.durations.growing_optimum import Optimum, optimum, sensitivity
+from expdesign.durations.growing_search import Measure, best_of, pool_of, refined, violation
+from expdesign.durations.growing_space import FamilySpace, family_spaces
 from expdesign.durations.growing_values import GrowRound, GrowSettings, Growth
-from expdesign.durations.polish import polish
-from expdesign.durations.solve import bordered
 from expdesign.errors import InputError, UnknownName
 from expdesign.information import PrimitiveInformation, check_informative, estimated_parameters, score_primitives
 from expdesign.simulation import CALM, Environment
@@ -69,12 +67,15 @@ def grow_dictionary(
     )
     check_informative(information, case.names, mean_subtraction)
     progress("simulating candidates", 0.0)
-    search = _search(case, information, settings)
+    spaces, measure = _spaces(case, information, settings), _measure(case)
+    rng = np.random.default_rng(settings.seed or 0)
+    archives = pool_of(spaces, measure, pool=settings.pool, seed=settings.seed or 0)
     grown, specs, rounds = list(information), list[PrimitiveSpec](), list[GrowRound]()
     first = best = optimum(grown, mean_subtraction)
     while True:
         tell = _within(progress, len(rounds), settings.rounds)
-        spec, found = search.best(best.inverse, partial(tell, SEARCHING))
+        archives = refined(archives, best.inverse, measure, rng, partial(tell, SEARCHING))
+        spec, found = best_of(archives, best.inverse)
         left = found
         if spec is None or len(rounds) == settings.rounds:
             break
@@ -104,7 +105,7 @@ def grow_dictionary(
         information=tuple(grown),
         rounds=tuple(rounds),
         limits=case.limits,
-        evaluated=search.evaluated,
+        evaluated=sum(len(archive.points) for archive in archives),
         dimension=best.dimension,
         parameters=len(case.names),
         best_left=left,
@@ -175,42 +176,6 @@ class _Case:
         return item
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Optimum:
-    """The best shares of the present dictionary.
-
-    Attributes:
-        fractions: (q,) time fractions.
-        log_det: in physical scale.
-        inverse: (d, d) B^-1 in physical scale.
-    """
-
-    fractions: Array
-    log_det: float
-    inverse: Array
-
-    @property
-    def dimension(self) -> int:
-        """Size of B."""
-        return len(self.inverse)
-
-
-def optimum(information: Sequence[PrimitiveInformation], mean_subtraction: str) -> Optimum:
-    """D-optimal time fractions of a dictionary that informs about every parameter."""
-    matrices = np.array([bordered(item, mean_subtraction) for item in information])
-    white, offset = whitened(matrices)
-    fractions = polish(white, np.full(len(white), 1.0 / len(white)))
-    total = np.tensordot(fractions, matrices, axes=1)
-    scale = np.sqrt(np.diag(total))
-    inverse = np.linalg.inv(total / np.outer(scale, scale)) / np.outer(scale, scale)
-    return Optimum(fractions=fractions, log_det=log_det(white, fractions) + offset, inverse=inverse)
-
-
-def sensitivity(best: Optimum, item: PrimitiveInformation, mean_subtraction: str) -> float:
-    """d = trace(B(w)^-1 B) of one run."""
-    return float(np.sum(best.inverse * bordered(item, mean_subtraction)))
-
-
 def motion_limits(settings: GrowSettings, primitives: Sequence[Primitive]) -> Array:
     """(3, 2) low and high of u, v, r: as wished, else what the primitives span in calm water.
 
@@ -229,19 +194,23 @@ def motion_limits(settings: GrowSettings, primitives: Sequence[Primitive]) -> Ar
     return limits
 
 
-def _search(case: _Case, information: Sequence[PrimitiveInformation], settings: GrowSettings) -> CandidateSearch:
+def _spaces(
+    case: _Case, information: Sequence[PrimitiveInformation], settings: GrowSettings
+) -> tuple[FamilySpace, ...]:
     step_s = case.vessel.sample_time_s
     run_s = settings.run_s or float(np.median([item.primitive.duration_s for item in information]))
     chosen = tuple(family(name) for name in settings.families) or FAMILIES
-    spaces = family_spaces(case.vessel, chosen, case.limits, max(round(run_s / step_s), 2) * step_s)
-    measure = Measure(
+    return family_spaces(case.vessel, chosen, case.limits, max(round(run_s / step_s), 2) * step_s)
+
+
+def _measure(case: _Case) -> Measure:
+    return Measure(
         vessel=case.vessel,
         names=case.names,
         environment=case.environment,
         mean_subtraction=case.mean_subtraction,
         limits=case.limits,
     )
-    return CandidateSearch(spaces, measure, pool=settings.pool, seed=settings.seed or 0)
 
 
 def _unused(number: int, kind: str, grown: Sequence[PrimitiveInformation]) -> str:

@@ -21,6 +21,10 @@ from expdesign.simulation import Environment
 from expdesign.values import Array
 from expdesign.vessel import Vessel
 
+SLACK = 1e-9
+"""Violation of a limit that is rounding."""
+FEWEST = 8
+"""Candidates of a family that are simulated one by one at least."""
 BATCH = 512
 """Runs simulated at once."""
 CLOSED_LOOP_SHARE = 32
@@ -77,15 +81,15 @@ def violation(motion: Array, limits: Array) -> Array:
     return np.asarray(np.maximum(excess.max(axis=(1, 2)), 0.0))
 
 
-@dataclass(kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Archive:
     """Every candidate of one family that was looked at.
 
     Attributes:
         space: the family's.
         points: (n, a) places in the unit cube.
-        matrices: (n, d, d).
-        excess: (n,) violations.
+        matrices: (n, d, d) B of each.
+        excess: (n,) violations of the limits.
     """
 
     space: FamilySpace
@@ -93,66 +97,83 @@ class Archive:
     matrices: Array
     excess: Array
 
-    def merits(self, inverse: Array, slack: float = 1e-9) -> Array:
+    def merits(self, inverse: Array) -> Array:
         """(n,) sensitivity of those within limits, minus the violation of the others."""
         d = np.einsum("ij,nji->n", inverse, self.matrices)
-        return np.where(self.excess <= slack, d, -self.excess)
+        return np.where(self.excess <= SLACK, d, -self.excess)
+
+    def with_more(self, other: Archive) -> Archive:
+        """Both together."""
+        return Archive(
+            space=self.space,
+            points=np.concatenate([self.points, other.points]),
+            matrices=np.concatenate([self.matrices, other.matrices]),
+            excess=np.concatenate([self.excess, other.excess]),
+        )
 
 
-class CandidateSearch:
-    """The archives of all families, and the steps that add to them."""
+def pool_of(spaces: Sequence[FamilySpace], measure: Measure, *, pool: int, seed: int) -> tuple[Archive, ...]:
+    """Quasi-random candidates of every family, `pool` or the next power of two of each."""
+    points = []
+    for number, space in enumerate(spaces):
+        count = max(FEWEST, pool // CLOSED_LOOP_SHARE) if space.family.closed_loop else pool
+        sobol = qmc.Sobol(len(space.axes), rng=np.random.default_rng([seed, number]))
+        points.append(sobol.random_base2(int(np.ceil(np.log2(count)))))
+    return _measured(spaces, points, measure)
 
-    def __init__(self, spaces: Sequence[FamilySpace], measure: Measure, *, pool: int, seed: int) -> None:
-        self.measure, self.rng = measure, np.random.default_rng(seed)
-        self.evaluated = 0
-        points = []
-        for number, space in enumerate(spaces):
-            count = max(8, pool // CLOSED_LOOP_SHARE) if space.family.closed_loop else pool
-            sobol = qmc.Sobol(len(space.axes), rng=np.random.default_rng([seed, number]))
-            points.append(sobol.random_base2(int(np.ceil(np.log2(count)))))
-        self.archives = [
-            Archive(space=space, points=found, matrices=matrices, excess=excess)
-            for space, found, (matrices, excess) in zip(spaces, points, self._measured(spaces, points), strict=True)
-        ]
 
-    def best(self, inverse: Array, progress: Callable[[float], None]) -> tuple[PrimitiveSpec | None, float]:
-        """The best candidate within limits for a design with B^-1 (d, d), and its sensitivity, after local steps."""
-        for generation, stride in enumerate(STRIDES):
-            progress(generation / len(STRIDES))
-            points = [self._steps(archive, inverse, stride) for archive in self.archives]
-            spaces = [archive.space for archive in self.archives]
-            for archive, more, (matrices, excess) in zip(
-                self.archives, points, self._measured(spaces, points), strict=True
-            ):
-                archive.points = np.concatenate([archive.points, more])
-                archive.matrices = np.concatenate([archive.matrices, matrices])
-                archive.excess = np.concatenate([archive.excess, excess])
-        merits = [archive.merits(inverse) for archive in self.archives]
-        winner = int(np.argmax([values.max() for values in merits]))
-        place = int(np.argmax(merits[winner]))
-        if self.archives[winner].excess[place] > 1e-9:
-            return None, -np.inf
-        return self.archives[winner].space.spec(self.archives[winner].points[place]), float(merits[winner][place])
+def refined(
+    archives: Sequence[Archive],
+    inverse: Array,
+    measure: Measure,
+    rng: np.random.Generator,
+    progress: Callable[[float], None] = lambda share: None,
+) -> tuple[Archive, ...]:
+    """The archives with local steps from each family's best candidates for a design with B^-1 (d, d)."""
+    spaces, grown = [archive.space for archive in archives], tuple(archives)
+    for generation, stride in enumerate(STRIDES):
+        progress(generation / len(STRIDES))
+        points = [_steps(archive, inverse, stride, rng) for archive in grown]
+        more = _measured(spaces, points, measure)
+        grown = tuple(archive.with_more(other) for archive, other in zip(grown, more, strict=True))
+    return grown
 
-    def _steps(self, archive: Archive, inverse: Array, stride: float) -> Array:
-        """(n, a) points near the family's best ones."""
-        if archive.space.family.closed_loop:
-            return archive.points[:0]
-        order = np.argsort(-archive.merits(inverse))[:LEADERS]
-        parents = np.repeat(archive.points[order], OFFSPRING, axis=0)
-        steps = stride * self.rng.standard_normal(parents.shape)
-        moved = self.rng.random(parents.shape) < max(0.4, 1.0 / parents.shape[1])
-        for index, axis in enumerate(archive.space.axes):
-            if axis.scale == "whole":
-                redrawn = self.rng.random(len(parents)) < REDRAWN
-                steps[:, index] = np.where(redrawn, self.rng.random(len(parents)) - parents[:, index], 0.0)
-                moved[:, index] = True
-        return np.clip(parents + np.where(moved, steps, 0.0), 0.0, 1.0 - 1e-12)
 
-    def _measured(self, spaces: Sequence[FamilySpace], points: Sequence[Array]) -> list[tuple[Array, Array]]:
-        """Matrices and violations of points of every family, simulated together."""
-        specs = [space.spec(point) for space, rows in zip(spaces, points, strict=True) for point in rows]
-        matrices, excess = self.measure(specs)
-        self.evaluated += len(specs)
-        ends = np.cumsum([len(rows) for rows in points])[:-1]
-        return list(zip(np.split(matrices, ends), np.split(excess, ends), strict=True))
+def best_of(archives: Sequence[Archive], inverse: Array) -> tuple[PrimitiveSpec | None, float]:
+    """The candidate of largest sensitivity within limits, and that; None and -inf where there is none."""
+    merits = [archive.merits(inverse) for archive in archives]
+    winner = int(np.argmax([values.max() for values in merits]))
+    place, archive = int(np.argmax(merits[winner])), archives[winner]
+    if archive.excess[place] > SLACK:
+        return None, -np.inf
+    return archive.space.spec(archive.points[place]), float(merits[winner][place])
+
+
+def _steps(archive: Archive, inverse: Array, stride: float, rng: np.random.Generator) -> Array:
+    """(n, a) points near the family's best ones."""
+    if archive.space.family.closed_loop:
+        return archive.points[:0]
+    order = np.argsort(-archive.merits(inverse), kind="stable")[:LEADERS]
+    parents = np.repeat(archive.points[order], OFFSPRING, axis=0)
+    steps = stride * rng.standard_normal(parents.shape)
+    moved = rng.random(parents.shape) < max(0.4, 1.0 / parents.shape[1])
+    for index, axis in enumerate(archive.space.axes):
+        if axis.scale == "whole":
+            redrawn = rng.random(len(parents)) < REDRAWN
+            steps[:, index] = np.where(redrawn, rng.random(len(parents)) - parents[:, index], 0.0)
+            moved[:, index] = True
+    return np.clip(parents + np.where(moved, steps, 0.0), 0.0, 1.0 - 1e-12)
+
+
+def _measured(spaces: Sequence[FamilySpace], points: Sequence[Array], measure: Measure) -> tuple[Archive, ...]:
+    """Candidates of every family, simulated together."""
+    matrices, excess = measure(
+        [space.spec(point) for space, rows in zip(spaces, points, strict=True) for point in rows]
+    )
+    ends = np.cumsum([len(rows) for rows in points])[:-1]
+    return tuple(
+        Archive(space=space, points=rows, matrices=found, excess=over)
+        for space, rows, found, over in zip(
+            spaces, points, np.split(matrices, ends), np.split(excess, ends), strict=True
+        )
+    )

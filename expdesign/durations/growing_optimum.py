@@ -1,0 +1,53 @@
+"""The D-optimal shares of a dictionary, and what one more run would be worth to them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from expdesign.durations.certificate import log_det, whitened
+from expdesign.durations.polish import polish
+from expdesign.durations.solve import bordered
+from expdesign.information import PrimitiveInformation
+from expdesign.values import Array, seal
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Optimum:
+    """The best shares of the present dictionary.
+
+    Attributes:
+        fractions: (q,) time fractions.
+        log_det: in physical scale.
+        inverse: (d, d) B^-1 in physical scale.
+    """
+
+    fractions: Array
+    log_det: float
+    inverse: Array
+
+    def __post_init__(self) -> None:
+        seal(self, fractions="q", inverse="d d")
+
+    @property
+    def dimension(self) -> int:
+        """Size of B."""
+        return len(self.inverse)
+
+
+def optimum(information: Sequence[PrimitiveInformation], mean_subtraction: str) -> Optimum:
+    """D-optimal time fractions of a dictionary that informs about every parameter."""
+    matrices = np.array([bordered(item, mean_subtraction) for item in information])
+    white, offset = whitened(matrices)
+    fractions = polish(white, np.full(len(white), 1.0 / len(white)))
+    total = np.tensordot(fractions, matrices, axes=1)
+    scale = np.sqrt(np.diag(total))
+    inverse = np.linalg.inv(total / np.outer(scale, scale)) / np.outer(scale, scale)
+    return Optimum(fractions=fractions, log_det=log_det(white, fractions) + offset, inverse=inverse)
+
+
+def sensitivity(best: Optimum, item: PrimitiveInformation, mean_subtraction: str) -> float:
+    """d = trace(B(w)^-1 B) of one run."""
+    return float(np.sum(best.inverse * bordered(item, mean_subtraction)))
