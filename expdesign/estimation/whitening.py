@@ -9,6 +9,9 @@ whatever a and c are. The terms zeta(k) n(k) depend on each other far less than 
 one-step residual at k and again, nearly cancelling, at k - 1, and no kernel with few lags sees that cancellation, while
 one with many loses variance to the estimated parameters. What colour is left is for the kernel to count.
 
+A disturbance that lasts many samples under much measurement noise is only partly seen so: with a current that wanders
+for 100 s the standard deviations of the surge parameters come out about a fifth too small.
+
 Source: prewhitening after D. W. K. Andrews and J. C. Monahan, Econometrica 60 (1992), 953-966, here of the residuals
 and exact; noise in one-step predictors: F. Ljungberg, doctoral thesis, Linköping University, (5.63)-(5.66).
 """
@@ -17,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from scipy.signal import lfilter
@@ -28,6 +32,8 @@ MOVING_AVERAGES = np.tanh(np.linspace(-2.3, 2.3, 18))
 """Values tried for c, from -0.98 to 0.98; they need not be exact."""
 SLOWEST = 0.98
 """Bound on a."""
+PASSES = 2
+"""A second filter finds a slow disturbance under the measurement noise that the first one dealt with."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +86,7 @@ def white_parts(Z: Array, residuals: Array, when: Timeline) -> tuple[Array, Arra
     """zeta (t, n, p) and n (t, n) from instruments (k, n, p) and residuals (k, n); no filter crosses batches."""
     zeta, white = when.spread(Z).copy(), when.spread(residuals).copy()
     batches, present = batch_slices(when.batch), when.spread(np.ones(len(when.place)))
-    for output in range(white.shape[1]):
+    for output, _ in product(range(white.shape[1]), range(PASSES)):
         colour = fitted_colour([white[rows, output] for rows in batches], [present[rows] for rows in batches])
         if colour == WHITE:
             continue
@@ -100,7 +106,7 @@ def fitted_colour(series: Sequence[Array], present: Sequence[Array]) -> Colour:
         present: (k,) one, or zero there.
     """
     count = sum(float(ones.sum()) for ones in present)
-    power = sum(float(rows @ rows) for rows in series)
+    power = sum(float((rows * ones) @ rows) for rows, ones in zip(series, present, strict=True))
     error, colour = min((_fitted(series, present, float(c)) for c in MOVING_AVERAGES), key=lambda item: item[0])
     return colour if error < power * (1.0 - 2.0 * np.log(count) / count) else WHITE
 
