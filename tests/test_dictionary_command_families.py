@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from design_case import one_line, spec, vessel
+from design_case import SCENARIOS, one_line, spec, vessel
 
 from expdesign.dictionary import FAMILIES, PrimitiveSpec, build_primitive, complete_settings, family
 from expdesign.dictionary.trim import STEADY, lost
@@ -206,3 +206,18 @@ def test_a_recorded_run_for_another_vessel_names_both():
     recorded = PrimitiveSpec(name="r", family="recorded", settings=settings, commands=run.commands)
     with pytest.raises(InputError, match="commands tau_x, tau_y, tau_psi, vessel 'rudder ship' takes n1, rudder1"):
         build_primitive(rudder_ship(), recorded)
+
+
+def test_the_standard_trials_file_builds_and_holds_each_trial_to_both_sides():
+    specs = load_dictionary(SCENARIOS / "dictionaries" / "imo-trials.toml")
+    runs = {item.name: build_primitive(SHIPS["azimuths"], item) for item in specs}
+    for stem in ("circle", "zigzag-10-10", "zigzag-20-20", "pull-out", "spiral"):
+        starboard, port = (run for name, run in runs.items() if name.startswith(stem))
+        np.testing.assert_allclose(
+            port.trajectory.velocity, starboard.trajectory.velocity * (1, -1, -1), atol=1e-6, err_msg=stem
+        )
+    heading = runs["zigzag-10-10-helm-0.174533"].trajectory.pose[:, 2]
+    assert heading.max() > np.radians(10.0)
+    assert heading.min() < -np.radians(10.0)
+    assert runs["circle-helm-0.610865"].trajectory.pose[-1, 2] > 2 * np.pi  # a full turn
+    assert abs(runs["stop"].exit_velocity[0]) < 0.1 * 1.4
