@@ -38,13 +38,13 @@ from expdesign.workflows.outcome import Outcome, Progress, TextTable, silent, wi
 def run(scenario: Path, out: Path | None, *, seed: int = 0, progress: Progress = silent) -> Outcome:
     """The main job: score, durations, plan, verification, route files and report, into `out` or runs/<scenario>."""
     case = _load(scenario, progress)
-    information, growth = _ready(case, seed=seed, progress=within(progress, 0.02, 0.1))
+    information, growth = ready(case, seed=seed, progress=within(progress, 0.02, 0.1))
     design = designed(case, information, seed=seed, progress=within(progress, 0.1, 0.13))
     compared = efficiencies(design)
     plan = planned(case, information, design, seed=seed, progress=within(progress, 0.14, 0.85))
     progress("writing routes, run cards and report", 0.85)
-    route = _route(case, plan)
-    content = replace(_report(case, information, design, plan, seed), compared=compared, route=route)
+    route = built_route(case, plan)
+    content = replace(report_content(case, information, design, plan, seed), compared=compared, route=route)
     files = {
         **_dictionary_files(case, information),
         **growth_files(case, growth),
@@ -54,7 +54,7 @@ def run(scenario: Path, out: Path | None, *, seed: int = 0, progress: Progress =
         "report.html": report_html(content),
         "cards.html": cards_html(content),
     }
-    summary = {**growth_summary(growth), **design_summary(design), **_plan_summary(plan)}
+    summary = {**growth_summary(growth), **design_summary(design), **plan_summary(plan)}
     return _written(case, out, files, summary, progress)
 
 
@@ -77,7 +77,7 @@ def durations(
 ) -> Outcome:
     """How long to run each primitive, with its certificate; with `grow` also of manoeuvres found to add most."""
     case = _load(scenario, progress)
-    information, growth = _ready(case, grow=grow, seed=seed, progress=within(progress, 0.05, 0.6))
+    information, growth = ready(case, grow=grow, seed=seed, progress=within(progress, 0.05, 0.6))
     design = designed(case, information, seed=seed, progress=within(progress, 0.6, 0.9))
     progress("comparing criteria", 0.9)
     compared = efficiencies(design)
@@ -95,12 +95,12 @@ def plan(
 ) -> Outcome:
     """One verified trajectory with the runs of a durations file, or of the optimal durations."""
     case = _load(scenario, progress)
-    information, _ = _ready(case, seed=seed, progress=within(progress, 0.02, 0.1))
+    information, _ = ready(case, seed=seed, progress=within(progress, 0.02, 0.1))
     design = designed(case, information, seed=seed)
     if durations is not None:
         design = with_repeats(design, load_repeats(durations, names=design.problem.names))
     result = planned(case, information, design, seed=seed, progress=within(progress, 0.1, 0.95))
-    return _written(case, out, _plan_files(case, result), _plan_summary(result), progress)
+    return _written(case, out, _plan_files(case, result), plan_summary(result), progress)
 
 
 def scored(case: Scenario, *, progress: Progress = silent) -> tuple[PrimitiveInformation, ...]:
@@ -117,8 +117,8 @@ def scored(case: Scenario, *, progress: Progress = silent) -> tuple[PrimitiveInf
     )
 
 
-def _ready(
-    case: Scenario, *, grow: bool = False, seed: int, progress: Progress
+def ready(
+    case: Scenario, *, grow: bool = False, seed: int, progress: Progress = silent
 ) -> tuple[tuple[PrimitiveInformation, ...], Growth | None]:
     """The scored dictionary, grown where that is wished."""
     information = scored(case, progress=within(progress, 0.0, 0.2 if grow or case.design.grow else 1.0))
@@ -189,7 +189,8 @@ def _plan_files(case: Scenario, plan: Plan) -> dict[str, str | bytes]:
     }
 
 
-def _route(case: Scenario, plan: Plan) -> Route:
+def built_route(case: Scenario, plan: Plan) -> Route:
+    """The plan as waypoints, its legs measured against the track and the chart."""
     track = planned_track(
         plan,
         scenario=case.name,
@@ -200,9 +201,10 @@ def _route(case: Scenario, plan: Plan) -> Route:
     return build_route(track, safe_water=case.area.water)
 
 
-def _report(
+def report_content(
     case: Scenario, information: tuple[PrimitiveInformation, ...], design: DurationDesign, plan: Plan, seed: int
 ) -> ReportContent:
+    """What the report and the run cards are made from."""
     return ReportContent(
         scenario=case.name,
         vessel=case.vessel,
@@ -221,7 +223,8 @@ def _report(
     )
 
 
-def _plan_summary(plan: Plan) -> dict[str, object]:
+def plan_summary(plan: Plan) -> dict[str, object]:
+    """Key numbers of a plan, units in the names."""
     return {
         "verified": plan.verification.verified,
         "informative_s": plan.seconds("primitive"),

@@ -1,0 +1,92 @@
+"""A trial as one value for notebooks: what was found, shown as the report, written when asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from html import escape
+from pathlib import Path
+
+from expdesign.durations import DurationDesign, efficiencies
+from expdesign.export import STANDARD, Route, route_files, write_files
+from expdesign.export.cards import cards_html
+from expdesign.export.report import ReportContent, report_html
+from expdesign.information import PrimitiveInformation
+from expdesign.plan.values import Plan
+from expdesign.scenario import Scenario, load_scenario
+from expdesign.workflows.design import designed
+from expdesign.workflows.outcome import Progress, silent, within
+from expdesign.workflows.trial import built_route, planned, ready, report_content
+
+FRAME_HEIGHT_PX = 700
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Trial:
+    """A planned and verified trial.
+
+    Attributes:
+        content: all that the report tells, as values.
+        route: waypoints.
+    """
+
+    content: ReportContent
+    route: Route
+
+    @property
+    def information(self) -> tuple[PrimitiveInformation, ...]:
+        """What every primitive tells."""
+        return self.content.information
+
+    @property
+    def design(self) -> DurationDesign:
+        """How long to run each, with its certificate."""
+        return self.content.design
+
+    @property
+    def plan(self) -> Plan:
+        """Commands, motion, legs and their verification."""
+        return self.content.plan
+
+    def files(self) -> Mapping[str, str | bytes]:
+        """File name -> content of the report, the run cards and the routes."""
+        return {
+            "report.html": report_html(self.content),
+            "cards.html": cards_html(self.content),
+            **route_files(self.route, STANDARD),
+        }
+
+    def write(self, folder: Path | str) -> tuple[Path, ...]:
+        """Write these files, all or none.
+
+        Raises:
+            FileError: they cannot be written.
+        """
+        return write_files(Path(folder), self.files())
+
+    def _repr_html_(self) -> str:
+        """The report in a frame, for notebooks."""
+        page = escape(report_html(self.content), quote=True)
+        style = f"width: 100%; height: {FRAME_HEIGHT_PX}px; border: 1px solid #ccc"
+        return f'<iframe srcdoc="{page}" style="{style}" title="report"></iframe>'
+
+
+def plan_for(scenario: Scenario | Path | str, *, seed: int = 0, progress: Progress = silent) -> Trial:
+    """Score, share out time, plan and verify: what `expdesign run` does, without writing anything.
+
+    Args:
+        scenario: a scenario, or its file.
+        seed: of all chance.
+        progress: called with what is being done and the share that is done.
+
+    Raises:
+        InputError: something in the files is wrong.
+        NoAnswer: there is no informative design or no feasible plan.
+    """
+    case = scenario if isinstance(scenario, Scenario) else load_scenario(Path(scenario))
+    information, _ = ready(case, seed=seed, progress=within(progress, 0.0, 0.1))
+    design = designed(case, information, seed=seed, progress=within(progress, 0.1, 0.15))
+    plan = planned(case, information, design, seed=seed, progress=within(progress, 0.15, 1.0))
+    route = built_route(case, plan)
+    content = report_content(case, information, design, plan, seed)
+    return Trial(content=replace(content, compared=efficiencies(design), route=route), route=route)

@@ -1,0 +1,49 @@
+"""In a notebook a trial shows its report, and the README's example runs."""
+
+import html
+import re
+from pathlib import Path
+
+import export_case as case
+import pytest
+
+from expdesign.export import build_route
+from expdesign.export.report import report_html
+from expdesign.workflows import notebook
+from expdesign.workflows.notebook import Trial
+
+README = Path(__file__).parents[1] / "README.md"
+
+
+def made(*_: object, **__: object) -> Trial:
+    route = build_route(case.planned(), safe_water=case.plan().area.water)
+    return Trial(content=case.report_content(route=route), route=route)
+
+
+def test_a_trial_shows_the_report_in_a_frame_that_nothing_breaks_out_of() -> None:
+    shown = made()._repr_html_()
+    inside = re.fullmatch(r'<iframe srcdoc="([^"]*)" style="[^"]*" title="report"></iframe>', shown)
+    assert inside is not None
+    assert html.unescape(inside[1]) == report_html(made().content)
+
+
+def test_a_trial_writes_the_report_the_cards_and_every_route(tmp_path: Path) -> None:
+    written = {path.name for path in made().write(tmp_path / "trial")}
+    assert written == {
+        "report.html", "cards.html", "route.rtz", "route.gpx", "route.kml", "route.geojson", "route.plan",
+        "route.waypoints", "route.csv",
+    }  # fmt: skip
+
+
+def test_the_notebook_example_of_the_readme_runs_as_it_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Line by line; only the search for a plan, which takes minutes, is replaced by one made before."""
+    code = next(
+        block for block in re.findall(r"```python\n(.*?)```", README.read_text(), re.DOTALL) if "plan_for" in block
+    )
+    monkeypatch.setattr(notebook, "plan_for", made)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "scenarios").symlink_to(README.parent / "scenarios")
+    names: dict[str, object] = {}
+    exec(code, names)  # noqa: S102  the example of our own README
+    assert isinstance(names["trial"], Trial)
+    assert (tmp_path / "runs" / "helsinki" / "cards.html").exists()
