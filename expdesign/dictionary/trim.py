@@ -61,7 +61,7 @@ def _direct_trim(vessel: Vessel, velocity: Array) -> Array:
     free = np.maximum(np.abs(drift(vessel, velocity, 0 * scale)).max(), 1e-12)
 
     def excess(share: Array) -> Array:
-        return np.r_[drift(vessel, velocity, share * scale) / free, 1e-9 * share]
+        return np.asarray(np.r_[drift(vessel, velocity, share * scale) / free, 1e-9 * share])
 
     ahead = np.array([name.startswith(("n", "tau_x")) for name in vessel.model.inputs])
     tries = [np.clip(start * np.sign(velocity[0]) * ahead, low + 1e-9, high - 1e-9) for start in STARTS]
