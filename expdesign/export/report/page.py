@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from expdesign.export.formats.format import xml_text
-from expdesign.export.report import tables, words
+from expdesign.export.report import criteria, tables, words
 from expdesign.export.report.admission import conditions
 from expdesign.export.report.content import ReportContent, primitive_runs
 from expdesign.export.report.figures.chart import chart
@@ -57,13 +56,16 @@ def report_html(content: ReportContent) -> str:
         runs=primitive_runs(content.plan),
         summary=summary(content),
         facts=facts(content),
-        certificate=certificate(content),
+        certificate=criteria.certificate(content),
+        criterion=criteria.criterion_sentence(content),
+        comparison=criteria.comparison(content),
+        limits=criteria.limit_rows(content),
         assumptions=assumptions(content),
         agenda=tables.agenda(content),
         primitives=tables.primitive_rows(content),
         parameters=tables.parameter_rows(content, after),
         noise=measures_velocity(content),
-        chain=chain(content, short_of_optimum=_short_of_optimum(content)),
+        chain=chain(content, short_of_optimum=criteria.short_of_optimum(content)),
         conditions=conditions(content),
         checks=tables.checks(content),
         glossary=GLOSSARY,
@@ -159,7 +161,7 @@ def facts(content: ReportContent) -> list[Fact]:
         ),
         Fact(
             name="Optimal to within",
-            value=_short_of_optimum(content),
+            value=criteria.short_of_optimum(content),
             remark=f"certified; whole runs reach {words.percent(design.efficiency_repeats)}",
         ),
         Fact(
@@ -168,29 +170,6 @@ def facts(content: ReportContent) -> list[Fact]:
             remark=f"of an optimal {words.duration(design.problem.total_s)}, repositioning included",
         ),
     ]
-
-
-def _short_of_optimum(content: ReportContent) -> str:
-    """Upper bound on what any other design could gain in D-efficiency, rounded up to be true."""
-    gain = math.expm1(max(content.design.gap, 0.0) / len(content.parameters))
-    if gain < 1e-8:
-        return f"0.000001{words.NB}%"
-    power = 10.0 ** (math.floor(math.log10(gain)) - 1)
-    return f"{100 * math.ceil(gain / power) * power:.10f}".rstrip("0").rstrip(".") + f"{words.NB}%"
-
-
-def certificate(content: ReportContent) -> str:
-    """The equivalence theorem, with this design's numbers."""
-    design = content.design
-    best = max(range(len(design.sensitivities)), key=lambda index: design.sensitivities[index])
-    gap = words.significant(design.gap, 2) if design.gap > 1e-6 else "0.000001"
-    return (
-        f"A sharing of the time is optimal exactly when no sensitivity exceeds the bound {design.problem.dimension} "
-        f"and every manoeuvre that gets time touches it (Kiefer and Wolfowitz, 1960). The largest sensitivity here is "
-        f"{words.number(float(design.sensitivities[best]), 6)} ({design.problem.names[best]}), so the log determinant "
-        f"{words.number(design.log_det, 3)} cannot be raised by more than {gap}: no other "
-        f"sharing among these manoeuvres is better by more than {_short_of_optimum(content)} in D-efficiency."
-    )
 
 
 def assumptions(content: ReportContent) -> list[tuple[str, str]]:

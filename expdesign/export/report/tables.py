@@ -76,7 +76,12 @@ def primitive_rows(content: ReportContent) -> list[PrimitiveRow]:
     """The dictionary in the order of the design."""
     design = content.design
     columns = zip(
-        content.information, design.fractions, design.durations_s, design.repeats, design.sensitivities, strict=True
+        content.information,
+        design.fractions,
+        design.durations_s,
+        design.repeats,
+        design.sensitivities - design.certificate.prices,
+        strict=True,
     )
     return [
         PrimitiveRow(

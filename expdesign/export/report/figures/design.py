@@ -45,13 +45,15 @@ def _draw_times(axes: Axes, design: DurationDesign) -> None:
 
 def _draw_sensitivities(axes: Axes, design: DurationDesign) -> None:
     rows = np.arange(len(design.problem.names))
-    used, bound = design.fractions > USED, design.problem.dimension
-    axes.axvline(bound, color="black", linewidth=1.2, label=f"bound {bound}")
-    axes.hlines(rows, 0, design.sensitivities, color=GREY, linewidth=0.8)
-    axes.plot(design.sensitivities[used], rows[used], "o", color=BLUE, label="used")
-    axes.plot(design.sensitivities[~used], rows[~used], "o", color="white", markeredgecolor=BLUE, label="not used")
-    axes.set_xlim(0, 1.12 * max(bound, float(design.sensitivities.max())))
-    axes.set_xlabel("sensitivity")
+    used, bound = design.fractions > USED, design.certificate.level
+    net = design.sensitivities - design.certificate.prices
+    axes.axvline(bound, color="black", linewidth=1.2, label=f"bound {bound:.4g}")
+    axes.hlines(rows, min(0.0, bound), net, color=GREY, linewidth=0.8)
+    axes.plot(net[used], rows[used], "o", color=BLUE, label="used")
+    axes.plot(net[~used], rows[~used], "o", color="white", markeredgecolor=BLUE, label="not used")
+    low, high = min(0.0, float(net.min())), max(bound, float(net.max()))
+    axes.set_xlim(low - 0.12 * (high - low) * (low < 0), high + 0.12 * (high - low))
+    axes.set_xlabel("sensitivity less price" if design.certificate.multipliers else "sensitivity")
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=9, columnspacing=1.0)
     light_grid(axes, "x")
 

@@ -1,0 +1,96 @@
+"""What the durations were made best for, how that is proven, and what other criteria say."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from expdesign.durations import CRITERIA, limits_kept
+from expdesign.export.report import words
+from expdesign.export.report.content import ReportContent
+
+
+@dataclass(frozen=True, kw_only=True)
+class Comparison:
+    """Efficiencies as a table; `missing` tells why a criterion is not in it."""
+
+    designs: tuple[str, ...]
+    rows: tuple[tuple[str, str, tuple[str, ...]], ...]
+    missing: tuple[tuple[str, str], ...]
+
+
+NAMES = {"continuous": "optimal shares", "repeats": "whole runs", "uniform": "equal time"}
+
+
+def comparison(content: ReportContent) -> Comparison:
+    """Every design under every criterion."""
+    known = [item for item in content.compared if item.of]
+    designs = tuple(known[0].of) if known else ()
+    return Comparison(
+        designs=tuple(NAMES.get(name, name) for name in designs),
+        rows=tuple(
+            (item.criterion, item.title, tuple(words.percent(item.of[name]) for name in designs)) for item in known
+        ),
+        missing=tuple((item.criterion, item.missing) for item in content.compared if item.missing),
+    )
+
+
+def limit_rows(content: ReportContent) -> list[tuple[str, str, str, str, str]]:
+    """Name, what was asked, optimal shares, whole runs and price of every limit."""
+    return [
+        (
+            kept.name,
+            words.significant(kept.limit),
+            words.significant(kept.continuous),
+            words.significant(kept.repeats),
+            words.significant(kept.price, 2) if kept.price > 1e-6 else "0",
+        )
+        for kept in limits_kept(content.design)
+    ]
+
+
+def criterion_sentence(content: ReportContent) -> str:
+    """The criterion, what it counts, and against which models."""
+    problem = content.design.problem
+    title = {item.name: item.title for item in CRITERIA}[problem.aim.criterion]
+    about = f", of {', '.join(problem.aim.interest)}" if problem.aim.interest else ""
+    if problem.aim.criterion == "V":
+        about = f": {', '.join(problem.aim.outcomes)}"
+    models = {
+        "nominal": "",
+        "average": f", on average over {len(problem.sampled)} models drawn from the prior",
+        "worst": f", for the worst of {len(problem.sampled)} models drawn from the prior",
+    }[problem.robust]
+    prior = " What is known before the trial is counted in." if problem.prior.any() else ""
+    return f"Criterion {problem.aim.criterion}: the least {title}{about}{models}.{prior}"
+
+
+def certificate(content: ReportContent) -> str:
+    """The equivalence theorem, with this design's numbers."""
+    design = content.design
+    proof, net = design.certificate, design.sensitivities - design.certificate.prices
+    if not math.isfinite(proof.bound):
+        return f"There is no certificate of optimality: {proof.kind.removeprefix('none: ')}."
+    best = int(net.argmax())
+    price = ", less what the limits take off it," if proof.multipliers else ""
+    gap = words.significant(design.gap, 2) if design.gap > 1e-6 else "0.000001"
+    return (
+        f"A sharing of the time is optimal exactly when no sensitivity{price} exceeds the bound "
+        f"{words.significant(proof.level, 6)} and every manoeuvre whose time is free touches it ({proof.kind}). The "
+        f"largest here is {words.number(float(net[best]), 6)} ({design.problem.names[best]}), so the criterion's "
+        f"logarithm, {words.number(proof.value, 3)}, cannot be raised by more than {gap}: no other sharing among these "
+        f"manoeuvres is better by more than {short_of_optimum(content)} in {design.problem.aim.criterion}-efficiency."
+    )
+
+
+def short_of_optimum(content: ReportContent) -> str:
+    """Upper bound on what any other design could gain in efficiency, rounded up to be true."""
+    design = content.design
+    degree = len(content.parameters) if design.problem.aim.criterion == "D" else design.certificate.degree
+    gain = math.expm1(max(design.gap, 0.0) / degree)
+    if not math.isfinite(gain):
+        return "not certified"
+    if gain < 1e-8:
+        return f"0.000001{words.NB}%"
+    power = 10.0 ** (math.floor(math.log10(gain)) - 1)
+    return f"{100 * math.ceil(gain / power) * power:.10f}".rstrip("0").rstrip(".") + f"{words.NB}%"
