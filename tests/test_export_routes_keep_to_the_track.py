@@ -3,6 +3,7 @@
 from dataclasses import replace
 from datetime import UTC, datetime
 from itertools import pairwise
+from pathlib import Path
 
 import export_case as case
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 import shapely
 
 from expdesign.errors import InputError, NoPlan
-from expdesign.export import PlannedTrack, Route, build_route
+from expdesign.export import PlannedTrack, Route, build_route, read_plan
 from expdesign.export.fence import fence_polygon
 from expdesign.plan.area import LocalFrame
 from expdesign.plan.values import Leg
@@ -203,3 +204,15 @@ def test_a_departure_without_time_zone_is_refused_and_one_with_it_becomes_utc() 
     route = build_route(case.planned(), departure=datetime(2027, 5, 1, 23, 59, 30, tzinfo=UTC))
     assert route.utc(45.0) == "2027-05-02T00:00:15Z"
     assert build_route(case.planned()).utc(45.0) is None
+
+
+def test_a_plan_read_from_its_files_brings_its_fence_and_its_route_stays_inside(tmp_path: Path) -> None:
+    for name, content in case.plan_files().items():
+        (tmp_path / name).write_text(content)
+    track = read_plan(tmp_path / "plan.json")
+    fresh = build_route(case.planned(), safe_water=case.plan().area.water)
+    route = build_route(track)
+    assert route.fence == fresh.fence
+    assert route.fit.in_water is True
+    legs = shapely.LineString(places(route)[:, ::-1])
+    assert fence_polygon(route.fence, track.frame).covers(legs)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.errors import NoPlan
+from expdesign.export.fence import Fence
 from expdesign.plan.area import LocalFrame
 from expdesign.plan.values import Leg, Plan
 from expdesign.signals import Commands, Trajectory
@@ -27,6 +28,7 @@ class PlannedTrack:
         trajectory: k + 1 samples.
         legs: in time order, without gaps.
         clearance_m: least distance from the hull to forbidden water that was asked for [m].
+        fence: allowed water around the track, or None when it is not known.
     """
 
     scenario: str
@@ -39,6 +41,7 @@ class PlannedTrack:
     trajectory: Trajectory
     legs: tuple[Leg, ...]
     clearance_m: float
+    fence: Fence | None = None
 
     @property
     def sample_leg(self) -> np.ndarray:

@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from expdesign.conventions import POSE_COLUMNS, VELOCITY_COLUMNS
 from expdesign.errors import FileError
+from expdesign.export.fence import Fence
 from expdesign.export.planned import PlannedTrack
 from expdesign.plan.area import LocalFrame
 from expdesign.plan.values import Leg
@@ -84,6 +85,11 @@ class _Leg(_Entry):
     end: _State
 
 
+class _Fence(_Entry):
+    inside: tuple[tuple[float, float], ...] = Field(min_length=3)
+    outside: tuple[tuple[tuple[float, float], ...], ...] = ()
+
+
 class _PlanFile(_Entry):
     scenario: str
     vessel: _Vessel
@@ -93,6 +99,7 @@ class _PlanFile(_Entry):
     environment: _Environment
     legs: list[_Leg] = Field(min_length=1)
     clearance_required_m: float = Field(ge=0)
+    fence: _Fence | None = None
     verified: bool
 
 
@@ -125,6 +132,7 @@ def read_plan(path: Path) -> PlannedTrack:
         trajectory=Trajectory(sample_time_s=file.sample_time_s, pose=track[:, 1:4], velocity=track[:, 4:7]),
         legs=legs,
         clearance_m=file.clearance_required_m,
+        fence=None if file.fence is None else Fence(inside=file.fence.inside, outside=file.fence.outside),
     )
 
 

@@ -18,6 +18,7 @@ from expdesign.conventions import POSE_COLUMNS, VELOCITY_COLUMNS, to_b_frame, to
 from expdesign.dictionary.primitive import Primitive
 from expdesign.durations import Efficiencies, limits_kept
 from expdesign.durations.values import DurationDesign
+from expdesign.export.fence import build_fence
 from expdesign.export.planned import require_verified
 from expdesign.information.primitive_information import PrimitiveInformation
 from expdesign.plan.values import Leg, Plan
@@ -181,6 +182,7 @@ def plan_json(plan: Plan, *, scenario: str, vessel: Vessel, environment: Environ
             "reposition_bound_s": plan.reposition_bound_s,
             "clearance_min_m": check.clearance_min_m,
             "clearance_required_m": clearance_m,
+            "fence": _fence_entry(plan, vessel, clearance_m),
             "leave_water_probability": plan.leave_water_probability,
             "design_efficiency_realised": plan.design_efficiency_realised,
             "verified": check.verified,
@@ -192,6 +194,18 @@ def plan_json(plan: Plan, *, scenario: str, vessel: Vessel, environment: Environ
             },
         }
     )
+
+
+def _fence_entry(plan: Plan, vessel: Vessel, clearance_m: float) -> dict[str, Any] | None:
+    """Allowed water around the track, simplified to its safe side, as rings of latitude and longitude."""
+    fence = build_fence(
+        plan.trajectory.pose[:, :2],
+        water=plan.area.water,
+        beam_m=vessel.beam_m,
+        clearance_m=clearance_m,
+        frame=plan.area.frame,
+    )
+    return None if fence is None else {"inside": fence.inside, "outside": fence.outside}
 
 
 def _leg_entry(plan: Plan, index: int, leg: Leg) -> dict[str, Any]:

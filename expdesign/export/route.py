@@ -15,10 +15,10 @@ import shapely
 from expdesign.conventions import METRES_PER_NAUTICAL_MILE
 from expdesign.errors import InputError, NoPlan
 from expdesign.export.chords import cut_into_chords, merge_standing
-from expdesign.export.fence import Fence, build_fence
+from expdesign.export.fence import Fence, build_fence, fence_polygon
 from expdesign.export.planned import PlannedTrack
 from expdesign.export.route_fit import RouteFit, fit_route
-from expdesign.plan.area import LocalFrame
+from expdesign.plan.area import LocalFrame, as_multipolygon
 from expdesign.values import Array
 
 ROUTE_NAME = "route"
@@ -131,7 +131,8 @@ def build_route(
         track: the verified plan.
         tolerance_m: largest distance of the track from the chords [m]; by default a third of the clearance, but no
             more than half the beam.
-        safe_water: where the chords may go, in (east, north), or None when the chart is not at hand.
+        safe_water: where the chords may go, in (east, north), or None when the chart is not at hand; then they go
+            where the track's fence lets them.
         departure: time of the first waypoint, with its time zone.
 
     Raises:
@@ -139,6 +140,9 @@ def build_route(
         NoPlan: the track itself leaves the safe water, or its legs do once rounded.
     """
     tolerance = _tolerance(track, tolerance_m)
+    fence = _fence(track, safe_water)
+    if safe_water is None and fence is not None:
+        safe_water = as_multipolygon(fence_polygon(fence, track.frame))
     if safe_water is not None:
         shapely.prepare(safe_water)
     points = track.trajectory.pose[:, :2]
@@ -161,14 +165,14 @@ def build_route(
         xtd_m=math.ceil(max(tolerance, fit.largest_m) / XTD_STEP_M - 1e-9) * XTD_STEP_M,
         frame=track.frame,
         fit=fit,
-        fence=_fence(track, safe_water),
+        fence=fence,
         departure=departure,
     )
 
 
 def _fence(track: PlannedTrack, water: shapely.MultiPolygon | None) -> Fence | None:
     if water is None:
-        return None
+        return track.fence
     return build_fence(
         track.trajectory.pose[:, :2],
         water=water,
