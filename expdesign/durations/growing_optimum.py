@@ -16,7 +16,7 @@ from expdesign.values import Array, seal
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Optimum:
-    """The best shares of the present dictionary.
+    """Shares of the time, in most cases the best ones, and what they give.
 
     Attributes:
         fractions: (q,) time fractions.
@@ -39,9 +39,16 @@ class Optimum:
 
 def optimum(information: Sequence[PrimitiveInformation], mean_subtraction: str) -> Optimum:
     """D-optimal time fractions of a dictionary that informs about every parameter."""
+    white, _ = whitened(np.array([bordered(item, mean_subtraction) for item in information]))
+    return shared(information, polish(white, np.full(len(white), 1.0 / len(white))), mean_subtraction)
+
+
+def shared(
+    information: Sequence[PrimitiveInformation], fractions: Array, mean_subtraction: str = "complete"
+) -> Optimum:
+    """The same for given time fractions (q,)."""
     matrices = np.array([bordered(item, mean_subtraction) for item in information])
     white, offset = whitened(matrices)
-    fractions = polish(white, np.full(len(white), 1.0 / len(white)))
     total = np.tensordot(fractions, matrices, axes=1)
     scale = np.sqrt(np.diag(total))
     inverse = np.linalg.inv(total / np.outer(scale, scale)) / np.outer(scale, scale)
