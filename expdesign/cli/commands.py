@@ -160,6 +160,18 @@ def export(
             help="One or more of: rtz rtz-1.0 rtz-1.1 gpx kml geojson qgc ardupilot csv.",
         ),
     ],
+    departure: Annotated[
+        str | None,
+        typer.Option("--departure", metavar="TIME", help="Time of the first waypoint, e.g. 2026-05-01T08:00:00Z."),
+    ] = None,
+    tolerance: Annotated[
+        float | None,
+        typer.Option(
+            "--tolerance-m",
+            metavar="D",
+            help="How far legs may cut corners; a third of the clearance when not given, half the beam at most.",
+        ),
+    ] = None,
     out: OutBeside = None,
     quiet: Quiet = False,
     json: Json = False,
@@ -172,7 +184,14 @@ def export(
 
     _carry_out(
         "export",
-        lambda tell: workflows.export(plan, check_out(out), formats=tuple(formats), progress=tell),
+        lambda tell: workflows.export(
+            plan,
+            check_out(out),
+            formats=tuple(formats),
+            departure=departure,
+            tolerance_m=tolerance,
+            progress=tell,
+        ),
         quiet,
         json,
     )
@@ -472,6 +491,56 @@ def validate(
             method=method,
             integrator=integrator,
             jobs=jobs,
+            seed=seed,
+            progress=tell,
+        ),
+        quiet,
+        json,
+    )
+
+
+@app.command()
+def whatif(
+    scenario: ScenarioFile,
+    variants: Annotated[
+        list[Path],
+        typer.Argument(metavar="VARIANT.toml ...", help="Files with only what differs, or complete scenarios."),
+    ],
+    plan: Annotated[
+        bool, typer.Option("--plan", help="Plan the trials, too, so that repositioning counts; takes minutes each.")
+    ] = False,
+    jobs: Annotated[int, typer.Option("--jobs", metavar="N", help="Processes; 0 for one per core.")] = 0,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            "--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers do it, e.g. tcp://host:8786."
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", metavar="FOLDER", help="Where to write; runs/<scenario>-whatif when not given."),
+    ] = None,
+    seed: Seed = 0,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> None:
+    """Compare variants of a scenario side by side: what changes, and what it costs.
+
+    Writes whatif.json and whatif.html.
+
+    Example: expdesign whatif scenarios/helsinki.toml scenarios/variants/half-an-hour.toml
+    """
+    from expdesign import workflows
+
+    _carry_out(
+        "whatif",
+        lambda tell: workflows.whatif(
+            scenario,
+            tuple(variants),
+            check_out(out),
+            with_plan=plan,
+            jobs=jobs,
+            scheduler=scheduler,
             seed=seed,
             progress=tell,
         ),

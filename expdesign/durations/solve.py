@@ -76,7 +76,8 @@ def build_durations(
     if mean_subtraction not in MEAN_SUBTRACTIONS:
         raise UnknownName("mean subtraction", mean_subtraction, known=MEAN_SUBTRACTIONS)
     if prior is None:
-        check_informative(information, parameters, mean_subtraction)
+        allowed = [item for item in information if item.primitive.name not in constraints.excluded]
+        check_informative(allowed or information, parameters, mean_subtraction)
     return DurationProblem(
         names=tuple(item.primitive.name for item in information),
         parameters=tuple(parameters),

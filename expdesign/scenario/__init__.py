@@ -11,6 +11,17 @@ from expdesign.scenario.dictionary_file import load_dictionary
 from expdesign.scenario.durations_file import load_repeats
 from expdesign.scenario.scenario_file import load_scenario
 from expdesign.scenario.values import DesignSettings, Scenario
+from expdesign.scenario.variant_file import Variant, load_variant
 from expdesign.scenario.vessel_file import load_vessel
 
-__all__ = ["DesignSettings", "Scenario", "load_area", "load_dictionary", "load_repeats", "load_scenario", "load_vessel"]
+__all__ = [
+    "DesignSettings",
+    "Scenario",
+    "Variant",
+    "load_area",
+    "load_dictionary",
+    "load_repeats",
+    "load_scenario",
+    "load_variant",
+    "load_vessel",
+]

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field
@@ -87,7 +88,17 @@ def load_scenario(path: Path | str) -> Scenario:
         NoPlan: the area holds no allowed water.
     """
     entry = Entry(Path(path))
-    file = check_table(ScenarioFile, read_toml(entry.path), entry)
+    return build_scenario(read_toml(entry.path), entry)
+
+
+def build_scenario(content: Mapping[str, Any], entry: Entry) -> Scenario:
+    """A scenario from the tables of its file; raises as `load_scenario` does.
+
+    Args:
+        content: the tables, unchecked.
+        entry: the file, to which the files it names are relative.
+    """
+    file = check_table(ScenarioFile, content, entry)
     places = {"start": file.start, "goal": file.goal}
     for key, place in places.items():
         _check_position(place, entry.at(key))

@@ -11,6 +11,7 @@ from expdesign.workflows.indices import check_routes, indices
 from expdesign.workflows.outcome import Outcome, Progress, TextTable
 from expdesign.workflows.trial import durations, plan, planned, run, score, scored
 from expdesign.workflows.validated import validate_design
+from expdesign.workflows.whatif import whatif
 
 __all__ = [
     "Outcome",
@@ -32,4 +33,5 @@ __all__ = [
     "scored",
     "simulate",
     "validate_design",
+    "whatif",
 ]

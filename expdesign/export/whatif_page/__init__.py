@@ -1,0 +1,6 @@
+"""Variants of a trial side by side: JSON and a page."""
+
+from expdesign.export.whatif_page.content import Case, WhatIfContent, explanations, whatif_json
+from expdesign.export.whatif_page.page import whatif_html
+
+__all__ = ["Case", "WhatIfContent", "explanations", "whatif_html", "whatif_json"]

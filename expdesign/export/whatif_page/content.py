@@ -1,0 +1,209 @@
+"""Variants side by side, as values, as JSON and in sentences."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from expdesign.values import Array
+
+NOTICED = 0.02
+"""Relative differences below this are not worth a sentence."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Case:
+    """One variant, or the scenario itself.
+
+    Attributes:
+        name: of the scenario.
+        changes: what it says otherwise than the first, one line each.
+        problem: why there is no answer, or "".
+        criterion: of the design.
+        runs: whole runs by primitive, only those used.
+        informative_s: time of all runs [s].
+        gap_relative: of the certificate.
+        efficiencies: criterion -> efficiency of the whole runs against that criterion's own optimum.
+        parameters: estimated ones.
+        covariance: (p, p) expected of estimates from the runs alone.
+        plan: numbers of the planned trial, units in the names; empty when none was planned.
+    """
+
+    name: str
+    changes: tuple[str, ...] = ()
+    problem: str = ""
+    criterion: str = ""
+    runs: Mapping[str, int]
+    informative_s: float = 0.0
+    gap_relative: float = 0.0
+    efficiencies: Mapping[str, float]
+    parameters: tuple[str, ...] = ()
+    covariance: Array
+    plan: Mapping[str, object]
+
+    @property
+    def std(self) -> Array:
+        """(p,) expected standard deviations."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Against:
+    """A variant against the first case, on the parameters that both estimate.
+
+    Attributes:
+        common: those parameters.
+        ratios: (c,) standard deviation over the first case's.
+        accuracy: information by the determinant, per parameter: 2 means half the variance in every direction.
+        same_accuracy_s: informative time in which the variant's mix of runs is as accurate as the first case [s].
+    """
+
+    common: tuple[str, ...]
+    ratios: tuple[float, ...]
+    accuracy: float
+    same_accuracy_s: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class WhatIfContent:
+    """Everything the page tells.
+
+    Attributes:
+        cases: the scenario first, then its variants.
+        planned: whether trials were planned.
+        command, version: to reproduce it.
+    """
+
+    cases: tuple[Case, ...]
+    planned: bool
+    command: str
+    version: str
+
+    def against(self, case: Case) -> Against | None:
+        """A case against the first, or None when one of them has no answer or they share no parameter."""
+        first = self.cases[0]
+        common = tuple(name for name in first.parameters if name in case.parameters)
+        if first.problem or case.problem or not common:
+            return None
+        mine, theirs = (_part(item, common) for item in (case, first))
+        ratios = np.sqrt(np.diag(mine) / np.diag(theirs))
+        scale = np.sqrt(np.outer(np.diag(theirs), np.diag(theirs)))
+        gain = np.linalg.slogdet(theirs / scale)[1] - np.linalg.slogdet(mine / scale)[1]
+        accuracy = float(np.exp(gain / len(common)))
+        return Against(
+            common=common,
+            ratios=tuple(ratios.tolist()),
+            accuracy=accuracy,
+            same_accuracy_s=case.informative_s / accuracy,
+        )
+
+
+def _part(case: Case, names: tuple[str, ...]) -> Array:
+    chosen = [case.parameters.index(name) for name in names]
+    return np.asarray(case.covariance[np.ix_(chosen, chosen)])
+
+
+def explanations(content: WhatIfContent) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    """For every variant its sentences."""
+    return tuple((case.name, tuple(_sentences(content, case))) for case in content.cases[1:])
+
+
+def _sentences(content: WhatIfContent, case: Case) -> Iterator[str]:
+    first = content.cases[0]
+    if case.problem:
+        yield f"There is no answer: {case.problem}."
+        return
+    against = content.against(case)
+    if against is None:
+        yield "It cannot be compared with the scenario: no parameter is estimated in both."
+        return
+    yield _accuracy(first, case, against)
+    yield from _parameters(against)
+    yield from _runs(first, case)
+    missing = [name for name in first.parameters if name not in case.parameters]
+    added = [name for name in case.parameters if name not in first.parameters]
+    if missing:
+        yield f"It does not estimate {', '.join(missing)}."
+    if added:
+        yield f"It also estimates {', '.join(added)}."
+    yield from _plan(first, case)
+
+
+def _accuracy(first: Case, case: Case, against: Against) -> str:
+    minutes, needed = case.informative_s / 60, against.same_accuracy_s / 60
+    if abs(against.accuracy - 1) < NOTICED:
+        return f"In {minutes:.1f} min it tells as much as the scenario in {first.informative_s / 60:.1f} min."
+    return (
+        f"In {minutes:.1f} min it tells {against.accuracy:.2f} times what the scenario tells in "
+        f"{first.informative_s / 60:.1f} min (by the determinant, per parameter); the same accuracy takes "
+        f"{needed:.1f} min."
+    )
+
+
+def _parameters(against: Against) -> Iterator[str]:
+    ratios = np.array(against.ratios)
+    if np.abs(ratios - 1).max() < NOTICED:
+        yield "No standard deviation changes noticeably."
+        return
+    best, worst = int(ratios.argmin()), int(ratios.argmax())
+    if ratios.max() / ratios.min() < 1 + 2 * NOTICED:
+        yield f"All standard deviations are about {np.median(ratios):.2f} times the scenario's."
+        return
+    yield (
+        f"Standard deviations are between {ratios.min():.2f} ({against.common[best]}) and {ratios.max():.2f} "
+        f"({against.common[worst]}) times the scenario's."
+    )
+
+
+def _runs(first: Case, case: Case) -> Iterator[str]:
+    names = dict.fromkeys((*first.runs, *case.runs))
+    changes = {name: case.runs.get(name, 0) - first.runs.get(name, 0) for name in names}
+    more = [f"{count} more of {name}" for name, count in changes.items() if count > 0]
+    less = [f"{-count} fewer of {name}" for name, count in changes.items() if count < 0]
+    if more or less:
+        yield f"Runs: {', '.join((*more, *less))}."
+
+
+def _plan(first: Case, case: Case) -> Iterator[str]:
+    key = "trial_s"
+    if key in first.plan and key in case.plan:
+        difference = float(str(case.plan[key])) - float(str(first.plan[key]))
+        yield (
+            f"The whole trial, repositioning included, takes {abs(difference) / 60:.1f} min "
+            f"{'more' if difference > 0 else 'less'}."
+        )
+
+
+def whatif_json(content: WhatIfContent) -> str:
+    """`whatif.json`."""
+    told = dict(explanations(content))
+    described = {
+        "scenario": content.cases[0].name,
+        "cases": [_entry(content, case, told.get(case.name, ())) for case in content.cases],
+    }
+    return json.dumps(described, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _entry(content: WhatIfContent, case: Case, sentences: tuple[str, ...]) -> dict[str, object]:
+    if case.problem:
+        return {"name": case.name, "changes": list(case.changes), "problem": case.problem}
+    against = content.against(case)
+    return {
+        "name": case.name,
+        "changes": list(case.changes),
+        "problem": None,
+        "criterion": case.criterion,
+        "runs": dict(case.runs),
+        "informative_s": case.informative_s,
+        "gap_relative": case.gap_relative,
+        "efficiency": dict(case.efficiencies),
+        "std": dict(zip(case.parameters, case.std.tolist(), strict=True)),
+        "accuracy": None if against is None else against.accuracy,
+        "same_accuracy_s": None if against is None else against.same_accuracy_s,
+        "std_ratio": None if against is None else dict(zip(against.common, against.ratios, strict=True)),
+        "plan": dict(case.plan) or None,
+        "differences": list(sentences),
+    }

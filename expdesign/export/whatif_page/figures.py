@@ -1,0 +1,76 @@
+"""Variants in pictures: what they cost for the same accuracy, and each parameter's standard deviation."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from expdesign.export.report.figures.style import LINES, REPOSITION, VERMILION, light_grid, new_figure, plain, svg
+from expdesign.export.whatif_page.content import WhatIfContent
+
+
+def time_figure(content: WhatIfContent) -> str:
+    """Informative time, with the repositioning where planned, and the time for the scenario's accuracy."""
+    cases = [case for case in content.cases if not case.problem]
+    figure = new_figure(8.0, 1.3 + 0.42 * len(cases))
+    axes = figure.subplots()
+    rows = np.arange(len(cases))
+    axes.barh(rows, [case.informative_s / 60 for case in cases], height=0.55, color=VERMILION, alpha=0.75, label="runs")
+    if content.planned:
+        moving = [float(str(case.plan.get("repositioning_s", 0.0))) / 60 for case in cases]
+        begin = [case.informative_s / 60 for case in cases]
+        axes.barh(rows, moving, left=begin, height=0.55, color=REPOSITION, alpha=0.6, label="repositioning")
+    same = [against.same_accuracy_s / 60 if (against := content.against(case)) else np.nan for case in cases]
+    axes.plot(same, rows, "D", color="white", markeredgecolor="black", label="runs for the scenario's accuracy")
+    axes.set_yticks(rows, [plain(case.name) for case in cases])
+    axes.invert_yaxis()
+    axes.set_xlabel("time [min]")
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=9)
+    light_grid(axes, "x")
+    return svg(figure, key="times", label="Time of each variant, and time for the accuracy of the scenario")
+
+
+def ratio_figure(content: WhatIfContent) -> str | None:
+    """Standard deviations over the scenario's, for each parameter; None when nothing can be compared."""
+    compared = [(case, against) for case in content.cases[1:] if (against := content.against(case))]
+    if not compared:
+        return None
+    names = content.cases[0].parameters
+    figure = new_figure(8.0, 1.3 + 0.26 * len(names))
+    axes = figure.subplots()
+    axes.axvline(1.0, color="black", linewidth=1.0, label=plain(content.cases[0].name))
+    for (case, against), colour in zip(compared, LINES * 9, strict=False):
+        rows = [names.index(name) for name in against.common]
+        axes.plot(against.ratios, rows, "o", color=colour, markersize=5, label=plain(case.name))
+    axes.set_yticks(range(len(names)), [plain(name) for name in names])
+    axes.invert_yaxis()
+    axes.set_xscale("log")
+    ticks = [tick for tick in (0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5, 10) if _within(axes, tick)]
+    axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+    axes.minorticks_off()
+    axes.set_xlabel("expected standard deviation / the scenario's")
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=9)
+    light_grid(axes, "x")
+    return svg(figure, key="ratios", label="Expected standard deviation of each parameter over the scenario's")
+
+
+def _within(axes: Axes, value: float) -> bool:
+    low, high = axes.get_xlim()
+    return low <= value <= high
+
+
+def runs_figure(content: WhatIfContent) -> str:
+    """Minutes of each primitive in every case."""
+    cases = [case for case in content.cases if not case.problem]
+    names = list(dict.fromkeys(name for case in cases for name in case.runs))
+    table = np.array([[case.runs.get(name, 0) for name in names] for case in cases])
+    figure = new_figure(8.0, 1.6 + 0.3 * len(names))
+    axes = figure.subplots()
+    axes.imshow(
+        np.where(table > 0, table, np.nan).T, cmap="Blues", vmin=0, vmax=1.6 * max(1, table.max()), aspect="auto"
+    )
+    for (column, row), count in np.ndenumerate(table):
+        axes.text(column, row, str(count) if count else "\N{MIDDLE DOT}", ha="center", va="center", fontsize=9)
+    axes.set_xticks(range(len(cases)), [plain(case.name) for case in cases], rotation=20, ha="right")
+    axes.set_yticks(range(len(names)), [plain(name) for name in names])
+    return svg(figure, key="runs", label="Whole runs of each primitive in every case")

@@ -1,0 +1,66 @@
+"""The page of variants side by side."""
+
+from __future__ import annotations
+
+from expdesign.export.pages import page_templates
+from expdesign.export.report.figures.style import report_style
+from expdesign.export.whatif_page.content import Case, WhatIfContent, explanations
+from expdesign.export.whatif_page.figures import ratio_figure, runs_figure, time_figure
+
+
+def whatif_html(content: WhatIfContent) -> str:
+    """One HTML page without any outside reference."""
+    with report_style():
+        figures = {"times": time_figure(content), "ratios": ratio_figure(content), "runs": runs_figure(content)}
+    return (
+        page_templates("whatif_page")
+        .get_template("whatif.html")
+        .render(
+            content=content,
+            header=table_header(content),
+            rows=[_row(content, case) for case in content.cases],
+            told=explanations(content),
+            figures=figures,
+        )
+    )
+
+
+def table_header(content: WhatIfContent) -> tuple[str, ...]:
+    """Names of the columns of `table_row`."""
+    planned = ("repositioning [min]", "whole trial [min]", "clearance [m]") if content.planned else ()
+    return ("Case", "criterion", "runs", "time [min]", "tells", "same accuracy [min]", "certificate", *planned)
+
+
+def table_row(content: WhatIfContent, case: Case) -> tuple[str, ...]:
+    """One case in a line; dashes where it has no answer."""
+    if case.problem:
+        return (case.name, *("-",) * (len(table_header(content)) - 1))
+    against = content.against(case)
+    planned = (
+        (_minutes(case.plan.get("repositioning_s")), _minutes(case.plan.get("trial_s")), _metres(case.plan))
+        if content.planned
+        else ()
+    )
+    return (
+        case.name,
+        case.criterion,
+        str(sum(case.runs.values())),
+        f"{case.informative_s / 60:.1f}",
+        "-" if against is None else f"{against.accuracy:.2f} \N{MULTIPLICATION SIGN}",
+        "-" if against is None else f"{against.same_accuracy_s / 60:.1f}",
+        f"{case.gap_relative:.0e}",
+        *planned,
+    )
+
+
+def _row(content: WhatIfContent, case: Case) -> tuple[tuple[str, ...], tuple[str, ...], str]:
+    return table_row(content, case), case.changes, case.problem
+
+
+def _minutes(value: object) -> str:
+    return f"{value / 60:.1f}" if isinstance(value, float) else "-"
+
+
+def _metres(plan: object) -> str:
+    value = plan.get("least_clearance_m") if isinstance(plan, dict) else None
+    return f"{value:.1f}" if isinstance(value, float) else "-"

@@ -1,0 +1,185 @@
+"""A scenario and variants of it, designed side by side and, if wished, planned."""
+
+from __future__ import annotations
+
+import os
+import shlex
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+from joblib import Parallel, delayed, parallel_config
+
+from expdesign import __version__
+from expdesign.durations import DurationDesign
+from expdesign.durations.efficiency import efficiencies
+from expdesign.durations.validation import trial_parts
+from expdesign.errors import InputError, NoAnswer
+from expdesign.export import write_files
+from expdesign.export.whatif_page import Case, WhatIfContent, explanations, whatif_html, whatif_json
+from expdesign.export.whatif_page.page import table_header, table_row
+from expdesign.information import PrimitiveInformation, estimated_parameters
+from expdesign.information.expected import expected_covariance
+from expdesign.scenario import Scenario, load_scenario, load_variant
+from expdesign.workflows.design import designed
+from expdesign.workflows.outcome import Outcome, Progress, TextTable, silent
+from expdesign.workflows.trial import plan_summary, planned, ready
+
+WHOLE_RUNS = "repeats"
+
+
+def whatif(
+    scenario: Path,
+    variants: Sequence[Path],
+    out: Path | None,
+    *,
+    with_plan: bool = False,
+    jobs: int = 0,
+    scheduler: str | None = None,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Outcome:
+    """The scenario and its variants side by side, into `out` or runs/<scenario>-whatif.
+
+    Every file is read before anything is computed. A variant without an answer is told as such beside the others.
+
+    Args:
+        scenario: the scenario file.
+        variants: files with what differs.
+        out: folder.
+        with_plan: plan the trials, too.
+        jobs: processes; 0 for one per core.
+        scheduler: address of a Dask scheduler whose workers carry the work instead.
+        seed: of everything drawn.
+        progress: told the share of the cases done.
+    """
+    if not variants:
+        raise InputError("no variant files are given, expected one or more")
+    progress("reading the scenario", 0.0)
+    base = load_scenario(scenario)
+    read = [load_variant(scenario, variant) for variant in variants]
+    cases = [(base, ()), *((item.scenario, item.changes) for item in read)]
+    names = [case.name for case, _ in cases]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"the name {name!r} is given to {names.count(name)} cases, expected different names")
+    done: dict[int, Case] = {}
+    with _workers(scheduler, jobs):
+        work = Parallel(return_as="generator_unordered")
+        tasks = (delayed(_case)(index, case, changes, with_plan, seed) for index, (case, changes) in enumerate(cases))
+        for index, found in work(tasks):
+            done[index] = found
+            progress(f"{found.name} is done", 0.95 * len(done) / len(cases))
+    content = WhatIfContent(
+        cases=tuple(done[index] for index in range(len(cases))),
+        planned=with_plan,
+        command=_command(scenario, variants, with_plan, seed),
+        version=__version__,
+    )
+    if all(case.problem for case in content.cases):
+        raise NoAnswer(f"no case has an answer; {content.cases[0].name}: {content.cases[0].problem}")
+    files = {"whatif.json": whatif_json(content), "whatif.html": whatif_html(content)}
+    written = write_files(out or Path("runs") / f"{base.name}-whatif", files)
+    progress("done", 1.0)
+    return Outcome(files=written, summary=_summary(content), tables=_tables(content))
+
+
+@contextmanager
+def _workers(scheduler: str | None, jobs: int) -> Iterator[None]:
+    """Where joblib does the work: processes here, or the workers of a Dask scheduler.
+
+    Raises:
+        InputError: Dask is not installed, or no scheduler answers.
+    """
+    if scheduler is None:
+        with parallel_config(backend="loky", n_jobs=jobs or os.cpu_count() or 1):
+            yield
+        return
+    try:
+        from distributed import Client
+    except ImportError:
+        raise InputError("--scheduler needs Dask, expected the extra: pip install 'expdesign[cluster]'") from None
+    try:
+        client = Client(scheduler, timeout="4s")
+    except (OSError, TimeoutError, ValueError) as error:
+        raise InputError(f"--scheduler {scheduler}: no scheduler answers there ({error})") from None
+    with client, parallel_config(backend="dask", n_jobs=-1):
+        yield
+
+
+def _case(index: int, case: Scenario, changes: tuple[str, ...], with_plan: bool, seed: int) -> tuple[int, Case]:
+    """One case computed; nobody to interrupt or to tell, as it may run in another process."""
+    try:
+        information, _ = ready(case, seed=seed)
+        design = designed(case, information, seed=seed)
+        plan = dict(plan_summary(planned(case, information, design, seed=seed))) if with_plan else {}
+        if plan:
+            plan["trial_s"] = float(str(plan["informative_s"])) + float(str(plan["repositioning_s"]))
+        return index, _described(case, changes, information, design, plan)
+    except NoAnswer as error:
+        empty = np.zeros((0, 0))
+        return index, Case(
+            name=case.name, changes=changes, problem=str(error), runs={}, efficiencies={}, plan={}, covariance=empty
+        )
+
+
+def _described(
+    case: Scenario,
+    changes: tuple[str, ...],
+    information: Sequence[PrimitiveInformation],
+    design: DurationDesign,
+    plan: dict[str, object],
+) -> Case:
+    primitives = [item.primitive for item in information]
+    parameters = estimated_parameters(case.vessel.model, case.design.fixed_parameters)
+    covariance = expected_covariance(
+        case.vessel,
+        trial_parts(primitives, design.repeats, environment=case.environment),
+        parameters,
+        environment=case.environment,
+        mean_subtraction=case.design.mean_subtraction,
+    )
+    compared = {item.criterion: item.of[WHOLE_RUNS] for item in efficiencies(design) if WHOLE_RUNS in item.of}
+    return Case(
+        name=case.name,
+        changes=changes,
+        criterion=case.design.criterion,
+        runs={name: count for name, count in zip(design.problem.names, design.repeats, strict=True) if count},
+        informative_s=float(np.dot(design.repeats, design.problem.run_s)),
+        gap_relative=design.gap_relative,
+        efficiencies=compared,
+        parameters=parameters,
+        covariance=covariance,
+        plan=plan,
+    )
+
+
+def _command(scenario: Path, variants: Sequence[Path], with_plan: bool, seed: int) -> str:
+    words = ["expdesign", "whatif", str(scenario), *map(str, variants), *(["--plan"] if with_plan else [])]
+    return shlex.join([*words, "--seed", str(seed)])
+
+
+def _summary(content: WhatIfContent) -> dict[str, object]:
+    told = dict(explanations(content))
+    return {
+        "cases": {
+            case.name: {
+                "problem": case.problem or None,
+                "informative_s": case.informative_s,
+                "accuracy": None if (against := content.against(case)) is None else against.accuracy,
+                "same_accuracy_s": None if against is None else against.same_accuracy_s,
+                "differences": list(told.get(case.name, ())),
+            }
+            for case in content.cases
+        }
+    }
+
+
+def _tables(content: WhatIfContent) -> tuple[TextTable, ...]:
+    rows = tuple(table_row(content, case) for case in content.cases)
+    told = tuple((name, sentence) for name, sentences in explanations(content) for sentence in sentences)
+    return (
+        TextTable(title="Side by side", header=table_header(content), rows=rows),
+        TextTable(title="Differences", header=("Case", "What differs"), rows=told),
+    )

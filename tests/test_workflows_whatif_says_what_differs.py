@@ -1,0 +1,124 @@
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scenario_files import write_scenario
+
+from expdesign import workflows
+from expdesign.cli import main
+from expdesign.errors import FileError, InputError
+from expdesign.scenario import load_scenario, load_variant
+
+SCENARIOS = Path(__file__).parents[1] / "scenarios"
+MODEL_SHIP, HELSINKI = SCENARIOS / "model-ship.toml", SCENARIOS / "helsinki.toml"
+VARIANTS = sorted((SCENARIOS / "variants").glob("*.toml"))
+
+
+def variant(folder: Path, name: str, text: str) -> Path:
+    path = folder / f"{name}.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def cases(outcome) -> dict[str, dict]:
+    content = json.loads(outcome.files[0].read_text("utf-8"))
+    return {case["name"]: case for case in content["cases"]}
+
+
+@pytest.mark.parametrize("path", VARIANTS, ids=lambda path: path.stem)
+def test_the_example_variants_change_what_they_say(path):
+    found = load_variant(HELSINKI, path)
+    assert found.scenario.name == path.stem
+    assert found.changes
+    assert found.scenario.area.name == load_scenario(HELSINKI).area.name
+
+
+def test_twice_the_time_is_twice_the_information_and_the_same_files_give_no_difference(tmp_path):
+    base = load_scenario(MODEL_SHIP).design.total_s
+    twice = variant(tmp_path, "twice", f"[design]\ntotal_s = {2 * base}\n")
+    same = variant(tmp_path, "same", "[design]\n")
+    found = cases(workflows.whatif(MODEL_SHIP, [twice, same], tmp_path / "out", jobs=1))
+    assert found["same"]["accuracy"] == pytest.approx(1.0, abs=1e-12)
+    assert all(ratio == pytest.approx(1.0) for ratio in found["same"]["std_ratio"].values())
+    # whole runs do not double exactly; their time does, to a run
+    longer = found["twice"]["informative_s"] / found["model-ship"]["informative_s"]
+    assert longer == pytest.approx(2.0, rel=0.1)
+    assert found["twice"]["accuracy"] == pytest.approx(longer, rel=0.1)
+    assert found["twice"]["same_accuracy_s"] == pytest.approx(found["model-ship"]["informative_s"], rel=0.1)
+    assert found["twice"]["changes"] == [f"design.total_s = {2 * base:g} instead of {base:g}"]
+
+
+def test_a_complete_scenario_is_a_variant_too_and_relative_files_are_found(tmp_path):
+    write_scenario(tmp_path)
+    own = tmp_path / "scenario.toml"
+    found = load_variant(MODEL_SHIP, own)
+    alone = load_scenario(own)
+    assert found.scenario.name == alone.name
+    assert np.array_equal(found.scenario.start, alone.start)
+    assert found.scenario.vessel.name == alone.vessel.name
+
+
+def test_a_position_in_other_keys_replaces_the_first(tmp_path):
+    moved = variant(tmp_path, "moved", "[start]\nheading_deg = 10.0\n")
+    assert load_variant(MODEL_SHIP, moved).scenario.start[2] == pytest.approx(np.radians(10.0))
+    base = load_scenario(MODEL_SHIP)
+    lat, lon = base.area.frame.to_degrees(base.start[:2])
+    other = variant(tmp_path, "other", f"[start]\nlat_deg = {lat:.9f}\nlon_deg = {lon:.9f}\n")
+    assert np.allclose(load_variant(MODEL_SHIP, other).scenario.start, base.start, atol=1e-3)
+
+
+def test_a_variant_without_answer_is_told_beside_the_others(tmp_path):
+    alone = variant(tmp_path, "circles-only", f"[design]\nexcluded = {json.dumps(_all_but_first())}\n")
+    found = cases(workflows.whatif(MODEL_SHIP, [alone], tmp_path / "out", jobs=1))
+    assert "cannot tell these parameters apart" in found["circles-only"]["problem"]
+    assert found["model-ship"]["problem"] is None
+    assert "There is no answer" in (tmp_path / "out" / "whatif.html").read_text("utf-8")
+
+
+def _all_but_first() -> list[str]:
+    return [spec.name for spec in load_scenario(MODEL_SHIP).dictionary[1:]]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[design]\ntotal_x = 3\n", "design.total_x: is not a known key, did you mean 'total_s'?"),
+        ("[design]\ntotal_s = 0\n", "design.total_s"),
+        ('[scenario]\nvessel = "nowhere.toml"\n', "nowhere.toml"),
+        ('scenario = "x"\n', "scenario"),
+    ],
+)
+def test_wrong_variants_are_one_line_of_their_own_file(tmp_path, capsys, text, words):
+    path = variant(tmp_path, "wrong", text)
+    assert main(["whatif", str(MODEL_SHIP), str(path), "--out", str(tmp_path / "out")]) == 2
+    error = capsys.readouterr().err.strip().splitlines()[-1]
+    assert str(path) in error
+    assert words in error
+    assert not (tmp_path / "out").exists()
+
+
+def test_two_of_one_name_and_none_at_all_are_refused(tmp_path):
+    path = variant(tmp_path, "model-ship", "[design]\n")
+    with pytest.raises(InputError, match="'model-ship' is given to 2 cases"):
+        workflows.whatif(MODEL_SHIP, [path], tmp_path, jobs=1)
+    with pytest.raises(InputError, match="no variant files"):
+        workflows.whatif(MODEL_SHIP, [], tmp_path, jobs=1)
+    with pytest.raises(FileError, match="does not exist"):
+        workflows.whatif(MODEL_SHIP, [tmp_path / "none.toml"], tmp_path, jobs=1)
+
+
+def test_the_same_call_runs_on_a_cluster(tmp_path):
+    distributed = pytest.importorskip("distributed")
+    half = variant(tmp_path, "half", "[design]\ntotal_s = 225.0\n")
+    here = cases(workflows.whatif(MODEL_SHIP, [half], tmp_path / "here", jobs=1))
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None, processes=True) as cluster:
+        there = cases(workflows.whatif(MODEL_SHIP, [half], tmp_path / "there", scheduler=cluster.scheduler_address))
+    assert there == here
+
+
+def test_no_scheduler_is_one_line(tmp_path):
+    pytest.importorskip("distributed")
+    path = variant(tmp_path, "same", "[design]\n")
+    with pytest.raises(InputError, match="no scheduler answers there"):
+        workflows.whatif(MODEL_SHIP, [path], tmp_path, scheduler="tcp://127.0.0.1:9")
