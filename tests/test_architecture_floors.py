@@ -28,7 +28,7 @@ FLOOR_OF = {"__init__": 0} | {room: floor for floor, rooms in enumerate(FLOORS, 
 EXCEPTIONS = {("__main__", "cli")}  # `python -m` is nothing but the command line under another name
 
 IMPORTERS = {
-    "cvxpy": ("durations/_cvxpy.py",),
+    "cvxpy": (),
     "ompl": ("plan/_ompl.py",),
     "casadi": ("durations/_casadi.py", "estimation/_casadi.py", "plan/_casadi.py"),
     "matplotlib": ("export/",),
