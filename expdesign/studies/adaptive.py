@@ -261,8 +261,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def _ship_part(wish: GrowSettings, runs: int) -> str:
     cases = (
         ("families", wish, False),
-        ("and free form", replace(wish, free_form=True), False),
-        ("with the same forces", wish, True),
+        ("families + free form", replace(wish, free_form=True), False),
+        ("families, same forces", wish, True),
     )
     found = [compare(name, settings, runs=runs, seed=wish.seed or 0, narrow=narrow) for name, settings, narrow in cases]
     parts = [f"tau1 to tau11 grown by {item.name}\n{growth_table(item.growth)}" for item in found]
