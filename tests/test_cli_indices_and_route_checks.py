@@ -4,10 +4,12 @@ import json
 import math
 from pathlib import Path
 
+import export_case
 import pytest
 from measured_trials import TUG, TUG_TRUE, quiet, write_run
 
 from expdesign.cli import main
+from expdesign.export import FORMATS
 from expdesign.indices import standard_results
 from expdesign.simulation import Conduct, zigzag
 
@@ -52,3 +54,23 @@ def test_what_is_wrong_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture
     (tmp_path / "bad.gpx").write_text("<gpx/>")
     assert main(["check-route", str(tmp_path / "bad.gpx")]) == 2
     assert "expected gpx 1.1" in capsys.readouterr().err
+
+
+def test_export_writes_every_format_from_the_plan_files_with_times_where_asked(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, content in export_case.plan_files().items():
+        (tmp_path / name).write_text(content)
+    plan = str(tmp_path / "plan.json")
+    formats = [known.name for known in FORMATS]
+    assert main(["export", plan, "--format", *formats[:3], "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["summary"]["legs_in_allowed_water"] is True
+    spelled = [part for name in formats for part in ("--format", name)]
+    assert main(["export", plan, *spelled, "--departure", "2027-05-01T08:00:00Z", "--quiet"]) == 0
+    assert all((tmp_path / known.file_name).exists() for known in FORMATS)
+    assert 'eta="2027-05-01T08:15:00Z"' in (tmp_path / "route.rtz").read_text()
+    assert main(["check-route", *(str(tmp_path / f"route{end}") for end in (".rtz", "-rtz10.rtz", ".gpx"))]) == 0
+    assert main(["export", plan, "--format", "rtz", "--departure", "tomorrow"]) == 2
+    assert "expected a time such as" in capsys.readouterr().err
+    assert main(["export", plan, "--format", "rtz", "--departure", "2027-05-01T08:00"]) == 2
+    assert "has no time zone" in capsys.readouterr().err
