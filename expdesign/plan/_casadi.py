@@ -1,7 +1,8 @@
-"""The only door to CasADi and IPOPT: fastest smooth commands between two states, within limits and a corridor.
+"""The only door to CasADi and IPOPT: fastest smooth commands between two states, within limits and a region.
 
 Direct multiple shooting on the very map that simulates the trial: commands are linear between nodes, sampled and held,
-and each sample is integrated with the simulation's Runge-Kutta steps.
+and each sample is integrated with the simulation's Runge-Kutta steps. Programs of one size are built once and reused:
+everything that differs from leg to leg is a bound or a parameter.
 
 Source: H. G. Bock and K. J. Plitt, A multiple shooting algorithm for direct solution of optimal control problems,
 IFAC Proc. 17 (1984), 1603-1608.
@@ -10,6 +11,7 @@ IFAC Proc. 17 (1984), 1603-1608.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import pairwise
 from typing import Any
 
@@ -23,9 +25,13 @@ from expdesign.vessel import Operators, Vessel
 
 CASADI = Operators(ca.fabs, ca.sin, ca.cos)
 SMOOTHNESS = 0.02
-"""Weight of squared command steps against relative time."""
+"""Weight of squared command steps against time in units of `LegProblem.time_scale_s`."""
 SMALLNESS = 1e-4
 """Weight of squared commands: decides between commands that give the same force."""
+NODES = (12, 18, 24, 32, 44, 60, 80, 110, 160)
+"""Numbers of nodes tried while the time is free."""
+PROGRAMS = 24
+"""Programs kept built."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -37,13 +43,15 @@ class LegProblem:
         environment: its means act.
         start, end: (6,) states; heading continuous along the reference.
         start_inputs, end_inputs: (m,) commands standing before the leg, and as its last sample.
-        reference: (j + 1, 6) states at the nodes: first guess, and what the corridor is measured from.
-        guess: (j + 1, m) commands at the nodes.
+        states, inputs: (j + 1, 6) and (j + 1, m) first guess at even times.
         duration_s: first guess.
-        side: (j + 1, 2) unit normals of the path, to starboard, north/east.
-        room_port_m, room_starboard_m: (j + 1,) how far the origin may be from the reference to either side.
-        hull_arm_m: points this far ahead and astern of the origin must keep to the corridor too.
+        time_scale_s: unit of time in which smoothness is weighed.
+        path: (j + 1, 3) poses that the corridor is measured from.
+        room_port_m, room_starboard_m: (j + 1,) how far the origin may be from the path to either side.
+        circle: (3,) north, east, radius that the hull's discs keep to; the radius may be infinite.
+        hull_arm_m: points this far ahead and astern of the origin must keep to corridor and circle too.
         top_speed_mps, yaw_rate_radps: bounds on speed over ground, in any direction, and yaw rate at the nodes.
+        lateral_mps2: bound on surge speed times yaw rate.
     """
 
     vessel: Vessel
@@ -52,19 +60,22 @@ class LegProblem:
     end: Array
     start_inputs: Array
     end_inputs: Array
-    reference: Array
-    guess: Array
+    states: Array
+    inputs: Array
     duration_s: float
-    side: Array
+    time_scale_s: float
+    path: Array
     room_port_m: Array
     room_starboard_m: Array
+    circle: Array
     hull_arm_m: float
     top_speed_mps: float
     yaw_rate_radps: float
+    lateral_mps2: float
 
     def __post_init__(self) -> None:
-        seal(self, start="6", end="6", start_inputs="m", end_inputs="m", reference="j 6", guess="j m")
-        seal(self, side="j 2", room_port_m="j", room_starboard_m="j")
+        seal(self, start="6", end="6", start_inputs="m", end_inputs="m", states="j 6", inputs="j m")
+        seal(self, path="j 3", room_port_m="j", room_starboard_m="j", circle="3")
 
 
 def solve_leg(problem: LegProblem) -> Array | None:
@@ -73,42 +84,42 @@ def solve_leg(problem: LegProblem) -> Array | None:
     First the fastest motion is sought with the sample time free, then the smoothest one on whole samples in that
     time. The answer is for the caller to check by simulation.
     """
-    nodes, sample_s = len(problem.reference) - 1, problem.vessel.sample_time_s
-    for stretch in (1.0, 1.6):
+    sample_s = problem.vessel.sample_time_s
+    for stretch in (1.0, 1.6, 3.0):
         guess_s = stretch * problem.duration_s
+        nodes = next((n for n in NODES if n >= guess_s / sample_s), NODES[-1])
         block = max(1, round(guess_s / (nodes * sample_s)))
-        fastest = _Transcription(problem, block, free_time=True)
-        found = fastest.solve(problem.reference, problem.guess, guess_s / (nodes * block))
+        fastest = _program(problem.vessel, problem.environment, nodes, block, True)
+        found = fastest.solve(_respaced(problem, nodes), guess_s / (nodes * block))
         if found is None:
             continue
-        states, commands, step_s = found
-        time_s = nodes * block * step_s
-        block = max(1, int(np.ceil(time_s / (nodes * sample_s) - 1e-6)))
-        least = int(np.ceil(time_s / (block * sample_s) - 1e-6))
+        time_s = nodes * block * found[1]
+        least = max(2, int(np.ceil(time_s / (block * sample_s) - 1e-6)))
         for count in (least, least + 1, least + 3, least + 8):
-            smooth = _Transcription(_respaced(problem, count), block, free_time=False)
-            exact = smooth.solve(_spread(states, count), _spread(commands, count), sample_s)
+            smooth = _program(problem.vessel, problem.environment, count, block, False)
+            exact = smooth.solve(_respaced(found[0], count), sample_s)
             if exact is not None:
-                return _samples(exact[1], block)
+                return _samples(exact[0].inputs, block)
     return None
 
 
 def _spread(rows: Array, count: int) -> Array:
     """Rows (j + 1, ...) linearly resampled to count + 1."""
     old, new = np.linspace(0, 1, len(rows)), np.linspace(0, 1, count + 1)
-    return np.stack([np.interp(new, old, column) for column in rows.T], axis=1)
+    return np.stack([np.interp(new, old, column) for column in np.atleast_2d(rows.T)], axis=-1).reshape(
+        count + 1, *rows.shape[1:]
+    )
 
 
 def _respaced(problem: LegProblem, count: int) -> LegProblem:
     """The same leg with another number of nodes."""
-    side = _spread(problem.side, count)
     return replace(
         problem,
-        reference=_spread(problem.reference, count),
-        guess=_spread(problem.guess, count),
-        side=side / np.linalg.norm(side, axis=1, keepdims=True),
-        room_port_m=_spread(problem.room_port_m[:, None], count)[:, 0],
-        room_starboard_m=_spread(problem.room_starboard_m[:, None], count)[:, 0],
+        states=_spread(problem.states, count),
+        inputs=_spread(problem.inputs, count),
+        path=_spread(problem.path, count),
+        room_port_m=_spread(problem.room_port_m, count),
+        room_starboard_m=_spread(problem.room_starboard_m, count),
     )
 
 
@@ -118,112 +129,120 @@ def _samples(nodes: Array, block: int) -> Array:
     return np.concatenate([a + (b - a) * shares for a, b in pairwise(nodes)])
 
 
-class _Transcription:
-    """The nonlinear program of one leg with a given number of nodes and samples per node."""
+class _Program:
+    """The nonlinear program of legs with a given number of nodes and samples per node."""
 
-    def __init__(self, problem: LegProblem, block: int, *, free_time: bool) -> None:
-        self.problem, self.nodes, self.block = problem, len(problem.reference) - 1, block
-        self.limits = problem.vessel.limits
-        self.state_scale = np.array(
-            [problem.vessel.length_m] * 2 + [1.0] + [problem.top_speed_mps] * 2 + [problem.yaw_rate_radps]
-        )
+    def __init__(self, vessel: Vessel, environment: Environment, nodes: int, block: int, free_time: bool) -> None:
+        self.vessel, self.environment, self.nodes, self.block, self.free = vessel, environment, nodes, block, free_time
+        self.limits = vessel.limits
+        self.state_scale = np.array([vessel.length_m] * 2 + [1.0] * 4)
         self.input_scale = np.array([max(abs(x.low), abs(x.high)) if np.isfinite(x.high) else 1.0 for x in self.limits])
-        self._build(free_time)
+        self._build()
 
-    def _build(self, free_time: bool) -> None:
-        p, j, m = self.problem, self.nodes, len(self.limits)
+    def _build(self) -> None:
+        j, m = self.nodes, len(self.limits)
         x, u, h = ca.MX.sym("x", 6, j + 1), ca.MX.sym("u", m, j + 1), ca.MX.sym("h")
-        states = ca.DM(self.state_scale) * x + ca.DM([*p.start[:2], 0, 0, 0, 0])
+        path, circle = ca.MX.sym("path", 3, j - 1), ca.MX.sym("circle", 2)
+        unit_s, arm = ca.MX.sym("unit_s"), ca.MX.sym("arm")
         inputs = ca.DM(self.input_scale) * u
+        states = ca.DM(self.state_scale) * x
         ends = self._block_map().map(j)(states[:, :-1], inputs[:, :-1], inputs[:, 1:], ca.repmat(h, 1, j))
-        defects = (ends - states[:, 1:]) / ca.DM(self.state_scale)
-        constraints, low, high = [ca.vec(defects)], [np.zeros(6 * j)], [np.zeros(6 * j)]
-        for row, lower, upper in self._corridor(states):
-            constraints.append(row)
-            low.append(lower)
-            high.append(upper)
-        reach = np.array([limit.rate for limit in self.limits]) * self.block
-        for index in np.flatnonzero(np.isfinite(reach)):
-            change = (inputs[int(index), 1:] - inputs[int(index), :-1]).T - reach[index] * h
-            fall = (inputs[int(index), :-1] - inputs[int(index), 1:]).T - reach[index] * h
-            constraints += [ca.vertcat(change, fall) / self.input_scale[index]]
-            low.append(np.full(2 * j, -np.inf))
-            high.append(np.zeros(2 * j))
-        constraints.append(ca.sum1(x[3:5, 1:-1] ** 2).T)  # speed over ground in units of its bound
-        low.append(np.zeros(j - 1))
-        high.append(np.ones(j - 1))
-        steps, sample = ca.diff(u, 1, 1), p.vessel.sample_time_s
+        rows = [ca.vec((ends - states[:, 1:]) / ca.DM(self.state_scale))]
+        rows += self._region(states[:, 1:-1], path, circle, arm)
+        for index in self._rated:
+            step = (inputs[int(index), 1:] - inputs[int(index), :-1]).T / self.input_scale[index]
+            reach = self.limits[index].rate * self.block * h / self.input_scale[index]
+            rows += [step - reach, -step - reach]
+        rows += [ca.sum1(x[3:5, 1:-1] ** 2).T, (x[3, 1:-1] * x[5, 1:-1]).T]
+        steps = ca.diff(u, 1, 1)
         cost = SMOOTHNESS * ca.sumsqr(steps) + SMALLNESS * ca.sumsqr(u) / j
-        if free_time:
-            cost = cost + h * j * self.block / p.duration_s
-        self.variables = ca.vertcat(ca.vec(x), ca.vec(u), h)
-        self.constraint_low, self.constraint_high = np.concatenate(low), np.concatenate(high)
-        self.time_low, self.time_high = (0.2 * sample, 3.0 * sample) if free_time else (sample, sample)
-        options: dict[str, Any] = {
-            "ipopt.print_level": 0,
-            "print_time": False,
-            "ipopt.sb": "yes",
-            "ipopt.max_iter": 400,
-        }
-        options |= {"ipopt.tol": 1e-7, "ipopt.constr_viol_tol": 1e-9, "ipopt.acceptable_iter": 0}
-        nlp: Any = {"x": self.variables, "f": cost, "g": ca.vertcat(*constraints)}
+        if self.free:
+            cost = cost + h * j * self.block / unit_s
+        options: dict[str, Any] = {"print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}
+        options |= {"ipopt.max_iter": 150, "ipopt.constr_viol_tol": 1e-9, "ipopt.acceptable_iter": 0}
+        options |= {"ipopt.tol": 1e-5 if self.free else 1e-7}
+        nlp: Any = {"x": ca.vertcat(ca.vec(x), ca.vec(u), h), "f": cost, "g": ca.vertcat(*rows)}
+        nlp["p"] = ca.vertcat(ca.vec(path), circle, unit_s, arm)
         self.solver = ca.nlpsol("leg", "ipopt", nlp, options)
+
+    @property
+    def _rated(self) -> np.ndarray:
+        """Indices of the signals with a finite rate."""
+        return np.flatnonzero(np.isfinite([limit.rate for limit in self.limits]))
 
     def _block_map(self) -> ca.Function:
         """State after a block of samples with commands running linearly from one node's to the next's."""
-        p, m = self.problem, len(self.limits)
+        m, model = len(self.limits), self.vessel.model
         x, a, b, h = ca.SX.sym("x", 6), ca.SX.sym("a", m), ca.SX.sym("b", m), ca.SX.sym("h")
-        current, wind = p.environment.current_to.tolist(), p.environment.wind_to.tolist()
+        current, wind = self.environment.current_to.tolist(), self.environment.wind_to.tolist()
         state: tuple[Any, ...] = tuple(ca.vertsplit(x))
         for sample in range(1, self.block + 1):
             held = ca.vertsplit(a + (b - a) * (sample / self.block))
 
             def rates(s: tuple[Any, ...], held: Any = held) -> tuple[Any, ...]:
-                return motion_rates(p.vessel.model, s, held, current_to=current, wind_to=wind, ops=CASADI)
+                return motion_rates(model, s, held, current_to=current, wind_to=wind, ops=CASADI)
 
             for _ in range(SUBSTEPS):
                 state = rk4_step(rates, state, h / SUBSTEPS)
         return ca.Function("block", [x, a, b, h], [ca.vertcat(*state)])
 
-    def _corridor(self, states: ca.MX) -> list[tuple[ca.MX, Array, Array]]:
-        """Rows (expression, low, high): origin, bow point and stern point between the sides of the corridor."""
-        p = self.problem
-        inner = slice(1, self.nodes)
-        side = ca.DM(p.side[inner].T)
-        centre = ca.DM(p.reference[inner, :2].T)
-        heading = states[2, inner]
-        ahead = ca.vertcat(ca.cos(heading), ca.sin(heading))
-        length = p.vessel.length_m
-        rows = []
-        for arm in (0.0, p.hull_arm_m, -p.hull_arm_m):
-            offset = ca.sum1(side * (states[:2, inner] + arm * ahead - centre)).T
-            # the reference hull itself may stick out of the corridor in a bend; it is what must be possible
-            own = arm * np.sum(p.side[inner] * _direction(p.reference[inner, 2]), axis=1)
-            low = -p.room_port_m[inner] + np.minimum(own, 0.0)
-            high = p.room_starboard_m[inner] + np.maximum(own, 0.0)
-            rows.append((offset / length, low / length, high / length))
-        return rows
+    def _region(self, inner: ca.MX, path: ca.MX, circle: ca.MX, arm: ca.MX) -> list[ca.MX]:
+        """Rows for origin, bow point and stern point: offset from the path, and squared distance from the circle."""
+        side = ca.vertcat(-ca.sin(path[2, :]), ca.cos(path[2, :]))
+        ahead = ca.vertcat(ca.cos(inner[2, :]), ca.sin(inner[2, :]))
+        length = self.vessel.length_m
+        points = [inner[:2, :] + share * arm * ahead for share in (0, 1, -1)]
+        offsets = [ca.sum1(side * (point - path[:2, :])).T / length for point in points]
+        return offsets + [ca.sum1((point - circle) ** 2).T / length**2 for point in points]
 
-    def solve(self, states: Array, inputs: Array, step_s: float) -> tuple[Array, Array, float] | None:
-        """Node states (j + 1, 6), node commands (j + 1, m) and the sample time found, or None."""
-        p, j, m = self.problem, self.nodes, len(self.limits)
-        origin = np.array([*p.start[:2], 0, 0, 0, 0])
-        ends = ((p.start - origin) / self.state_scale, (p.end - origin) / self.state_scale)
-        big = np.full((j + 1, 6), np.inf)
-        big[:, 3:] = 1.0  # speeds and yaw rate in units of their bounds
-        low, high = -big, big.copy()
-        low[0] = high[0] = ends[0]
-        low[-1] = high[-1] = ends[1]
-        command_low = np.tile([limit.low for limit in self.limits] / self.input_scale, (j + 1, 1))
-        command_high = np.tile([limit.high for limit in self.limits] / self.input_scale, (j + 1, 1))
-        command_low[0] = command_high[0] = p.start_inputs / self.input_scale
-        command_low[-1] = command_high[-1] = p.end_inputs / self.input_scale
+    def _row_bounds(self, problem: LegProblem) -> tuple[Array, Array]:
+        """Lower and upper bounds of the constraints, in the order of `_build`."""
+        j, inner, length = self.nodes, slice(1, self.nodes), self.vessel.length_m
+        low, high = [np.zeros(6 * j)], [np.zeros(6 * j)]
+        low += 3 * [-problem.room_port_m[inner] / length]
+        high += 3 * [problem.room_starboard_m[inner] / length]
+        radius = problem.circle[2]
+        low += [np.full(3 * (j - 1), -np.inf)]
+        high += [np.full(3 * (j - 1), (radius / length) ** 2)]
+        low += [np.full(2 * j * len(self._rated), -np.inf), np.full(j - 1, -np.inf)]
+        high += [np.zeros(2 * j * len(self._rated)), np.full(j - 1, problem.top_speed_mps**2)]
+        low += [np.full(j - 1, -problem.lateral_mps2)]
+        high += [np.full(j - 1, problem.lateral_mps2)]
+        return np.concatenate(low), np.concatenate(high)
+
+    def _variable_bounds(self, problem: LegProblem, origin: Array) -> tuple[Array, Array]:
+        """Lower and upper bounds of states, commands and sample time."""
+        j = self.nodes
+        high = np.full((j + 1, 6), np.inf)
+        high[:, 3:] = [problem.top_speed_mps, problem.top_speed_mps, problem.yaw_rate_radps]
+        low = -high
+        low[0] = high[0] = (problem.start - origin) / self.state_scale
+        low[-1] = high[-1] = (problem.end - origin) / self.state_scale
+        first, last = (np.tile([getattr(x, name) for x in self.limits], (j + 1, 1)) for name in ("low", "high"))
+        first[0] = last[0] = problem.start_inputs
+        first[-1] = last[-1] = problem.end_inputs
+        sample_s = self.vessel.sample_time_s
+        times = (0.2 * sample_s, 3.0 * sample_s) if self.free else (sample_s, sample_s)
+        return (
+            np.r_[low.ravel(), (first / self.input_scale).ravel(), times[0]],
+            np.r_[high.ravel(), (last / self.input_scale).ravel(), times[1]],
+        )
+
+    def solve(self, problem: LegProblem, step_s: float) -> tuple[LegProblem, float] | None:
+        """The problem with states and inputs replaced by the answer, and the sample time found; or None."""
+        j, m = self.nodes, len(self.limits)
+        origin = np.array([*problem.start[:2], 0, 0, 0, 0])
+        path = problem.path[1:j] - origin[:3]
+        guess = [((problem.states - origin) / self.state_scale).ravel(), (problem.inputs / self.input_scale).ravel()]
+        low, high = self._variable_bounds(problem, origin)
+        least, most = self._row_bounds(problem)
         answer = self.solver(
-            x0=np.r_[((states - origin) / self.state_scale).ravel(), (inputs / self.input_scale).ravel(), step_s],
-            lbx=np.r_[low.ravel(), command_low.ravel(), self.time_low],
-            ubx=np.r_[high.ravel(), command_high.ravel(), self.time_high],
-            lbg=self.constraint_low,
-            ubg=self.constraint_high,
+            x0=np.clip(np.r_[guess[0], guess[1], step_s], low, high),
+            p=np.r_[path.ravel(), problem.circle[:2] - origin[:2], problem.time_scale_s, problem.hull_arm_m],
+            lbx=low,
+            ubx=high,
+            lbg=least,
+            ubg=most,
         )
         outcome = self.solver.stats()
         if outcome["return_status"] == "NonIpopt_Exception_Thrown":
@@ -231,10 +250,11 @@ class _Transcription:
         if not outcome["success"]:
             return None
         values = np.asarray(answer["x"]).ravel()
-        found = values[: 6 * (j + 1)].reshape(j + 1, 6) * self.state_scale + origin
-        commands = values[6 * (j + 1) : -1].reshape(j + 1, m) * self.input_scale
-        return found, commands, float(values[-1])
+        states = values[: 6 * (j + 1)].reshape(j + 1, 6) * self.state_scale + origin
+        inputs = values[6 * (j + 1) : -1].reshape(j + 1, m) * self.input_scale
+        return replace(problem, states=states, inputs=inputs), float(values[-1])
 
 
-def _direction(heading: Array) -> Array:
-    return np.stack([np.cos(heading), np.sin(heading)], axis=-1)
+@lru_cache(maxsize=PROGRAMS)
+def _program(vessel: Vessel, environment: Environment, nodes: int, block: int, free_time: bool) -> _Program:
+    return _Program(vessel, environment, nodes, block, free_time)

@@ -7,10 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from expdesign.conventions import wrap_angle
 from expdesign.dictionary.build import drift, trim
 from expdesign.errors import NoPlan
 from expdesign.plan.values import PlanSettings
-from expdesign.vessel import Vessel
+from expdesign.values import Array
+from expdesign.vessel import Vessel, force_matrix
 
 USABLE = 0.9
 """Share of the largest steady speed, and of the largest steady yaw rate, that repositioning counts on."""
@@ -29,6 +31,10 @@ class Capability:
         turning_radius_m: of repositioning legs.
         yaw_rate_radps: largest yaw rate used on legs.
         acceleration_mps2: mean surge acceleration between rest and transit speed.
+        spot_rate_radps: yaw rate of turns at little speed, used only where `agile`.
+        agile: the actuators push in every direction at once, so the vessel turns on the spot and goes sideways; others
+            sail arcs of the turning radius.
+        lateral_mps2: largest surge speed times yaw rate on legs.
     """
 
     top_speed_mps: float
@@ -36,6 +42,19 @@ class Capability:
     turning_radius_m: float
     yaw_rate_radps: float
     acceleration_mps2: float
+    spot_rate_radps: float = 0.0
+    agile: bool = False
+    lateral_mps2: float = LATERAL_MPS2
+
+    @property
+    def swing_radps(self) -> float:
+        """Mean yaw rate of an agile vessel's turns, on the spot or slowed down as far as the lateral limit asks."""
+        return min(self.spot_rate_radps, 1.5 * self.lateral_mps2 / self.transit_speed_mps)
+
+    @property
+    def settle_s(self) -> float:
+        """Time that a change of motion takes beyond what speeds and accelerations explain: a thumb rule."""
+        return 0.25 * self.transit_speed_mps / self.acceleration_mps2
 
 
 def capability(vessel: Vessel, settings: PlanSettings, *, current_mps: float = 0.0) -> Capability:
@@ -68,6 +87,8 @@ def capability(vessel: Vessel, settings: PlanSettings, *, current_mps: float = 0
             f"plan.turning_radius_m is {settings.turning_radius_m:g}, at {transit:.3g} m/s vessel {vessel.name!r} "
             f"needs {transit / yaw:.3g} m or more"
         )
+    spot = _largest(lambda r: _holds(vessel, (0.0, 0.0, r)), start=1e-4 * transit / vessel.length_m) or 0.0
+    agile = bool(np.linalg.matrix_rank(force_matrix(vessel.actuators)) == 3) and spot > transit / vessel.length_m / 10
     radius = settings.turning_radius_m or max(transit / (USABLE * yaw), 1.5 * vessel.length_m)
     return Capability(
         top_speed_mps=top,
@@ -75,7 +96,34 @@ def capability(vessel: Vessel, settings: PlanSettings, *, current_mps: float = 0
         turning_radius_m=radius,
         yaw_rate_radps=min(USABLE * yaw, 2.0 * transit / radius),
         acceleration_mps2=_acceleration(vessel, transit),
+        spot_rate_radps=USABLE * spot,
+        agile=agile,
+        lateral_mps2=max(LATERAL_MPS2, 1.01 * transit * min(USABLE * yaw, 2.0 * transit / radius)),
     )
+
+
+def turn_loss_s(ship: Capability, first_rad: Array, second_rad: Array) -> Array:
+    """Time that turning costs an agile vessel besides the way: from its course at first to the way, and at the end.
+
+    A fit to optimised legs: about the time of half a turn on the spot for half a turn in all, less when it is shared
+    between the ends.
+    """
+    half_turn_s = np.pi / ship.swing_radps
+    return np.asarray(2.0 * half_turn_s * (wrap_angle(first_rad) ** 2 + wrap_angle(second_rad) ** 2) / np.pi**2)
+
+
+def speed_loss_s(ship: Capability, first_mps: Array, last_mps: Array) -> Array:
+    """Time that gathering and losing speed costs besides the way at transit speed, and settling."""
+    v = ship.transit_speed_mps
+    lost = [(v - np.clip(end, 0.0, v)) ** 2 / (2 * ship.acceleration_mps2 * v) for end in (first_mps, last_mps)]
+    return np.asarray(lost[0] + lost[1] + ship.settle_s)
+
+
+def joint_m(ship: Capability, turn_rad: float, hull_m: float) -> float:
+    """Length of way in which an agile vessel turns by an angle and reaches transit speed."""
+    v = ship.transit_speed_mps
+    turning = v * abs(float(wrap_angle(turn_rad))) / ship.swing_radps
+    return turning + v**2 / (2 * ship.acceleration_mps2) + 2 * v * ship.settle_s + hull_m / 2
 
 
 def _holds(vessel: Vessel, velocity: tuple[float, float, float]) -> bool:

@@ -1,4 +1,8 @@
-"""How a partial plan can go on: an arc and a straight, or a stretch of the way to the goal; and whether it is clear."""
+"""How a partial plan can go on, and whether that is clear.
+
+Agile vessels turn where they are and go straight, or along the way to the goal, to a run with any heading. Others sail
+an arc and a straight, or a stretch of the way to the goal.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.conventions import wrap_angle
-from expdesign.plan.field import OCTILE_EXCESS
+from expdesign.plan.capability import speed_loss_s, turn_loss_s
 from expdesign.plan.search_space import PartialPlans, SearchSpace
 from expdesign.values import Array
 
@@ -17,6 +21,14 @@ STRAIGHTS = np.array([0.0, 2.0, 6.0])
 """Straight after a turn, beyond the run-up, in hull lengths."""
 WAYS = np.array([5.0, 12.0, 25.0, 50.0, 100.0])
 """Stretches of the shortest way to the goal, in hull lengths; the whole way is always tried too."""
+AGILE_WAYS = np.array([1.0, 1.5, 2.5, 4.0, 7.0, 12.0, 25.0, 50.0, 100.0])
+"""The same for agile vessels."""
+AGILE_STRAIGHTS = np.array([0.5, 1.0, 2.0, 5.0])
+"""Straight legs of agile vessels, beyond the run-up, in hull lengths."""
+COURSES = np.arange(6) * np.pi / 3
+"""Courses of straight legs of agile vessels, from the heading that the run before ends with."""
+HEADINGS = np.arange(16) * np.pi / 8
+"""Headings of runs, from that heading or from the direction of the way."""
 WAY_OFFSETS = np.deg2rad([0, 30, -30, 60, -60, 90, -90, 135, -135, 180])
 
 
@@ -29,7 +41,8 @@ class Options:
         primitive: (n,) index of the run to do next.
         start: (n, 3) where it begins.
         leg_s: (n,) time to get there.
-        turn: (n,) angle of the arc that leads there, before a straight; nan for stretches of the way to the goal.
+        turn: (n,) angle of the arc that leads there, before a straight; nan for others.
+        straight: (n,) whether a straight line leads there.
     """
 
     parent: np.ndarray
@@ -37,6 +50,7 @@ class Options:
     start: Array
     leg_s: Array
     turn: Array
+    straight: np.ndarray
 
     def __getitem__(self, rows: np.ndarray) -> Options:
         return Options(**{name: column[rows] for name, column in vars(self).items()})
@@ -51,6 +65,8 @@ def continuations(space: SearchSpace, beam: PartialPlans, q: int) -> list[Option
     """Every way to begin primitive q after each partial plan."""
     able = np.flatnonzero(beam.left[:, q] > 0)
     runup = np.array([_run_up(space, int(last), q) for last in beam.last[able]])
+    if space.ship.agile:
+        return [_at_once(space, beam, able, q), _straights(space, beam, able, q, runup), _ways(space, beam, able, q)]
     change_s = np.abs(beam.exit_mps[able] - space.stamps[q].entry_mps) / space.ship.acceleration_mps2
     return [_arcs(space, beam, able, q, runup, change_s), _transits(space, beam, able, q, change_s)]
 
@@ -69,7 +85,68 @@ def _arcs(space: SearchSpace, beam: PartialPlans, able: np.ndarray, q: int, runu
     leg_s = length / space.ship.transit_speed_mps + np.repeat(change_s, len(turn))
     start = _arc_end(pose, turns, straight, space.ship.turning_radius_m)
     parent = np.repeat(able, len(turn))
-    return Options(parent=parent, primitive=np.full(len(parent), q), start=start, leg_s=leg_s, turn=turns)
+    return _options(q, parent, start, leg_s, turn=turns)
+
+
+def _options(
+    q: int, parent: np.ndarray, start: Array, leg_s: Array, *, turn: Array | None = None, straight: bool = False
+) -> Options:
+    n = len(parent)
+    turn = np.full(n, np.nan) if turn is None else turn
+    return Options(
+        parent=parent, primitive=np.full(n, q), start=start, leg_s=leg_s, turn=turn, straight=np.full(n, straight)
+    )
+
+
+def _at_once(space: SearchSpace, beam: PartialPlans, able: np.ndarray, q: int) -> Options:
+    """Runs that begin where the run before ended, after a turn on the spot; both at rest."""
+    slow = 0.05 * space.ship.transit_speed_mps
+    able = able[(beam.exit_mps[able] < slow) & (space.stamps[q].entry_mps < slow)]
+    parent, heading = np.repeat(able, len(HEADINGS)), np.tile(HEADINGS, len(able))
+    start = beam.pose[parent] + heading[:, None] * [0.0, 0.0, 1.0]
+    leg_s = space.ship.settle_s + 1.3 * np.abs(wrap_angle(heading)) / space.ship.swing_radps
+    return _options(q, parent, start, leg_s)
+
+
+def _straights(space: SearchSpace, beam: PartialPlans, able: np.ndarray, q: int, runup: Array) -> Options:
+    course, length, heading = (
+        grid.ravel() for grid in np.meshgrid(COURSES, AGILE_STRAIGHTS * space.hull_m, HEADINGS, indexing="ij")
+    )
+    parent = np.repeat(able, len(course))
+    course, heading = np.tile(course, len(able)), np.tile(heading, len(able))
+    length = np.tile(length, len(able)) + np.repeat(runup, len(parent) // max(len(able), 1)) - space.hull_m
+    length = length + (beam.exit_mps[parent] + space.stamps[q].entry_mps) * 1.5 * space.ship.settle_s
+    step = np.column_stack([length * np.cos(course), length * np.sin(course), heading])
+    leg_s = _agile_s(space, length, course, heading - course, beam.exit_mps[parent], q)
+    return _options(q, parent, _moved(beam.pose[parent], step), leg_s, straight=True)
+
+
+def _ways(space: SearchSpace, beam: PartialPlans, able: np.ndarray, q: int) -> Options:
+    """Runs at points of the way to the goal, with any heading."""
+    parents, starts, times = [np.zeros(0, dtype=int)], [np.zeros((0, 3))], [np.zeros(0)]
+    for index in able:
+        points, along = _way_points(space, beam.pose[index], AGILE_WAYS)
+        if not len(points):
+            continue
+        direction = np.arctan2(points[:, 3], points[:, 2])
+        near = along < 10 * space.hull_m
+        to_point = np.arctan2(*(points[:, :2] - beam.pose[index, :2]).T[::-1])
+        first = np.where(near, to_point, direction[0]) - beam.pose[index, 2]
+        last = np.where(near, to_point, direction)
+        heading = direction[:, None] + HEADINGS
+        leg_s = _agile_s(space, along[:, None], first[:, None], heading - last[:, None], beam.exit_mps[index], q)
+        placed = np.repeat(points[:, :2], len(HEADINGS), axis=0)
+        starts.append(np.column_stack([placed, heading.ravel()]))
+        times.append(leg_s.ravel())
+        parents.append(np.full(len(placed), index))
+    return _options(q, np.concatenate(parents), np.concatenate(starts), np.concatenate(times))
+
+
+def _agile_s(space: SearchSpace, length: Array, first: Array, last: Array, exit_mps: Array, q: int) -> Array:
+    """Time of agile legs by what optimised ones take, from lengths and turns at both ends."""
+    way_s = length / space.ship.transit_speed_mps + turn_loss_s(space.ship, first, last)
+    spot_s = 1.3 * np.abs(wrap_angle(first + last)) / space.ship.swing_radps
+    return np.maximum(way_s, spot_s) + speed_loss_s(space.ship, exit_mps, np.array(space.stamps[q].entry_mps))
 
 
 def _arc_end(pose: Array, turn: Array, straight: Array, radius: float) -> Array:
@@ -89,7 +166,7 @@ def _moved(pose: Array, step: Array) -> Array:
 def _transits(space: SearchSpace, beam: PartialPlans, able: np.ndarray, q: int, change_s: Array) -> Options:
     parents, starts, times = [], [], []
     for index, wait in zip(able, change_s, strict=True):
-        points, along = _way_points(space, beam.pose[index])
+        points, along = _way_points(space, beam.pose[index], WAYS)
         if not len(points):
             continue
         heading = np.arctan2(points[:, 3], points[:, 2])
@@ -99,27 +176,27 @@ def _transits(space: SearchSpace, beam: PartialPlans, able: np.ndarray, q: int, 
             starts.append(np.column_stack([points[:, :2], heading + offset]))
             times.append(length / space.ship.transit_speed_mps + wait)
             parents.append(np.full(len(points), index))
-    return Options(
-        parent=np.concatenate([np.zeros(0, dtype=int), *parents]),
-        primitive=np.full(sum(map(len, parents)), q),
-        start=np.concatenate([np.zeros((0, 3)), *starts]),
-        leg_s=np.concatenate([np.zeros(0), *times]),
-        turn=np.full(sum(map(len, parents)), np.nan),
+    return _options(
+        q,
+        np.concatenate([np.zeros(0, dtype=int), *parents]),
+        np.concatenate([np.zeros((0, 3)), *starts]),
+        np.concatenate([np.zeros(0), *times]),
     )
 
 
-def _way_points(space: SearchSpace, pose: Array) -> tuple[Array, Array]:
+def _way_points(space: SearchSpace, pose: Array, stretches: Array) -> tuple[Array, Array]:
     """Rows (north, east, direction north, direction east) along the way to the goal, and their distances along it."""
     way = space.goal_way.way(pose[:2])
-    if len(way) < 3:
-        return np.zeros((0, 4)), np.zeros(0)
     steps = np.hypot(*np.diff(way, axis=0).T)
-    along = np.r_[0.0, np.cumsum(steps)] / np.sqrt(OCTILE_EXCESS)
-    wished = np.r_[WAYS * space.hull_m, along[-1]]
-    at = np.searchsorted(along, wished[wished <= along[-1]]).clip(1, len(way) - 1)
-    back = np.maximum(at - 5, 0)
-    ahead = np.minimum(at + 5, len(way) - 1)
-    return np.column_stack([way[at], way[ahead] - way[back]]), along[at]
+    way, steps = way[np.r_[True, steps > 1e-6]], steps[steps > 1e-6]
+    if not len(steps):
+        return np.zeros((0, 4)), np.zeros(0)
+    along = np.r_[0.0, np.cumsum(steps)]
+    wished = np.r_[stretches * space.hull_m, along[-1]]
+    wished = wished[wished <= along[-1]]
+    piece = np.clip(np.searchsorted(along, wished, side="left") - 1, 0, len(steps) - 1)
+    places = np.stack([np.interp(wished, along, column) for column in way.T], axis=1)
+    return np.column_stack([places, np.diff(way, axis=0)[piece] / steps[piece, None]]), wished
 
 
 def run_ends(space: SearchSpace, primitive: np.ndarray, start: Array) -> Array:
@@ -140,6 +217,8 @@ def clear_options(space: SearchSpace, plans: PartialPlans, options: Options) -> 
     clear &= space.field.at(run_ends(space, primitive, start)[:, :2]) >= space.leg_margin_m
     arcs = np.flatnonzero(clear & ~np.isnan(turn))
     clear[arcs] = _arcs_clear(space, plans.pose[options.parent[arcs]], turn[arcs], start[arcs])
+    lines = np.flatnonzero(clear & options.straight)
+    clear[lines] = _lines_clear(space, plans.pose[options.parent[lines]], start[lines])
     for q in np.unique(primitive[clear]):
         some = np.flatnonzero(clear & (primitive == q))
         item = space.stamps[q]
@@ -160,4 +239,12 @@ def _arcs_clear(space: SearchSpace, pose: Array, turn: Array, start: Array) -> n
         on_arc = _arc_end(pose, share * turn, np.zeros(len(turn)), radius)[:, :2]
         on_line = corner[:, :2] + share * (start[:, :2] - corner[:, :2])
         clear &= np.minimum(space.field.at(on_arc), space.field.at(on_line)) >= space.leg_margin_m
+    return clear
+
+
+def _lines_clear(space: SearchSpace, pose: Array, start: Array) -> np.ndarray:
+    """Whether straight lines between poses keep the leg margin at points along them, their own ends apart."""
+    clear = np.ones(len(pose), dtype=bool)
+    for share in np.linspace(0.2, 1.0, 9):
+        clear &= space.field.at((1 - share) * pose[:, :2] + share * start[:, :2]) >= space.leg_margin_m
     return clear

@@ -14,6 +14,7 @@ import numpy as np
 
 from expdesign.conventions import wrap_angle
 from expdesign.errors import NoPlan
+from expdesign.plan.capability import turn_loss_s
 from expdesign.plan.continuations import Options, clear_options, continuations, joined, run_ends
 from expdesign.plan.search_space import PartialPlans, SearchSpace
 from expdesign.plan.values import Placement
@@ -116,6 +117,9 @@ def _leg_to_goal_s(space: SearchSpace, pose: Array) -> Array:
     """Estimated time of the last leg from poses (b, 3) to the goal [s]."""
     distance = space.goal_way.to_goal(pose[:, :2])
     direct = np.arctan2(space.goal[1] - pose[:, 1], space.goal[0] - pose[:, 0])
+    if space.ship.agile:
+        way_s = distance / space.ship.transit_speed_mps
+        return np.asarray(way_s + turn_loss_s(space.ship, direct - pose[:, 2], space.goal[2] - direct))
     turns = np.abs(wrap_angle(direct - pose[:, 2])) + np.abs(wrap_angle(space.goal[2] - direct))
     return np.asarray((distance + space.ship.turning_radius_m * turns) / space.ship.transit_speed_mps)
 

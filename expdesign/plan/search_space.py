@@ -11,8 +11,9 @@ import numpy as np
 from expdesign.dictionary import Primitive
 from expdesign.plan.area import LocalFrame
 from expdesign.plan.capability import Capability
-from expdesign.plan.field import ClearanceField, GoalField
+from expdesign.plan.field import ClearanceField
 from expdesign.plan.footprint import covering_discs, disc_points, thinned_poses
+from expdesign.plan.goal_ways import GoalWays
 from expdesign.plan.values import Placement
 from expdesign.values import Array
 
@@ -61,7 +62,7 @@ class SearchSpace:
     stamps: tuple[Stamp, ...]
     frame: LocalFrame
     field: ClearanceField
-    goal_way: GoalField
+    goal_way: GoalWays
     goal: Array
     ship: Capability
     hull_m: float

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -15,9 +15,12 @@ from expdesign.errors import NoPlan
 from expdesign.plan.area import SeaArea
 from expdesign.plan.capability import capability
 from expdesign.plan.checks import verify_plan
-from expdesign.plan.field import ROUTING_CELLS, ClearanceField, clearance_field, goal_field, narrowest_passage
+from expdesign.plan.field import ClearanceField, clearance_field, narrowest_passage
 from expdesign.plan.footprint import covering_discs, swept_area
-from expdesign.plan.legs import NEAR_ENDS, LegTask, LegWater, find_leg, leg_speed_mps, leg_trajectory
+from expdesign.plan.goal_ways import build_goal_ways
+from expdesign.plan.leg_values import leg_speed_mps
+from expdesign.plan.legs import LegTask, LegWater, find_leg, leg_trajectory
+from expdesign.plan.lower_bound import reposition_bound_s
 from expdesign.plan.placement import place_runs
 from expdesign.plan.realised import realised_efficiency
 from expdesign.plan.safety import leave_water_probability
@@ -116,27 +119,30 @@ def _repeats(problem: PlanProblem) -> dict[str, int]:
 
 
 def _water(problem: PlanProblem) -> LegWater:
+    ship = capability(problem.vessel, problem.settings, current_mps=float(np.hypot(*problem.environment.current_to)))
+    # a ship that stands the turns of the runs stands them on legs
+    turns = [item.trajectory.velocity[:, 0] * item.trajectory.velocity[:, 2] for item in _used(problem)]
+    lateral = max([ship.lateral_mps2, *(float(np.abs(turn).max()) for turn in turns)])
     return LegWater(
         vessel=problem.vessel,
         environment=problem.environment,
-        ship=capability(problem.vessel, problem.settings, current_mps=float(np.hypot(*problem.environment.current_to))),
+        ship=replace(ship, lateral_mps2=lateral),
         area=problem.area,
         clearance_m=problem.settings.clearance_m,
         field=clearance_field(problem.area, resolution_m=problem.vessel.length_m / 8),
     )
 
 
+def _used(problem: PlanProblem) -> list[Primitive]:
+    repeats = _repeats(problem)
+    return [item for item in problem.primitives if repeats[item.name]]
+
+
 def _search_space(problem: PlanProblem, water: LegWater) -> SearchSpace:
     vessel, grid = problem.vessel, water.field
-    margin = water.path_margin_m + grid.cell_m / 2
-    way = goal_field(
-        grid,
-        problem.goal[:2],
-        clearance_m=margin,
-        berths=np.array([problem.start[:2], problem.goal[:2]]),
-        berth_m=NEAR_ENDS * vessel.length_m,
-    )
-    if not np.isfinite(way.to_goal(problem.start[:2])):
+    margin = water.leg_margin_m + grid.cell_m / 2
+    way = build_goal_ways(water.narrowest_ways, grid, problem.goal[:2])
+    if way is None or not water.candidate_ways(problem.start[:2], problem.goal[:2]):
         raise NoPlan(_no_way(problem, grid, margin))
     return SearchSpace(
         stamps=_stamps(problem, grid),
@@ -280,20 +286,15 @@ def _at_rest(problem: PlanProblem, pose: Array) -> Array:
 
 
 def _reposition_bound_s(problem: PlanProblem, water: LegWater) -> float:
-    """No plan with these runs and legs no faster than transit speed repositions in less.
-
-    The way to the goal less all that runs can carry, which is the length of their paths: a run may round an island. The
-    way is measured for a hull that keeps the clearance abeam only. A cell counts as passable when any point nearer to
-    it than to its neighbours could be: clearance changes no faster than distance.
-    """
-    coarse = water.field.thinned(ROUTING_CELLS)
-    narrow = problem.settings.clearance_m + problem.vessel.beam_m / 2 - water.field.error_m - coarse.error_m / 2
-    way = goal_field(coarse, problem.goal[:2], clearance_m=max(narrow, 0.0))
-    current, used = float(np.hypot(*problem.environment.current_to)), _repeats(problem)
-    carried = sum(
-        used[item.name] * (item.trajectory.distance_m + current * item.duration_s) for item in problem.primitives
+    ends = tuple(x for item in problem.primitives for x in (item.entry_velocity, item.exit_velocity))
+    return reposition_bound_s(
+        problem.vessel,
+        problem.area,
+        problem.environment,
+        clearance_m=problem.settings.clearance_m,
+        primitives=problem.primitives,
+        repeats=_repeats(problem),
+        ends=(problem.start, problem.goal),
+        speed_mps=leg_speed_mps(water.ship.transit_speed_mps, ends),
+        yaw_rate_radps=water.ship.spot_rate_radps + water.ship.yaw_rate_radps,
     )
-    fastest = leg_speed_mps(
-        water.ship, [x for item in problem.primitives for x in (item.entry_velocity, item.exit_velocity)]
-    )
-    return max(0.0, way.lower_bound(problem.start[:2]) - carried) / (fastest + current)

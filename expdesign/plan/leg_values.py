@@ -1,0 +1,179 @@
+"""What legs are made from: the task, the water all legs share, and whether commands fulfil a task."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import shapely
+
+from expdesign.plan.area import SeaArea
+from expdesign.plan.capability import Capability
+from expdesign.plan.field import ClearanceField
+from expdesign.plan.footprint import swept_area
+from expdesign.plan.ways import Ways, build_ways, polyline_length, simplified
+from expdesign.signals import Commands, Trajectory
+from expdesign.simulation import Environment, simulate
+from expdesign.values import Array, seal
+from expdesign.vessel import Vessel
+
+ROOM_M = 3.0
+"""Hull lengths to either side beyond which a corridor is not widened."""
+ARRIVAL = 1e-3
+"""Largest miss of a leg's end state, in hull lengths, and in transit speeds."""
+SPARES = (0.25, 0.1, 0.02)
+"""Hull lengths that ways keep from the shore beyond clearance and half the beam: more gives smoother ways, less leads
+through narrower water."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LegTask:
+    """A leg to be found.
+
+    Attributes:
+        start, end: (6,) states, pose in the n-frame and velocity over ground.
+        start_inputs, end_inputs: (m,) commands standing at its ends.
+        seed: of the path search.
+    """
+
+    start: Array
+    end: Array
+    start_inputs: Array
+    end_inputs: Array
+    seed: int
+
+    def __post_init__(self) -> None:
+        seal(self, start="6", end="6", start_inputs="m", end_inputs="m")
+
+
+@dataclass(frozen=True, kw_only=True)
+class LegWater:
+    """Vessel, weather and water that all legs of a plan share.
+
+    Attributes:
+        vessel, environment, ship: who sails, in what, how fast.
+        area: allowed water.
+        clearance_m: least distance of the hull from anything forbidden.
+        field: the same water on a grid.
+    """
+
+    vessel: Vessel
+    environment: Environment
+    ship: Capability
+    area: SeaArea
+    clearance_m: float
+    field: ClearanceField
+
+    @cached_property
+    def safe(self) -> shapely.MultiPolygon:
+        """Water that the hull may touch."""
+        safe = self.area.safe_water(self.clearance_m)
+        shapely.prepare(safe)
+        return safe
+
+    @cached_property
+    def ways(self) -> tuple[Ways, ...]:
+        """Shortest ways for amidships of a hull that points along them, from wide to narrow."""
+        length = self.vessel.length_m
+        margins = [self.straight_margin_m + spare * length for spare in SPARES]
+        if not self.ship.agile:
+            margins = [self.path_margin_m]
+        waters = [self.area.safe_water(margin) for margin in margins]
+        return tuple(build_ways(simplified(water, grow=False, tolerance_m=length / 60)) for water in waters)
+
+    @property
+    def narrowest_ways(self) -> Ways:
+        """Ways in all the water that centre lines may use."""
+        return self.ways[-1]
+
+    @property
+    def straight_margin_m(self) -> float:
+        """Clearance of the centre line of a hull that goes straight."""
+        return self.clearance_m + self.vessel.beam_m / 2
+
+    @property
+    def leg_margin_m(self) -> float:
+        """Clearance that the centre lines of legs need."""
+        return self.straight_margin_m + SPARES[-1] * self.vessel.length_m if self.ship.agile else self.path_margin_m
+
+    @property
+    def path_margin_m(self) -> float:
+        """Clearance of the centre line that keeps the hull clear on an arc of the turning radius."""
+        radius, half_length, half_beam = (
+            self.ship.turning_radius_m,
+            self.vessel.length_m / 2,
+            self.vessel.beam_m / 2,
+        )
+        return self.clearance_m + float(np.hypot(radius + half_beam, half_length)) - radius
+
+    def candidate_ways(self, start: Array, end: Array) -> list[Array]:
+        """Ways (k, 2) between two points, shortest first, of like ones the one farther from the shore.
+
+        A straight one where a hull may go straight; none where there is none.
+        """
+        straight = np.stack([start, end])
+        if shapely.contains_properly(self._open, shapely.LineString(straight[:, ::-1])):
+            return [straight]
+        found = [way for ways in self.ways if (way := ways.shortest(start, end)) is not None]
+        return sorted(found, key=lambda way: np.ceil(polyline_length(way) / (2 * self.vessel.length_m)))
+
+    @cached_property
+    def _open(self) -> shapely.MultiPolygon:
+        water = self.area.safe_water(self.straight_margin_m)
+        shapely.prepare(water)
+        return water
+
+    def holds(self, pose: Array) -> bool:
+        """Whether the hull stays in safe water between consecutive poses (k, 3)."""
+        return bool(shapely.contains_properly(self.safe, swept_area(pose, self.vessel.hull_b)))
+
+    def sail(self, start: Array, values: Array, standing: Array | None = None) -> Trajectory:
+        """The motion that commands (k, m) give from a state (6,)."""
+        commands = Commands(sample_time_s=self.vessel.sample_time_s, names=self.vessel.model.inputs, values=values)
+        return simulate(
+            self.vessel, commands, pose=start[:3], velocity=start[3:], environment=self.environment, standing=standing
+        )
+
+
+def leg_trajectory(water: LegWater, start: Array, values: Array) -> Trajectory:
+    """The motion that commands (k, m) give from a state (6,)."""
+    return water.sail(start, values)
+
+
+def last_state(track: Trajectory) -> Array:
+    """(6,) the state at a trajectory's end."""
+    return np.asarray(np.r_[track.pose[-1], track.velocity[-1]])
+
+
+def acceptable(start: Array, end: Array, water: LegWater, values: Array) -> bool:
+    """Whether commands, simulated from a state, arrive at another one and stay in safe water."""
+    track = water.sail(start, values)
+    scale = np.r_[[water.vessel.length_m] * 2, 1.0, [water.ship.transit_speed_mps] * 2, water.ship.yaw_rate_radps]
+    return bool((np.abs(last_state(track) - end) <= ARRIVAL * scale).all()) and water.holds(track.pose)
+
+
+def nearest_turns(vessel: Vessel, inputs: Array, near: Array) -> Array:
+    """The same commands with unlimited azimuth angles shifted by whole turns towards `near`."""
+    shifted = inputs.copy()
+    for index, (name, limit) in enumerate(zip(vessel.model.inputs, vessel.limits, strict=True)):
+        if name.startswith("a") and not np.isfinite([limit.low, limit.high]).any():
+            shifted[index] += 2 * np.pi * np.round((near[index] - inputs[index]) / (2 * np.pi))
+    return shifted
+
+
+def room_beside(water: LegWater, centre: Array, side: Array, margin_m: float) -> Array:
+    """(j,) how far each centre may move to one side while its discs keep clear, at most `ROOM_M` hull lengths."""
+    steps = np.arange(0.0, ROOM_M * water.vessel.length_m, water.field.cell_m)
+    points = centre[:, None] + steps[:, None] * side[:, None, :]
+    free = water.field.at(points) >= margin_m
+    free[:, 0] = True
+    return np.asarray(steps[np.cumprod(free, axis=1).sum(axis=1).astype(int) - 1])
+
+
+def leg_speed_mps(transit_mps: float, ends: Iterable[Array]) -> float:
+    """Largest speed on a leg: transit speed, or 2 % above what its ends (3,) have, where they are faster."""
+    steady = 1.001 * transit_mps
+    fastest = max((float(np.hypot(*velocity[:2])) for velocity in ends), default=0.0)
+    return 1.02 * fastest if fastest > steady else steady
