@@ -30,6 +30,7 @@ ESTIMATE = {
     "start": "auto",
     "tests": (),
 }
+PLAIN = {"departure": None, "tolerance_m": None}
 COMMANDS = ("run", "score", "durations", "plan", "export", "simulate", "estimate")
 
 
@@ -74,8 +75,19 @@ def workflows(monkeypatch: pytest.MonkeyPatch) -> Workflows:
         ("durations a.toml", "durations", (Path("a.toml"), None), {"seed": 0}),
         ("plan a.toml", "plan", (Path("a.toml"), None), {"seed": 0, "durations": None}),
         ("plan a.toml --durations d.json", "plan", (Path("a.toml"), None), {"seed": 0, "durations": Path("d.json")}),
-        ("export p.json --format rtz gpx", "export", (Path("p.json"), None), {"formats": ("rtz", "gpx")}),
-        ("export --format rtz p.json --format csv", "export", (Path("p.json"), None), {"formats": ("rtz", "csv")}),
+        ("export p.json --format rtz gpx", "export", (Path("p.json"), None), {"formats": ("rtz", "gpx"), **PLAIN}),
+        (
+            "export --format rtz p.json --format csv",
+            "export",
+            (Path("p.json"), None),
+            {"formats": ("rtz", "csv"), **PLAIN},
+        ),
+        (
+            "indices --vessel v.toml",
+            "indices",
+            ((), None),
+            {"vessel": Path("v.toml"), "speed_mps": None, "scale": 1.0, "antenna_forward_m": 0.0},
+        ),
         ("simulate p.json --truth v.toml", "simulate", (Path("p.json"), None), {"seed": 0, "truth": Path("v.toml")}),
         ("estimate d.csv --vessel v.toml", "estimate", ((Path("d.csv"),), None), ESTIMATE),
         (

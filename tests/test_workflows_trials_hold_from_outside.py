@@ -30,7 +30,11 @@ EXPECTED = {
     "route.geojson",
     "route.gpx",
     "route.rtz",
+    "route.kml",
+    "route.plan",
+    "route.waypoints",
     "report.html",
+    "cards.html",
 }
 
 
