@@ -28,6 +28,9 @@ ESTIMATE = {
     "velocity": "auto",
     "mean": "complete",
     "start": "auto",
+    "motion": "continuous",
+    "horizon_s": None,
+    "constant": False,
     "tests": (),
 }
 PLAIN = {"departure": None, "tolerance_m": None}
@@ -72,7 +75,7 @@ def workflows(monkeypatch: pytest.MonkeyPatch) -> Workflows:
         ("run a.toml", "run", (Path("a.toml"), None), {"seed": 0}),
         ("run a.toml --out o --seed 7", "run", (Path("a.toml"), Path("o")), {"seed": 7}),
         ("score --seed 1 a.toml", "score", (Path("a.toml"), None), {"seed": 1}),
-        ("durations a.toml", "durations", (Path("a.toml"), None), {"seed": 0}),
+        ("durations a.toml", "durations", (Path("a.toml"), None), {"seed": 0, "grow": False}),
         ("plan a.toml", "plan", (Path("a.toml"), None), {"seed": 0, "durations": None}),
         ("plan a.toml --durations d.json", "plan", (Path("a.toml"), None), {"seed": 0, "durations": Path("d.json")}),
         ("export p.json --format rtz gpx", "export", (Path("p.json"), None), {"formats": ("rtz", "gpx"), **PLAIN}),

@@ -77,7 +77,7 @@ def shown(key: str, value: float | None) -> str:
 def verdict_rows(content: IndicesContent) -> list[tuple[str, ...]]:
     """Source, run, index, value, value by length, limit, rule, verdict."""
     length = content.vessel.length_m
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for source, verdict in content.verdicts:
         limit, value = verdict.criterion, verdict.value
         metric = limit.key.endswith("_m")
