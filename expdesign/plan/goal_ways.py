@@ -18,8 +18,10 @@ from expdesign.plan.ways import Ways, sight_lines
 from expdesign.values import Array
 
 TABLE_CELLS = 60_000
-ROUNDS = 60
-"""Corners tried from each cell, nearest way first, before it counts as cut off."""
+CHUNK = 4000
+"""Cells looked at at a time."""
+FEW = 20
+"""Corners that are sorted by the way over them first; the others only where none of these is in sight."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -100,19 +102,35 @@ def _from_goal(ways: Ways, goal: Array) -> tuple[Array, Array, np.ndarray]:
 def _tabled(ways: Ways, points: Array, nodes: Array, distance: Array) -> tuple[Array, np.ndarray]:
     """(k,) length of the shortest way from each point and the node it bends at first."""
     length, turn = np.full(len(points), np.inf), np.zeros(len(points), dtype=int)
+    for first in range(0, len(points), CHUNK):
+        part = slice(first, first + CHUNK)
+        length[part], turn[part] = _first_bends(ways, points[part], nodes, distance)
+    return length, turn
+
+
+def _first_bends(ways: Ways, points: Array, nodes: Array, distance: Array) -> tuple[Array, np.ndarray]:
+    """The same for some points: nodes are tried from the best on until one is in sight."""
     total = np.hypot(*np.moveaxis(points[:, None] - nodes, -1, 0)) + distance
-    tries = min(ROUNDS, len(nodes))
-    nearest = np.argpartition(total, tries - 1, axis=1)[:, :tries] if tries < len(nodes) else np.argsort(total, axis=1)
-    nearest = np.take_along_axis(nearest, np.argsort(np.take_along_axis(total, nearest, 1), axis=1), 1)
+    length, turn = np.full(len(points), np.inf), np.zeros(len(points), dtype=int)
+    order = _best_first(total, min(FEW, len(nodes)))
     left = np.arange(len(points))
-    for k in range(tries):
-        node = nearest[left, k]
+    for k in range(len(nodes)):
+        if k == FEW:
+            order = np.zeros((len(points), len(nodes)), dtype=int)
+            order[left] = np.argsort(total[left], axis=1)
+        node = order[left, k]
         seen = shapely.covers(ways.water, sight_lines(points[left], nodes[node]))
         length[left[seen]], turn[left[seen]] = total[left[seen], node[seen]], node[seen]
         left = left[~seen]
         if not len(left):
             break
     return length, turn
+
+
+def _best_first(total: Array, count: int) -> np.ndarray:
+    """(k, count) columns of the least totals, in order."""
+    few = np.argpartition(total, count - 1, axis=1)[:, :count]
+    return np.asarray(np.take_along_axis(few, np.argsort(np.take_along_axis(total, few, 1), axis=1), 1))
 
 
 def _filled(table: Array, turn: np.ndarray, cell_m: float) -> tuple[Array, np.ndarray]:

@@ -35,6 +35,11 @@ from expdesign.vessel import NUMPY, Vessel
 
 Progress = Callable[[str, float], None]
 GOAL = "goal"
+TRY_S = 2.0
+"""Seconds of the time budget that count as one try of another place: effort is counted, so that a slow machine finds
+the same plan as a fast one."""
+LAST_RESORT = 10.0
+"""Time budgets by the clock after which the search ends whatever the count."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -196,7 +201,8 @@ def _no_way(problem: PlanProblem, grid: ClearanceField, needed_m: float) -> str:
 def _sail_all(problem: PlanProblem, water: LegWater, space: SearchSpace, progress: Progress) -> Timeline:
     line = Timeline(begin=_at_rest(problem, problem.start), begin_inputs=np.zeros(len(problem.vessel.limits)))
     left = _repeats(problem)
-    total, deadline = sum(left.values()), time.monotonic() + problem.settings.time_budget_s
+    budget_s = problem.settings.time_budget_s
+    total, deadline, tries = sum(left.values()), time.monotonic() + LAST_RESORT * budget_s, 0
     queue: list[Placement] = []
     stuck = ""
     while sum(left.values()) or not _sail_home(problem, water, line):
@@ -204,8 +210,9 @@ def _sail_all(problem: PlanProblem, water: LegWater, space: SearchSpace, progres
             undone = line.undo_run()
             space, queue, stuck = refusing(space, line.last, undone), [], "no leg leads from the last run to the goal"
             left[undone.primitive] += 1
-        if stuck and time.monotonic() > deadline:
-            raise NoPlan(f"no plan within plan.time_budget_s = {problem.settings.time_budget_s:g}: {stuck}")
+        tries += bool(stuck)
+        if stuck and (tries > budget_s / TRY_S or time.monotonic() > deadline):
+            raise NoPlan(f"no plan within plan.time_budget_s = {budget_s:g}, {tries} places were tried: {stuck}")
         if not queue:
             progress("placing runs", _share(total, left))
             queue = _placed(space, left, line, stuck)

@@ -1,0 +1,87 @@
+"""Ways by the visibility graph against closed forms, and in turned, mirrored and shifted charts."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+from plan_case import area, leg_water
+
+from expdesign.plan.field import clearance_field
+from expdesign.plan.goal_ways import build_goal_ways
+from expdesign.plan.ways import build_ways, polyline_length, simplified
+
+OPEN = shapely.box(-500, -500, 500, 500)
+WALL = shapely.box(-10, -500, 10, 300)
+
+
+def rocks(seed: int) -> shapely.Geometry:
+    rng = np.random.default_rng(seed)
+    return OPEN.difference(
+        shapely.union_all(shapely.buffer(shapely.points(rng.uniform(-350, 350, (15, 2))), rng.uniform(20, 90, 15)))
+    )
+
+
+def turned(geometry, angle):
+    """Turned clockwise on the chart, as headings are counted."""
+    c, s = np.cos(angle), np.sin(angle)
+    return shapely.transform(geometry, lambda xy: xy @ np.array([[c, -s], [s, c]]))
+
+
+def turned_point(point, angle):
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s], [s, c]]) @ point
+
+
+def test_in_open_water_the_way_is_straight():
+    way = build_ways(OPEN).shortest(np.array([-400.0, -300.0]), np.array([400.0, 300.0]))
+    assert len(way) == 2
+    assert polyline_length(way) == pytest.approx(1000.0)
+
+
+def test_round_a_wall_the_way_bends_at_both_corners():
+    way = build_ways(OPEN.difference(WALL)).shortest(np.array([0.0, -200.0]), np.array([0.0, 200.0]))
+    assert polyline_length(way) == pytest.approx(2 * np.hypot(300, 190) + 20, abs=1e-2)
+    np.testing.assert_allclose(way[1:3], [[300, -10], [300, 10]], atol=1e-2)
+
+
+def test_a_closed_wall_leaves_no_way():
+    water = OPEN.difference(shapely.box(-10, -600, 10, 600))
+    assert build_ways(water).shortest(np.array([0.0, -200.0]), np.array([0.0, 200.0])) is None
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("angle", [0.3, 1.1, 2.5])
+def test_turning_and_mirroring_the_chart_changes_no_length(seed, angle):
+    start, end = np.array([-450.0, -420.0]), np.array([440.0, 460.0])
+    length = build_ways(rocks(seed)).length_m(start, end)
+    again = build_ways(turned(rocks(seed), angle)).length_m(turned_point(start, angle), turned_point(end, angle))
+    assert again == pytest.approx(length, abs=0.02)
+    mirrored = shapely.transform(rocks(seed), lambda xy: xy * [-1, 1])
+    assert build_ways(mirrored).length_m(start * [1, -1], end * [1, -1]) == pytest.approx(length, abs=0.02)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_simplified_water_holds_or_is_held(seed):
+    water = leg_water(rocks(seed)).safe
+    more, less = (simplified(water, grow=grow, tolerance_m=2.0) for grow in (True, False))
+    assert more.covers(water)
+    assert water.covers(less)
+    start, end = np.array([-450.0, -420.0]), np.array([440.0, 460.0])
+    long, short = build_ways(less).length_m(start, end), build_ways(more).length_m(start, end)
+    assert short <= build_ways(water).length_m(start, end) + 1e-6
+    assert build_ways(water).length_m(start, end) <= long + 1e-6
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_the_table_of_distances_agrees_with_the_ways_and_the_ways_with_the_table(seed):
+    water = rocks(seed)
+    field = clearance_field(area(water), resolution_m=4.0)
+    ways, goal = build_ways(water), np.array([440.0, 460.0])
+    table = build_goal_ways(ways, field, goal)
+    points = np.random.default_rng(seed).uniform(-450, 450, (60, 2))
+    points = points[field.at(points) > 3 * field.cell_m]
+    exact = np.array([ways.length_m(point, goal) for point in points])
+    np.testing.assert_allclose(table.to_goal(points), exact, atol=3 * table.field.cell_m)
+    lengths = [polyline_length(table.way(point)) for point in points]
+    np.testing.assert_allclose(lengths, exact, atol=3 * table.field.cell_m)
