@@ -238,7 +238,7 @@ def _estimated(truth: Vessel, parts: Sequence[tuple[Array, ...]]) -> Trials:
         Z = instruments[:, :, own].transpose(0, 2, 1)
         told = np.flatnonzero((np.abs(Z).max(axis=2) > 0).all(axis=1))
         left, right = Z @ regressors[:, :, own], Z @ changes[:, :, output][..., None]
-        estimates[np.ix_(told, own)] = np.linalg.solve(left[told], right[told])[..., 0]
+        estimates[told[:, None], own] = np.linalg.solve(left[told], right[told])[..., 0]
     return Trials(estimates=estimates, truth=truth.model.parameters)
 
 
