@@ -203,6 +203,10 @@ def simulate(
     truth: Annotated[
         Path, typer.Option("--truth", metavar="VESSEL.toml", help="The vessel that runs the trial, with its sensors.")
     ],
+    until: Annotated[
+        float | None,
+        typer.Option("--until", metavar="S", help="End the data after S seconds, as of a trial broken off."),
+    ] = None,
     out: OutBeside = None,
     seed: Seed = 0,
     quiet: Quiet = False,
@@ -216,7 +220,7 @@ def simulate(
 
     _carry_out(
         "simulate",
-        lambda tell: workflows.simulate(plan, check_out(out), truth=truth, seed=seed, progress=tell),
+        lambda tell: workflows.simulate(plan, check_out(out), truth=truth, until_s=until, seed=seed, progress=tell),
         quiet,
         json,
     )
@@ -378,6 +382,61 @@ def diagnose(
             vessel=vessel,
             scenario=scenario,
             velocity=velocity,
+            seed=seed,
+            progress=tell,
+        ),
+        quiet,
+        json,
+    )
+
+
+@app.command()
+def replan(
+    scenario: ScenarioFile,
+    data: Annotated[
+        list[Path],
+        typer.Option(
+            "--data", metavar="DATA.csv ...", help="Measured so far; the last row of the last file is the ship's place."
+        ),
+    ],
+    vessel: Annotated[
+        Path | None,
+        typer.Option(
+            "--vessel",
+            metavar="VESSEL.toml",
+            help="Model to go on with, e.g. vessel-extended.toml; estimated from the data when not given.",
+        ),
+    ] = None,
+    remaining: Annotated[
+        float | None,
+        typer.Option(
+            "--remaining",
+            metavar="S",
+            help="Informative time that is left; design.total_s less the time of the data when not given.",
+        ),
+    ] = None,
+    out: Out = None,
+    seed: Seed = 0,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> None:
+    """Plan the rest of a trial, from where the ship is now and with what the data so far have told.
+
+    Writes what run writes, for the rest; and replan.json, what is known and what the rest buys, and vessel-used.toml,
+    the model it is planned with. The ship is taken to be stopped at the last position of the data.
+
+    Example: expdesign replan scenarios/story.toml --data measured.csv --vessel vessel-extended.toml --remaining 480
+    """
+    from expdesign import workflows
+
+    _carry_out(
+        "replan",
+        lambda tell: workflows.replan(
+            scenario,
+            check_out(out),
+            data=tuple(data),
+            vessel=vessel,
+            remaining_s=remaining,
             seed=seed,
             progress=tell,
         ),

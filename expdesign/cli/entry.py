@@ -18,8 +18,10 @@ from expdesign.cli.arguments import repeat_option
 from expdesign.cli.commands import app
 from expdesign.errors import InputError, NoAnswer
 
-LISTS = ("--format", "--method", "--fixed", "--test")
+LISTS = ("--format", "--method", "--fixed", "--test", "--data")
 """Options that take several values."""
+FILE_LISTS = ("--test", "--data")
+"""Those of them whose values are files."""
 DONE, BUG, WRONG_INPUT, NO_ANSWER, INTERRUPTED = 0, 1, 2, 3, 130
 
 
@@ -35,7 +37,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
     for option in LISTS:
-        arguments = repeat_option(arguments, option, files=option == "--test")
+        arguments = repeat_option(arguments, option, files=option in FILE_LISTS)
     try:
         with _termination_interrupts():
             return _invoke(arguments)

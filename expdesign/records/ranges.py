@@ -38,7 +38,7 @@ RANGES = (
     Range(pattern="wind_[uv]_mps", low=-120, high=120, expected="-120 to 120 m/s"),
     Range(pattern="wind_speed_mps", low=0, high=120, expected="0 to 120 m/s"),
     Range(pattern="wind_angle_rad", low=-TURN, high=TURN, expected="-6.28 to 6.28 rad", degrees=True),
-    Range(pattern=r"a\d+_rad", low=-2 * TURN, high=2 * TURN, expected="-12.6 to 12.6 rad", degrees=True),
+    Range(pattern=r"a\d+_rad", low=-4 * TURN, high=4 * TURN, expected="-25.1 to 25.1 rad", degrees=True),
     Range(pattern=r"rudder\d+_rad", low=-TURN / 4, high=TURN / 4, expected="-1.57 to 1.57 rad", degrees=True),
     Range(pattern="depth_m", low=1e-9, high=12000, expected="more than 0, counted downwards, at most 12000 m"),
     Range(pattern="lat_deg", low=-90, high=90, expected="-90 to 90 degrees"),

@@ -9,6 +9,7 @@ from expdesign.workflows.design import designed, duration_problem
 from expdesign.workflows.diagnosed import diagnose
 from expdesign.workflows.indices import check_routes, indices
 from expdesign.workflows.outcome import Outcome, Progress, TextTable
+from expdesign.workflows.replan import replan
 from expdesign.workflows.trial import durations, plan, planned, run, score, scored
 from expdesign.workflows.validated import validate_design
 from expdesign.workflows.whatif import whatif
@@ -28,6 +29,7 @@ __all__ = [
     "measured",
     "plan",
     "planned",
+    "replan",
     "run",
     "score",
     "scored",

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import re
 import shlex
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
@@ -78,11 +80,23 @@ def _departure(text: str | None) -> datetime | None:
         raise InputError(f"--departure is {text!r}, expected a time such as 2026-05-01T08:00:00Z") from None
 
 
-def simulate(plan: Path, out: Path | None, *, truth: Path, seed: int = 0, progress: Progress = silent) -> Outcome:
+def simulate(
+    plan: Path,
+    out: Path | None,
+    *,
+    truth: Path,
+    until_s: float | None = None,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Outcome:
     """The commands of a plan run open loop on another vessel in drawn weather, and what its sensors record.
 
-    Mean current and wind are drawn around the plan's forecast, and vary from sample to sample as the forecast says.
+    Mean current and wind are drawn around the plan's forecast, and vary from sample to sample as the forecast says;
+    where the vessel's file has a current or a wind, around that. With `until_s` the data end at that time, as of a
+    trial broken off.
     """
+    if until_s is not None and not 0 < until_s < np.inf:
+        raise InputError(f"--until is {until_s:g}, expected more than 0 seconds")
     progress("reading the plan", 0.05)
     track, vessel = read_plan(plan), load_vessel(truth)
     if (vessel.model.inputs, vessel.sample_time_s) != (track.commands.names, track.commands.sample_time_s):
@@ -93,16 +107,18 @@ def simulate(plan: Path, out: Path | None, *, truth: Path, seed: int = 0, progre
             f"{', '.join(track.commands.names)} every {track.commands.sample_time_s:g} s",
         )
     rng = np.random.default_rng(seed)
-    weather = draw_environment(track.environment, rng)
+    weather = draw_environment(_truth_weather(track.environment, vessel.environment), rng)
     progress("simulating the trial", 0.2)
     begin, met = track.trajectory, _met(weather, track.commands, rng)
     sailed = simulate_run(vessel, track.commands, pose=begin.pose[0], velocity=begin.velocity[0], environment=met)
     columns = measure(vessel, track.commands, sailed, environment=met, rng=rng)
-    apart = np.hypot(*(sailed.pose - begin.pose)[:, :2].T)
+    kept = len(track.commands) if until_s is None else math.ceil(until_s / track.commands.sample_time_s - 1e-9)
+    columns = {name: values[:kept] for name, values in columns.items()}
+    apart = np.hypot(*(sailed.pose - begin.pose)[: kept + 1, :2].T)
     files = write_files(out or plan.parent, {"measured.csv": _csv(columns)})
     summary = {
         "trial_s": track.commands.duration_s,
-        "samples": len(track.commands),
+        "samples": len(columns["time_s"]),
         "farthest_from_plan_m": float(apart.max()),
         "current_to_north_mps": float(weather.current_to[0]),
         "current_to_east_mps": float(weather.current_to[1]),
@@ -110,6 +126,17 @@ def simulate(plan: Path, out: Path | None, *, truth: Path, seed: int = 0, progre
         "wind_to_east_mps": float(weather.wind_to[1]),
     }
     return Outcome(files=files, summary=summary)
+
+
+def _truth_weather(forecast: Environment, own: Environment) -> Environment:
+    """The forecast, but the current and the wind of the vessel's file where it has a mean one."""
+    if own.current_to.any():
+        names = ("current_to", "current_std_mps", "current_variation")
+        forecast = replace(forecast, **{name: getattr(own, name) for name in names})
+    if own.wind_to.any():
+        names = ("wind_to", "wind_std_mps", "wind_variation")
+        forecast = replace(forecast, **{name: getattr(own, name) for name in names})
+    return forecast
 
 
 def _met(weather: Environment, commands: Commands, rng: np.random.Generator) -> Environment | WeatherSeries:

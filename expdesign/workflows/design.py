@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -32,22 +32,34 @@ from expdesign.workflows.outcome import Progress, TextTable, silent, within
 
 
 def designed(
-    case: Scenario, information: Sequence[PrimitiveInformation], *, seed: int = 0, progress: Progress = silent
+    case: Scenario,
+    information: Sequence[PrimitiveInformation],
+    *,
+    stated_std: Mapping[str, float] | None = None,
+    seed: int = 0,
+    progress: Progress = silent,
 ) -> DurationDesign:
-    """The certified durations of a scored scenario."""
-    problem = duration_problem(case, information, seed=seed, progress=within(progress, 0.0, 0.8))
+    """The certified durations of a scored scenario; arguments as of `duration_problem`."""
+    problem = duration_problem(case, information, stated_std=stated_std, seed=seed, progress=within(progress, 0.0, 0.8))
     progress("sharing out time", 0.8)
     return solve_durations(problem)
 
 
 def duration_problem(
-    case: Scenario, information: Sequence[PrimitiveInformation], *, seed: int = 0, progress: Progress = silent
+    case: Scenario,
+    information: Sequence[PrimitiveInformation],
+    *,
+    stated_std: Mapping[str, float] | None = None,
+    seed: int = 0,
+    progress: Progress = silent,
 ) -> DurationProblem:
     """Everything that the scenario's table [design] asks of the durations.
 
     Args:
         case: the scenario.
         information: of its dictionary, by the nominal model.
+        stated_std: prior standard deviations by parameter that design.prior means, where the vessel's own already
+            count the prior data; None for the vessel's own.
         seed: of the models drawn from the prior.
         progress: told about long work.
 
@@ -91,7 +103,7 @@ def duration_problem(
         mean_subtraction=wish.mean_subtraction,
         aim=_aim(case, parameters, interest, progress=within(progress, 0.4, 0.9)),
         constraints=_constraints(case, primitives),
-        prior=_prior(case, parameters),
+        prior=_prior(case, parameters, stated_std),
         sampled=sampled,
         robust=wish.robust,
         equations=equations,
@@ -175,14 +187,14 @@ def cubed_propeller_speed(primitive: Primitive) -> float:
     return float(sum(np.mean(np.abs(primitive.commands.column(name)) ** 3) for name in names))
 
 
-def _prior(case: Scenario, parameters: tuple[str, ...]) -> Array | None:
+def _prior(case: Scenario, parameters: tuple[str, ...], stated: Mapping[str, float] | None) -> Array | None:
     """What is known before, per sample of the informative time; None when that is nothing."""
     wish, model = case.design, case.vessel.model
     means = len(model.outputs) if wish.mean_subtraction == MEAN_SUBTRACTIONS[-1] else 0
     dimension, samples = len(parameters) + means, wish.total_s / case.vessel.sample_time_s
     prior = np.zeros((dimension, dimension))
     if wish.prior == "parameter_std":
-        std = dict(zip(model.names, model.parameter_std.tolist(), strict=True))
+        std = dict(zip(model.names, model.parameter_std.tolist(), strict=True)) if stated is None else stated
         own = [name for name in parameters if name in std]
         known = np.zeros(len(parameters))
         noise = np.zeros(len(parameters))

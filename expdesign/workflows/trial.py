@@ -45,17 +45,22 @@ def run(scenario: Path, out: Path | None, *, seed: int = 0, progress: Progress =
     progress("writing routes, run cards and report", 0.85)
     route = built_route(case, plan)
     content = replace(report_content(case, information, design, plan, seed), compared=compared, route=route)
-    files = {
-        **_dictionary_files(case, information),
+    files = trial_files(case, growth, content, route)
+    summary = {**growth_summary(growth), **design_summary(design), **plan_summary(plan)}
+    return _written(case, out, files, summary, progress)
+
+
+def trial_files(case: Scenario, growth: Growth | None, content: ReportContent, route: Route) -> dict[str, str | bytes]:
+    """Every file of a planned trial, by name."""
+    return {
+        **_dictionary_files(case, content.information),
         **growth_files(case, growth),
-        "durations.json": durations_json(design, compared=compared),
-        **_plan_files(case, plan),
+        "durations.json": durations_json(content.design, compared=content.compared),
+        **_plan_files(case, content.plan),
         **route_files(route, STANDARD),
         "report.html": report_html(content),
         "cards.html": cards_html(content),
     }
-    summary = {**growth_summary(growth), **design_summary(design), **plan_summary(plan)}
-    return _written(case, out, files, summary, progress)
 
 
 def score(scenario: Path, out: Path | None, *, seed: int = 0, progress: Progress = silent) -> Outcome:

@@ -8,6 +8,7 @@ import numpy as np
 
 from expdesign.durations import Efficiencies
 from expdesign.durations.values import DurationDesign
+from expdesign.export.known import Known
 from expdesign.export.route import Route
 from expdesign.information.primitive_information import PrimitiveInformation
 from expdesign.plan.values import Plan
@@ -36,6 +37,7 @@ class ReportContent:
         version: of the program.
         compared: the design under every criterion.
         route: the waypoints as exported, or None when there are none.
+        known: what a trial that goes on has told so far, or None for one that begins.
     """
 
     scenario: str
@@ -54,6 +56,7 @@ class ReportContent:
     version: str
     compared: tuple[Efficiencies, ...] = ()
     route: Route | None = None
+    known: Known | None = None
 
     def __post_init__(self) -> None:
         seal(self, start="3", goal="3")

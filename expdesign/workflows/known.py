@@ -1,0 +1,178 @@
+"""What a trial has told so far, what the rest of it buys, and which of its manoeuvres buy it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from expdesign.assessment import Wish, assess
+from expdesign.durations import DurationDesign
+from expdesign.errors import Diverged, NoAnswer, NotInformative
+from expdesign.estimation.values import Estimate
+from expdesign.export.known import Purchase
+from expdesign.information.expected import TrialPart, expected_covariance
+from expdesign.plan.values import Plan
+from expdesign.signals import Commands, Record
+from expdesign.simulation import Environment
+from expdesign.values import Array
+from expdesign.vessel import Vessel
+from expdesign.workflows.outcome import Progress
+
+MATTERS = 1.05
+"""Runs without which a standard deviation would be larger by this factor are worth naming."""
+
+
+def updated(
+    vessel: Vessel, record: Record, *, fixed: Sequence[str], prior_counts: bool, progress: Progress
+) -> tuple[Vessel, str, tuple[str, ...]]:
+    """The vessel with parameters estimated from the data so far, by the method that an assessment prefers.
+
+    Parameters that these data cannot tell stay at the vessel's values, and all of them do where no estimate gives a
+    model that can simulate the data; both is told.
+
+    Args:
+        vessel: as known before.
+        record: the data.
+        fixed: parameters that are not to be estimated.
+        prior_counts: whether the vessel's standard deviations are knowledge to be combined with the estimate.
+        progress: told what is done.
+
+    Returns:
+        Vessel, where its parameters come from, and notes.
+    """
+    held: tuple[str, ...] = ()
+    while len(held) + len(fixed) < len(vessel.model.names):
+        try:
+            found = assess(vessel, record, Wish(fixed=(*fixed, *held)), progress=progress)
+        except NotInformative as error:
+            more = tuple(name for name in error.parameters if name not in (*fixed, *held))
+            if not more:
+                return _unchanged(vessel, str(error))
+            held = (*held, *more)
+            continue
+        except Diverged as error:
+            return _unchanged(vessel, str(error))
+        if not found.best.stable:
+            return _unchanged(vessel, next(run.problem for run in found.best.runs if run.problem))
+        told = found.best.estimate
+        ship = combined(vessel, told, prior_counts=prior_counts)
+        notes = (f"The data so far cannot tell {', '.join(held)}: kept at the values known before.",) if held else ()
+        how = ", combined with what was known before" if prior_counts else ""
+        return ship, f"estimated from the data so far by {found.best.method.title}{how}", notes
+    return _unchanged(vessel, "they tell of no parameter by itself")
+
+
+def _unchanged(vessel: Vessel, why: str) -> tuple[Vessel, str, tuple[str, ...]]:
+    return vessel, "as known before the trial", (f"The data so far give no estimate to plan with: {why}.",)
+
+
+def combined(vessel: Vessel, told: Estimate, *, prior_counts: bool) -> Vessel:
+    """The vessel with an estimate; with its own values, weighted by their standard deviations, where these count.
+
+    Args:
+        vessel: as known before; the standard deviations of parameters that were not estimated stay.
+        told: the estimate.
+        prior_counts: whether to weight in the values known before, where a standard deviation is stated.
+    """
+    model = vessel.model
+    before = dict(zip(model.names, zip(model.parameters, model.parameter_std, strict=True), strict=True))
+    values, covariance = told.values, told.covariance
+    index = [place for place, name in enumerate(told.names) if before[name][1] > 0]
+    if prior_counts and index:
+        stated = np.array([before[told.names[place]] for place in index])
+        gain = np.linalg.solve(covariance[np.ix_(index, index)] + np.diag(stated[:, 1] ** 2), covariance[index]).T
+        values = values + gain @ (stated[:, 0] - values[index])
+        covariance = covariance - gain @ covariance[index]
+    std = dict(zip(told.names, np.sqrt(np.maximum(np.diag(covariance), 0.0)).tolist(), strict=True))
+    known = [std.get(name, own) for name, own in zip(model.names, model.parameter_std.tolist(), strict=True)]
+    assigned = model.with_parameters(dict(zip(told.names, values.tolist(), strict=True)))
+    return replace(vessel, model=replace(assigned, parameter_std=np.array(known)))
+
+
+def data_parts(record: Record, vessel: Vessel) -> tuple[TrialPart, ...]:
+    """The data so far as parts of a trial: their commands, from their first velocity and heading."""
+    inputs = vessel.model.inputs
+    return tuple(
+        TrialPart(
+            commands=Commands(
+                sample_time_s=batch.sample_time_s,
+                names=inputs,
+                values=batch.inputs[:, [batch.input_names.index(name) for name in inputs]],
+            ),
+            velocity=np.nan_to_num(batch.velocity[0]),
+            heading_rad=0.0 if batch.pose is None else float(np.nan_to_num(batch.pose[0, 2])),
+        )
+        for batch in record.batches
+    )
+
+
+def plan_part(plan: Plan) -> TrialPart:
+    """The whole track of a plan as one part of a trial."""
+    motion = plan.trajectory
+    return TrialPart(commands=plan.commands, velocity=motion.velocity[0], heading_rad=float(motion.pose[0, 2]))
+
+
+def expected_std(
+    vessel: Vessel,
+    parts: Sequence[TrialPart],
+    parameters: Sequence[str],
+    *,
+    environment: Environment,
+    mean_subtraction: str,
+) -> Array:
+    """(p,) standard deviations that estimates from a trial have by theory; nan for what it does not tell."""
+    told = list(parameters)
+    found: Mapping[str, float] = {}
+    while told:
+        try:
+            covariance = expected_covariance(
+                vessel, parts, told, environment=environment, mean_subtraction=mean_subtraction
+            )
+        except NotInformative as error:
+            rest = [name for name in told if name not in error.parameters]
+            told = rest if len(rest) < len(told) else []
+            continue
+        except NoAnswer:
+            break
+        found = dict(zip(told, np.sqrt(np.maximum(np.diag(covariance), 0.0)).tolist(), strict=True))
+        break
+    return np.array([found.get(name, np.nan) for name in parameters])
+
+
+def purchases(design: DurationDesign, parameters: Sequence[str]) -> tuple[Purchase, ...]:
+    """For each parameter the manoeuvre without whose runs its standard deviation would be largest.
+
+    By the inverse of the design's information matrix, prior data included.
+    """
+    problem = design.problem
+    shares = np.array(design.repeats) * problem.run_s / problem.total_s
+    pieces = shares[:, None, None] * (problem.matrices + problem.matrices.transpose(0, 2, 1)) / 2
+    whole = _variances(problem.prior + pieces.sum(axis=0))
+    used = np.flatnonzero(design.repeats)
+    without = {index: _variances(problem.prior + pieces.sum(axis=0) - pieces[index]) for index in used.tolist()}
+    found = []
+    for name in parameters:
+        place = problem.parameters.index(name)
+        ratios = {index: float(np.sqrt(variances[place] / whole[place])) for index, variances in without.items()}
+        best = max(ratios, key=lambda index: ratios[index], default=None)
+        if best is None or not ratios[best] > MATTERS:
+            found.append(Purchase(primitive="", runs=0, without=1.0 if best is None else ratios[best]))
+        else:
+            found.append(Purchase(primitive=problem.names[best], runs=design.repeats[best], without=ratios[best]))
+    return tuple(found)
+
+
+def _variances(matrix: Array) -> Array:
+    """(d,) diagonal of the inverse; infinite throughout where there is none."""
+    scale = np.sqrt(np.abs(np.diag(matrix)))
+    size = np.where(scale > 0, scale, 1.0)
+    scaled = matrix / np.outer(size, size)
+    values, vectors = np.linalg.eigh(scaled)
+    if not values[0] > 1e-12 * values[-1]:
+        lost = (vectors[:, values <= 1e-12 * values[-1]] ** 2).sum(axis=1) > 1e-6
+        kept = values > 1e-12 * values[-1]
+        rest = (vectors[:, kept] ** 2 / values[kept]).sum(axis=1) / size**2
+        return np.where(lost, np.inf, rest)
+    return np.asarray((vectors**2 / values).sum(axis=1) / size**2)
