@@ -357,8 +357,15 @@ def is_damping(term: Term, expression: Expression, model: VesselModel) -> bool:
     return not (is_thrust(expression, model) or is_coriolis(term) or {"u_q", "v_q"} & set(expression.signals))
 
 
-def observed(ship: Extended, states: Array, windows: Windows) -> Array:
-    """(w, s, 4) channels that the sensors would show for states (w, k, n) at integrator steps."""
+def observed(ship: Extended, states: Array, windows: Windows, turned: Array | None = None) -> Array:
+    """(w, s, 4) channels that the sensors would show.
+
+    Args:
+        ship: its sensors.
+        states: (w, k, n) at integrator steps.
+        windows: what is measured, and when.
+        turned: (w, k) heading since the start; integrated from the yaw rate when None.
+    """
     u, v, r = np.moveaxis(states[:, :: windows.steps_per_sample, :3], -1, 0)
     u, v = u - ship.get("lever:starboard") * r, v + ship.get("lever:forward") * r
     bias = ship.get("heading_bias")
@@ -369,8 +376,11 @@ def observed(ship: Extended, states: Array, windows: Windows) -> Array:
         turned = r * late
         u, v = u * np.cos(turned) - v * np.sin(turned), v * np.cos(turned) + u * np.sin(turned)
     channels = {"u": u, "v": v, "r": (1 + ship.get("gyro")) * r, "psi_rate": r}
-    if windows.derived:
-        channels = {name: _averaged(values) for name, values in channels.items()}
+    for name in channels if windows.derived else ("psi_rate",):
+        channels[name] = averaged(channels[name])
+    if turned is not None:
+        channels["psi_rate"] = differenced(turned[:, :: windows.steps_per_sample], channels["psi_rate"], windows)
+        channels["r"] = (1 + ship.get("gyro")) * channels["psi_rate"] if windows.derived else channels["r"]
     for name, keys in LATE.items():
         delay = sum(ship.get(f"late:{key}") for key in keys)
         if delay:
@@ -387,10 +397,17 @@ def observed(ship: Extended, states: Array, windows: Windows) -> Array:
 LATE = {"u": ("u", "position"), "v": ("v", "position"), "r": ("r", "psi"), "psi_rate": ("psi",)}
 
 
-def _averaged(values: Array) -> Array:
-    """What central differences see of a velocity: its mean over two samples."""
+def differenced(turned: Array, otherwise: Array, windows: Windows) -> Array:
+    """Central differences (w, s) of a heading; at the ends what is given."""
+    result = otherwise.copy()
+    result[:, 1:-1] = (turned[:, 2:] - turned[:, :-2]) / (2 * windows.sample_s)
+    return result
+
+
+def averaged(values: Array) -> Array:
+    """What central differences see of a velocity (..., w, s): its mean over two samples, by Simpson's rule."""
     result = values.copy()
-    result[:, 1:-1] = (values[:, :-2] + 2 * values[:, 1:-1] + values[:, 2:]) / 4
+    result[..., 1:-1] = (values[..., :-2] + 4 * values[..., 1:-1] + values[..., 2:]) / 6
     return result
 
 

@@ -19,8 +19,8 @@ from expdesign.values import Array
 
 WANDER_MPS = (0.0, 0.005, 0.01, 0.02, 0.035, 0.06, 0.1, 0.2)
 WANDER_TIMES_S = (60.0, 150.0, 400.0, 1000.0)
-SPACING_S = 60.0
-MOST_HATS = 16
+SPACING_S = 10.0
+MOST_HATS = 40
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -246,31 +246,52 @@ def fit(
         linear = linearise(motion)
         pushes = [push_of(linear, ship.having({k: ship.get(k) + d}), d) for k in keys for d in [step_of(ship, k)]]
         columns = build_columns(linear, pushes, wander=windows.has_heading)
-        noise = _colours(columns, noise, precision, ship, keys, colour_order)
-        found = marginal(g := grams(columns, noise), columns, noise)
-        A = found.A + np.diag(precision)
+        if noise is None or step in (0, steps):
+            noise = _colours(columns, noise, precision, ship, keys, colour_order)
         now = np.array([ship.get(key) for key in keys])
-        cost = found.quadratic + found.log_det + g.log_det_starts + float(precision @ now**2)
-        cost += _log_sizes(columns, noise)
-        covariance = np.linalg.pinv(A, rcond=1e-14, hermitian=True) if len(keys) else np.zeros((0, 0))
-        move = covariance @ (found.s - precision * now)
-        gained = float(move @ (found.s - precision * now))
-        here = Fit(
-            ship=ship, keys=keys, free=len(free), covariance=covariance, starts=starts, noise=noise,
-            cost=cost, linear=linear, columns=columns, precision=precision,
-        )  # fmt: skip
-        if best is not None and cost > best.cost + 2.0 and step < steps:
+        if best is not None and _cost_here(columns, noise, precision, now) > _cost_here(
+            best.columns, noise, precision, np.array([best.ship.get(key) for key in keys])
+        ) + 1.0:
             ship, starts = _halfway(best, ship, starts)
             continue
-        best = here if best is None or cost < best.cost or not len(keys) else best
-        if step == steps:
+        g = grams(columns, noise)
+        found = marginal(g, columns, noise)
+        A = found.A + np.diag(precision)
+        covariance = np.linalg.pinv(A, rcond=1e-14, hermitian=True) if len(keys) else np.zeros((0, 0))
+        pull = found.s - precision * now
+        move = covariance @ pull
+        gained = float(move @ pull)
+        best = Fit(
+            ship=ship, keys=keys, free=len(free), covariance=covariance, starts=starts, noise=noise,
+            cost=np.nan, linear=linear, columns=columns, precision=precision,
+        )  # fmt: skip
+        if step == steps or (gained < 0.01 and step > 0):
             break
         ship = ship.having(limited(ship, dict(zip(keys, (now + move).tolist(), strict=True))))
-        starts = starts + _start_moves(columns, noise, move)
-        if gained < 0.01 and step > 0:
-            break
+        starts = starts + _fitting_starts(_start_moves(columns, noise, move), ship.states)
     assert best is not None
-    return best
+    return replace(best, cost=own_cost(best))
+
+
+def _cost_here(columns: Columns, noise: Noise, precision: Array, now: Array) -> float:
+    """Quadratic cost at the point of linearisation, wandering current and initial states at their best."""
+    found = marginal(grams(columns, noise), columns, noise)
+    return found.quadratic + float(precision @ now**2)
+
+
+def profile_cost(found: Fit, noise: Noise) -> float:
+    """Quadratic cost of a fit under some noise, every number moved to its best in the linear model."""
+    m = marginal(grams(found.columns, noise), found.columns, noise)
+    now = np.array([found.ship.get(key) for key in found.keys])
+    pull = m.s - found.precision * now
+    best = pull @ np.linalg.lstsq(m.A + np.diag(found.precision), pull, rcond=None)[0] if len(now) else 0.0
+    return float(m.quadratic + found.precision @ now**2 - best)
+
+
+def own_cost(found: Fit) -> float:
+    """Twice the negative log likelihood with the fit's own noise."""
+    m = marginal(grams(found.columns, found.noise), found.columns, found.noise)
+    return profile_cost(found, found.noise) + m.log_det + _log_sizes(found.columns, found.noise)
 
 
 def _fitting_starts(starts: Array, n: int) -> Array:
@@ -306,7 +327,7 @@ def step_of(ship: Extended, key: str) -> float:
         return 1e-4 * max(1e-4, _parameter_scale(ship, key))
     if kind in ("lag", "delay", "deadband") or key.startswith("roll:"):
         return max(0.05 * value, 1e-6)
-    return 1e-4
+    return 1e-6 if kind == "asymmetry" else 1e-4
 
 
 def _parameter_scale(ship: Extended, key: str) -> float:
@@ -317,7 +338,7 @@ def _parameter_scale(ship: Extended, key: str) -> float:
 
 
 def _start_moves(columns: Columns, noise: Noise, move: Array) -> Array:
-    """(w, n) change of the initial states that goes with a change of the numbers."""
+    """(w, 3) change of the initial velocities that goes with a change of the numbers."""
     rest = columns.error - np.tensordot(move, columns.values[: columns.numbers], axes=(0, 0))
     error = whitened(rest, noise)
     seen = np.isfinite(error)
@@ -346,7 +367,11 @@ def _colours(columns: Columns, noise, precision, ship, keys, order) -> Noise:  #
 
 
 def remainder(columns: Columns, g: Grams, noise: Noise, precision: Array, now: Array) -> Array:
-    """(w, s, 4) error less the best linear answer of numbers, wandering current and initial states."""
+    """(w, s, 4) error less the best linear answer of numbers and initial states, and a likely wandering current.
+
+    The likeliest current would take noise along with it and leave too little; one drawn from its posterior does not
+    (stochastic EM: G. Celeux and J. Diebolt, Computational Statistics Quarterly 2 (1985), 73-82).
+    """
     m = marginal(g, columns, noise)
     c = columns.numbers
     move = np.linalg.lstsq(m.A + np.diag(precision), m.s - precision * now, rcond=None)[0] if c else np.zeros(0)
@@ -356,6 +381,8 @@ def remainder(columns: Columns, g: Grams, noise: Noise, precision: Array, now: A
         prior = noise.wander_mps**2 * wander_covariance(hats_count, columns.spacing_s, noise.wander_time_s)
         ZZ = g.XX[:, c:, c:] + np.linalg.inv(prior)
         b = np.linalg.solve(ZZ, (g.Xe[:, c:] - g.XX[:, c:, :c] @ move)[..., None])[..., 0]
+        chance = np.random.default_rng(0).standard_normal((*b.shape, 1))
+        b = b + np.linalg.solve(np.swapaxes(np.linalg.cholesky(ZZ), 1, 2), chance)[..., 0]
         rest = rest - np.einsum("wz,zwsn->wsn", b, columns.values[c:])
     trimmed = replace(columns, error=rest)
     starts = _start_moves(trimmed, noise, np.zeros(c))

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from expdesign.diagnosis.extended import Extended, Surroundings, observed, rates, surroundings
+from expdesign.diagnosis.extended import Extended, Surroundings, averaged, observed, rates, surroundings
 from expdesign.diagnosis.windows import Windows
 from expdesign.values import Array
 
@@ -28,6 +28,7 @@ class Motion:
         windows: the data it is set against.
         around: inputs and surroundings.
         states: (w, k, n) at integrator steps.
+        turned: (w, k) heading since the start [rad].
         shown: (w, s, 4) what the sensors would show.
     """
 
@@ -35,6 +36,7 @@ class Motion:
     windows: Windows
     around: Surroundings
     states: Array
+    turned: Array
     shown: Array
 
     @property
@@ -60,23 +62,32 @@ def simulate_windows(ship: Extended, windows: Windows, start: Array) -> Motion:
     states = np.empty((len(start), windows.steps, ship.states))
     states[:, 0] = start
     x, h = tuple(start.T), windows.step_s
+    turned = np.zeros(states.shape[:2])
     with np.errstate(over="ignore", invalid="ignore"):
         for step in range(windows.steps - 1):
-            x = _rk4(ship, x, around.at(step), h)
+            x, turn = _rk4(ship, x, around.at(step), h)
             states[:, step + 1] = np.stack(x, axis=-1)
+            turned[:, step + 1] = turned[:, step] + turn
     states = np.nan_to_num(states, nan=1e3, posinf=1e3, neginf=-1e3)
-    return Motion(ship=ship, windows=windows, around=around, states=states, shown=observed(ship, states, windows))
+    turned = np.nan_to_num(turned, nan=1e3, posinf=1e3, neginf=-1e3)
+    shown = observed(ship, states, windows, turned)
+    return Motion(ship=ship, windows=windows, around=around, states=states, turned=turned, shown=shown)
 
 
-def _rk4(ship: Extended, x: tuple[Array, ...], around: Surroundings, h: float) -> tuple[Array, ...]:
+def _rk4(
+    ship: Extended, x: tuple[Array, ...], around: Surroundings, h: float
+) -> tuple[tuple[Array, ...], Array]:
+    """The state one step on, and the heading gained."""
+
     def ahead(slope: tuple[Array, ...], share: float) -> tuple[Array, ...]:
         return tuple(np.clip(a + share * h * b, -1e3, 1e3) for a, b in zip(x, slope, strict=True))
 
     k1 = rates(ship, x, around)
-    k2 = rates(ship, ahead(k1, 0.5), around)
-    k3 = rates(ship, ahead(k2, 0.5), around)
-    k4 = rates(ship, ahead(k3, 1.0), around)
-    return tuple(a + h / 6 * (p + 2 * q + 2 * s + t) for a, p, q, s, t in zip(x, k1, k2, k3, k4, strict=True))
+    k2 = rates(ship, x2 := ahead(k1, 0.5), around)
+    k3 = rates(ship, x3 := ahead(k2, 0.5), around)
+    k4 = rates(ship, x4 := ahead(k3, 1.0), around)
+    onward = tuple(a + h / 6 * (p + 2 * q + 2 * s + t) for a, p, q, s, t in zip(x, k1, k2, k3, k4, strict=True))
+    return onward, h / 6 * (x[2] + 2 * x2[2] + 2 * x3[2] + x4[2])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -139,7 +150,7 @@ def push_of(linear: Linear, changed: Extended, per: float) -> Push:
     """What a change of effects does along the path, divided by `per`."""
     motion = linear.motion
     windows = motion.windows
-    sensor = observed(changed, motion.states, windows) - motion.shown
+    sensor = observed(changed, motion.states, windows, motion.turned) - motion.shown
     around = surroundings(changed, windows).before_last()
     ends = (motion.states[:, :-1], motion.states[:, 1:])
     force = np.mean([_rates(changed, end, around) for end in ends], axis=0) - linear.slopes.mean(axis=0)
@@ -172,11 +183,11 @@ def responses(linear: Linear, pushes: Sequence[Push]) -> Array:
 
 
 def start_responses(linear: Linear) -> Array:
-    """(n, w, s, 4) answers to unit initial states of every window."""
+    """(3, w, s, 4) answers to unit initial velocities of every window; roll begins at rest."""
     motion = linear.motion
     w, k, n = motion.states.shape
-    x = np.broadcast_to(np.eye(n), (w, n, n)).copy()
-    path = np.empty((k, w, n, n))
+    x = np.broadcast_to(np.eye(n)[:, :3], (w, n, 3)).copy()
+    path = np.empty((k, w, n, 3))
     path[0] = x
     for step in range(k - 1):
         x = linear.onward[:, step] @ x
@@ -187,19 +198,14 @@ def start_responses(linear: Linear) -> Array:
 def _shown(linear: Linear, moved: Array) -> Array:
     """Changes of the channels for changes of the states (c, w, k, n); sensors are nearly linear in the states."""
     motion = linear.motion
-    sampled = motion.states[:, :: motion.windows.steps_per_sample]
     if not any(key.startswith(("heading", "lever", "gyro", "late")) for key in motion.ship.effects):
         values = moved[:, :, :: motion.windows.steps_per_sample, :3]
-        result = np.concatenate([values, values[..., 2:]], axis=-1)
-        return _averaged_all(result) if motion.windows.derived else result
-    del sampled
+        if motion.windows.derived:
+            values = np.moveaxis(averaged(np.moveaxis(values, -1, 0)), 0, -1)
+            return np.concatenate([values, values[..., 2:]], axis=-1)
+        return np.concatenate([values, averaged(values[..., 2])[..., None]], axis=-1)
     size = 1e-4
+    still = observed(motion.ship, motion.states, motion.windows)
     return np.stack(
-        [(observed(motion.ship, motion.states + size * part, motion.windows) - motion.shown) / size for part in moved]
+        [(observed(motion.ship, motion.states + size * part, motion.windows) - still) / size for part in moved]
     )
-
-
-def _averaged_all(values: Array) -> Array:
-    result = values.copy()
-    result[:, :, 1:-1] = (values[:, :, :-2] + 2 * values[:, :, 1:-1] + values[:, :, 2:]) / 4
-    return result

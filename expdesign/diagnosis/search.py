@@ -11,7 +11,7 @@ from scipy.stats import chi2
 from expdesign.diagnosis.candidate import Candidate, Situation
 from expdesign.diagnosis.causes import CAUSES
 from expdesign.diagnosis.extended import Extended
-from expdesign.diagnosis.joint import Fit, fit
+from expdesign.diagnosis.joint import Fit, fit, profile_cost
 from expdesign.diagnosis.screening import LEVEL, Scored, Screening, screen
 from expdesign.diagnosis.windows import Windows
 from expdesign.values import Array
@@ -109,7 +109,7 @@ def _step(base: Fit, windows: Windows, found: Screening, progress: Progress) -> 
         contender = contend(base, windows, scored)
         if contender is not None:
             contenders.append(contender)
-    contenders.sort(key=lambda item: -item.worth)
+    contenders = _judged(base, contenders)
     for chosen in contenders[:1]:
         p_value = min(1.0, found.tests * float(chi2.sf(max(chosen.gain, 0.0), len(chosen.keys))))
         if p_value > LEVEL:
@@ -156,10 +156,24 @@ def contend(base: Fit, windows: Windows, scored: Scored) -> Contender | None:
     except (FloatingPointError, np.linalg.LinAlgError):
         return None
     counted = len(keys) + (1 if candidate.grid and candidate.grid[0] not in keys else 0)
-    gain = base.cost - found.cost
+    gain = _gain(base, found, found)
     return Contender(candidate=candidate, fit=found, gain=gain, worth=gain - PRICE * counted, keys=keys)
 
 
-def refined(step: Step, windows: Windows) -> Step:
-    """The same; kept for callers that refine further."""
-    return replace(step)
+def _gain(base: Fit, found: Fit, judge: Fit) -> float:
+    """Fall of twice the negative log likelihood, both fits under the noise of a third."""
+    return profile_cost(base, judge.noise) - profile_cost(found, judge.noise)
+
+
+def _judged(base: Fit, contenders: list[Contender]) -> list[Contender]:
+    """Contenders by worth, all under the noise of the best."""
+    if not contenders:
+        return []
+    for _ in range(2):
+        judge = max(contenders, key=lambda item: item.worth)
+        judged = []
+        for item in contenders:
+            gain = _gain(base, item.fit, judge.fit)
+            judged.append(replace(item, gain=gain, worth=gain - (item.gain - item.worth)))
+        contenders = judged
+    return sorted(contenders, key=lambda item: -item.worth)

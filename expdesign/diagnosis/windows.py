@@ -37,8 +37,8 @@ class Windows:
         batch_inputs: one (k_b, m) array per batch, held inputs at integrator steps.
         first: (w,) first integrator step of each window in its batch.
         measured: (w, s, 4) channels; nan where not measured.
-        heading: (w, k) measured heading at integrator steps, continuous; zero where there is none.
-        wind: (w, k, 2) wind in the b-frame from measured relative wind, nan where not measured.
+        heading: (w, k) measured heading in the middle of integrator steps, continuous; zero where there is none.
+        wind: (w, k, 2) likewise the wind in the b-frame from measured relative wind, nan where not measured.
         depth_m: (w, k), inf where not known.
         time_s: (w, k) time since the first batch began, batches laid end to end.
         has_heading, has_wind, has_depth: whether these are measured.
@@ -172,9 +172,9 @@ class _Part:
         heading = np.zeros(len(batch)) if batch.pose is None else batch.pose[:, 2]
         if not np.isfinite(heading).all():
             heading = np.cumsum(np.nan_to_num(batch.velocity[:, 2])) * batch.sample_time_s
-        self.heading = self._between(self._centred(heading))
+        self.heading = _middles(self._between(self._centred(heading)))
         wind = np.full((len(batch), 2), np.nan) if batch.wind is None else batch.velocity[:, :2] - batch.wind
-        self.wind = self._between(self._centred(wind))
+        self.wind = _middles(self._between(self._centred(wind)))
         depth = np.full(len(batch), np.inf) if batch.depth_m is None else batch.depth_m
         self.depth = self._between(self._centred(depth))
 
@@ -219,6 +219,11 @@ class _Part:
             mixed = values[:, None] * (1 - share) + following[:, None] * share
         mixed[:, 0] = values
         return np.asarray(mixed.reshape(-1, *values.shape[1:]))
+
+
+def _middles(values: Array) -> Array:
+    """Values in the middle of every step from those at its ends: what acts on average while inputs are held."""
+    return np.concatenate([(values[:-1] + values[1:]) / 2, values[-1:]])
 
 
 def _is_derived(batch: Batch) -> bool:
