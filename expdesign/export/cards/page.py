@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
-
 from expdesign.export.cards.card import build_card
-from expdesign.export.formats.format import xml_text
+from expdesign.export.pages import page_templates
 from expdesign.export.planned import require_verified
 from expdesign.export.report import tables, words
 from expdesign.export.report.content import ReportContent, primitive_runs
@@ -20,19 +18,12 @@ def cards_html(content: ReportContent) -> str:
         NoPlan: the plan is not verified: nobody shall sail it.
     """
     require_verified(content.plan)
-    templates = Environment(
-        loader=PackageLoader("expdesign.export.cards"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        finalize=lambda value: xml_text(value) if type(value) is str else value,
-    )
     runs = primitive_runs(content.plan)
     with report_style():
         cards = [build_card(content, run) for run in runs]
         overview = chart(content)
-    return templates.get_template("cards.html").render(
+    page = page_templates("cards").get_template("cards.html")
+    return page.render(
         content=content,
         cards=cards,
         chart=overview,

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
 from expdesign.diagnosis import Diagnosis, Finding
 from expdesign.export.diagnosis_page.figures import growth_figure, suspect_figure, window_figure
 from expdesign.export.estimates import plus_minus
-from expdesign.export.formats.format import xml_text
+from expdesign.export.pages import page_templates
 from expdesign.export.report import words
 from expdesign.export.report.figures.style import report_style
 
@@ -18,15 +17,6 @@ SHOWN = 4
 
 def diagnosis_html(found: Diagnosis, *, command: str, version: str) -> str:
     """One HTML page without any outside reference."""
-    loaders = [PackageLoader(f"expdesign.export.{name}") for name in ("diagnosis_page", "report")]
-    templates = Environment(
-        loader=ChoiceLoader(loaders),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        finalize=lambda value: xml_text(value) if type(value) is str else value,
-    )
     with report_style():
         figures = {
             "windows": [
@@ -35,7 +25,8 @@ def diagnosis_html(found: Diagnosis, *, command: str, version: str) -> str:
             "growth": growth_figure(found),
             "suspects": [suspect_figure(found, item, f"suspect{i}") for i, item in enumerate(found.findings)],
         }
-    return templates.get_template("diagnosis.html").render(
+    page = page_templates("diagnosis_page").get_template("diagnosis.html")
+    return page.render(
         found=found,
         findings=[_finding(item, found) for item in found.findings],
         accuracy=_accuracy(found),

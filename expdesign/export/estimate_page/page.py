@@ -6,14 +6,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
 from expdesign.assessment import Assessed, Assessment, sentence
 from expdesign.assessment.limits import AHEAD_S
 from expdesign.export.estimate_page.content import EstimateContent
 from expdesign.export.estimate_page.figures import autocorrelation_figure, interval_figure, residual_figure, run_figure
 from expdesign.export.estimates import breach_sentences, fit_table, motion_words, plus_minus, unstable_warning
-from expdesign.export.formats.format import xml_text
+from expdesign.export.pages import page_templates
 from expdesign.export.report import words
 from expdesign.export.report.figures.style import report_style
 
@@ -47,17 +46,9 @@ class MethodNotes:
 
 def estimate_html(content: EstimateContent) -> str:
     """One HTML page without any outside reference."""
-    loaders = [PackageLoader(f"expdesign.export.{name}") for name in ("estimate_page", "report")]
-    templates = Environment(
-        loader=ChoiceLoader(loaders),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        finalize=_shown,
-    )
     found = content.found
-    return templates.get_template("estimate.html").render(
+    page = page_templates("estimate_page").get_template("estimate.html")
+    return page.render(
         content=content,
         found=found,
         best=found.best,
@@ -75,10 +66,6 @@ def estimate_html(content: EstimateContent) -> str:
         figures=_figures(content),
         sample_time_s=found.record.batches[0].sample_time_s,
     )
-
-
-def _shown(value: object) -> object:
-    return xml_text(value) if type(value) is str else value
 
 
 def _figures(content: EstimateContent) -> dict[str, object]:

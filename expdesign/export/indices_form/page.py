@@ -4,25 +4,16 @@ from __future__ import annotations
 
 import math
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
-
-from expdesign.export.formats.format import xml_text
 from expdesign.export.indices_form.form import IndicesContent, shown, verdict_rows
+from expdesign.export.pages import page_templates
 from expdesign.indices import Circle, NotStandard, Stop, ZigZag
 
 
 def indices_html(content: IndicesContent) -> str:
     """One HTML page without outside references."""
-    templates = Environment(
-        loader=PackageLoader("expdesign.export.indices_form"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        finalize=lambda value: xml_text(value) if type(value) is str else value,
-    )
     unmet = sum(verdict.met is False for _, verdict in content.verdicts)
-    return templates.get_template("indices.html").render(
+    page = page_templates("indices_form").get_template("indices.html")
+    return page.render(
         content=content,
         rows=verdict_rows(content),
         unmet=unmet,

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
-
-from expdesign.export.formats.format import xml_text
+from expdesign.export.pages import page_templates
 from expdesign.export.report import criteria, tables, words
 from expdesign.export.report.admission import conditions
 from expdesign.export.report.content import ReportContent, primitive_runs
@@ -39,16 +37,9 @@ class Fact:
 
 def report_html(content: ReportContent) -> str:
     """One HTML page without any outside reference: figures inside as SVG, readable on a phone and on paper."""
-    templates = Environment(
-        loader=PackageLoader("expdesign.export.report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        finalize=_shown,
-    )
     after = expected(content)
-    return templates.get_template("report.html").render(
+    page = page_templates("report").get_template("report.html")
+    return page.render(
         content=content,
         plan=content.plan,
         design=content.design,
@@ -73,11 +64,6 @@ def report_html(content: ReportContent) -> str:
         origin=_origin(content),
         percent=words.percent,
     )
-
-
-def _shown(value: object) -> object:
-    """Names may hold anything; what no page may hold becomes a replacement sign."""
-    return xml_text(value) if type(value) is str else value
 
 
 def _figures(content: ReportContent, after: Expected) -> dict[str, object]:
