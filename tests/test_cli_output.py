@@ -34,7 +34,8 @@ ESTIMATE = {
     "tests": (),
 }
 PLAIN = {"departure": None, "tolerance_m": None}
-COMMANDS = ("run", "score", "durations", "plan", "export", "simulate", "estimate")
+REPLAN = {"data": (Path("d.csv"),), "vessel": None, "remaining_s": None, "seed": 0}
+COMMANDS = ("run", "score", "durations", "plan", "export", "simulate", "estimate", "replan")
 
 
 @dataclass
@@ -91,7 +92,25 @@ def workflows(monkeypatch: pytest.MonkeyPatch) -> Workflows:
             ((), None),
             {"vessel": Path("v.toml"), "speed_mps": None, "scale": 1.0, "antenna_forward_m": 0.0},
         ),
-        ("simulate p.json --truth v.toml", "simulate", (Path("p.json"), None), {"seed": 0, "truth": Path("v.toml")}),
+        (
+            "simulate p.json --truth v.toml",
+            "simulate",
+            (Path("p.json"), None),
+            {"seed": 0, "truth": Path("v.toml"), "until_s": None},
+        ),
+        (
+            "simulate p.json --truth v.toml --until 600 --seed 2",
+            "simulate",
+            (Path("p.json"), None),
+            {"seed": 2, "truth": Path("v.toml"), "until_s": 600.0},
+        ),
+        ("replan s.toml --data d.csv", "replan", (Path("s.toml"), None), REPLAN),
+        (
+            "replan s.toml --data a.csv b.csv --vessel v.toml --remaining 300 --out o --seed 3",
+            "replan",
+            (Path("s.toml"), Path("o")),
+            {"data": (Path("a.csv"), Path("b.csv")), "vessel": Path("v.toml"), "remaining_s": 300.0, "seed": 3},
+        ),
         ("estimate d.csv --vessel v.toml", "estimate", ((Path("d.csv"),), None), ESTIMATE),
         (
             "estimate a.csv b.csv --vessel v.toml --method ls iv --fixed X_u N_r --test c.csv d.csv --out o",

@@ -108,9 +108,10 @@ def screen(base: Fit, candidates: Sequence[Candidate], rng: np.random.Generator)
 
 def _effective_tests(A: Array, halves: list[tuple[Array, Array]], rng: np.random.Generator) -> float:
     """How many times likelier the smallest p-value is to fall below a level than a single one."""
-    values, vectors = np.linalg.eigh((A + A.T) / 2)
+    size = np.sqrt(np.maximum(np.diag(A), 1e-300))  # sizes may span more digits than numbers have
+    values, vectors = np.linalg.eigh((A + A.T) / 2 / np.outer(size, size))
     root = vectors * np.sqrt(np.maximum(values, 0.0))
-    drawn = rng.standard_normal((DRAWS, len(A))) @ root.T
+    drawn = rng.standard_normal((DRAWS, len(A))) @ root.T * size
     smallest = np.ones(DRAWS)
     by_size: dict[int, list[Array]] = {}
     for index, half in halves:
