@@ -1,10 +1,18 @@
 """A planned trial is admissible exactly within the limits of MSC/Circ.1053, and what is not known is not called met."""
 
 from dataclasses import replace
+from pathlib import Path
 
+import export_case as case
 import pytest
+from scenario_files import spoil, write_scenario
 
+from expdesign.errors import FileError, InputError
+from expdesign.export import plan_json, read_plan, write_files
+from expdesign.export.report.admission import conditions
 from expdesign.indices import BEAUFORT_MPS, Conditions, admissibility, beaufort
+from expdesign.scenario import load_scenario
+from expdesign.simulation import Environment
 
 KNOWN = Conditions(
     draught_m=5.0,
@@ -51,3 +59,28 @@ def test_room_is_what_was_asked_for_and_uniform_current_is_for_the_day_to_show()
     assert met()["Sea room"] is True
     assert met(room_m=29.9)["Sea room"] is False
     assert met()["Current"] is None
+
+
+@pytest.mark.parametrize(("state", "expected"), [(4, True), (5, False), (None, None)])
+def test_the_sea_state_of_a_scenario_decides_and_travels_with_the_plan(
+    state: int | None, expected: bool | None, tmp_path: Path
+) -> None:
+    path = write_scenario(tmp_path)
+    if state is not None:
+        spoil(path, "[environment]", f"[environment]\nsea_state = {state}")
+    environment = load_scenario(path).environment
+    judged = {row.what: row.met for row in conditions(case.report_content(environment=environment))}
+    assert judged["Sea state"] is expected
+    text = plan_json(case.plan(), scenario="s", vessel=case.tug(), environment=environment, clearance_m=20.0)
+    write_files(tmp_path / "out", {**case.plan_files(), "plan.json": text})
+    assert read_plan(tmp_path / "out" / "plan.json").environment.sea_state == state
+
+
+@pytest.mark.parametrize("state", ["10", "-1", "3.5", '"rough"'])
+def test_a_sea_state_that_is_none_is_refused(state: str, tmp_path: Path) -> None:
+    path = write_scenario(tmp_path)
+    spoil(path, "[environment]", f"[environment]\nsea_state = {state}")
+    with pytest.raises(FileError, match=r"environment\.sea_state"):
+        load_scenario(path)
+    with pytest.raises(InputError, match="from 0 to 9"):
+        Environment(sea_state=12)

@@ -61,6 +61,7 @@ class _Medium(_Entry):
 class _Environment(_Entry):
     current_to: _Medium
     wind_to: _Medium
+    sea_state: int | None = Field(default=None, ge=0, le=9)
 
 
 class _State(_Entry):
@@ -249,4 +250,5 @@ def _environment(file: _Environment) -> Environment:
         wind_std_mps=wind.std_mps,
         current_variation=Variation(std_mps=current.variation_std_mps, correlation_s=current.correlation_s),
         wind_variation=Variation(std_mps=wind.variation_std_mps, correlation_s=wind.correlation_s),
+        sea_state=file.sea_state,
     )

@@ -175,6 +175,7 @@ def plan_json(plan: Plan, *, scenario: str, vessel: Vessel, environment: Environ
                     environment.current_to, environment.current_std_mps, environment.current_variation
                 ),
                 "wind_to": _wind_or_current(environment.wind_to, environment.wind_std_mps, environment.wind_variation),
+                **({} if environment.sea_state is None else {"sea_state": environment.sea_state}),
             },
             "legs": [_leg_entry(plan, index, leg) for index, leg in enumerate(plan.legs)],
             "informative_s": plan.seconds("primitive"),

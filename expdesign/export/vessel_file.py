@@ -87,8 +87,10 @@ def _environment(environment: Environment) -> Iterator[str]:
     }
     rows = {name: _flow(*flow) for name, flow in flows.items()}
     known = {name: row for name, row in rows.items() if any(row.values())}
-    if known:
+    if known or environment.sea_state is not None:
         yield from ("", "[environment]")
+    if environment.sea_state is not None:
+        yield f"sea_state = {environment.sea_state}"
     for name, row in known.items():
         yield f"{name} = {{{', '.join(f'{key} = {_value(value)}' for key, value in row.items())}}}"
 

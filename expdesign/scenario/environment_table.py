@@ -44,6 +44,7 @@ class EnvironmentTable(Table):
 
     current_to: CurrentTable = CurrentTable(north_mps=0.0, east_mps=0.0)
     wind_to: WindTable = WindTable(north_mps=0.0, east_mps=0.0)
+    sea_state: int | None = Field(default=None, ge=0, le=9, description="the WMO code of the sea, 0 to 9")
 
 
 def build_environment(table: EnvironmentTable) -> Environment:
@@ -56,4 +57,5 @@ def build_environment(table: EnvironmentTable) -> Environment:
         wind_std_mps=wind.std_mps,
         current_variation=current.variation,
         wind_variation=wind.variation,
+        sea_state=table.sea_state,
     )

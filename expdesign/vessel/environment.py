@@ -40,6 +40,8 @@ class Variation:
 
 STEADY = Variation()
 """No variation."""
+SEA_STATES = range(10)
+"""Codes of the World Meteorological Organization, table 3700."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -52,6 +54,8 @@ class Environment:
         wind_to: (2,) mean wind, velocity to north/east [m/s].
         wind_std_mps: standard deviation with which the trial's mean of each component is known [m/s].
         current_variation, wind_variation: what happens around the trial's mean from sample to sample.
+        sea_state: WMO code 0 (calm) to 9 (phenomenal) of table 3700, or None when not given; it is told beside the
+            limits on trials and moves no ship here.
     """
 
     current_to: Array = field(default_factory=lambda: np.zeros(2))
@@ -60,9 +64,12 @@ class Environment:
     wind_std_mps: float = 0.0
     current_variation: Variation = STEADY
     wind_variation: Variation = STEADY
+    sea_state: int | None = None
 
     def __post_init__(self) -> None:
         seal(self, current_to="2", wind_to="2")
+        if self.sea_state is not None and self.sea_state not in SEA_STATES:
+            raise InputError(f"sea_state is {self.sea_state}, expected a whole number from 0 to 9")
 
     @property
     def isotropic(self) -> bool:

@@ -20,7 +20,7 @@ def conditions(content: ReportContent) -> tuple[Condition, ...]:
             least_depth_m=least_charted_depth(plan.area, plan.trajectory.pose[:, :2]),
             wind_mps=float(np.hypot(*environment.wind_to)),
             wind_std_mps=environment.wind_std_mps,
-            sea_state=None,
+            sea_state=environment.sea_state,
             current_mps=float(np.hypot(*environment.current_to)),
             current_std_mps=environment.current_std_mps,
             room_m=plan.verification.clearance_min_m,
