@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 
 from expdesign.dictionary import build_dictionary
+from expdesign.durations.validation import Rehearsal, heading_rad, trial_parts, validate
 from expdesign.errors import NotInformative
 from expdesign.information.expected import TrialPart, expected_covariance
 from expdesign.scenario import load_vessel
 from expdesign.scenario.dictionary_file import load_dictionary
 from expdesign.signals import Commands
 from expdesign.simulation import Environment, Variation
-from expdesign.durations.validation import Rehearsal, trial_parts, validate
 from expdesign.vessel import Actuator, Limit, Sensors, Term, Vessel, VesselModel
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
@@ -109,6 +109,54 @@ def test_predicted_standard_deviations_are_those_of_simulated_trials(trials):
     # a standard deviation from n trials is known to 1 / sqrt(2 n); ten parameters share the chance
     allowed = 0.10 + 2.8 / np.sqrt(2 * trials)
     assert (np.abs(ratio - 1.0) < allowed).all(), dict(zip(NAMES, ratio.round(3), strict=True))
+
+
+SHIP_30M = load_vessel(SCENARIOS / "vessels" / "azimuth-30m-true.toml")
+FEW = (
+    "acceleration",
+    "zigzag-steep-speed-1",
+    "turning-circle-starboard",
+    "inward-spiral-speed-0.9",
+    "telegraph-draw-1",
+)
+
+
+def ship_30m_rehearsal(trials: int, method: str, designs: tuple[str, ...] = ()) -> Rehearsal:
+    """The 30 m ship in steady wind, true and nominal alike, with sensors so quiet that first order holds."""
+    specs = load_dictionary(SCENARIOS / "dictionaries" / "standard.toml")
+    primitives = build_dictionary(SHIP_30M, [spec for spec in specs if not designs or spec.name in designs])
+    assert not designs or len(primitives) == len(designs)
+    return Rehearsal(
+        truth=replace(SHIP_30M, sensors=Sensors(velocity_mps=0.002, yaw_rate_radps=0.0005, wind_mps=0.005)),
+        nominal=SHIP_30M,
+        primitives=primitives,
+        designs={"each once": (1,) * len(primitives)},
+        total_s=1000.0,
+        environment=Environment(wind_to=np.array([3.0, 2.0])),
+        parameters=SHIP_30M.model.names,
+        method=method,
+        integrator="euler",
+        trials=trials,
+    )
+
+
+@pytest.mark.parametrize(
+    ("trials", "designs"), [pytest.param(600, (), marks=pytest.mark.slow), (40, FEW)], ids=["dictionary", "few"]
+)
+def test_eighteen_parameters_in_measured_wind_are_as_uncertain_as_predicted(trials, designs):
+    (result,) = validate(ship_30m_rehearsal(trials, "iv-air", designs))
+    assert result.failed == 0
+    # 18 parameters share the chance; a bias of half a standard deviation would count as inconsistent
+    assert (np.abs(result.found / result.theory - 1.0) < 0.10 + 3.0 / np.sqrt(2 * trials)).all()
+    assert (np.abs(result.bias) < (0.1 + 3.3 / np.sqrt(trials)) * result.found).all()
+
+
+def test_headings_of_a_trial_are_spread_evenly_whatever_part_of_it_one_looks_at():
+    headings = np.array([heading_rad(number) for number in range(60)])
+    for first in range(0, 50, 7):
+        part = np.exp(1j * headings[first : first + 8])
+        # eight headings in one direction have the modulus 8, eight drawn at random 2.8
+        assert abs(part.sum()) < 1.6
 
 
 def test_any_number_of_processes_and_any_interruption_give_the_same():

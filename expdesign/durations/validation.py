@@ -4,6 +4,9 @@ A trial is a number of whole runs, each simulated with a true ship from its entr
 sensors, and estimated as measured data would be, with the scenario's vessel as the nominal model. Designs are compared
 at the same informative time: the optimised one, equal shares, and runs drawn at random, anew for every trial.
 
+Each run of a trial begins at a heading of its own, the same in every trial: a golden angle further than the last, which
+spreads the runs of every manoeuvre evenly over the wind. Predictions are made for these headings.
+
 Work is cut into chunks with random numbers of their own: any number of processes gives the same result, and chunks that
 are done need not be done again.
 
@@ -34,6 +37,8 @@ Progress = Callable[[str, float], None]
 CHUNK = 20
 """Trials of one chunk."""
 RANDOM = "random"
+GOLDEN_ANGLE_RAD = np.pi * (3.0 - 5.0**0.5)
+"""From the heading of one run to that of the next."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -225,6 +230,7 @@ def _sailed(
                 runs=trials,
                 environment=weather,
                 rng=rng,
+                pose=(0.0, 0.0, heading_rad(len(batches))),
                 velocity=primitive.entry_velocity,
                 standing=primitive.entry_inputs,
                 integrator=rehearsal.integrator,
@@ -233,6 +239,11 @@ def _sailed(
             name = f"{primitive.name} {repeat + 1}"
             batches.append([replace(ensemble.batch(trial), name=name) for trial in range(trials)])
     return [Record(batches=tuple(rows)) for rows in zip(*batches, strict=True)]
+
+
+def heading_rad(number: int) -> float:
+    """Heading [rad] at the beginning of a run, counted from 0 in the order of the trial."""
+    return float(number * GOLDEN_ANGLE_RAD % (2 * np.pi))
 
 
 def _estimated(rehearsal: Rehearsal, record: Record) -> Array:
@@ -274,13 +285,29 @@ def _predicted(rehearsal: Rehearsal, design: str, vessel: Vessel) -> Array:
         return np.full(len(rehearsal.parameters), np.nan)
     covariance = expected_covariance(
         replace(vessel, sensors=rehearsal.truth.sensors),
-        trial_parts(rehearsal.primitives, runs, environment=rehearsal.environment),
+        _rehearsed_parts(rehearsal, runs),
         rehearsal.parameters,
         environment=rehearsal.environment,
         mean_subtraction=rehearsal.mean_subtraction,
         integrator=rehearsal.integrator,
     )
     return np.asarray(np.sqrt(np.diag(covariance)))
+
+
+def _rehearsed_parts(rehearsal: Rehearsal, runs: Sequence[int]) -> tuple[TrialPart, ...]:
+    """Every run of a trial at its heading; repeats are counted where headings do not matter."""
+    if rehearsal.environment.isotropic:
+        return trial_parts(rehearsal.primitives, runs)
+    order = [item for item, count in zip(rehearsal.primitives, runs, strict=True) for _ in range(count)]
+    return tuple(
+        TrialPart(
+            commands=primitive.commands,
+            velocity=primitive.entry_velocity,
+            heading_rad=heading_rad(number),
+            standing=primitive.entry_inputs,
+        )
+        for number, primitive in enumerate(order)
+    )
 
 
 def trial_parts(

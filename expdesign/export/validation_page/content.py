@@ -98,25 +98,57 @@ def _judged(result: Validated) -> Iterator[str]:
 def _assumptions(content: ValidationContent) -> Iterator[str]:
     """Which assumptions of the prediction do not hold here."""
     rehearsal = content.rehearsal
+    found = [f"Assumption that fails: {text}" for text in (*_of_motion(content), *_of_weather(rehearsal))]
+    yield from found
+    if not found:
+        yield (
+            "No assumption that can be checked from the files fails. What is left is that noise is small: predictions "
+            "take the derivative of the residual by it; quieter sensors in the true vessel's file would show."
+        )
+
+
+def _of_motion(content: ValidationContent) -> Iterator[str]:
+    rehearsal = content.rehearsal
+    if rehearsal.method.startswith("ls"):
+        yield (
+            "regressors without noise. Least squares is biased by the sensors' noise in them; the prediction is for "
+            "instrumental variables."
+        )
     if content.noisy_moduli:
         yield (
-            "Assumption that fails: whatever stands inside a modulus keeps its sign under noise. It may turn in "
+            "whatever stands inside a modulus keeps its sign under noise. It may turn in "
             f"{', '.join(content.noisy_moduli)}."
         )
     if rehearsal.integrator == "rk4" and rehearsal.nominal.model.form == "discrete":
         yield (
-            "Assumption that fails: the parameters in the file are those of Euler's map, the simulated ship moves "
-            "continuously between samples, so its map has other values; --integrator euler leaves this out."
-        )
-    weather = rehearsal.environment
-    constant = (weather.current_to.any(), weather.current_std_mps, weather.wind_to.any(), weather.wind_std_mps)
-    if any(constant) and rehearsal.method in ("iv", "ls"):
-        yield (
-            f"Assumption that fails: no current and wind. Method {rehearsal.method} only takes off a constant; "
-            "--method iv-augmented or iv-wind allows for weather."
+            "the parameters in the file are those of Euler's map, the simulated ship moves continuously between "
+            "samples, so its map has other values; --integrator euler leaves this out."
         )
     if rehearsal.truth.model.names != rehearsal.nominal.model.names:
-        yield "Assumption that fails: the true ship has other terms than the model."
+        yield "the true ship has other terms than the model."
+
+
+def _of_weather(rehearsal: Rehearsal) -> Iterator[str]:
+    weather, method = rehearsal.environment, rehearsal.method
+    current = weather.current_to.any() or weather.current_std_mps > 0
+    wind = weather.wind_to.any() or weather.wind_std_mps > 0
+    solver, _, allows = method.partition("-")
+    if (current or wind) and not allows:
+        yield (
+            f"no current and wind. Method {method} only takes off a constant; --method {solver}-air, {solver}-wind or "
+            f"{solver}-augmented allows for weather."
+        )
+    if current and allows == "air":
+        yield f"no current. Method {method} allows for measured wind only; --method {solver}-wind for current, too."
+    if allows in ("wind", "augmented"):
+        what = "the current" if allows == "wind" else "current and wind"
+        yield (
+            f"{what} known. Method {method} estimates more parameters to allow for what it does not know, which costs "
+            'accuracy that the prediction does not count; design for it with predictor = "'
+            f'{allows}" in the scenario.'
+        )
+    if weather.current_std_mps > 0 or weather.wind_std_mps > 0:
+        yield "the mean weather. Every trial has weather of its own, drawn around the forecast."
 
 
 def validation_json(content: ValidationContent) -> str:
