@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,17 +42,31 @@ def whole_runs(problem: DurationProblem, fractions: Array) -> tuple[int, ...]:
         NoAnswer: no set of whole runs was found that keeps the limits and informs about every parameter.
     """
     search = _Search.of(problem, fractions)
-    runs = np.maximum(np.floor(fractions / search.shares + 1e-9).astype(int), search.fewest)
-    runs = search.grown(search.thinned(np.minimum(runs, np.maximum(search.most_runs, search.fewest)), -1))
-    while (better := _exchanged(search, runs)) is not None:
-        runs = better
-    if not search.allowed(runs) or not np.isfinite(Collected.of(problem).value(runs * search.shares)):
+    runs = _searched(search, fractions)
+    if not search.informative(runs) and problem.aim.criterion != "D":
+        # The criterion may do without seeing what has to be estimated along; then the runs best for everything do.
+        everything = _Search.of(replace(problem, aim=replace(problem.aim, criterion="D")), fractions)
+        runs = _searched(everything, fractions)
+    if not search.informative(runs):
         raise NoAnswer(
             f"design.total_s is {problem.total_s:g}: whole runs that inform about every parameter do not fit; the "
             f"shortest run takes {problem.run_s.min():g} s, the optimal design uses {int((fractions > 1e-6).sum())} "
             "primitives" + (" (least and most times and budgets counted)" if not search.polytope.plain else "")
         )
     return tuple(int(n) for n in runs)
+
+
+def _searched(search: _Search, fractions: Array) -> Array:
+    """The local optimum (q,) near rounded fractions."""
+    runs = np.maximum(np.floor(fractions / search.shares + 1e-9).astype(int), search.fewest)
+    runs = search.grown(search.thinned(np.minimum(runs, np.maximum(search.most_runs, search.fewest)), -1))
+    best = search.worth_of(runs)
+    while (better := _exchanged(search, runs)) is not None:
+        gained = search.worth_of(better)
+        if not gained > best:  # rounding in nearly singular sums; without this the exchange could go round in circles
+            break
+        runs, best = better, gained
+    return runs
 
 
 def efficiency_of_runs(problem: DurationProblem, fractions: Array, runs: Array) -> float:
@@ -125,6 +139,10 @@ class _Search:
             and (runs <= self.most_runs).all()
             and (self.polytope.rows @ shares <= self.polytope.limits + 2 * TIGHT).all()
         )
+
+    def informative(self, runs: Array) -> bool:
+        """Whether runs keep the limits and inform about every parameter without anything lent."""
+        return self.allowed(runs) and bool(np.isfinite(self.collected.value(runs * self.shares)))
 
     def fitting(self, runs: Array) -> Indices:
         """Indices of the primitives of which one more run fits."""
