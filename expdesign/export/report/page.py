@@ -15,6 +15,7 @@ from expdesign.export.report.figures.style import report_style
 from expdesign.export.report.figures.timeline import timeline_figure
 from expdesign.export.report.figures.uncertainty import uncertainty_figure
 from expdesign.export.report.glossary import GLOSSARY
+from expdesign.export.report.progress import known_rows, known_sentences
 from expdesign.export.report.trust import chain
 from expdesign.export.report.uncertainty import Expected, expected, measures_velocity
 
@@ -55,6 +56,8 @@ def report_html(content: ReportContent) -> str:
         agenda=tables.agenda(content),
         primitives=tables.primitive_rows(content),
         parameters=tables.parameter_rows(content, after),
+        known_rows=known_rows(content.known),
+        known_sentences=known_sentences(content.known, content.plan.area.frame),
         noise=measures_velocity(content),
         chain=chain(content, short_of_optimum=criteria.short_of_optimum(content)),
         conditions=conditions(content),
@@ -176,5 +179,5 @@ def assumptions(content: ReportContent) -> list[tuple[str, str]]:
         ("Fixed parameters", f"{fixed}: held at the vessel file's values" if fixed else "none, all are estimated"),
         ("Mean subtraction", SUBTRACTION[content.design.problem.mean_subtraction]),
         ("Hull", f"a rectangle of {vessel.length_m:g} m by {vessel.beam_m:g} m, which contains the waterline"),
-        ("Start and goal", "the ship starts and ends at rest"),
+        ("Start and goal", "the ship starts and ends at rest through the water"),
     ]

@@ -1,0 +1,104 @@
+"""The part of the report about a trial that goes on: what is known, and what the rest buys."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from expdesign.export.known import Known, Purchase
+from expdesign.export.report import words
+from expdesign.plan.area import LocalFrame
+
+
+@dataclass(frozen=True, kw_only=True)
+class KnownRow:
+    """One parameter: its value and standard deviation before the trial, now, and after the rest."""
+
+    name: str
+    new: bool
+    before: str
+    now: str
+    stated: str
+    so_far: str
+    after: str
+    bought: str
+    without: str
+
+
+def known_rows(known: Known | None) -> list[KnownRow]:
+    """Parameters in order; none for a trial that begins."""
+    if known is None:
+        return []
+    columns = (known.before, known.now, known.stated, known.so_far, known.after)
+    rows = zip(known.parameters, *(column.tolist() for column in columns), known.purchases, strict=True)
+    return [
+        KnownRow(
+            name=name,
+            new=name in known.new,
+            before="not in the model" if math.isnan(before) else words.significant(before),
+            now=words.significant(now, 4),
+            stated=words.significant(stated, 2) if stated > 0 else "not stated",
+            so_far=_std(so_far),
+            after=_std(after),
+            bought=f"{item.runs} \N{MULTIPLICATION SIGN} {item.primitive}"
+            if item.primitive
+            else "no run in particular",
+            without=_without(item),
+        )
+        for name, before, now, stated, so_far, after, item in rows
+    ]
+
+
+def _std(value: float) -> str:
+    return "not told" if math.isnan(value) else words.significant(value, 2)
+
+
+def _without(item: Purchase) -> str:
+    if not item.primitive:
+        return ""
+    return "not told" if math.isinf(item.without) else f"{words.significant(item.without, 2)} times larger"
+
+
+def known_sentences(known: Known | None, frame: LocalFrame) -> list[str]:
+    """Where the trial stands; none for a trial that begins."""
+    if known is None:
+        return []
+    lat, lon = frame.to_degrees(known.pose[:2]).tolist()
+    files = ", ".join(known.data)
+    left = (
+        "as stated"
+        if known.remaining_stated
+        else f"the {words.duration(known.total_s)} of the whole trial less the time of the data"
+    )
+    current = words.current(known.environment.current_to, known.environment.current_std_mps)
+    wind = words.wind(known.environment.wind_to, known.environment.wind_std_mps)
+    moving = (
+        f"Its speed over ground there was {words.speed(known.speed_mps)}; this plan takes it to be stopped through the "
+        "water before it goes on."
+    )
+    return [
+        f"This is the rest of a trial. So far {words.duration(known.sailed_s)} of data are there ({files}); "
+        f"{words.duration(known.remaining_s)} of informative time are left, {left}.",
+        f"The data end with the ship at {words.latitude(lat)}, {words.longitude(lon)}, heading "
+        f"{words.bearing(float(known.pose[2]))}. {moving}",
+        f"The model: {known.model}. The weather: {current}; {wind} ({known.weather}).",
+        *known.notes,
+        _gain(known),
+    ]
+
+
+def _gain(known: Known) -> str:
+    """How much better the rest makes what the data have told."""
+    both = np.isfinite(known.so_far) & np.isfinite(known.after) & (known.after > 0)
+    if not both.any():
+        return "What the data so far have told of the parameters cannot be compared with what the rest adds."
+    ratio = float(np.exp(np.mean(np.log(known.so_far[both] / known.after[both]))))
+    first = np.isnan(known.so_far) & np.isfinite(known.after)
+    names = [name for name, untold in zip(known.parameters, first, strict=True) if untold]
+    more = f" It tells {', '.join(names)} for the first time." if names else ""
+    return (
+        f"With the rest, standard deviations are expected to be {words.significant(ratio, 2)} times smaller than by "
+        f"the data so far (geometric mean).{more}"
+    )
