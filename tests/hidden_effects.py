@@ -99,8 +99,8 @@ def sail(trials: list[Trial], orders: np.ndarray, step_s: float, weather: Weathe
 
     Effects: gain, kappa, asymmetry (yaw moment per ahead force), angle_offset (all azimuths or the rudder), lag_s,
     delay_s, deadband (of the first input of every actuator), load_u load_v load_r, shallow_damping shallow_inertia
-    (times draught/depth, draught 2.5 m), roll_period_s roll_damping roll_sway roll_yaw, change_s with change_gain
-    change_damping, and any name of TERMS. lag, delay and deadband act on the inputs named by `acts_on` (bit mask).
+    (times draught/depth, draught 2.5 m), roll_period_s roll_damping roll_sway roll_yaw, change_s (batches laid end to end) with
+    change_gain change_damping, and any name of TERMS. lag, delay and deadband act on the inputs named by `acts_on` (bit mask).
     """
     ship = trials[0].ship
     n, b, k, m = orders.shape
@@ -140,7 +140,7 @@ def sail(trials: list[Trial], orders: np.ndarray, step_s: float, weather: Weathe
                 out["u_q"][:, :, i] = x[3] - (c * wind[0] + s * wind[1])
                 out["v_q"][:, :, i] = x[4] - (c * wind[1] - s * wind[0])
             shoal = np.zeros((n, b)) if depth is None else 2.5 / depth[:, :, i]
-            after = (t >= e["change_s"]) & (e["change_s"] > 0)
+            after = (t + k * step_s * np.arange(b) >= e["change_s"]) & (e["change_s"] > 0)
             current, wind = mean_c + vary_c, mean_w + vary_w
 
             def rates(x, acting=acting, shoal=shoal, after=after, current=current, wind=wind):

@@ -18,7 +18,8 @@ class Candidate:
         free: effects to estimate, with a first guess each; zero where the effect is smooth around zero.
         fixed: effects that say which candidate it is, e.g. the roll period.
         finite: the effect is not smooth at zero; it is tried at the first guess as a whole.
-        grid: effect that is searched on these values once the candidate is singled out.
+        grid: effect whose value is found by trying these once the candidate is singled out, as the likelihood has
+            corners in it.
     """
 
     cause: str

@@ -15,18 +15,22 @@ from expdesign.diagnosis.extended import Extended
 from expdesign.diagnosis.extension import as_extended, extend, public_name
 from expdesign.diagnosis.gain import HeldOut, gained, held_out
 from expdesign.diagnosis.joint import Fit
+from expdesign.diagnosis.motion import linearise, start_responses
 from expdesign.diagnosis.search import Search, Step, search
 from expdesign.diagnosis.tell_apart import Proposal, most_telling, standard_proposals
 from expdesign.diagnosis.values import Accuracy, Diagnosis, Estimated, Finding
 from expdesign.diagnosis.windows import Windows, cut_windows
 from expdesign.errors import Diverged, NotInformative
 from expdesign.signals import Record
-from expdesign.values import Array
 from expdesign.vessel import Vessel
 
 Progress = Callable[[str, float], None]
 FEWEST_SAMPLES = 100
 UNITS = 4
+SHORTENINGS, SHORTEST, LARGEST_GROWTH = 4, 30, 6.0
+"""Rounds and fewest samples of shortening windows of unstable models, and how much an error may grow in them."""
+LEAST_GAIN = 0.1
+"""Points of simulated fit on held-out runs, mean over outputs."""
 
 
 def diagnose(
@@ -61,6 +65,7 @@ def diagnose(
         raise Diverged(f"vessel {vessel.name!r}: its simulation of the data diverges; the model is unstable")
     found = search(ship, windows, first_states(windows), rng, lambda what, share: progress(what, 0.05 + 0.6 * share))
     held = _held_out(found, ship, windows, lambda share: progress("measuring the gain on held-out runs", share))
+    found = _worthwhile(found, held)
     progress("looking for manoeuvres that tell causes apart", 0.92)
     proposed = proposals or standard_proposals(windows, ship.model.inputs, windows.sample_s)
     findings = tuple(
@@ -89,12 +94,31 @@ def diagnose(
 
 
 def _windows(ship: Extended, record: Record) -> Windows:
-    """As long as may be, but at least four, and no longer than the model's errors stay linear."""
+    """As long as may be, but at least four, and no longer than an error in a state stays of its own size."""
     total = sum(len(batch) * batch.sample_time_s for batch in record.batches)
     windows = cut_windows(ship.model, record)
     if len(windows.batch) < UNITS:
         windows = cut_windows(ship.model, record, longest_s=total / UNITS)
+    for _ in range(SHORTENINGS):
+        steady_s = _steady_time(ship, windows)
+        if steady_s >= windows.steps * windows.step_s:
+            break
+        windows = cut_windows(ship.model, record, longest_s=steady_s)
     return windows
+
+
+def _steady_time(ship: Extended, windows: Windows) -> float:
+    """Time within which no error of a state grows beyond `LARGEST_GROWTH` of itself, in units of the measured spread."""
+    motion = simulate_from_first(ship, windows)
+    if motion.diverged:
+        return windows.steps * windows.step_s / 2
+    spread = np.nanstd(windows.measured[..., :3].reshape(-1, 3), axis=0)
+    scale = np.where(np.isfinite(spread) & (spread > 0), spread, 1.0)
+    answers = np.moveaxis(start_responses(linearise(motion))[..., :3], 0, -1) * scale / scale[:, None]
+    size = np.linalg.norm(answers, axis=(2, 3)) / np.sqrt(3.0)
+    grown = (size > LARGEST_GROWTH).any(axis=0)
+    samples = int(np.argmax(grown)) if grown.any() else len(grown)
+    return max(samples, SHORTEST) * windows.sample_s if grown.any() else windows.steps * windows.step_s
 
 
 def _check(ship: Extended, windows: Windows, record: Record) -> None:
@@ -134,6 +158,15 @@ def _held_out(found: Search, ship: Extended, windows: Windows, tell: Callable[[f
     return results
 
 
+def _worthwhile(found: Search, held: Sequence[HeldOut]) -> Search:
+    """Without the last causes that gain nothing where they were not fitted: significant, but of no use to anyone."""
+    steps = list(found.steps)
+    while steps and not np.nanmean(held[len(steps)].fit - held[len(steps) - 1].fit) > LEAST_GAIN:
+        steps.pop()
+    last = steps[-1].chosen.fit if steps else found.first
+    return replace(found, steps=tuple(steps), last=last)
+
+
 def cause_of(name: str) -> Cause:
     """The entry of the catalogue that a name belongs to."""
     return next(cause for cause in CAUSES if cause.name == name.split(":")[0])
@@ -146,8 +179,9 @@ def _finding(
     chosen = step.chosen
     gain, interval = gained(before, after, rng)
     values: dict[str, tuple[float, float]] = {key: (chosen.fit.value(key), chosen.fit.std(key)) for key in chosen.keys}
-    if "change:time" in chosen.candidate.fixed and "change:time" not in values:
-        values["change:time"] = (chosen.fit.value("change:time"), chosen.time_std)
+    if chosen.searched is not None:
+        key, std = chosen.searched
+        values[key] = (chosen.fit.value(key), std)
     cause = cause_of(chosen.candidate.cause)
     telling = None
     if step.rivals:
@@ -220,6 +254,3 @@ def _screened(found: Search) -> tuple[tuple[str, float], ...]:
         p_value = min(1.0, item.p_value * found.final_screening.tests)
         best[item.candidate.cause] = min(p_value, best.get(item.candidate.cause, 1.0))
     return tuple(sorted(best.items(), key=lambda pair: pair[1]))
-
-
-__all__ = ["Array", "diagnose", "replace"]

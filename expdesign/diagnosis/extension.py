@@ -197,7 +197,8 @@ def public_name(key: str, ship: Extended) -> tuple[str, float, float, str]:
     if kind == "change" and rest.startswith("theta:"):
         return f"{rest[6:]}_change", 1.0, 0.0, ""
     fixed = {
-        "current": (f"{rest}_mps", "m/s"), "wind": (f"{rest}_mps", "m/s"), "offset": (f"angle_offset_{rest}_rad", "rad"),
+        "current": (f"{rest}_mps", "m/s"), "wind": (f"{rest}_mps", "m/s"),
+        "offset": (f"angle_offset_{rest}_rad", "rad"),
         "lag": (f"lag_{rest}_s", "s"), "delay": (f"delay_{rest}_s", "s"), "deadband": (f"deadband_{rest}", ""),
         "lever": (f"{rest}_m", "m"), "late": (f"{rest}_delay_s", "s"), "heading_bias": ("heading_bias_rad", "rad"),
         "shallow": (f"{rest}_growth", ""), "asymmetry": ("thrust_offset_m", "m"), "term": (rest, ""),

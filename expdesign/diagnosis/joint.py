@@ -20,7 +20,7 @@ from expdesign.values import Array
 WANDER_MPS = (0.0, 0.005, 0.01, 0.02, 0.035, 0.06, 0.1, 0.2)
 WANDER_TIMES_S = (60.0, 150.0, 400.0, 1000.0)
 SPACING_S = 10.0
-MOST_HATS = 40
+MOST_HATS = 24
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -167,7 +167,7 @@ class Fit:
         covariance: (c, c).
         starts: (w, n) initial states.
         noise: colour of the remainder.
-        cost: twice the negative log likelihood.
+        cost: weighted squared error at the end, while fitting.
         linear, columns: at the end.
         precision: (c,) prior precision of the numbers.
     """
@@ -213,7 +213,7 @@ def fit(
     *,
     starts: Array,
     noise: Noise | None = None,
-    steps: int = 3,
+    steps: int = 2,
     colour_order: int | None = None,
     flat: tuple[str, ...] = (),
 ) -> Fit:
@@ -246,16 +246,17 @@ def fit(
         linear = linearise(motion)
         pushes = [push_of(linear, ship.having({k: ship.get(k) + d}), d) for k in keys for d in [step_of(ship, k)]]
         columns = build_columns(linear, pushes, wander=windows.has_heading)
-        if noise is None or step in (0, steps):
+        if noise is None or step == 0:
             noise = _colours(columns, noise, precision, ship, keys, colour_order)
         now = np.array([ship.get(key) for key in keys])
-        if best is not None and _cost_here(columns, noise, precision, now) > _cost_here(
-            best.columns, noise, precision, np.array([best.ship.get(key) for key in keys])
-        ) + 1.0:
+        found = marginal(grams(columns, noise), columns, noise)
+        cost = found.quadratic + float(precision @ now**2)
+        if best is not None and cost > best.cost + 1.0:
             ship, starts = _halfway(best, ship, starts)
             continue
-        g = grams(columns, noise)
-        found = marginal(g, columns, noise)
+        if step == steps and step > 0:
+            noise = _colours(columns, noise, precision, ship, keys, colour_order)
+            found = marginal(grams(columns, noise), columns, noise)
         A = found.A + np.diag(precision)
         covariance = np.linalg.pinv(A, rcond=1e-14, hermitian=True) if len(keys) else np.zeros((0, 0))
         pull = found.s - precision * now
@@ -263,20 +264,14 @@ def fit(
         gained = float(move @ pull)
         best = Fit(
             ship=ship, keys=keys, free=len(free), covariance=covariance, starts=starts, noise=noise,
-            cost=np.nan, linear=linear, columns=columns, precision=precision,
+            cost=cost, linear=linear, columns=columns, precision=precision,
         )  # fmt: skip
         if step == steps or (gained < 0.01 and step > 0):
             break
         ship = ship.having(limited(ship, dict(zip(keys, (now + move).tolist(), strict=True))))
         starts = starts + _fitting_starts(_start_moves(columns, noise, move), ship.states)
     assert best is not None
-    return replace(best, cost=own_cost(best))
-
-
-def _cost_here(columns: Columns, noise: Noise, precision: Array, now: Array) -> float:
-    """Quadratic cost at the point of linearisation, wandering current and initial states at their best."""
-    found = marginal(grams(columns, noise), columns, noise)
-    return found.quadratic + float(precision @ now**2)
+    return best
 
 
 def profile_cost(found: Fit, noise: Noise) -> float:
@@ -286,12 +281,6 @@ def profile_cost(found: Fit, noise: Noise) -> float:
     pull = m.s - found.precision * now
     best = pull @ np.linalg.lstsq(m.A + np.diag(found.precision), pull, rcond=None)[0] if len(now) else 0.0
     return float(m.quadratic + found.precision @ now**2 - best)
-
-
-def own_cost(found: Fit) -> float:
-    """Twice the negative log likelihood with the fit's own noise."""
-    m = marginal(grams(found.columns, found.noise), found.columns, found.noise)
-    return profile_cost(found, found.noise) + m.log_det + _log_sizes(found.columns, found.noise)
 
 
 def _fitting_starts(starts: Array, n: int) -> Array:
@@ -355,7 +344,7 @@ def _colours(columns: Columns, noise, precision, ship, keys, order) -> Noise:  #
         noise = Noise(filters=np.ones((4, 1)), std=np.where(np.isfinite(spread) & (spread > 0), spread, np.inf))
         passes = 3
     else:
-        passes = 2
+        passes = 1
     now = np.array([ship.get(key) for key in keys])
     for _ in range(passes):
         g = grams(columns, noise)
@@ -387,9 +376,3 @@ def remainder(columns: Columns, g: Grams, noise: Noise, precision: Array, now: A
     trimmed = replace(columns, error=rest)
     starts = _start_moves(trimmed, noise, np.zeros(c))
     return np.asarray(rest - np.einsum("wn,nwsk->wsk", starts, columns.starts))
-
-
-def _log_sizes(columns: Columns, noise: Noise) -> float:
-    seen = np.isfinite(whitened(columns.error, noise))
-    used = np.isfinite(noise.std)
-    return float((2 * np.log(noise.std[used]) * seen.sum(axis=(0, 1))[used]).sum())

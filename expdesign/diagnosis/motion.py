@@ -74,9 +74,7 @@ def simulate_windows(ship: Extended, windows: Windows, start: Array) -> Motion:
     return Motion(ship=ship, windows=windows, around=around, states=states, turned=turned, shown=shown)
 
 
-def _rk4(
-    ship: Extended, x: tuple[Array, ...], around: Surroundings, h: float
-) -> tuple[tuple[Array, ...], Array]:
+def _rk4(ship: Extended, x: tuple[Array, ...], around: Surroundings, h: float) -> tuple[tuple[Array, ...], Array]:
     """The state one step on, and the heading gained."""
 
     def ahead(slope: tuple[Array, ...], share: float) -> tuple[Array, ...]:

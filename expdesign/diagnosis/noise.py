@@ -14,11 +14,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import lfilter
 
 from expdesign.values import Array
 
 ORDERS = (1, 2, 3, 4, 6, 8, 12)
 SHORTEST_PER_ORDER = 6
+NO_FEEDBACK = np.array([1.0, 0.0])
+"""With one coefficient instead of two SciPy takes a path through Python loops."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -50,11 +53,14 @@ def white_noise(std: Array) -> Noise:
 
 def whitened(values: Array, noise: Noise) -> Array:
     """(..., w, s - p, 4) filtered and in units of the remainder's standard deviation; nan where a tap is nan."""
-    p, size = noise.order, values.shape[-2]
-    total = np.zeros((*values.shape[:-2], size - p, values.shape[-1]))
-    for lag in range(p + 1):
-        total += noise.filters[:, lag] * values[..., p - lag : size - lag, :]
-    return np.asarray(total / noise.std)
+    p = noise.order
+    result = np.empty((*values.shape[:-2], values.shape[-2] - p, values.shape[-1]))
+    for channel, (taps, std) in enumerate(zip(noise.filters, noise.std, strict=True)):
+        if np.isfinite(std):
+            result[..., channel] = lfilter(taps / std, NO_FEEDBACK, values[..., channel], axis=-1)[..., p:]
+        else:
+            result[..., channel] = 0.0 * values[..., p:, channel]
+    return result
 
 
 def fit_colour(remainder: Array, *, order: int | None = None) -> Noise:

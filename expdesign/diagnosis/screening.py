@@ -56,11 +56,10 @@ class Screening:
     tests: float
 
 
-def screen(base: Fit, candidates: Sequence[Candidate], rng: np.random.Generator) -> Screening:
-    """Test every candidate against the fit without it."""
+def screen(base: Fit, candidates: Sequence[Candidate], rng: np.random.Generator | None = None) -> Screening:
+    """Test every candidate against the fit without it; without `rng` nothing is said of how many tests these are."""
     pushes = [push_of(base.linear, base.ship.having({k: base.ship.get(k) + d}), d) for k in base.keys
               for d in [step_of(base.ship, k)]]  # fmt: skip
-    blocks: list[tuple[Candidate, slice]] = []
     shared: dict[object, int] = {}
     place: list[list[int]] = []
     for candidate in candidates:
@@ -81,7 +80,6 @@ def screen(base: Fit, candidates: Sequence[Candidate], rng: np.random.Generator)
         solved = np.linalg.lstsq(own, np.column_stack([A[:c, c:], s[:c] - base.precision * now]), rcond=None)[0]
         s = s[c:] - A[c:, :c] @ solved[:, -1]
         A = A[c:, c:] - A[c:, :c] @ solved[:, :-1]
-    del blocks
     scored, halves = [], []
     size = np.sqrt(np.maximum(np.diag(m.A)[c:], 1e-300))
     for candidate, rows in zip(candidates, place, strict=True):
@@ -102,7 +100,7 @@ def screen(base: Fit, candidates: Sequence[Candidate], rng: np.random.Generator)
             )
         )
         halves.append((index, half / size[index][:, None]))
-    tests = _effective_tests(A, halves, rng) if scored else 1.0
+    tests = _effective_tests(A, halves, rng) if scored and rng is not None else 1.0
     return Screening(scored=tuple(sorted(scored, key=lambda item: item.p_value)), tests=tests)
 
 

@@ -18,12 +18,15 @@ from expdesign.values import Array
 
 Progress = Callable[[str, float], None]
 SHORTLIST = 7
+FINER = 11
 PER_CAUSE = 2
 PRICE = 5.0
 """Of every estimated number, in units of twice the log likelihood: a cause with fewer numbers is to be preferred."""
 AS_GOOD = 5.0
 """Twice the log likelihood by which the runner-up may trail and still count as not distinguishable: a wrong cause that
 truly trails by d comes out ahead by more than this with a probability below Phi(-sqrt(AS_GOOD))."""
+CLEARLY_LESS, MARGIN = 0.4, 20.0
+"""Candidates with less than this share of the largest statistic, and by more than this, are not fitted."""
 MOST_FINDINGS = 6
 
 
@@ -37,6 +40,7 @@ class Contender:
         gain: fall of twice the negative log likelihood.
         worth: the same less the price of its numbers.
         keys: its own free effects.
+        searched: the effect found by trying values, with its standard error.
     """
 
     candidate: Candidate
@@ -44,7 +48,7 @@ class Contender:
     gain: float
     worth: float
     keys: tuple[str, ...]
-    time_std: float = float("nan")
+    searched: tuple[str, float] | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -78,7 +82,7 @@ class Search:
 
 def search(ship: Extended, windows: Windows, starts: Array, rng: np.random.Generator, progress: Progress) -> Search:
     """Add causes until nothing significant is left."""
-    base = fit(ship, windows, (), starts=starts)
+    base = fit(ship, windows, (), starts=starts, steps=3)
     first, steps = base, []
     while True:
         share = 1.0 - 0.7 ** (len(steps) + 1)
@@ -111,7 +115,7 @@ def _step(base: Fit, windows: Windows, found: Screening, progress: Progress) -> 
             contenders.append(contender)
     contenders = _judged(base, contenders)
     for chosen in contenders[:1]:
-        p_value = min(1.0, found.tests * float(chi2.sf(max(chosen.gain, 0.0), len(chosen.keys))))
+        p_value = min(1.0, found.tests * float(chi2.sf(max(chosen.gain, 0.0), max(1, len(chosen.keys)))))
         if p_value > LEVEL:
             return None
         rivals: dict[str, Contender] = {}
@@ -128,9 +132,10 @@ def _shortlist(found: Screening) -> list[Scored]:
     ranked = sorted(found.scored, key=lambda item: PRICE * item.candidate.size - item.statistic)
     kept: list[Scored] = []
     count: dict[str, int] = {}
+    least = CLEARLY_LESS * max((item.statistic for item in ranked), default=0.0) - MARGIN
     for scored in ranked:
         cause = scored.candidate.cause
-        if scored.p_value * found.tests > 1.0 and kept:
+        if (scored.p_value * found.tests > 1.0 or scored.statistic < least) and kept:
             continue
         if cause not in count and len(count) == SHORTLIST:
             continue
@@ -142,22 +147,59 @@ def _shortlist(found: Screening) -> list[Scored]:
 
 def contend(base: Fit, windows: Windows, scored: Scored) -> Contender | None:
     """Fit a candidate together with everything found before."""
-    candidate = scored.candidate
-    start = dict(candidate.free.items())
-    if not candidate.finite:
-        start = {key: base.ship.get(key) for key in candidate.free}
+    candidate, searched = scored.candidate, (None if scored.candidate.grid is None else _searched(base, scored))
+    fixed = dict(candidate.fixed) if searched is None else {**candidate.fixed, searched[0]: searched[1]}
+    start = dict(candidate.free) if candidate.finite else {key: base.ship.get(key) for key in candidate.free}
     extra = tuple(key for key in ("roll:period",) if key in candidate.fixed)
-    keys = (*candidate.free, *extra)
-    ship = base.ship.having({**candidate.fixed, **start})
+    keys = tuple(key for key in (*candidate.free, *extra) if searched is None or key != searched[0])
     before = tuple(key for key in base.keys[: base.free] if key not in keys)
     try:
-        found = fit(ship, windows, (*before, *keys), starts=base.starts, noise=base.noise,
-                    colour_order=base.noise.order)  # fmt: skip
+        found = fit(base.ship.having({**start, **fixed}), windows, (*before, *keys), starts=base.starts,
+                    noise=base.noise, colour_order=base.noise.order)  # fmt: skip
+        gain = _gain(base, found, found)
     except (FloatingPointError, np.linalg.LinAlgError):
         return None
-    counted = len(keys) + (1 if candidate.grid and candidate.grid[0] not in keys else 0)
-    gain = _gain(base, found, found)
-    return Contender(candidate=candidate, fit=found, gain=gain, worth=gain - PRICE * counted, keys=keys)
+    counted = len(keys) + (searched is not None)
+    return Contender(
+        candidate=candidate,
+        fit=found,
+        gain=gain,
+        worth=gain - PRICE * counted,
+        keys=keys,
+        searched=None if searched is None else (searched[0], searched[2]),
+    )
+
+
+def _searched(base: Fit, scored: Scored) -> tuple[str, float, float]:
+    """Key, best value and standard error of the effect that is found by trying values."""
+    assert scored.candidate.grid is not None
+    key, values = scored.candidate.grid
+    best, std, width = values[0], float("nan"), 0.0
+    for _ in range(2):
+        tried = [_at(scored.candidate, key, value) for value in values]
+        results = {_value(item.candidate, key): item.statistic for item in screen(base, tried).scored}
+        if not results:
+            break
+        found = np.array(sorted(results))
+        statistics = np.array([results[value] for value in found])
+        best = float(found[np.argmax(statistics)])
+        width = float(np.min(np.diff(found))) if len(found) > 1 else 0.0
+        inside = found[statistics > statistics.max() - chi2.isf(LEVEL, 1)]
+        std = max(float(np.ptp(inside)) / 4.0, width / 3.5)
+        place = int(np.argmax(statistics))
+        low, high = found[max(place - 1, 0)], found[min(place + 1, len(found) - 1)]
+        values = tuple(np.linspace(low, high, FINER).tolist())
+    return key, best, std
+
+
+def _at(candidate: Candidate, key: str, value: float) -> Candidate:
+    if key in candidate.free:
+        return replace(candidate, free={**candidate.free, key: value})
+    return replace(candidate, fixed={**candidate.fixed, key: value})
+
+
+def _value(candidate: Candidate, key: str) -> float:
+    return candidate.free.get(key, candidate.fixed.get(key, 0.0))
 
 
 def _gain(base: Fit, found: Fit, judge: Fit) -> float:
@@ -169,11 +211,11 @@ def _judged(base: Fit, contenders: list[Contender]) -> list[Contender]:
     """Contenders by worth, all under the noise of the best."""
     if not contenders:
         return []
-    for _ in range(2):
-        judge = max(contenders, key=lambda item: item.worth)
-        judged = []
-        for item in contenders:
-            gain = _gain(base, item.fit, judge.fit)
-            judged.append(replace(item, gain=gain, worth=gain - (item.gain - item.worth)))
-        contenders = judged
+    judge = max(contenders, key=lambda item: item.worth).fit
+    without = profile_cost(base, judge.noise)
+    judged = []
+    for item in contenders:
+        gain = without - profile_cost(item.fit, judge.noise)
+        judged.append(replace(item, gain=gain, worth=gain - (item.gain - item.worth)))
+    contenders = judged
     return sorted(contenders, key=lambda item: -item.worth)

@@ -8,8 +8,16 @@ from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.actuator_lag import input_groups
 from expdesign.diagnosis.causes.words import first, rounded
 from expdesign.diagnosis.extended import members
+from expdesign.values import Array
 
 QUANTILES = (0.1, 0.2, 0.35, 0.5)
+SHARE, COUNT = 0.75, 40
+
+
+def between(widths: Array, levels: Array) -> list[float]:
+    """Widths moved to the middle between the levels around them, as no data tell more."""
+    place = np.clip(np.searchsorted(levels, widths, side="right"), 1, len(levels) - 1)
+    return sorted(set(((levels[place - 1] + levels[place]) / 2).tolist()))
 
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
@@ -22,16 +30,14 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
         if len({inputs[c].rstrip("0123456789") for c in columns}) > 1:
             continue  # inputs of different units share no width
         sizes = np.concatenate([np.abs(rows[:, columns]).ravel() for rows in situation.windows.batch_inputs])
-        widths = sorted({float(np.quantile(sizes[sizes > 0], q)) for q in QUANTILES}) if (sizes > 0).any() else []
-        grid = tuple(np.unique(np.quantile(sizes[sizes > 0], np.linspace(0.02, 0.7, 30)))) if widths else ()
+        levels = np.unique(sizes[sizes > 0])
+        if len(levels) < 3:
+            continue  # nothing is small beside the rest
+        key = f"deadband:{group}"
+        grid = tuple(between(np.quantile(levels, np.linspace(0.0, SHARE, COUNT)), levels))
         found += [
-            Candidate(
-                cause="actuator_deadband",
-                free={f"deadband:{group}": 1.0001 * width},
-                finite=True,
-                grid=(f"deadband:{group}", tuple(1.0001 * value for value in grid)),
-            )
-            for width in widths
+            Candidate(cause="actuator_deadband", free={key: float(width)}, finite=True, grid=(key, grid))
+            for width in between(np.quantile(sizes[sizes > 0], QUANTILES), levels)
         ]
     return tuple(found)
 

@@ -26,8 +26,8 @@ def _explain(values: Values) -> str:
             f"thrust acted that far to {'port' if value > 0 else 'starboard'}. The ship turns at zero angle."
         )
     return (
-        f"The angle of {key.split(':')[1]} is off by {rounded(57.29578 * value, 57.29578 * std)} degrees: the ship turns "
-        f"when it is commanded straight."
+        f"The angle of {key.split(':')[1]} is off by {rounded(57.29578 * value, 57.29578 * std)} degrees: the ship "
+        f"turns when it is commanded straight."
     )
 
 

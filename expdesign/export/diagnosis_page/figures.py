@@ -55,6 +55,8 @@ def growth_figure(found: Diagnosis) -> str:
             axes.plot(found.after.horizons_s, factor * found.after.growth[:, index], "s-", color=BLUE,
                       label="extended model", markersize=3.5)  # fmt: skip
         axes.set_xscale("log")
+        axes.set_xticks(found.before.horizons_s, [f"{value:g}" for value in found.before.horizons_s])
+        axes.minorticks_off()
         axes.set_ylim(bottom=0.0)
         axes.set_title(f"error of {label}")
         axes.set_xlabel("horizon [s]")
