@@ -6,9 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
+from expdesign.dictionary import build_dictionary
+from expdesign.durations.validation import Rehearsal, Validated, validate
 from expdesign.errors import NoAnswer
 from expdesign.estimation.methods import estimate
 from expdesign.scenario import load_vessel
+from expdesign.scenario.dictionary_file import load_dictionary
 from expdesign.signals import Batch, Record
 from expdesign.simulation import Environment, Variation, simulate_ensemble
 from expdesign.vessel import Sensors, Vessel
@@ -55,6 +58,7 @@ def record(*batches: Batch) -> Record:
 
 CALM_CURRENT = Environment(current_variation=Variation(std_mps=0.03))
 STEADY_CURRENT = Environment(current_to=CURRENT, current_variation=Variation(std_mps=0.03))
+WANDERING_CURRENT = Environment(current_to=CURRENT, current_variation=Variation(std_mps=0.03, correlation_s=100.0))
 MERGED = {"X_abs_u_u": "W_abs_u_u", "Y_abs_v_v": "W_abs_v_v", "N_uv": "W_uv"}
 
 
@@ -95,3 +99,27 @@ def drawn_trials(trials: int, samples: int, weather: Environment, rng: np.random
         inputs = np.stack([commands(samples, rng) for _ in range(runs)], axis=1)
         many = simulate_ensemble(TRUE, inputs, runs=runs, environment=weather, rng=rng, velocity=(1.7, 0.7, 0.0))
         yield from (many.batch(run) for run in range(runs))
+
+
+SHORT_RUNS = (2, 1, 0, 0, 0, 4, 0, 2, 0, 0, 3)
+"""Optimal whole runs of the model ship's dictionary in 450 s: twelve batches of 300 samples."""
+
+
+def many_short_batches(trials: int, *, seed: int = 0) -> Validated:
+    """Trials of the model ship, `iv`, by Euler's map with quiet sensors and a white current."""
+    model_ship = load_vessel(ROOT / "scenarios/vessels/model-ship.toml")
+    true = load_vessel(ROOT / "scenarios/vessels/model-ship-true.toml")
+    rehearsal = Rehearsal(
+        truth=replace(true, sensors=Sensors(velocity_mps=0.03, yaw_rate_radps=0.03)),
+        nominal=model_ship,
+        primitives=build_dictionary(model_ship, load_dictionary(ROOT / "scenarios/dictionaries/model-ship.toml")),
+        designs={"optimised": SHORT_RUNS},
+        total_s=450.0,
+        environment=Environment(current_variation=Variation(std_mps=0.02)),
+        parameters=true.model.names,
+        integrator="euler",
+        trials=trials,
+        seed=seed,
+    )
+    (result,) = validate(rehearsal)
+    return result

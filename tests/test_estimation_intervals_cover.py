@@ -11,7 +11,8 @@ from estimation_case import CALM_CURRENT, NOMINAL, STEADY_CURRENT, TRUE, command
 from expdesign.estimation.methods import Settings, estimate
 from expdesign.estimation.regression import single_output
 from expdesign.estimation.solution import Weighting, solve_iv
-from expdesign.estimation.whitening import Colour, fitted_colour, timeline, white_parts
+from expdesign.estimation.timeline import timeline
+from expdesign.estimation.whitening import Colour, fitted_colour, white_parts
 from expdesign.signals import Record
 from expdesign.simulation import Environment
 

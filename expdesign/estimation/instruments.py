@@ -14,17 +14,20 @@ regressors. Relative wind is, by choice,
   variation shows is then biased towards zero, by the anemometer's share of that variation; for winds white from sample
   to sample there is nothing else.
 
+Simulations start from the first measured velocity, whose noise is in the first residual too. The first row of every
+batch is therefore not used: with it, many short batches are biased by half a standard deviation.
+
 Source: F. Ljungberg, doctoral thesis, Linköping University, (4.37)-(4.39), for velocities.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from expdesign.errors import InputError, UnknownName
+from expdesign.errors import InputError, NotInformative, UnknownName
 from expdesign.estimation.nuisance import batch_signs
 from expdesign.estimation.predictors import Layout, Rows
 from expdesign.estimation.regression import Integers
@@ -100,10 +103,32 @@ class InstrumentModel:
         return self.layout.rows({**table, **moved}, signs, used=_run(self.rows.used[index]), scale=ratio)
 
 
+def apart_from_start(rows: Rows) -> Rows:
+    """The same without the first pair of samples of every batch, whose noise the instruments share.
+
+    Raises:
+        NotInformative: nothing is left.
+    """
+    regression = rows.regression
+    kept = regression.step_of > 0
+    if not kept.any():
+        raise NotInformative("instruments need batches of three samples or more")
+    shorter = replace(
+        regression,
+        Phi=regression.Phi[kept],
+        y=regression.y[kept],
+        batch=regression.batch_of[kept],
+        step=regression.step_of[kept],
+    )
+    return replace(rows, regression=shorter, used=tuple(places[places > 0] for places in rows.used))
+
+
 def _run(places: Integers) -> Integers | slice:
-    """The same places, as a slice where none is left out."""
-    whole = len(places) == places[-1] + 1 if len(places) else False
-    return slice(0, len(places)) if whole else places
+    """The same places, as a slice where none is left out between them."""
+    if not len(places):
+        return slice(0, 0)
+    whole = len(places) == places[-1] - places[0] + 1
+    return slice(int(places[0]), int(places[-1]) + 1) if whole else places
 
 
 def carried_heading(measured: Array, simulated: Array) -> Array:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from expdesign.errors import Diverged, UnknownName
-from expdesign.estimation.instruments import InstrumentModel
+from expdesign.estimation.instruments import InstrumentModel, apart_from_start
 from expdesign.estimation.null_space import NullSpace
 from expdesign.estimation.output_error import Fitting, minimise_output_error
 from expdesign.estimation.predictors import Layout, Rows, build_layout, build_regression
@@ -125,6 +125,8 @@ def estimate(record: Record, model: VesselModel, *, method: str = "iv", settings
         quadrature=choices.quadrature,
     )
     rows = build_regression(layout, record)
+    if chosen.solver == "iv":
+        rows = apart_from_start(rows)
     refined = _instrumental(layout, record, rows, choices) if chosen.solver == "iv" else _least_squares(rows, choices)
     if chosen.solver == "oe":
         solution, regression = minimise_output_error(layout, record, refined.solution, _fitting(choices))
@@ -189,7 +191,13 @@ def _estimate(method: Method, layout: Layout, rows: Rows, refined: Refined) -> E
         residuals=_statistics(rows.regression, solution, rows.left_out),
         null_space=solution.null_space,
         refinements=refined.refinements,
-        warnings=(*layout.notes, *_row_notes(rows), *refined.warnings, *faint_notes(solution.null_space)),
+        warnings=(
+            *layout.notes,
+            *_row_notes(rows),
+            *refined.warnings,
+            *solution.warnings,
+            *faint_notes(solution.null_space),
+        ),
     )
 
 

@@ -1,12 +1,7 @@
 """LS and IV: the estimate, its covariance and its residuals, from a regression and instruments.
 
     theta = (sum Z Phi^T)^-1 sum Z y                          LS is IV with Z = Phi
-    P = G^-1 Omega G^-T,   G = sum Z Phi^T,   Omega = long-run covariance of Z(k) eps(k)
-
-Residuals of one-step predictors from noisy data are coloured (noise enters at k and, through Phi, at k - 1), so Omega
-is by default robust to both changing variance and correlation in time ("hac"): the residuals are made white first, and
-a kernel counts what colour is left, see `whitening`. "kernel" is robust to both too, by the kernel alone; "hc0" and
-"hc1" are robust to changing variance only. These three are as in econometric software.
+    P = G^-1 Omega G^-T,   G = sum Z Phi^T,   Omega = covariance of sum Z(k) eps(k), see `sandwich`
 
 With one block of instruments per batch there are more equations than unknowns; they are weighted by the inverse second
 moments of the instruments (two-stage least squares), which keeps the estimate free of the scale of parameters, or by
@@ -23,13 +18,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from expdesign.errors import InputError, ShapeError
-from expdesign.estimation.long_run import automatic_lags, long_run_covariance, lost_share
 from expdesign.estimation.null_space import NullSpace, joined, require_informative
-from expdesign.estimation.regression import Regression, batch_slices
-from expdesign.estimation.systems import System, instruments_of, occupied, solvers, split
+from expdesign.estimation.regression import Regression
+from expdesign.estimation.sandwich import by_batch, covariance_of
+from expdesign.estimation.systems import Part, System, instruments_of, occupied, solvers, split
 from expdesign.estimation.weighting import Weighting as Weighting
-from expdesign.estimation.whitening import Timeline, timeline, white_parts
-from expdesign.estimation.zero_mean import subtract_mean
 from expdesign.values import Array, seal
 
 
@@ -41,8 +34,9 @@ class Solution:
         values: (p,) estimate.
         covariance: (p, p) of the estimate.
         residuals: (k, n) one-step residuals; with zero-mean instruments without their mean.
-        lags: last lag that the covariance counts.
+        lags: last lag that a kernel of the covariance counts, 0 where there is none.
         null_space: what the data cannot see.
+        warnings: one sentence each.
     """
 
     values: Array
@@ -50,6 +44,7 @@ class Solution:
     residuals: Array
     lags: int
     null_space: NullSpace = field(repr=False)
+    warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         seal(self, values="p", covariance="p p", residuals="k n")
@@ -110,8 +105,15 @@ def solve(equations: Equations, instruments: Array) -> Solution:
         theta, left = part.solved(weighting.mean)
         values[part.system.columns], residuals[:, part.system.outputs] = theta, left
     found = joined([part.found for part in parts])
-    covariance, lags = _covariance(equations, parts, residuals)
-    return Solution(values=values, covariance=covariance, residuals=residuals, lags=lags, null_space=found)
+    said = covariance_of(regression, weighting, parts, residuals)
+    return Solution(
+        values=values,
+        covariance=said.covariance,
+        residuals=residuals,
+        lags=said.lags,
+        null_space=found,
+        warnings=said.warnings,
+    )
 
 
 def solve_quick(equations: Equations, instruments: Array) -> tuple[Array, Array]:
@@ -120,7 +122,7 @@ def solve_quick(equations: Equations, instruments: Array) -> tuple[Array, Array]
     values, std = np.zeros((2, len(equations.regression.parameters)))
     for part in _parts(equations, instruments, exogenous=True):  # spares the search for weak instruments
         theta, left = part.solved(equations.weighting.mean)
-        influences = _by_batch(part, np.einsum("knp,kn->kp", part.Z, left), part.system.parts)
+        influences = by_batch(part.A, np.einsum("knp,kn->kp", part.Z, left), part.system.parts)
         values[part.system.columns] = theta
         std[part.system.columns] = np.sqrt(np.einsum("kp,kp->p", influences, influences))
     return values, std
@@ -134,31 +136,6 @@ def _fitting(equations: Equations, instruments: Array) -> Equations:
     return build_equations(equations.regression, instruments, equations.weighting)
 
 
-@dataclass(frozen=True, eq=False)
-class Part:
-    """A system with its instruments.
-
-    Attributes:
-        system: the part of the regression.
-        Z: (k, n, p) instruments, without mean and weighted.
-        A: (p, p) per batch, with theta = sum over batches of A sum Z y.
-        found: what its data cannot see.
-    """
-
-    system: System
-    Z: Array
-    A: list[Array]
-    found: NullSpace
-
-    def solved(self, mean: str) -> tuple[Array, Array]:
-        """Parameters (p,) and residuals (k, n) without the mean that instruments are without."""
-        system, p = self.system, len(self.system.names)
-        theta = np.zeros(p)
-        for rows, A in zip(system.parts, self.A, strict=True):
-            theta += A @ (self.Z[rows].reshape(-1, p).T @ system.y[rows].ravel())
-        return theta, subtract_mean(system.y - system.Phi @ theta, system.batch, mean)
-
-
 def _parts(equations: Equations, instruments: Array, *, exogenous: bool) -> list[Part]:
     parts = []
     for system in equations.systems:
@@ -166,35 +143,6 @@ def _parts(equations: Equations, instruments: Array, *, exogenous: bool) -> list
         parts.append(Part(system, Z, *solvers(system, Z, equations.weighting, exogenous=exogenous)))
     require_informative(joined([part.found for part in parts]))
     return parts
-
-
-def _covariance(equations: Equations, parts: list[Part], residuals: Array) -> tuple[Array, int]:
-    """(p, p), and the last lag counted."""
-    regression, weighting = equations.regression, equations.weighting
-    p, kind = len(regression.parameters), weighting.covariance
-    when = timeline(regression.batch_of, regression.step_of)
-    scores = np.zeros((len(when.batch), p))
-    lags = 0 if weighting.lags is None or kind in ("hc0", "hc1") else weighting.lags
-    for part in parts:
-        own = _influences(part, residuals[:, part.system.outputs], when, white=kind == "hac")
-        scores[:, part.system.columns] = own
-        if weighting.lags is None and kind in ("hac", "kernel"):
-            lags = max(lags, automatic_lags(own, when.batch, when.step, kernel=weighting.kernel))
-    P = long_run_covariance(scores, when.batch, when.step, lags=lags, kernel=weighting.kernel)
-    factor = 1.0 if kind == "hc0" else residuals.size / max(1, residuals.size - p)
-    if kind == "hac":
-        factor /= 1.0 - lost_share(len(regression), lags=lags, kernel=weighting.kernel)
-    return factor * P, lags
-
-
-def _influences(part: Part, left: Array, when: Timeline, *, white: bool) -> Array:
-    """(t, p) what each sample adds to the error of the estimate, or, made white, terms of the same sum."""
-    Z, left = white_parts(part.Z, left, when) if white else (when.spread(part.Z), when.spread(left))
-    return _by_batch(part, np.einsum("knp,kn->kp", Z, left), batch_slices(when.batch))
-
-
-def _by_batch(part: Part, scores: Array, batches: list[slice]) -> Array:
-    return np.concatenate([scores[rows] @ A.T for rows, A in zip(batches, part.A, strict=True)])
 
 
 def _power(regression: Regression, instruments: Array) -> Array:

@@ -89,6 +89,31 @@ def _cut(whole: Array, outputs: Integers, columns: Integers) -> Array:
     return np.asarray(whole.transpose(1, 2, 0)[outputs[:, None], columns].transpose(2, 0, 1))
 
 
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A system with its instruments.
+
+    Attributes:
+        system: the part of the regression.
+        Z: (k, n, p) instruments, without mean and weighted.
+        A: (p, p) per batch, with theta = sum over batches of A sum Z y.
+        found: what its data cannot see.
+    """
+
+    system: System
+    Z: Array
+    A: list[Array]
+    found: NullSpace
+
+    def solved(self, mean: str) -> tuple[Array, Array]:
+        """Parameters (p,) and residuals (k, n) without the mean that instruments are without."""
+        system, p = self.system, len(self.system.names)
+        theta = np.zeros(p)
+        for rows, A in zip(system.parts, self.A, strict=True):
+            theta += A @ (self.Z[rows].reshape(-1, p).T @ system.y[rows].ravel())
+        return theta, subtract_mean(system.y - system.Phi @ theta, system.batch, mean)
+
+
 def instruments_of(system: System, instruments: Array, weighting: Weighting) -> Array:
     """(k, n, p) instruments of a part, without mean and weighted."""
     Z = subtract_mean(system.cut(instruments), system.batch, weighting.mean)

@@ -8,7 +8,7 @@ import numpy as np
 
 from expdesign.errors import InputError, UnknownName
 
-COVARIANCES = ("hac", "kernel", "hc1", "hc0")
+COVARIANCES = ("components", "hac", "kernel", "hc1", "hc0")
 BLOCKS = ("one", "batch")
 
 
@@ -21,7 +21,7 @@ class Weighting:
         blocks: "one" block of instruments for all batches, or one per "batch" (4.45).
         batch_weights: one factor per batch, how much its equations count; () for all alike.
         output_weights: one factor per output, how much its equation counts; () for all alike.
-        covariance: one of `COVARIANCES`, see `solution`.
+        covariance: one of `COVARIANCES`, see `sandwich`.
         kernel: of the "hac" and "kernel" covariance.
         lags: their last lag, None for automatic.
     """
@@ -30,7 +30,7 @@ class Weighting:
     blocks: str = "one"
     batch_weights: tuple[float, ...] = ()
     output_weights: tuple[float, ...] = ()
-    covariance: str = "hac"
+    covariance: str = "components"
     kernel: str = "parzen"
     lags: int | None = None
 

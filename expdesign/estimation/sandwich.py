@@ -1,0 +1,166 @@
+"""The covariance of an estimate: what its instruments make of the noise in the residuals.
+
+    P = sum over k, l of W(k) cov(eps(k), eps(l)) W(l)^T,    W = G^-1 Z
+
+Residuals of one-step predictors from noisy data are coloured: noise enters at k and, through Phi, at k - 1, where it
+nearly cancels; disturbances may last. By choice,
+
+- "components", the default: noise is a sum of white, sensor and slow parts, whose variances are estimated, and P is
+  exact for them, for one long batch as for many short ones, see `components`. Both assumptions are tested. Where the
+  variance changes with the instruments (White's test, 1 % for all parameters of an equation together), standard
+  deviations are multiplied by what White's factor says of the whitened residuals. Where the parts do not fit the
+  periodogram (Bartlett's test, 1 %), they are those of "hac" where these are larger, and a warning says so.
+- "hac": robust to changing variance and to any correlation in time that a kernel with few lags sees after the residuals
+  are made white, see `whitening`. Disturbances that last for tens of samples are seen in part.
+- "kernel": robust to both too, by the kernel alone; "hc0" and "hc1" are robust to changing variance only. These three
+  are as in econometric software.
+
+Source: L. P. Hansen, Econometrica 50 (1982), 1029-1054; H. White, Econometrica 48 (1980), 817-838.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import norm
+
+from expdesign.estimation.components import MISFIT, Components, fit_components, score_covariance
+from expdesign.estimation.long_run import automatic_lags, long_run_covariance, lost_share
+from expdesign.estimation.regression import Regression, batch_slices
+from expdesign.estimation.systems import Part
+from expdesign.estimation.timeline import Timeline, stretches, timeline
+from expdesign.estimation.weighting import Weighting
+from expdesign.estimation.whitening import white_parts
+from expdesign.values import Array
+
+LEVEL = 0.01
+"""Of White's test."""
+
+
+@dataclass(frozen=True, eq=False)
+class Uncertainty:
+    """How uncertain an estimate is.
+
+    Attributes:
+        covariance: (p, p).
+        lags: last lag that a kernel counts.
+        warnings: one sentence each.
+    """
+
+    covariance: Array
+    lags: int
+    warnings: tuple[str, ...] = ()
+
+
+def covariance_of(regression: Regression, weighting: Weighting, parts: Sequence[Part], residuals: Array) -> Uncertainty:
+    """The covariance that a weighting asks for, of the estimate from parts with residuals (k, n)."""
+    p, kind = len(regression.parameters), weighting.covariance
+    when = timeline(regression.batch_of, regression.step_of)
+    terms = [_Terms(part, residuals[:, part.system.outputs], when, kind in ("components", "hac")) for part in parts]
+    factor = 1.0 if kind == "hc0" else residuals.size / max(1, residuals.size - p)
+    if kind != "components":
+        P, lags = _summed(terms, weighting, p, len(regression))
+        return Uncertainty(factor * P, lags)
+    return _by_components(regression, weighting, terms, residuals, factor)
+
+
+class _Terms:
+    """Terms whose sum is the error of a part's estimate.
+
+    Attributes:
+        part: the part.
+        when: where its rows stand.
+        zeta, n: (t, n, p) and (t, n) instruments and residuals, made white if wished.
+    """
+
+    def __init__(self, part: Part, left: Array, when: Timeline, white: bool) -> None:
+        self.part, self.when = part, when
+        self.zeta, self.n = white_parts(part.Z, left, when) if white else (when.spread(part.Z), when.spread(left))
+
+    def influences(self) -> Array:
+        """(t, p) what each term adds."""
+        return self._led(np.einsum("knp,kn->kp", self.zeta, self.n))
+
+    def white_factor(self) -> Array:
+        """(p,) by how much changing variance adds to the variance of parameters, where it clearly does; else 1."""
+        even, changing, chance = np.zeros((3, self.zeta.shape[2]))
+        for output in range(self.n.shape[1]):
+            squares = self.n[self.when.place, output] ** 2
+            level = float(squares.mean())
+            shares = self._led(self.zeta[:, output])[self.when.place] ** 2
+            even += level * shares.sum(axis=0)
+            changing += squares @ shares
+            chance += ((squares - level) ** 2).mean() * ((shares - shares.mean(axis=0)) ** 2).sum(axis=0)
+        clear = changing - even > norm.isf(LEVEL / len(even)) * np.sqrt(chance)
+        return np.where(clear, np.divide(changing, even, out=np.ones_like(even), where=even > 0), 1.0)
+
+    def _led(self, scores: Array) -> Array:
+        return by_batch([self.part.A[owner] for owner in self.when.owner], scores, batch_slices(self.when.batch))
+
+
+def _summed(terms: Sequence[_Terms], weighting: Weighting, p: int, rows: int) -> tuple[Array, int]:
+    """(p, p) long-run covariance of the terms, and the last lag counted."""
+    when, kind = terms[0].when, weighting.covariance
+    scores = np.zeros((len(when.batch), p))
+    lags = 0 if weighting.lags is None or kind in ("hc0", "hc1") else weighting.lags
+    for item in terms:
+        own = item.influences()
+        scores[:, item.part.system.columns] = own
+        if weighting.lags is None and kind not in ("hc0", "hc1"):
+            lags = max(lags, automatic_lags(own, when.batch, when.step, kernel=weighting.kernel))
+    P = long_run_covariance(scores, when.batch, when.step, lags=lags, kernel=weighting.kernel)
+    if kind in ("hac", "components"):
+        P = P / (1.0 - lost_share(rows, lags=lags, kernel=weighting.kernel))
+    return P, lags
+
+
+def _by_components(
+    regression: Regression, weighting: Weighting, terms: Sequence[_Terms], residuals: Array, factor: float
+) -> Uncertainty:
+    parts = stretches(regression.batch_of, regression.step_of)
+    fitted = [fit_components(residuals[:, output], parts) for output in range(residuals.shape[1])]
+    P = factor * _exact(regression, terms, residuals, fitted)
+    scale, odd = np.ones((2, len(P)))
+    for item in terms:
+        system = item.part.system
+        scale[system.columns] = np.sqrt(item.white_factor())
+        odd[system.columns] = max(fitted[output].misfit for output in system.outputs)
+    lags, warnings = 0, []
+    if (odd > MISFIT).any():
+        other, lags = _summed(terms, weighting, len(P), len(regression))
+        variances = np.diag(P) * scale**2
+        ratio = np.divide(factor * np.diag(other), variances, out=np.ones_like(variances), where=variances > 0)
+        scale *= np.where(odd > MISFIT, np.sqrt(np.maximum(ratio, 1.0)), 1.0)
+        names = [name for name, item in zip(regression.outputs, fitted, strict=True) if item.misfit > MISFIT]
+        warnings.append(
+            f"Residuals of {', '.join(names)} are coloured otherwise than sensor noise and lasting disturbances colour "
+            "them; standard deviations are the larger of two kinds."
+        )
+    return Uncertainty(P * np.outer(scale, scale), lags, tuple(warnings))
+
+
+def _exact(regression: Regression, terms: Sequence[_Terms], residuals: Array, fitted: Sequence[Components]) -> Array:
+    """(p, p) covariance of an estimate under noise of these parts."""
+    parts = stretches(regression.batch_of, regression.step_of)
+    W, columns = [], []
+    for output in range(residuals.shape[1]):
+        own = next((item.part for item in terms if output in item.part.system.outputs), None)
+        if own is None:
+            W.append(np.zeros((len(regression), 0)))
+            columns.append(np.zeros(0, dtype=np.int64))
+            continue
+        place = int(np.flatnonzero(own.system.outputs == output)[0])
+        W.append(by_batch(own.A, own.Z[:, place], own.system.parts))
+        columns.append(own.system.columns)
+    P = np.zeros((len(regression.parameters),) * 2)
+    for row, blocks in zip(columns, score_covariance(W, residuals, fitted, parts), strict=True):
+        for column, block in zip(columns, blocks, strict=True):
+            P[np.ix_(row, column)] += block
+    return P
+
+
+def by_batch(A: Sequence[Array], scores: Array, batches: Sequence[slice]) -> Array:
+    """Scores (k, p), as what they add to the estimate, with each batch's own A (p, p)."""
+    return np.concatenate([scores[rows] @ own.T for rows, own in zip(batches, A, strict=True)])
