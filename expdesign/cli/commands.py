@@ -497,6 +497,59 @@ def indices(
     )
 
 
+@app.command()
+def mine(
+    data: Annotated[
+        list[Path], typer.Argument(metavar="DATA.csv ...", help="Measured runs; what is read is told in the README.")
+    ],
+    vessel: Annotated[
+        Path, typer.Option("--vessel", metavar="VESSEL.toml", help="Nominal model; its simulation gives instruments.")
+    ],
+    keep: Annotated[int, typer.Option("--keep", metavar="K", help="How many batches to choose.")],
+    piece: Annotated[
+        float | None,
+        typer.Option("--piece", metavar="SECONDS", help="Cut runs into pieces of about this length first."),
+    ] = None,
+    fixed: Annotated[
+        list[str] | None, typer.Option("--fixed", metavar="NAME ...", help="Parameters that count as known.")
+    ] = None,
+    mean: Annotated[
+        str, typer.Option(metavar="HOW", help="Mean taken off the instruments, as in `estimate`.")
+    ] = "complete",
+    velocity: Annotated[str, typer.Option(metavar="HOW", help="Where u, v, r come from, as in `estimate`.")] = "auto",
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", metavar="FOLDER", help="Where to write; runs/<first data file> when not given."),
+    ] = None,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> None:
+    """Rank recorded runs by what they tell, and choose the few to estimate from again.
+
+    Writes mining.json and chosen.csv, which `estimate` reads.
+
+    Example: expdesign mine voyage.csv --vessel ship.toml --piece 120 --keep 10
+    """
+    from expdesign import workflows
+
+    _carry_out(
+        "mine",
+        lambda tell: workflows.mine(
+            tuple(data),
+            check_out(out),
+            vessel=vessel,
+            keep=keep,
+            piece_s=piece,
+            fixed=tuple(fixed or ()),
+            mean=mean,
+            velocity=velocity,
+            progress=tell,
+        ),
+        quiet,
+        json,
+    )
+
+
 @app.command("check-route")
 def check_route(
     files: Annotated[list[Path], typer.Argument(metavar="ROUTE.rtz ...", help="RTZ or GPX files of any origin.")],

@@ -24,7 +24,7 @@ from expdesign.durations.task import symmetric_part
 from expdesign.durations.values import DurationProblem
 from expdesign.errors import InputError, NotInformative
 from expdesign.information.recorded import BatchInformation
-from expdesign.values import Array
+from expdesign.values import Array, seal
 
 LARGEST_EXACT = 20_000
 """Subsets up to this number are all tried."""
@@ -38,8 +38,12 @@ class Subset:
         names: of all batches, most informative first: in the order in which greedy choice would take them.
         chosen: of those to estimate from.
         efficiency: against all batches together, by the criterion.
-        bound: no subset of that size has a higher efficiency; the same as `efficiency` where all were tried.
+        bound: no subset of that size has a higher efficiency; the same as `efficiency` where all were tried, nan where
+            none is known.
         exact: whether all were tried.
+        symmetric: whether the symmetric part of the information counted; else the magnitude of its determinant, which
+            guarantees nothing.
+        first: (N,) efficiency of the first 1, 2, ... N of `names`; 0 while they do not inform about every parameter.
     """
 
     names: tuple[str, ...]
@@ -47,6 +51,11 @@ class Subset:
     efficiency: float
     bound: float
     exact: bool
+    symmetric: bool
+    first: Array
+
+    def __post_init__(self) -> None:
+        seal(self, first="N")
 
 
 def best_subset(
@@ -59,7 +68,8 @@ def best_subset(
 ) -> Subset:
     """Rank recorded batches and choose `size` of them for re-estimation.
 
-    The symmetric part of each batch's matrix counts, which is a guaranteed part of its information.
+    The symmetric part of each batch's matrix counts, which is a guaranteed part of its information. Where the nominal
+    model is so far off that all batches together have none, the magnitude of the determinant counts instead.
 
     Args:
         batches: measured or simulated, see `information.recorded_information`.
@@ -74,8 +84,8 @@ def best_subset(
     """
     if not 1 <= size <= len(batches):
         raise InputError(f"{size} of {len(batches)} batches cannot be chosen, expected 1 to {len(batches)}")
-    problem = _pool(batches, parameters, mean_subtraction, aim or Aim())
-    collected, shares = Collected.of(problem), problem.run_s / problem.total_s
+    problem, collected = _pool(batches, parameters, mean_subtraction, aim or Aim())
+    shares = problem.run_s / problem.total_s
     order = _greedy(collected, shares)
     exact = comb(len(batches), size) <= LARGEST_EXACT
     if exact:
@@ -91,18 +101,20 @@ def best_subset(
         names=tuple(problem.names[index] for index in order),
         chosen=tuple(problem.names[index] for index in sorted(chosen)),
         efficiency=efficiency,
-        bound=efficiency if exact else max(_relaxed(problem, collected, size), efficiency),
+        bound=efficiency if exact else _bound(problem, collected, size, efficiency),
         exact=exact,
+        symmetric=collected.symmetric,
+        first=np.array([collected.efficiency(_indicator(shares, order[: k + 1]), shares) for k in range(len(order))]),
     )
 
 
 def _pool(
     batches: Sequence[BatchInformation], parameters: Sequence[str], mean_subtraction: str, aim: Aim
-) -> DurationProblem:
-    """All batches as primitives of one run each, in a time that holds them all."""
-    matrices = symmetric_part(np.array([batch.bordered(mean_subtraction) for batch in batches]))
+) -> tuple[DurationProblem, Collected]:
+    """All batches as primitives of one run each, in a time that holds them all, and what counts of them."""
+    matrices = np.array([batch.bordered(mean_subtraction) for batch in batches])
     samples = np.array([float(batch.samples) for batch in batches])
-    return DurationProblem(
+    problem = DurationProblem(
         names=tuple(batch.name for batch in batches),
         parameters=tuple(parameters),
         mean_subtraction=mean_subtraction,
@@ -111,6 +123,16 @@ def _pool(
         total_s=float(samples.sum()),
         aim=aim,
     )
+    definite = replace(problem, matrices=symmetric_part(matrices))
+    try:
+        return definite, Collected.of(definite)
+    except NotInformative:
+        if problem.symmetric or aim.criterion != "D":
+            raise
+    collected = Collected.of(problem)
+    if not np.isfinite(collected.value(samples / samples.sum())):
+        raise NotInformative("all batches together do not inform about every parameter", parameters=tuple(parameters))
+    return problem, collected
 
 
 def _indicator(shares: Array, chosen: Sequence[int]) -> Array:
@@ -148,6 +170,10 @@ def _exchanged(collected: Collected, shares: Array, chosen: tuple[int, ...]) -> 
         if not values or max(values) <= best + 1e-12:
             return chosen
         best, chosen = max(values), swaps[int(np.argmax(values))]
+
+
+def _bound(problem: DurationProblem, collected: Collected, size: int, efficiency: float) -> float:
+    return max(_relaxed(problem, collected, size), efficiency) if collected.symmetric else float("nan")
 
 
 def _relaxed(problem: DurationProblem, collected: Collected, size: int) -> float:

@@ -27,7 +27,7 @@ from expdesign.estimation.methods import Settings, estimate
 from expdesign.estimation.solution import Weighting
 from expdesign.information.expected import TrialPart, expected_covariance
 from expdesign.information.moments import HEADINGS
-from expdesign.signals import Record
+from expdesign.signals import Batch, Record
 from expdesign.simulation import CALM, Environment, simulate_ensemble
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array, seal
@@ -221,7 +221,7 @@ def _sailed(
     rehearsal: Rehearsal, runs: Sequence[int], weather: Environment, trials: int, rng: np.random.Generator
 ) -> list[Record]:
     """What every trial measures, one batch for each whole run."""
-    batches = []
+    batches: list[list[Batch]] = []
     for primitive, count in zip(rehearsal.primitives, runs, strict=True):
         for repeat in range(count):
             ensemble = simulate_ensemble(

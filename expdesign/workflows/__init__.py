@@ -8,6 +8,7 @@ from expdesign.workflows.after import estimate, export, measured, simulate
 from expdesign.workflows.design import designed, duration_problem
 from expdesign.workflows.diagnosed import diagnose
 from expdesign.workflows.indices import check_routes, indices
+from expdesign.workflows.mined import mine
 from expdesign.workflows.outcome import Outcome, Progress, TextTable
 from expdesign.workflows.replan import replan
 from expdesign.workflows.trial import durations, plan, planned, run, score, scored
@@ -27,6 +28,7 @@ __all__ = [
     "export",
     "indices",
     "measured",
+    "mine",
     "plan",
     "planned",
     "replan",

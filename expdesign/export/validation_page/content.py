@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from expdesign.durations.validation import Rehearsal, Validated
-from expdesign.values import Array
 
 AGREES = 0.10
 """Relative difference of standard deviations that still counts as agreement, chance aside."""
@@ -57,7 +57,7 @@ def biased(result: Validated) -> list[str]:
     return _named(result, np.abs(result.bias) > allowed * result.found)
 
 
-def _named(result: Validated, chosen: Array) -> list[str]:
+def _named(result: Validated, chosen: NDArray[np.bool_]) -> list[str]:
     return [name for name, is_so in zip(result.parameters, chosen, strict=True) if is_so]
 
 

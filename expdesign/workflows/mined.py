@@ -1,0 +1,214 @@
+"""Which recorded batches to estimate from: ranked by what they tell, and the best few."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from expdesign import __version__
+from expdesign.durations import MEAN_SUBTRACTIONS, Subset, best_subset
+from expdesign.errors import InputError, NotInformative
+from expdesign.export import write_files
+from expdesign.export.record_file import record_csv
+from expdesign.information import estimated_parameters
+from expdesign.information.recorded import BatchInformation, recorded_information
+from expdesign.scenario import load_vessel
+from expdesign.signals import Batch, Record
+from expdesign.vessel import VesselModel
+from expdesign.workflows.after import measured
+from expdesign.workflows.outcome import Outcome, Progress, TextTable, silent
+
+
+def mine(
+    data: Sequence[Path],
+    out: Path | None,
+    *,
+    vessel: Path,
+    keep: int,
+    piece_s: float | None = None,
+    fixed: Sequence[str] = (),
+    mean: str = "complete",
+    velocity: str = "auto",
+    progress: Progress = silent,
+) -> Outcome:
+    """The `keep` batches that tell most together, into `out` or runs/<first data file>.
+
+    Args:
+        data: CSV files; each is a batch, and so is what follows a gap.
+        out: folder, or None.
+        vessel: nominal model, which simulates the instruments.
+        keep: how many batches to choose.
+        piece_s: cut batches into pieces of about this length [s].
+        fixed: parameters that count as known.
+        mean: mean subtraction of the estimator that will follow.
+        velocity: where velocities come from, as in `estimate`.
+        progress: told what is done.
+
+    Raises:
+        InputError: arguments or files that are wrong.
+        NoAnswer: the data do not inform about every parameter, or the nominal model is unstable.
+    """
+    if mean not in MEAN_SUBTRACTIONS:
+        raise InputError(f"--mean is {mean}, expected one of {', '.join(MEAN_SUBTRACTIONS)}")
+    progress("reading the data", 0.02)
+    ship = load_vessel(vessel)
+    record = in_pieces(measured(data, ship, velocity=velocity), piece_s)
+    windy = all(batch.wind is not None for batch in record.batches)
+    names, unseen = _told_of(ship.model, fixed, windy=windy)
+    progress("simulating the runs", 0.2)
+    batches = recorded_information(record, ship.model, names, predictor="basic-wind" if windy else "basic")
+    _need_every_parameter(batches, names)
+    progress("choosing among them", 0.6)
+    subset = best_subset(batches, names, size=keep, mean_subtraction=mean)
+    chosen = [batch for batch in record.batches if batch.name in subset.chosen]
+    command = _command(data, vessel, keep, piece_s, fixed, mean, velocity)
+    content = _content(subset, batches, names, unseen, mean=mean, command=command)
+    files = {
+        "mining.json": json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n",
+        "chosen.csv": record_csv(chosen),
+    }
+    written = write_files(out or Path("runs") / data[0].stem, files)
+    progress("done", 1.0)
+    return Outcome(files=written, summary=_summary(content), tables=(_table(subset, batches),))
+
+
+def in_pieces(record: Record, piece_s: float | None) -> Record:
+    """Batches cut into equal pieces of about `piece_s` [s]; None leaves them whole.
+
+    Raises:
+        InputError: a piece of fewer than three samples.
+    """
+    if piece_s is None:
+        return record
+    step = record.batches[0].sample_time_s
+    if not piece_s >= 3 * step:
+        raise InputError(f"--piece is {piece_s:g}, expected three samples of {step:g} s or more")
+    return replace(record, batches=tuple(piece for batch in record.batches for piece in _pieces(batch, piece_s)))
+
+
+def _pieces(batch: Batch, piece_s: float) -> list[Batch]:
+    count = max(1, round(len(batch) * batch.sample_time_s / piece_s))
+    if count == 1:
+        return [batch]
+    edges = np.linspace(0, len(batch), count + 1).round().astype(int)
+    spans = [slice(int(first), int(last)) for first, last in pairwise(edges)]
+    return [_piece(batch, span) for span in spans]
+
+
+def _piece(batch: Batch, span: slice) -> Batch:
+    parts = {name: getattr(batch, name) for name in ("inputs", "velocity", "pose", "wind", "depth_m")}
+    cut = {name: values[span] for name, values in parts.items() if values is not None}
+    begin, end = (row * batch.sample_time_s for row in (span.start, span.stop))
+    name = f"{batch.name}, {begin:g} to {end:g} s"
+    return replace(batch, name=name, first_row=batch.first_row and batch.first_row + span.start, **cut)
+
+
+def _told_of(model: VesselModel, fixed: Sequence[str], *, windy: bool) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Parameters to estimate, and those that data without measured wind can tell nothing of."""
+    wanted = estimated_parameters(model, fixed)
+    of_air = {
+        term.name
+        for term, expression in zip(model.terms, model.expressions, strict=True)
+        if {"u_q", "v_q"} & set(expression.signals)
+    }
+    unseen = () if windy else tuple(name for name in wanted if name in of_air)
+    names = tuple(name for name in wanted if name not in unseen)
+    if not names:
+        raise InputError("every parameter is fixed or needs measured wind, nothing is left to estimate")
+    return names, unseen
+
+
+def _need_every_parameter(batches: Sequence[BatchInformation], names: Sequence[str]) -> None:
+    """A parameter whose regressor or instrument is zero throughout, by name."""
+    size = np.max([np.abs(np.diag(batch.X)) for batch in batches], axis=0)
+    blind = tuple(name for name, value in zip(names, size, strict=True) if not value > 0)
+    if blind:
+        raise NotInformative(
+            f"no batch tells anything of {', '.join(blind)}; hold with --fixed what is known", parameters=blind
+        )
+
+
+def _content(
+    subset: Subset,
+    batches: Sequence[BatchInformation],
+    names: Sequence[str],
+    unseen: Sequence[str],
+    *,
+    mean: str,
+    command: str,
+) -> dict[str, object]:
+    """`mining.json`."""
+    of = {batch.name: batch for batch in batches}
+    return {
+        "parameters": list(names),
+        "not_told_without_wind": list(unseen),
+        "mean_subtraction": mean,
+        "keep": len(subset.chosen),
+        "chosen": list(subset.chosen),
+        "efficiency": subset.efficiency,
+        "efficiency_bound": subset.bound if np.isfinite(subset.bound) else None,
+        "all_subsets_tried": subset.exact,
+        "counts": "symmetric part of the information"
+        if subset.symmetric
+        else "magnitude of the determinant: with this nominal model the symmetric part is not definite",
+        "batches": [
+            {
+                "rank": rank,
+                "name": name,
+                "duration_s": of[name].seconds,
+                "samples": of[name].samples,
+                "chosen": name in subset.chosen,
+                "efficiency_up_to_here": float(efficiency),
+            }
+            for rank, (name, efficiency) in enumerate(zip(subset.names, subset.first, strict=True), start=1)
+        ],
+        "command": command,
+        "version": __version__,
+    }
+
+
+def _summary(content: Mapping[str, object]) -> dict[str, object]:
+    told = ("chosen", "efficiency", "efficiency_bound", "all_subsets_tried", "counts", "not_told_without_wind")
+    return {name: content[name] for name in told}
+
+
+def _table(subset: Subset, batches: Sequence[BatchInformation]) -> TextTable:
+    of = {batch.name: batch for batch in batches}
+    rows = zip(subset.names, subset.first, strict=True)
+    return TextTable(
+        title="Batches in the order in which each adds most, with the information of all up to there",
+        header=("rank", "batch", "seconds", "information", "chosen"),
+        rows=tuple(
+            (
+                str(rank),
+                name,
+                f"{of[name].seconds:.1f}",
+                f"{100 * efficiency:.1f} %" if efficiency > 0 else "not yet enough",
+                "yes" if name in subset.chosen else "",
+            )
+            for rank, (name, efficiency) in enumerate(rows, start=1)
+        ),
+    )
+
+
+def _command(
+    data: Sequence[Path],
+    vessel: Path,
+    keep: int,
+    piece_s: float | None,
+    fixed: Sequence[str],
+    mean: str,
+    velocity: str,
+) -> str:
+    words = ["expdesign", "mine", *map(str, data), "--vessel", str(vessel), "--keep", str(keep)]
+    words += ["--piece", f"{piece_s:g}"] if piece_s is not None else []
+    words += [part for name in fixed for part in ("--fixed", name)]
+    words += ["--mean", mean] if mean != "complete" else []
+    words += ["--velocity", velocity] if velocity != "auto" else []
+    return shlex.join(words)
