@@ -23,15 +23,17 @@ class ExcitedRuns:
         possible: (n,) 1 where the request makes sense and the vessel can hold its entry state; the others' rows are
             zero.
         velocity: (n, 3) entry u, v, r through water.
+        entry_inputs: (n, m) commands that must be standing when they begin.
         commands: (n, k, m) within limits and rates.
     """
 
     possible: Array
     velocity: Array
+    entry_inputs: Array
     commands: Array
 
     def __post_init__(self) -> None:
-        seal(self, possible="n", velocity="n 3", commands="n k m")
+        seal(self, possible="n", velocity="n 3", entry_inputs="n m", commands="n k m")
 
 
 def excite_many(vessel: Vessel, specs: Sequence[PrimitiveSpec]) -> ExcitedRuns:
@@ -66,5 +68,5 @@ def excite_many(vessel: Vessel, specs: Sequence[PrimitiveSpec]) -> ExcitedRuns:
         references = np.array(list(wished.values()))
         before, followed = follow(vessel, references)
         possible[rows] = lost(vessel, references[:, 0], before) <= STEADY
-        velocity[rows], commands[rows] = references[:, 0], followed
-    return ExcitedRuns(possible=possible, velocity=velocity, commands=commands)
+        velocity[rows], entry[rows], commands[rows] = references[:, 0], before, followed
+    return ExcitedRuns(possible=possible, velocity=velocity, entry_inputs=entry, commands=commands)

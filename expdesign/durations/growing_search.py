@@ -68,6 +68,7 @@ class Measure:
             self.names,
             environment=self.environment,
             mean_subtraction=self.mean_subtraction,
+            standing=runs.entry_inputs,
         )
         over = violation(motion, self.limits)
         sound = (runs.possible > 0) & np.isfinite(matrices).all(axis=(1, 2)) & np.isfinite(over)

@@ -22,7 +22,7 @@ from expdesign.information.moments import HEADINGS, log_det_or_none
 from expdesign.information.primitive_information import PrimitiveInformation
 from expdesign.information.scoring import score_primitives
 from expdesign.signals import Batch, Record
-from expdesign.simulation import CALM, Environment, simulate, to_body
+from expdesign.simulation import CALM, Environment, delivered, simulate, to_body
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, Vessel
 
@@ -102,7 +102,7 @@ def score_augmented(
 
 
 def _batch(vessel: Vessel, primitive: Primitive, heading: float, environment: Environment) -> Batch:
-    """A noise-free run as it would be measured."""
+    """A noise-free run as it would be measured, with what the actuators deliver as inputs."""
     current_b = np.array(to_body(environment.current_to, heading, NUMPY))
     run = simulate(
         vessel,
@@ -110,6 +110,7 @@ def _batch(vessel: Vessel, primitive: Primitive, heading: float, environment: En
         pose=(0.0, 0.0, heading),
         velocity=primitive.entry_velocity + np.append(current_b, 0.0),
         environment=environment,
+        standing=primitive.entry_inputs,
     )
     pose, velocity = run.pose[:-1], run.velocity[:-1]
     wind_b = np.stack(to_body(environment.wind_to, pose[:, 2], NUMPY), axis=1)
@@ -117,7 +118,7 @@ def _batch(vessel: Vessel, primitive: Primitive, heading: float, environment: En
         name=primitive.name,
         sample_time_s=primitive.commands.sample_time_s,
         input_names=primitive.commands.names,
-        inputs=primitive.commands.values,
+        inputs=delivered(vessel, primitive.commands, standing=primitive.entry_inputs).values,
         velocity=velocity,
         pose=pose,
         wind=velocity[:, :2] - wind_b,

@@ -11,8 +11,8 @@ no autocorrelation has to be estimated. With G = sum Z Phi^T the estimate has co
 It holds while noise is small enough for one derivative to describe it, and nothing inside a modulus changes its sign
 with it. What stays constant for a whole trial, such as a mean current, is a bias and not in it.
 
-Source: F. Ljungberg, doctoral thesis, Linköping University, (2.21), (5.3), (5.61), (7.9); the first-order form is derived
-here.
+Source: F. Ljungberg, doctoral thesis, Linköping University, (2.21), (5.3), (5.61), (7.9); the first-order form is
+derived here.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ import numpy as np
 from expdesign.errors import NotInformative
 from expdesign.information.moments import regressor_rows
 from expdesign.signals import Commands, Trajectory
-from expdesign.simulation import CALM, Environment, relative_velocity, simulate
+from expdesign.simulation import CALM, Environment, delivered, relative_velocity, simulate
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array, seal
 from expdesign.vessel import NUMPY, Vessel, VesselModel
@@ -133,14 +133,16 @@ def _rows(
             substeps=1 if integrator == "euler" else SUBSTEPS,
         )
 
+    second = vessel if instruments is model else replace(vessel, model=instruments)
     own = sailed(vessel)
-    other = own if instruments is model else sailed(replace(vessel, model=instruments))
-    by_water, by_air = _derivatives(model, own, part.commands, environment)
+    other = own if second is vessel else sailed(second)
+    given, given_second = (delivered(which, part.commands, standing=part.standing) for which in (vessel, second))
+    by_water, by_air = _derivatives(model, own, given, environment)
     noise = vessel.sensors
     chosen = [("u", "v", "r").index(name) for name in outputs]
     return _Rows(
-        regressors=_blocks(model, own, part.commands, environment, parameters),
-        instruments=_blocks(instruments, other, part.commands, environment, parameters),
+        regressors=_blocks(model, own, given, environment, parameters),
+        instruments=_blocks(instruments, other, given_second, environment, parameters),
         by_velocity=by_water[:, chosen][:, :, chosen],
         by_air=by_air[:, chosen],
         by_current=by_water[:, chosen, :2],

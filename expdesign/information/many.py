@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from expdesign.information.moments import HEADINGS, rows_of, signals_of
-from expdesign.simulation import Environment, simulate_many, to_body
+from expdesign.simulation import Environment, deliver, simulate_many, to_body
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, Vessel
 
@@ -20,6 +20,7 @@ def bordered_runs(
     *,
     environment: Environment,
     mean_subtraction: str,
+    standing: Array | None = None,
 ) -> tuple[Array, Array]:
     """B (n, d, d) of many runs, and their motion through calm water (n, k + 1, 3).
 
@@ -32,44 +33,52 @@ def bordered_runs(
         names: parameters to estimate.
         environment: mean current and wind; information is averaged over headings where they matter.
         mean_subtraction: "none", "batch" or "complete".
+        standing: (n, m) commands that stood before; None for those of the first sample.
     """
-    calm = _states(vessel, commands, velocity, Environment(), 0.0)
+    start = (velocity, commands[:, 0] if standing is None else standing)
+    given = deliver(
+        vessel.responses, commands.transpose(1, 2, 0), sample_time_s=vessel.sample_time_s, standing=start[1].T
+    )[:, 0]
+    calm = _states(vessel, commands, start, Environment(), 0.0)
     if environment.isotropic:
-        pieces = [_matrices(vessel, calm, commands, names, Environment(), mean_subtraction)]
+        pieces = [_matrices(vessel, calm, given, names, Environment(), mean_subtraction)]
     else:
         pieces = []
         for heading in 2 * np.pi * np.arange(HEADINGS) / HEADINGS:
-            states = _states(vessel, commands, velocity, environment, float(heading))
-            pieces.append(_matrices(vessel, states, commands, names, environment, mean_subtraction))
+            states = _states(vessel, commands, start, environment, float(heading))
+            pieces.append(_matrices(vessel, states, given, names, environment, mean_subtraction))
     return np.mean(pieces, axis=0), calm[..., 3:].transpose(1, 0, 2)
 
 
-def _states(vessel: Vessel, commands: Array, velocity: Array, environment: Environment, heading: float) -> Array:
-    """(k + 1, n, 6)."""
+def _states(
+    vessel: Vessel, commands: Array, start: tuple[Array, Array], environment: Environment, heading: float
+) -> Array:
+    """(k + 1, n, 6) from entry velocities (n, 3) through water and standing commands (n, m)."""
     runs = len(commands)
     current_b = np.array([*to_body(environment.current_to, heading, NUMPY), 0.0])
     return simulate_many(
         vessel,
         commands,
         pose=np.tile([0.0, 0.0, heading], (runs, 1)),
-        velocity=velocity + current_b,
+        velocity=start[0] + current_b,
         current_to=np.tile(environment.current_to, (runs, 1)),
         wind_to=np.tile(environment.wind_to, (runs, 1)),
         parameters=np.tile(vessel.model.parameters, (runs, 1)),
+        standing=start[1],
     )
 
 
 def _matrices(
     vessel: Vessel,
     states: Array,
-    commands: Array,
+    given: Array,
     names: Sequence[str],
     environment: Environment,
     mean_subtraction: str,
 ) -> Array:
     model = vessel.model
     with np.errstate(invalid="ignore", over="ignore"):
-        table = signals_of(model, tuple(np.moveaxis(states[:-1], -1, 0)), commands.transpose(2, 1, 0), environment)
+        table = signals_of(model, tuple(np.moveaxis(states[:-1], -1, 0)), given.swapaxes(0, 1), environment)
         rows = rows_of(model, table, (len(states) - 1, states.shape[1]))  # (all, k, n)
         chosen = [model.names.index(name) for name in names]
         equations = [model.terms[index].equation for index in chosen]

@@ -50,7 +50,8 @@ def estimated_parameters(model: VesselModel, fixed: Sequence[str]) -> tuple[str,
 def regressor_rows(model: VesselModel, trajectory: Trajectory, commands: Commands, environment: Environment) -> Array:
     """(k, p) value of every term at every command's start, under the environment's mean current and wind.
 
-    A term that only rounding keeps from being zero throughout the run is zero: no matrix could tell afterwards.
+    Commands are what the actuators deliver, `simulation.delivered`, where they do not follow at once. A term that only
+    rounding keeps from being zero throughout the run is zero: no matrix could tell afterwards.
     """
     return rows_of(model, _signals(model, trajectory, commands, environment), (len(commands),)).T
 

@@ -10,7 +10,7 @@ Source: F. Ljungberg, doctoral thesis, Linköping University, 7.3 and (7.50)-(7.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,11 +18,12 @@ from expdesign.errors import InputError
 from expdesign.estimation.instruments import InstrumentModel
 from expdesign.estimation.predictors import build_layout, build_regression
 from expdesign.estimation.replay import Integration, build_replay
-from expdesign.estimation.tables import model_for
+from expdesign.estimation.tables import inputs_of, model_for
 from expdesign.information.moments import MEAN_SUBTRACTIONS
 from expdesign.signals import Record
+from expdesign.simulation import deliver
 from expdesign.values import Array, seal
-from expdesign.vessel import VesselModel
+from expdesign.vessel import IDEAL, VesselModel
 
 REGRESSORS = ("measured", "simulated")
 
@@ -87,6 +88,7 @@ def recorded_information(
     if regressors not in REGRESSORS:
         raise InputError(f"regressors is {regressors!r}, expected one of {', '.join(REGRESSORS)}")
     driven = model_for(model, record)
+    record = _as_delivered(driven, record)
     fixed = tuple(name for name in driven.names if name not in parameters)
     layout = build_layout(driven, record, predictor=predictor, fixed=fixed)
     if layout.nuisance:
@@ -116,6 +118,22 @@ def recorded_information(
             )
         )
     return tuple(found)
+
+
+def _as_delivered(model: VesselModel, record: Record) -> Record:
+    """The record with the mean over each sample of what the actuators deliver of its inputs."""
+    responses = [response for actuator in model.actuators for response in actuator.responses]
+    if all(response == IDEAL for response in responses):
+        return record
+    batches = [
+        replace(
+            batch,
+            input_names=model.inputs,
+            inputs=deliver(responses, inputs_of(model, batch), sample_time_s=batch.sample_time_s)[:, 0],
+        )
+        for batch in record.batches
+    ]
+    return replace(record, batches=tuple(batches))
 
 
 def _padded(values: Array, place: list[int], count: int, *, both: bool = False) -> Array:

@@ -23,8 +23,7 @@ from expdesign.information.moments import (
     signals_of,
 )
 from expdesign.information.primitive_information import PrimitiveInformation
-from expdesign.signals import Commands
-from expdesign.simulation import CALM, Environment, motion_rates, simulate, to_body
+from expdesign.simulation import CALM, Environment, deliver, motion_rates, simulate, to_body
 from expdesign.simulation.motion import State, rk4_step
 from expdesign.simulation.run import LARGEST_SPEED, SUBSTEPS
 from expdesign.values import Array
@@ -158,18 +157,21 @@ class _Runs:
 
     Attributes:
         vessel, environment: as given.
-        commands: (k, inputs, n).
+        inputs: (k, inputs, n) mean over each sample of what the actuators deliver.
         states: (k, 6, m, h, n) at the start of every command; nan where a run diverges.
     """
 
     vessel: Vessel
     environment: Environment
-    commands: Array
+    inputs: Array
     states: Array
 
     @staticmethod
     def of(vessel: Vessel, primitives: Sequence[Primitive], parameters: Array, environment: Environment) -> _Runs:
         commands = np.array([primitive.commands.values for primitive in primitives]).transpose(1, 2, 0)
+        standing = np.array([primitive.entry_inputs for primitive in primitives]).T
+        sample_time_s = primitives[0].commands.sample_time_s
+        given = deliver(vessel.responses, commands, sample_time_s=sample_time_s, substeps=SUBSTEPS, standing=standing)
         headings = _headings(environment)
         shape = (len(parameters), len(headings), len(primitives))
         current_b = to_body(environment.current_to, headings[:, None], NUMPY)
@@ -177,13 +179,14 @@ class _Runs:
         start = (0.0, 0.0, headings[:, None], entry[0] + current_b[0], entry[1] + current_b[1], entry[2])
         states = _simulated(
             vessel,
-            commands,
+            given,
             tuple(np.broadcast_to(value, shape).copy() for value in start),
             parameters,
             environment,
-            sample_time_s=primitives[0].commands.sample_time_s,
+            sample_time_s=sample_time_s,
         )
-        return _Runs(vessel=vessel, environment=environment, commands=commands, states=states)
+        inputs = given[:, 0] if given.shape[1] == 1 else given.mean(axis=1)
+        return _Runs(vessel=vessel, environment=environment, inputs=inputs, states=states)
 
     def moments(self, names: Sequence[str]) -> _Moments:
         """Averages over headings, some primitives at a time."""
@@ -196,7 +199,7 @@ class _Runs:
     def _some(self, chosen: slice, names: Sequence[str]) -> _Moments:
         model, p = self.vessel.model, len(names)
         states = np.moveaxis(self.states[..., chosen], 1, 0)  # (6, k, m, h, n)
-        inputs = self.commands[:, :, None, None, chosen].swapaxes(0, 1)  # (inputs, k, 1, 1, n)
+        inputs = self.inputs[:, :, None, None, chosen].swapaxes(0, 1)  # (inputs, k, 1, 1, n)
         with np.errstate(invalid="ignore", over="ignore"):
             table = signals_of(model, tuple(states), inputs, self.environment)
             rows = rows_of(model, table, states.shape[1:])[[model.names.index(name) for name in names]]
@@ -219,24 +222,27 @@ class _Runs:
 
 
 def _simulated(
-    vessel: Vessel, commands: Array, start: State, parameters: Array, environment: Environment, *, sample_time_s: float
+    vessel: Vessel, given: Array, start: State, parameters: Array, environment: Environment, *, sample_time_s: float
 ) -> Array:
-    """(k, 6, m, h, n) states at the start of every command; runs that diverge are nan throughout."""
+    """(k, 6, m, h, n) states at the start of every command; runs that diverge are nan throughout.
+
+    `given` (k, steps, inputs, n) is what the actuators deliver in each integrator step, or (k, 1, ...) all the time.
+    """
     theta = parameters[0].tolist() if len(parameters) == 1 else list(parameters.T[:, :, None, None])
     current, wind = environment.current_to.tolist(), environment.wind_to.tolist()
-    states = np.empty((len(commands), 6, *start[0].shape))
+    states = np.empty((len(given), 6, *start[0].shape))
     state, largest = start, np.zeros(start[0].shape)
     with np.errstate(over="ignore", invalid="ignore"):
-        for sample, held in enumerate(commands):
-
-            def rates(x: State, held: Array = held) -> State:
-                return motion_rates(
-                    vessel.model, x, held, current_to=current, wind_to=wind, ops=NUMPY, parameters=theta
-                )
-
+        for sample, steps in enumerate(given):
             for place, value in enumerate(state):
                 states[sample, place] = value
-            for _ in range(SUBSTEPS):
+            for held in np.broadcast_to(steps, (SUBSTEPS, *steps.shape[1:])):
+
+                def rates(x: State, held: Array = held) -> State:
+                    return motion_rates(
+                        vessel.model, x, held, current_to=current, wind_to=wind, ops=NUMPY, parameters=theta
+                    )
+
                 state = rk4_step(rates, state, sample_time_s / SUBSTEPS)
             for speed in state[3:]:
                 largest = np.maximum(largest, np.abs(speed))
@@ -249,10 +255,12 @@ def _raise_diverged(vessel: Vessel, primitives: Sequence[Primitive], environment
     for primitive in primitives:
         for heading in _headings(environment):
             current_b = np.array(to_body(environment.current_to, float(heading), NUMPY))
-            _try(vessel, primitive.commands, float(heading), primitive.entry_velocity + np.append(current_b, 0.0),
-                 environment)  # fmt: skip
+            simulate(
+                vessel,
+                primitive.commands,
+                pose=(0.0, 0.0, float(heading)),
+                velocity=primitive.entry_velocity + np.append(current_b, 0.0),
+                environment=environment,
+                standing=primitive.entry_inputs,
+            )
     raise Diverged(f"vessel {vessel.name!r}: a regressor overflows under the commands of the dictionary")
-
-
-def _try(vessel: Vessel, commands: Commands, heading: float, velocity: Array, environment: Environment) -> None:
-    simulate(vessel, commands, pose=(0.0, 0.0, heading), velocity=velocity, environment=environment)

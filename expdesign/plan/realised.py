@@ -12,7 +12,7 @@ from expdesign.durations.collected import Collected
 from expdesign.information import moments, regressor_rows
 from expdesign.plan.values import Leg
 from expdesign.signals import Commands, Trajectory
-from expdesign.simulation import Environment
+from expdesign.simulation import Environment, delivered
 from expdesign.values import Array
 from expdesign.vessel import Vessel
 
@@ -35,7 +35,7 @@ def realised_efficiency(
     problem = replace(design.problem, robust="nominal", sampled=np.zeros((0, 0, 0, 0)))
     if not set(problem.parameters) <= set(vessel.model.names) or not problem.symmetric:
         return None
-    rows = regressor_rows(vessel.model, trajectory, commands, environment)
+    rows = regressor_rows(vessel.model, trajectory, delivered(vessel, commands), environment)
     batches = [rows[leg.first : leg.last] for leg in legs] if problem.mean_subtraction == "batch" else [rows]
     matrix = np.sum(
         [
