@@ -10,6 +10,7 @@ IFAC Proc. 17 (1984), 1603-1608.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
@@ -18,7 +19,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from expdesign.simulation import Environment, motion_rates, rk4_step
+from expdesign.simulation import Environment, motion_rates, rk4_step, sample_map
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array, seal
 from expdesign.vessel import Operators, Vessel
@@ -30,6 +31,8 @@ SMALLNESS = 1e-4
 """Weight of squared commands: decides between commands that give the same force."""
 NODES = (12, 18, 24, 32, 44, 60, 80, 110, 160)
 """Numbers of nodes tried while the time is free."""
+SETTLED = 1e-4
+"""How near what lagging actuators deliver must be to the end's commands, relative to the largest."""
 PROGRAMS = 24
 """Programs kept built."""
 
@@ -43,6 +46,8 @@ class LegProblem:
         environment: its means act.
         start, end: (6,) states; heading continuous along the reference.
         start_inputs, end_inputs: (m,) commands standing before the leg, and as its last sample.
+        past: (h, m) commands given before the leg, the standing one last.
+        delivered: (m,) what the actuators deliver as the leg begins, misalignment included.
         states, inputs: (j + 1, 6) and (j + 1, m) first guess at even times.
         duration_s: first guess.
         time_scale_s: unit of time in which smoothness is weighed.
@@ -60,6 +65,8 @@ class LegProblem:
     end: Array
     start_inputs: Array
     end_inputs: Array
+    past: Array
+    delivered: Array
     states: Array
     inputs: Array
     duration_s: float
@@ -75,6 +82,7 @@ class LegProblem:
 
     def __post_init__(self) -> None:
         seal(self, start="6", end="6", start_inputs="m", end_inputs="m", states="j 6", inputs="j m")
+        seal(self, past="h m", delivered="m")
         seal(self, path="j 3", room_port_m="j", room_starboard_m="j", circle="3")
 
 
@@ -95,7 +103,7 @@ def solve_leg(problem: LegProblem) -> Array | None:
             continue
         time_s = nodes * block * found[1]
         least = max(2, int(np.ceil(time_s / (block * sample_s) - 1e-6)))
-        for count in (least, least + 1, least + 3, least + 8):
+        for count in (least, least + 1, least + 3, least + 8, least + 16):
             smooth = _program(problem.vessel, problem.environment, count, block, False)
             exact = smooth.solve(_respaced(found[0], count), sample_s)
             if exact is not None:
@@ -137,6 +145,9 @@ class _Program:
         self.limits = vessel.limits
         self.state_scale = np.array([vessel.length_m] * 2 + [1.0] * 4)
         self.input_scale = np.array([max(abs(x.low), abs(x.high)) if np.isfinite(x.high) else 1.0 for x in self.limits])
+        self.maps = [sample_map(x, sample_time_s=vessel.sample_time_s, substeps=SUBSTEPS) for x in vessel.responses]
+        self.lagging = np.flatnonzero([response.lag_s > 0 for response in vessel.responses])
+        self.memory = 1 + max(through.lateness for through in self.maps)
         self._build()
 
     def _build(self) -> None:
@@ -144,10 +155,13 @@ class _Program:
         x, u, h = ca.MX.sym("x", 6, j + 1), ca.MX.sym("u", m, j + 1), ca.MX.sym("h")
         path, circle = ca.MX.sym("path", 3, j - 1), ca.MX.sym("circle", 2)
         unit_s, arm = ca.MX.sym("unit_s"), ca.MX.sym("arm")
+        past, d = ca.MX.sym("past", m, self.memory), ca.MX.sym("d", len(self.lagging), j + 1)
         inputs = ca.DM(self.input_scale) * u
         states = ca.DM(self.state_scale) * x
-        ends = self._block_map().map(j)(states[:, :-1], inputs[:, :-1], inputs[:, 1:], ca.repmat(h, 1, j))
-        rows = [ca.vec((ends - states[:, 1:]) / ca.DM(self.state_scale))]
+        lag_scale = ca.DM(self.input_scale[self.lagging])
+        early, late = self._arriving(past, inputs)
+        ends, held = self._block_map().map(j)(states[:, :-1], lag_scale * d[:, :-1], early, late, ca.repmat(h, 1, j))
+        rows = [ca.vec((ends - states[:, 1:]) / ca.DM(self.state_scale)), ca.vec(held / lag_scale - d[:, 1:])]
         rows += self._region(states[:, 1:-1], path, circle, arm)
         for index in self._rated:
             step = (inputs[int(index), 1:] - inputs[int(index), :-1]).T / self.input_scale[index]
@@ -161,8 +175,8 @@ class _Program:
         options: dict[str, Any] = {"print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}
         options |= {"ipopt.max_iter": 150, "ipopt.constr_viol_tol": 1e-9, "ipopt.acceptable_iter": 0}
         options |= {"ipopt.tol": 1e-5 if self.free else 1e-7}
-        nlp: Any = {"x": ca.vertcat(ca.vec(x), ca.vec(u), h), "f": cost, "g": ca.vertcat(*rows)}
-        nlp["p"] = ca.vertcat(ca.vec(path), circle, unit_s, arm)
+        nlp: Any = {"x": ca.vertcat(ca.vec(x), ca.vec(u), ca.vec(d), h), "f": cost, "g": ca.vertcat(*rows)}
+        nlp["p"] = ca.vertcat(ca.vec(path), circle, unit_s, arm, ca.vec(past))
         self.solver = ca.nlpsol("leg", "ipopt", nlp, options)
 
     @property
@@ -170,21 +184,45 @@ class _Program:
         """Indices of the signals with a finite rate."""
         return np.flatnonzero(np.isfinite([limit.rate for limit in self.limits]))
 
+    def _arriving(self, past: ca.MX, inputs: ca.MX) -> tuple[ca.MX, ca.MX]:
+        """(m block, j) commands that arrive at the actuators in each sample: the earlier and the later one."""
+        j, m, block = self.nodes, len(self.limits), self.block
+        shares = np.zeros((j + 1, j * block))
+        for sample in range(j * block):
+            node, share = divmod(sample, block)
+            shares[node, sample], shares[node + 1, sample] = 1 - (share + 1) / block, (share + 1) / block
+        given = ca.horzcat(past, ca.mtimes(inputs, ca.sparsify(ca.DM(shares))))
+        firsts = [self.memory - through.lateness for through in self.maps]
+        late = ca.vertcat(*[given[i, first : first + j * block] for i, first in enumerate(firsts)])
+        early = ca.vertcat(*[given[i, first - 1 : first - 1 + j * block] for i, first in enumerate(firsts)])
+        return ca.reshape(early, m * block, j), ca.reshape(late, m * block, j)
+
     def _block_map(self) -> ca.Function:
-        """State after a block of samples with commands running linearly from one node's to the next's."""
-        m, model = len(self.limits), self.vessel.model
-        x, a, b, h = ca.SX.sym("x", 6), ca.SX.sym("a", m), ca.SX.sym("b", m), ca.SX.sym("h")
-        current, wind = self.environment.current_to.tolist(), self.environment.wind_to.tolist()
+        """State and delivered values after a block of samples, from the commands that arrive in them.
+
+        Dead bands are left out: commands inside them make the leg miss its end, which the caller finds.
+        """
+        m, count = len(self.limits), len(self.lagging)
+        x, d, h = ca.SX.sym("x", 6), ca.SX.sym("d", count), ca.SX.sym("h")
+        early, late = ca.SX.sym("early", m * self.block), ca.SX.sym("late", m * self.block)
         state: tuple[Any, ...] = tuple(ca.vertsplit(x))
-        for sample in range(1, self.block + 1):
-            held = ca.vertsplit(a + (b - a) * (sample / self.block))
+        lagged: dict[int, Any] = {int(i): d[k] for k, i in enumerate(self.lagging)}
+        for sample in range(self.block):
+            start, after = early[sample * m : (sample + 1) * m], late[sample * m : (sample + 1) * m]
+            for step in range(SUBSTEPS):
+                given = [
+                    _mixed(through.means[step], lagged.get(i, 0.0), start[i], after[i]) + through.offset
+                    for i, through in enumerate(self.maps)
+                ]
+                state = rk4_step(self._rates(given), state, h / SUBSTEPS)
+            lagged = {i: _mixed(self.maps[i].end, value, start[i], after[i]) for i, value in lagged.items()}
+        delivered = ca.vertcat(*[lagged[int(i)] for i in self.lagging]) if count else ca.SX(0, 1)
+        return ca.Function("block", [x, d, early, late, h], [ca.vertcat(*state), delivered])
 
-            def rates(s: tuple[Any, ...], held: Any = held) -> tuple[Any, ...]:
-                return motion_rates(model, s, held, current_to=current, wind_to=wind, ops=CASADI)
-
-            for _ in range(SUBSTEPS):
-                state = rk4_step(rates, state, h / SUBSTEPS)
-        return ca.Function("block", [x, a, b, h], [ca.vertcat(*state)])
+    def _rates(self, given: list[Any]) -> Callable[[tuple[Any, ...]], tuple[Any, ...]]:
+        current, wind = self.environment.current_to.tolist(), self.environment.wind_to.tolist()
+        model = self.vessel.model
+        return lambda state: motion_rates(model, state, given, current_to=current, wind_to=wind, ops=CASADI)
 
     def _region(self, inner: ca.MX, path: ca.MX, circle: ca.MX, arm: ca.MX) -> list[ca.MX]:
         """Rows for origin, bow point and stern point: offset from the path, and squared distance from the circle."""
@@ -198,7 +236,7 @@ class _Program:
     def _row_bounds(self, problem: LegProblem) -> tuple[Array, Array]:
         """Lower and upper bounds of the constraints, in the order of `_build`."""
         j, inner, length = self.nodes, slice(1, self.nodes), self.vessel.length_m
-        low, high = [np.zeros(6 * j)], [np.zeros(6 * j)]
+        low, high = [np.zeros((6 + len(self.lagging)) * j)], [np.zeros((6 + len(self.lagging)) * j)]
         low += 3 * [-problem.room_port_m[inner] / length]
         high += 3 * [problem.room_starboard_m[inner] / length]
         radius = problem.circle[2]
@@ -220,12 +258,20 @@ class _Program:
         low[-1] = high[-1] = (problem.end - origin) / self.state_scale
         first, last = (np.tile([getattr(x, name) for x in self.limits], (j + 1, 1)) for name in ("low", "high"))
         first[0] = last[0] = problem.start_inputs
-        first[-1] = last[-1] = problem.end_inputs
+        for index, response in enumerate(self.vessel.responses):  # nothing may still be on its way at the end
+            after = j - int(np.ceil(response.delay_s / (self.block * self.vessel.sample_time_s) - 1e-9))
+            first[after:, index] = last[after:, index] = problem.end_inputs[index]
+        offset = np.array([response.offset for response in self.vessel.responses])
+        ends = ((problem.delivered - offset)[self.lagging], problem.end_inputs[self.lagging])
+        least, most = (np.full((j + 1, len(self.lagging)), sign * np.inf) for sign in (-1, 1))
+        scale = self.input_scale[self.lagging]
+        least[0] = most[0] = ends[0] / scale
+        least[-1], most[-1] = ends[1] / scale - SETTLED, ends[1] / scale + SETTLED
         sample_s = self.vessel.sample_time_s
         times = (0.2 * sample_s, 3.0 * sample_s) if self.free else (sample_s, sample_s)
         return (
-            np.r_[low.ravel(), (first / self.input_scale).ravel(), times[0]],
-            np.r_[high.ravel(), (last / self.input_scale).ravel(), times[1]],
+            np.r_[low.ravel(), (first / self.input_scale).ravel(), least.ravel(), times[0]],
+            np.r_[high.ravel(), (last / self.input_scale).ravel(), most.ravel(), times[1]],
         )
 
     def solve(self, problem: LegProblem, step_s: float) -> tuple[LegProblem, float] | None:
@@ -233,12 +279,25 @@ class _Program:
         j, m = self.nodes, len(self.limits)
         origin = np.array([*problem.start[:2], 0, 0, 0, 0])
         path = problem.path[1:j] - origin[:3]
-        guess = [((problem.states - origin) / self.state_scale).ravel(), (problem.inputs / self.input_scale).ravel()]
+        inputs = problem.inputs / self.input_scale
+        guess = [
+            ((problem.states - origin) / self.state_scale).ravel(),
+            inputs.ravel(),
+            inputs[:, self.lagging].ravel(),
+        ]
+        rows = len(problem.past) - 1 + np.arange(-self.memory + 1, 1)
+        past = problem.past[np.maximum(rows, 0)]
         low, high = self._variable_bounds(problem, origin)
         least, most = self._row_bounds(problem)
         answer = self.solver(
-            x0=np.clip(np.r_[guess[0], guess[1], step_s], low, high),
-            p=np.r_[path.ravel(), problem.circle[:2] - origin[:2], problem.time_scale_s, problem.hull_arm_m],
+            x0=np.clip(np.r_[*guess, step_s], low, high),
+            p=np.r_[
+                path.ravel(),
+                problem.circle[:2] - origin[:2],
+                problem.time_scale_s,
+                problem.hull_arm_m,
+                past.ravel(),
+            ],
             lbx=low,
             ubx=high,
             lbg=least,
@@ -251,8 +310,14 @@ class _Program:
             return None
         values = np.asarray(answer["x"]).ravel()
         states = values[: 6 * (j + 1)].reshape(j + 1, 6) * self.state_scale + origin
-        inputs = values[6 * (j + 1) : -1].reshape(j + 1, m) * self.input_scale
+        inputs = values[6 * (j + 1) : (6 + m) * (j + 1)].reshape(j + 1, m) * self.input_scale
         return replace(problem, states=states, inputs=inputs), float(values[-1])
+
+
+def _mixed(weights: Array, start: Any, early: Any, late: Any) -> Any:
+    """What a sample map makes of the value it starts from and of two commands; weights of zero leave no trace."""
+    parts = [weight * value for weight, value in zip(weights.tolist(), (start, early, late), strict=True) if weight]
+    return sum(parts[1:], parts[0]) if parts else 0.0
 
 
 @lru_cache(maxsize=PROGRAMS)

@@ -32,7 +32,7 @@ def curved_leg(task: LegTask, water: LegWater) -> Array | None:
             room_starboard_m=narrowing * wide.room_starboard_m,
         )
         values = solve_leg(problem)
-        if values is not None and acceptable(problem.start, problem.end, water, values):
+        if values is not None and acceptable(problem.start, problem.end, water, values, task.past):
             return values
     return None
 
@@ -100,6 +100,8 @@ def _leg_problem(task: LegTask, water: LegWater, path: Array) -> LegProblem:
         end=end,
         start_inputs=task.start_inputs,
         end_inputs=end_inputs,
+        past=task.past,
+        delivered=water.delivered(task.past),
         states=reference,
         inputs=guess,
         duration_s=duration_s,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -15,12 +15,15 @@ from expdesign.plan.field import ClearanceField
 from expdesign.plan.footprint import swept_area
 from expdesign.plan.ways import Ways, build_ways, polyline_length, simplified
 from expdesign.signals import Commands, Trajectory
-from expdesign.simulation import Environment, simulate
+from expdesign.simulation import Environment, deliver, delivered_at_samples, simulate
+from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array, seal
-from expdesign.vessel import Vessel
+from expdesign.vessel import IDEAL, Vessel
 
 ROOM_M = 3.0
 """Hull lengths to either side beyond which a corridor is not widened."""
+MEMORY = 20.0
+"""Time constants after which a lagging actuator has forgotten: two parts in a thousand million are left."""
 ARRIVAL = 1e-3
 """Largest miss of a leg's end state, in hull lengths, and in transit speeds."""
 SPARES = (0.25, 0.1, 0.02)
@@ -36,6 +39,8 @@ class LegTask:
         start, end: (6,) states, pose in the n-frame and velocity over ground.
         start_inputs, end_inputs: (m,) commands standing at its ends.
         seed: of the path search.
+        before: (h, m) commands given before the leg, the standing one last; None when it has stood for long. Only
+            lagging and late actuators remember them.
     """
 
     start: Array
@@ -43,9 +48,15 @@ class LegTask:
     start_inputs: Array
     end_inputs: Array
     seed: int
+    before: Array | None = None
 
     def __post_init__(self) -> None:
         seal(self, start="6", end="6", start_inputs="m", end_inputs="m")
+
+    @property
+    def past(self) -> Array:
+        """(h, m) commands before the leg."""
+        return self.start_inputs[None] if self.before is None else self.before
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,17 +140,56 @@ class LegWater:
         """Whether the hull stays in safe water between consecutive poses (k, 3)."""
         return bool(shapely.contains_properly(self.safe, swept_area(pose, self.vessel.hull_b)))
 
-    def sail(self, start: Array, values: Array, standing: Array | None = None) -> Trajectory:
-        """The motion that commands (k, m) give from a state (6,)."""
-        commands = Commands(sample_time_s=self.vessel.sample_time_s, names=self.vessel.model.inputs, values=values)
-        return simulate(
-            self.vessel, commands, pose=start[:3], velocity=start[3:], environment=self.environment, standing=standing
+    def sail(self, start: Array, values: Array, before: Array | None = None) -> Trajectory:
+        """The motion that commands (k, m) give from a state (6,), after commands `before` (h, m).
+
+        What was given before matters for lagging and late actuators only; the first of them has stood for long.
+        """
+        vessel, names = self.vessel, self.vessel.model.inputs
+        if before is None or self.prompt:
+            commands = Commands(sample_time_s=vessel.sample_time_s, names=names, values=values)
+            return simulate(vessel, commands, pose=start[:3], velocity=start[3:], environment=self.environment)
+        told = np.concatenate([before, values])
+        step_s = vessel.sample_time_s / SUBSTEPS
+        given = deliver(
+            vessel.responses, told, sample_time_s=vessel.sample_time_s, substeps=SUBSTEPS, standing=before[0]
+        )
+        fine = Commands(sample_time_s=step_s, names=names, values=given[len(before) :].reshape(-1, len(names)))
+        track = simulate(
+            self._prompt_vessel, fine, pose=start[:3], velocity=start[3:], environment=self.environment, substeps=1
+        )
+        return Trajectory(
+            sample_time_s=vessel.sample_time_s, pose=track.pose[::SUBSTEPS], velocity=track.velocity[::SUBSTEPS]
         )
 
+    @property
+    def prompt(self) -> bool:
+        """Whether every actuator delivers its commands at once."""
+        return all(response == IDEAL for response in self.vessel.responses)
 
-def leg_trajectory(water: LegWater, start: Array, values: Array) -> Trajectory:
-    """The motion that commands (k, m) give from a state (6,)."""
-    return water.sail(start, values)
+    @cached_property
+    def _prompt_vessel(self) -> Vessel:
+        """The same vessel with actuators that deliver at once."""
+        actuators = tuple(
+            replace(actuator, responses=(IDEAL,) * len(actuator.limits)) for actuator in self.vessel.actuators
+        )
+        return replace(self.vessel, model=replace(self.vessel.model, actuators=actuators))
+
+    def remembered(self, commands: Array) -> Array:
+        """The last of given commands (k, m), as many as any actuator still shows."""
+        longest_s = max(MEMORY * response.lag_s + response.delay_s for response in self.vessel.responses)
+        return commands[-int(np.ceil(longest_s / self.vessel.sample_time_s)) - 2 :]
+
+    def delivered(self, before: Array) -> Array:
+        """(m,) what the actuators deliver after commands (h, m) of which the first stood for long."""
+        sample_s = self.vessel.sample_time_s
+        values = delivered_at_samples(self.vessel.responses, before, sample_time_s=sample_s, standing=before[0])
+        return np.asarray(values[-1])
+
+
+def leg_trajectory(water: LegWater, start: Array, values: Array, before: Array | None = None) -> Trajectory:
+    """The motion that commands (k, m) give from a state (6,) after commands `before` (h, m)."""
+    return water.sail(start, values, before)
 
 
 def last_state(track: Trajectory) -> Array:
@@ -147,9 +197,9 @@ def last_state(track: Trajectory) -> Array:
     return np.asarray(np.r_[track.pose[-1], track.velocity[-1]])
 
 
-def acceptable(start: Array, end: Array, water: LegWater, values: Array) -> bool:
-    """Whether commands, simulated from a state, arrive at another one and stay in safe water."""
-    track = water.sail(start, values)
+def acceptable(start: Array, end: Array, water: LegWater, values: Array, before: Array) -> bool:
+    """Whether commands, simulated from a state after others, arrive at another state and stay in safe water."""
+    track = water.sail(start, values, before)
     scale = np.r_[[water.vessel.length_m] * 2, 1.0, [water.ship.transit_speed_mps] * 2, water.ship.yaw_rate_radps]
     return bool((np.abs(last_state(track) - end) <= ARRIVAL * scale).all()) and water.holds(track.pose)
 

@@ -141,6 +141,7 @@ def _in_weather(vessel: Vessel, primitive: Primitive, environment: Environment) 
         current_to=np.tile(environment.current_to, (HEADINGS, 1)),
         wind_to=np.tile(environment.wind_to, (HEADINGS, 1)),
         parameters=np.tile(vessel.model.parameters, (HEADINGS, 1)),
+        standing=primitive.entry_inputs,
     )
     return list(np.moveaxis(states[..., :2], 1, 0))
 

@@ -29,6 +29,8 @@ from expdesign.values import Array
 from expdesign.vessel import allocate, required_force
 
 GUESS_NODES = 40
+MOST_REMEMBERED = 5000
+"""Commands looked back at while steering."""
 BENDS = (1.5, 0.8, 0.4)
 """Lengths over which bends of a way are rounded, in turning radii."""
 
@@ -118,22 +120,24 @@ def _joint_lengths(task: LegTask, water: LegWater, line: Line) -> tuple[float, f
 
 def _in_parts(task: LegTask, water: LegWater, line: Line, first_m: float, last_m: float) -> Array | None:
     track, inputs = _steady(water, line, first_m, line.length_m - last_m, task.start[2])
-    departure = LegTask(
-        start=task.start, end=track[0], start_inputs=task.start_inputs, end_inputs=inputs, seed=task.seed
-    )
+    departure = replace(task, end=track[0], end_inputs=inputs)
     first = _optimised(departure, water, _cut(line, 0.0, first_m))
     if first is None:
         return None
-    middle, state = _steered(water, Reference(states=track), last_state(water.sail(task.start, first)), first[-1])
-    arrival = replace(task, start=state, start_inputs=middle[-1])
+    given = np.concatenate([task.past, first])
+    middle, state = _steered(
+        water, Reference(states=track), last_state(water.sail(task.start, first, task.past)), given
+    )
+    given = water.remembered(np.concatenate([given, middle]))
+    arrival = replace(task, start=state, start_inputs=middle[-1], before=given)
     last = _optimised(arrival, water, _cut(line, line.length_m - last_m, line.length_m))
     if last is None:
         return None
     values = np.concatenate([first, middle, last])
-    turned = last_state(water.sail(task.start, values))[2]
+    turned = last_state(water.sail(task.start, values, task.past))[2]
     whole = 2 * np.pi * np.round((turned - task.end[2]) / (2 * np.pi))
     end = np.r_[task.end[:2], task.end[2] + whole, task.end[3:]]
-    return values if acceptable(task.start, end, water, values) else None
+    return values if acceptable(task.start, end, water, values, task.past) else None
 
 
 def _cut(line: Line, first_m: float, last_m: float) -> Line:
@@ -171,23 +175,24 @@ def _steady(water: LegWater, line: Line, first_m: float, last_m: float, heading:
 
 
 def _steered(water: LegWater, reference: Reference, state: Array, before: Array) -> tuple[Array, Array]:
-    """Commands (k, m) of the helmsman along a reference, and the state they end in."""
+    """Commands (k, m) of the helmsman along a reference, and the state they end in, after commands (h, m)."""
     helm = Helmsman(vessel=water.vessel, environment=water.environment, ship=water.ship)
-    sample, rows, last = np.zeros(1), [], before[None]
+    sample, given, first = np.zeros(1), list(water.remembered(before)), len(water.remembered(before))
     states = state[None]
     while sample[0] < len(reference.states) - 1:
         sample = sample + np.maximum(reference.pace(sample, states, water.vessel.length_m / 2), 0.2)
-        last = helm.commands(reference.at(sample), states, last)
-        rows.append(last[0])
-        states = last_state(water.sail(states[0], last))[None]
-    return np.array(rows), states[0]
+        row = helm.commands(reference.at(sample), states, given[-1][None])
+        past = None if water.prompt else water.remembered(np.array(given[-MOST_REMEMBERED:]))
+        states = last_state(water.sail(states[0], row, past))[None]
+        given.append(row[0])
+    return np.array(given[first:]), states[0]
 
 
 def _optimised(task: LegTask, water: LegWater, line: Line) -> Array | None:
     """The fastest leg in the water beside a line."""
     for problem in _problems(task, water, line):
         values = solve_leg(problem)
-        if values is not None and acceptable(problem.start, problem.end, water, values):
+        if values is not None and acceptable(problem.start, problem.end, water, values, task.past):
             return values
     return None
 
@@ -226,6 +231,8 @@ def _problem(task: LegTask, water: LegWater, line: Line, turn: float) -> LegProb
         end=states[-1],
         start_inputs=task.start_inputs,
         end_inputs=inputs[-1],
+        past=task.past,
+        delivered=water.delivered(task.past),
         states=states,
         inputs=inputs,
         duration_s=duration_s,

@@ -58,6 +58,7 @@ def leave_water_probability(
             current_to=current,
             wind_to=wind,
             parameters=parameters,
+            standing=commands.values[leg.first - 1] if leg.first else None,
         )
         left |= _leaves(area, vessel, states)
     return float(left.mean())

@@ -18,7 +18,7 @@ from expdesign.plan.checks import verify_plan
 from expdesign.plan.field import ClearanceField, clearance_field, narrowest_passage
 from expdesign.plan.footprint import covering_discs, swept_area
 from expdesign.plan.goal_ways import build_goal_ways
-from expdesign.plan.leg_values import leg_speed_mps
+from expdesign.plan.leg_values import last_state, leg_speed_mps
 from expdesign.plan.legs import LegTask, LegWater, find_leg, leg_trajectory
 from expdesign.plan.lower_bound import reposition_bound_s
 from expdesign.plan.placement import place_runs
@@ -244,13 +244,13 @@ def _sail_run(problem: PlanProblem, water: LegWater, line: Timeline, placement: 
     entry = _through_water(problem, placement.pose, primitive.entry_velocity)
     lat, lon = problem.area.frame.to_degrees(placement.pose[:2])
     where = f"{primitive.name!r} near {lat:.5f}, {lon:.5f}"
-    leg = find_leg(_task(problem, line, entry, primitive.entry_inputs), water)
+    leg = _leg(problem, water, line, entry, primitive.entry_inputs)
     if leg is None:
         return f"no leg leads to {where}"
-    track = leg_trajectory(water, line.state, leg)
+    track = leg_trajectory(water, line.state, leg, line.given)
     arrived = np.r_[track.pose[-1], track.velocity[-1]]
     values = primitive.commands.values + _whole_turns(leg[-1] - primitive.entry_inputs)
-    run = leg_trajectory(water, arrived, values)
+    run = leg_trajectory(water, arrived, values, water.remembered(np.concatenate([line.given, leg])))
     if not shapely.contains_properly(water.safe, swept_area(run.pose, problem.vessel.hull_b)):
         return f"the run {where} leaves safe water"
     line.sail("reposition", primitive.name, leg, track)
@@ -260,21 +260,28 @@ def _sail_run(problem: PlanProblem, water: LegWater, line: Timeline, placement: 
 
 def _sail_home(problem: PlanProblem, water: LegWater, line: Timeline) -> bool:
     """Sail the last leg; whether there is one."""
-    task = _task(problem, line, _at_rest(problem, problem.goal), np.zeros(len(problem.vessel.limits)))
-    leg = find_leg(task, water)
+    leg = _leg(problem, water, line, _at_rest(problem, problem.goal), np.zeros(len(problem.vessel.limits)))
     if leg is not None:
-        line.sail("reposition", GOAL, leg, leg_trajectory(water, line.state, leg))
+        line.sail("reposition", GOAL, leg, leg_trajectory(water, line.state, leg, line.given))
     return leg is not None
 
 
-def _task(problem: PlanProblem, line: Timeline, end: Array, end_inputs: Array) -> LegTask:
-    return LegTask(
-        start=line.state,
+def _leg(problem: PlanProblem, water: LegWater, line: Timeline, end: Array, end_inputs: Array) -> Array | None:
+    """Commands (k, m) from where the timeline ends, or None."""
+    start, wait = line.state, line.begin_inputs[None]
+    if not line.stretches and not water.prompt:
+        # what actuators deliver before the first sample is told by its commands: begin with what stood
+        start = last_state(leg_trajectory(water, start, wait, wait))
+    task = LegTask(
+        start=start,
         end=end,
         start_inputs=line.inputs,
         end_inputs=end_inputs,
         seed=problem.seed + len(line.stretches) + 1,
+        before=water.remembered(line.given),
     )
+    leg = find_leg(task, water)
+    return leg if leg is None or line.stretches or water.prompt else np.concatenate([wait, leg])
 
 
 def _whole_turns(difference: Array) -> Array:

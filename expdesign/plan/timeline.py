@@ -46,6 +46,11 @@ class Timeline:
         return np.asarray(self.stretches[-1].commands[-1] if self.stretches else self.begin_inputs)
 
     @property
+    def given(self) -> Array:
+        """(h, m) all commands so far, what stood before them first."""
+        return np.concatenate([self.begin_inputs[None], *(stretch.commands for stretch in self.stretches)])
+
+    @property
     def last(self) -> str:
         """Name of the stretch sailed last, or ""."""
         return self.stretches[-1].name if self.stretches else ""

@@ -71,6 +71,7 @@ def stray_m(
         current_to=current,
         wind_to=wind,
         parameters=parameters,
+        standing=primitive.entry_inputs,
     )
     time_s = primitive.trajectory.time_s[:, None, None]
     moved = states[..., :2] - drift * time_s
