@@ -35,7 +35,8 @@ def test_a_recorded_zigzag_stands_beside_the_models(tmp_path: Path) -> None:
         ship, heading_rad=TWENTY, helm_rad=TWENTY, side="port", conduct=Conduct(speed_mps=2.0, approach_s=40.0)
     )
     path = write_run(tmp_path / "swing.csv", ship, commands, velocity=tuple(motion.velocity[0]))
-    assert main(["indices", str(path), "--vessel", str(TUG), "--out", str(tmp_path / "out")]) == 0
+    told = ["--depth-m", "30", "--wind-mps", "4.5", "--sea-state", "2"]
+    assert main(["indices", str(path), "--vessel", str(TUG), *told, "--out", str(tmp_path / "out")]) == 0
     written = json.loads((tmp_path / "out" / "indices.json").read_text())
     expected = standard_results(ship, speed_mps=2.0, sides=("port",)).zigzags[1]
     (found,) = written["measured"]
@@ -43,6 +44,8 @@ def test_a_recorded_zigzag_stands_beside_the_models(tmp_path: Path) -> None:
     assert found["overshoots_rad"] == pytest.approx(expected.overshoots_rad, abs=math.radians(2.5))
     page = (tmp_path / "out" / "indices.html").read_text()
     assert "swing.csv" in page
+    assert " ".join(told) in page
+    assert written["held"] == {"depth_m": 30.0, "wind_mps": 4.5, "sea_state": 2}
     assert "http" not in page
 
 
@@ -51,6 +54,8 @@ def test_what_is_wrong_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture
     assert "cannot hold 30 m/s" in capsys.readouterr().err
     assert main(["indices", "--vessel", str(TUG), "--scale", "0.5"]) == 2
     assert "--scale is 0.5" in capsys.readouterr().err
+    assert main(["indices", "--vessel", str(TUG), "--sea-state", "10"]) == 2
+    assert "expected a whole number from 0 to 9" in capsys.readouterr().err
     (tmp_path / "bad.gpx").write_text("<gpx/>")
     assert main(["check-route", str(tmp_path / "bad.gpx")]) == 2
     assert "expected gpx 1.1" in capsys.readouterr().err

@@ -466,6 +466,15 @@ def indices(
         float,
         typer.Option("--antenna-forward-m", metavar="X", help="How far forward of amidships the positions are."),
     ] = 0.0,
+    depth: Annotated[
+        float | None, typer.Option("--depth-m", metavar="D", help="Depth of the water in the measured trials.")
+    ] = None,
+    wind: Annotated[
+        float | None, typer.Option("--wind-mps", metavar="W", help="Mean true wind in the measured trials.")
+    ] = None,
+    sea: Annotated[
+        int | None, typer.Option("--sea-state", metavar="N", help="Sea state in the measured trials, 0 to 9.")
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option("--out", "-o", metavar="FOLDER", help="Where to write; runs/<vessel>-indices when not given."),
@@ -490,6 +499,9 @@ def indices(
             speed_mps=speed,
             scale=scale,
             antenna_forward_m=antenna,
+            depth_m=depth,
+            wind_mps=wind,
+            sea_state=sea,
             progress=tell,
         ),
         quiet,

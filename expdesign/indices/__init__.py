@@ -4,7 +4,16 @@ Advance, transfer and tactical diameter are those of the midship point, the orig
 rudder order along and across the heading of the approach. SI units and radians; sides are "starboard" and "port".
 """
 
-from expdesign.indices.admissibility import BEAUFORT_MPS, Condition, Conditions, admissibility, beaufort
+from expdesign.indices.admissibility import (
+    BEAUFORT_MPS,
+    DEPTH_BY_DRAUGHT,
+    HIGHEST_SEA,
+    STRONGEST_WIND,
+    Condition,
+    Conditions,
+    admissibility,
+    beaufort,
+)
 from expdesign.indices.criteria import Criterion, Verdict, criteria, judge
 from expdesign.indices.measured import NotStandard, measured_trial, measured_trials
 from expdesign.indices.outcomes import OUTCOMES, StandardResults, outcomes, standard_results
@@ -13,7 +22,10 @@ from expdesign.indices.watched import Watched, watched
 
 __all__ = [
     "BEAUFORT_MPS",
+    "DEPTH_BY_DRAUGHT",
+    "HIGHEST_SEA",
     "OUTCOMES",
+    "STRONGEST_WIND",
     "Circle",
     "Condition",
     "Conditions",

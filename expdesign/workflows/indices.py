@@ -11,7 +11,7 @@ from expdesign import __version__
 from expdesign.errors import FileError, InputError
 from expdesign.export import write_files
 from expdesign.export.formats.check import check_route_file
-from expdesign.export.indices_form import IndicesContent, indices_html, indices_json, verdict_rows
+from expdesign.export.indices_form import Held, IndicesContent, indices_html, indices_json, verdict_rows
 from expdesign.indices import StandardResults, ZigZag, measured_trial, standard_results
 from expdesign.indices.measured import Found
 from expdesign.scenario import load_vessel
@@ -30,9 +30,16 @@ def indices(
     speed_mps: float | None = None,
     scale: float = 1.0,
     antenna_forward_m: float = 0.0,
+    depth_m: float | None = None,
+    wind_mps: float | None = None,
+    sea_state: int | None = None,
     progress: Progress = silent,
 ) -> Outcome:
-    """Turning, zig-zag and stopping indices with the limits of MSC.137(76), into `out` or runs/<vessel>-indices."""
+    """Turning, zig-zag and stopping indices with the limits of MSC.137(76), into `out` or runs/<vessel>-indices.
+
+    Depth of the water, mean true wind and sea state are those of the measured trials, for the form.
+    """
+    held = Held(depth_m=depth_m, wind_mps=wind_mps, sea_state=sea_state)
     if not scale >= 1:
         raise InputError(f"--scale is {scale:g}, expected ship length by model length, 1 or more")
     progress("reading the vessel", 0.0)
@@ -47,8 +54,9 @@ def indices(
         simulated_why_not=why_not,
         measured=seen,
         notes=notes,
-        command=_command(data, vessel, speed_mps, scale, antenna_forward_m),
+        command=_command(data, vessel, speed_mps, scale, antenna_forward_m, held),
         version=__version__,
+        held=held,
     )
     files = {"indices.json": indices_json(content), "indices.html": indices_html(content)}
     written = write_files(out or Path("runs") / f"{vessel.stem}-indices", files)
@@ -94,8 +102,11 @@ def _simulated(ship: Vessel, speed_mps: float | None, *, needed: bool) -> tuple[
         return None, str(error)
 
 
-def _command(data: Sequence[Path], vessel: Path, speed_mps: float | None, scale: float, forward_m: float) -> str:
+def _command(
+    data: Sequence[Path], vessel: Path, speed_mps: float | None, scale: float, forward_m: float, held: Held
+) -> str:
     options = [("--speed-mps", speed_mps, None), ("--scale", scale, 1.0), ("--antenna-forward-m", forward_m, 0.0)]
+    options += [(f"--{name.replace('_', '-')}", value, None) for name, value in vars(held).items()]
     spelled = [part for option, value, usual in options if value != usual for part in (option, f"{value:g}")]
     return shlex.join(["expdesign", "indices", *map(str, data), "--vessel", str(vessel), *spelled])
 

@@ -3,16 +3,44 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from expdesign.errors import InputError
 from expdesign.export.results import strict_json
 from expdesign.indices import Circle, NotStandard, StandardResults, Stop, Verdict, ZigZag, judge
 from expdesign.indices.criteria import LEAST_LENGTH_M
 from expdesign.vessel import Vessel
+from expdesign.vessel.environment import SEA_STATES
 
 KINDS = {Circle: "turning circle", ZigZag: "zig-zag", Stop: "stopping", NotStandard: "no standard trial"}
 Found = Circle | ZigZag | Stop | NotStandard
+
+
+@dataclass(frozen=True, kw_only=True)
+class Held:
+    """Where and in what weather the measured trials were held; None where it is not told.
+
+    Attributes:
+        depth_m: of the water.
+        wind_mps: mean speed of the true wind.
+        sea_state: code of the World Meteorological Organization, 0 to 9.
+
+    Raises:
+        InputError: a depth that is not positive, a negative wind, a code that there is not.
+    """
+
+    depth_m: float | None = None
+    wind_mps: float | None = None
+    sea_state: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.depth_m is not None and not 0 < self.depth_m < math.inf:
+            raise InputError(f"depth is {self.depth_m:g} m, expected more than 0")
+        if self.wind_mps is not None and not 0 <= self.wind_mps < math.inf:
+            raise InputError(f"wind is {self.wind_mps:g} m/s, expected 0 or more")
+        if self.sea_state is not None and self.sea_state not in SEA_STATES:
+            raise InputError(f"sea state is {self.sea_state}, expected a whole number from 0 to 9")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -28,6 +56,7 @@ class IndicesContent:
         notes: what was found in the files, one sentence each.
         command: the command line.
         version: of the program.
+        held: where and in what weather the measured trials were held.
     """
 
     vessel: Vessel
@@ -38,6 +67,7 @@ class IndicesContent:
     notes: tuple[str, ...]
     command: str
     version: str
+    held: Held = field(default_factory=Held)
 
     @property
     def trials(self) -> tuple[tuple[str, Circle | ZigZag | Stop], ...]:
@@ -119,6 +149,7 @@ def indices_json(content: IndicesContent) -> str:
                 }
                 for source, verdict in content.verdicts
             ],
+            "held": asdict(content.held),
             "notes": list(content.notes),
         }
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from expdesign.export.indices_form.appendix import condition_rows, form_lines, ship_rows
 from expdesign.export.indices_form.form import IndicesContent, shown, verdict_rows
 from expdesign.export.pages import page_templates
 from expdesign.indices import Circle, NotStandard, Stop, ZigZag
@@ -11,11 +12,16 @@ from expdesign.indices import Circle, NotStandard, Stop, ZigZag
 
 def indices_html(content: IndicesContent) -> str:
     """One HTML page without outside references."""
+    sources = tuple(dict.fromkeys(source for source, _ in content.trials))
     unmet = sum(verdict.met is False for _, verdict in content.verdicts)
     page = page_templates("indices_form").get_template("indices.html")
     return page.render(
         content=content,
         rows=verdict_rows(content),
+        sources=sources,
+        forms={source: form_lines(content, source) for source in sources},
+        ship=ship_rows(content),
+        conditions=condition_rows(content),
         unmet=unmet,
         circles=[_circle(source, trial) for source, trial in content.trials if isinstance(trial, Circle)],
         zigzags=[_zigzag(source, trial) for source, trial in content.trials if isinstance(trial, ZigZag)],

@@ -1,0 +1,99 @@
+"""The form of MSC/Circ.1053, appendix 6: both sides beside the criterion, ship and conditions, blanks where unknown."""
+
+import math
+from dataclasses import replace
+
+import pytest
+from lxml import html
+from nomoto_ship import nomoto_ship
+
+from expdesign.errors import InputError
+from expdesign.export.indices_form import Held, IndicesContent, indices_html
+from expdesign.export.indices_form.appendix import condition_rows, form_lines, ship_rows
+from expdesign.indices import Circle, criteria, standard_results
+from expdesign.vessel import Vessel
+
+SHIP = replace(nomoto_ship(), length_m=180.0, beam_m=30.0, draught_m=10.0)
+SPEED = 7.0
+ODD = "<script>alert('x')</script> & \"Åbo\" 訓練 \x07" + " a very long name" * 20
+
+
+def content(vessel: Vessel = SHIP, **changes: object) -> IndicesContent:
+    given: dict[str, object] = {
+        "vessel": vessel,
+        "scale": 1.0,
+        "simulated": standard_results(vessel, speed_mps=SPEED),
+        "simulated_why_not": "",
+        "measured": (),
+        "notes": (),
+        "command": "expdesign indices",
+        "version": "1.2.3",
+    }
+    return IndicesContent(**(given | changes))
+
+
+def test_every_index_stands_under_its_side_beside_its_criterion() -> None:
+    form = content()
+    found = form.simulated
+    limits = {limit.key: limit.limit for limit in criteria(SHIP.length_m, SPEED)}
+    lines = form_lines(form, "simulated")
+    assert [line.name for line in lines] == [
+        "Advance", "Tactical diameter", "First overshoot", "Second overshoot", "First overshoot",
+        "Way to 10° of heading at 10° of helm", "Track reach, full astern",
+    ]  # fmt: skip
+    port = next(circle for circle in found.circles if circle.side == "port")
+    assert lines[0].port[0].value == f"{port.advance_m:.4g} m"
+    assert lines[0].port[0].by_length == f"{port.advance_m / 180:.2f} L"
+    assert lines[0].criterion == "4.5 L = 810 m"
+    ten = next(zigzag for zigzag in found.zigzags if zigzag.side == "starboard" and zigzag.helm_rad < 0.2)
+    assert lines[3].starboard[0].value == f"{math.degrees(ten.overshoots_rad[1]):.1f} deg"
+    assert lines[3].criterion == f"{math.degrees(limits['second_overshoot_10_10_rad']):.1f} deg at L/V = 25.7 s"
+    assert [len(line.both) for line in lines] == [0, 0, 0, 0, 0, 0, 1]
+    assert lines[6].both[0].met == (found.stops[0].track_reach_m <= limits["track_reach_m"])
+
+
+def test_what_exceeds_its_limit_is_marked_and_what_was_not_run_is_not_shown() -> None:
+    wide = Circle(
+        name="wide.csv", side="port", helm_rad=0.6, speed_mps=SPEED, advance_m=811.0, transfer_m=1.0,
+        tactical_diameter_m=899.0, initial_turning_m=1.0, steady_diameter_m=None,
+    )  # fmt: skip
+    lines = form_lines(content(simulated=None, measured=(wide,)), "measured")
+    assert (lines[0].port[0].met, lines[1].port[0].met, lines[0].starboard) == (False, True, ())
+    page = html.fromstring(indices_html(content(simulated=None, measured=(wide,))))
+    rows = {" ".join(" ".join(row.itertext()).split()) for row in page.iter("tr")}
+    assert any(row.startswith("Turning circle Advance 811 m 4.51 L \N{BALLOT X} exceeds not shown") for row in rows)
+
+
+def test_ship_data_are_the_vessels_and_what_no_file_tells_is_left_open() -> None:
+    rows = dict(ship_rows(content()))
+    assert rows["Length, beam, mean draught"] == "L 180 m, B 30 m, T 10 m"
+    assert (rows["L/B"], rows["B/T"]) == ("6.00", "3.00")
+    assert rows["L/V"] == f"{180 / SPEED:.1f} s ({SPEED:.2f} m/s)"
+    assert rows["Block coefficient"] == rows["Type of ship"] == ""
+    assert dict(ship_rows(content(scale=25.0)))["L/V"].startswith(f"{180 / SPEED * 5:.1f} s")
+
+
+@pytest.mark.parametrize(
+    ("held", "met"),
+    [
+        (Held(), (None, None, None)),
+        (Held(depth_m=40.0, wind_mps=10.7, sea_state=4), (False, True, True)),
+        (Held(depth_m=40.1, wind_mps=10.8, sea_state=5), (True, False, False)),
+    ],
+)
+def test_conditions_are_judged_by_four_draughts_beaufort_five_and_sea_state_four(held: Held, met: object) -> None:
+    assert tuple(row.met for row in condition_rows(content(held=held))) == met
+
+
+@pytest.mark.parametrize("wrong", [{"depth_m": 0.0}, {"wind_mps": -1.0}, {"sea_state": 10}])
+def test_conditions_that_cannot_be_are_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(InputError, match=r"expected"):
+        Held(**wrong)
+
+
+def test_odd_names_are_shown_and_never_run() -> None:
+    odd = indices_html(content(replace(SHIP, name=ODD), notes=(ODD,), command=ODD))
+    assert "<script" not in odd
+    assert "\x07" not in odd
+    assert "http" not in odd
+    assert html.fromstring(odd).find(".//h1").text_content() == ODD.replace("\x07", "\N{REPLACEMENT CHARACTER}")
