@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from expdesign.dictionary import Primitive
+from expdesign.errors import Diverged
 from expdesign.estimation.nuisance import batch_signs
 from expdesign.estimation.predictors import Layout, build_layout
 from expdesign.estimation.tables import measured_table, model_for
@@ -22,7 +23,7 @@ from expdesign.information.moments import HEADINGS, log_det_or_none
 from expdesign.information.primitive_information import PrimitiveInformation
 from expdesign.information.scoring import score_primitives
 from expdesign.signals import Batch, Record
-from expdesign.simulation import CALM, Environment, delivered, simulate, to_body
+from expdesign.simulation import CALM, Environment, delivered, simulate_many, to_body
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, Vessel
 
@@ -75,11 +76,7 @@ def score_augmented(
         fixed_parameters=fixed_parameters,
         mean_subtraction=mean_subtraction,
     )
-    batches = [
-        _batch(vessel, primitive, 2 * np.pi * number / HEADINGS, environment)
-        for primitive in primitives
-        for number in range(HEADINGS)
-    ]
+    batches = _measured(vessel, primitives, environment)
     record = Record(batches=tuple(batches))
     model = model_for(vessel.model, record)
     layout = build_layout(model, record, predictor=predictor, fixed=fixed_parameters)
@@ -101,18 +98,47 @@ def score_augmented(
     )
 
 
-def _batch(vessel: Vessel, primitive: Primitive, heading: float, environment: Environment) -> Batch:
-    """A noise-free run as it would be measured, with what the actuators deliver as inputs."""
-    current_b = np.array(to_body(environment.current_to, heading, NUMPY))
-    run = simulate(
-        vessel,
-        primitive.commands,
-        pose=(0.0, 0.0, heading),
-        velocity=primitive.entry_velocity + np.append(current_b, 0.0),
-        environment=environment,
-        standing=primitive.entry_inputs,
-    )
-    pose, velocity = run.pose[:-1], run.velocity[:-1]
+def _measured(vessel: Vessel, primitives: Sequence[Primitive], environment: Environment) -> list[Batch]:
+    """Noise-free runs of every primitive on every heading, in this order, as they would be measured.
+
+    Runs of one length are simulated together. Inputs are what the actuators deliver.
+
+    Raises:
+        Diverged: the nominal model is unstable.
+    """
+    headings = 2 * np.pi * np.arange(HEADINGS) / HEADINGS
+    current_b = np.stack(to_body(environment.current_to, headings, NUMPY), axis=1)
+    pose = np.pad(headings[:, None], ((0, 0), (2, 0)))
+    lengths: dict[tuple[int, float], list[int]] = {}
+    for index, primitive in enumerate(primitives):
+        commands = primitive.commands
+        lengths.setdefault((len(commands), commands.sample_time_s), []).append(index)
+    found: dict[int, list[Batch]] = {}
+    for members in lengths.values():
+        some = [primitives[index] for index in members]
+        states = simulate_many(
+            vessel,
+            np.repeat([primitive.commands.values for primitive in some], HEADINGS, axis=0),
+            pose=np.tile(pose, (len(some), 1)),
+            velocity=np.concatenate([item.entry_velocity + np.pad(current_b, ((0, 0), (0, 1))) for item in some]),
+            current_to=np.tile(environment.current_to, (len(some) * HEADINGS, 1)),
+            wind_to=np.tile(environment.wind_to, (len(some) * HEADINGS, 1)),
+            parameters=np.tile(vessel.model.parameters, (len(some) * HEADINGS, 1)),
+            standing=np.repeat([primitive.entry_inputs for primitive in some], HEADINGS, axis=0),
+        )
+        for place, index in enumerate(members):
+            own = states[:-1, place * HEADINGS : (place + 1) * HEADINGS]
+            if not np.isfinite(own).all():
+                raise Diverged(
+                    f"vessel {vessel.name!r}: the model is unstable under the commands of {some[place].name!r}"
+                )
+            found[index] = [_batch(vessel, some[place], own[:, heading], environment) for heading in range(HEADINGS)]
+    return [batch for index in range(len(primitives)) for batch in found[index]]
+
+
+def _batch(vessel: Vessel, primitive: Primitive, states: Array, environment: Environment) -> Batch:
+    """One run from its states (k, 6)."""
+    pose, velocity = states[:, :3], states[:, 3:]
     wind_b = np.stack(to_body(environment.wind_to, pose[:, 2], NUMPY), axis=1)
     return Batch(
         name=primitive.name,
