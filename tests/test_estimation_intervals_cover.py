@@ -1,47 +1,81 @@
 """Coverage: 95 % intervals hold the truth in about 95 % of simulated trials where the estimator is consistent.
 
-Noise enters through the regressors, so residuals are coloured; thresholds are the binomial chance error of as many
-trials. `benchmarks/estimation_coverage.py` prints every parameter's share beside bias, spread and kurtosis.
+Noise enters through the regressors, so residuals are coloured: in one long batch, in many short ones, and with a
+current that wanders for 100 s. Thresholds are the binomial chance error of as many trials.
+`benchmarks/estimation_coverage.py` prints every parameter's share beside bias, spread and kurtosis.
 """
 
 import numpy as np
 import pytest
-from estimation_case import CALM_CURRENT, NOMINAL, STEADY_CURRENT, TRUE, commands, errors_and_std, measured
+from estimation_case import (
+    CALM_CURRENT,
+    NOMINAL,
+    STEADY_CURRENT,
+    TRUE,
+    WANDERING_CURRENT,
+    commands,
+    errors_and_std,
+    many_short_batches,
+    measured,
+)
 
 from expdesign.estimation.methods import Settings, estimate
 from expdesign.estimation.regression import single_output
 from expdesign.estimation.solution import Weighting, solve_iv
 from expdesign.estimation.timeline import timeline
-from expdesign.estimation.whitening import Colour, fitted_colour, white_parts
+from expdesign.estimation.whitening import Colour, fitted_colour, innovations, white_parts
 from expdesign.signals import Record
-from expdesign.simulation import Environment
+
+CASES = {
+    "iv": ("iv", CALM_CURRENT),
+    "iv-augmented": ("iv-augmented", STEADY_CURRENT),
+    "wandering": ("iv-augmented", WANDERING_CURRENT),
+}
 
 
-def covered(trials: int, samples: int, method: str, weather: Environment) -> np.ndarray:
+def covered(case: str, trials: int, samples: int = 4000) -> np.ndarray:
     """(p,) share of trials whose interval holds the truth."""
+    if case == "short":
+        found = many_short_batches(trials, seed=31)
+        assert found.failed == 0
+        return found.coverage
+    method, weather = CASES[case]
     _, errors, std, failed = errors_and_std(trials, samples, method, weather, seed=31)
     assert failed <= 0.01 * trials
     return (np.abs(errors) < 1.96 * std).mean(axis=0)
 
 
-def test_intervals_cover_small() -> None:
-    trials = 60
-    shares = covered(trials, 2000, "iv", CALM_CURRENT)
+@pytest.mark.parametrize(
+    ("case", "trials", "samples"), [("iv", 40, 2000), ("wandering", 30, 2500), ("short", 30, 12 * 300)]
+)
+def test_intervals_cover_small(case: str, trials: int, samples: int) -> None:
+    shares = covered(case, trials, samples)
     chance = np.sqrt(0.95 * 0.05 / trials)
     assert (shares > 0.95 - 4 * chance).all(), shares
     assert abs(shares.mean() - 0.95) < 2 * chance, shares
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("method", "weather"), [("iv", CALM_CURRENT), ("iv-augmented", STEADY_CURRENT)])
-def test_intervals_of_every_parameter_cover_between_93_and_97_in_100(method: str, weather: Environment) -> None:
+@pytest.mark.parametrize("case", [*CASES, "short"])
+def test_intervals_of_every_parameter_cover_between_93_and_97_in_100(case: str) -> None:
     """Each parameter by itself, give or take two standard errors of the count; all together without any."""
     trials = 1000
-    shares = covered(trials, 4000, method, weather)
+    shares = covered(case, trials)
     chance = 2 * np.sqrt(0.95 * 0.05 / trials)
     assert (shares > 0.93 - chance).all(), shares
     assert (shares < 0.97 + chance).all(), shares
     assert 0.93 < shares.mean() < 0.97, shares
+
+
+@pytest.mark.parametrize("colour", [Colour(0.0, -0.9), Colour(0.9, -0.5), Colour(0.7, 0.0), Colour(0.0, 0.6)])
+def test_filters_start_as_the_noise_does(colour: Colour) -> None:
+    """Terms zeta n of equal variance mean cov(eps) = zeta^T zeta; for ARMA(1, 1) that is known in closed form."""
+    a, c, count = colour.a, colour.c, 40
+    zeta, _ = innovations(np.eye(count), np.zeros(count), colour)
+    first = (1 + a * c) * (a + c) / (1 - a**2)
+    lag = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
+    exact = np.where(lag == 0, (1 + 2 * a * c + c**2) / (1 - a**2), first * a ** np.maximum(lag - 1, 0))
+    np.testing.assert_allclose(zeta.T @ zeta, exact, atol=1e-9)
 
 
 @pytest.mark.parametrize("colour", [0.0, -0.9])
@@ -85,6 +119,6 @@ def test_ignoring_the_colour_of_residuals_gives_intervals_far_too_wide() -> None
         estimate(
             Record(batches=(batch,)), NOMINAL, settings=Settings(weighting=Weighting(mean="complete", covariance=kind))
         ).std
-        for kind in ("hac", "hc1")
+        for kind in ("components", "hc1")
     )
     assert np.median(white / robust) > 1.5

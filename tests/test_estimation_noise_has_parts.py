@@ -73,7 +73,7 @@ def test_covariances_are_found_from_many_short_batches() -> None:
     for _ in range(60):
         e = rng.normal(size=(40, 51))
         eps = 0.5 * rng.normal(size=(40, 50)) + np.diff(e, axis=1) + 0.7 * rng.normal(size=(40, 1))
-        fitted = fit_components(eps.ravel(), parts)
+        (fitted,) = fit_components(eps.reshape(-1, 1), parts)
         columns = [filtered(index, fitted.memories, np.eye(50)) for index in range(len(fitted.variances))]
         total = np.einsum("i,ijk->jk", fitted.variances, columns)
         found.append((total[20, 20], total[20, 21], total.sum()))
@@ -87,7 +87,7 @@ def test_noise_of_other_shape_is_noticed_and_noise_of_these_parts_is_not() -> No
     parts = stretches(np.zeros(2000, dtype=np.int64), np.arange(2000))
 
     def noticed(noise: np.ndarray) -> float:
-        return float(np.mean([fit_components(row, parts).misfit > MISFIT for row in noise]))
+        return float(np.mean([fitted.misfit > MISFIT for fitted in fit_components(noise.T, parts)]))
 
     e = rng.normal(size=(100, 2001))
     assert noticed(np.diff(e) + 0.3 * rng.normal(size=(100, 2000))) < 0.01 + 4 * np.sqrt(0.01 * 0.99 / 100)

@@ -56,14 +56,25 @@ class Components:
     misfit: float
 
 
-def fit_components(eps: Array, parts: Sequence[tuple[slice, Integers]]) -> Components:
-    """The parts of residuals (k,) in these `stretches`."""
+def fit_components(residuals: Array, parts: Sequence[tuple[slice, Integers]]) -> list[Components]:
+    """The parts of each output's residuals (k, n) in these `stretches`."""
     longest = max(int(places[-1]) + 1 for _, places in parts)
     memories = np.append(MEMORIES[longest / 4 >= MEMORIES], np.inf)
+    expected: dict[bytes, Array] = {}
+    for _, places in parts:
+        if (key := places.tobytes()) not in expected:
+            expected[key] = _expected(places, memories)
+    shapes = [expected[places.tobytes()] for _, places in parts]
+    return [_fitted(column, parts, shapes, memories) for column in residuals.T]
+
+
+def _fitted(
+    eps: Array, parts: Sequence[tuple[slice, Integers]], expected: Sequence[Array], memories: Array
+) -> Components:
     power = float(eps @ eps) / len(eps)
     variances = np.zeros(2 + len(memories))
     variances[0] = power
-    frequency, ordinates, shapes = _periodograms(eps, parts, memories)
+    frequency, ordinates, shapes = _periodograms(eps, parts, expected)
     if not power > 0 or not (frequency > 0).any():
         return Components(variances, memories, 0.0)
     binned = _binned(frequency, ordinates / power, shapes)
@@ -72,7 +83,9 @@ def fit_components(eps: Array, parts: Sequence[tuple[slice, Integers]]) -> Compo
     variances[:2] = power * quick
     if quick_cost - slow_cost > np.log(len(frequency)) / 2:
         variances = power * slow
-    return Components(variances, memories, _misfit(frequency, ordinates / (variances @ shapes)))
+    level = variances @ shapes
+    ratio = ordinates / np.maximum(level, 1e-12 * level.max())
+    return Components(variances, memories, _misfit(frequency, ratio))
 
 
 def filtered(index: int, memories: Array, W: Array) -> Array:
@@ -131,20 +144,16 @@ def _correlation(residuals: Array, fitted: Sequence[Components]) -> Array:
     return found if least >= 0 else np.asarray((found - least * np.eye(len(found))) / (1.0 - least))
 
 
-def _periodograms(eps: Array, parts: Sequence[tuple[slice, Integers]], memories: Array) -> tuple[Array, Array, Array]:
+def _periodograms(
+    eps: Array, parts: Sequence[tuple[slice, Integers]], expected: Sequence[Array]
+) -> tuple[Array, Array, Array]:
     """Frequencies (f,), the periodogram there, and each part's expected one (2 + m, f), of all stretches in a row.
 
     Frequency zero is there only where the mean is, not where it was subtracted.
     """
-    known: dict[int, Array] = {}
     found = []
-    for rows, places in parts:
+    for (rows, places), shapes in zip(parts, expected, strict=True):
         count, own = int(places[-1]) + 1, eps[rows]
-        shapes = known.get(count) if count == len(places) else None
-        if shapes is None:
-            shapes = _expected(places, memories)
-            if count == len(places):
-                known[count] = shapes
         ordinates = np.abs(np.fft.rfft(spread(own, places))) ** 2 / len(places)
         frequency = 2 * np.pi * np.arange(len(ordinates)) / count
         first = int(abs(own.sum()) <= 1e-9 * np.sqrt(len(own)) * np.linalg.norm(own))
@@ -196,5 +205,7 @@ def _misfit(frequency: Array, ratio: Array) -> float:
     """Bartlett's statistic: how far the cumulated ratio of periodogram to expectation is from a straight line."""
     order = np.argsort(frequency, kind="stable")
     rising = np.cumsum(ratio[order[frequency[order] > 0]])
+    if not rising[-1] > 0:
+        return 0.0
     even = np.arange(1, len(rising) + 1) / len(rising)
     return float(np.abs(rising / rising[-1] - even).max() * np.sqrt(len(rising)))

@@ -110,9 +110,10 @@ def apart_from_start(rows: Rows) -> Rows:
         NotInformative: nothing is left.
     """
     regression = rows.regression
-    kept = regression.step_of > 0
-    if not kept.any():
+    later = np.flatnonzero(regression.step_of > 0)
+    if not len(later):
         raise NotInformative("instruments need batches of three samples or more")
+    kept = _run(later)
     shorter = replace(
         regression,
         Phi=regression.Phi[kept],

@@ -32,7 +32,7 @@ from expdesign.estimation.regression import Regression, batch_slices
 from expdesign.estimation.systems import Part
 from expdesign.estimation.timeline import Timeline, stretches, timeline
 from expdesign.estimation.weighting import Weighting
-from expdesign.estimation.whitening import white_parts
+from expdesign.estimation.whitening import PASSES, white_parts
 from expdesign.values import Array
 
 LEVEL = 0.01
@@ -57,15 +57,15 @@ class Uncertainty:
 def covariance_of(regression: Regression, weighting: Weighting, parts: Sequence[Part], residuals: Array) -> Uncertainty:
     """The covariance that a weighting asks for, of the estimate from parts with residuals (k, n)."""
     p, kind = len(regression.parameters), weighting.covariance
-    when = timeline(regression.batch_of, regression.step_of)
-    terms = [_Terms(part, residuals[:, part.system.outputs], when, kind in ("components", "hac")) for part in parts]
     factor = 1.0 if kind == "hc0" else residuals.size / max(1, residuals.size - p)
-    if kind != "components":
-        P, lags = _summed(terms, weighting, p, len(regression))
-        return Uncertainty(factor * P, lags)
-    return _by_components(regression, weighting, terms, residuals, factor)
+    if kind == "components":
+        return _by_components(regression, weighting, parts, residuals, factor)
+    terms = _terms(regression, parts, residuals, passes=PASSES if kind == "hac" else 0)
+    P, lags = _summed(terms, weighting, p, len(regression))
+    return Uncertainty(factor * P, lags)
 
 
+@dataclass(frozen=True, eq=False)
 class _Terms:
     """Terms whose sum is the error of a part's estimate.
 
@@ -75,9 +75,10 @@ class _Terms:
         zeta, n: (t, n, p) and (t, n) instruments and residuals, made white if wished.
     """
 
-    def __init__(self, part: Part, left: Array, when: Timeline, white: bool) -> None:
-        self.part, self.when = part, when
-        self.zeta, self.n = white_parts(part.Z, left, when) if white else (when.spread(part.Z), when.spread(left))
+    part: Part
+    when: Timeline
+    zeta: Array
+    n: Array
 
     def influences(self) -> Array:
         """(t, p) what each term adds."""
@@ -100,6 +101,14 @@ class _Terms:
         return by_batch([self.part.A[owner] for owner in self.when.owner], scores, batch_slices(self.when.batch))
 
 
+def _terms(regression: Regression, parts: Sequence[Part], residuals: Array, *, passes: int) -> list[_Terms]:
+    when = timeline(regression.batch_of, regression.step_of)
+    return [
+        _Terms(part, when, *white_parts(part.Z, residuals[:, part.system.outputs], when, passes=passes))
+        for part in parts
+    ]
+
+
 def _summed(terms: Sequence[_Terms], weighting: Weighting, p: int, rows: int) -> tuple[Array, int]:
     """(p, p) long-run covariance of the terms, and the last lag counted."""
     when, kind = terms[0].when, weighting.covariance
@@ -117,36 +126,39 @@ def _summed(terms: Sequence[_Terms], weighting: Weighting, p: int, rows: int) ->
 
 
 def _by_components(
-    regression: Regression, weighting: Weighting, terms: Sequence[_Terms], residuals: Array, factor: float
+    regression: Regression, weighting: Weighting, parts: Sequence[Part], residuals: Array, factor: float
 ) -> Uncertainty:
-    parts = stretches(regression.batch_of, regression.step_of)
-    fitted = [fit_components(residuals[:, output], parts) for output in range(residuals.shape[1])]
-    P = factor * _exact(regression, terms, residuals, fitted)
+    places = stretches(regression.batch_of, regression.step_of)
+    fitted = fit_components(residuals, places)
+    P = factor * _exact(regression, parts, residuals, fitted)
     scale, odd = np.ones((2, len(P)))
-    for item in terms:
+    for item in _terms(regression, parts, residuals, passes=1):
         system = item.part.system
         scale[system.columns] = np.sqrt(item.white_factor())
         odd[system.columns] = max(fitted[output].misfit for output in system.outputs)
-    lags, warnings = 0, []
-    if (odd > MISFIT).any():
-        other, lags = _summed(terms, weighting, len(P), len(regression))
-        variances = np.diag(P) * scale**2
-        ratio = np.divide(factor * np.diag(other), variances, out=np.ones_like(variances), where=variances > 0)
-        scale *= np.where(odd > MISFIT, np.sqrt(np.maximum(ratio, 1.0)), 1.0)
-        names = [name for name, item in zip(regression.outputs, fitted, strict=True) if item.misfit > MISFIT]
-        warnings.append(
-            f"Residuals of {', '.join(names)} are coloured otherwise than sensor noise and lasting disturbances colour "
-            "them; standard deviations are the larger of two kinds."
-        )
-    return Uncertainty(P * np.outer(scale, scale), lags, tuple(warnings))
+    P *= np.outer(scale, scale)
+    if (odd <= MISFIT).all():
+        return Uncertainty(P, 0)
+    robust, lags = _summed(_terms(regression, parts, residuals, passes=PASSES), weighting, len(P), len(regression))
+    own, other = np.diag(P), factor * np.diag(robust)
+    larger = (odd > MISFIT) & (other > own) & (own > 0)
+    scale = np.sqrt(np.divide(other, own, out=np.ones_like(own), where=larger))
+    names = [name for name, item in zip(regression.outputs, fitted, strict=True) if item.misfit > MISFIT]
+    return Uncertainty(P * np.outer(scale, scale), lags, (_misfit_note(names),))
 
 
-def _exact(regression: Regression, terms: Sequence[_Terms], residuals: Array, fitted: Sequence[Components]) -> Array:
+def _misfit_note(outputs: Sequence[str]) -> str:
+    return (
+        f"Residuals of {', '.join(outputs)} are coloured otherwise than by sensor noise and lasting disturbances; "
+        "standard deviations are the larger of two kinds and less certain than usual."
+    )
+
+
+def _exact(regression: Regression, parts: Sequence[Part], residuals: Array, fitted: Sequence[Components]) -> Array:
     """(p, p) covariance of an estimate under noise of these parts."""
-    parts = stretches(regression.batch_of, regression.step_of)
     W, columns = [], []
     for output in range(residuals.shape[1]):
-        own = next((item.part for item in terms if output in item.part.system.outputs), None)
+        own = next((part for part in parts if output in part.system.outputs), None)
         if own is None:
             W.append(np.zeros((len(regression), 0)))
             columns.append(np.zeros(0, dtype=np.int64))
@@ -155,8 +167,9 @@ def _exact(regression: Regression, terms: Sequence[_Terms], residuals: Array, fi
         W.append(by_batch(own.A, own.Z[:, place], own.system.parts))
         columns.append(own.system.columns)
     P = np.zeros((len(regression.parameters),) * 2)
-    for row, blocks in zip(columns, score_covariance(W, residuals, fitted, parts), strict=True):
-        for column, block in zip(columns, blocks, strict=True):
+    blocks = score_covariance(W, residuals, fitted, stretches(regression.batch_of, regression.step_of))
+    for row, line in zip(columns, blocks, strict=True):
+        for column, block in zip(columns, line, strict=True):
             P[np.ix_(row, column)] += block
     return P
 

@@ -48,11 +48,11 @@ class Colour:
 WHITE = Colour(0.0, 0.0)
 
 
-def white_parts(Z: Array, residuals: Array, when: Timeline) -> tuple[Array, Array]:
+def white_parts(Z: Array, residuals: Array, when: Timeline, *, passes: int = PASSES) -> tuple[Array, Array]:
     """zeta (t, n, p) and n (t, n) from instruments (k, n, p) and residuals (k, n); no filter crosses batches."""
     zeta, white = when.spread(Z).copy(), when.spread(residuals).copy()
     batches, present = batch_slices(when.batch), when.spread(np.ones(len(when.place)))
-    for output, _ in product(range(white.shape[1]), range(PASSES)):
+    for output, _ in product(range(white.shape[1]), range(passes)):
         colour = fitted_colour([white[rows, output] for rows in batches], [present[rows] for rows in batches])
         if colour == WHITE:
             continue
