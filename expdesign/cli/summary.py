@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 UNITS = {"s": "s", "m": "m", "mps": "m/s", "radps": "rad/s", "rad": "rad", "deg": "°", "kn": "kn", "rps": "1/s"}
 """Last part of a name -> unit as people write it."""
+LONGEST = 200
+"""Characters of a value beside its name; longer ones are left to the tables."""
 
 
 def as_json(command: str, outcome: Outcome) -> str:
@@ -44,7 +46,7 @@ def print_summary(outcome: Outcome) -> None:
 
 def _brief(value: object) -> bool:
     """Whether a value is worth a line where tables tell the rest."""
-    return not isinstance(value, Mapping) and value != []
+    return not isinstance(value, Mapping) and value != [] and len(_text(value)) < LONGEST
 
 
 def _print_table(console: Console, text: TextTable) -> None:

@@ -85,7 +85,7 @@ def validate_design(
     )
     forget()
     progress("done", 1.0)
-    return Outcome(files=files, summary=_summary(content), tables=(_table(content),))
+    return Outcome(files=files, summary=_summary(content), tables=(_told(content), _table(content)))
 
 
 def _identity(rehearsal: Rehearsal) -> tuple[object, ...]:
@@ -135,6 +135,12 @@ def _summary(content: ValidationContent) -> dict[str, object]:
         "without_estimate": {item.design: item.failed for item in content.results},
         "judgements": list(judgements(content)),
     }
+
+
+def _told(content: ValidationContent) -> TextTable:
+    return TextTable(
+        title="What the trials show", header=("",), rows=tuple((sentence,) for sentence in judgements(content))
+    )
 
 
 def _table(content: ValidationContent) -> TextTable:

@@ -148,7 +148,7 @@ def _of_weather(rehearsal: Rehearsal) -> Iterator[str]:
             f'{allows}" in the scenario.'
         )
     if weather.current_std_mps > 0 or weather.wind_std_mps > 0:
-        yield "the mean weather. Every trial has weather of its own, drawn around the forecast."
+        yield "every trial meets the mean weather of the forecast. Here each has its own, drawn around it."
 
 
 def validation_json(content: ValidationContent) -> str:

@@ -8,6 +8,9 @@ from expdesign.durations.validation import Validated
 from expdesign.export.report.figures.style import BLUE, GREY, LINES, VERMILION, light_grid, new_figure, plain, svg
 from expdesign.export.validation_page.content import ERROR_LIMIT, chance
 
+WIDE = 10.0
+"""Ratio of the ends of an axis beyond which its ticks stand farther apart."""
+
 
 def error_figure(results: tuple[Validated, ...]) -> str:
     """Share of trials below each normalised error, one line per design."""
@@ -49,9 +52,20 @@ def spread_figure(result: Validated) -> str:
     axes.set_yticks(rows, names)
     axes.invert_yaxis()
     axes.set_xscale("log")
-    axes.set_xticks([0.5, 0.7, 1.0, 1.5, 2.0], ["0.5", "0.7", "1", "1.5", "2"])
+    low, high = axes.get_xlim()
+    axes.set_xticks(_ticks(low, high), [f"{tick:g}" for tick in _ticks(low, high)])
     axes.minorticks_off()
+    axes.set_xlim(low, high)
     axes.set_xlabel("standard deviation found in trials / predicted")
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, fontsize=9)
     light_grid(axes, "x")
     return svg(figure, key="spread", label="Standard deviation found over predicted, for each parameter")
+
+
+def _ticks(low: float, high: float) -> list[float]:
+    """Round ratios on a logarithmic axis, closer together where it is short."""
+    wide = high / low > WIDE
+    ladder = (1.0, 2.0, 5.0) if wide else (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)
+    decades = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
+    ticks = [step * 10.0**decade for decade in decades for step in ladder]
+    return [tick for tick in ticks if low <= tick <= high]
