@@ -66,7 +66,7 @@ def test_a_prior_of_unstable_ships_is_refused_with_its_reason():
 
 def leave(vessel, water, environment=CALM, draws=400):
     run = primitive(vessel)
-    return leave_water_probability(
+    total, by_leg = leave_water_probability(
         vessel,
         area(water),
         environment,
@@ -76,6 +76,8 @@ def leave(vessel, water, environment=CALM, draws=400):
         rng=np.random.default_rng(1),
         draws=draws,
     )
+    assert by_leg == (total,)
+    return total
 
 
 def test_a_certain_ship_leaves_never_or_always():

@@ -35,8 +35,10 @@ def leave_water_probability(
     legs: Sequence[Leg],
     rng: np.random.Generator,
     draws: int = DRAWS,
-) -> float:
-    """Share of drawn vessels, currents and winds for which some run's hull leaves the allowed water.
+) -> tuple[float, tuple[float | None, ...]]:
+    """Share of drawn vessels, currents and winds for which some run's hull leaves the allowed water, and for each leg.
+
+    Legs between runs have no share, None.
 
     One draw is one trial: the same parameters (normal, independent, standard deviations of the vessel file), current
     and wind in all its runs. Its standard error is sqrt(p (1 - p) / draws). Runs that diverge count as leaving.
@@ -44,8 +46,10 @@ def leave_water_probability(
     parameters, current, wind = draw_truths(vessel, environment, draws, rng)
     shapely.prepare(area.water)
     left = np.zeros(draws, dtype=bool)
+    shares: list[float | None] = []
     for leg in legs:
         if leg.kind != "primitive":
+            shares.append(None)
             continue
         run = Commands(
             sample_time_s=commands.sample_time_s, names=commands.names, values=commands.values[leg.first : leg.last]
@@ -60,8 +64,10 @@ def leave_water_probability(
             parameters=parameters,
             standing=commands.values[leg.first - 1] if leg.first else None,
         )
-        left |= _leaves(area, vessel, states)
-    return float(left.mean())
+        leaves = _leaves(area, vessel, states)
+        left |= leaves
+        shares.append(float(leaves.mean()))
+    return float(left.mean()), tuple(shares)
 
 
 def _leaves(area: SeaArea, vessel: Vessel, states: Array) -> np.ndarray:

@@ -103,7 +103,7 @@ def _finished(
     if not verification.verified:
         raise NoPlan("the plan found does not pass its own verification: " + "; ".join(verification.problems))
     rng = np.random.default_rng(problem.seed)
-    leaving = leave_water_probability(vessel, area, environment, rng=rng, **sailed)  # type: ignore[arg-type]
+    leaving, leaving_by_leg = leave_water_probability(vessel, area, environment, rng=rng, **sailed)  # type: ignore[arg-type]
     if leaving > 1.0 - problem.settings.confidence + 1e-12:
         raise NoPlan(
             f"{leaving:.1%} of drawn vessels leave allowed water during the runs of the plan found, more than "
@@ -114,6 +114,7 @@ def _finished(
         **sailed,  # type: ignore[arg-type]
         reposition_bound_s=_reposition_bound_s(problem, water),
         leave_water_probability=leaving,
+        leave_water_by_leg=leaving_by_leg,
         design_efficiency_realised=realised_efficiency(vessel, problem.design, environment, **sailed),  # type: ignore[arg-type]
         verification=verification,
     )

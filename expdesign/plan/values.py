@@ -82,6 +82,7 @@ class Plan:
         legs: in time order, without gaps.
         reposition_bound_s: no plan with these runs repositions in less time [s].
         leave_water_probability: chance that a primitive run open loop leaves safe water, or None if not computed.
+        leave_water_by_leg: the same for each leg; None for legs between runs, or () if not computed.
         design_efficiency_realised: D-efficiency of the whole trajectory's information against the optimal design's.
         verification: what the independent check found.
     """
@@ -94,6 +95,7 @@ class Plan:
     leave_water_probability: float | None
     design_efficiency_realised: float | None
     verification: Verification
+    leave_water_by_leg: tuple[float | None, ...] = ()
 
     @property
     def sample_leg(self) -> np.ndarray:
