@@ -99,8 +99,9 @@ def sail(trials: list[Trial], orders: np.ndarray, step_s: float, weather: Weathe
 
     Effects: gain, kappa, asymmetry (yaw moment per ahead force), angle_offset (all azimuths or the rudder), lag_s,
     delay_s, deadband (of the first input of every actuator), load_u load_v load_r, shallow_damping shallow_inertia
-    (times draught/depth, draught 2.5 m), roll_period_s roll_damping roll_sway roll_yaw, change_s (batches laid end to end) with
-    change_gain change_damping, and any name of TERMS. lag, delay and deadband act on the inputs named by `acts_on` (bit mask).
+    (times draught/depth, draught 2.5 m), roll_period_s roll_damping roll_sway roll_yaw, change_s (batches laid end to
+    end) with change_gain change_damping, and any name of TERMS. lag, delay and deadband act on the inputs named by
+    `acts_on` (bit mask).
     """
     ship = trials[0].ship
     n, b, k, m = orders.shape
@@ -217,7 +218,6 @@ def measure(true: dict[str, np.ndarray], step_s: float, sensors: Sensors, rng: n
     Faults: heading_bias (v_meas = v + u sin(bias)), lever_m (v_meas = v + lever r), gyro (r_meas = (1 + gyro) r),
     late_u, late_v, late_r (seconds).
     """
-    n, b, k = true["u"].shape
 
     def of(name: str) -> np.ndarray:
         return np.array([fault.get(name, 0.0) for fault in faults])[:, None, None]

@@ -108,7 +108,7 @@ def _windows(ship: Extended, record: Record) -> Windows:
 
 
 def _steady_time(ship: Extended, windows: Windows) -> float:
-    """Time within which no error of a state grows beyond `LARGEST_GROWTH` of itself, in units of the measured spread."""
+    """Time within which no error of a state, in units of the measured spread, grows beyond `LARGEST_GROWTH`."""
     motion = simulate_from_first(ship, windows)
     if motion.diverged:
         return windows.steps * windows.step_s / 2
@@ -159,12 +159,14 @@ def _held_out(found: Search, ship: Extended, windows: Windows, tell: Callable[[f
 
 
 def _worthwhile(found: Search, held: Sequence[HeldOut]) -> Search:
-    """Without the last causes that gain nothing where they were not fitted: significant, but of no use to anyone."""
-    steps = list(found.steps)
-    while steps and not np.nanmean(held[len(steps)].fit - held[len(steps) - 1].fit) > LEAST_GAIN:
-        steps.pop()
-    last = steps[-1].chosen.fit if steps else found.first
-    return replace(found, steps=tuple(steps), last=last)
+    """Only as many causes as do best where they were not fitted: others may be significant, but mend nothing."""
+    means = [float(np.nanmean(item.fit)) for item in held]
+    count = 0
+    for number in range(1, len(means)):
+        if means[number] > means[count] + LEAST_GAIN:
+            count = number
+    steps = found.steps[:count]
+    return replace(found, steps=steps, last=steps[-1].chosen.fit if steps else found.first)
 
 
 def cause_of(name: str) -> Cause:

@@ -26,6 +26,7 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
+from scipy.signal import lfilter
 
 from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.windows import Windows
@@ -95,12 +96,10 @@ class Surroundings(dict[str, Array]):
 
 def surroundings(ship: Extended, windows: Windows) -> Surroundings:
     """Everything outside the ship, with the inputs as its actuators follow them."""
-    acting = np.moveaxis(windows.gather(followed_inputs(ship, windows)), -1, 0)
-    model = ship.model
-    table = Surroundings(zip(model.inputs, acting, strict=True))
-    forces = generalised_force(model.actuators, table, NUMPY)
-    shape = windows.heading.shape
-    table |= {n: np.broadcast_to(np.asarray(f, dtype=float), shape) for n, f in zip(FORCE_SIGNALS, forces, strict=True)}
+    model, shape = ship.model, windows.heading.shape
+    names = (*dict.fromkeys((*model.inputs, *FORCE_SIGNALS)),)
+    signals = windows.gather(tuple(_acting(model, *rows) for rows in followed_inputs(ship, windows)))
+    table = Surroundings({n: np.broadcast_to(signals[..., i], shape) for i, n in enumerate(names)})
     if ship.get("asymmetry"):
         table["tau_psi"] = table["tau_psi"] + ship.get("asymmetry") * ahead_force(table, model)
         table["lean"] = ship.get("asymmetry") * ahead_force(table, model)
@@ -116,6 +115,15 @@ def surroundings(ship: Extended, windows: Windows) -> Surroundings:
     return table
 
 
+def _acting(model: VesselModel, rows: Array, finer: int) -> Array:
+    """(k, m) inputs and forces, each its mean over the finer steps that it is known at."""
+    table = dict(zip(model.inputs, rows.T, strict=True))
+    forces = generalised_force(model.actuators, table, NUMPY)
+    table |= dict(zip(FORCE_SIGNALS, forces, strict=True))
+    columns = [np.broadcast_to(np.asarray(values, dtype=float), len(rows)) for values in table.values()]
+    return np.asarray(np.stack(columns, axis=-1).reshape(len(rows) // finer, finer, -1).mean(axis=1))
+
+
 def _wind(ship: Extended, windows: Windows) -> tuple[Array, Array]:
     """Measured where it is, else the mean wind of the model."""
     if windows.has_wind:
@@ -128,16 +136,22 @@ def members(group: str, inputs: tuple[str, ...]) -> list[int]:
     return [index for index, name in enumerate(inputs) if group in ("all", name) or name.rstrip("0123456789") == group]
 
 
-def followed_inputs(ship: Extended, windows: Windows) -> tuple[Array, ...]:
-    """Per batch, the inputs after dead band, dead time, lag and offset."""
+FINER = 4
+"""Steps within an integrator step in which moving actuators are followed: forces are not linear in angles."""
+
+
+def followed_inputs(ship: Extended, windows: Windows) -> tuple[tuple[Array, int], ...]:
+    """Per batch, the inputs after dead band, dead time, lag and offset, and how many rows an integrator step has."""
     inputs = ship.model.inputs
-    acting = tuple(windows.batch_inputs)
+    moving = any(key.startswith(("delay:", "lag:")) and value for key, value in ship.effects.items())
+    finer = FINER if moving else 1
+    acting = tuple(np.repeat(rows, finer, axis=0) for rows in windows.batch_inputs)
     for kind, change in (("deadband", _dead_band), ("delay", _delayed), ("lag", _lagged), ("offset", _offset)):
         for key, value in ship.effects.items():
             if key.startswith(kind + ":") and value != 0.0:
                 columns = members(key.split(":", 1)[1], inputs)
-                acting = tuple(_changed(rows, columns, change, value, windows.step_s) for rows in acting)
-    return acting
+                acting = tuple(_changed(rows, columns, change, value, windows.step_s / finer) for rows in acting)
+    return tuple((rows, finer) for rows in acting)
 
 
 def _changed(rows: Array, columns: list[int], change, value: float, step_s: float) -> Array:  # type: ignore[no-untyped-def]
@@ -168,11 +182,9 @@ def _lagged(rows: Array, lag_s: float, step_s: float) -> Array:
         return rows
     fade = np.exp(-step_s / lag_s)
     mean_share = lag_s / step_s * (1 - fade)
-    state, result = rows[0].copy(), np.empty_like(rows)
-    for index, order in enumerate(rows):
-        result[index] = order + (state - order) * mean_share
-        state = order + (state - order) * fade
-    return result
+    ends = lfilter([1 - fade], [1.0, -fade], rows, axis=0, zi=fade * rows[:1])[0]
+    begins = np.concatenate([rows[:1], ends[:-1]])
+    return np.asarray(rows + (begins - rows) * mean_share)
 
 
 def to_body(north: Array | float, east: Array | float, heading: Array) -> tuple[Array, Array]:

@@ -1,0 +1,79 @@
+"""Records with an effect hidden in them, and the models that know nothing of it, for the tests of the diagnosis."""
+
+from __future__ import annotations
+
+import hidden_effects as sea
+import numpy as np
+
+from expdesign.signals import Batch, Record
+from expdesign.vessel import STRUCTURES, Actuator, Limit, Term, Vessel, VesselModel
+
+COASTER_TERMS = {
+    "X_u": ("u", "u"), "X_abs_u_u": ("u", "abs(u)*u"), "X_vr": ("u", "v*r"), "X_nn": ("u", "abs(n1)*n1"),
+    "X_dd": ("u", "u*abs(u)*rudder1*rudder1"), "Y_v": ("v", "v"), "Y_ur": ("v", "u*r"),
+    "Y_rud": ("v", "u*abs(u)*rudder1"), "N_r": ("r", "r"), "N_uv": ("r", "u*v"), "N_rud": ("r", "u*abs(u)*rudder1"),
+}  # fmt: skip
+FREE = Limit()
+
+
+def vessel_of(ship: str, *, relative_std: float = 0.0, sample_time_s: float = 1.0) -> Vessel:
+    """A ship of `hidden_effects` as the package knows it, with the generator's parameters."""
+    if ship == "tug":
+        terms = STRUCTURES["manoeuvring-18"]
+        actuators = tuple(
+            Actuator(kind="azimuth", number=i, forward_m=x, limits=(FREE, FREE)) for i, x in ((1, 9.0), (2, -9.0))
+        )
+    elif ship == "barge":
+        terms, actuators = STRUCTURES["manoeuvring-10"], (Actuator(kind="force", number=1, limits=(FREE,) * 3),)
+    else:
+        terms = tuple(Term(equation, name, text) for name, (equation, text) in COASTER_TERMS.items())
+        actuators = (
+            Actuator(kind="propeller", number=1, forward_m=-20.0, limits=(FREE,)),
+            Actuator(kind="rudder", number=1, forward_m=-25.0, limits=(FREE,)),
+        )
+    values = np.array([sea.SHIPS[ship][term.name] for term in terms])
+    model = VesselModel(
+        terms=terms, parameters=values, parameter_std=relative_std * np.abs(values), form="continuous",
+        sample_time_s=sample_time_s, actuators=actuators,
+    )  # fmt: skip
+    return Vessel(name=ship, length_m=60.0, beam_m=12.0, draught_m=2.5, sample_time_s=sample_time_s, model=model)
+
+
+def hidden_record(
+    ship: str,
+    *,
+    seed: int,
+    effects: dict[str, float] | None = None,
+    faults: dict[str, float] | None = None,
+    relative_std: float = 0.0,
+    batches: int = 6,
+    samples: int = 300,
+    current: tuple[float, float] = (0.0, 0.0),
+    step_s: float = 1.0,
+    weather: sea.Weather | None = None,
+) -> Record:
+    """A trial with an effect hidden in it; parameters are drawn around the model's by their standard deviations."""
+    rng = np.random.default_rng(seed)
+    drawn = {name: value * (1 + relative_std * rng.standard_normal()) for name, value in sea.SHIPS[ship].items()}
+    trial = sea.Trial(ship=ship, parameters=drawn, effects=effects or {}, current=current)
+    orders = sea.commands(ship, batches, samples, step_s, rng)[None]
+    true = sea.sail([trial], orders, step_s, weather or sea.Weather(), rng)
+    told = {name: values[0] for name, values in sea.measure(true, step_s, sea.Sensors(), rng, [faults or {}]).items()}
+
+    def stacked(number: int, *names: str) -> np.ndarray:
+        return np.column_stack([told[name][number] for name in names])
+
+    return Record(
+        batches=tuple(
+            Batch(
+                name=f"run {number}",
+                sample_time_s=step_s,
+                input_names=sea.INPUTS[ship],
+                inputs=orders[0, number],
+                velocity=stacked(number, "u_mps", "v_mps", "r_radps"),
+                pose=stacked(number, "north_m", "east_m", "heading_rad"),
+                wind=stacked(number, "wind_u_mps", "wind_v_mps"),
+            )
+            for number in range(batches)
+        )
+    )

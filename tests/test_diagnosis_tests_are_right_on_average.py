@@ -1,0 +1,83 @@
+"""Identities behind the diagnosis: linear answers, prior, noise, corrected p-values."""
+
+import numpy as np
+from diagnosis_case import hidden_record, vessel_of
+from scipy.stats import chi2
+
+from expdesign.diagnosis.accuracy import first_states
+from expdesign.diagnosis.extension import as_extended, extend
+from expdesign.diagnosis.joint import fit
+from expdesign.diagnosis.motion import linearise, push_of, responses, simulate_windows
+from expdesign.diagnosis.noise import Noise, fit_colour, hats, whitened
+from expdesign.diagnosis.windows import cut_windows
+
+SMALL = {"theta:X_u": 1e-5, "current:north": 1e-4, "gain": 1e-4, "inertia:v": 1e-4, "heading_bias": 1e-4}
+
+
+def case(ship="barge", **options):
+    record = hidden_record(ship, seed=3, batches=2, samples=150, **options)
+    extended = as_extended(vessel_of(ship), record)
+    return extended, cut_windows(extended.model, record)
+
+
+def test_linear_answers_are_differences_of_simulations():
+    for ship in ("barge", "tug", "coaster"):
+        extended, windows = case(ship)
+        start = first_states(windows)
+        motion = simulate_windows(extended, windows, start)
+        linear = linearise(motion)
+        for key, size in SMALL.items():
+            changed = extended.having({key: size})
+            answer = responses(linear, [push_of(linear, changed, 1.0)])[0]
+            difference = simulate_windows(changed, windows, start).shown - motion.shown
+            assert np.abs(answer - difference).max() < 0.02 * np.abs(difference).max(), (ship, key)
+
+
+def test_colour_of_an_autoregression_is_found_and_whitened():
+    rng = np.random.default_rng(0)
+    white = rng.standard_normal((4, 4000, 4))
+    series = np.zeros_like(white)
+    for k in range(1, 4000):
+        series[:, k] = 0.8 * series[:, k - 1] + white[:, k]
+    noise = fit_colour(series)
+    assert np.allclose(noise.filters[:, 1], -0.8, atol=4 * np.sqrt((1 - 0.64) / 16000))
+    rest = whitened(series, noise)
+    assert np.allclose(rest.std(axis=(0, 1)), 1.0, atol=4 / np.sqrt(2 * 16000))
+
+
+def test_hats_sum_to_one():
+    assert np.allclose(hats(100, 1.0, 10.0).sum(axis=0), 1.0)
+
+
+def test_whitening_of_white_noise_only_scales():
+    values = np.arange(24.0).reshape(1, 6, 4)
+    noise = Noise(filters=np.ones((4, 1)), std=np.array([1.0, 2.0, 4.0, 8.0]))
+    assert np.array_equal(whitened(values, noise), values / noise.std)
+
+
+def test_an_effect_that_is_not_there_is_estimated_as_zero_within_its_standard_error():
+    """Over four trials the squared ratios are chi-squared, at least no larger; the threshold is its 99.9 % point."""
+    ratios = []
+    for seed in range(4):
+        record = hidden_record("barge", seed=500 + seed, batches=3, samples=120)
+        extended = as_extended(vessel_of("barge"), record)
+        windows = cut_windows(extended.model, record)
+        found = fit(extended, windows, ("gain", "heading_bias"), starts=first_states(windows))
+        ratios += [found.value(key) / found.std(key) for key in ("gain", "heading_bias")]
+    assert np.sum(np.square(ratios)) < chi2.isf(1e-3, len(ratios))
+
+
+def test_an_extended_vessel_simulates_as_the_extended_model():
+    """Gain, load, lag, offsets and sensors survive the way into a vessel and back."""
+    record = hidden_record("tug", seed=1, batches=2, samples=120)
+    vessel = vessel_of("tug")
+    effects = {"gain": 0.1, "inertia:u": 0.2, "lag:n": 2.0, "delay:a": 1.5, "offset:a1": 0.05, "gyro": 0.04,
+               "heading_bias": 0.02, "lever:forward": 1.0, "current:north": 0.1, "theta:Y_v": -0.02}  # fmt: skip
+    extended = as_extended(vessel, record).having(effects)
+    again, missing = extend(vessel, extended, {})
+    assert missing == ()
+    windows = cut_windows(extended.model, record)
+    start = first_states(windows)
+    one = simulate_windows(extended, windows, start).shown
+    other = simulate_windows(as_extended(again, record), windows, start).shown
+    assert np.abs(one - other).max() < 1e-9
