@@ -104,6 +104,18 @@ def test_the_chosen_are_those_of_largest_information_and_can_be_estimated_from(f
         np.testing.assert_allclose(batch.velocity, record.batches[index].velocity, atol=1e-8)
 
 
+def test_what_is_typed_is_what_is_done(files: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    options = ["--keep", "5", "--piece", "12.5", "--fixed", "X_vr", "Y_ur", "--mean", "batch", "--json"]
+    assert main(["mine", *map(str, files), "--vessel", str(SHIP), "--out", str(tmp_path / "out"), *options]) == 0
+    told = json.loads((tmp_path / "out" / "mining.json").read_text())
+    assert set(told["parameters"]) == set(vessel("model-ship").model.names) - {"X_vr", "Y_ur"}
+    assert told["mean_subtraction"] == "batch"
+    assert len(told["batches"]) == 3 * len(files)
+    assert len(told["chosen"]) == 5
+    assert json.loads(capsys.readouterr().out)["summary"]["chosen"] == told["chosen"]
+    assert len(load_records(tmp_path / "out" / "chosen.csv", vessel_inputs=FORCES).batches) == 5
+
+
 def test_without_a_definite_part_the_magnitude_of_the_determinant_decides():
     rng = np.random.default_rng(2)
     turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]

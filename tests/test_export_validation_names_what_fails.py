@@ -1,0 +1,125 @@
+"""Where simulated trials differ from predictions, the page says which assumption does not hold."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from design_case import example_dictionary, vessel
+
+from expdesign.durations.validation import Rehearsal, Validated, validate
+from expdesign.export.validation_page import ValidationContent, judgements
+from expdesign.simulation import CALM, Environment
+from expdesign.vessel import Sensors, Vessel
+
+CURRENT = Environment(current_to=np.array([0.2, 0.0]))
+WIND = Environment(wind_to=np.array([3.0, 2.0]))
+
+
+def rehearsal(**changes: object) -> Rehearsal:
+    """The model ship, whose true and nominal models have the same terms."""
+    first = Rehearsal(
+        truth=vessel("model-ship-true"),
+        nominal=vessel("model-ship"),
+        primitives=example_dictionary("model-ship"),
+        designs={"optimised": (1,) * 11},
+        total_s=412.5,
+        environment=CALM,
+        parameters=vessel("model-ship").model.names,
+        integrator="euler",
+        trials=400,
+    )
+    return replace(first, **changes)
+
+
+def without_cross_force() -> Vessel:
+    """The true model ship without the force of sway times yaw rate."""
+    ship = vessel("model-ship-true")
+    kept = [index for index, name in enumerate(ship.model.names) if name != "X_vr"]
+    model = replace(
+        ship.model,
+        terms=tuple(ship.model.terms[index] for index in kept),
+        parameters=ship.model.parameters[kept],
+        parameter_std=ship.model.parameter_std[kept],
+    )
+    return replace(ship, model=model)
+
+
+def told(plan: Rehearsal, *, spread: float, noisy: tuple[str, ...] = ()) -> str:
+    """Judgements on trials whose spread is so many times the predicted one."""
+    truth, p = vessel("model-ship-true").model.parameters, len(plan.parameters)
+    draws = np.random.default_rng(0).standard_normal((400, p))
+    draws = (draws - draws.mean(axis=0)) / draws.std(axis=0, ddof=1)
+    result = Validated(
+        design="optimised",
+        parameters=plan.parameters,
+        truth=truth,
+        estimates=truth + spread * draws,
+        stated=np.ones((400, p)),
+        forecast=np.ones(p),
+        theory=np.ones(p),
+        failed=0,
+    )
+    content = ValidationContent(
+        scenario="any", rehearsal=plan, results=(result,), noisy_moduli=noisy, command="", version=""
+    )
+    return " ".join(judgements(content))
+
+
+def test_where_predictions_hold_no_assumption_is_blamed():
+    said = told(rehearsal(environment=CURRENT, integrator="rk4"), spread=1.0, noisy=("tau01",))
+    assert "every standard deviation found is within 10% of the predicted one" in said
+    assert "ssumption" not in said
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"environment": CURRENT}, "no current and wind. Method iv only takes off a constant"),
+        ({"environment": WIND}, "--method iv-air, iv-wind or iv-augmented allows for weather"),
+        ({"environment": CURRENT, "method": "iv-air"}, "no current. Method iv-air allows for measured wind only"),
+        ({"method": "iv-wind"}, "the current known. Method iv-wind estimates more parameters"),
+        ({"method": "iv-augmented"}, "current and wind known. Method iv-augmented estimates more parameters"),
+        ({"method": "ls"}, "regressors without noise"),
+        ({"integrator": "rk4"}, "--integrator euler leaves this out"),
+        ({"environment": Environment(wind_std_mps=1.0), "method": "iv-air"}, "Here each has its own, drawn around it"),
+        ({"truth": without_cross_force()}, "the true ship has other terms"),
+    ],
+)
+def test_each_assumption_that_fails_is_named(changes: dict[str, object], words: str):
+    said = told(rehearsal(**changes), spread=1.5)
+    assert "predicted and found standard deviations differ for X_u" in said
+    assert words in said
+
+
+def test_moduli_are_named_with_their_primitives():
+    assert "It may turn in tau01, tau09" in told(rehearsal(), spread=1.5, noisy=("tau01", "tau09"))
+
+
+def test_when_nothing_that_can_be_checked_fails_noise_is_left():
+    said = told(rehearsal(), spread=1.5)
+    assert "No assumption that can be checked from the files fails" in said
+    assert "Assumption that fails" not in said
+
+
+def test_wind_that_the_method_does_not_know_is_found_and_named():
+    """The whole way: trials of the 30 m ship in wind, estimated as if there were none."""
+    ship = vessel("azimuth-30m-true")
+    names = ("zigzag-steep-speed-1", "turning-circle-starboard", "inward-spiral-speed-0.9", "telegraph-draw-1")
+    primitives = tuple(item for item in example_dictionary("standard") if item.name in names)
+    plan = Rehearsal(
+        truth=replace(ship, sensors=Sensors(velocity_mps=0.002, yaw_rate_radps=0.0005, wind_mps=0.005)),
+        nominal=ship,
+        primitives=primitives,
+        designs={"optimised": (1,) * len(primitives)},
+        total_s=900.0,
+        environment=WIND,
+        parameters=tuple(name for name in ship.model.names if not name.startswith("W_")),
+        integrator="euler",
+        trials=12,
+    )
+    content = ValidationContent(
+        scenario="any", rehearsal=plan, results=validate(plan), noisy_moduli=(), command="", version=""
+    )
+    said = " ".join(judgements(content))
+    assert "biased by more than half a standard deviation" in said
+    assert "no current and wind. Method iv only takes off a constant" in said
