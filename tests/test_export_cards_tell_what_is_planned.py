@@ -1,6 +1,7 @@
 """Run cards: a page for every run, orders that give the commands back, distances that geometry confirms."""
 
 import math
+from dataclasses import replace
 from functools import cache
 
 import export_case as case
@@ -12,9 +13,10 @@ from lxml import html
 from expdesign.conventions import to_n_frame
 from expdesign.errors import NoPlan
 from expdesign.export.cards import cards_html
-from expdesign.export.cards.card import steady_s
+from expdesign.export.cards.card import card_groups, run_orders, steady_s
 from expdesign.export.cards.danger import FARTHEST_M, look_out
 from expdesign.export.cards.orders import MOST_ROWS, TOLERANCE, condensed
+from expdesign.export.report.content import primitive_runs
 
 
 @cache
@@ -26,22 +28,51 @@ def text(element: html.HtmlElement) -> str:
     return " ".join(element.text_content().split())
 
 
-def test_every_run_has_its_card_in_order() -> None:
-    titles = [text(card.find(".//h1")) for card in page().find_class("card")]
-    assert titles == [f"Run {n} of {len(case.runs())}: {name}" for n, name in enumerate(case.runs(), start=1)]
+def columns(card: html.HtmlElement) -> dict[str, tuple[str, ...]]:
+    """Name of a line -> one text for each run of a card."""
+    rows = [[text(cell) for cell in row] for row in card.find_class("runs")[0].iter("tr")]
+    return {row[0]: tuple(row[1:]) for row in rows}
 
 
-def test_each_card_says_where_when_and_how_to_begin_and_to_stop() -> None:
+def test_every_run_is_on_one_card_in_order_and_under_its_name() -> None:
+    found = [(number, text(card.find(".//h1"))) for card in page().find_class("card") for number in columns(card)[""]]
+    assert [number for number, _ in found] == [f"Run {n}" for n in range(1, len(case.runs()) + 1)]
+    for (_, title), name in zip(found, case.runs(), strict=True):
+        assert title.endswith(f" of {len(case.runs())}: {name}")
+
+
+def test_each_run_says_where_when_and_how_to_begin_and_to_stop() -> None:
     plan = case.plan()
-    legs = [leg for leg in plan.legs if leg.kind == "primitive"]
-    for card, leg in zip(page().find_class("card"), legs, strict=True):
-        told = text(card)
-        heading = round(math.degrees(plan.trajectory.pose[leg.first, 2])) % 360
-        assert f"{heading:03d}\N{DEGREE SIGN}" in told
-        assert f"{leg.first // 3600}:{leg.first // 60 % 60:02d}:{leg.first % 60:02d}" in told
-        assert f"{leg.last // 3600}:{leg.last // 60 % 60:02d}:{leg.last % 60:02d}" in told
-        for word in ("Purpose", "Abort", "Stop", "Record", "Remarks", "Sea state"):
-            assert word in told
+    legs = iter([leg for leg in plan.legs if leg.kind == "primitive"])
+    for card in page().find_class("card"):
+        told = columns(card)
+        for place in range(len(told[""])):
+            leg = next(legs)
+            heading = round(math.degrees(plan.trajectory.pose[leg.first, 2])) % 360
+            assert told["Heading"][place] == f"{heading:03d}\N{DEGREE SIGN}"
+            assert told["Starts at"][place] == f"{leg.first // 3600}:{leg.first // 60 % 60:02d}:{leg.first % 60:02d}"
+            assert told["Ends at"][place] == f"{leg.last // 3600}:{leg.last // 60 % 60:02d}:{leg.last % 60:02d}"
+            assert told["Abort off track by"][place].endswith("m")
+            assert told["Began (UTC)"][place] == ""
+        for word in ("Purpose", "Abort", "Record", "Remarks", "Orders"):
+            assert word in text(card)
+
+
+def test_runs_with_the_same_orders_share_a_sheet_and_turns_of_a_thruster_do_not_part_them() -> None:
+    plan, leg = case.plan(), next(leg for leg in case.plan().legs if leg.kind == "primitive")
+    count = leg.last - leg.first
+    assert 8 * count < len(plan.commands)
+    runs = tuple(replace(leg, first=k * count, last=(k + 1) * count) for k in range(8))
+    turns = np.repeat([0, 0, 1, -3, 0, 0, 0, 0], count)
+    values = np.zeros((len(plan.commands), 3))
+    values[: 8 * count, 0] = np.tile(np.linspace(0, 5, count), 8)
+    values[: 8 * count, 1] = 0.5 + 2 * math.pi * turns
+    values[5 * count : 6 * count, 2] = 1.0
+    commands = replace(plan.commands, names=("n1", "a1", "n2"), values=values)
+    content = case.report_content(plan=replace(plan, legs=runs, commands=commands))
+    groups = card_groups(content, primitive_runs(content.plan))
+    assert [[run.number for run in group] for group in groups] == [[1, 2, 3], [4, 5], [6], [7, 8]]
+    assert all(run_orders(content, run)[0, 1] == pytest.approx(0.5) for group in groups for run in group)
 
 
 def test_the_page_needs_nothing_from_outside_and_a_plan_that_failed_gets_none() -> None:

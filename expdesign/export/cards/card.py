@@ -1,8 +1,9 @@
-"""What stands on one card."""
+"""What stands on one card: a sheet for the runs of one manoeuvre that follow one another."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,72 +14,156 @@ from expdesign.export.cards.orders import order_columns, order_rows
 from expdesign.export.report import words
 from expdesign.export.report.content import ReportContent, Run, relative_information
 from expdesign.export.report.tables import settings_sentence
+from expdesign.plan.values import Leg
+from expdesign.values import Array
 from expdesign.vessel import column_name
 
 STEADY_HEADING_RAD = math.radians(3.0)
 STEADY_SPEED_SHARE, STEADY_SPEED_MPS = 0.1, 0.1
-LONG, WIDE = 12, 6
-"""Rows and columns of orders that fit one beside another."""
+MOST_RUNS = 3
+"""Runs on one sheet."""
+LONG, WIDE = 12, 5
+"""Rows of orders from which they stand in columns beside another, and how many cells leave room for a third column."""
+HASTE_S = 10.0
+"""Orders that follow each other faster than this, on average, are not for calling out."""
 TOLD = 4
 """Parameters named as what a run is for."""
+TURN = 2 * math.pi
+BLANKS = ("Began (UTC)", "Wind, from", "Sea state; current, to", "Depth", "File")
+"""What is written down at every run."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Card:
-    """One run, in words and figures ready to be printed; `rows` are (name, text) pairs."""
+    """A sheet: runs of one manoeuvre that follow one another, in words and figures ready to be printed.
 
-    number: int
+    Attributes:
+        runs: numbers of the runs.
+        approach, danger, stop: (name, one text for each run) row by row.
+        orders: the rows of orders in columns beside another.
+        signals: (name, unit) of the columns of orders.
+        room: (name, text) pairs.
+    """
+
+    runs: tuple[int, ...]
     name: str
     chart: str
     what: str
     purpose: str
-    approach: list[tuple[str, str]]
+    approach: list[tuple[str, tuple[str, ...]]]
+    danger: list[tuple[str, tuple[str, ...]]]
+    stop: list[tuple[str, tuple[str, ...]]]
     signals: list[tuple[str, str]]
     orders: list[list[tuple[str, ...]]]
-    orders_note: str
-    stop: str
-    abort: list[tuple[str, str]]
-    abort_off: str
+    orders_notes: list[str]
     room: list[tuple[str, str]]
     record: str
 
+    @property
+    def title(self) -> str:
+        """Run 3, Runs 4 and 5, or Runs 6 to 8."""
+        first, last = self.runs[0], self.runs[-1]
+        if first == last:
+            return f"Run {first}"
+        return f"Runs {first} {'and' if last == first + 1 else 'to'} {last}"
 
-def build_card(content: ReportContent, run: Run) -> Card:
-    """The card of one run."""
-    plan, leg = content.plan, content.plan.legs[run.leg]
+
+def card_groups(content: ReportContent, runs: Sequence[Run]) -> list[list[Run]]:
+    """Runs sheet by sheet, in time order: neighbours with the same name and the same orders share one."""
+    groups: list[list[Run]] = []
+    for run in runs:
+        if groups and _alike(content, groups[-1][-1], run):
+            groups[-1].append(run)
+        else:
+            groups.append([run])
+    return [
+        [group[index] for index in part]
+        for group in groups
+        for part in np.array_split(np.arange(len(group)), math.ceil(len(group) / MOST_RUNS))
+    ]
+
+
+def _alike(content: ReportContent, one: Run, other: Run) -> bool:
+    a, b = (content.plan.legs[run.leg] for run in (one, other))
+    first, second = (run_orders(content, run) for run in (one, other))
+    return a.name == b.name and first.shape == second.shape and bool(np.allclose(first, second, rtol=0, atol=1e-6))
+
+
+def run_orders(content: ReportContent, run: Run) -> Array:
+    """(k, m) commands of a run; angles of thrusters that turn round and round begin between -180 and 180 degrees."""
+    leg, commands = content.plan.legs[run.leg], content.plan.commands
+    values = np.array(commands.values[leg.first : leg.last])
+    for column, name in enumerate(commands.names):
+        if name.rstrip("0123456789") == "a":
+            values[:, column] -= TURN * np.round(values[0, column] / TURN)
+    return values
+
+
+def build_card(content: ReportContent, runs: Sequence[Run]) -> Card:
+    """The card of runs that share a sheet."""
+    plan, vessel = content.plan, content.vessel
+    legs = [plan.legs[run.leg] for run in runs]
     names = [item.primitive.name for item in content.information]
-    item = content.information[names.index(leg.name)]
-    rows, missed = order_rows(content.vessel, plan.commands, leg.first, leg.last)
-    pose = plan.trajectory.pose[leg.first : leg.last + 1]
-    danger = look_out(pose, hull_b=content.vessel.hull_b, water=plan.area.water)
+    item = content.information[names.index(legs[0].name)]
+    poses = [plan.trajectory.pose[leg.first : leg.last + 1] for leg in legs]
+    dangers = [look_out(pose, hull_b=vessel.hull_b, water=plan.area.water) for pose in poses]
     step = plan.commands.sample_time_s
+    lasts = words.duration((legs[0].last - legs[0].first) * step)
+    rows, missed = order_rows(vessel, run_orders(content, runs[0]), step)
     return Card(
-        number=run.number,
-        name=leg.name,
-        chart=run_chart(content, leg, number=run.number),
-        what=f"{item.primitive.family.replace('_', ' ')}; {settings_sentence(item)}",
-        purpose=_purpose(content, names.index(leg.name)),
-        approach=_approach(content, leg.first),
-        signals=[(name, unit) for name, unit, _ in order_columns(content.vessel)],
+        runs=tuple(run.number for run in runs),
+        name=legs[0].name,
+        chart=run_chart(content, legs, numbers=[run.number for run in runs]),
+        what=f"{item.primitive.family.replace('_', ' ')} of {lasts}; {settings_sentence(item)}",
+        purpose=_purpose(content, names.index(legs[0].name)),
+        approach=_together([_approach(content, leg.first) for leg in legs]),
+        danger=_together([_danger(danger, leg.first, step) for danger, leg in zip(dangers, legs, strict=True)]),
+        stop=_together([_stop(content, leg.first, leg.last) for leg in legs]),
+        signals=[(name, unit) for name, unit, _ in order_columns(vessel)],
         orders=_columns(rows),
-        orders_note=(
-            f"Between the rows all orders change evenly; the full commands every {step:g} s are in commands.csv, and "
-            f"these rows differ from them by {100 * missed:.0f} % of each order's span at most."
-        ),
-        stop=_stop(content, leg.first, leg.last),
-        abort=_abort(danger, step),
-        abort_off=words.distance(danger.nearest_m / 2),
-        room=_room(content, danger),
+        orders_notes=_orders_notes(content, legs[0], rows, missed),
+        room=_room(content, max((danger.room_m for danger in dangers), key=math.prod)),
         record=_record(content),
     )
 
 
+def _together(runs: list[list[tuple[str, str]]]) -> list[tuple[str, tuple[str, ...]]]:
+    """Rows with the same name of several runs as one row with a cell for each."""
+    return [(rows[0][0], tuple(text for _, text in rows)) for rows in zip(*runs, strict=True)]
+
+
 def _columns(rows: list[tuple[str, ...]]) -> list[list[tuple[str, ...]]]:
-    """Rows in one column, or in two beside each other where they are many and narrow."""
-    if len(rows) <= LONG or len(rows[0]) > WIDE:
-        return [rows]
-    half = (len(rows) + 1) // 2
-    return [rows[:half], rows[half:]]
+    """Rows in one column, or in two or three beside each other where they are many and narrow."""
+    count = 1 if len(rows) <= LONG else 3 if len(rows[0]) <= WIDE and len(rows) > 2 * LONG else 2
+    length = math.ceil(len(rows) / count)
+    return [rows[start : start + length] for start in range(0, len(rows), length)]
+
+
+def _orders_notes(content: ReportContent, leg: Leg, rows: list[tuple[str, ...]], missed: float) -> list[str]:
+    step = content.plan.commands.sample_time_s
+    every = (leg.last - leg.first) * step / len(rows)
+    signs = [meaning for stem, meaning in SIGNS.items() if any(_stem(n) == stem for n in content.vessel.model.inputs)]
+    notes = [
+        f"Between the rows all orders change evenly; they differ from the full commands, every {step:g} s in "
+        f"commands.csv, by {100 * missed:.0f} % of each order's span at most. {' '.join(signs)}".rstrip()
+    ]
+    if every < HASTE_S:
+        notes.append(
+            f"An order every {every:.2g} s is too fast to be called out: let the control system play commands.csv, "
+            "and use these rows to see that it does."
+        )
+    return notes
+
+
+SIGNS = {
+    "n": "n: propeller speed, ahead positive.",
+    "a": "a: direction of thrust, 0 ahead, 90 to starboard.",
+}
+"""Stem of a signal -> what its sign means."""
+
+
+def _stem(name: str) -> str:
+    return name.rstrip("0123456789")
 
 
 def _purpose(content: ReportContent, index: int) -> str:
@@ -92,12 +177,14 @@ def _approach(content: ReportContent, first: int) -> list[tuple[str, str]]:
     plan = content.plan
     pose, velocity = plan.trajectory.pose[first], plan.trajectory.velocity[first]
     lat, lon = plan.area.frame.to_degrees(pose[:2]).tolist()
+    sway, rate = words.number(velocity[1]), words.number(math.degrees(velocity[2]), 1)
     return [
         ("Starts at", words.clock(first * plan.commands.sample_time_s)),
-        ("Position", f"{words.latitude(lat)}, {words.longitude(lon)}"),
+        ("Latitude", words.latitude(lat)),
+        ("Longitude", words.longitude(lon)),
         ("Heading", words.bearing(float(pose[2]))),
         ("Speed over ground", words.speed(float(np.hypot(*velocity[:2])))),
-        ("Sway, yaw rate", f"{words.number(velocity[1])} m/s, {words.number(math.degrees(velocity[2]), 1)} deg/s"),
+        ("Sway; yaw rate", f"{sway}{words.NB}m/s; {rate}{words.NB}\N{DEGREE SIGN}/s"),
         ("Steady before", words.duration(steady_s(content, first))),
     ]
 
@@ -112,26 +199,26 @@ def steady_s(content: ReportContent, first: int) -> float:
     return float(first - (away[-1] + 1 if len(away) else 0)) * motion.sample_time_s
 
 
-def _stop(content: ReportContent, first: int, last: int) -> str:
+def _stop(content: ReportContent, first: int, last: int) -> list[tuple[str, str]]:
     plan = content.plan
     pose, step = plan.trajectory.pose, plan.commands.sample_time_s
-    lat, lon = plan.area.frame.to_degrees(pose[last, :2]).tolist()
     turned = math.degrees(float(pose[last, 2] - pose[first, 2]))
     side = "starboard" if turned > 0 else "port"
-    heading = words.bearing(float(pose[last, 2]))
-    return (
-        f"after {words.duration((last - first) * step)}, at {words.clock(last * step)}. Planned: heading {heading} "
-        f"(turned {abs(turned):.0f} deg to {side}), {words.latitude(lat)}, {words.longitude(lon)}."
-    )
-
-
-def _abort(danger: Danger, step: float) -> list[tuple[str, str]]:
-    when = words.clock(danger.nearest_sample * step)
+    way = f" ({abs(turned):.0f}\N{DEGREE SIGN} to {side})" if round(abs(turned)) else ""
     return [
-        ("ahead", _reach(danger.ahead_m)),
-        ("to port", _reach(danger.port_m)),
-        ("to starboard", _reach(danger.starboard_m)),
-        (f"nearest, at {when}", words.distance(danger.nearest_m)),
+        ("Ends at", words.clock(last * step)),
+        ("Heading then", f"{words.bearing(float(pose[last, 2]))}{way}"),
+    ]
+
+
+def _danger(danger: Danger, first: int, step: float) -> list[tuple[str, str]]:
+    when = words.clock((first + danger.nearest_sample) * step)
+    return [
+        ("Ahead", _reach(danger.ahead_m)),
+        ("To port", _reach(danger.port_m)),
+        ("To starboard", _reach(danger.starboard_m)),
+        ("Nearest", f"{words.distance(danger.nearest_m)} at {when}"),
+        ("Abort off track by", words.distance(danger.nearest_m / 2)),
     ]
 
 
@@ -139,15 +226,14 @@ def _reach(distance_m: float) -> str:
     return f"over {words.distance(FARTHEST_M)}" if distance_m >= FARTHEST_M else words.distance(distance_m)
 
 
-def _room(content: ReportContent, danger: Danger) -> list[tuple[str, str]]:
-    long, wide = danger.room_m
+def _room(content: ReportContent, room_m: tuple[float, float]) -> list[tuple[str, str]]:
     draught = content.vessel.draught_m
     return [
-        ("Hull sweeps", f"{words.distance(long)} by {words.distance(wide)}"),
-        ("With clearance", " by ".join(words.distance(side + 2 * content.clearance_m) for side in (long, wide))),
+        ("Hull sweeps", " by ".join(words.distance(side) for side in room_m)),
+        ("With clearance", " by ".join(words.distance(side + 2 * content.clearance_m) for side in room_m)),
         (
             "Depth",
-            f"more than {4 * draught:g} m for results free of the bottom (4 draughts); {content.plan.area.depth_rule}",
+            f"more than {4 * draught:g} m for results free of the bottom (4 draughts). {content.plan.area.depth_rule}",
         ),
     ]
 

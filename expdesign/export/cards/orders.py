@@ -6,13 +6,12 @@ import math
 
 import numpy as np
 
-from expdesign.signals import Commands
 from expdesign.values import Array
 from expdesign.vessel import Vessel
 
 TOLERANCE = 0.02
 """Of each signal's span over the run: what the condensed orders may miss at most, unless rows run out."""
-MOST_ROWS = 24
+MOST_ROWS = 48
 UNITS = {"n": ("rpm", 60.0), "a": ("deg", 180.0 / math.pi), "rudder": ("deg", 180.0 / math.pi)}
 
 
@@ -48,15 +47,20 @@ def order_columns(vessel: Vessel) -> list[tuple[str, str, float]]:
     return [(name, *UNITS.get(stem, ("", 1.0))) for name, stem in stems]
 
 
-def order_rows(vessel: Vessel, commands: Commands, first: int, last: int) -> tuple[list[tuple[str, ...]], float]:
-    """Time from the start of the run [s] and every signal, row by row; and the largest miss as a share of its span."""
-    values = commands.values[first:last]
+def order_rows(vessel: Vessel, values: Array, step_s: float) -> tuple[list[tuple[str, ...]], float]:
+    """Time from the start of the run [s] and every signal, row by row; and the largest miss as a share of its span.
+
+    Args:
+        vessel: whose signals they are.
+        values: (k, m) commands of a run.
+        step_s: between them.
+    """
     kept, missed = condensed(values)
     factors = np.array([factor for *_, factor in order_columns(vessel)])
     rows = []
     for index in kept:
         shown = values[index] * factors
-        rows.append((f"{index * commands.sample_time_s:.4g}", *(_figure(value) for value in shown.tolist())))
+        rows.append((f"{index * step_s:.4g}", *(_figure(value) for value in shown.tolist())))
     return rows, missed
 
 

@@ -1,8 +1,8 @@
-"""The cards as one page that prints on A4, an agenda with the chart first."""
+"""The cards as one page that prints on A4: a chart, an agenda, and the sheets in time order."""
 
 from __future__ import annotations
 
-from expdesign.export.cards.card import build_card
+from expdesign.export.cards.card import BLANKS, build_card, card_groups
 from expdesign.export.pages import page_templates
 from expdesign.export.planned import require_verified
 from expdesign.export.report import tables, words
@@ -12,7 +12,7 @@ from expdesign.export.report.figures.style import report_style
 
 
 def cards_html(content: ReportContent) -> str:
-    """One HTML page without outside references, a sheet of paper for each run.
+    """One HTML page without outside references; runs of one manoeuvre that follow one another share a sheet.
 
     Raises:
         NoPlan: the plan is not verified: nobody shall sail it.
@@ -20,12 +20,15 @@ def cards_html(content: ReportContent) -> str:
     require_verified(content.plan)
     runs = primitive_runs(content.plan)
     with report_style():
-        cards = [build_card(content, run) for run in runs]
+        cards = [build_card(content, group) for group in card_groups(content, runs)]
         overview = chart(content)
     page = page_templates("cards").get_template("cards.html")
     return page.render(
         content=content,
         cards=cards,
+        runs=len(runs),
+        blanks=BLANKS,
+        depths=bool(content.plan.area.depths),
         chart=overview,
         agenda=tables.agenda(content),
         total=words.duration(content.plan.commands.duration_s),
