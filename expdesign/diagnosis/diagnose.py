@@ -149,13 +149,13 @@ def _held_out(found: Search, ship: Extended, windows: Windows, tell: Callable[[f
     fits: list[Fit | None] = [None, *(step.chosen.fit for step in found.steps)]
     results = []
     for number, item in enumerate(fits):
-        share = (0.65 + 0.27 * number / len(fits), 0.27 / len(fits))
-        results.append(
-            held_out(
-                item, ship if item is None else item.ship, windows, lambda part, at=share: tell(at[0] + at[1] * part)
-            )  # type: ignore[misc]
-        )
+        low, part = 0.65 + 0.27 * number / len(fits), 0.27 / len(fits)
+        results.append(held_out(item, ship if item is None else item.ship, windows, _onward(tell, low, part)))
     return results
+
+
+def _onward(tell: Callable[[float], None], low: float, part: float) -> Callable[[float], None]:
+    return lambda share: tell(low + part * share)
 
 
 def _worthwhile(found: Search, held: Sequence[HeldOut]) -> Search:
@@ -182,8 +182,8 @@ def _finding(
     gain, interval = gained(before, after, rng)
     values: dict[str, tuple[float, float]] = {key: (chosen.fit.value(key), chosen.fit.std(key)) for key in chosen.keys}
     if chosen.searched is not None:
-        key, std = chosen.searched
-        values[key] = (chosen.fit.value(key), std)
+        key, error = chosen.searched
+        values[key] = (chosen.fit.value(key), error)
     cause = cause_of(chosen.candidate.cause)
     telling = None
     if step.rivals:

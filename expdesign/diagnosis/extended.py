@@ -429,4 +429,4 @@ def _shifted(values: Array, samples: float) -> Array:
     low = np.floor(place).astype(int)
     share = place - low
     high = np.minimum(low + 1, values.shape[1] - 1)
-    return values[:, low] * (1 - share) + values[:, high] * share
+    return np.asarray(values[:, low] * (1 - share) + values[:, high] * share)

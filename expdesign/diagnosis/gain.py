@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.accuracy import simulate_from_first, sums
@@ -72,7 +73,7 @@ def held_out(found: Fit | None, ship: Extended, windows: Windows, tell: Callable
     return HeldOut(lost=lost, spread=spread)
 
 
-def _fitted(found: Fit, windows: Windows, train: Array) -> Extended:
+def _fitted(found: Fit, windows: Windows, train: NDArray[np.bool_]) -> Extended:
     free = tuple(key for key in found.keys[: found.free])
     try:
         return fit(

@@ -143,14 +143,14 @@ def likeliest_wander(found: Grams, columns: Columns, noise: Noise, precision: Ar
     """The wandering current that makes the data most likely, the numbers free within their prior precision (c,)."""
     if found.XX.shape[1] == columns.numbers:
         return noise
-    best = (np.inf, noise)
+    best: tuple[float, Noise] = (np.inf, noise)
     for size in WANDER_MPS:
         for time_s in WANDER_TIMES_S if size else WANDER_TIMES_S[:1]:
             trial = replace(noise, wander_mps=size, wander_time_s=time_s)
             m = marginal(found, columns, trial)
             A = m.A + np.diag(precision)
-            cost = m.log_det + m.quadratic - m.s @ np.linalg.lstsq(A, m.s, rcond=None)[0]
-            cost += np.linalg.slogdet(A + 1e-12 * np.diag(np.diag(A) + 1e-30))[1]
+            cost = m.log_det + m.quadratic - float(m.s @ np.linalg.lstsq(A, m.s, rcond=None)[0])
+            cost += float(np.linalg.slogdet(A + 1e-12 * np.diag(np.diag(A) + 1e-30))[1])
             if cost < best[0] - 1e-9:
                 best = (cost, trial)
     return best[1]
@@ -258,7 +258,9 @@ def fit(
             noise = _colours(columns, noise, precision, ship, keys, colour_order)
             found = marginal(grams(columns, noise), columns, noise)
         A = found.A + np.diag(precision)
-        covariance = np.linalg.pinv(A, rcond=1e-14, hermitian=True) if len(keys) else np.zeros((0, 0))
+        covariance = (
+            np.asarray(np.linalg.pinv(A, rcond=1e-14, hermitian=True), dtype=float) if keys else np.zeros((0, 0))
+        )
         pull = found.s - precision * now
         move = covariance @ pull
         gained = float(move @ pull)
@@ -337,7 +339,9 @@ def _start_moves(columns: Columns, noise: Noise, move: Array) -> Array:
     return np.stack([np.linalg.lstsq(B, b, rcond=None)[0] for B, b in zip(S, e, strict=True)])
 
 
-def _colours(columns: Columns, noise, precision, ship, keys, order) -> Noise:  # type: ignore[no-untyped-def]
+def _colours(
+    columns: Columns, noise: Noise | None, precision: Array, ship: Extended, keys: tuple[str, ...], order: int | None
+) -> Noise:
     """Colour of what is left after the best linear answer, twice."""
     if noise is None:
         spread = np.nanstd(columns.error, axis=(0, 1)) if columns.error.size else np.ones(4)

@@ -161,12 +161,13 @@ def push_of(linear: Linear, changed: Extended, per: float) -> Push:
 def responses(linear: Linear, pushes: Sequence[Push]) -> Array:
     """(c, w, s, 4) how the shown channels answer each push, from undisturbed initial states."""
     motion = linear.motion
-    _windows, n = motion.windows, motion.ship.states
+    n = motion.ship.states
     w, k = motion.states.shape[:2]
     moved = np.zeros((len(pushes), w, k, n))
-    driven = [index for index, push in enumerate(pushes) if push.force is not None]
+    forces = {index: push.force for index, push in enumerate(pushes) if push.force is not None}
+    driven = list(forces)
     if driven:
-        kicks = np.stack([np.einsum("wkij,wkj->wki", linear.driven, pushes[index].force) for index in driven], axis=-1)
+        kicks = np.stack([np.einsum("wkij,wkj->wki", linear.driven, force) for force in forces.values()], axis=-1)
         x = np.zeros((w, n, len(driven)))
         path = np.zeros((k, w, n, len(driven)))
         for step in range(k - 1):

@@ -107,7 +107,7 @@ def _lagged_rows(values: Array, order: int) -> Array:
 def wander_covariance(count: int, spacing_s: float, time_s: float) -> Array:
     """(2 count, 2 count) of hat coefficients, north then east, for unit standard deviation."""
     apart = np.abs(np.subtract.outer(np.arange(count), np.arange(count))) * spacing_s
-    return np.kron(np.eye(2), np.exp(-apart / time_s))
+    return np.asarray(np.kron(np.eye(2), np.exp(-apart / time_s)), dtype=float)
 
 
 def hats(steps: int, step_s: float, spacing_s: float) -> Array:

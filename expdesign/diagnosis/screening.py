@@ -114,8 +114,8 @@ def _effective_tests(A: Array, halves: list[tuple[Array, Array]], rng: np.random
     by_size: dict[int, list[Array]] = {}
     for index, half in halves:
         by_size.setdefault(len(index), []).append(((drawn[:, index] @ half) ** 2).sum(axis=1))
-    for size, statistics in by_size.items():
-        smallest = np.minimum(smallest, chi2.sf(np.max(statistics, axis=0), size))
+    for freedom, statistics in by_size.items():
+        smallest = np.minimum(smallest, chi2.sf(np.max(statistics, axis=0), freedom))
     return float(max(1.0, LEVEL / np.quantile(smallest, LEVEL)))
 
 

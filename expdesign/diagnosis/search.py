@@ -83,16 +83,22 @@ class Search:
 def search(ship: Extended, windows: Windows, starts: Array, rng: np.random.Generator, progress: Progress) -> Search:
     """Add causes until nothing significant is left."""
     base = fit(ship, windows, (), starts=starts, steps=3)
-    first, steps = base, []
+    first = base
+    steps: list[Step] = []
     while True:
         share = 1.0 - 0.7 ** (len(steps) + 1)
         progress(f"testing causes, round {len(steps) + 1}", share)
         found = screen(base, _candidates(base, windows), rng)
-        step = _step(base, windows, found, lambda what, part, at=share: progress(what, at + 0.2 * part * (1 - at)))
+        step = _step(base, windows, found, _within(progress, share))
         if step is None or len(steps) == MOST_FINDINGS:
             return Search(steps=tuple(steps), first=first, last=base, final_screening=found)
         steps.append(step)
         base = step.chosen.fit
+
+
+def _within(progress: Progress, share: float) -> Progress:
+    """Progress of a round that begins when a share of the search is done."""
+    return lambda what, part: progress(what, share + 0.2 * part * (1 - share))
 
 
 def _candidates(base: Fit, windows: Windows) -> list[Candidate]:

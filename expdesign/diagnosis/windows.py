@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from expdesign.conventions import OUTPUTS
 from expdesign.estimation.tables import inputs_of
@@ -78,16 +79,16 @@ class Windows:
         return float(np.isfinite(self.measured).any(axis=2).sum() * self.sample_s)
 
     @cached_property
-    def places(self) -> Array:
+    def places(self) -> NDArray[np.int64]:
         """(w, k) integrator steps of each window in its batch, the last one repeated where the window is filled up."""
         ends = np.array([len(rows) for rows in self.batch_inputs])[self.batch.astype(int)]
-        return np.minimum(self.first[:, None] + np.arange(self.steps), ends[:, None] - 1).astype(int)
+        return np.asarray(np.minimum(self.first[:, None] + np.arange(self.steps), ends[:, None] - 1).astype(int))
 
     def gather(self, batches: tuple[Array, ...]) -> Array:
         """(w, k, ...) rows of per-batch arrays at the steps of every window."""
         return np.stack([batches[int(b)][rows] for b, rows in zip(self.batch, self.places, strict=True)])
 
-    def picked(self, keep: Array) -> Windows:
+    def picked(self, keep: NDArray[np.bool_]) -> Windows:
         """Only some of the windows, by a mask (w,)."""
         parts = {name: getattr(self, name)[keep] for name in ROWS}
         others = {name: getattr(self, name) for name in self.__dataclass_fields__ if name not in ROWS}
@@ -191,7 +192,7 @@ class _Part:
         if self.merged == 1:
             return values
         padded = np.concatenate([values, np.repeat(values[-1:], self.samples * self.merged - len(values), axis=0)])
-        return padded.reshape(self.samples, self.merged, -1).mean(axis=1)
+        return np.asarray(padded.reshape(self.samples, self.merged, -1).mean(axis=1))
 
     def _centred(self, values: Array) -> Array:
         """Values at the instants of comparison, averaged over the samples around them."""

@@ -9,6 +9,8 @@ from expdesign.diagnosis.causes.words import rounded
 
 COUNT = 12
 FINER = 6
+EDGE = 0.06
+"""Share of the data at either end in which no change is looked for: it would be no change."""
 
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
@@ -24,7 +26,12 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
             cause="change_point",
             free={key: 0.0},
             fixed={"change:time": float(time)},
-            grid=("change:time", tuple(float(t) for t in time + spacing * np.linspace(-1, 1, 2 * FINER + 1))),
+            grid=(
+                "change:time",
+                tuple(
+                    np.clip(time + spacing * np.linspace(-1, 1, 2 * FINER + 1), EDGE * end, (1 - EDGE) * end).tolist()
+                ),
+            ),
         )
         for time in times
         for key in what

@@ -8,7 +8,9 @@ from expdesign.diagnosis.causes.words import rounded
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     model = situation.ship.model
-    groups = [(f"theta:{term.name}",) for term in model.terms if not situation.has(f"theta:{term.name}")]
+    groups: list[tuple[str, ...]] = [
+        (f"theta:{term.name}",) for term in model.terms if not situation.has(f"theta:{term.name}")
+    ]
     for equation in model.outputs:
         groups.append(tuple(f"theta:{term.name}" for term in model.terms if term.equation == equation))
     groups.append(tuple(f"theta:{name}" for name in model.names))

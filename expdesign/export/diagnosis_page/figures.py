@@ -21,18 +21,20 @@ def window_figure(found: Diagnosis, index: int) -> str:
     figure = new_figure(9.0, 0.7 + 1.4 * len(outputs))
     rows = np.atleast_1d(figure.subplots(len(outputs), 1, sharex=True))
     windows = found.windows
-    time = windows.sample_s * np.arange(windows.measured.shape[1])
+    time = np.asarray(windows.sample_s * np.arange(windows.measured.shape[1]), dtype=float)
     for axes, output in zip(rows, outputs, strict=True):
         label, factor = AXES[output]
         column = OUTPUTS.index(output)
-        measured = factor * windows.measured[index, :, column]
+        measured = np.asarray(factor * windows.measured[index, :, column], dtype=float)
         axes.plot(*thinned(time, measured), color="#b0b0b0", linewidth=2.6, label="measured")
         for shown, colour, name in (
             (found.simulated_before, VERMILION, "model in use"),
             (found.simulated_after, BLUE, "extended model"),
         ):
             if name == "model in use" or found.findings:
-                values = np.where(np.isfinite(measured), factor * shown[index, :, column], np.nan)
+                values = np.asarray(
+                    np.where(np.isfinite(measured), factor * shown[index, :, column], np.nan), dtype=float
+                )
                 axes.plot(*thinned(time, values), color=colour, linewidth=1.1, label=name)
         axes.set_ylabel(label, fontsize=9)
         light_grid(axes)
@@ -116,7 +118,7 @@ def suspected(found: Diagnosis, name: str) -> tuple[Array, str]:
         "input": (push, "first input"),
         "thrust": (push, "first input"),
         "small input": (push, "first input"),
-        "input change": (_since(change > 0.2) * windows.sample_s, "time since an input changed [s]"),
+        "input change": (_since((change > 0.2).astype(float)) * windows.sample_s, "time since an input changed [s]"),
         "advance": (push * u, "first input times surge speed"),
         "u": (u, "u [m/s]"),
         "r": (DEGREES * r, "r [\N{DEGREE SIGN}/s]"),

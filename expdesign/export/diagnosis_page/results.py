@@ -59,7 +59,7 @@ def finding_entry(item: Finding, outputs: Sequence[str]) -> dict[str, Any]:
 
 def diagnosis_tables(found: Diagnosis) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Header and rows: one finding each."""
-    rows = [
+    rows: list[tuple[str, ...]] = [
         (
             item.cause,
             ", ".join(f"{one.name} {plus_minus(one.value, one.std)}" for one in item.estimates),
