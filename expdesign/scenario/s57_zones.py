@@ -42,7 +42,7 @@ class CellRules:
 
 def open_cell(file: AreaTable, *, draught_m: float, entry: Entry) -> OpenChart:
     """The cell that an area file names with `chart.s57`."""
-    for name in {"land_layers", "depth_layers"} & file.chart.model_fields_set:
+    for name in [name for name in ("land_layers", "depth_layers") if name in file.chart.model_fields_set]:
         raise entry.at(name).error("stands beside s57, expected it with geojson only: a cell knows its own layers")
     path = entry.at("s57").file(file.chart.s57 or "")
     cell = read_cell(path)
