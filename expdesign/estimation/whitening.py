@@ -7,7 +7,8 @@ triangular matrix T of that filter, its score is
 
 whatever a and c are. The terms zeta(k) n(k) depend on each other far less than Z(k) eps(k): measurement noise enters a
 one-step residual at k and again, nearly cancelling, at k - 1, and no kernel with few lags sees that cancellation, while
-one with many loses variance to the estimated parameters. What colour is left is for the kernel to count.
+one with many loses variance to the estimated parameters. What colour is left is for the kernel to count. Filters start
+as stationary noise does, not from zero, so that the ends of many short batches count too.
 
 A disturbance that lasts many samples under much measurement noise is only partly seen so: with a current that wanders
 for 100 s the standard deviations of the surge parameters come out about a fifth too small. `components` sees it.
