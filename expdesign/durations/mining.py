@@ -145,13 +145,24 @@ def _value(collected: Collected, shares: Array, chosen: Sequence[int]) -> float:
     return collected.value(_indicator(shares, chosen))
 
 
+def _with_each(collected: Collected, shares: Array, taken: Array, candidates: Sequence[int]) -> Array:
+    """(c,) values of shares (q,) with each candidate added to them."""
+    added = np.array(candidates)
+    return collected.worth(
+        tuple(
+            total + shares[added, None, None] * piece.matrices[added]
+            for total, piece in zip(collected.totals(taken), collected.pieces, strict=True)
+        )
+    )
+
+
 def _greedy(collected: Collected, shares: Array) -> list[int]:
     """All batches, each time the one that adds most; a little of all is lent so that few can be compared too."""
     lent = 1e-6 * shares
     order: list[int] = []
     left = list(range(len(shares)))
     while left:
-        values = [collected.value(_indicator(shares, [*order, index]) + lent) for index in left]
+        values = _with_each(collected, shares, _indicator(shares, order) + lent, left)
         order.append(left.pop(int(np.argmax(values))))
     return order
 
@@ -160,16 +171,13 @@ def _exchanged(collected: Collected, shares: Array, chosen: tuple[int, ...]) -> 
     """Swaps of one batch for another while one helps."""
     best = _value(collected, shares, chosen)
     while True:
-        swaps = [
-            (*(index for index in chosen if index != out), into)
-            for out in chosen
-            for into in range(len(shares))
-            if into not in chosen
-        ]
-        values = [_value(collected, shares, swap) for swap in swaps]
-        if not values or max(values) <= best + 1e-12:
+        others = [index for index in range(len(shares)) if index not in chosen]
+        kept = [tuple(index for index in chosen if index != out) for out in chosen]
+        values = np.array([_with_each(collected, shares, _indicator(shares, rest), others) for rest in kept])
+        if not others or values.max() <= best + 1e-12:
             return chosen
-        best, chosen = max(values), swaps[int(np.argmax(values))]
+        out, into = np.unravel_index(int(np.argmax(values)), values.shape)
+        best, chosen = float(values.max()), (*kept[out], others[into])
 
 
 def _bound(problem: DurationProblem, collected: Collected, size: int, efficiency: float) -> float:
