@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from expdesign.assessment import Wish, assess
+from expdesign.assessment import Assessed, Wish, assess
 from expdesign.durations import DurationDesign
 from expdesign.errors import Diverged, NoAnswer, NotInformative
 from expdesign.estimation.values import Estimate
@@ -58,10 +58,17 @@ def updated(
             return _unchanged(vessel, next(run.problem for run in found.best.runs if run.problem))
         told = found.best.estimate
         ship = combined(vessel, told, prior_counts=prior_counts)
-        notes = (f"The data so far cannot tell {', '.join(held)}: kept at the values known before.",) if held else ()
+        notes = [f"The data so far cannot tell {', '.join(held)}: kept at the values known before."] if held else []
+        notes.append(_fit_note(found.best))
         how = ", combined with what was known before" if prior_counts else ""
-        return ship, f"estimated from the data so far by {found.best.method.title}{how}", notes
+        return ship, f"estimated from the data so far by {found.best.method.title}{how}", tuple(notes)
     return _unchanged(vessel, "they tell of no parameter by itself")
+
+
+def _fit_note(item: Assessed) -> str:
+    fits = np.mean([run.fit_percent for run in item.runs], axis=0)
+    told = ", ".join(f"{name} {fit:.0f} %" for name, fit in zip(item.runs[0].outputs, fits, strict=True))
+    return f"With it the simulation fits the data so far with {told}; expdesign diagnose names what a model lacks."
 
 
 def _unchanged(vessel: Vessel, why: str) -> tuple[Vessel, str, tuple[str, ...]]:

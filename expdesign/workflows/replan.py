@@ -70,6 +70,7 @@ def replan(
     design = designed(
         case, information, stated_std=_stated(state.first.vessel), seed=seed, progress=within(progress, 0.12, 0.15)
     )
+    _check_runs(design)
     plan = planned(case, information, design, seed=seed, progress=within(progress, 0.15, 0.85))
     progress("writing routes, run cards and report", 0.85)
     known = known_of(replace(state, notes=(*state.notes, *notes)), case, design, plan)
@@ -281,6 +282,13 @@ def _possible(
     if not kept:
         raise NoAnswer(f"the ship as known now can do none of the dictionary's manoeuvres; the last: {why}")
     return tuple(kept), tuple(notes)
+
+
+def _check_runs(design: DurationDesign) -> None:
+    """With what is known already no run at all may count as a design, but there is nothing to plan then."""
+    if not any(design.repeats):
+        shortest = float(design.problem.run_s.min())
+        raise NoAnswer(f"no whole run fits in the {design.problem.total_s:g} s left; the shortest takes {shortest:g} s")
 
 
 def known_of(state: PresentState, case: Scenario, design: DurationDesign, plan: Plan) -> Known:

@@ -1,0 +1,135 @@
+"""The story of the README: plan, sail with a ship that differs, find out why, and plan the rest with what was found.
+
+The truth has a current that nobody forecast and a cross-flow drag that the nominal model lacks.
+"""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from outside_check import columns
+
+from expdesign import workflows
+from expdesign.scenario import load_vessel
+from expdesign.signals import Commands
+from expdesign.simulation import simulate
+
+SCENARIOS = Path(__file__).parents[1] / "scenarios"
+STORY = SCENARIOS / "story.toml"
+NOMINAL, TRUE = SCENARIOS / "vessels/tender-20m.toml", SCENARIOS / "vessels/tender-20m-true.toml"
+MISSING = "Y_abs_v_v"
+UNTIL_S, REMAINING_S = 600.0, 360.0
+
+
+@pytest.fixture(scope="module")
+def story(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("story")
+    first, second, found, after = (folder / name for name in ("first", "second", "found", "after"))
+    workflows.plan(STORY, first, seed=1)
+    strayed = workflows.simulate(first / "plan.json", None, truth=TRUE, until_s=UNTIL_S, seed=2)
+    data = first / "measured.csv"
+    workflows.diagnose([data], found, vessel=NOMINAL, scenario=STORY)
+    workflows.replan(STORY, second, data=[data], vessel=found / "vessel-extended.toml", remaining_s=REMAINING_S, seed=1)
+    again = workflows.simulate(second / "plan.json", None, truth=TRUE, seed=3)
+    workflows.diagnose([second / "measured.csv"], after, vessel=found / "vessel-extended.toml")
+    return folder, strayed.summary, again.summary
+
+
+def read(path):
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
+def test_the_data_end_when_they_were_asked_to(story):
+    folder, strayed, _ = story
+    rows = columns(folder / "first/measured.csv")
+    assert len(rows["time_s"]) == strayed["samples"] == UNTIL_S
+    assert strayed["trial_s"] > UNTIL_S
+
+
+def test_the_diagnosis_names_the_current_and_the_missing_term_with_their_sizes(story):
+    folder, *_ = story
+    findings = {item["cause"]: item["estimate"] for item in read(folder / "found/diagnosis.json")["findings"]}
+    assert set(findings) == {"current", f"missing_term:{MISSING}"}
+    truth = load_vessel(TRUE)
+    north, east = truth.environment.current_to
+    drag = truth.model.parameters[truth.model.names.index(MISSING)]
+    for cause, name, value in (
+        ("current", "north_mps", north),
+        ("current", "east_mps", east),
+        (f"missing_term:{MISSING}", MISSING, drag),
+    ):
+        estimate = findings[cause][name]
+        assert abs(estimate["value"] - value) < 3 * estimate["std"]
+
+
+def test_the_rest_begins_where_the_data_end_and_counts_on_the_current_found(story):
+    folder, *_ = story
+    last = {name: values[-1] for name, values in columns(folder / "first/measured.csv").items()}
+    plan, told = read(folder / "second/plan.json"), read(folder / "second/replan.json")
+    begin = plan["legs"][0]["start"]
+    for name in ("north_m", "east_m", "heading_rad"):
+        assert begin[name] == pytest.approx(last[name], abs=1e-6)
+        assert told["start"][name] == pytest.approx(last[name], abs=1e-9)
+    extended = load_vessel(folder / "found/vessel-extended.toml")
+    current = [plan["environment"]["current_to"][name] for name in ("north_mps", "east_mps")]
+    assert current == extended.environment.current_to.tolist()
+    forecast = tomllib.loads(STORY.read_text(encoding="utf-8"))["environment"]["current_to"]
+    assert forecast["north_mps"] == forecast["east_mps"] == 0
+    assert "current from the vessel file" in told["environment"]["from"]
+
+
+def test_the_new_parameter_is_bought_by_runs_that_are_in_the_plan(story):
+    folder, *_ = story
+    told = read(folder / "second/replan.json")
+    entry = told["parameters"][MISSING]
+    assert entry["before"] is None
+    assert entry["std_after_rest"] < entry["std_so_far"] / 2
+    assert entry["std_ratio_without_it"] > 1.5
+    sailed = [leg["name"] for leg in read(folder / "second/plan.json")["legs"] if leg["kind"] == "primitive"]
+    assert entry["bought_by"] in sailed
+    dictionary = {item["name"]: item for item in read(folder / "second/dictionary.json")["primitives"]}
+    place = read(folder / "second/dictionary.json")["parameters"].index(MISSING)
+    rates = {name: item["X"][place][place] for name, item in dictionary.items()}
+    assert rates[entry["bought_by"]] == max(rates.values())
+
+
+def test_no_parameter_is_known_less_after_the_rest(story):
+    folder, *_ = story
+    for entry in read(folder / "second/replan.json")["parameters"].values():
+        assert entry["std_after_rest"] < entry["std_so_far"]
+
+
+def test_the_vessel_written_beside_the_plan_reproduces_its_track(story):
+    folder, *_ = story
+    second = folder / "second"
+    ship, track = load_vessel(second / "vessel-used.toml"), columns(second / "track.csv")
+    names = ship.model.inputs
+    table = columns(second / "commands.csv")
+    values = np.stack([table[f"{name}_{'rad' if name[0] == 'a' else 'rps'}"] for name in names], axis=1)
+    again = simulate(
+        ship,
+        Commands(sample_time_s=ship.sample_time_s, names=names, values=values),
+        pose=[track[name][0] for name in ("north_m", "east_m", "heading_rad")],
+        velocity=[track[name][0] for name in ("u_mps", "v_mps", "r_radps")],
+        environment=ship.environment,
+    )
+    assert np.abs(again.pose[:, 0] - track["north_m"]).max() < 0.05
+    assert np.abs(again.pose[:, 1] - track["east_m"]).max() < 0.05
+
+
+def test_the_extended_model_keeps_the_ship_nearer_to_its_plan_and_nothing_more_is_found_wrong(story):
+    folder, strayed, again = story
+    assert again["farthest_from_plan_m"] < strayed["farthest_from_plan_m"] / 3
+    assert read(folder / "after/diagnosis.json")["findings"] == []
+
+
+def test_the_report_says_where_the_trial_stands(story):
+    folder, *_ = story
+    page = (folder / "second/report.html").read_text(encoding="utf-8")
+    for words in ("What is known, and what the rest buys", "takes it to be stopped", f"<b>{MISSING}</b> (new)"):
+        assert words in page
+    assert "expdesign replan" in page

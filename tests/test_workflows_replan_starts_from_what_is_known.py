@@ -1,0 +1,292 @@
+"""Where the rest of a trial begins, what it counts on, and what is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scenario_files import spoil
+
+from expdesign import workflows
+from expdesign.cli import main
+from expdesign.durations import DurationProblem, solve_durations
+from expdesign.estimation.methods import estimate
+from expdesign.information.expected import TrialPart
+from expdesign.scenario import load_scenario, load_vessel
+from expdesign.signals import Batch, Commands, Record
+from expdesign.simulation import Environment, Variation, simulate
+from expdesign.vessel import Mounting
+from expdesign.workflows.known import combined, expected_std, purchases
+from expdesign.workflows.replan import present_state, rest_of, weather_for_rest
+
+SCENARIOS = Path(__file__).parents[1] / "scenarios"
+STORY = SCENARIOS / "story.toml"
+SHIP = load_vessel(SCENARIOS / "vessels/tender-20m.toml")
+SAMPLES = 200
+NAMES = ("time_s", "north_m", "east_m", "heading_rad", "u_mps", "v_mps", "r_radps")
+
+
+def wandering() -> Commands:
+    """Commands that excite every parameter: slow beats of both thrusters."""
+    time = np.arange(SAMPLES)
+    speeds = np.stack([7 + 4 * np.sin(time / 9), 6 + 5 * np.sin(time / 14 + 1)], axis=1)
+    angles = np.stack([0.9 * np.sin(time / 23), 0.8 * np.sin(time / 31 + 2)], axis=1)
+    values = np.stack([speeds[:, 0], angles[:, 0], speeds[:, 1], angles[:, 1]], axis=1)
+    return Commands(sample_time_s=1.0, names=SHIP.model.inputs, values=values)
+
+
+def measured(path: Path, *, noise: float = 1e-3, drop=(), degrees=False, pose=(-100.0, -450.0, 1.0)):
+    """A data file of the nominal ship; the last row's pose."""
+    commands, rng = wandering(), np.random.default_rng(0)
+    run = simulate(SHIP, commands, pose=np.array(pose))
+    state = np.concatenate([run.pose[:-1], run.velocity[:-1] + noise * rng.standard_normal((SAMPLES, 3))], axis=1)
+    table = dict(zip(NAMES, np.column_stack([np.arange(SAMPLES), state]).T, strict=True))
+    if degrees:
+        lat_lon = load_scenario(STORY).area.frame.to_degrees(state[:, :2])
+        table |= {"lat_deg": lat_lon[:, 0], "lon_deg": lat_lon[:, 1]}
+        drop = (*drop, "north_m", "east_m")
+    table |= dict(zip(("n1_rps", "a1_rad", "n2_rps", "a2_rad"), commands.values.T, strict=True))
+    kept = {name: values for name, values in table.items() if name not in drop}
+    rows = [",".join(kept), *(",".join(map(repr, row)) for row in np.array(list(kept.values())).T.tolist())]
+    path.write_text("\n".join(rows) + "\n", encoding="utf-8")
+    return state[-1, :3]
+
+
+def refused(capsys, *arguments: object, status: int = 2) -> str:
+    assert main(["replan", *map(str, arguments), "--quiet"]) == status
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    return error
+
+
+# where it begins
+
+
+@pytest.mark.parametrize("degrees", [False, True])
+def test_the_rest_begins_at_the_last_row_in_metres_or_in_degrees(tmp_path, degrees):
+    last = measured(tmp_path / "a.csv", degrees=degrees)
+    state = present_state(STORY, [tmp_path / "a.csv"])
+    assert np.abs(state.pose - last).max() < 1e-6
+    case, _ = rest_of(state)
+    assert case.start.tolist() == state.pose.tolist()
+
+
+def test_the_last_file_tells_the_place(tmp_path):
+    measured(tmp_path / "a.csv")
+    last = measured(tmp_path / "b.csv", pose=(0.0, 0.0, 2.0))
+    state = present_state(STORY, [tmp_path / "a.csv", tmp_path / "b.csv"])
+    assert np.abs(state.pose - last).max() < 1e-6
+    assert state.sailed_s == 2 * SAMPLES
+
+
+def test_antenna_and_compass_errors_that_the_vessel_file_states_are_taken_off(tmp_path):
+    last = measured(tmp_path / "a.csv")
+    text = (SCENARIOS / "vessels/tender-20m.toml").read_text(encoding="utf-8")
+    found = "[sensors]\nposition_forward_m = 5.0\nposition_starboard_m = -2.0\nheading_bias_rad = 0.1"
+    (tmp_path / "ship.toml").write_text(text.replace("[sensors]", found), encoding="utf-8")
+    state = present_state(STORY, [tmp_path / "a.csv"], vessel=tmp_path / "ship.toml")
+    heading = last[2] - 0.1
+    c, s = np.cos(heading), np.sin(heading)
+    antenna = state.pose[:2] + np.array([5.0 * c + 2.0 * s, 5.0 * s - 2.0 * c])
+    assert state.ship.sensors.position == Mounting(forward_m=5.0, starboard_m=-2.0)
+    assert np.abs(antenna - last[:2]).max() < 1e-9
+    assert state.pose[2] == pytest.approx(heading)
+
+
+# how much is left
+
+
+def test_what_is_left_is_the_whole_less_the_data_unless_it_is_said(tmp_path):
+    measured(tmp_path / "a.csv")
+    counted = present_state(STORY, [tmp_path / "a.csv"])
+    assert counted.left_s == load_scenario(STORY).design.total_s - SAMPLES
+    assert not counted.left_stated
+    assert rest_of(present_state(STORY, [tmp_path / "a.csv"], remaining_s=240.0))[0].design.total_s == 240.0
+
+
+def test_data_that_fill_the_whole_time_need_a_word_about_what_is_left(tmp_path, capsys):
+    for name in "abcd":
+        measured(tmp_path / f"{name}.csv")
+    error = refused(capsys, STORY, "--data", *(tmp_path / f"{name}.csv" for name in "abcd"))
+    assert "--remaining S" in error
+    assert "800 s" in error
+
+
+# what it counts on
+
+
+def test_without_a_vessel_the_parameters_are_estimated_from_the_data(tmp_path):
+    measured(tmp_path / "a.csv")
+    state = present_state(STORY, [tmp_path / "a.csv"])
+    assert state.origin.startswith("estimated from the data so far")
+    error = np.abs(state.ship.model.parameters - SHIP.model.parameters)
+    assert (error < 4 * state.ship.model.parameter_std + 0.02 * np.abs(SHIP.model.parameters)).all()
+    assert (state.ship.model.parameters != SHIP.model.parameters).all()
+
+
+def test_what_the_data_cannot_tell_stays_as_it_was_and_is_told(tmp_path):
+    values = wandering().values.copy()
+    values[:, 1::2] = 0.0
+    commands = Commands(sample_time_s=1.0, names=SHIP.model.inputs, values=values)
+    run = simulate(SHIP, commands, pose=np.array([-100.0, -450.0, 1.0]))
+    noise = 1e-3 * np.random.default_rng(0).standard_normal((SAMPLES, 1))
+    velocity = run.velocity[:-1] + np.hstack([noise, np.zeros((SAMPLES, 2))])
+    table = np.column_stack([np.arange(SAMPLES), run.pose[:-1], velocity, values])
+    header = ",".join((*NAMES, "n1_rps", "a1_rad", "n2_rps", "a2_rad"))
+    np.savetxt(tmp_path / "ahead.csv", table, delimiter=",", header=header, comments="")
+    state = present_state(STORY, [tmp_path / "ahead.csv"])
+    assert any("cannot tell" in note and "N_mu" in note for note in state.notes)
+    now = dict(zip(state.ship.model.names, state.ship.model.parameters.tolist(), strict=True))
+    std = dict(zip(state.ship.model.names, state.ship.model.parameter_std.tolist(), strict=True))
+    before = dict(zip(SHIP.model.names, SHIP.model.parameters.tolist(), strict=True))
+    assert now["N_mu"] == before["N_mu"]
+    assert std["N_mu"] == SHIP.model.parameter_std[SHIP.model.names.index("N_mu")]
+    assert now["X_u"] != before["X_u"]
+
+
+def test_an_estimate_and_what_was_known_before_combine_like_information():
+    commands = wandering()
+    run = simulate(SHIP, commands)
+    velocity = run.velocity[:-1] + 0.02 * np.random.default_rng(1).standard_normal((SAMPLES, 3))
+    batch = Batch(
+        name="a", sample_time_s=1.0, input_names=commands.names, inputs=commands.values, velocity=velocity,
+        pose=run.pose[:-1],
+    )  # fmt: skip
+    told = estimate(Record(batches=(batch,)), SHIP.model, method="ls")
+    scale = np.sqrt(np.diag(told.covariance))
+    inverse = np.linalg.inv(told.covariance / np.outer(scale, scale))
+    known = np.diag((scale / SHIP.model.parameter_std) ** 2)
+    covariance = np.linalg.inv(inverse + known)
+    mean = covariance @ (inverse @ (told.values / scale) + known @ (SHIP.model.parameters / scale))
+    ship = combined(SHIP, told, prior_counts=True)
+    assert np.allclose(ship.model.parameters, mean * scale, rtol=1e-8)
+    assert np.allclose(ship.model.parameter_std, np.sqrt(np.diag(covariance)) * scale, rtol=1e-6)
+    alone = combined(SHIP, told, prior_counts=False)
+    assert np.array_equal(alone.model.parameters, told.values)
+    assert np.allclose(alone.model.parameter_std, told.std)
+
+
+def test_the_vessel_files_weather_counts_only_where_the_scenario_has_none():
+    found = Environment(
+        current_to=np.array([0.1, 0.2]), wind_to=np.array([5.0, 0.0]), wind_std_mps=0.1,
+        current_variation=Variation(std_mps=0.05, correlation_s=60.0),
+    )  # fmt: skip
+    forecast = Environment(wind_to=np.array([1.0, 1.0]), wind_std_mps=0.5, current_std_mps=0.15)
+    weather, words = weather_for_rest(forecast, found)
+    assert weather.current_to.tolist() == [0.1, 0.2]
+    assert (weather.current_std_mps, weather.current_variation) == (0.15, found.current_variation)
+    assert (weather.wind_to.tolist(), weather.wind_std_mps) == ([1.0, 1.0], 0.5)
+    assert words == "current from the vessel file, as the scenario has none, wind from the scenario"
+    same, _ = weather_for_rest(found, forecast)
+    assert same.current_to.tolist() == [0.1, 0.2]
+    assert same.wind_to.tolist() == [5.0, 0.0]
+
+
+def test_manoeuvres_that_the_ship_can_no_longer_do_are_left_out_and_told(tmp_path):
+    measured(tmp_path / "a.csv")
+    text = (SCENARIOS / "vessels/tender-20m.toml").read_text(encoding="utf-8")
+    (tmp_path / "weak.toml").write_text(text.replace("X_mu = 0.012\n", "X_mu = 0.0045\n"), encoding="utf-8")
+    case, notes = rest_of(present_state(STORY, [tmp_path / "a.csv"], vessel=tmp_path / "weak.toml"))
+    left = {item.name for item in load_scenario(STORY).dictionary} - {item.name for item in case.dictionary}
+    assert "deceleration" in left
+    assert len(notes) == len(left)
+    assert all(any(name in note for note in notes) for name in left)
+
+
+# what is told
+
+
+def test_the_rest_can_only_add_and_what_is_not_told_is_not_a_number():
+    straight = Commands(sample_time_s=1.0, names=SHIP.model.inputs, values=np.tile([8.0, 0.0, 8.0, 0.0], (60, 1)))
+    ahead = TrialPart(commands=straight, velocity=np.zeros(3))
+    both = (ahead, TrialPart(commands=wandering(), velocity=np.zeros(3)))
+    names = SHIP.model.names
+    first = expected_std(SHIP, both[:1], names, environment=Environment(), mean_subtraction="none")
+    after = expected_std(SHIP, both, names, environment=Environment(), mean_subtraction="none")
+    assert np.isnan(first[names.index("N_mu")])
+    assert np.isfinite(after).all()
+    twice = [replace(part, repeats=2.0) for part in both]
+    assert np.allclose(
+        expected_std(SHIP, twice, names, environment=Environment(), mean_subtraction="none"), after / np.sqrt(2)
+    )
+
+
+def test_a_parameter_is_bought_by_the_runs_that_tell_of_it():
+    problem = DurationProblem(
+        names=("of a", "of b"),
+        parameters=("a", "b"),
+        mean_subtraction="none",
+        matrices=np.array([np.diag([1.0, 0.0]), np.diag([0.0, 1.0])]),
+        run_s=np.array([10.0, 10.0]),
+        total_s=40.0,
+        prior=np.diag([0.5, 0.0]),
+    )
+    design = replace(solve_durations(problem), repeats=(2, 2))
+    a, b = purchases(design, ("a", "b"))
+    assert (a.primitive, a.runs) == ("of a", 2)
+    assert a.without == pytest.approx(np.sqrt(2.0))
+    assert (b.primitive, b.without) == ("of b", np.inf)
+    (sure,) = purchases(replace(design, problem=replace(problem, prior=np.diag([50.0, 0.0]))), ("a",))
+    assert sure.primitive == ""
+
+
+# what is refused
+
+
+def test_data_without_a_position_are_refused(tmp_path, capsys):
+    measured(tmp_path / "a.csv", drop=("north_m", "east_m"))
+    error = refused(capsys, STORY, "--data", tmp_path / "a.csv")
+    assert "a.csv: row 1: does not say where the ship is" in error
+    measured(tmp_path / "a.csv", drop=("heading_rad",))
+    assert "expected heading_rad" in refused(capsys, STORY, "--data", tmp_path / "a.csv")
+
+
+def test_a_ship_outside_the_safe_water_is_refused_with_its_place(tmp_path, capsys):
+    last = measured(tmp_path / "a.csv", pose=(1200.0, 0.0, 0.3))
+    error = refused(capsys, STORY, "--data", tmp_path / "a.csv", "--out", tmp_path / "out")
+    assert f"row {SAMPLES + 1}" in error
+    lat, lon = load_scenario(STORY).area.frame.to_degrees(last[:2])
+    assert f"({lat:.6f}, {lon:.6f}) is on land" in error
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key"),
+    [
+        ("length_m = 20.0", "length_m = 21.0", "vessel.length_m: is 21, expected 20"),
+        ("sample_time_s = 1.0", "sample_time_s = 0.5", "vessel.sample_time_s: is 0.5, expected 1"),
+        ('kind = "azimuth"\nforward_m = 6.0', 'kind = "azimuth"\nforward_m = 99.0', "forward_m"),
+    ],
+)
+def test_another_ship_is_refused(tmp_path, capsys, old, new, key):
+    measured(tmp_path / "a.csv")
+    ship = tmp_path / "other.toml"
+    ship.write_text((SCENARIOS / "vessels/tender-20m.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    spoil(ship, old, new)
+    assert key in refused(capsys, STORY, "--data", tmp_path / "a.csv", "--vessel", ship)
+
+
+@pytest.mark.parametrize("left", ["0", "-5", "nan"])
+def test_no_time_left_is_refused(tmp_path, capsys, left):
+    measured(tmp_path / "a.csv")
+    assert "--remaining is" in refused(capsys, STORY, "--data", tmp_path / "a.csv", "--remaining", left)
+
+
+def test_too_little_time_for_any_run_has_no_answer(tmp_path, capsys):
+    measured(tmp_path / "a.csv")
+    error = refused(capsys, STORY, "--data", tmp_path / "a.csv", "--remaining", "20", status=3)
+    assert "no whole run fits in the 20 s left" in error
+
+
+def test_an_interruption_leaves_nothing(tmp_path):
+    measured(tmp_path / "a.csv")
+
+    def interrupt(what: str, share: float) -> None:
+        if share > 0.15:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        workflows.replan(STORY, tmp_path / "out", data=[tmp_path / "a.csv"], remaining_s=240.0, progress=interrupt)
+    assert not (tmp_path / "out").exists()
