@@ -20,6 +20,9 @@ from expdesign.values import Array
 
 ORDERS = (1, 2, 3, 4, 6, 8, 12)
 SHORTEST_PER_ORDER = 6
+FLOOR = 0.05
+"""White share of the remainder's variance that is taken for granted: no model is right at every frequency, and smoothed
+data would otherwise make the quickest motions, of which they tell nothing, count most."""
 NO_FEEDBACK = np.array([1.0, 0.0])
 """With one coefficient instead of two SciPy takes a path through Python loops."""
 
@@ -83,9 +86,11 @@ def fit_colour(remainder: Array, *, order: int | None = None) -> Noise:
             if len(rows) < 10 * (p + 1):
                 continue
             target, past = rows[:, 0], rows[:, 1 : p + 1]
-            taps = np.linalg.lstsq(past, target, rcond=None)[0]
+            floor = FLOOR * float(np.mean(target**2))
+            moments = past.T @ past + floor * len(rows) * np.eye(p)
+            taps = np.linalg.lstsq(moments, past.T @ target, rcond=None)[0]
             filters[channel, 1:] = -taps
-            variance = float(np.mean((target - past @ taps) ** 2))
+            variance = float(np.mean((target - past @ taps) ** 2)) + floor * (1.0 + float(taps @ taps))
             std[channel] = max(np.sqrt(variance), 1e-12)
             criterion += len(rows) * np.log(max(variance, 1e-24)) + p * np.log(len(rows))
         noise = Noise(filters=filters, std=std)
