@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 GLOSSARY: tuple[tuple[str, str], ...] = (
-    ("Manoeuvre", "a primitive of the dictionary, run from a stated speed with stated commands"),
+    ("Manoeuvre", "a primitive of the dictionary: a short piece of sailing from a stated speed with stated commands"),
     ("Run", "one execution of a manoeuvre; numbered in order on the chart and in the time series"),
     ("Leg", "a stretch of the plan, either a run or repositioning; numbered from 0 as in plan.json and the CSV files"),
     ("Repositioning", "sailing from the end of one run to where the next can begin, at its entry speed and heading"),

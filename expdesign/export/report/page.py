@@ -27,6 +27,9 @@ SUBTRACTION = {
 }
 
 
+UNKNOWN_DEPTH = "No depths were checked: the chart tells only land. Check the whole track against the official chart."
+
+
 @dataclass(frozen=True, kw_only=True)
 class Fact:
     """A key number with its name and one remark."""
@@ -39,6 +42,7 @@ class Fact:
 def report_html(content: ReportContent) -> str:
     """One HTML page without any outside reference: figures inside as SVG, readable on a phone and on paper."""
     after = expected(content)
+    rows = tables.parameter_rows(content, after)
     page = page_templates("report").get_template("report.html")
     return page.render(
         content=content,
@@ -55,7 +59,7 @@ def report_html(content: ReportContent) -> str:
         assumptions=assumptions(content),
         agenda=tables.agenda(content),
         primitives=tables.primitive_rows(content),
-        parameters=tables.parameter_rows(content, after),
+        parameters=rows,
         known_rows=known_rows(content.known),
         known_sentences=known_sentences(content.known, content.plan.area.frame),
         noise=measures_velocity(content),
@@ -66,6 +70,9 @@ def report_html(content: ReportContent) -> str:
         figures=_figures(content, after),
         origin=_origin(content),
         percent=words.percent,
+        equation=tables.equation_sentence(content),
+        less=any(row.less for row in rows),
+        told=tables.excitation_sentence(content),
     )
 
 
@@ -102,11 +109,13 @@ def summary(content: ReportContent) -> list[str]:
         if check.verified
         else f"The plan is NOT verified and must not be sailed: {'; '.join(check.problems)}."
     )
+    depths = [] if plan.area.depths else [UNKNOWN_DEPTH]
     return [
         f"{words.duration(total)} and {words.distance(plan.trajectory.distance_m)} from start to goal: "
         f"{words.counted(runs, 'informative run')} taking {words.duration(plan.seconds('primitive'))}, and "
         f"{words.duration(plan.seconds('reposition'))} of repositioning{bound if plan.reposition_bound_s > 0 else ''}.",
         verdict,
+        *depths,
         _design_sentence(content),
     ]
 
@@ -146,7 +155,7 @@ def facts(content: ReportContent) -> list[Fact]:
         Fact(
             name="Least clearance",
             value=words.distance(check.clearance_min_m),
-            remark=f"{words.distance(content.clearance_m)} asked for",
+            remark=f"{words.distance(content.clearance_m)} asked for{'' if plan.area.depths else '; to land only'}",
         ),
         Fact(
             name="Optimal to within",
@@ -173,7 +182,7 @@ def assumptions(content: ReportContent) -> list[tuple[str, str]]:
         ("Wind", words.wind(environment.wind_to, environment.wind_std_mps)),
         (
             "Vessel model",
-            f"{words.counted(len(model.terms), 'term')}, {model.form} parameters at their nominal values; "
+            f"{words.counted(len(model.terms), 'term')} with their nominal parameters, in {model.form} form; "
             "what the real ship does differently is not in the track, only in the stated uncertainties",
         ),
         ("Fixed parameters", f"{fixed}: held at the vessel file's values" if fixed else "none, all are estimated"),

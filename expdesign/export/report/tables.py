@@ -195,30 +195,68 @@ class ParameterRow:
     runs: str
     track: str
     gain: str
+    less: bool = False
 
 
 def parameter_rows(content: ReportContent, found: Expected) -> list[ParameterRow]:
     """Parameters in order; standard deviations in the parameter's own unit."""
     model = content.vessel.model
     nominal = dict(zip(model.names, model.parameters.tolist(), strict=True))
-    terms = {term.name: f"d{term.equation}/dt = ... + {term.name} * {term.expression}" for term in model.terms}
+    left = "T d{}/dt" if model.form == "discrete" else "d{}/dt"
+    terms = {term.name: f"{left.format(term.equation)} = ... + {term.name} * {term.expression}" for term in model.terms}
     columns = zip(content.parameters, found.before.tolist(), found.runs.tolist(), found.track.tolist(), strict=True)
     return [
         ParameterRow(
             name=name,
             term=terms[name],
             nominal=words.significant(nominal[name]),
-            before=words.significant(before) if before > 0 else "not stated",
+            before=_small(before) if before > 0 else "not stated",
             runs=_std(runs),
             track=_std(track),
             gain=f"{words.significant(before / track, 2)} times" if before > 0 and track > 0 else "",
+            less=0 < before < track,
         )
         for name, before, runs, track in columns
     ]
 
 
 def _std(value: float) -> str:
-    return "cannot be told" if np.isnan(value) else words.significant(value, 2)
+    return "cannot be told" if np.isnan(value) else _small(value)
+
+
+SMALL = 1e-3
+
+
+def _small(value: float) -> str:
+    """Two digits, as a power of ten where written out there would be more noughts than digits."""
+    if not 0 < value < SMALL:
+        return words.significant(value, 2)
+    digits, _, power = f"{value:.1e}".partition("e")
+    return f"{digits}\N{MIDDLE DOT}10{str(int(power)).translate(RAISED)}"
+
+
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def equation_sentence(content: ReportContent) -> str:
+    """What the terms of the parameters are terms of."""
+    model = content.vessel.model
+    units = "Parameters and standard deviations are in m, s and rad, and the model's units of force."
+    if model.form == "discrete":
+        return f"T is the sample time that the parameters hold, {model.sample_time_s:g} s. {units}"
+    return units
+
+
+def excitation_sentence(content: ReportContent) -> str:
+    """What follows for the estimation from where the excitation condition holds."""
+    held = [item.primitive.name for item in content.information if item.excitation_condition]
+    if len(held) == len(content.information):
+        return "The excitation condition holds everywhere: instrumental variables stay unbiased with noisy sensors."
+    where = f"only in {words.counted(len(held), 'manoeuvre')}" if held else "nowhere"
+    return (
+        f"The excitation condition holds {where}: elsewhere noisy velocities bias the estimates of terms with a "
+        "modulus, also those by instrumental variables; output error avoids it where only sensors disturb."
+    )
 
 
 def _share_of_draws(probability: float) -> str:

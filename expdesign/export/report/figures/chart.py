@@ -154,7 +154,7 @@ def _draw_runs(axes: Axes, plan: Plan, *, metres_per_inch: float) -> None:
 def _legend(content: ReportContent) -> Sequence[Line2D | Patch]:
     reposition, primitive = KINDS["reposition"], KINDS["primitive"]
     clearance = f"{content.clearance_m:g} m from forbidden water"
-    covered = f"hull with {100 * content.confidence:g} % of drawn ships"
+    covered = f"where {100 * content.confidence:g} % of drawn ships stay"
     depths = content.plan.area.depths
     shown = (
         Patch(facecolor=depth_colour(number, len(depths)), edgecolor="#7aa6c2", alpha=0.6, label=f"{depth:g} m or more")

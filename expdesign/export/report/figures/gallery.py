@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from expdesign.conventions import to_n_frame
 from expdesign.dictionary.primitive import Primitive
@@ -20,42 +21,57 @@ from expdesign.export.report.figures.style import (
 from expdesign.values import Array
 
 HULLS = 5
-LEAST_SPAN = {"u [m/s]": 0.1, "v [m/s]": 0.1, "r [\N{DEGREE SIGN}/s]": 0.1}
+LEAST_SPAN = {"u [m/s]": 0.2, "v [m/s]": 0.2, "r [\N{DEGREE SIGN}/s]": 0.2}
 """Axes show at least this much, so that rounding errors do not look like motion."""
+
+
+SIZE_IN = (5.2, 3.3)
+PATH_BOX = (0.125, 0.15, 0.335, 0.82)
+"""Of the path's axes: left, bottom, width, height, as shares of the figure."""
+CURVE_BOXES = tuple((0.655, bottom, 0.33, 0.235) for bottom in (0.735, 0.4425, 0.15))
 
 
 def primitive_figure(primitive: Primitive, hull_b: Array, *, number: int) -> str:
     """Path with hull outlines on the left; u, v and r over time on the right, dashed what the family wished for."""
-    figure = new_figure(5.2, 3.3)
-    left, right = figure.subfigures(1, 2, width_ratios=(1, 1.15), squeeze=False)[0]
-    path = left.subplots()
-    pose = primitive.trajectory.pose
-    path.plot(pose[:, 1], pose[:, 0], color=PRIMITIVE, linewidth=1.6)
-    for sample in np.linspace(0, len(pose) - 1, HULLS).round().astype(int):
-        corners = to_n_frame(hull_b, pose[sample])
-        path.fill(corners[:, 1], corners[:, 0], facecolor="none", edgecolor=GREY, linewidth=0.8)
-    path.plot(pose[0, 1], pose[0, 0], "o", color=GREEN, markersize=6)
-    path.set_aspect("equal", adjustable="datalim")
-    path.set_xlabel("starboard [m]")
-    path.set_ylabel("ahead [m]")
-    path.locator_params(nbins=4)
-    light_grid(path)
+    figure = new_figure(*SIZE_IN, arranged=False)  # fixed places: many small figures are drawn much sooner
+    _draw_path(figure.add_axes(PATH_BOX), primitive.trajectory.pose, hull_b)
     time_s = primitive.trajectory.time_s
     velocity = primitive.trajectory.velocity * (1.0, 1.0, np.degrees(1.0))
     wished = wished_motion(primitive)
     shown = velocity if wished is None else wished * (1.0, 1.0, np.degrees(1.0))
-    rows = right.subplots(3, 1, sharex=True)
+    rows = [figure.add_axes(box) for box in CURVE_BOXES]
     for axes, values, wish, (name, span) in zip(rows, velocity.T, shown.T, LEAST_SPAN.items(), strict=True):
         axes.axhline(0.0, color=BLACK, linewidth=0.5)
         if wished is not None:
             axes.plot(time_s, wish, color=GREY, linewidth=1.0, linestyle="--")
         axes.plot(time_s, values, color=BLUE, linewidth=1.4)
         axes.set_ylabel(name)
+        axes.yaxis.set_label_coords(-0.37, 0.5)
+        axes.tick_params(labelsize=9, labelbottom=axes is rows[-1])
         low, high = min(values.min(), wish.min(), 0.0), max(values.max(), wish.max(), 0.0)
         slack = max(span - (high - low), 0.0) / 2 + 0.06 * (high - low)
         axes.set_ylim(low - slack, high + slack)
-        axes.locator_params(axis="y", nbins=4)
+        axes.locator_params(nbins=4)
         light_grid(axes)
     rows[-1].set_xlabel("time [s]")
-    figure.draw_without_rendering()  # equal aspect widens the limits, and with them the labels to make room for
     return svg(figure, key=f"primitive-{number}", label=f"Path and velocities of primitive {primitive.name}")
+
+
+def _draw_path(axes: Axes, pose: Array, hull_b: Array) -> None:
+    axes.plot(pose[:, 1], pose[:, 0], color=PRIMITIVE, linewidth=1.6)
+    hulls = [to_n_frame(hull_b, pose[sample]) for sample in np.linspace(0, len(pose) - 1, HULLS).round().astype(int)]
+    for corners in hulls:
+        axes.fill(corners[:, 1], corners[:, 0], facecolor="none", edgecolor=GREY, linewidth=0.8)
+    axes.plot(pose[0, 1], pose[0, 0], "o", color=GREEN, markersize=6)
+    places = np.vstack([*hulls, pose[:, :2]])
+    middle = (places.min(axis=0) + places.max(axis=0)) / 2
+    inches = np.array([PATH_BOX[3] * SIZE_IN[1], PATH_BOX[2] * SIZE_IN[0]])
+    half = inches * float((np.ptp(places, axis=0) / inches).max()) * 0.54  # metres alike on both axes, with a margin
+    axes.set_ylim(middle[0] - half[0], middle[0] + half[0])
+    axes.set_xlim(middle[1] - half[1], middle[1] + half[1])
+    axes.set_xlabel("starboard [m]")
+    axes.set_ylabel("ahead [m]")
+    axes.yaxis.set_label_coords(-0.27, 0.5)
+    axes.tick_params(labelsize=9)
+    axes.locator_params(nbins=4)
+    light_grid(axes)

@@ -53,9 +53,9 @@ def report_style() -> Iterator[None]:
         yield
 
 
-def new_figure(width_in: float, height_in: float) -> Figure:
-    """An empty figure that owes nothing to any window system."""
-    figure = Figure(figsize=(width_in, height_in), layout="constrained")
+def new_figure(width_in: float, height_in: float, *, arranged: bool = True) -> Figure:
+    """An empty figure that owes nothing to any window system; its axes are arranged, unless they are given places."""
+    figure = Figure(figsize=(width_in, height_in), layout="constrained" if arranged else "none")
     FigureCanvasSVG(figure)
     return figure
 

@@ -23,6 +23,8 @@ class _Panel:
     values: Array
 
 
+NUMBER_GAP = 0.022
+"""Of the width, between the numbers of runs."""
 GROUPS = {
     "n": ("propeller speed [rev/s]", 1.0),
     "a": ("azimuth angle [\N{DEGREE SIGN}]", float(np.degrees(1.0))),
@@ -67,19 +69,30 @@ def _command_panels(plan: Plan) -> tuple[_Panel, ...]:
     for name in plan.commands.names:
         title, factor = GROUPS.get(name.rstrip("0123456789"), (plain(name), 1.0))
         grouped.setdefault(title, []).append((name, plan.commands.column(name) * factor))
+    grouped = {
+        title: [(name, _within_a_turn(values)) for name, values in signals] if title == GROUPS["a"][0] else signals
+        for title, signals in grouped.items()
+    }
     return tuple(
         _Panel(title, tuple(name for name, _ in signals), np.stack([values for _, values in signals], axis=1))
         for title, signals in grouped.items()
     )
 
 
+def _within_a_turn(degrees: Array) -> Array:
+    """Angles of thrusters that turn round and round, from -180 to 180, with gaps where they pass there."""
+    wrapped = (degrees + 180.0) % 360.0 - 180.0
+    wrapped[1:][np.abs(np.diff(wrapped)) > 180.0] = np.nan
+    return wrapped
+
+
 def _draw(axes: Axes, panel: _Panel, sample_time_s: float) -> None:
     time_min = np.arange(len(panel.values)) * sample_time_s / 60
     for name, values, colour in zip(panel.names, panel.values.T, LINES * len(panel.names), strict=False):
-        axes.plot(time_min, values, color=colour, linewidth=1.1, label=plain(name))
+        axes.plot(time_min, values, color=colour, linewidth=1.1, label=plain(name))  # thinned where straight
     axes.set_ylabel(panel.title, fontsize=9)
     if len(panel.names) > 1:
-        axes.legend(loc="center left", bbox_to_anchor=(1.06, 0.5), fontsize=8)
+        axes.legend(loc="center left", bbox_to_anchor=(1.09, 0.5), fontsize=8)
     light_grid(axes)
 
 
@@ -92,9 +105,14 @@ def _shade_runs(axes: Axes, plan: Plan) -> None:
 
 def _number_runs(axes: Axes, plan: Plan) -> None:
     minutes = plan.commands.sample_time_s / 60
+    last = -np.inf
     for run in primitive_runs(plan):
         leg = plan.legs[run.leg]
+        middle = (leg.first + leg.last) / 2 * minutes
+        if middle - last < NUMBER_GAP * plan.commands.duration_s / 60:
+            continue  # numbers of runs too short to be told apart here
+        last = middle
         axes.annotate(
-            str(run.number), ((leg.first + leg.last) / 2 * minutes, 1.0), (0, 3), xycoords=("data", "axes fraction"),
+            str(run.number), (middle, 1.0), (0, 3), xycoords=("data", "axes fraction"),
             textcoords="offset points", ha="center", fontsize=9, fontweight="bold", color=PRIMITIVE,
         )  # fmt: skip
