@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from expdesign.dictionary import Primitive
 from expdesign.errors import Diverged, UnknownName
+from expdesign.estimation.tables import AIR
 from expdesign.information.moments import (
     HEADINGS,
     MEAN_SUBTRACTIONS,
@@ -23,14 +24,16 @@ from expdesign.information.moments import (
     signals_of,
 )
 from expdesign.information.primitive_information import PrimitiveInformation
-from expdesign.simulation import CALM, Environment, deliver, motion_rates, simulate, to_body
-from expdesign.simulation.motion import State, rk4_step
+from expdesign.simulation import CALM, Environment, deliver, rk4_step, simulate, to_body
+from expdesign.simulation.program import RatesProgram, march
 from expdesign.simulation.run import LARGEST_SPEED, SUBSTEPS
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, Vessel
 
 SIMULATED_AT_ONCE, EVALUATED_AT_ONCE = 3_000_000, 500_000
 """Samples held in memory."""
+MARCHED_AT_ONCE = 2048
+"""Runs simulated in one go; what they need then stays in the processor's cache."""
 
 
 def score_primitives(
@@ -172,19 +175,8 @@ class _Runs:
         standing = np.array([primitive.entry_inputs for primitive in primitives]).T
         sample_time_s = primitives[0].commands.sample_time_s
         given = deliver(vessel.responses, commands, sample_time_s=sample_time_s, substeps=SUBSTEPS, standing=standing)
-        headings = _headings(environment)
-        shape = (len(parameters), len(headings), len(primitives))
-        current_b = to_body(environment.current_to, headings[:, None], NUMPY)
         entry = np.array([primitive.entry_velocity for primitive in primitives]).T
-        start = (0.0, 0.0, headings[:, None], entry[0] + current_b[0], entry[1] + current_b[1], entry[2])
-        states = _simulated(
-            vessel,
-            given,
-            tuple(np.broadcast_to(value, shape).copy() for value in start),
-            parameters,
-            environment,
-            sample_time_s=sample_time_s,
-        )
+        states = _sailed(vessel, given, entry, parameters, environment, sample_time_s)
         inputs = given[:, 0] if given.shape[1] == 1 else given.mean(axis=1)
         return _Runs(vessel=vessel, environment=environment, inputs=inputs, states=states)
 
@@ -221,31 +213,68 @@ class _Runs:
         return _Moments(X=X, Y=Y, YZ=YZ, clear=np.atleast_2d(clear.all(axis=1)))
 
 
+def _sailed(
+    vessel: Vessel, given: Array, entry: Array, parameters: Array, environment: Environment, sample_time_s: float
+) -> Array:
+    """(k, 6, m, h, n) states of all models on all headings, from entry velocities (3, n) through water.
+
+    Where wind moves no model and there is no current, motion does not depend on heading and is simulated on one only;
+    the position of the others is not turned with their heading.
+    """
+    headings = _headings(environment)
+    if len(headings) > 1 and not environment.current_to.any() and not _moved_by_air(vessel, parameters):
+        alone = _simulated(vessel, given, entry, parameters, CALM, sample_time_s, np.zeros(1))
+        states = np.repeat(alone, len(headings), axis=3)
+        states[:, 2] += headings[:, None]
+        return states
+    return _simulated(vessel, given, entry, parameters, environment, sample_time_s, headings)
+
+
+def _moved_by_air(vessel: Vessel, parameters: Array) -> bool:
+    """Whether any of the models has a force of the air."""
+    reads = [bool(set(AIR) & set(expression.signals)) for expression in vessel.model.expressions]
+    return bool(parameters[:, reads].any())
+
+
 def _simulated(
-    vessel: Vessel, given: Array, start: State, parameters: Array, environment: Environment, *, sample_time_s: float
+    vessel: Vessel,
+    given: Array,
+    entry: Array,
+    parameters: Array,
+    environment: Environment,
+    sample_time_s: float,
+    headings: Array,
 ) -> Array:
     """(k, 6, m, h, n) states at the start of every command; runs that diverge are nan throughout.
 
     `given` (k, steps, inputs, n) is what the actuators deliver in each integrator step, or (k, 1, ...) all the time.
     """
-    theta = parameters[0].tolist() if len(parameters) == 1 else list(parameters.T[:, :, None, None])
-    current, wind = environment.current_to.tolist(), environment.wind_to.tolist()
-    states = np.empty((len(given), 6, *start[0].shape))
-    state, largest = start, np.zeros(start[0].shape)
+    shape = (len(parameters), len(headings), entry.shape[1])
+    current_b = to_body(environment.current_to, headings[:, None], NUMPY)
+    start = (0.0, 0.0, headings[:, None], entry[0] + current_b[0], entry[1] + current_b[1], entry[2])
+    first = np.array([np.broadcast_to(value, shape).reshape(-1) for value in start])
+    own = np.repeat(parameters, shape[1] * shape[2], axis=0)
+    states = np.empty((len(given), *first.shape))
+    size = shape[2] * max(1, MARCHED_AT_ONCE // shape[2])
+    for begin in range(0, first.shape[1], size):
+        some = slice(begin, begin + size)
+        runs = first[:, some].shape[1]
+        program = RatesProgram(vessel.model, runs=runs, parameters=parameters[0] if len(parameters) == 1 else own[some])
+        program.sea[...] = np.r_[environment.current_to, environment.wind_to][:, None]
+        states[..., some] = _marched(program, given, first[:, some], sample_time_s / SUBSTEPS)
+    return states.reshape(len(states), 6, *shape)
+
+
+def _marched(program: RatesProgram, given: Array, start: Array, step_s: float) -> Array:
+    """(k, 6, n) states at the start of every command; runs that diverge are nan throughout."""
+    states, largest = np.empty((len(given), *start.shape)), np.zeros(start.shape[1])
     with np.errstate(over="ignore", invalid="ignore"):
-        for sample, steps in enumerate(given):
-            for place, value in enumerate(state):
-                states[sample, place] = value
-            for held in np.broadcast_to(steps, (SUBSTEPS, *steps.shape[1:])):
-
-                def rates(x: State, held: Array = held) -> State:
-                    return motion_rates(
-                        vessel.model, x, held, current_to=current, wind_to=wind, ops=NUMPY, parameters=theta
-                    )
-
-                state = rk4_step(rates, state, sample_time_s / SUBSTEPS)
-            for speed in state[3:]:
-                largest = np.maximum(largest, np.abs(speed))
+        marched = march(program, given, start, step=rk4_step, step_s=step_s, substeps=SUBSTEPS)
+        states[0] = next(marched)
+        for sample, state in enumerate(marched, start=1):
+            largest = np.maximum(largest, np.abs(state[3:]).max(axis=0))
+            if sample < len(states):
+                states[sample] = state
     states[..., ~(largest < LARGEST_SPEED)] = np.nan
     return states
 

@@ -70,7 +70,7 @@ class RatesProgram:
         self._run = prepared(codes, memory, constants, engine)
 
     def hold(self, inputs: Array) -> None:
-        """Take delivered inputs (k, m, n), or (k, m, 1) where all runs share them."""
+        """Take delivered inputs (k, m, n); or of fewer runs, 1 or a divisor of n, that the others repeat in turn."""
         entries, values = self._tape.entries, dict[int, Any]()
         for place in self._places:
             entry = entries[place]
@@ -86,7 +86,9 @@ class RatesProgram:
 
     def select(self, row: int) -> None:
         """Use one of the rows held."""
-        self._current[...] = self._table[row]
+        held = self._table[row]
+        rows, own = held.shape
+        self._current.reshape(rows, self._current.shape[1] // own, own)[...] = held[:, None]
 
     def rates(self, state: tuple[Array, ...]) -> tuple[Array, ...]:
         """Time derivative of the state, (6, n) each, packed as one entry so that every integrator takes them.
