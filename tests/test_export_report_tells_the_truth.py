@@ -13,6 +13,7 @@ import shapely
 from lxml import etree
 
 from expdesign.durations import MEAN_SUBTRACTIONS, build_durations, solve_durations
+from expdesign.durations.growing_values import GrowRound, Growth
 from expdesign.export import build_route
 from expdesign.export.report import report_html, words
 from expdesign.export.report.admission import least_charted_depth
@@ -238,6 +239,43 @@ def test_uncertainties_are_those_of_the_whole_track_and_of_the_runs() -> None:
     rows = parameter_rows(content, found)
     assert [read_number(row.track) for row in rows] == pytest.approx(found.track, rel=0.051)
     assert [row.less for row in rows] == [0 < a < b for a, b in zip(found.before, found.track, strict=True)]
+
+
+def growth_of(name: str) -> Growth:
+    """Two additions; the numbers are only to be found again."""
+    rounds = tuple(
+        GrowRound(
+            name=name, family="steps", settings={"speed_mps": 1.5, "duration_s": 60.0}, sensitivity=20.25 - number,
+            searched=20.0, log_det_gain=2.125, efficiency=1.25 + number, excitation_condition=number == 0,
+        )
+        for number in range(2)
+    )  # fmt: skip
+    limits = np.array([[0.0, 3.0], [-0.5, 0.5], [-0.1, 0.1]])
+    return Growth(
+        specs=(), information=case.scored(), rounds=rounds, limits=limits, evaluated=321, dimension=13, parameters=10,
+        best_left=13.5,
+    )  # fmt: skip
+
+
+def test_what_was_added_to_the_dictionary_is_told_with_what_it_brought() -> None:
+    told = Page(report_html(case.report_content(growth=growth_of("found-1")))).text.replace("\N{NO-BREAK SPACE}", " ")
+    assert "1 found-1 steps; speed 1.5 m/s, duration 60 s 20.25 +2.125 125 % holds" in told
+    assert "2 found-1 steps; speed 1.5 m/s, duration 60 s 19.25 +2.125 225 % does not hold" in told
+    assert "321 candidates were looked at, with u from 0.00 to 3.00 m/s" in told
+    assert f"at least {100 * math.exp(-0.05):.1f} % among all candidates" in told
+    assert "Manoeuvres that were searched for" not in page()
+    empty = Page(report_html(case.report_content(growth=replace(growth_of("x"), rounds=())))).text
+    assert "None was found that adds anything." in empty
+    assert "<script>" not in report_html(case.report_content(growth=growth_of(ODD)))
+
+
+@pytest.mark.parametrize("deep", [True, False])
+def test_a_chart_without_depths_is_called_that_before_anything_else(deep: bool) -> None:
+    area = case.plan().area
+    charted = replace(area, depths=((10.0, area.water),) if deep else ())
+    told = Page(report_html(case.report_content(plan=replace(case.plan(), area=charted)))).text
+    assert ("No depths were checked" not in told.partition("How long")[0]) is deep
+    assert ("depths not checked" not in told) is deep
 
 
 def test_the_chain_of_proofs_ends_at_the_route_that_was_written() -> None:

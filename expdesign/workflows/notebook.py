@@ -84,9 +84,9 @@ def plan_for(scenario: Scenario | Path | str, *, seed: int = 0, progress: Progre
         NoAnswer: there is no informative design or no feasible plan.
     """
     case = scenario if isinstance(scenario, Scenario) else load_scenario(Path(scenario))
-    information, _ = ready(case, seed=seed, progress=within(progress, 0.0, 0.1))
+    information, growth = ready(case, seed=seed, progress=within(progress, 0.0, 0.1))
     design = designed(case, information, seed=seed, progress=within(progress, 0.1, 0.15))
     plan = planned(case, information, design, seed=seed, progress=within(progress, 0.15, 1.0))
     route = built_route(case, plan)
     content = report_content(case, information, design, plan, seed)
-    return Trial(content=replace(content, compared=efficiencies(design), route=route), route=route)
+    return Trial(content=replace(content, compared=efficiencies(design), route=route, growth=growth), route=route)

@@ -52,6 +52,7 @@ def run(scenario: Path, out: Path | None, *, seed: int = 0, progress: Progress =
 
 def trial_files(case: Scenario, growth: Growth | None, content: ReportContent, route: Route) -> dict[str, str | bytes]:
     """Every file of a planned trial, by name."""
+    content = replace(content, growth=growth)
     return {
         **_dictionary_files(case, content.information),
         **growth_files(case, growth),

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.durations import Efficiencies
+from expdesign.durations.growing_values import Growth
 from expdesign.durations.values import DurationDesign
 from expdesign.export.known import Known
 from expdesign.export.route import Route
@@ -38,6 +39,7 @@ class ReportContent:
         compared: the design under every criterion.
         route: the waypoints as exported, or None when there are none.
         known: what a trial that goes on has told so far, or None for one that begins.
+        growth: what was added to the dictionary, or None when that was not wished.
     """
 
     scenario: str
@@ -57,6 +59,7 @@ class ReportContent:
     compared: tuple[Efficiencies, ...] = ()
     route: Route | None = None
     known: Known | None = None
+    growth: Growth | None = None
 
     def __post_init__(self) -> None:
         seal(self, start="3", goal="3")

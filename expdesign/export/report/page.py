@@ -15,6 +15,7 @@ from expdesign.export.report.figures.style import report_style
 from expdesign.export.report.figures.timeline import timeline_figure
 from expdesign.export.report.figures.uncertainty import uncertainty_figure
 from expdesign.export.report.glossary import GLOSSARY
+from expdesign.export.report.growth import growth_rows, growth_sentences
 from expdesign.export.report.progress import known_rows, known_sentences
 from expdesign.export.report.trust import chain
 from expdesign.export.report.uncertainty import Expected, expected, measures_velocity
@@ -66,6 +67,8 @@ def report_html(content: ReportContent) -> str:
         chain=chain(content, short_of_optimum=criteria.short_of_optimum(content)),
         conditions=conditions(content),
         checks=tables.checks(content),
+        growth=[] if content.growth is None else growth_rows(content.growth),
+        grown=("", "") if content.growth is None else growth_sentences(content.growth),
         glossary=GLOSSARY,
         figures=_figures(content, after),
         origin=_origin(content),

@@ -115,10 +115,11 @@ UNITS = {
 def settings_sentence(item: PrimitiveInformation) -> str:
     """Settings of a primitive in friendly units, its duration left out."""
     chosen = {name: value for name, value in item.primitive.settings.items() if name != "duration_s"}
-    return ", ".join(_setting(name, value) for name, value in chosen.items())
+    return ", ".join(setting(name, value) for name, value in chosen.items())
 
 
-def _setting(name: str, value: float) -> str:
+def setting(name: str, value: float) -> str:
+    """Name and value of a setting, in friendly units."""
     stem, _, ending = name.rpartition("_")
     unit, factor = UNITS.get(ending, ("", 1.0)) if stem else ("", 1.0)
     title = (stem if unit else name).replace("_", " ")
@@ -209,7 +210,7 @@ def parameter_rows(content: ReportContent, found: Expected) -> list[ParameterRow
         ParameterRow(
             name=name,
             term=terms[name],
-            nominal=words.significant(nominal[name]),
+            nominal=_small(nominal[name], 3),
             before=_small(before) if before > 0 else "not stated",
             runs=_std(runs),
             track=_std(track),
@@ -227,12 +228,13 @@ def _std(value: float) -> str:
 SMALL = 1e-3
 
 
-def _small(value: float) -> str:
-    """Two digits, as a power of ten where written out there would be more noughts than digits."""
-    if not 0 < value < SMALL:
-        return words.significant(value, 2)
-    digits, _, power = f"{value:.1e}".partition("e")
-    return f"{digits}\N{MIDDLE DOT}10{str(int(power)).translate(RAISED)}"
+def _small(value: float, digits: int = 2) -> str:
+    """Significant digits, as a power of ten where written out there would be more noughts than digits."""
+    if not 0 < abs(value) < SMALL:
+        return words.significant(value, digits)
+    number, _, power = f"{value:.{digits - 1}e}".partition("e")
+    trimmed = (number.rstrip("0").rstrip(".") if digits > 2 else number).replace("-", words.MINUS)
+    return f"{trimmed}\N{MIDDLE DOT}10{str(int(power)).translate(RAISED)}"
 
 
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
