@@ -10,6 +10,9 @@ periodograms of the batches, whose expectations for batches of finite length, wi
 by Whittle's likelihood. Slow parts count only if they earn more likelihood than one parameter may by chance (Schwarz's
 criterion). The covariance of sum W eps then follows for any W, ends of batches included, without kernel or lags.
 
+Turns of the ship modulate a disturbance that comes from one side, which no slow part describes quite: with a current
+that wanders for 100 s stated standard deviations were 0.95 to 1.05 of those found, but 0.86 for one thrust parameter.
+
 Whether the parts fit is tested: the periodogram over its expectation must spread its sum evenly over frequencies
 (Bartlett's test, 1 %).
 
