@@ -206,7 +206,8 @@ def _rates(ship, x, acting, th, e, shoal, after, current, wind):
     dr = (damp * dn + gain * fn + extra["N"]) / (1 + e["load_r"]) / heavy
     w0 = 2 * np.pi / np.where(e["roll_period_s"] > 0, e["roll_period_s"], 1.0)
     on = e["roll_period_s"] > 0
-    dp = np.where(on, -2 * e["roll_damping"] * w0 * p - w0**2 * phi + w0**2 * ur * r, 0.0)
+    side = dv + u * r  # the hull leans against the acceleration of the water it pushes
+    dp = np.where(on, -2 * e["roll_damping"] * w0 * p - w0**2 * phi + w0**2 * side, 0.0)
     dv, dr = dv + e["roll_sway"] * phi, dr + e["roll_yaw"] * phi
     return np.stack([u * c - v * s, u * s + v * c, r, du, dv, dr, p, dp])
 

@@ -21,6 +21,8 @@ WANDER_MPS = (0.0, 0.005, 0.01, 0.02, 0.035, 0.06, 0.1, 0.2)
 WANDER_TIMES_S = (60.0, 150.0, 400.0, 1000.0)
 SPACING_S = 10.0
 MOST_HATS = 24
+CLOSE = 0.05
+"""A fit has converged when the next step would lower twice the negative log likelihood by less than this."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -213,7 +215,7 @@ def fit(
     *,
     starts: Array,
     noise: Noise | None = None,
-    steps: int = 2,
+    steps: int = 5,
     colour_order: int | None = None,
     flat: tuple[str, ...] = (),
 ) -> Fit:
@@ -254,21 +256,26 @@ def fit(
         if best is not None and cost > best.cost + 1.0:
             ship, starts = _halfway(best, ship, starts)
             continue
-        if step == steps and step > 0:
+        pull = found.s - precision * now
+        near = (
+            float(pull @ np.linalg.lstsq(found.A + np.diag(precision), pull, rcond=None)[0]) < CLOSE if keys else True
+        )
+        last = step == steps or (near and step > 0)
+        if step == 1 or last:
             noise = _colours(columns, noise, precision, ship, keys, colour_order)
             found = marginal(grams(columns, noise), columns, noise)
+            cost = found.quadratic + float(precision @ now**2)
+            pull = found.s - precision * now
         A = found.A + np.diag(precision)
         covariance = (
             np.asarray(np.linalg.pinv(A, rcond=1e-14, hermitian=True), dtype=float) if keys else np.zeros((0, 0))
         )
-        pull = found.s - precision * now
         move = covariance @ pull
-        gained = float(move @ pull)
         best = Fit(
             ship=ship, keys=keys, free=len(free), covariance=covariance, starts=starts, noise=noise,
             cost=cost, linear=linear, columns=columns, precision=precision,
         )  # fmt: skip
-        if step == steps or (gained < 0.01 and step > 0):
+        if last:
             break
         ship = ship.having(limited(ship, dict(zip(keys, (now + move).tolist(), strict=True))))
         starts = starts + _fitting_starts(_start_moves(columns, noise, move), ship.states)

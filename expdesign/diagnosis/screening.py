@@ -24,6 +24,9 @@ from expdesign.values import Array
 
 DRAWS = 2000
 LEVEL = 0.05
+LEAST_OWN = 1e-5
+"""Share of a candidate's answer that nothing else in the model can imitate, at least, for it to be tested."""
+TINY = 1e-12
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -86,7 +89,7 @@ def screen(base: Fit, candidates: Sequence[Candidate], rng: np.random.Generator 
         index = np.array(rows) - c
         block = A[np.ix_(index, index)] / np.outer(size[index], size[index])
         values, vectors = np.linalg.eigh(block)
-        if values[0] < 1e-7 or not np.isfinite(block).all():
+        if values[0] < LEAST_OWN or not np.isfinite(block).all():
             continue  # the data cannot show it beside what the model already has
         half = vectors / np.sqrt(values)
         z = half.T @ (s[index] / size[index])
@@ -116,7 +119,7 @@ def _effective_tests(A: Array, halves: list[tuple[Array, Array]], rng: np.random
         by_size.setdefault(len(index), []).append(((drawn[:, index] @ half) ** 2).sum(axis=1))
     for freedom, statistics in by_size.items():
         smallest = np.minimum(smallest, chi2.sf(np.max(statistics, axis=0), freedom))
-    return float(max(1.0, LEVEL / np.quantile(smallest, LEVEL)))
+    return float(max(1.0, LEVEL / max(float(np.quantile(smallest, LEVEL)), TINY)))
 
 
 def _pushes(linear: Linear, candidate: Candidate):  # type: ignore[no-untyped-def]

@@ -5,12 +5,13 @@ from __future__ import annotations
 from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.words import rounded
 
+NAMED = ("X_kappa", "W_abs_u_u", "W_abs_v_v", "W_uv")
+"""Parameters whose change has a physical name in the catalogue: advance loss and wind."""
+
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     model = situation.ship.model
-    groups: list[tuple[str, ...]] = [
-        (f"theta:{term.name}",) for term in model.terms if not situation.has(f"theta:{term.name}")
-    ]
+    groups: list[tuple[str, ...]] = [(f"theta:{name}",) for name in model.names if name not in NAMED]
     for equation in model.outputs:
         groups.append(tuple(f"theta:{term.name}" for term in model.terms if term.equation == equation))
     groups.append(tuple(f"theta:{name}" for name in model.names))

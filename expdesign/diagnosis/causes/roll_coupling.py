@@ -7,7 +7,7 @@ import numpy as np
 from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.words import listed
 
-COUNT = 9
+COUNT = 14
 DAMPING = 0.08
 
 

@@ -25,6 +25,7 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
             found += [Candidate(cause="wind", free={f"term:{name}": 0.0}) for name in terms if len(terms) > 1]
         if reads_air and not terms:
             found.append(Candidate(cause="wind", free={f"theta:{name}": 0.0 for name in reads_air}))
+            found += [Candidate(cause="wind", free={f"theta:{name}": 0.0}) for name in reads_air if len(reads_air) > 1]
     elif windows.has_heading and reads_air and not situation.has("wind:north"):
         found += [
             Candidate(cause="wind", free={"wind:north": speed * n, "wind:east": speed * e}, finite=True)
