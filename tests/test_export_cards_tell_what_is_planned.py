@@ -84,10 +84,29 @@ def test_the_page_needs_nothing_from_outside_and_a_plan_that_failed_gets_none() 
         cards_html(case.report_content(plan=case.unverified()))
 
 
-def test_odd_names_are_shown_and_never_run() -> None:
-    odd = cards_html(case.report_content(scenario="<script>alert('x')</script> & Åbo"))
-    assert "<script>" not in odd
-    assert "Åbo" in text(html.fromstring(odd))
+ODD = "<script>alert('x')</script> & \"Åbo\" \N{SNOWMAN} \x07 訓練"
+
+
+@pytest.mark.parametrize("name", [ODD, "a very long name " * 30 + "end"])
+def test_names_of_any_kind_are_shown_and_never_run(name: str) -> None:
+    content = case.report_content()
+    first = case.runs()[0]
+    information = tuple(
+        replace(item, primitive=replace(item.primitive, name=name)) if item.primitive.name == first else item
+        for item in content.information
+    )
+    legs = tuple(replace(leg, name=name) if leg.name == first else leg for leg in content.plan.legs)
+    plan = replace(content.plan, legs=legs, area=replace(content.plan.area, name=name, depth_rule=name))
+    odd = cards_html(
+        replace(content, scenario=name, vessel=replace(content.vessel, name=name), information=information, plan=plan)
+    )
+    assert "<script" not in odd
+    assert "\x07" not in odd
+    page = html.fromstring(odd)
+    shown = " ".join(name.replace("\x07", "\N{REPLACEMENT CHARACTER}").split())
+    assert text(page.find(".//h1")) == f"{shown}: run cards"
+    assert text(page.find_class("card")[0].find(".//h1")).endswith(shown)
+    assert text(page.find_class("cover")[0]).count(shown) == 3
 
 
 @pytest.mark.parametrize("name", [item.primitive.name for item in case.scored()])

@@ -64,20 +64,20 @@ def page() -> str:
     return report_html(case.report_content())
 
 
-def odd_page() -> str:
-    renamed = replace(case.scored()[0].primitive, name=ODD)
+def odd_page(name: str = ODD) -> str:
+    renamed = replace(case.scored()[0].primitive, name=name)
     information = (replace(case.scored()[0], primitive=renamed), *case.scored()[1:])
-    problem = replace(case.design().problem, names=(ODD, *case.design().problem.names[1:]))
-    legs = (replace(case.plan().legs[0], name=ODD), *case.plan().legs[1:])
-    area = replace(case.plan().area, name=ODD, source=ODD, notes=(ODD,))
+    problem = replace(case.design().problem, names=(name, *case.design().problem.names[1:]))
+    legs = (replace(case.plan().legs[0], name=name), *case.plan().legs[1:])
+    area = replace(case.plan().area, name=name, source=name, notes=(name,))
     return report_html(
         case.report_content(
-            scenario=ODD,
-            vessel=replace(case.tug(), name=ODD),
+            scenario=name,
+            vessel=replace(case.tug(), name=name),
             information=information,
             design=replace(case.design(), problem=problem),
             plan=replace(case.plan(), legs=legs, area=area),
-            command=ODD,
+            command=name,
         )
     )
 
@@ -109,6 +109,14 @@ def test_odd_names_are_shown_and_never_run() -> None:
     assert "script" not in read.tags
     assert "\x07" not in html
     assert 'x <script>alert(1)</script> & "$\\alpha$" $ \N{REPLACEMENT CHARACTER} \N{SNOWMAN}' in read.text
+
+
+def test_a_very_long_name_is_told_whole_and_cut_only_beside_axes() -> None:
+    long = "a very long name " * 30 + "end"
+    html = odd_page(long)  # a figure squeezed by a name would be a warning, and so an error
+    assert Page(html).text.count(long) >= 6
+    durations = next(figure for figure in re.findall(r"<svg.*?</svg>", html, flags=re.DOTALL) if "bound" in figure)
+    assert f"{long[:31]}\N{HORIZONTAL ELLIPSIS}" in durations
 
 
 def test_the_same_trial_gives_the_same_page() -> None:

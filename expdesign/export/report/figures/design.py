@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 
 from expdesign.durations.values import DurationDesign
 from expdesign.export.report.content import ReportContent, relative_information
-from expdesign.export.report.figures.style import BLUE, GREY, PRIMITIVE, light_grid, new_figure, plain, svg
+from expdesign.export.report.figures.style import BLUE, GREY, PRIMITIVE, light_grid, new_figure, short, svg
 
 USED = 1e-6
 """Time fractions below this count as none."""
@@ -16,7 +16,7 @@ USED = 1e-6
 def durations_figure(content: ReportContent) -> str:
     """Left: time of each primitive, optimal and in whole runs. Right: its sensitivity against the bound."""
     design = content.design
-    names = [plain(name) for name in design.problem.names]
+    names = [short(name) for name in design.problem.names]
     figure = new_figure(8.0, 1.5 + 0.32 * len(names))
     times, sensitivities = figure.subplots(1, 2, sharey=True, width_ratios=(3, 2))
     _draw_times(times, design)
@@ -61,14 +61,14 @@ def _draw_sensitivities(axes: Axes, design: DurationDesign) -> None:
 def information_figure(content: ReportContent) -> str:
     """Heat map: for each parameter, how much each primitive tells per minute next to the best one."""
     share = relative_information(content).T
-    names = [plain(name) for name in content.design.problem.names]
+    names = [short(name) for name in content.design.problem.names]
     figure = new_figure(min(2.2 + 0.62 * len(names), 14.0), 1.9 + 0.3 * len(content.parameters))
     axes = figure.subplots()
     mesh = axes.pcolormesh(share, cmap="cividis", vmin=0.0, vmax=1.0, edgecolors="white", linewidth=1.0)
     for (row, column), value in np.ndenumerate(share):
         colour = "black" if value > 0.55 else "white"
         axes.text(column + 0.5, row + 0.5, f"{100 * value:.0f}", ha="center", va="center", fontsize=8, color=colour)
-    axes.set_yticks(np.arange(len(content.parameters)) + 0.5, [plain(name) for name in content.parameters])
+    axes.set_yticks(np.arange(len(content.parameters)) + 0.5, [short(name) for name in content.parameters])
     axes.set_xticks(np.arange(len(names)) + 0.5, names)
     if max(map(len, names)) > 6:
         axes.tick_params(axis="x", rotation=40, rotation_mode="xtick")

@@ -29,6 +29,8 @@ PIXELS_PER_INCH = 120.0
 """Figures are shown no larger than this, so that their letters keep the size of the text around them."""
 LAND, WATER, FORBIDDEN = "#e9d8a6", "#e6f2fa", "#d4d4d4"
 
+LONGEST_NAME = 32
+
 SETTINGS: dict[Any, Any] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "expdesign",
@@ -85,6 +87,12 @@ def svg(figure: Figure, *, key: str, label: str) -> Markup:
 def plain(text: str) -> str:
     """Text on one line, with a replacement sign for each character that no SVG may hold."""
     return " ".join(xml_text(text).split())
+
+
+def short(text: str) -> str:
+    """A name beside an axis: on one line, and cut where it would take the figure's room."""
+    line = plain(text)
+    return line if len(line) <= LONGEST_NAME else f"{line[: LONGEST_NAME - 1]}\N{HORIZONTAL ELLIPSIS}"
 
 
 def light_grid(axes: Axes, axis: Literal["both", "x", "y"] = "both") -> None:

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 
 from expdesign.conventions import KNOTS_PER_MPS
 from expdesign.export.report.content import primitive_runs
-from expdesign.export.report.figures.style import LINES, PRIMITIVE, light_grid, new_figure, plain, svg
+from expdesign.export.report.figures.style import LINES, PRIMITIVE, light_grid, new_figure, plain, short, svg
 from expdesign.plan.values import Plan
 from expdesign.values import Array
 
@@ -89,7 +89,7 @@ def _within_a_turn(degrees: Array) -> Array:
 def _draw(axes: Axes, panel: _Panel, sample_time_s: float) -> None:
     time_min = np.arange(len(panel.values)) * sample_time_s / 60
     for name, values, colour in zip(panel.names, panel.values.T, LINES * len(panel.names), strict=False):
-        axes.plot(time_min, values, color=colour, linewidth=1.1, label=plain(name))  # thinned where straight
+        axes.plot(time_min, values, color=colour, linewidth=1.1, label=short(name))  # thinned where straight
     axes.set_ylabel(panel.title, fontsize=9)
     if len(panel.names) > 1:
         axes.legend(loc="center left", bbox_to_anchor=(1.09, 0.5), fontsize=8)

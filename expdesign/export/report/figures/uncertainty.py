@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from expdesign.export.report.content import ReportContent
-from expdesign.export.report.figures.style import BLACK, BLUE, GREY, PRIMITIVE, light_grid, new_figure, plain, svg
+from expdesign.export.report.figures.style import BLACK, BLUE, GREY, PRIMITIVE, light_grid, new_figure, short, svg
 from expdesign.export.report.uncertainty import Expected
 from expdesign.values import Array
 
 
 def uncertainty_figure(content: ReportContent, found: Expected) -> str:
     """One row for each parameter, logarithmic: prior, after the runs, after the whole track."""
-    names = [plain(name) for name in content.parameters]
+    names = [short(name) for name in content.parameters]
     figure = new_figure(8.0, 1.4 + 0.27 * len(names))
     axes = figure.subplots()
     size = parameter_size(content)
