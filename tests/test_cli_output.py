@@ -34,7 +34,7 @@ ESTIMATE = {
     "tests": (),
 }
 PLAIN = {"departure": None, "tolerance_m": None}
-REPLAN = {"data": (Path("d.csv"),), "vessel": None, "remaining_s": None, "seed": 0}
+REPLAN = {"data": (Path("d.csv"),), "vessel": None, "remaining_s": None, "interest": (), "seed": 0}
 COMMANDS = ("run", "score", "durations", "plan", "export", "simulate", "estimate", "replan")
 
 
@@ -106,10 +106,16 @@ def workflows(monkeypatch: pytest.MonkeyPatch) -> Workflows:
         ),
         ("replan s.toml --data d.csv", "replan", (Path("s.toml"), None), REPLAN),
         (
-            "replan s.toml --data a.csv b.csv --vessel v.toml --remaining 300 --out o --seed 3",
+            "replan s.toml --data a.csv b.csv --vessel v.toml --remaining 300 --interest Y_v N_r --out o",
             "replan",
             (Path("s.toml"), Path("o")),
-            {"data": (Path("a.csv"), Path("b.csv")), "vessel": Path("v.toml"), "remaining_s": 300.0, "seed": 3},
+            {
+                "data": (Path("a.csv"), Path("b.csv")),
+                "vessel": Path("v.toml"),
+                "remaining_s": 300.0,
+                "interest": ("Y_v", "N_r"),
+                "seed": 0,
+            },
         ),
         ("estimate d.csv --vessel v.toml", "estimate", ((Path("d.csv"),), None), ESTIMATE),
         (

@@ -11,7 +11,7 @@ from scenario_files import spoil
 
 from expdesign import workflows
 from expdesign.cli import main
-from expdesign.durations import DurationProblem, solve_durations
+from expdesign.durations import DurationProblem, optimal_shares, solve_durations
 from expdesign.estimation.methods import estimate
 from expdesign.information.expected import TrialPart
 from expdesign.scenario import load_scenario, load_vessel
@@ -195,6 +195,21 @@ def test_manoeuvres_that_the_ship_can_no_longer_do_are_left_out_and_told(tmp_pat
     assert all(any(name in note for note in notes) for name in left)
 
 
+def test_the_rest_can_be_made_best_for_one_parameter(tmp_path):
+    measured(tmp_path / "a.csv")
+    state = present_state(STORY, [tmp_path / "a.csv"], remaining_s=360.0)
+    variances = {}
+    for interest in ((), ("N_r",), ("X_abs_u_u",)):
+        case, _ = rest_of(state, interest=interest)
+        problem = workflows.duration_problem(case, workflows.scored(case))
+        shares = optimal_shares(problem).fractions
+        known = problem.prior + np.tensordot(shares, problem.matrices, axes=1)
+        variances[interest] = dict(zip(problem.parameters, np.diag(np.linalg.inv(known)), strict=False))
+    for name in ("N_r", "X_abs_u_u"):
+        assert variances[(name,)][name] == min(found[name] for found in variances.values())
+        assert variances[(name,)][name] < 0.99 * variances[()][name]
+
+
 # what is told
 
 
@@ -272,6 +287,13 @@ def test_another_ship_is_refused(tmp_path, capsys, old, new, key):
 def test_no_time_left_is_refused(tmp_path, capsys, left):
     measured(tmp_path / "a.csv")
     assert "--remaining is" in refused(capsys, STORY, "--data", tmp_path / "a.csv", "--remaining", left)
+
+
+def test_an_unknown_parameter_of_interest_is_refused_with_the_nearest(tmp_path, capsys):
+    measured(tmp_path / "a.csv")
+    assert "'Y_urr', did you mean 'Y_ur'?" in refused(
+        capsys, STORY, "--data", tmp_path / "a.csv", "--interest", "Y_urr"
+    )
 
 
 def test_too_little_time_for_any_run_has_no_answer(tmp_path, capsys):

@@ -415,6 +415,14 @@ def replan(
             help="Informative time that is left; design.total_s less the time of the data when not given.",
         ),
     ] = None,
+    interest: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--interest",
+            metavar="NAME ...",
+            help="Parameters that the rest is to be best for (criterion D_s), e.g. one that a diagnosis added.",
+        ),
+    ] = None,
     out: Out = None,
     seed: Seed = 0,
     quiet: Quiet = False,
@@ -437,6 +445,7 @@ def replan(
             data=tuple(data),
             vessel=vessel,
             remaining_s=remaining,
+            interest=tuple(interest or ()),
             seed=seed,
             progress=tell,
         ),

@@ -18,7 +18,7 @@ from expdesign.cli.arguments import repeat_option
 from expdesign.cli.commands import app
 from expdesign.errors import InputError, NoAnswer
 
-LISTS = ("--format", "--method", "--fixed", "--test", "--data")
+LISTS = ("--format", "--method", "--fixed", "--test", "--data", "--interest")
 """Options that take several values."""
 FILE_LISTS = ("--test", "--data")
 """Those of them whose values are files."""

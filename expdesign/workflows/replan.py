@@ -16,7 +16,7 @@ from expdesign.conventions import to_n_frame
 from expdesign.dictionary import build_primitive
 from expdesign.dictionary.spec import PrimitiveSpec
 from expdesign.durations import DurationDesign, efficiencies
-from expdesign.errors import Diverged, FileError, InputError, NoAnswer
+from expdesign.errors import Diverged, FileError, InputError, NoAnswer, UnknownName
 from expdesign.export import vessel_toml, write_files
 from expdesign.export.known import Known, replan_json
 from expdesign.information import estimated_parameters
@@ -45,6 +45,7 @@ def replan(
     data: Sequence[Path],
     vessel: Path | None = None,
     remaining_s: float | None = None,
+    interest: Sequence[str] = (),
     seed: int = 0,
     progress: Progress = silent,
 ) -> Outcome:
@@ -56,6 +57,7 @@ def replan(
         data: measured so far; the last row of the last file is where the ship is now.
         vessel: the model to go on with, e.g. an extended one; estimated from the data when None.
         remaining_s: informative time left; the scenario's less the time of the data when None.
+        interest: parameters that the rest is to be best for, by criterion D_s; the scenario's criterion when empty.
         seed: of all chance.
         progress: told what is done.
 
@@ -65,7 +67,7 @@ def replan(
     """
     progress("reading scenario and data", 0.0)
     state = present_state(scenario, data, vessel=vessel, remaining_s=remaining_s, progress=within(progress, 0.02, 0.08))
-    case, notes = rest_of(state)
+    case, notes = rest_of(state, interest=interest)
     information, growth = ready(case, seed=seed, progress=within(progress, 0.08, 0.12))
     design = designed(
         case, information, stated_std=_stated(state.first.vessel), seed=seed, progress=within(progress, 0.12, 0.15)
@@ -80,7 +82,7 @@ def replan(
         compared=efficiencies(design),
         route=route,
         known=known,
-        command=_command(scenario, data, vessel, remaining_s, seed),
+        command=_command(scenario, data, vessel, remaining_s, interest, seed),
     )
     files = {
         **trial_files(case, growth, content, route),
@@ -242,15 +244,26 @@ def weather_for_rest(scenario: Environment, vessel: Environment) -> tuple[Enviro
     return chosen, ", ".join(words)
 
 
-def rest_of(state: PresentState) -> tuple[Scenario, tuple[str, ...]]:
+def rest_of(state: PresentState, *, interest: Sequence[str] = ()) -> tuple[Scenario, tuple[str, ...]]:
     """The scenario of the rest, without manoeuvres that the ship as known now cannot do, and notes.
 
+    Args:
+        state: where the trial stands.
+        interest: parameters that the rest is to be best for, by criterion D_s; the scenario's criterion when empty.
+
     Raises:
+        UnknownName: no such parameter to be estimated.
         NoAnswer: it can do none.
         InputError: it cannot do one that is required.
     """
     first, wish = state.first, state.first.design
     weather, _ = weather_for_rest(first.environment, state.ship.environment)
+    if interest:
+        known = estimated_parameters(state.ship.model, wish.fixed_parameters)
+        for name in interest:
+            if name not in known:
+                raise UnknownName("parameter after --interest", name, known=known)
+        wish = replace(wish, criterion="D_s", interest=tuple(dict.fromkeys(interest)))
     kept, notes = _possible(state.ship, first.dictionary, needed={*wish.required, *wish.least_s})
     names = {spec.name for spec in kept}
     if wish.least_s or wish.most_s or wish.required or wish.budgets:
@@ -328,10 +341,18 @@ def _stated(vessel: Vessel) -> dict[str, float]:
     return dict(zip(vessel.model.names, vessel.model.parameter_std.tolist(), strict=True))
 
 
-def _command(scenario: Path, data: Sequence[Path], vessel: Path | None, remaining_s: float | None, seed: int) -> str:
+def _command(
+    scenario: Path,
+    data: Sequence[Path],
+    vessel: Path | None,
+    remaining_s: float | None,
+    interest: Sequence[str],
+    seed: int,
+) -> str:
     words = ["expdesign", "replan", str(scenario), "--data", *map(str, data)]
     words += ["--vessel", str(vessel)] if vessel else []
     words += ["--remaining", f"{remaining_s:g}"] if remaining_s is not None else []
+    words += ["--interest", *interest] if interest else []
     return shlex.join([*words, "--seed", str(seed)])
 
 
