@@ -159,12 +159,10 @@ def _onward(tell: Callable[[float], None], low: float, part: float) -> Callable[
 
 
 def _worthwhile(found: Search, held: Sequence[HeldOut]) -> Search:
-    """Only as many causes as do best where they were not fitted: others may be significant, but mend nothing."""
+    """Up to the first cause that gains nothing where it was not fitted: significant perhaps, but it mends nothing."""
     means = [float(np.nanmean(item.fit)) for item in held]
-    count = 0
-    for number in range(1, len(means)):
-        if means[number] > means[count] + LEAST_GAIN:
-            count = number
+    gains = np.diff(means)
+    count = int(np.argmin(np.append(gains > LEAST_GAIN, False)))
     steps = found.steps[:count]
     return replace(found, steps=steps, last=steps[-1].chosen.fit if steps else found.first)
 
