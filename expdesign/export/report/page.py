@@ -28,6 +28,9 @@ SUBTRACTION = {
 }
 
 
+MORE_THAN_OPTIMAL = (
+    ", because the legs between the runs take time of their own and do what no manoeuvre in the dictionary does"
+)
 UNKNOWN_DEPTH = "No depths were checked: the chart tells only land. Check the whole track against the official chart."
 
 
@@ -133,10 +136,12 @@ def _design_sentence(content: ReportContent) -> str:
     if realised is None:
         return f"{text}."
     optimal = words.duration(design.problem.total_s)
-    more = ", because repositioning takes time of its own and informs too" if realised > 1 else ""
+    more = MORE_THAN_OPTIMAL if realised > 1 else ""
+    placed = content.plan.design_efficiency_placed
+    runs = "" if placed is None else f"The runs as placed collect {words.percent(placed)}, the"
     return (
-        f"{text}. The whole track, repositioning included, collects {words.percent(realised)} of the information of an "
-        f"optimal {optimal}{more}."
+        f"{text}. {runs or 'The'} whole track, repositioning included, {'' if runs else 'collects '}"
+        f"{words.percent(realised)} of the information of an optimal {optimal}{more}."
     )
 
 
