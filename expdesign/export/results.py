@@ -185,6 +185,7 @@ def plan_json(plan: Plan, *, scenario: str, vessel: Vessel, environment: Environ
             "clearance_required_m": clearance_m,
             "fence": _fence_entry(plan, vessel, clearance_m),
             "leave_water_probability": plan.leave_water_probability,
+            "design_efficiency_placed": plan.design_efficiency_placed,
             "design_efficiency_realised": plan.design_efficiency_realised,
             "verified": check.verified,
             "verification": {

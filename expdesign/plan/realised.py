@@ -17,7 +17,7 @@ from expdesign.values import Array
 from expdesign.vessel import Vessel
 
 
-def realised_efficiency(
+def realised_efficiencies(
     vessel: Vessel,
     design: DurationDesign,
     environment: Environment,
@@ -25,26 +25,28 @@ def realised_efficiency(
     commands: Commands,
     trajectory: Trajectory,
     legs: Sequence[Leg],
-) -> float | None:
-    """Efficiency of the whole trial, legs included, against the optimal design in the time asked for.
+) -> tuple[float | None, float | None]:
+    """Efficiencies of the runs as they are placed, and of the whole trial, against the optimum in the time asked for.
 
-    By the design's criterion and the nominal model, of the information collected, not per second: above 1 when what the
-    legs add outweighs what rounding and headings take. None where the design has nuisance regressors or recorded
-    primitives, which the track alone says nothing about.
+    By the design's criterion and the nominal model, of the information collected, not per second. What the runs lose
+    against the design's whole runs is due to their places: headings in wind, and entries that a leg reached within its
+    tolerance. What the whole trial has more is due to its legs; above 1 where they add more than rounding and places
+    take. None where the design has nuisance regressors or recorded primitives: of these the track says nothing.
     """
     problem = replace(design.problem, robust="nominal", sampled=np.zeros((0, 0, 0, 0)))
     if not set(problem.parameters) <= set(vessel.model.names) or not problem.symmetric:
-        return None
+        return None, None
     rows = regressor_rows(vessel.model, trajectory, delivered(vessel, commands), environment)
-    batches = [rows[leg.first : leg.last] for leg in legs] if problem.mean_subtraction == "batch" else [rows]
-    matrix = np.sum(
-        [
-            len(batch) / len(rows) * _bordered(vessel, batch, problem.parameters, problem.mean_subtraction)
-            for batch in batches
-        ],
-        axis=0,
-    )
-    return Collected.of(problem).efficiency_of(commands.duration_s / problem.total_s * matrix, design.fractions)
+    collected, sample_s = Collected.of(problem), commands.sample_time_s
+
+    def efficiency(batches: list[Array]) -> float:
+        subtraction = problem.mean_subtraction
+        matrices = [len(batch) * _bordered(vessel, batch, problem.parameters, subtraction) for batch in batches]
+        return collected.efficiency_of(sample_s / problem.total_s * np.sum(matrices, axis=0), design.fractions)
+
+    runs = [rows[leg.first : leg.last] for leg in legs if leg.kind == "primitive"]
+    everything = [rows[leg.first : leg.last] for leg in legs] if problem.mean_subtraction == "batch" else [rows]
+    return efficiency(runs), efficiency(everything)
 
 
 def _bordered(vessel: Vessel, rows: Array, parameters: Sequence[str], mean_subtraction: str) -> Array:

@@ -22,7 +22,7 @@ from expdesign.plan.leg_values import last_state, leg_speed_mps
 from expdesign.plan.legs import LegTask, LegWater, find_leg, leg_trajectory
 from expdesign.plan.lower_bound import reposition_bound_s
 from expdesign.plan.placement import place_runs
-from expdesign.plan.realised import realised_efficiency
+from expdesign.plan.realised import realised_efficiencies
 from expdesign.plan.safety import leave_water_probability
 from expdesign.plan.search_space import SearchSpace, Stamp, refusing, stamp
 from expdesign.plan.timeline import Timeline
@@ -109,13 +109,15 @@ def _finished(
             f"{leaving:.1%} of drawn vessels leave allowed water during the runs of the plan found, more than "
             f"plan.confidence = {problem.settings.confidence:g} allows: more plan.clearance_m helps"
         )
+    placed, realised = realised_efficiencies(vessel, problem.design, environment, **sailed)  # type: ignore[arg-type]
     return Plan(
         area=area,
         **sailed,  # type: ignore[arg-type]
         reposition_bound_s=_reposition_bound_s(problem, water),
         leave_water_probability=leaving,
         leave_water_by_leg=leaving_by_leg,
-        design_efficiency_realised=realised_efficiency(vessel, problem.design, environment, **sailed),  # type: ignore[arg-type]
+        design_efficiency_placed=placed,
+        design_efficiency_realised=realised,
         verification=verification,
     )
 

@@ -18,7 +18,8 @@ class PlanSettings:
     Attributes:
         clearance_m: least distance from the hull to anything forbidden [m].
         confidence: share of sampled truths whose runs must stay in safe water, between 0 and 1.
-        time_budget_s: time for the search of order and placement and of the legs [s].
+        time_budget_s: buys tries of other places when a leg or a run fails, one for every two seconds, so that a slow
+            machine finds the same plan as a fast one; by the clock the search ends after ten times as long [s].
         transit_speed_mps: speed of repositioning legs, or None for nine tenths of what the actuators allow.
         turning_radius_m: of repositioning legs, or None for what the vessel model allows.
     """
@@ -83,8 +84,10 @@ class Plan:
         reposition_bound_s: no plan with these runs repositions in less time [s].
         leave_water_probability: chance that a primitive run open loop leaves safe water, or None if not computed.
         leave_water_by_leg: the same for each leg; None for legs between runs, or () if not computed.
-        design_efficiency_realised: D-efficiency of the whole trajectory's information against the optimal design's.
+        design_efficiency_realised: efficiency of the whole trajectory's information, by the design's criterion, against
+            the optimal design's in the time asked for; None where the track alone cannot tell.
         verification: what the independent check found.
+        design_efficiency_placed: as realised, of the runs alone, with the headings in wind and the entries they got.
     """
 
     area: SeaArea
@@ -96,6 +99,7 @@ class Plan:
     design_efficiency_realised: float | None
     verification: Verification
     leave_water_by_leg: tuple[float | None, ...] = ()
+    design_efficiency_placed: float | None = None
 
     @property
     def sample_leg(self) -> np.ndarray:

@@ -33,6 +33,14 @@ def chain(content: ReportContent, *, short_of_optimum: str) -> list[Link]:
             proof="the information of the runs as they are counted",
         ),
     ]
+    if plan.design_efficiency_placed is not None:
+        links.append(
+            Link(
+                step="Runs as placed",
+                found=f"{words.percent(plan.design_efficiency_placed)} of the optimum's information",
+                proof="the information of the runs alone, on their headings in the wind and from the entries reached",
+            )
+        )
     if plan.design_efficiency_realised is not None:
         links.append(
             Link(
