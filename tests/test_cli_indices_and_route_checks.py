@@ -2,6 +2,8 @@
 
 import json
 import math
+import re
+import shlex
 from pathlib import Path
 
 import export_case
@@ -11,8 +13,9 @@ from measured_trials import TUG, TUG_TRUE, quiet, write_run
 from expdesign.cli import main
 from expdesign.export import FORMATS
 from expdesign.indices import standard_results
-from expdesign.simulation import Conduct, zigzag
+from expdesign.simulation import Conduct, turning_circle, zigzag
 
+README = Path(__file__).parents[1] / "README.md"
 TWENTY = math.radians(20)
 
 
@@ -47,6 +50,31 @@ def test_a_recorded_zigzag_stands_beside_the_models(tmp_path: Path) -> None:
     assert " ".join(told) in page
     assert written["held"] == {"depth_m": 30.0, "wind_mps": 4.5, "sea_state": 2}
     assert "http" not in page
+
+
+def test_the_readmes_commands_for_indices_and_routes_run_as_they_stand(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With files of the names that it uses."""
+    readme = README.read_text()
+    ship, conduct = quiet(TUG_TRUE), Conduct(speed_mps=2.0, approach_s=40.0)
+    for name, (commands, motion) in {
+        "zigzag.csv": zigzag(ship, heading_rad=TWENTY, helm_rad=TWENTY, conduct=conduct),
+        "circle.csv": turning_circle(ship, conduct=conduct),
+    }.items():
+        write_run(tmp_path / name, ship, commands, velocity=tuple(motion.velocity[0]))
+    (tmp_path / "ship.toml").write_bytes(TUG.read_bytes())
+    for name, content in export_case.plan_files().items():
+        (tmp_path / name).write_text(content)
+    monkeypatch.chdir(tmp_path)
+    (line,) = re.findall(r"^\.venv/bin/expdesign (indices .*)$", readme, re.MULTILINE)
+    assert main(shlex.split(line)) == 0
+    kinds = [run["kind"] for run in json.loads((tmp_path / "runs/ship-indices/indices.json").read_text())["measured"]]
+    assert kinds == ["zig-zag", "turning circle"]
+    assert all(f"`{name}`" in readme for name in ("rtz-1.0", "rtz-1.1"))
+    assert main(["export", "plan.json", "--format", "rtz", "rtz-1.0", "rtz-1.1", "--quiet"]) == 0
+    assert "expdesign check-route FILE.rtz ..." in readme
+    assert main(["check-route", *map(str, tmp_path.glob("*.rtz"))]) == 0
 
 
 def test_what_is_wrong_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

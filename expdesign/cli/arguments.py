@@ -13,8 +13,8 @@ from expdesign.errors import InputError
 def repeat_option(arguments: Sequence[str], option: str, *, files: bool = False) -> list[str]:
     """Spell out a list of values: `--format rtz gpx` becomes `--format rtz --format gpx`.
 
-    A list ends at the next option and, unless it lists files, at anything that looks like a file, i.e. has a dot or a
-    slash.
+    A list ends at the next option and, unless it lists files, at anything that looks like a file, i.e. has a slash or an
+    ending that is no number: rtz-1.0 is a value.
     """
     spelled, rest = [], list(arguments)
     while rest:
@@ -55,7 +55,8 @@ def check_out(out: Path | None) -> Path | None:
 
 
 def _looks_like_value(text: str) -> bool:
-    return not text.startswith("-") and "." not in text and "/" not in text
+    _, dot, ending = text.rpartition(".")
+    return not text.startswith("-") and "/" not in text and (not dot or ending.isdecimal())
 
 
 def _looks_like_file_or_value(text: str) -> bool:

@@ -157,13 +157,21 @@ def limit_rows(found: Assessment) -> list[tuple[str, ...]]:
                     _percent(run.fit_percent[index]),
                     *(_percent(100 * share[index]) for share in shares),
                     _percent(limits.ceiling_percent[index]),
-                    f"\N{MULTIPLICATION SIGN}{words.significant(limits.growth, 2)}"
-                    if index == 0 and math.isfinite(limits.growth)
-                    else "",
+                    _growth(limits.growth) if index == 0 else "",
                     _percent(100 * limits.ahead_share[index]),
                 )
             )
     return rows
+
+
+DIES_OUT = 1e-3
+
+
+def _growth(factor: float) -> str:
+    """By how much an error grows by itself; nothing where that is not known."""
+    if not math.isfinite(factor):
+        return ""
+    return "dies out" if factor < DIES_OUT else f"\N{MULTIPLICATION SIGN}{words.significant(factor, 2)}"
 
 
 def _percent(value: float) -> str:
