@@ -13,8 +13,8 @@ from expdesign.errors import InputError
 def repeat_option(arguments: Sequence[str], option: str, *, files: bool = False) -> list[str]:
     """Spell out a list of values: `--format rtz gpx` becomes `--format rtz --format gpx`.
 
-    A list ends at the next option and, unless it lists files, at anything that looks like a file, i.e. has a slash or an
-    ending that is no number: rtz-1.0 is a value.
+    A list ends at the next option and, unless it lists files, at anything that looks like a file, i.e. has a slash or
+    an ending that is no number: rtz-1.0 is a value.
     """
     spelled, rest = [], list(arguments)
     while rest:
