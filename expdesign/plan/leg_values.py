@@ -136,6 +136,11 @@ class LegWater:
         shapely.prepare(water)
         return water
 
+    def parted(self, start: Array, end: Array) -> bool:
+        """Whether forbidden water lies between two positions (2,) on every way of a hull, however small."""
+        ends = shapely.points(np.stack([start[1::-1], end[1::-1]]))
+        return not any(shapely.contains(part, ends).all() for part in self.safe.geoms)
+
     def holds(self, pose: Array) -> bool:
         """Whether the hull stays in safe water between consecutive poses (k, 3)."""
         return bool(shapely.contains_properly(self.safe, swept_area(pose, self.vessel.hull_b)))

@@ -16,5 +16,7 @@ def find_leg(task: LegTask, water: LegWater) -> Array | None:
     Agile vessels turn where they are and go the shortest way; others, and agile ones that find no such leg, sail
     Dubins curves. The end commands of azimuths without angle limits may be whole turns away from the wished ones.
     """
+    if water.parted(task.start[:2], task.end[:2]):
+        return None
     found = agile_leg(task, water) if water.ship.agile else None
     return curved_leg(task, water) if found is None else found
