@@ -57,7 +57,7 @@ def report_style() -> Iterator[None]:
 
 def new_figure(width_in: float, height_in: float, *, arranged: bool = True) -> Figure:
     """An empty figure that owes nothing to any window system; its axes are arranged, unless they are given places."""
-    figure = Figure(figsize=(width_in, height_in), layout="constrained" if arranged else "none")
+    figure = Figure(figsize=(width_in, height_in), layout="constrained" if arranged else None)
     FigureCanvasSVG(figure)
     return figure
 
