@@ -16,8 +16,10 @@ COASTER_TERMS = {
 FREE = Limit()
 
 
-def vessel_of(ship: str, *, relative_std: float = 0.0, sample_time_s: float = 1.0) -> Vessel:
-    """A ship of `hidden_effects` as the package knows it, with the generator's parameters."""
+def vessel_of(
+    ship: str, *, relative_std: float = 0.0, sample_time_s: float = 1.0, without: tuple[str, ...] = ()
+) -> Vessel:
+    """A ship of `hidden_effects` as the package knows it, with the generator's parameters, perhaps lacking terms."""
     if ship == "tug":
         terms = STRUCTURES["manoeuvring-18"]
         actuators = tuple(
@@ -31,6 +33,7 @@ def vessel_of(ship: str, *, relative_std: float = 0.0, sample_time_s: float = 1.
             Actuator(kind="propeller", number=1, forward_m=-20.0, limits=(FREE,)),
             Actuator(kind="rudder", number=1, forward_m=-25.0, limits=(FREE,)),
         )
+    terms = tuple(term for term in terms if term.name not in without)
     values = np.array([sea.SHIPS[ship][term.name] for term in terms])
     model = VesselModel(
         terms=terms, parameters=values, parameter_std=relative_std * np.abs(values), form="continuous",
@@ -51,13 +54,27 @@ def hidden_record(
     current: tuple[float, float] = (0.0, 0.0),
     step_s: float = 1.0,
     weather: sea.Weather | None = None,
+    manoeuvre: str = "helmsman",
+    factors: dict[str, float] | None = None,
+    wind: tuple[float, float] = (0.0, 0.0),
+    shoaling: bool = False,
 ) -> Record:
-    """A trial with an effect hidden in it; parameters are drawn around the model's by their standard deviations."""
+    """A trial with an effect hidden in it; parameters are drawn around the model's by their standard deviations.
+
+    Args:
+        ship, seed, effects, faults, batches, samples, current, step_s, weather, wind: as in `hidden_effects`.
+        relative_std: of every parameter.
+        manoeuvre: of `hidden_effects.MANOEUVRES`.
+        factors: of single parameters, beside what is drawn.
+        shoaling: the depth varies along the track and is recorded.
+    """
     rng = np.random.default_rng(seed)
     drawn = {name: value * (1 + relative_std * rng.standard_normal()) for name, value in sea.SHIPS[ship].items()}
-    trial = sea.Trial(ship=ship, parameters=drawn, effects=effects or {}, current=current)
-    orders = sea.commands(ship, batches, samples, step_s, rng)[None]
-    true = sea.sail([trial], orders, step_s, weather or sea.Weather(), rng)
+    drawn |= {name: drawn[name] * factor for name, factor in (factors or {}).items()}
+    trial = sea.Trial(ship=ship, parameters=drawn, effects=effects or {}, current=current, wind=wind)
+    orders = sea.MANOEUVRES[manoeuvre](ship, batches, samples, step_s, rng)[None]
+    depth = sea.depths(batches, samples, step_s, rng) if shoaling else None
+    true = sea.sail([trial], orders, step_s, weather or sea.Weather(), rng, None if depth is None else depth[None])
     told = {name: values[0] for name, values in sea.measure(true, step_s, sea.Sensors(), rng, [faults or {}]).items()}
 
     def stacked(number: int, *names: str) -> np.ndarray:
@@ -73,6 +90,7 @@ def hidden_record(
                 velocity=stacked(number, "u_mps", "v_mps", "r_radps"),
                 pose=stacked(number, "north_m", "east_m", "heading_rad"),
                 wind=stacked(number, "wind_u_mps", "wind_v_mps"),
+                depth_m=None if depth is None else depth[number],
             )
             for number in range(batches)
         )

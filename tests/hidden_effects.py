@@ -88,6 +88,30 @@ def commands(ship: str, batches: int, samples: int, step_s: float, rng: np.rando
     return np.stack([held(2.5, 6.0), held(-0.6, 0.6)], axis=-1)
 
 
+def zigzags(ship: str, batches: int, samples: int, step_s: float, rng: np.random.Generator) -> np.ndarray:
+    """(batches, samples, m) square waves of the steering inputs; the driving ones change two or three times a run."""
+    time = np.arange(samples) * step_s
+    period, phase = rng.uniform(30, 90, (3, batches, 1)), rng.uniform(0, 1, (3, batches, 1))
+    swing = np.sign(np.sin(2 * np.pi * (time / period + phase))) * rng.uniform(0.4, 1.0, (3, batches, 1))
+    levels = rng.uniform(0, 1, (batches, 3))
+    drive = levels[np.arange(batches)[:, None], np.minimum((3 * np.arange(samples)) // samples, 2)[None]]
+    if ship == "tug":
+        return np.stack([5 + 6 * drive, 0.8 * swing[0], 5 + 6 * drive + swing[2], 0.8 * swing[1]], axis=-1)
+    if ship == "barge":
+        return np.stack([7 + 12 * drive, 6 * swing[0], 60 * swing[1]], axis=-1)
+    return np.stack([3 + 2.8 * drive, 0.55 * swing[0]], axis=-1)
+
+
+MANOEUVRES = {"helmsman": commands, "zigzag": zigzags}
+
+
+def depths(batches: int, samples: int, step_s: float, rng: np.random.Generator) -> np.ndarray:
+    """(batches, samples) water depth along the tracks [m]: a bottom that undulates between 4 and 15 m or so."""
+    time = np.arange(samples) * step_s
+    waves = np.sin(2 * np.pi * (time / rng.uniform(150, 600, (batches, 1)) + rng.uniform(0, 1, (batches, 1))))
+    return np.exp(np.log(8.0) + 0.65 * waves)
+
+
 def sail(trials: list[Trial], orders: np.ndarray, step_s: float, weather: Weather, rng: np.random.Generator,
          depth: np.ndarray | None = None) -> dict[str, np.ndarray]:  # fmt: skip
     """True motion of every trial and batch.

@@ -1,0 +1,362 @@
+"""How often the diagnosis is right: a campaign over ships, manoeuvres, effects, sizes and seeds, all drawn.
+
+``nice python tests/benchmarks/diagnosis.py [--trials 60] [--part known] [--jobs 2] [--seed 1] [--log FILE]``
+
+Data come from `hidden_effects`, which shares no code with the package. An effect is drawn, then enlarged until it costs
+the model with the generator's own parameters 5 points of simulated fit or more (mean over u, v, r). Parts:
+
+- known: one effect, parameters known;
+- uncertain: parameters drawn around the model's by 10 % each, and the model says so;
+- clean: nothing hidden, known and uncertain by turns;
+- pairs: two effects at once, parameters known;
+- power: effects of a tenth to a hundredth of their size, found against an oracle, the score test of the one true cause
+  at 5 %, without any correction.
+
+Columns: trials; the true cause first among the findings; the same or listed as not distinguishable from the first;
+among the findings at all; nothing found; estimate within three standard errors, of those named; other findings beside
+it; p < 0.01 in the oracle's test, that is, trials in which the data hold enough to know. Errors are binomial.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from joblib import Parallel, delayed
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+import hidden_effects as sea
+from diagnosis_case import hidden_record, vessel_of
+
+from expdesign.diagnosis import CAUSES, diagnose
+from expdesign.diagnosis.accuracy import accuracy, first_states
+from expdesign.diagnosis.candidate import Situation
+from expdesign.diagnosis.extension import as_extended
+from expdesign.diagnosis.joint import fit
+from expdesign.diagnosis.screening import screen
+from expdesign.diagnosis.windows import cut_windows
+from expdesign.signals import Record
+from expdesign.vessel import Vessel
+
+LEAST_POINTS, GROWTH, MOST_GROWTHS = 5.0, 1.5, 6
+AIR = ("W_abs_u_u", "W_abs_v_v", "W_uv")
+PARTS = ("known", "uncertain", "clean", "pairs", "power")
+ALL = {"tug": 0b1111, "barge": 0b111, "coaster": 0b11}
+FORCES = ("tug", "barge")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hidden:
+    """What is hidden: a cause, how, and what the estimate ought to be (name, value); `scaled` are enlarged."""
+
+    cause: str
+    effects: dict[str, float] = field(default_factory=dict)
+    faults: dict[str, float] = field(default_factory=dict)
+    factors: dict[str, float] = field(default_factory=dict)
+    current: tuple[float, float] = (0.0, 0.0)
+    wind: tuple[float, float] = (0.0, 0.0)
+    shoaling: bool = False
+    without: tuple[str, ...] = ()
+    truth: tuple[str, float] | None = None
+
+    def scaled(self, by: float) -> Hidden:
+        """The same, larger."""
+        fixed = ("acts_on", "roll_period_s", "roll_damping", "change_s")
+        truth = self.truth
+        if truth is not None:
+            rest = 1.0 if truth[0].startswith(("factor", "inertia")) else 0.0
+            truth = (truth[0], rest + (truth[1] - rest) * by)
+        return Hidden(
+            cause=self.cause,
+            effects={key: value * (1.0 if key in fixed else by) for key, value in self.effects.items()},
+            faults={key: value * by for key, value in self.faults.items()},
+            factors={key: 1 + (value - 1) * by for key, value in self.factors.items()},
+            current=(self.current[0] * by, self.current[1] * by),
+            wind=(self.wind[0] * by, self.wind[1] * by),
+            shoaling=self.shoaling, without=self.without, truth=truth,
+        )  # fmt: skip
+
+    def with_another(self, other: Hidden) -> Hidden:
+        """Both at once."""
+        return Hidden(
+            cause=f"{self.cause}+{other.cause}", effects=self.effects | other.effects,
+            faults=self.faults | other.faults, factors=self.factors | other.factors,
+            current=tuple(np.add(self.current, other.current).tolist()),
+            wind=tuple(np.add(self.wind, other.wind).tolist()), shoaling=self.shoaling or other.shoaling,
+            without=(*self.without, *other.without),
+        )  # fmt: skip
+
+
+def drawn_effect(cause: str, ship: str, rng: np.random.Generator, length_s: float) -> Hidden:
+    """An effect of a cause, of a size drawn at random."""
+    sign, size = float(rng.choice([-1, 1])), float(rng.uniform(0.5, 1.5))
+    angle = float(rng.uniform(0, 2 * np.pi))
+    way = np.array([np.cos(angle), np.sin(angle)])
+    if cause == "current":
+        vector = tuple((0.15 * size * way).tolist())
+        return Hidden(cause=cause, current=vector, truth=("north_mps", vector[0]))
+    if cause == "wind":
+        return Hidden(cause=cause, wind=tuple((7 * size * way).tolist()), without=AIR)
+    if cause == "parameters":
+        names = {"tug": ("X_u", "Y_v", "N_r", "Y_abs_v_v"), "barge": ("X_u", "Y_v", "N_r", "Y_ur"),
+                 "coaster": ("X_u", "Y_v", "N_r", "Y_rud")}[ship]  # fmt: skip
+        return Hidden(cause=cause, factors={str(rng.choice(names)): 1 + 0.3 * sign * size})
+    if cause == "missing_term":
+        name = str(rng.choice({"tug": ["N_uv"], "barge": ["X_abs_u_u", "Y_abs_v_v", "Y_abs_v_r"],
+                               "coaster": ["Y_abs_v_v", "Y_abs_v_r", "N_abs_v_r"]}[ship]))  # fmt: skip
+        value = {"X": -0.02, "Y": -0.06, "N": -0.03}[name[0]] * size
+        known = sea.SHIPS[ship].get(name)
+        if known is not None:  # the ship has it, the model is left without
+            return Hidden(cause=f"missing_term:{name}", without=(name,), factors={name: 1 + size},
+                          truth=(name, known * (1 + size)))  # fmt: skip
+        return Hidden(cause=f"missing_term:{name}", effects={name: value}, truth=(name, value))
+    if cause in ("actuator_lag", "actuator_delay"):
+        kind = cause.split("_")[1]
+        return Hidden(cause=cause, effects={f"{kind}_s": 4 * size, "acts_on": ALL[ship]},
+                      truth=(f"{kind}_all_s", 4 * size))  # fmt: skip
+    if cause == "actuator_deadband":
+        which, width = {"tug": (0b1010, 0.2), "barge": (0b100, 12.0), "coaster": (0b10, 0.15)}[ship]
+        return Hidden(cause=cause, effects={"deadband": width * size, "acts_on": which})
+    if cause == "thruster_asymmetry":
+        if ship == "barge":
+            return Hidden(cause=cause, effects={"asymmetry": 0.6 * sign * size},
+                          truth=("thrust_offset_m", 0.6 * sign * size))  # fmt: skip
+        group = "a" if ship == "tug" else "rudder"
+        return Hidden(cause=cause, effects={"angle_offset": 0.06 * sign * size},
+                      truth=(f"angle_offset_{group}_rad", 0.06 * sign * size))  # fmt: skip
+    if cause == "load_change":
+        axis = str(rng.choice(list("uvr")))
+        return Hidden(
+            cause=cause, effects={f"load_{axis}": 0.3 * size}, truth=(f"inertia_factor_{axis}", 1 + 0.3 * size)
+        )
+    if cause == "sensor_delay":
+        axis = str(rng.choice(list("vr")))
+        return Hidden(cause=cause, faults={f"late_{axis}": 2 * size}, truth=(f"{axis}_delay_s", 2 * size))
+    if cause == "change_point":
+        what = str(rng.choice(["change_gain", "change_damping"]))
+        return Hidden(cause=cause, effects={"change_s": length_s * rng.uniform(0.25, 0.75), what: 0.25 * sign * size})
+    if cause == "roll_coupling":
+        return Hidden(cause=cause, effects={"roll_period_s": rng.uniform(6, 20), "roll_damping": 0.08,
+                                            "roll_sway": 0.4 * size, "roll_yaw": 0.01 * size})  # fmt: skip
+    if cause == "shallow_water":
+        return Hidden(cause=cause, shoaling=True,
+                      effects={"shallow_damping": 0.8 * size, "shallow_inertia": 0.3 * size})  # fmt: skip
+    return {
+        "thrust_gain": Hidden(cause=cause, effects={"gain": 0.12 * sign * size},
+                              truth=("factor", 1 + 0.12 * sign * size)),
+        "thrust_advance_loss": Hidden(cause=cause, effects={"kappa": -0.002 * size}),
+        "heading_bias": Hidden(cause=cause, faults={"heading_bias": 0.04 * sign * size},
+                               truth=("heading_bias_rad", 0.04 * sign * size)),
+        "lever_arm": Hidden(cause=cause, faults={"lever_m": 3 * sign * size}, truth=("forward_m", 3 * sign * size)),
+        "gyro_scale": Hidden(cause=cause, faults={"gyro": 0.08 * sign * size},
+                             truth=("factor", 1 + 0.08 * sign * size)),
+    }[cause]  # fmt: skip
+
+
+NAMES = tuple(cause.name for cause in CAUSES)
+
+
+def drawn_ship(cause: str, rng: np.random.Generator) -> str:
+    """A ship that can have the effect; the tug's simulations cost most."""
+    if cause == "wind":
+        return "tug"
+    ships = FORCES if cause == "thrust_advance_loss" else ("barge", "barge", "coaster", "tug")
+    return str(rng.choice(ships))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """A trial to sail: everything but what is hidden."""
+
+    ship: str
+    seed: int
+    manoeuvre: str
+    batches: int
+    samples: int
+
+    def record(self, hidden: Hidden, relative_std: float = 0.0) -> Record:
+        """Data."""
+        return hidden_record(
+            self.ship, seed=self.seed, effects=hidden.effects, faults=hidden.faults, factors=hidden.factors,
+            current=hidden.current, wind=hidden.wind, shoaling=hidden.shoaling, relative_std=relative_std,
+            batches=self.batches, samples=self.samples, manoeuvre=self.manoeuvre,
+        )  # fmt: skip
+
+    def vessel(self, hidden: Hidden, relative_std: float = 0.0) -> Vessel:
+        """The model in use."""
+        return vessel_of(self.ship, relative_std=relative_std, without=hidden.without)
+
+
+def drawn_case(ship: str, seed: int, rng: np.random.Generator) -> Case:
+    """Manoeuvres and their lengths: 20 to 30 minutes."""
+    batches = int(rng.integers(4, 8))
+    return Case(
+        ship=ship, seed=seed, manoeuvre=str(rng.choice(list(sea.MANOEUVRES))), batches=batches,
+        samples=int(rng.uniform(1200, 1800) / batches),
+    )  # fmt: skip
+
+
+def mean_fit(case: Case, hidden: Hidden) -> float:
+    """Of the model that knows the generator's own parameters, over u, v, r [%]."""
+    vessel, record = case.vessel(hidden), case.record(hidden)
+    return float(np.clip(accuracy(as_extended(vessel, record), record).fit, -100, 100).mean())
+
+
+def large_enough(case: Case, hidden: Hidden) -> tuple[Hidden, float]:
+    """The effect, enlarged until it costs what is asked; small ones may stay smaller, and then say so."""
+    clean = mean_fit(case, Hidden(cause="none", shoaling=hidden.shoaling))
+    for _ in range(MOST_GROWTHS):
+        lost = clean - mean_fit(case, hidden)
+        if lost >= LEAST_POINTS:
+            break
+        hidden = hidden.scaled(GROWTH)
+    return hidden, lost
+
+
+def oracle(case: Case, hidden: Hidden, relative_std: float) -> float:
+    """Smallest p of the true cause's candidates, times their number, beside the nuisance alone."""
+    record, vessel = case.record(hidden, relative_std), case.vessel(hidden, relative_std)
+    ship = as_extended(vessel, record)
+    windows = cut_windows(ship.model, record)
+    base = fit(ship, windows, (), starts=first_states(windows), steps=3)
+    situation = Situation(ship=ship, windows=windows)
+    mine = [
+        item for cause in CAUSES for item in cause.candidates(situation)
+        if item.cause == hidden.cause and (hidden.cause != "actuator_deadband" or item.finite)
+    ]  # fmt: skip
+    scored = screen(base, mine).scored
+    return min((item.p_value for item in scored), default=1.0) * max(1, len(scored)) if mine else float("nan")
+
+
+def tried(part: str, number: int, seed: int) -> dict[str, object]:
+    """One trial."""
+    whole = np.random.SeedSequence([seed, PARTS.index(part), number])
+    rng = np.random.default_rng(whole)
+    name = NAMES[number % len(NAMES)]
+    ship = drawn_ship(name, rng)
+    case = drawn_case(ship, int(whole.generate_state(1)[0]), rng)
+    uncertain = part == "uncertain" or (part == "clean" and number % 2 == 1)
+    std = 0.1 if uncertain else 0.0
+    hidden, lost = Hidden(cause="none"), 0.0
+    if part != "clean":
+        hidden, lost = large_enough(case, drawn_effect(name, ship, rng, case.batches * float(case.samples)))
+    if part == "pairs":
+        others = [n for n in NAMES if n not in (name, "wind", "thrust_advance_loss", "change_point")]
+        other = drawn_effect(str(rng.choice(others)), ship, rng, case.batches * float(case.samples))
+        hidden = hidden.with_another(large_enough(case, other)[0])
+    if part == "power":
+        hidden = hidden.scaled(float(10 ** rng.uniform(-2, -1)))
+    row: dict[str, object] = {
+        "part": part, "number": number, "cause": hidden.cause, "ship": ship, "manoeuvre": case.manoeuvre,
+        "std": std, "lost": lost, "truth": hidden.truth, "effects": hidden.effects | hidden.faults | hidden.factors,
+    }  # fmt: skip
+    try:
+        found = diagnose(case.vessel(hidden, std), case.record(hidden, std), seed=number)
+    except Exception as error:  # a crash is a result of the campaign, not its end
+        return row | {"crash": f"{type(error).__name__}: {error}", "findings": [], "oracle": float("nan")}
+    row["findings"] = [
+        {
+            "cause": item.cause, "gain": item.gain, "low": item.gain_interval[0], "worth": item.worth,
+            "same": item.not_distinguishable_from, "estimates": [(e.name, e.value, e.std) for e in item.estimates],
+        }
+        for item in found.findings
+    ]  # fmt: skip
+    row["oracle"] = float("nan") if part in ("clean", "pairs") else oracle(case, hidden, std)
+    return row
+
+
+def share(count: int, total: int) -> str:
+    """A count as per cent with its binomial standard error (Agresti and Coull, 1998)."""
+    if not total:
+        return "-"
+    p = (count + 2) / (total + 4)
+    return f"{count}/{total} ({100 * count / total:.0f} ± {100 * np.sqrt(p * (1 - p) / (total + 4)):.0f} %)"
+
+
+def judged(row: dict) -> dict[str, bool | int | None]:
+    """What is right about a trial with one effect."""
+    names = [item["cause"] for item in row["findings"]]
+    listed = set(names[:1]) | set(row["findings"][0]["same"] if names else ())
+    within = None
+    mine = [item for item in row["findings"] if item["cause"] == row["cause"]]
+    if mine and row["truth"]:
+        value = [(v, s) for name, v, s in mine[0]["estimates"] if name == row["truth"][0]]
+        within = bool(value) and abs(value[0][0] - row["truth"][1]) < 3 * value[0][1] + 1e-9
+    return {
+        "first": names[:1] == [row["cause"]], "listed": row["cause"] in listed, "among": row["cause"] in names,
+        "none": not names, "within": within, "extra": len([n for n in names if n != row["cause"]]),
+        "knowable": row["oracle"] < 0.01,
+    }  # fmt: skip
+
+
+def table(rows: list[dict]) -> None:
+    """Per cause and in total."""
+    print(f"{'cause':30}{'n':>4}{'first':>7}{'listed':>7}{'among':>7}{'none':>6}{'3 std':>8}{'extra':>7}{'oracle':>8}")
+    groups: dict[str, list[dict]] = {}
+    for row in rows:
+        groups.setdefault(row["cause"].split(":")[0], []).append(judged(row))
+    groups["all"] = [item for items in groups.values() for item in items]
+    for name, items in groups.items():
+        within = [item["within"] for item in items if item["within"] is not None]
+        sums = {key: sum(bool(item[key]) for item in items) for key in ("first", "listed", "among", "none", "knowable")}
+        print(
+            f"{name:30}{len(items):4}{sums['first']:7}{sums['listed']:7}{sums['among']:7}{sums['none']:6}"
+            f"{f'{sum(within)}/{len(within)}':>8}{sum(item['extra'] for item in items):7}{sums['knowable']:8}"
+        )
+    knowable = [item for item in groups["all"] if item["knowable"]]
+    within = [item["within"] for item in groups["all"] if item["within"] is not None]
+    print(f"named first or listed with it: {share(sum(i['listed'] for i in groups['all']), len(groups['all']))}")
+    print(f"the same where the oracle knows: {share(sum(i['listed'] for i in knowable), len(knowable))}")
+    print(f"trials with other findings: {share(sum(i['extra'] > 0 for i in groups['all']), len(groups['all']))}")
+    print(f"estimates within 3 std: {share(sum(within), len(within))}")
+
+
+def report(part: str, rows: list[dict]) -> None:
+    """What a part of the campaign says."""
+    print(f"\n{part}: {len(rows)} trials, {sum('crash' in row for row in rows)} failed")
+    if part == "clean":
+        for std in (0.0, 0.1):
+            some = [row for row in rows if row["std"] == std]
+            print(f"alarms, parameters {'uncertain' if std else 'known'}: "
+                  f"{share(sum(bool(row['findings']) for row in some), len(some))}")  # fmt: skip
+        return
+    if part == "pairs":
+        names = [([f["cause"] for f in row["findings"]], row["cause"].split("+")) for row in rows]
+        print(f"both found: {share(sum(set(true) <= set(found) for found, true in names), len(rows))}")
+        print(f"one at least: {share(sum(bool(set(true) & set(found)) for found, true in names), len(rows))}")
+        print(f"trials with others: {share(sum(bool(set(found) - set(true)) for found, true in names), len(rows))}")
+        return
+    if part == "power":
+        weak = [row for row in rows if row["oracle"] < 0.05]
+        print(f"oracle finds: {share(len(weak), len(rows))}")
+        print(f"found, of these, by the diagnosis: {share(sum(judged(row)['listed'] for row in weak), len(weak))}")
+        return
+    table(rows)
+
+
+def main() -> None:
+    """Run the campaign."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--trials", type=int, default=2 * len(NAMES))
+    parser.add_argument("--part", choices=(*PARTS, "all"), default="all")
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--log", type=Path)
+    chosen = parser.parse_args()
+    for part in PARTS if chosen.part == "all" else (chosen.part,):
+        work = (delayed(tried)(part, number, chosen.seed) for number in range(chosen.trials))
+        rows = []
+        for row in Parallel(n_jobs=chosen.jobs, return_as="generator_unordered")(work):
+            rows.append(row)
+            if chosen.log:
+                with chosen.log.open("a") as file:
+                    file.write(json.dumps(row) + "\n")
+        report(part, rows)
+
+
+if __name__ == "__main__":
+    main()
