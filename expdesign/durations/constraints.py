@@ -128,6 +128,14 @@ class Polytope:
             return None
         return np.asarray(answer.x[:-1])
 
+    def feasible(self) -> bool:
+        """Whether there are fractions within the limits at all."""
+        bounds = np.stack([self.least, np.maximum(self.most, self.least)], axis=1)
+        total = np.clip(1.0, self.least.sum(), self.most.sum())
+        ones = np.ones((1, len(self.least)))
+        answer = linprog(np.zeros(len(self.least)), self.rows, self.limits, ones, [total], bounds, method="highs")
+        return bool(answer.status == 0)
+
     def loosened(self) -> Polytope:
         """The same with limits of rows moved by `TIGHT`."""
         return Polytope(
@@ -160,6 +168,10 @@ def feasible_set(constraints: Constraints, names: Sequence[str], *, run_s: Array
     for name in constraints.excluded:
         most[_index(names, name, "design.excluded")] = 0.0
     rows, limits = _rows(constraints.budgets, names, total_s)
+    dear = rows * TIGHT > limits[:, None]  # a budget allows no time that matters
+    most = np.where(dear.any(axis=0) & (least == 0), 0.0, most)
+    rows[:, most == 0] = 0.0
+    limits = np.where(rows.any(axis=1), limits, 1.0)
     polytope = Polytope(
         least=least, most=most, rows=rows, limits=limits, labels=tuple(item.name for item in constraints.budgets)
     )
@@ -204,7 +216,7 @@ def _check_box(polytope: Polytope, names: Sequence[str], total_s: float) -> None
         )
     if polytope.most.sum() < 1 - 1e-12:
         raise NoAnswer(
-            f"design.total_s is {total_s:g}, but the most times allow only {polytope.most.sum() * total_s:g} s"
+            f"design.total_s is {total_s:g}, but most times and budgets allow only {polytope.most.sum() * total_s:g} s"
         )
 
 
@@ -221,7 +233,7 @@ def _check_budgets(polytope: Polytope, budgets: Sequence[Budget]) -> None:
                 f"budget {budget.name!r} has the limit {budget.limit:g}, but no sharing of the time uses less than "
                 f"{needed * scale:g}"
             )
-    if len(budgets) and polytope.inside() is None and polytope.loosened().inside() is None:
+    if len(budgets) and not polytope.loosened().feasible():
         raise NoAnswer(
             f"no sharing of the time keeps the budgets {', '.join(item.name for item in budgets)} together with the "
             "least and most times"

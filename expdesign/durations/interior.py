@@ -19,7 +19,7 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from expdesign.durations.constraints import Polytope
+from expdesign.durations.constraints import TIGHT, Polytope
 from expdesign.durations.objective import Indices, Objective
 from expdesign.values import Array
 
@@ -27,6 +27,8 @@ WARM_UP = 30
 """Multiplicative steps that sort the primitives before the interior-point method; they are cheap."""
 MIXED_IN = 0.02
 """Share of equal fractions mixed into every start, so that it lies inside."""
+WARMTH = 1e-6
+"""Share of equal fractions mixed into every such step: criteria about some parameters may lead to singular designs."""
 SMALLEST_SET = 50
 """Primitives in the working set at least; also as many as may join at a time."""
 NEWTON_STEPS = 60
@@ -91,6 +93,9 @@ def climb(task: Task, start: Array, *, tolerance: float = 1e-10, rounds: int = 5
         tolerance: what may be missing, per degree.
         rounds: how often the working set may grow.
     """
+    least = task.polytope.least
+    if not 1.0 - least.sum() > TIGHT:  # least times take everything
+        return _ended(task, least / least.sum(), tolerance)
     chosen = _first_set(task, start)
     result = _solve(task, _restricted(task, start, chosen), chosen, tolerance / 2)
     for _ in range(rounds):
@@ -110,7 +115,7 @@ def warmed(task: Task, start: Array) -> Array:
     for _ in range(WARM_UP):
         slope = np.maximum(task.objective.tangent(w, 0.1).slope, 0.0)
         w = w * slope if task.objective.pieces[0].measure.degree > 1 else w * np.sqrt(slope)
-        w = w / w.sum()
+        w = (1.0 - WARMTH) * w / w.sum() + WARMTH / len(w)
     return np.asarray((1.0 - MIXED_IN) * w + MIXED_IN / len(w))
 
 

@@ -20,6 +20,10 @@ from expdesign.values import Array
 Indices = NDArray[np.intp]
 SINGULAR = 1e-13
 """Eigenvalues below this, relative to the largest, are rounding."""
+SHAKY = 1e-10
+"""Below this, rounding shows in what is computed from a matrix by elimination."""
+ESTIMABLE = 1e-6
+"""What is to be estimated may reach out of a singular matrix's range by this share of itself."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,13 +165,30 @@ def _soft_least(values: Array, blur: float) -> tuple[float, Array]:
 
 
 def stacked_values(measure: Measure, M: Array) -> Array:
-    """(c,) values of (c, d, d), -inf where one is singular to working precision."""
+    """(c,) values of (c, d, d); where one is singular to working precision, that of what it still estimates.
+
+    What a measure picks out can be estimated from a singular M when it lies in the range of M (F. Pukelsheim, Optimal
+    Design of Experiments (2006), 3.3); else the value is -inf.
+    """
     eigenvalues = np.linalg.eigvalsh(M)
     regular = eigenvalues[:, 0] > SINGULAR * eigenvalues[:, -1]
     values = np.full(len(M), -np.inf)
     if regular.any():
         values[regular] = measure.values(M[regular])
+    if measure.L.shape[1] < M.shape[1]:
+        shaky = eigenvalues[:, 0] < SHAKY * eigenvalues[:, -1]
+        values[shaky] = [_value_within(measure, item) for item in M[shaky]]
     return values
+
+
+def _value_within(measure: Measure, M: Array) -> float:
+    """The value of a matrix that is nearly singular, in coordinates where rounding in its null space is harmless."""
+    eigenvalues, vectors = np.linalg.eigh(M)
+    seen = vectors[:, eigenvalues > SINGULAR * max(eigenvalues[-1], 0.0)]
+    missing = measure.L - seen @ (seen.T @ measure.L)
+    if not seen.size or (np.linalg.norm(missing, axis=0) > ESTIMABLE * np.linalg.norm(measure.L, axis=0)).any():
+        return -np.inf
+    return float(measure.transformed(seen.T).values(np.diag(eigenvalues[-seen.shape[1] :])))
 
 
 def congruent(T: Array, matrices: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,6 +10,8 @@ from numpy.typing import NDArray
 
 from expdesign.durations.collected import Collected
 from expdesign.durations.constraints import TIGHT, Polytope
+from expdesign.durations.estimable import merged_nuisance, unseen
+from expdesign.durations.objective import SINGULAR
 from expdesign.durations.task import limits_of
 from expdesign.durations.values import DurationProblem
 from expdesign.errors import NoAnswer
@@ -22,6 +25,11 @@ LENT = 1e-6
 """Share of the optimal design lent to every set of runs, so that singular ones can be compared too."""
 GAIN = 1e-9
 """Gains below this count as rounding."""
+FAINT, FAINT_GAIN = 1e-9, 1e-6
+"""Share of equal times lent besides where the optimal design is itself this close to singular, as only criteria about
+some of the parameters allow; and what then counts as rounding."""
+NAMED = 3
+"""Pairs of merged regressors that a note names."""
 PUSHES = 200
 """Primitives that are tried as pushes, those that would gain most per second first."""
 
@@ -42,11 +50,14 @@ def whole_runs(problem: DurationProblem, fractions: Array) -> tuple[int, ...]:
         NoAnswer: no set of whole runs was found that keeps the limits and informs about every parameter.
     """
     search = _Search.of(problem, fractions)
-    runs = _searched(search, fractions)
-    if not search.informative(runs) and problem.aim.criterion != "D":
-        # The criterion may do without seeing what has to be estimated along; then the runs best for everything do.
+    runs = _searched(search, search.rounded(fractions))
+    if not search.informative(runs) and problem.symmetric:
+        # The criterion may do without what has to be estimated along: from the runs best for everything, exchange
+        # only what leaves that seen.
         everything = _Search.of(replace(problem, aim=replace(problem.aim, criterion="D")), fractions)
-        runs = _searched(everything, fractions)
+        runs = _searched(everything, everything.rounded(fractions))
+        if search.informative(runs):
+            runs = _searched(search, runs, accepted=search.informative)
     if not search.informative(runs):
         raise NoAnswer(
             f"design.total_s is {problem.total_s:g}: whole runs that inform about every parameter do not fit; the "
@@ -56,17 +67,32 @@ def whole_runs(problem: DurationProblem, fractions: Array) -> tuple[int, ...]:
     return tuple(int(n) for n in runs)
 
 
-def _searched(search: _Search, fractions: Array) -> Array:
-    """The local optimum (q,) near rounded fractions."""
-    runs = np.maximum(np.floor(fractions / search.shares + 1e-9).astype(int), search.fewest)
-    runs = search.grown(search.thinned(np.minimum(runs, np.maximum(search.most_runs, search.fewest)), -1))
+def _anything(runs: Array) -> bool:
+    return True
+
+
+def _searched(search: _Search, runs: Array, *, accepted: Callable[[Array], bool] = _anything) -> Array:
+    """The local optimum (q,) by exchanges from given runs, among sets that are accepted."""
     best = search.worth_of(runs)
-    while (better := _exchanged(search, runs)) is not None:
+    while (better := _exchanged(search, runs, accepted)) is not None:
         gained = search.worth_of(better)
         if not gained > best:  # rounding in nearly singular sums; without this the exchange could go round in circles
             break
         runs, best = better, gained
     return runs
+
+
+def note_on_runs(problem: DurationProblem, runs: Array) -> str:
+    """What the estimator will merge after whole runs (q,), in a sentence, or ""."""
+    pairs = merged_nuisance(problem, runs * problem.run_s / problem.total_s) if problem.nuisance else ()
+    if not pairs:
+        return ""
+    shown = "; ".join(f"{one} with {other}" for one, other in pairs[:NAMED])
+    more = f" and {len(pairs) - NAMED} more" if len(pairs) > NAMED else ""
+    return (
+        f"in these whole runs {len(pairs)} regressors of disturbances coincide with others, and the estimator merges "
+        f"them: {shown}{more}"
+    )
 
 
 def efficiency_of_runs(problem: DurationProblem, fractions: Array, runs: Array) -> float:
@@ -84,18 +110,22 @@ class _Search:
     """What is the same for all sets of runs.
 
     Attributes:
+        problem: what is asked.
         collected: the criterion.
         pieces: for each model (q, d, d) share of one run in the total time, times B_q.
         shares: (q,) that share.
-        lent: for each model (d, d) prior and a little of the optimal design.
+        lent: for each model (d, d) prior and a little of the optimal design, or of equal shares where that is singular.
+        gain: what an exchange must gain at least.
         polytope: limits.
         fewest, most_runs: (q,) least and most runs.
     """
 
+    problem: DurationProblem
     collected: Collected
     pieces: Totals
     shares: Array
     lent: Totals
+    gain: float
     polytope: Polytope
     fewest: NDArray[np.int64]
     most_runs: NDArray[np.int64]
@@ -105,13 +135,19 @@ class _Search:
         collected, polytope = Collected.of(problem), limits_of(problem)
         shares = np.asarray(problem.run_s / problem.total_s)
         most = np.where(polytope.most < 1.0, polytope.most, np.inf) / shares
+        faint = FAINT if collected.symmetric and _nearly_singular(collected, fractions) else 0.0
         return _Search(
+            problem=problem,
             collected=collected,
             pieces=tuple(shares[:, None, None] * piece.matrices for piece in collected.pieces),
             shares=shares,
             lent=tuple(
-                piece.prior + LENT * np.tensordot(fractions, piece.matrices, axes=1) for piece in collected.pieces
+                piece.prior
+                + LENT * np.tensordot(fractions, piece.matrices, axes=1)
+                + faint * np.eye(problem.dimension)  # equal shares, in whitened coordinates
+                for piece in collected.pieces
             ),
+            gain=FAINT_GAIN if faint else GAIN,
             polytope=polytope,
             fewest=np.ceil(polytope.least / shares - 1e-9).astype(int),
             most_runs=np.floor(np.minimum(most, 1e9) + 1e-9).astype(int),
@@ -142,7 +178,12 @@ class _Search:
 
     def informative(self, runs: Array) -> bool:
         """Whether runs keep the limits and inform about every parameter without anything lent."""
-        return self.allowed(runs) and bool(np.isfinite(self.collected.value(runs * self.shares)))
+        return self.allowed(runs) and sees_everything(self.problem, self.collected, runs * self.shares)
+
+    def rounded(self, fractions: Array) -> Array:
+        """Fractions rounded down to allowed runs, then filled up."""
+        runs = np.maximum(np.floor(fractions / self.shares + 1e-9).astype(int), self.fewest)
+        return self.grown(self.thinned(np.minimum(runs, np.maximum(self.most_runs, self.fewest)), -1))
 
     def fitting(self, runs: Array) -> Indices:
         """Indices of the primitives of which one more run fits."""
@@ -170,12 +211,13 @@ class _Search:
         return runs
 
 
-def _exchanged(search: _Search, runs: Array) -> Array | None:
+def _exchanged(search: _Search, runs: Array, accepted: Callable[[Array], bool]) -> Array | None:
     """A better set of runs nearby, or None: the best swap of one run for one, else any push that helps."""
-    target = search.worth_of(runs) + GAIN
-    swap = _swapped(search, runs, target)
+    target = search.worth_of(runs) + search.gain
+    swap = _swapped(search, runs, target, accepted)
     if swap is not None:
-        return search.grown(swap)
+        filled = search.grown(swap)
+        return filled if accepted(filled) else swap
     if np.ptp(search.shares) < 1e-12 and search.polytope.plain:
         return None  # runs of one length: a push is a swap
     everything = np.flatnonzero(runs < search.most_runs)
@@ -183,12 +225,14 @@ def _exchanged(search: _Search, runs: Array) -> Array | None:
     for place in np.argsort(-(added - search.worth_of(runs)) / search.shares[everything])[:PUSHES]:
         index = int(everything[place])
         pushed = search.thinned(runs + _unit(index, runs), index)
-        if search.allowed(pushed) and search.worth_of(pushed := search.grown(pushed)) > target:
+        if not search.allowed(pushed):
+            continue
+        if search.worth_of(pushed := search.grown(pushed)) > target and accepted(pushed):
             return pushed
     return None
 
 
-def _swapped(search: _Search, runs: Array, target: float) -> Array | None:
+def _swapped(search: _Search, runs: Array, target: float, accepted: Callable[[Array], bool]) -> Array | None:
     """The best set above `target` that has one run in place of another."""
     best = None
     for out in np.flatnonzero(runs > search.fewest):
@@ -197,9 +241,32 @@ def _swapped(search: _Search, runs: Array, target: float) -> Array | None:
         if not len(fits):
             continue
         worths = search.after(search.totals(left), fits, 1.0)
-        if worths.max() > target:
-            target, best = float(worths.max()), left + _unit(int(fits[np.argmax(worths)]), runs)
+        for place in np.argsort(-worths):
+            if not worths[place] > target:
+                break
+            if accepted(swapped := left + _unit(int(fits[place]), runs)):
+                target, best = float(worths[place]), swapped
+                break
     return best
+
+
+def sees_everything(problem: DurationProblem, collected: Collected, shares: Array) -> bool:
+    """Whether time shares (q,) inform about every parameter, nuisance regressors that coincide counted once."""
+    if not collected.symmetric:
+        return bool(np.isfinite(collected.value(shares)))
+    if not np.isfinite(collected.value(shares)):
+        return False
+    return _regular(collected, shares) or (bool(problem.nuisance) and not unseen(problem, shares))
+
+
+def _regular(collected: Collected, shares: Array) -> bool:
+    values = [np.linalg.eigvalsh(total) for total in collected.totals(shares)]
+    return all(item[0] > SINGULAR * item[-1] for item in values)
+
+
+def _nearly_singular(collected: Collected, shares: Array) -> bool:
+    values = [np.linalg.eigvalsh(total) for total in collected.totals(shares)]
+    return any(item[0] < LENT * item[-1] for item in values)
 
 
 def _unit(index: int, runs: Array) -> Array:

@@ -12,8 +12,16 @@ from expdesign.durations.certificate import certify
 from expdesign.durations.collected import Collected
 from expdesign.durations.constraints import NO_CONSTRAINTS, Constraints
 from expdesign.durations.criteria import Aim
-from expdesign.durations.interior import climb
-from expdesign.durations.rounding import efficiency_of_runs, efficiency_of_shares, whole_runs
+from expdesign.durations.estimable import unseen
+from expdesign.durations.interior import Task, climb
+from expdesign.durations.objective import SHAKY
+from expdesign.durations.rounding import (
+    efficiency_of_runs,
+    efficiency_of_shares,
+    note_on_runs,
+    sees_everything,
+    whole_runs,
+)
 from expdesign.durations.task import polytope_of, start_of, task_of
 from expdesign.durations.values import Certificate, DurationDesign, DurationProblem
 from expdesign.errors import InputError, NoAnswer, NotInformative, UnknownName
@@ -22,7 +30,8 @@ from expdesign.values import Array
 
 LARGEST_GAP = 1e-6
 """Certificates above this, per degree, are not given out as optimal designs."""
-TOLERANCES = {"smooth": (1e-10, 1e-8), "cornered": (1e-7, 1e-8, 1e-9)}
+WIDEST = 1e-7
+TOLERANCES = {"smooth": (1e-10, 1e-8, WIDEST), "cornered": (1e-7, 1e-8, 1e-9)}
 """What the solver aims at, per degree, one after the other until the certificate holds."""
 THEOREMS = {
     "D": "Kiefer and Wolfowitz 1960",
@@ -54,6 +63,7 @@ def build_durations(
     sampled: Sequence[Sequence[PrimitiveInformation]] = (),
     robust: str = "nominal",
     equations: Sequence[str] = (),
+    nuisance: Sequence[str] = (),
 ) -> DurationProblem:
     """The duration problem of a scored dictionary.
 
@@ -68,6 +78,7 @@ def build_durations(
         sampled: the information again by every model drawn from the prior of the nominal parameters.
         robust: "nominal", or what the sampled models count for: "average" or "worst".
         equations: of each parameter; only needed for `constraints.balance`.
+        nuisance: parameters of disturbances that are estimated along.
 
     Raises:
         UnknownName: no such mean subtraction.
@@ -91,6 +102,7 @@ def build_durations(
         robust=robust,
         sampled=np.array([_stack(items, mean_subtraction) for items in sampled]),
         equations=tuple(equations),
+        nuisance=tuple(nuisance),
     )
 
 
@@ -122,9 +134,20 @@ def solve_durations(problem: DurationProblem) -> DurationDesign:
 
 def optimal_shares(problem: DurationProblem) -> DurationDesign:
     """As `solve_durations`, but without whole runs: `repeats` are all zero and their efficiency is nan."""
-    if not problem.symmetric:
-        return _improved_shares(problem)
-    return _certified_shares(problem, None)
+    try:
+        return _certified_shares(problem, None) if problem.symmetric else _improved_shares(problem)
+    except np.linalg.LinAlgError:
+        raise _blinded(problem) from None
+
+
+def _blinded(problem: DurationProblem) -> NotInformative:
+    """What the limits leave too little time for."""
+    blind = unseen(problem, polytope_of(problem).most) or problem.parameters
+    return NotInformative(
+        f"what the limits of [design] leave does not inform about every parameter, to working precision; too little or "
+        f"nothing is told of {', '.join(blind)}",
+        parameters=blind,
+    )
 
 
 def _certified_shares(problem: DurationProblem, within: Array | None) -> DurationDesign:
@@ -136,15 +159,23 @@ def _certified_shares(problem: DurationProblem, within: Array | None) -> Duratio
     """
     task = task_of(problem, within=within)
     start, best = start_of(task, within=within), None
+    if not np.isfinite(task.objective.value(start)):
+        raise np.linalg.LinAlgError
     cornered = problem.aim.criterion == "E" or problem.robust == "worst"
     for tolerance in TOLERANCES["cornered" if cornered else "smooth"]:
-        found = climb(task, start, tolerance=tolerance)
-        answer = certify(task, found, kind=THEOREMS.get(problem.aim.criterion, ""))
+        try:
+            found = climb(task, start, tolerance=tolerance)
+            answer = certify(task, found, kind=THEOREMS.get(problem.aim.criterion, ""))
+        except np.linalg.LinAlgError:
+            continue
+        if _shaky(task, found.fractions) and tolerance < WIDEST:
+            continue  # the optimum is singular; a wider barrier keeps so far away that the certificate means something
         if best is None or answer[0].bound - answer[0].value < best[1][0].gap:
             best = (found, answer)
         if best[1][0].gap < 0.3 * LARGEST_GAP * best[1][0].degree:
             break
-    assert best is not None
+    if best is None:
+        raise np.linalg.LinAlgError
     found, (certificate, slope) = best
     if not certificate.gap < LARGEST_GAP * certificate.degree:
         raise NoAnswer(
@@ -168,6 +199,12 @@ def _certified_shares(problem: DurationProblem, within: Array | None) -> Duratio
         efficiency_uniform=_uniform_efficiency(problem, fractions),
         certificate=certificate,
     )
+
+
+def _shaky(task: Task, fractions: Array) -> bool:
+    """Whether rounding shows in what is computed at fractions (q,)."""
+    values = [np.linalg.eigvalsh(piece.matrix(fractions)) for piece in task.objective.pieces]
+    return any(item[0] < SHAKY * item[-1] for item in values)
 
 
 def _improved_shares(problem: DurationProblem) -> DurationDesign:
@@ -218,17 +255,16 @@ def with_repeats(design: DurationDesign, repeats: Sequence[int]) -> DurationDesi
     Raises:
         NotInformative: the runs do not inform about every parameter.
     """
-    changed = _with_runs(design, tuple(repeats))
-    if not changed.efficiency_repeats > 0:
-        raise NotInformative(
-            "the given whole runs do not inform about every parameter", parameters=design.problem.parameters
-        )
+    problem, changed = design.problem, _with_runs(design, tuple(repeats))
+    if not sees_everything(problem, Collected.of(problem), np.array(repeats) * problem.run_s / problem.total_s):
+        raise NotInformative("the given whole runs do not inform about every parameter", parameters=problem.parameters)
     return changed
 
 
 def _with_runs(design: DurationDesign, repeats: tuple[int, ...]) -> DurationDesign:
-    efficiency = efficiency_of_runs(design.problem, design.fractions, np.array(repeats))
-    return replace(design, repeats=repeats, efficiency_repeats=efficiency)
+    runs = np.array(repeats)
+    efficiency = efficiency_of_runs(design.problem, design.fractions, runs)
+    return replace(design, repeats=repeats, efficiency_repeats=efficiency, note=note_on_runs(design.problem, runs))
 
 
 def _uniform_efficiency(problem: DurationProblem, fractions: Array) -> float:

@@ -36,6 +36,8 @@ class DurationProblem:
         robust: one of `ROBUST`.
         sampled: (m, q, d, d) B_q of models drawn from the prior of the nominal parameters; m is 0 for "nominal".
         equations: (p) equation, "u", "v" or "r", of each parameter; only `constraints.balance` needs it.
+        nuisance: parameters of disturbances that are estimated along; where runs make two of their regressors coincide,
+            the estimator merges them, see `estimable`.
 
     Source: F. Ljungberg, doctoral thesis, Linköping University, (7.50)-(7.58); Schur complement form derived here.
     """
@@ -52,6 +54,7 @@ class DurationProblem:
     robust: str = "nominal"
     sampled: Array = field(default_factory=lambda: np.zeros((0, 0, 0, 0)))
     equations: tuple[str, ...] = ()
+    nuisance: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if np.size(self.prior) == 0:
@@ -147,6 +150,7 @@ class DurationDesign:
             would need for the same.
         efficiency_uniform: the same for equal time on every primitive, whether that is allowed or not.
         certificate: the proof.
+        note: what has to be known of the whole runs, in a sentence, or "".
     """
 
     problem: DurationProblem
@@ -158,6 +162,7 @@ class DurationDesign:
     efficiency_repeats: float
     efficiency_uniform: float
     certificate: Certificate
+    note: str = ""
 
     def __post_init__(self) -> None:
         seal(self, fractions="q", sensitivities="q")

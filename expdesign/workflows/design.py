@@ -71,6 +71,7 @@ def duration_problem(
     parameters = estimated_parameters(vessel.model, wish.fixed_parameters)
     equation = {term.name: term.equation for term in vessel.model.terms}
     equations, interest = tuple(equation[name] for name in parameters), wish.interest
+    nuisance: tuple[str, ...] = ()
     primitives = [item.primitive for item in information]
     if wish.predictor != "model":
         progress("simulating disturbances with the dictionary", 0.0)
@@ -83,6 +84,7 @@ def duration_problem(
             mean_subtraction=wish.mean_subtraction,
         )
         information, parameters, equations = wide.information, wide.parameters, wide.equations
+        nuisance = tuple(name for name in wide.parameters if name not in wide.interest)
         interest = _still_estimated(interest or wide.interest, wide.interest, wish.predictor)
     sampled: Sequence[Sequence[PrimitiveInformation]] = ()
     if wish.robust != "nominal":
@@ -107,6 +109,7 @@ def duration_problem(
         sampled=sampled,
         robust=wish.robust,
         equations=equations,
+        nuisance=nuisance,
     )
 
 
@@ -227,6 +230,7 @@ def design_summary(design: DurationDesign) -> dict[str, object]:
         **({} if np.isnan(guaranteed) else {"log_det": design.log_det, "log_det_guaranteed": guaranteed}),
         "efficiency_of_whole_runs": design.efficiency_repeats,
         "efficiency_of_equal_shares": design.efficiency_uniform,
+        **({"note_on_whole_runs": design.note} if design.note else {}),
         **{f"price_of_{kept.name}": kept.price for kept in limits_kept(design)},
     }
 
