@@ -22,6 +22,7 @@ from expdesign.estimation.tables import inputs_of, model_for
 from expdesign.information.moments import MEAN_SUBTRACTIONS
 from expdesign.signals import Record
 from expdesign.simulation import deliver
+from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array, seal
 from expdesign.vessel import IDEAL, VesselModel
 
@@ -94,7 +95,8 @@ def recorded_information(
     if layout.nuisance:
         raise InputError(f"predictor {predictor!r} has nuisance regressors, expected basic or basic-wind")
     rows = build_regression(layout, record)
-    replay = build_replay(driven, record, Integration(), windy=layout.predictor.wind)
+    motion = Integration(integrator="rk4", substeps=SUBSTEPS)  # as primitives are scored
+    replay = build_replay(driven, record, motion, windy=layout.predictor.wind)
     Z = InstrumentModel(layout, record, rows, replay, "measured", "lagged").instruments(driven.parameters)
     place = [list(parameters).index(name) for name in layout.parameters]
     found, first = [], 0
