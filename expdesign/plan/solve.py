@@ -189,10 +189,10 @@ def _no_way(problem: PlanProblem, grid: ClearanceField, needed_m: float) -> str:
         return "the goal cannot be reached from the start: forbidden water lies between them on every way"
     widest, place = narrowest_passage(grid, problem.start[:2], problem.goal[:2])
     lat, lon = problem.area.frame.to_degrees(place)
-    if widest <= grid.error_m:
+    if widest <= grid.error_m or widest > needed_m:  # too little for the grid to tell, or lost in simplifying the shore
         return (
-            f"the goal cannot be reached from the start in a chart grid of {grid.cell_m:.3g} m: if there is a "
-            "narrow way, give the area smaller [bounds]"
+            f"the goal cannot be reached from the start in a chart grid of {grid.cell_m:.3g} m and by a simplified "
+            f"shore: if there is a way, also near {lat:.5f}, {lon:.5f}, give the area smaller [bounds]"
         )
     return (
         f"the goal cannot be reached from the start: the widest way leaves {widest:.1f} m on each side near "

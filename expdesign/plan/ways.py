@@ -20,6 +20,8 @@ from expdesign.values import Array
 
 MOST_CORNERS = 700
 """Corners of a simplified water; more would make the graph slow."""
+MOST_AT_ALL, COARSE = 2500, 16.0
+"""Corners accepted once the tolerance is so many times what was asked for."""
 SLIT_M = 1e-3
 """A string may touch the shore: the water is grown by this before lines of sight are tested."""
 
@@ -102,15 +104,18 @@ def build_ways(water: shapely.Geometry) -> Ways:
 def simplified(water: shapely.MultiPolygon, *, grow: bool, tolerance_m: float) -> shapely.MultiPolygon:
     """Water with at most `MOST_CORNERS` corners that contains the given one (`grow`), or lies inside it.
 
+    Water that shrinks loses its narrow ways: from `COARSE` times the first tolerance on, `MOST_AT_ALL` corners will do.
+
     Args:
         water: polygons.
         grow: which.
         tolerance_m: of the first try; doubled until few enough corners are left.
     """
+    coarse_m = np.inf if grow else COARSE * tolerance_m
     while True:
         moved = shapely.buffer(water, tolerance_m if grow else -tolerance_m)
         simple = as_multipolygon(shapely.make_valid(shapely.simplify(moved, 0.98 * tolerance_m)))
-        if len(_corners(simple)[0]) <= MOST_CORNERS:
+        if len(_corners(simple)[0]) <= (MOST_AT_ALL if tolerance_m >= coarse_m else MOST_CORNERS):
             return simple
         tolerance_m *= 2.0
 

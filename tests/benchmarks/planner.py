@@ -3,14 +3,67 @@
 Run from anywhere with the package installed: ``python tests/benchmarks/planner.py [SCENARIO.toml ...]``, by default all
 of `scenarios/`. One row each: whether the plan is verified, least clearance, repositioning time, its lower bound and
 their ratio, the time in percent of the informative time, processor seconds and peak memory of the whole job.
+
+With ``--charts FOLDER`` two real charts with depths are planned on instead, those of them that the folder holds: half
+an hour of trials of the 30 m ship, 2.5 m draught, through the sounds of Alesund (`aalesund.geojson`) and out of
+Commencement Bay (the S-57 cell `US5WA22M.000`).
 """
 
 from __future__ import annotations
 
-import sys
+import argparse
+import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
 from main_job import SCENARIOS, baseline_s, main_job
+
+SEABED = ", ".join(f"seabed{depth}m = {depth}" for depth in (0, 5, 10, 20, 50, 100, 200, 350))
+CHARTS = {
+    "aalesund": (
+        "aalesund.geojson",
+        f'geojson = "{{chart}}"\nland_layers = ["land", "shore"]\ndepth_layers = {{{{{SEABED}}}}}',
+        (62.45797, 6.23991, 62.44889, 6.14436),
+    ),
+    "tacoma": ("US5WA22M.000", 's57 = "{chart}"', (47.27225, -122.44194, 47.31352, -122.46154)),
+}
+"""File, chart table, and latitude and longitude of start and goal."""
+SCENARIO = """
+[scenario]
+name = "{name}"
+vessel = "{folder}/vessels/azimuth-30m.toml"
+dictionary = "{folder}/dictionaries/standard.toml"
+area = "{name}-area.toml"
+[design]
+total_s = 1800.0
+criterion = "D"
+mean_subtraction = "complete"
+[start]
+lat_deg = {ends[0]}
+lon_deg = {ends[1]}
+heading_deg = 90.0
+[goal]
+lat_deg = {ends[2]}
+lon_deg = {ends[3]}
+heading_deg = 0.0
+[environment]
+current_to = {{north_mps = 0.0, east_mps = 0.0, std_mps = 0.05}}
+wind_to = {{north_mps = 3.0, east_mps = 2.0, std_mps = 1.0}}
+[plan]
+clearance_m = 20.0
+confidence = 0.95
+"""
+
+
+def charted(charts: Path, folder: Path) -> Iterator[Path]:
+    """Scenario files on the real charts that are there, written into a folder."""
+    for name, (file, table, ends) in CHARTS.items():
+        if (charts / file).exists():
+            chart = table.format(chart=(charts / file).resolve())
+            (folder / f"{name}-area.toml").write_text(f'[area]\nname = "{name}"\n[chart]\n{chart}\n', "utf-8")
+            path = folder / f"{name}.toml"
+            path.write_text(SCENARIO.format(name=name, folder=SCENARIOS.resolve(), ends=ends), "utf-8")
+            yield path
 
 
 def row(scenario: Path, unit_s: float) -> str:
@@ -26,7 +79,11 @@ def row(scenario: Path, unit_s: float) -> str:
 
 
 if __name__ == "__main__":
-    wanted = [Path(name) for name in sys.argv[1:]] or sorted(SCENARIOS.glob("*.toml"))
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenarios", nargs="*", type=Path)
+    parser.add_argument("--charts", type=Path)
+    wished = parser.parse_args()
+    examples = [] if wished.charts else sorted(SCENARIOS.glob("*.toml"))
     unit = baseline_s()
     print(f"baseline loop {unit:.2f} s of processor time\n")
     print(
@@ -34,5 +91,7 @@ if __name__ == "__main__":
         "| x baseline | memory |"
     )
     print("|---|---|---|---|---|---|---|---|---|---|---|")
-    for scenario in wanted:
-        print(row(scenario, unit), flush=True)
+    with tempfile.TemporaryDirectory() as written:
+        extra = [] if wished.charts is None else list(charted(wished.charts, Path(written)))
+        for scenario in [*(wished.scenarios or examples), *extra]:
+            print(row(scenario, unit), flush=True)
