@@ -10,7 +10,7 @@ from expdesign.errors import InputError
 from expdesign.signals import Batch, Record
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, Actuator, Limit, VesselModel
-from expdesign.vessel.structures import FORCE_SIGNALS
+from expdesign.vessel.structures import FORCE_SIGNALS, SHOAL
 
 Table = dict[str, Array]
 AIR = ("u_q", "v_q")
@@ -18,6 +18,8 @@ AIR = ("u_q", "v_q")
 
 def model_for(model: VesselModel, record: Record) -> VesselModel:
     """The model driven by the inputs that were recorded: its own actuators, or plain generalised forces.
+
+    Where draught over depth is recorded as one more input, the terms that depend on depth read it.
 
     Raises:
         InputError: no batches, or the recorded inputs do not drive the model.
@@ -28,12 +30,15 @@ def model_for(model: VesselModel, record: Record) -> VesselModel:
     for batch in record.batches:
         if batch.input_names != recorded:
             raise InputError(f"{batch.name} has inputs {', '.join(batch.input_names)}, expected {', '.join(recorded)}")
+    if SHOAL in recorded and SHOAL not in model.inputs:
+        model = replace(model, actuators=(*model.actuators, Actuator(kind="depth", number=1, limits=(Limit(),))))
     if set(model.inputs) <= set(recorded):
         return model
     needs = {name for expression in model.expressions for name in expression.signals} & set(model.inputs)
-    if set(FORCE_SIGNALS) <= set(recorded) and not needs - set(FORCE_SIGNALS):
+    if set(FORCE_SIGNALS) <= set(recorded) and not needs - {*FORCE_SIGNALS, SHOAL}:
         force = Actuator(kind="force", number=1, limits=(Limit(), Limit(), Limit()))
-        return replace(model, actuators=(force,))
+        depth = tuple(actuator for actuator in model.actuators if actuator.kind == "depth")
+        return replace(model, actuators=(force, *depth))
     raise InputError(
         f"{record.batches[0].name} has inputs {', '.join(recorded)}, expected {', '.join(model.inputs)} "
         f"or {', '.join(FORCE_SIGNALS)}"

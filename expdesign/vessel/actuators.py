@@ -27,8 +27,12 @@ KINDS: dict[str, tuple[str, ...]] = {
     "propeller": ("n",),
     "rudder": ("rudder",),
     "force": ("tau_x", "tau_y", "tau_psi"),
+    "depth": ("h",),
 }
-"""Kind of actuator -> stems of its signals; all but `force` carry the actuator's number, e.g. n2, a2, rudder1."""
+"""Kind of actuator -> stems of its signals; all but `force` carry the actuator's number, e.g. n2, a2, rudder1.
+
+`depth` stands in no vessel file: it is how recorded depth reaches the terms that read it, beside the recorded inputs.
+"""
 
 UNITS = {"n": "rps", "a": "rad", "rudder": "rad"}
 """Signal stem -> unit in column names; generalised forces carry none."""
@@ -137,7 +141,7 @@ class Actuator:
     def signals(self) -> tuple[str, ...]:
         """Names of its commands, e.g. ("n1", "a1")."""
         stems = KINDS[self.kind]
-        return stems if self.kind == "force" else tuple(f"{stem}{self.number}" for stem in stems)
+        return stems if self.kind in ("force", "depth") else tuple(f"{stem}{self.number}" for stem in stems)
 
     def force(self, signals: Signals, ops: Operators) -> tuple[Any, Any, Any]:
         """Its share of (tau_x, tau_y, tau_psi); zero for rudders, whose force is a model term of its own."""

@@ -12,7 +12,7 @@ from expdesign.values import Array
 from expdesign.vessel.actuators import Actuator
 from expdesign.vessel.expressions import NUMPY
 from expdesign.vessel.model import VesselModel
-from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS
+from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS, SHOAL
 
 
 def required_force(model: VesselModel, velocity: Array, acceleration: Array) -> Array:
@@ -31,7 +31,7 @@ def required_force(model: VesselModel, velocity: Array, acceleration: Array) -> 
             f"{', '.join(FORCE_SIGNALS)}; use families that give commands"
         )
     motion = dict(zip(("u", "v", "r"), np.moveaxis(velocity, -1, 0), strict=True))
-    signals = motion | {"u_q": motion["u"], "v_q": motion["v"]}
+    signals = motion | {"u_q": motion["u"], "v_q": motion["v"], SHOAL: 0.0}
 
     def response(force: Array) -> Array:
         table = signals | dict(zip(FORCE_SIGNALS, force, strict=True))

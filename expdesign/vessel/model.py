@@ -18,7 +18,7 @@ from expdesign.errors import InputError, UnknownName
 from expdesign.values import Array, readonly
 from expdesign.vessel.actuators import Actuator, generalised_force
 from expdesign.vessel.expressions import NUMPY, Expression, Operators, Signals, parse_expression
-from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS, Term
+from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS, SHOAL, Term
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -80,6 +80,11 @@ class VesselModel:
         """Divides Phi^T theta to give accelerations [s]."""
         return self.sample_time_s if self.form == "discrete" else 1.0
 
+    @property
+    def reads_depth(self) -> bool:
+        """Whether a term depends on the depth of the water."""
+        return any(SHOAL in expression.signals for expression in self.expressions)
+
     def with_parameters(self, values: Mapping[str, float] | Array) -> VesselModel:
         """The same structure with other parameter values, all (p,) or some by name."""
         if not isinstance(values, Mapping):
@@ -116,9 +121,9 @@ class VesselModel:
         return totals["u"] * scale, totals["v"] * scale, totals["r"] * scale
 
     def signals(self, velocity_r: Any, velocity_q: Any, inputs: Any, ops: Operators) -> Signals:
-        """The table of everything an expression may read."""
+        """The table of everything an expression may read; the water is deep unless depth is among the inputs."""
         u, v, r = velocity_r
         u_q, v_q = velocity_q
         commands = dict(zip(self.inputs, inputs, strict=True))
         forces = dict(zip(FORCE_SIGNALS, generalised_force(self.actuators, commands, ops), strict=True))
-        return {"u": u, "v": v, "r": r, "u_q": u_q, "v_q": v_q, **forces, **commands}
+        return {"u": u, "v": v, "r": r, "u_q": u_q, "v_q": v_q, SHOAL: 0.0, **forces, **commands}

@@ -1,7 +1,8 @@
 """The term library and the built-in model structures, each a list of terms.
 
 A term is one row of the regressor matrix: an equation (u, v or r), a parameter name and an expression over
-`u v r` (through water; r has no relative counterpart), `u_q v_q` (through air) and the actuator signals.
+`u v r` (through water; r has no relative counterpart), `u_q v_q` (through air), `h` and the actuator signals. `h` is
+draught over water depth: 0 in deep water, and wherever no depth is known.
 Every structure is a second-order modulus model: linear in its parameters.
 
 Source: F. Ljungberg, doctoral thesis, Linköping University, Definition 3.3, (3.58)-(3.65) and (9.1).
@@ -13,7 +14,9 @@ from dataclasses import dataclass
 
 from expdesign.errors import InputError, UnknownName
 
-MOTION_SIGNALS = ("u", "v", "r", "u_q", "v_q")
+SHOAL = "h"
+"""Draught over water depth."""
+MOTION_SIGNALS = ("u", "v", "r", "u_q", "v_q", SHOAL)
 FORCE_SIGNALS = ("tau_x", "tau_y", "tau_psi")
 
 

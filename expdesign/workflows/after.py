@@ -40,7 +40,7 @@ from expdesign.signals import Commands, Record
 from expdesign.simulation import Environment, WeatherSeries, draw_environment, draw_weather, measure
 from expdesign.simulation import simulate as simulate_run
 from expdesign.vessel import Vessel, column_name
-from expdesign.vessel.structures import FORCE_SIGNALS
+from expdesign.vessel.structures import FORCE_SIGNALS, SHOAL
 from expdesign.workflows.outcome import Outcome, Progress, TextTable, silent, within
 
 
@@ -202,7 +202,7 @@ def measured(data: Sequence[Path], vessel: Vessel, *, velocity: str = "auto") ->
     inputs, header = vessel.model.inputs, _header(data[0])
     if not {column_name(name) for name in inputs} <= header and set(FORCE_SIGNALS) <= header:
         inputs = FORCE_SIGNALS
-    return load_records(
+    record = load_records(
         list(data),
         vessel_inputs=inputs,
         sample_time_s=vessel.sample_time_s if vessel.model.form == "discrete" else None,
@@ -210,6 +210,19 @@ def measured(data: Sequence[Path], vessel: Vessel, *, velocity: str = "auto") ->
         heading_std_rad=vessel.sensors.heading_rad or None,
         outputs=vessel.model.outputs,
     )
+    return with_depth(record, vessel) if vessel.model.reads_depth else record
+
+
+def with_depth(record: Record, vessel: Vessel) -> Record:
+    """The record with draught over depth as one more input, 0 where a batch has no depth, which is told."""
+    batches = []
+    for batch in record.batches:
+        shoal = np.zeros(len(batch)) if batch.depth_m is None else vessel.draught_m / batch.depth_m
+        inputs = np.column_stack([batch.inputs, shoal])
+        batches.append(replace(batch, inputs=inputs, input_names=(*batch.input_names, SHOAL)))
+    missing = [batch.name for batch in record.batches if batch.depth_m is None]
+    told = [f"{', '.join(missing)}: no depth_m is measured; the model's dependence on depth is that of deep water."]
+    return replace(record, batches=tuple(batches), notes=(*record.notes, *(told if missing else [])))
 
 
 def _header(path: Path) -> set[str]:

@@ -1,0 +1,157 @@
+"""Whatever a diagnosis finds, the vessel file it writes is read again and used like any other."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnosis_case import hidden_record, vessel_of
+
+from expdesign.diagnosis import CAUSES, Estimated, Finding
+from expdesign.diagnosis import diagnose as diagnose_record
+from expdesign.diagnosis.causes.shallow_water import in_deep_water, in_shallow_water
+from expdesign.diagnosis.extended import Surroundings, rates
+from expdesign.diagnosis.extension import as_extended, extend
+from expdesign.dictionary import PrimitiveSpec, build_dictionary
+from expdesign.dictionary.build import family
+from expdesign.dictionary.spec import complete_settings
+from expdesign.estimation.methods import Settings, estimate
+from expdesign.estimation.replay import Integration, simulate_batch
+from expdesign.estimation.tables import model_for
+from expdesign.export import vessel_toml
+from expdesign.export.diagnosis_page import extended_vessel
+from expdesign.information import score_primitives
+from expdesign.scenario import load_vessel
+from expdesign.signals import Record
+from expdesign.vessel import NUMPY, Limit
+from expdesign.workflows.after import with_depth
+from expdesign.workflows.diagnosed import carrying_depth, deep
+
+EFFECTS = {
+    "parameters": {"theta:Y_v": -0.01},
+    "current": {"current:north": 0.2, "current:east": -0.1},
+    "wind": {"wind:north": 4.0, "wind:east": 2.0},
+    "missing_term": {"term:Y_abs_r_r": -0.3},
+    "thrust_gain": {"gain": -0.1},
+    "thrust_advance_loss": {"theta:X_kappa": -0.001},
+    "thruster_asymmetry": {"offset:a": 0.05},
+    "actuator_lag": {"lag:all": 3.0},
+    "actuator_delay": {"delay:n": 2.0},
+    "actuator_deadband": {"deadband:n": 1.0},
+    "load_change": {"inertia:u": 0.2, "inertia:v": 0.1},
+    "heading_bias": {"heading_bias": 0.03},
+    "lever_arm": {"lever:forward": 4.0},
+    "sensor_delay": {"late:r": 1.0},
+    "gyro_scale": {"gyro": 0.05},
+    "shallow_water": {"shallow:damping": 0.8, "shallow:inertia": 0.4},
+    "roll_coupling": {"roll:sway": 0.1, "roll:yaw": 0.01, "roll:period": 8.0, "roll:damping": 0.08},
+    "change_point": {"change:time": 300.0, "change:gain": -0.2},
+}
+GROWTH = {"damping_growth": 0.8, "inertia_growth": 0.4}
+FREE = vessel_of("tug")
+BOUNDED = tuple(replace(one, limits=(Limit(low=-20.0, high=20.0), Limit())) for one in FREE.actuators)
+TUG = replace(FREE, model=replace(FREE.model, actuators=BOUNDED))
+SPEC = PrimitiveSpec(
+    name="run",
+    family="acceleration",
+    settings=complete_settings(family("acceleration"), {"duration_s": 60.0, "speed_mps": 1.5, "from_speed_mps": 0.5}),
+)
+
+
+def shoaling(seed: int = 3) -> Record:
+    """Clean data of the tug with a depth between 4 and 15 m beside them."""
+    record = hidden_record("tug", seed=seed, batches=4, samples=200)
+    depth = 9.0 + 5.0 * np.sin(np.arange(200) / 15.0)
+    return Record(batches=tuple(replace(batch, depth_m=depth) for batch in record.batches))
+
+
+@pytest.fixture(scope="module")
+def clean():
+    return diagnose_record(TUG, shoaling())
+
+
+def finding(cause: str) -> Finding:
+    """A made-up finding; only its name and numbers are used."""
+    numbers = GROWTH if cause == "shallow_water" else {}
+    estimates = tuple(Estimated(name=name, value=value, std=0.1, unit="") for name, value in numbers.items())
+    return Finding(
+        cause=cause, estimates=estimates, p_value=1e-6, fit_before=np.zeros(3), fit_after=np.ones(3), gain=1.0,
+        gain_interval=(0.5, 1.5), not_distinguishable_from=(), would_tell_apart=None, explanation="made up",
+        suspect="time", worth=30.0,
+    )  # fmt: skip
+
+
+def as_found(clean, cause: str):
+    """A diagnosis that found one cause, put together as `diagnose` does it."""
+    final = as_extended(TUG, clean.record).having(EFFECTS[cause])
+    extended, missing = extend(TUG, final, {})
+    found = replace(clean, extended=extended, findings=(finding(cause),), notes=missing)
+    return carrying_depth(found, TUG), final
+
+
+def test_every_cause_of_the_catalogue_is_tried():
+    assert set(EFFECTS) == {cause.name for cause in CAUSES}
+
+
+@pytest.mark.parametrize("cause", EFFECTS)
+def test_the_file_with_a_cause_is_read_and_scored(cause, clean, tmp_path):
+    found, _ = as_found(clean, cause)
+    path = tmp_path / "vessel-extended.toml"
+    path.write_text(extended_vessel(found, command="made up"), encoding="utf-8")
+    ship = load_vessel(path)
+    assert ship.model.terms == found.extended.model.terms
+    scored = score_primitives(ship, build_dictionary(ship, [SPEC]))
+    assert np.isfinite(scored[0].X).all()
+    assert (vessel_toml(ship) != vessel_toml(TUG)) == (cause != "roll_coupling")
+    unsaid = [note for note in found.notes if "not in the vessel file" in note]
+    assert bool(unsaid) == (cause == "roll_coupling")
+
+
+def test_the_written_dependence_on_depth_is_the_one_found(clean):
+    """Accelerations of the file's terms beside those of the diagnosis' own motion, at any depth in the data."""
+    found, final = as_found(clean, "shallow_water")
+    rng = np.random.default_rng(1)
+    velocity, inputs = rng.uniform(-1, 1, (3, 40)), rng.uniform(-1, 1, (4, 40))
+    shoal = rng.uniform(0.0, TUG.draught_m / 4.0, 40)
+    own = final.model.signals(velocity, velocity[:2], inputs, NUMPY)
+    around = Surroundings({n: np.broadcast_to(x, 40) for n, x in own.items() if n not in ("u", "v", "r", "h")})
+    around["shoal"] = shoal
+    wanted = rates(final, tuple(velocity), around)
+    record = with_depth(clean.record, found.extended)
+    driven = model_for(found.extended.model, record)
+    given = driven.accelerations(velocity, velocity[:2], [*inputs, shoal])
+    _, error = in_shallow_water(TUG.model, GROWTH, reach=TUG.draught_m / 4.0, known=TUG.model)
+    np.testing.assert_allclose(given, wanted, rtol=2 * error, atol=error * np.abs(wanted).max())
+
+
+def test_deep_water_is_draught_over_depth_zero():
+    model, error = in_shallow_water(TUG.model, GROWTH, reach=0.6, known=TUG.model)
+    state = ((1.0, 0.2, 0.05), (2.0, -1.0), (5.0, 0.3, 4.0, -0.2))
+    np.testing.assert_array_equal(model.accelerations(*state), TUG.model.accelerations(*state))
+    np.testing.assert_array_equal(in_deep_water(model).accelerations(*state), TUG.model.accelerations(*state))
+    assert model.reads_depth
+    assert not in_deep_water(model).reads_depth
+    assert error < 2e-3
+
+
+def test_estimates_read_the_measured_depth():
+    """Noise-free motion of a model that reads depth, simulated over its depths, gives its parameters back."""
+    model, _ = in_shallow_water(TUG.model, GROWTH, reach=0.6, known=TUG.model)
+    record = with_depth(shoaling(), replace(TUG, model=model))
+    how = Integration("rk4", 4)
+    batches = tuple(
+        replace(batch, velocity=simulate_batch(model, batch, integration=how).velocity) for batch in record.batches
+    )
+    held = tuple(name for name in model.names if name.startswith("W_"))
+    settings = Settings(fixed=held, quadrature="trapezoid", integration=Integration("rk4", 2))
+    found = estimate(Record(batches=batches), model, method="oe", settings=settings)
+    truth = [model.parameters[model.names.index(name)] for name in found.names]
+    blind = estimate(Record(batches=batches), TUG.model, method="oe", settings=settings)
+    np.testing.assert_allclose(found.values, truth, rtol=1e-3, atol=1e-6)
+    assert np.abs(blind.values / truth - 1).max() > 0.05
+
+
+def test_without_a_finding_the_dependence_of_the_file_is_kept(clean):
+    model, _ = in_shallow_water(TUG.model, GROWTH, reach=0.6, known=TUG.model)
+    ship = replace(TUG, model=model)
+    found = replace(clean, extended=deep(ship), findings=())
+    assert carrying_depth(found, ship).extended.model.terms == model.terms
