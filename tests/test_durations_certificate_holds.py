@@ -14,7 +14,7 @@ from expdesign.durations import (
     sensitivities,
     solve_durations,
 )
-from expdesign.durations.certificate import scaled
+from expdesign.durations.certificate import scaled, whitened
 from expdesign.information import MEAN_SUBTRACTIONS
 from expdesign.simulation import CALM
 from expdesign.values import Array
@@ -63,8 +63,8 @@ def test_the_examples_are_certified(dictionary: str, subtraction: str):
     assert design.log_det_bound == design.log_det + design.gap
 
 
-@pytest.mark.parametrize("draw", range(200))
-def test_random_problems_are_certified(draw: int):
+def random_problem(draw: int) -> DurationProblem:
+    """Of any size up to 40 primitives and 12 parameters, some nearly collinear, some in units far apart."""
     rng = np.random.default_rng(draw)
     outputs = int(rng.integers(1, 4))
     parameters = int(rng.integers(outputs, 13))
@@ -78,7 +78,34 @@ def test_random_problems_are_certified(draw: int):
     if draw % 4 in (2, 3):  # units that spread the parameters over eight decades
         units = np.r_[10.0 ** rng.uniform(-4, 4, parameters), np.ones(outputs)]
         matrices = matrices * np.outer(units, units)
-    assert certificate(solved(duration_problem(matrices, means=outputs))) < CERTIFICATE
+    return duration_problem(matrices, means=outputs)
+
+
+@pytest.mark.parametrize("draw", range(200))
+def test_random_problems_are_certified(draw: int):
+    assert certificate(solved(random_problem(draw))) < CERTIFICATE
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:Values in x were outside bounds")
+@pytest.mark.parametrize("draw", range(200))
+def test_twenty_local_searches_find_nothing_better_on_any_random_problem(draw: int):
+    problem = random_problem(draw)
+    matrices, count = whitened(problem.matrices)[0], len(problem.names)
+    own = log_det(matrices, solved(problem).fractions)
+    rng = np.random.default_rng(draw)
+    for start in rng.dirichlet(np.ones(count), 20):
+        found = minimize(
+            lambda w: -np.linalg.slogdet(np.tensordot(w, matrices, axes=1))[1],
+            start,
+            jac=lambda w: -sensitivities(matrices, w),
+            method="SLSQP",
+            bounds=[(1e-12, 1.0)] * count,
+            constraints=[{"type": "eq", "fun": lambda w: w.sum() - 1.0, "jac": lambda w: np.ones(count)}],
+            options={"maxiter": 100, "ftol": 1e-12},
+        )
+        w = np.clip(found.x, 0.0, None)
+        assert log_det(matrices, w / w.sum()) < own + 1e-7
 
 
 @pytest.mark.parametrize("count", [200, 1000])

@@ -24,6 +24,12 @@ def equation_noise(vessel: Vessel, parameters: Sequence[str]) -> Array:
 
     The residual is the difference of two samples, each with the sensor's noise; it is counted in the units in which
     regressors stand in X, so that X over its square is information per sample about the parameters.
+
+    Successive residuals share a sample, so their noise has a colour, and noise reaches the regressors, too. Both are
+    left out on purpose: the covariance with them, `expected.expected_covariance`, does not follow from a sum of
+    matrices over primitives, so no certificate could be given for it. Criteria A, E and V only weigh equations against
+    each other by this number; a factor common to all cancels. Against a stated prior it counts as it is, and then too
+    little is made of data whose regressors vary slowly, in which the shared samples partly cancel.
     """
     sensors, model = vessel.sensors, vessel.model
     spread = {"u": sensors.velocity_mps, "v": sensors.velocity_mps, "r": sensors.yaw_rate_radps}

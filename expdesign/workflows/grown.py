@@ -61,11 +61,34 @@ def growth_files(case: Scenario, growth: Growth | None) -> dict[str, str | bytes
     }
 
 
-def growth_summary(growth: Growth | None) -> dict[str, object]:
-    """Key numbers."""
-    if growth is None:
+def growth_note(case: Scenario) -> dict[str, object]:
+    """What of the table [design] the search for additions does not count, where there is any."""
+    wish = case.design
+    told = {
+        f"criterion {wish.criterion}": wish.criterion != "D",
+        f"predictor {wish.predictor}": wish.predictor != "model",
+        f"robust {wish.robust}": wish.robust != "nominal",
+        "prior": wish.prior != "none" or bool(wish.prior_data),
+        "times": bool(wish.least_s or wish.most_s or wish.required or wish.excluded),
+        "budgets": bool(wish.budgets),
+        "balance": bool(wish.balance),
+    }
+    asked = [name for name, is_asked in told.items() if is_asked]
+    if not asked:
         return {}
     return {
+        "note_on_additions": "searched for criterion D of the nominal model alone; only the sharing of time counts "
+        f"{', '.join(asked)} of [design]"
+    }
+
+
+def growth_summary(growth: Growth | None, case: Scenario | None = None) -> dict[str, object]:
+    """Key numbers, and with the scenario what the search left out."""
+    if growth is None:
+        return {}
+    note = {} if case is None else growth_note(case)
+    return {
+        **note,
         "manoeuvres_added": len(growth.rounds),
         "efficiency_of_grown_dictionary": growth.rounds[-1].efficiency if growth.rounds else 1.0,
         "candidates_looked_at": growth.evaluated,

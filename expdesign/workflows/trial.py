@@ -46,7 +46,7 @@ def run(scenario: Path, out: Path | None, *, seed: int = 0, progress: Progress =
     route = built_route(case, plan)
     content = replace(report_content(case, information, design, plan, seed), compared=compared, route=route)
     files = trial_files(case, growth, content, route)
-    summary = {**growth_summary(growth), **design_summary(design), **plan_summary(plan)}
+    summary = {**growth_summary(growth, case), **design_summary(design), **plan_summary(plan)}
     return _written(case, out, files, summary, progress)
 
 
@@ -91,7 +91,7 @@ def durations(
         "durations.json": durations_json(design, compared=compared),
         **growth_files(case, growth),
     }
-    summary = {**growth_summary(growth), **design_summary(design)}
+    summary = {**growth_summary(growth, case), **design_summary(design)}
     tables = (*growth_tables(growth), *design_tables(design, compared))
     return _written(case, out, files, summary, progress, tables)
 
