@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
@@ -11,7 +12,7 @@ from plan_case import area, at_rest, leg_water, ship
 from test_plan_verification_catches_what_is_wrong import primitive
 
 from expdesign.plan.legs import LegTask, find_leg
-from expdesign.plan.lower_bound import Carry, carry, joint_losses, reposition_bound_s, way_to_sail_m
+from expdesign.plan.lower_bound import Carry, carry, credit, joint_losses, reposition_bound_s, way_to_sail_m
 from expdesign.simulation import CALM, Environment
 
 OPEN = shapely.box(-1000, -1000, 1000, 1000)
@@ -51,6 +52,54 @@ def test_a_straight_run_carries_its_length_and_does_not_stray():
     assert found.stray_m < 0.01 * found.path_m
     drifting = carry(ship(), run, Environment(current_to=np.array([0.3, 0.4])))
     assert drifting.chord_m == pytest.approx(found.chord_m + 0.5 * run.duration_s)
+
+
+def test_what_a_run_is_credited_with_in_a_current_is_the_most_over_all_headings():
+    run, current, speed = primitive(ship()), np.array([0.3, 0.4]), 1.3
+    heading = np.linspace(-np.pi, np.pi, 3601)
+    found = credit(run, carry(ship(), run, Environment(current_to=current)), 0.5, speed)
+    track = run.trajectory.pose[:, :2]
+
+    def most(water):
+        moved = np.stack([np.cos(heading), np.sin(heading)]) * water
+        ground = moved + current[:, None] * run.duration_s
+        return (np.hypot(*ground) - current @ ground / speed).max()
+
+    assert found.chord_m == pytest.approx(most(np.hypot(*(track[-1] - track[0]))), rel=1e-5)
+    assert found.path_m == pytest.approx(found.chord_m, rel=0.02)  # a straight run, its speed changing
+
+
+def test_no_point_of_a_drifting_runs_chord_is_farther_from_its_path_than_told():
+    run = primitive(ship())
+    turn = np.radians(120.0) * np.linspace(0, 1, len(run.trajectory))
+    arc = np.column_stack([40 * np.sin(turn), 40 * (1 - np.cos(turn)), turn])
+    bent = replace(run, trajectory=replace(run.trajectory, pose=arc))
+    for current in (np.zeros(2), np.array([0.2, 0.0])):
+        told = carry(ship(), bent, Environment(current_to=current)).stray_m
+        for heading in np.linspace(-np.pi, np.pi, 37):
+            c, s = np.cos(heading), np.sin(heading)
+            track = arc[:, :2] @ np.array([[c, s], [-s, c]]) + current * run.trajectory.time_s[:, None]
+            chord = track[0] + np.linspace(0, 1, 400)[:, None] * (track[-1] - track[0])
+            assert shapely.distance(shapely.points(chord), shapely.linestrings(track)).max() <= told
+
+
+@pytest.mark.parametrize("along", [1.0, -1.0])
+def test_with_and_against_a_current_the_bound_is_the_way_by_the_speed_over_ground(along):
+    current = np.array([0.0, 0.2 * along])
+    bound_s = reposition_bound_s(
+        ship(),
+        area(OPEN),
+        Environment(current_to=current),
+        clearance_m=20.0,
+        primitives=(),
+        repeats={},
+        ends=ENDS,
+        speed_mps=1.3,
+        yaw_rate_radps=0.1,
+    )
+    truth = 400 / (1.3 + 0.2 * along)
+    assert 400 / 1.5 - 1e-9 <= bound_s <= truth + 1e-6
+    assert bound_s == pytest.approx(truth, rel=0.03)  # 1 / (1 + x) against 1 - x
 
 
 def test_the_cheapest_assignment_of_speeds_is_the_least_over_all_orders():

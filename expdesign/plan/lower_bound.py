@@ -76,8 +76,41 @@ def reposition_bound_s(
     exits, entries = _joint_speeds(runs, counts)
     most = _most_acceleration(vessel, environment, speed_mps, yaw_rate_radps)
     lost_m, least_s = joint_losses(exits, entries, speed_mps=speed_mps, acceleration_mps2=most)
-    fastest = speed_mps + float(np.hypot(*environment.current_to))
-    return float(max(0.0, least_s, (way_m + lost_m) / fastest))
+    current_mps = float(np.hypot(*environment.current_to))
+    bound_s = (way_m + lost_m) / (speed_mps + current_mps)
+    if current_mps and not (environment.wind_to.any() and _feels_wind(vessel)):
+        credits = {item.name: credit(item, carries[item.name], current_mps, speed_mps) for item in runs}
+        margin_m, tolerance_m = clearance_m + vessel.beam_m / 2, vessel.length_m / 30
+        owed_m = way_to_sail_m(area, margin_m, credits, counts, ends, tolerance_m)
+        helped_m = float(environment.current_to @ (ends[1] - ends[0])[:2]) / speed_mps
+        bound_s = max(bound_s, (owed_m - helped_m) / speed_mps)
+    return float(max(0.0, least_s, bound_s))
+
+
+def credit(primitive: Primitive, carried: Carry, current_mps: float, speed_mps: float) -> Carry:
+    """What a run carries, less what the current then no longer does for the legs.
+
+    A leg in direction e gains at most V + c.e over ground, so it takes at least (1 - c.e / V) / V for each metre, and
+    all legs together the length of their ways less c.d / V, by V, for their displacements d. These and the runs' add
+    up to that from start to goal: a run is credited with its length less c.d / V, at the heading that suits it best.
+    """
+    steps = np.hypot(*np.diff(primitive.trajectory.pose[:, :2], axis=0).T)
+    chord = np.hypot(*(primitive.trajectory.pose[-1] - primitive.trajectory.pose[0])[:2])
+    drift_m, reach_m = (speed * primitive.duration_s for speed in (current_mps, speed_mps))
+    share = 1.0 / len(steps)
+    return Carry(
+        chord_m=float(_credited(np.atleast_1d(chord), drift_m, reach_m).sum()),
+        path_m=float(_credited(steps, share * drift_m, share * reach_m).sum()),
+        stray_m=carried.stray_m,
+    )
+
+
+def _credited(length_m: Array, drift_m: float, reach_m: float) -> Array:
+    """Most of |l + k| - k.(l + k) / reach for vectors l, k of these lengths: concave in the cosine between them."""
+    squares, product = length_m**2 + drift_m**2, 2 * length_m * drift_m
+    cosine = np.clip((reach_m**2 - squares) / np.maximum(product, 1e-300), -1.0, 1.0)
+    ground = np.sqrt(np.maximum(squares + product * cosine, 0.0))
+    return np.asarray(ground - drift_m / reach_m * (drift_m + length_m * cosine))
 
 
 def way_to_sail_m(
@@ -119,7 +152,22 @@ def carry(vessel: Vessel, primitive: Primitive, environment: Environment) -> Car
         tracks, spare, drift_m = _in_weather(vessel, primitive, environment), 1.02, 0.0
     found = [_carry(track) for track in tracks]
     chord, path, stray = (spare * max(item[k] for item in found) + drift_m for k in range(3))
+    if drift_m:
+        stray = min(stray, _stray_adrift(tracks[0], drift_m))
     return Carry(chord_m=chord, path_m=path, stray_m=stray)
+
+
+def _stray_adrift(track: Array, drift_m: float) -> float:
+    """Bound on what a chord's points are away from a track (k, 2) through water that drifts any way by so much.
+
+    The current carries the chord's point at a share of it as far as it carries the ship in that share of the time;
+    between points and samples at other shares lies the drift in the time between.
+    """
+    share, when = np.linspace(0.0, 1.0, 201), np.linspace(0.0, 1.0, len(track))
+    points = track[0] + share[:, None] * (track[-1] - track[0])
+    apart = np.hypot(*np.moveaxis(points[:, None] - track, -1, 0)) + drift_m * np.abs(share[:, None] - when)
+    between = (float(np.hypot(*(track[-1] - track[0]))) + drift_m) / 400
+    return float(apart.min(axis=1).max()) + between
 
 
 def _feels_wind(vessel: Vessel) -> bool:
