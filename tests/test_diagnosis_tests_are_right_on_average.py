@@ -8,7 +8,7 @@ from expdesign.diagnosis.accuracy import first_states
 from expdesign.diagnosis.extension import as_extended, extend
 from expdesign.diagnosis.joint import fit
 from expdesign.diagnosis.motion import linearise, push_of, responses, simulate_windows
-from expdesign.diagnosis.noise import Noise, fit_colour, hats, whitened
+from expdesign.diagnosis.noise import FLOOR, Noise, fit_colour, hats, whitened
 from expdesign.diagnosis.windows import cut_windows
 
 SMALL = {"theta:X_u": 1e-5, "current:north": 1e-4, "gain": 1e-4, "inertia:v": 1e-4, "heading_bias": 1e-4}
@@ -33,16 +33,19 @@ def test_linear_answers_are_differences_of_simulations():
             assert np.abs(answer - difference).max() < 0.02 * np.abs(difference).max(), (ship, key)
 
 
-def test_colour_of_an_autoregression_is_found_and_whitened():
+def test_colour_of_an_autoregression_with_the_white_floor_is_whitened():
+    """The filter fitted to a series makes it and its floor white and of unit size, but for chance."""
     rng = np.random.default_rng(0)
     white = rng.standard_normal((4, 4000, 4))
     series = np.zeros_like(white)
     for k in range(1, 4000):
         series[:, k] = 0.8 * series[:, k - 1] + white[:, k]
     noise = fit_colour(series)
-    assert np.allclose(noise.filters[:, 1], -0.8, atol=4 * np.sqrt((1 - 0.64) / 16000))
-    rest = whitened(series, noise)
+    floor = np.sqrt(FLOOR * (series**2).mean()) * rng.standard_normal(series.shape)
+    rest = whitened(series + floor, noise)
     assert np.allclose(rest.std(axis=(0, 1)), 1.0, atol=4 / np.sqrt(2 * 16000))
+    for lag in (1, 2, 3, 5, 10):
+        assert np.allclose((rest[:, lag:] * rest[:, :-lag]).mean(axis=(0, 1)), 0.0, atol=4 / np.sqrt(16000))
 
 
 def test_hats_sum_to_one():

@@ -28,6 +28,8 @@ truly trails by d comes out ahead by more than this with a probability below Phi
 CLEARLY_LESS, MARGIN = 0.4, 20.0
 """Candidates with less than this share of the largest statistic, and by more than this, are not fitted."""
 MOST_FINDINGS = 6
+MOST_RETURNS = 4
+"""How often the search goes back to take an addition out that later ones made superfluous."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -81,19 +83,53 @@ class Search:
 
 
 def search(ship: Extended, windows: Windows, starts: Array, rng: np.random.Generator, progress: Progress) -> Search:
-    """Add causes until nothing significant is left."""
+    """Add causes until nothing significant is left; take those out again that later ones made superfluous.
+
+    A cause that only stood in for another loses its worth once that is found. The search then returns to where it was
+    added and goes on without it, so that what is left does not depend on it.
+    """
     base = fit(ship, windows, (), starts=starts, steps=3)
     first = base
     steps: list[Step] = []
+    refused: list[Candidate] = []
+    rounds = 0
     while True:
-        share = 1.0 - 0.7 ** (len(steps) + 1)
-        progress(f"testing causes, round {len(steps) + 1}", share)
-        found = screen(base, _candidates(base, windows), rng)
+        rounds += 1
+        share = 1.0 - 0.7**rounds
+        progress(f"testing causes, round {rounds}", share)
+        found = screen(base, [c for c in _candidates(base, windows) if not _same_as_any(c, refused)], rng)
         step = _step(base, windows, found, _within(progress, share))
         if step is None or len(steps) == MOST_FINDINGS:
             return Search(steps=tuple(steps), first=first, last=base, final_screening=found)
         steps.append(step)
         base = step.chosen.fit
+        idle = _superfluous(steps, windows, found.tests) if len(refused) < MOST_RETURNS else None
+        if idle is not None:
+            refused.append(steps[idle].chosen.candidate)
+            base = steps[idle].before
+            del steps[idle:]
+
+
+def _same_as_any(candidate: Candidate, others: list[Candidate]) -> bool:
+    """The same effects, whatever their first guess."""
+    return any(candidate.cause == other.cause and set(candidate.free) == set(other.free) for other in others)
+
+
+def _superfluous(steps: list[Step], windows: Windows, tests: float) -> int | None:
+    """The earliest addition without which the last fit is as good as chance makes it."""
+    whole = steps[-1].chosen.fit
+    for index, step in enumerate(steps[:-1]):
+        own = {*step.chosen.keys, *step.chosen.candidate.free, *step.chosen.candidate.fixed}
+        kept = tuple(key for key in whole.keys[: whole.free] if key not in own)
+        ship = replace(whole.ship, effects={key: v for key, v in whole.ship.effects.items() if key not in own})
+        try:
+            less = fit(ship, windows, kept, starts=whole.starts, noise=whole.noise, colour_order=whole.noise.order)
+        except (FloatingPointError, np.linalg.LinAlgError):
+            continue
+        lost = _gain(less, whole, whole)
+        if tests * float(chi2.sf(max(lost, 0.0), max(1, len(own)))) > LEVEL or lost < PRICE * len(own):
+            return index
+    return None
 
 
 def _within(progress: Progress, share: float) -> Progress:

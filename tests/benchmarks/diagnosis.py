@@ -1,6 +1,6 @@
 """How often the diagnosis is right: a campaign over ships, manoeuvres, effects, sizes and seeds, all drawn.
 
-``nice python tests/benchmarks/diagnosis.py [--trials 60] [--part known] [--jobs 2] [--seed 1] [--log FILE]``
+``nice python tests/benchmarks/diagnosis.py [--trials 60] [--part known] [--jobs 2] [--seed 1] [--ship barge]``
 
 Data come from `hidden_effects`, which shares no code with the package. An effect is drawn, then enlarged until it costs
 the model with the generator's own parameters 5 points of simulated fit or more (mean over u, v, r). Parts:
@@ -67,6 +67,8 @@ class Hidden:
         """The same, larger."""
         fixed = ("acts_on", "roll_period_s", "roll_damping", "change_s")
         truth = self.truth
+        if truth is not None and truth[0].startswith("delay"):
+            by = _on_substeps(truth[1] * by) / truth[1]
         if truth is not None:
             rest = 1.0 if truth[0].startswith(("factor", "inertia")) else 0.0
             truth = (truth[0], rest + (truth[1] - rest) * by)
@@ -89,6 +91,11 @@ class Hidden:
             wind=tuple(np.add(self.wind, other.wind).tolist()), shoaling=self.shoaling or other.shoaling,
             without=(*self.without, *other.without),
         )  # fmt: skip
+
+
+def _on_substeps(delay_s: float) -> float:
+    """The generator's actuators act from the next of its steps on."""
+    return max(1, round(delay_s * sea.SUBSTEPS)) / sea.SUBSTEPS
 
 
 def drawn_effect(cause: str, ship: str, rng: np.random.Generator, length_s: float) -> Hidden:
@@ -116,8 +123,9 @@ def drawn_effect(cause: str, ship: str, rng: np.random.Generator, length_s: floa
         return Hidden(cause=f"missing_term:{name}", effects={name: value}, truth=(name, value))
     if cause in ("actuator_lag", "actuator_delay"):
         kind = cause.split("_")[1]
-        return Hidden(cause=cause, effects={f"{kind}_s": 4 * size, "acts_on": ALL[ship]},
-                      truth=(f"{kind}_all_s", 4 * size))  # fmt: skip
+        late = _on_substeps(4 * size) if kind == "delay" else 4 * size
+        return Hidden(cause=cause, effects={f"{kind}_s": late, "acts_on": ALL[ship]},
+                      truth=(f"{kind}_all_s", late))  # fmt: skip
     if cause == "actuator_deadband":
         which, width = {"tug": (0b1010, 0.2), "barge": (0b100, 12.0), "coaster": (0b10, 0.15)}[ship]
         return Hidden(cause=cause, effects={"deadband": width * size, "acts_on": which})
@@ -160,8 +168,10 @@ def drawn_effect(cause: str, ship: str, rng: np.random.Generator, length_s: floa
 NAMES = tuple(cause.name for cause in CAUSES)
 
 
-def drawn_ship(cause: str, rng: np.random.Generator) -> str:
-    """A ship that can have the effect; the tug's simulations cost most."""
+def drawn_ship(cause: str, rng: np.random.Generator, only: str | None) -> str:
+    """A ship that can have the effect, the one asked for if it can; the tug's simulations cost most."""
+    if only is not None and (cause != "wind" or only == "tug"):
+        return only
     if cause == "wind":
         return "tug"
     ships = FORCES if cause == "thrust_advance_loss" else ("barge", "barge", "coaster", "tug")
@@ -232,12 +242,12 @@ def oracle(case: Case, hidden: Hidden, relative_std: float) -> float:
     return min((item.p_value for item in scored), default=1.0) * max(1, len(scored)) if mine else float("nan")
 
 
-def tried(part: str, number: int, seed: int) -> dict[str, object]:
+def tried(part: str, number: int, seed: int, only: str | None = None) -> dict[str, object]:
     """One trial."""
     whole = np.random.SeedSequence([seed, PARTS.index(part), number])
     rng = np.random.default_rng(whole)
     name = NAMES[number % len(NAMES)]
-    ship = drawn_ship(name, rng)
+    ship = drawn_ship(name, rng, only)
     case = drawn_case(ship, int(whole.generate_state(1)[0]), rng)
     uncertain = part == "uncertain" or (part == "clean" and number % 2 == 1)
     std = 0.1 if uncertain else 0.0
@@ -345,10 +355,11 @@ def main() -> None:
     parser.add_argument("--part", choices=(*PARTS, "all"), default="all")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--ship", choices=tuple(sea.SHIPS))
     parser.add_argument("--log", type=Path)
     chosen = parser.parse_args()
     for part in PARTS if chosen.part == "all" else (chosen.part,):
-        work = (delayed(tried)(part, number, chosen.seed) for number in range(chosen.trials))
+        work = (delayed(tried)(part, number, chosen.seed, chosen.ship) for number in range(chosen.trials))
         rows = []
         for row in Parallel(n_jobs=chosen.jobs, return_as="generator_unordered")(work):
             rows.append(row)
