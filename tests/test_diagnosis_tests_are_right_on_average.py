@@ -5,10 +5,13 @@ from diagnosis_case import hidden_record, vessel_of
 from scipy.stats import chi2
 
 from expdesign.diagnosis.accuracy import first_states
+from expdesign.diagnosis.candidate import Candidate
 from expdesign.diagnosis.extension import as_extended, extend
 from expdesign.diagnosis.joint import fit
 from expdesign.diagnosis.motion import linearise, push_of, responses, simulate_windows
 from expdesign.diagnosis.noise import FLOOR, Noise, fit_colour, hats, whitened
+from expdesign.diagnosis.screening import Scored, Screening
+from expdesign.diagnosis.search import Step, contend, superfluous
 from expdesign.diagnosis.windows import cut_windows
 
 SMALL = {"theta:X_u": 1e-5, "current:north": 1e-4, "gain": 1e-4, "inertia:v": 1e-4, "heading_bias": 1e-4}
@@ -84,3 +87,23 @@ def test_an_extended_vessel_simulates_as_the_extended_model():
     one = simulate_windows(extended, windows, start).shown
     other = simulate_windows(as_extended(again, record), windows, start).shown
     assert np.abs(one - other).max() < 1e-9
+
+
+def test_a_stand_in_is_superfluous_beside_the_true_cause_and_the_true_cause_is_not():
+    """A misaligned sensor that a drift term imitates: whichever is added first, only the imitation may go."""
+    record = hidden_record("barge", seed=41, batches=3, samples=150, faults={"heading_bias": 0.04})
+    extended = as_extended(vessel_of("barge"), record)
+    windows = cut_windows(extended.model, record)
+    true = Candidate(cause="heading_bias", free={"heading_bias": 0.0})
+    stand_in = Candidate(cause="parameters", free={"theta:Y_ur": 0.0})
+    for order, idle in (((stand_in, true), 0), ((true, stand_in), None)):
+        before = fit(extended, windows, (), starts=first_states(windows))
+        steps = []
+        for candidate in order:
+            chosen = contend(before, windows, Scored(candidate=candidate, statistic=0.0, p_value=1.0, step=np.zeros(1)))
+            assert chosen is not None
+            steps.append(
+                Step(chosen=chosen, p_value=0.0, rivals=(), before=before, screening=Screening(scored=(), tests=1.0))
+            )
+            before = chosen.fit
+        assert superfluous(steps, windows, tests=20.0) == idle

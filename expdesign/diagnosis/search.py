@@ -103,7 +103,7 @@ def search(ship: Extended, windows: Windows, starts: Array, rng: np.random.Gener
             return Search(steps=tuple(steps), first=first, last=base, final_screening=found)
         steps.append(step)
         base = step.chosen.fit
-        idle = _superfluous(steps, windows, found.tests) if len(refused) < MOST_RETURNS else None
+        idle = superfluous(steps, windows, found.tests) if len(refused) < MOST_RETURNS else None
         if idle is not None:
             refused.append(steps[idle].chosen.candidate)
             base = steps[idle].before
@@ -115,7 +115,7 @@ def _same_as_any(candidate: Candidate, others: list[Candidate]) -> bool:
     return any(candidate.cause == other.cause and set(candidate.free) == set(other.free) for other in others)
 
 
-def _superfluous(steps: list[Step], windows: Windows, tests: float) -> int | None:
+def superfluous(steps: list[Step], windows: Windows, tests: float) -> int | None:
     """The earliest addition without which the last fit is as good as chance makes it."""
     whole = steps[-1].chosen.fit
     for index, step in enumerate(steps[:-1]):
