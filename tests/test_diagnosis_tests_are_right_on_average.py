@@ -61,6 +61,16 @@ def test_whitening_of_white_noise_only_scales():
     assert np.array_equal(whitened(values, noise), values / noise.std)
 
 
+def test_a_missing_sample_costs_only_the_samples_whose_filter_reads_it():
+    values = np.ones((1, 30, 4))
+    values[0, 0, 3] = values[0, 10, 0] = np.nan
+    noise = Noise(filters=np.tile([1.0, -0.5, 0.1], (4, 1)), std=np.ones(4))
+    seen = np.isfinite(whitened(values, noise))[0]
+    assert seen.sum(axis=0).tolist() == [25, 28, 28, 27]
+    assert not seen[8:11, 0].any()
+    assert not seen[0, 3]
+
+
 def test_an_effect_that_is_not_there_is_estimated_as_zero_within_its_standard_error():
     """Over four trials the squared ratios are chi-squared, at least no larger; the threshold is its 99.9 % point."""
     ratios = []

@@ -60,10 +60,20 @@ def whitened(values: Array, noise: Noise) -> Array:
     result = np.empty((*values.shape[:-2], values.shape[-2] - p, values.shape[-1]))
     for channel, (taps, std) in enumerate(zip(noise.filters, noise.std, strict=True)):
         if np.isfinite(std):
-            result[..., channel] = lfilter(taps / std, NO_FEEDBACK, values[..., channel], axis=-1)[..., p:]
+            result[..., channel] = _filtered(values[..., channel], taps / std)[..., p:]
         else:
             result[..., channel] = 0.0 * values[..., p:, channel]
     return result
+
+
+def _filtered(values: Array, taps: Array) -> Array:
+    """Filtered along the last axis; nan where a tap falls on a nan, not ever after as in a recursion."""
+    missing = ~np.isfinite(values)
+    if not missing.any():
+        return np.asarray(lfilter(taps, NO_FEEDBACK, values, axis=-1))
+    result = lfilter(taps, NO_FEEDBACK, np.where(missing, 0.0, values), axis=-1)
+    touched = lfilter(np.ones(len(taps)), NO_FEEDBACK, missing.astype(float), axis=-1) > 0.5
+    return np.where(touched, np.nan, result)
 
 
 def fit_colour(remainder: Array, *, order: int | None = None) -> Noise:
