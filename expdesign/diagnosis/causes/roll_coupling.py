@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
-from expdesign.diagnosis.causes.words import listed
+from expdesign.diagnosis.causes.words import rounded
 
 COUNT = 14
 DAMPING = 0.08
@@ -28,7 +28,11 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
 
 
 def _explain(values: Values) -> str:
-    return f"Sway or yaw oscillate at one period as a rolling ship makes them: {listed(values)}."
+    period, std = values["roll:period"]
+    return (
+        f"Sway or yaw oscillate with a period of {rounded(period, std)} s, as a rolling ship makes them. Roll is not "
+        "measured: compare the period with that of the ship, for waves or a steering loop may oscillate alike."
+    )
 
 
 ROLL_COUPLING = Cause(name="roll_coupling", candidates=_candidates, explain=_explain, suspect="time")

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
-from expdesign.diagnosis.causes.words import listed
+from expdesign.diagnosis.causes.words import rounded
 from expdesign.diagnosis.extended import is_coriolis, is_damping
 from expdesign.values import Array
 from expdesign.vessel import Term, VesselModel
@@ -40,7 +40,10 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
 
 
 def _explain(values: Values) -> str:
-    return f"The ship is slower where the water is shallow: growth per unit of draught over depth: {listed(values)}."
+    half = ", ".join(
+        f"{key.split(':')[1]} is {rounded(50 * value, 50 * std)} % larger" for key, (value, std) in values.items()
+    )
+    return f"The ship moves otherwise where the water is shallow: where it is twice as deep as the draught, {half}."
 
 
 SHALLOW_WATER = Cause(name="shallow_water", candidates=_candidates, explain=_explain, suspect="depth")

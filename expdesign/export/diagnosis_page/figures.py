@@ -61,7 +61,7 @@ def growth_figure(found: Diagnosis) -> str:
         axes.minorticks_off()
         axes.set_ylim(bottom=0.0)
         axes.set_title(f"error of {label}")
-        axes.set_xlabel("horizon [s]")
+        axes.set_xlabel("time since the start [s]")
         light_grid(axes)
     columns[0].legend(fontsize=8)
     return svg(figure, key="growth", label="Root mean square error of the simulation against its horizon")

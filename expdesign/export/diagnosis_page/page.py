@@ -6,6 +6,7 @@ import numpy as np
 
 from expdesign.diagnosis import Diagnosis, Finding
 from expdesign.export.diagnosis_page.figures import growth_figure, suspect_figure, window_figure
+from expdesign.export.diagnosis_page.wording import titled, worded
 from expdesign.export.estimates import plus_minus
 from expdesign.export.pages import page_templates
 from expdesign.export.report import words
@@ -13,6 +14,8 @@ from expdesign.export.report.figures.style import report_style
 
 SHOWN = 4
 """Stretches of data drawn."""
+ASTRAY = -500.0
+"""Fit [%] below which its size says no more."""
 
 
 def diagnosis_html(found: Diagnosis, *, command: str, version: str) -> str:
@@ -29,6 +32,10 @@ def diagnosis_html(found: Diagnosis, *, command: str, version: str) -> str:
     return page.render(
         found=found,
         findings=[_finding(item, found) for item in found.findings],
+        verdict=_verdict(found),
+        astray=bool((found.before.fit < ASTRAY).any() or (found.after.fit < ASTRAY).any()),
+        outputs=", ".join(found.before.outputs),
+        tested=[(titled(cause), p_value) for cause, p_value in found.screened],
         accuracy=_accuracy(found),
         data=_data(found),
         figures=figures,
@@ -52,7 +59,7 @@ def _accuracy(found: Diagnosis) -> list[tuple[str, ...]]:
         cells = [f"{name} [{unit}]"]
         for item in (found.before, found.after):
             cells += [
-                f"{words.number(float(item.fit[index]), 1)}{words.NB}%",
+                _fit(float(item.fit[index])),
                 words.significant(factor * float(item.rmse[index])),
                 words.significant(factor * float(item.bias[index])),
             ]
@@ -63,15 +70,16 @@ def _accuracy(found: Diagnosis) -> list[tuple[str, ...]]:
 def _finding(item: Finding, found: Diagnosis) -> dict[str, object]:
     low, high = item.gain_interval
     fits = [
-        f"{name} {words.number(float(a), 1)} \N{RIGHTWARDS ARROW} {words.number(float(b), 1)}{words.NB}%"
+        f"{name} {_fit(float(a))} \N{RIGHTWARDS ARROW} {_fit(float(b))}"
         for name, a, b in zip(found.before.outputs, item.fit_before, item.fit_after, strict=True)
     ]
     return {
         "cause": item.cause,
-        "title": item.cause.replace("_", " ").replace(":", ": "),
+        "title": titled(item.cause),
         "explanation": item.explanation,
         "estimates": [
-            (one.name, plus_minus(one.value, one.std).replace("-", words.MINUS), one.unit) for one in item.estimates
+            (worded(one.name, item.cause), plus_minus(one.value, one.std).replace("-", words.MINUS), one.unit)
+            for one in item.estimates
         ],
         "chance": _chance(item.p_value),
         "gain": words.number(item.gain, 1),
@@ -80,6 +88,28 @@ def _finding(item: Finding, found: Diagnosis) -> dict[str, object]:
         "rivals": item.not_distinguishable_from,
         "telling": item.would_tell_apart,
     }
+
+
+def _verdict(found: Diagnosis) -> str:
+    """The verdict with names as titles, and without fits that only say that the simulation is lost."""
+    if not (found.before.fit < ASTRAY).any() or not found.findings:
+        text = found.verdict
+        for cause in sorted({item.cause for item in found.findings}, key=len, reverse=True):
+            title = titled(cause)
+            text = text.replace(cause, title[0].lower() + title[1:])
+        return text
+    titles = [titled(item.cause) for item in found.findings]
+    names = [title[0].lower() + title[1:] for title in titles]
+    listed = names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+    gain = sum(item.gain for item in found.findings)
+    return (
+        f"Simulated over whole runs, the model in use parts from the ship altogether. It lacks {listed}; mending gains "
+        f"{words.number(float(gain), 1)} points of fit on runs that were held out."
+    )
+
+
+def _fit(value: float) -> str:
+    return f"below {words.number(ASTRAY, 0)}{words.NB}%" if value < ASTRAY else f"{words.number(value, 1)}{words.NB}%"
 
 
 def _chance(p_value: float) -> str:
