@@ -1,5 +1,6 @@
 """Whatever a diagnosis finds, the vessel file it writes is read again and used like any other."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +19,7 @@ from expdesign.estimation.methods import Settings, estimate
 from expdesign.estimation.replay import Integration, simulate_batch
 from expdesign.estimation.tables import model_for
 from expdesign.export import vessel_toml
-from expdesign.export.diagnosis_page import extended_vessel
+from expdesign.export.diagnosis_page import diagnosis_html, extended_vessel
 from expdesign.information import score_primitives
 from expdesign.scenario import load_vessel
 from expdesign.signals import Record
@@ -155,3 +156,16 @@ def test_without_a_finding_the_dependence_of_the_file_is_kept(clean):
     ship = replace(TUG, model=model)
     found = replace(clean, extended=deep(ship), findings=())
     assert carrying_depth(found, ship).extended.model.terms == model.terms
+
+
+def test_the_page_of_a_lost_simulation_shows_no_astronomic_numbers(clean):
+    """Models that are unstable on their course run away over whole runs; the size of that error says nothing."""
+    lost = np.full(3, -1e8)
+    before = replace(clean.before, fit=lost, rmse=np.full(3, np.inf), bias=np.full(3, -1e292))
+    before = replace(before, growth=np.full_like(before.growth, 1e6))
+    found = replace(clean, before=before, findings=(finding("wind"),), errors={"wind": clean.windows.measured})
+    page = diagnosis_html(found, command="made up", version="0")
+    text = re.sub(r"<svg.*?</svg>", "", page, flags=re.DOTALL)
+    assert "below \N{MINUS SIGN}500" in text
+    assert not re.search(r"\binf\b|e\+\d|100000000", text)
+    assert "parts from the ship" in text

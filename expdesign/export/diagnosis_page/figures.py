@@ -12,6 +12,8 @@ from expdesign.export.report.figures.style import BLUE, GREY, VERMILION, light_g
 from expdesign.values import Array
 
 BINS = 16
+MOST_SPREADS = 3.0
+"""Errors beyond so many standard deviations of what is measured are not drawn: the simulation is lost."""
 DEGREES = float(np.degrees(1.0))
 
 
@@ -59,7 +61,9 @@ def growth_figure(found: Diagnosis) -> str:
         axes.set_xscale("log")
         axes.set_xticks(found.before.horizons_s, [f"{value:g}" for value in found.before.horizons_s])
         axes.minorticks_off()
-        axes.set_ylim(bottom=0.0)
+        spread = factor * float(np.nanstd(found.windows.measured[..., OUTPUTS.index(output)]))
+        _, top = axes.get_ylim()
+        axes.set_ylim(0.0, min(top, MOST_SPREADS * spread) if spread > 0 else top)
         axes.set_title(f"error of {label}")
         axes.set_xlabel("time since the start [s]")
         light_grid(axes)

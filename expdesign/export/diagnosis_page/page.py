@@ -16,15 +16,14 @@ SHOWN = 4
 """Stretches of data drawn."""
 ASTRAY = -500.0
 """Fit [%] below which its size says no more."""
+UNTOLD = "\N{EN DASH}"
 
 
 def diagnosis_html(found: Diagnosis, *, command: str, version: str) -> str:
     """One HTML page without any outside reference."""
     with report_style():
         figures = {
-            "windows": [
-                (found.windows.names[int(found.windows.batch[i])], window_figure(found, i)) for i in drawn(found)
-            ],
+            "windows": [(_stretch(found, i), window_figure(found, i)) for i in drawn(found)],
             "growth": growth_figure(found),
             "suspects": [suspect_figure(found, item, f"suspect{i}") for i, item in enumerate(found.findings)],
         }
@@ -52,12 +51,22 @@ def drawn(found: Diagnosis) -> list[int]:
     return [int(index) for index in np.sort(np.argsort(-size)[:SHOWN])]
 
 
+def _stretch(found: Diagnosis, index: int) -> str:
+    """The run of a window, and where in it the window begins."""
+    windows = found.windows
+    begin = float(windows.first[index]) * windows.step_s
+    return windows.names[int(windows.batch[index])] + (f", from {begin:.0f}{words.NB}s" if begin > 0 else "")
+
+
 def _accuracy(found: Diagnosis) -> list[tuple[str, ...]]:
     rows = []
     for index, name in enumerate(found.before.outputs):
         unit, factor = ("\N{DEGREE SIGN}/s", float(np.degrees(1.0))) if name == "r" else ("m/s", 1.0)
         cells = [f"{name} [{unit}]"]
         for item in (found.before, found.after):
+            if not float(item.fit[index]) >= ASTRAY:
+                cells += [_fit(float(item.fit[index])), UNTOLD, UNTOLD]
+                continue
             cells += [
                 _fit(float(item.fit[index])),
                 words.significant(factor * float(item.rmse[index])),
@@ -109,7 +118,9 @@ def _verdict(found: Diagnosis) -> str:
 
 
 def _fit(value: float) -> str:
-    return f"below {words.number(ASTRAY, 0)}{words.NB}%" if value < ASTRAY else f"{words.number(value, 1)}{words.NB}%"
+    return (
+        f"below {words.number(ASTRAY, 0)}{words.NB}%" if not value >= ASTRAY else f"{words.number(value, 1)}{words.NB}%"
+    )
 
 
 def _chance(p_value: float) -> str:
