@@ -30,8 +30,9 @@ FEWEST_SAMPLES = 100
 UNITS = 4
 SHORTENINGS, SHORTEST, LARGEST_GROWTH = 4, 30, 6.0
 """Rounds and fewest samples of shortening windows of unstable models, and how much an error may grow in them."""
-LEAST_GAIN = 0.1
-"""Points of simulated fit on held-out runs, mean over outputs."""
+LEAST_GAIN, PLAIN_GAIN = 0.1, 1.0
+"""Points of simulated fit on held-out runs, mean over outputs: what is reported at least, and what is reported even
+when its interval, of few runs perhaps, reaches zero."""
 
 
 def diagnose(
@@ -160,13 +161,13 @@ def _onward(tell: Callable[[float], None], low: float, part: float) -> Callable[
 
 
 def _worthwhile(found: Search, held: Sequence[HeldOut], rng: np.random.Generator) -> Search:
-    """Up to the first cause that does not surely gain where it was not fitted: it may be significant but mends nothing.
+    """Up to the first cause that mends nothing where it was not fitted, or so little that it may be nothing.
 
-    Sure is what 95 % of draws of the held-out runs agree on. Significance alone is not enough to report: once a large
-    error is mended, what is left shows every small difference between any model and a ship.
+    Significance alone is not enough to report: once a large error is mended, what is left shows every small difference
+    between any model and a ship. Little gains count when their interval leaves zero out.
     """
     results = [gained(one, other, rng) for one, other in pairwise(held)]
-    good = [gain > LEAST_GAIN and interval[0] > 0 for gain, interval in results]
+    good = [gain > LEAST_GAIN and (gain > PLAIN_GAIN or low > 0) for gain, (low, _) in results]
     count = int(np.argmin([*good, False]))
     steps = found.steps[:count]
     return replace(found, steps=steps, last=steps[-1].chosen.fit if steps else found.first)
