@@ -129,6 +129,7 @@ def test_deep_water_is_draught_over_depth_zero():
     state = ((1.0, 0.2, 0.05), (2.0, -1.0), (5.0, 0.3, 4.0, -0.2))
     np.testing.assert_array_equal(model.accelerations(*state), TUG.model.accelerations(*state))
     np.testing.assert_array_equal(in_deep_water(model).accelerations(*state), TUG.model.accelerations(*state))
+    assert in_deep_water(model).terms == TUG.model.terms
     assert model.reads_depth
     assert not in_deep_water(model).reads_depth
     assert error < 2e-3

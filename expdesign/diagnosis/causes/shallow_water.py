@@ -26,6 +26,8 @@ LEAST_VARIATION = 0.01
 DAMPING, INERTIA = "damping_growth", "inertia_growth"
 """Names of the estimates in results."""
 ORDER = 3
+WRITTEN = re.compile(rf"\((.+)\)\*\(1(?: \+ [-+.e\d]+(?:\*{SHOAL})+)+\)")
+"""A term times a factor as it is written here."""
 
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
@@ -71,10 +73,14 @@ def in_shallow_water(
 
 
 def in_deep_water(model: VesselModel) -> VesselModel:
-    """The model with draught over depth zero in all its terms."""
-    deep = re.compile(rf"\b{SHOAL}\b")
-    terms = tuple(replace(term, expression=deep.sub("0", term.expression)) for term in model.terms)
+    """The model with draught over depth zero in all its terms; factors as written here disappear from them."""
+    terms = tuple(replace(term, expression=_deep(term.expression)) for term in model.terms)
     return replace(model, terms=terms)
+
+
+def _deep(expression: str) -> str:
+    written = WRITTEN.fullmatch(expression)
+    return written.group(1) if written else re.sub(rf"\b{SHOAL}\b", "0", expression)
 
 
 def _inverse(growth: float, reach: float) -> tuple[Polynomial, float]:
