@@ -215,7 +215,7 @@ def fit(
     *,
     starts: Array,
     noise: Noise | None = None,
-    steps: int = 5,
+    steps: int = 8,
     colour_order: int | None = None,
     flat: tuple[str, ...] = (),
 ) -> Fit:

@@ -28,6 +28,8 @@ truly trails by d comes out ahead by more than this with a probability below Phi
 CLEARLY_LESS, MARGIN = 0.4, 20.0
 """Candidates with less than this share of the largest statistic, and by more than this, are not fitted."""
 MOST_FINDINGS = 6
+SETTLING = 12
+"""Gauss-Newton steps, at most, before anything is tested."""
 MOST_RETURNS = 4
 """How often the search goes back to take an addition out that later ones made superfluous."""
 
@@ -88,8 +90,7 @@ def search(ship: Extended, windows: Windows, starts: Array, rng: np.random.Gener
     A cause that only stood in for another loses its worth once that is found. The search then returns to where it was
     added and goes on without it, so that what is left does not depend on it.
     """
-    base = fit(ship, windows, (), starts=starts, steps=3)
-    first = base
+    base = first = settled(ship, windows, starts)
     steps: list[Step] = []
     refused: list[Candidate] = []
     rounds = 0
@@ -108,6 +109,17 @@ def search(ship: Extended, windows: Windows, starts: Array, rng: np.random.Gener
             refused.append(steps[idle].chosen.candidate)
             base = steps[idle].before
             del steps[idle:]
+
+
+def settled(ship: Extended, windows: Windows, starts: Array) -> Fit:
+    """The model in use at the likeliest values of its uncertain parameters, the colour found where they settled.
+
+    Far from there the remainder is a poor guide to the noise, and any cause that lets the fit go on looks true.
+    """
+    found = fit(ship, windows, (), starts=starts, steps=SETTLING)
+    if not found.keys:
+        return found
+    return fit(found.ship, windows, (), starts=found.starts, noise=found.noise, steps=SETTLING)
 
 
 def _same_as_any(candidate: Candidate, others: list[Candidate]) -> bool:
