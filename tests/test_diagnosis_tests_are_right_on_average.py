@@ -1,5 +1,6 @@
 """Identities behind the diagnosis: linear answers, prior, noise, corrected p-values."""
 
+import hidden_effects as sea
 import numpy as np
 from diagnosis_case import hidden_record, vessel_of
 from scipy.stats import chi2
@@ -11,7 +12,7 @@ from expdesign.diagnosis.joint import fit
 from expdesign.diagnosis.motion import linearise, push_of, responses, simulate_windows
 from expdesign.diagnosis.noise import FLOOR, Noise, fit_colour, hats, whitened
 from expdesign.diagnosis.screening import Scored, Screening
-from expdesign.diagnosis.search import Step, contend, superfluous
+from expdesign.diagnosis.search import Step, contend, settled, superfluous
 from expdesign.diagnosis.windows import cut_windows
 
 SMALL = {"theta:X_u": 1e-5, "current:north": 1e-4, "gain": 1e-4, "inertia:v": 1e-4, "heading_bias": 1e-4}
@@ -117,3 +118,21 @@ def test_a_stand_in_is_superfluous_beside_the_true_cause_and_the_true_cause_is_n
             )
             before = chosen.fit
         assert superfluous(steps, windows, tests=20.0) == idle
+
+
+def test_what_uncertain_parameters_explain_is_gone_before_anything_is_tested():
+    """The remainder of a ship 20 % off everywhere is that of one whose parameters are known, within 5 %.
+
+    Standard deviations of white remainders over 720 samples have a relative standard error of 2.6 %, and parameters
+    take 11 of 720 degrees of freedom; three channels move together with the noise, which is the same in both.
+    """
+    record = hidden_record("coaster", seed=8, batches=3, samples=240, relative_std=0.2)
+    rng = np.random.default_rng(8)
+    drawn = {name: value * (1 + 0.2 * rng.standard_normal()) for name, value in sea.SHIPS["coaster"].items()}
+    vessel = vessel_of("coaster", relative_std=0.2)
+    windows = cut_windows(vessel.model, record)
+    known = as_extended(vessel_of("coaster"), record)
+    wrong = {f"theta:{name}": drawn[name] - sea.SHIPS["coaster"][name] for name in known.model.names}
+    truth = settled(known.having(wrong), windows, first_states(windows))
+    found = settled(as_extended(vessel, record), windows, first_states(windows))
+    assert np.abs(found.noise.std / truth.noise.std - 1).max() < 0.05
