@@ -149,14 +149,20 @@ def _check(ship: Extended, windows: Windows, record: Record) -> None:
 def _held_out(found: Search, ship: Extended, windows: Windows, tell: Callable[[float], None]) -> list[HeldOut]:
     """Of the model in use, uncertain parameters at their likeliest, then after every step.
 
-    What uncertain parameters mend by themselves is no merit of a cause.
+    What uncertain parameters mend by themselves is no merit of a cause, but of parameters beyond their bounds it is.
     """
-    fits: list[Fit | None] = [found.first if found.first.keys else None, *(step.chosen.fit for step in found.steps)]
+    settled = bool(found.first.keys) and not any(_only_moves(step, found) for step in found.steps[:1])
+    fits: list[Fit | None] = [found.first if settled else None, *(step.chosen.fit for step in found.steps)]
     results = []
     for number, item in enumerate(fits):
         low, part = 0.65 + 0.27 * number / len(fits), 0.27 / len(fits)
         results.append(held_out(item, ship if item is None else item.ship, windows, _onward(tell, low, part)))
     return results
+
+
+def _only_moves(step: Step, found: Search) -> bool:
+    """It is of parameters that are free to move anyhow: it says that they moved too far, which gains nothing more."""
+    return set(step.chosen.keys) <= set(found.first.keys)
 
 
 def _onward(tell: Callable[[float], None], low: float, part: float) -> Callable[[float], None]:
@@ -170,7 +176,10 @@ def _worthwhile(found: Search, held: Sequence[HeldOut], rng: np.random.Generator
     between any model and a ship. Little gains count when their interval leaves zero out.
     """
     results = [gained(one, other, rng) for one, other in pairwise(held)]
-    good = [gain > LEAST_GAIN and (gain > PLAIN_GAIN or low > 0) for gain, (low, _) in results]
+    good = [
+        _only_moves(step, found) or (gain > LEAST_GAIN and (gain > PLAIN_GAIN or low > 0))
+        for step, (gain, (low, _)) in zip(found.steps, results, strict=True)
+    ]
     count = int(np.argmin([*good, False]))
     steps = found.steps[:count]
     return replace(found, steps=steps, last=steps[-1].chosen.fit if steps else found.first)
