@@ -18,6 +18,8 @@ from expdesign.plan.checks import verify_plan
 from expdesign.plan.field import ClearanceField, clearance_field, narrowest_passage
 from expdesign.plan.footprint import covering_discs, swept_area
 from expdesign.plan.goal_ways import build_goal_ways
+from expdesign.plan.lattice import LatticePlan, search_lattice
+from expdesign.plan.lattice_moves import build_lattice
 from expdesign.plan.leg_values import last_state, leg_speed_mps
 from expdesign.plan.legs import LegTask, LegWater, find_leg, leg_trajectory
 from expdesign.plan.lower_bound import reposition_bound_s
@@ -80,6 +82,20 @@ def plan_trial(problem: PlanProblem, *, progress: Progress = lambda what, share:
     )
     progress("verifying", 0.9)
     return _finished(problem, water, commands, trajectory, legs)
+
+
+def lattice_reference(problem: PlanProblem, *, spacing_m: float, suboptimality: float = 0.02) -> LatticePlan:
+    """The same runs on a state lattice, for comparison: its costs are seconds of repositioning at transit speed.
+
+    Changes of speed and the current are left out there, which favours the lattice.
+
+    Raises:
+        NoPlan: the lattice is too coarse for the water, or there is no way.
+    """
+    space = _search_space(problem, _water(problem))
+    counts = [_repeats(problem)[item.name] for item in space.stamps]
+    lattice = build_lattice(space, counts, problem.start, spacing_m=spacing_m)
+    return search_lattice(lattice, suboptimality=suboptimality)
 
 
 def _finished(
