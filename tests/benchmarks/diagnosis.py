@@ -170,7 +170,7 @@ NAMES = tuple(cause.name for cause in CAUSES)
 
 def drawn_ship(cause: str, rng: np.random.Generator, only: str | None) -> str:
     """A ship that can have the effect, the one asked for if it can; the tug's simulations cost most."""
-    if only is not None and (cause != "wind" or only == "tug"):
+    if only is not None and only in {"wind": ("tug",), "thrust_advance_loss": FORCES}.get(cause, tuple(sea.SHIPS)):
         return only
     if cause == "wind":
         return "tug"
