@@ -90,7 +90,15 @@ def workflows(monkeypatch: pytest.MonkeyPatch) -> Workflows:
             "indices --vessel v.toml",
             "indices",
             ((), None),
-            {"vessel": Path("v.toml"), "speed_mps": None, "scale": 1.0, "antenna_forward_m": 0.0},
+            {
+                "vessel": Path("v.toml"),
+                "speed_mps": None,
+                "scale": 1.0,
+                "antenna_forward_m": 0.0,
+                "depth_m": None,
+                "wind_mps": None,
+                "sea_state": None,
+            },
         ),
         (
             "simulate p.json --truth v.toml",
