@@ -1,0 +1,78 @@
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+
+from expdesign import workflows
+from expdesign.plan.solve import PlanProblem, plan_trial
+from expdesign.scenario import load_scenario
+
+MODEL_SHIP = Path(__file__).parents[1] / "scenarios" / "model-ship.toml"
+FLIP = np.array([1.0, -1.0, -1.0])
+"""North, east, heading; or forces ahead, to starboard, about the vertical."""
+TURNED = 0.10
+"""Largest change of cost when the chart is turned: placements are found on grids, which turn with no chart."""
+
+
+@pytest.fixture(scope="module")
+def problem() -> PlanProblem:
+    case = load_scenario(MODEL_SHIP)
+    information = workflows.scored(case)
+    return PlanProblem(
+        vessel=case.vessel,
+        area=case.area,
+        environment=case.environment,
+        settings=case.plan,
+        primitives=tuple(item.primitive for item in information),
+        design=workflows.designed(case, information),
+        start=case.start,
+        goal=case.goal,
+    )
+
+
+@pytest.fixture(scope="module")
+def cost_s(problem) -> float:
+    return plan_trial(problem).seconds("reposition")
+
+
+def moved(problem: PlanProblem, points, poses) -> PlanProblem:
+    """The same with the chart's (east, north) points and the poses moved."""
+    area = problem.area
+    return replace(
+        problem,
+        area=replace(area, water=shapely.transform(area.water, points), land=shapely.transform(area.land, points)),
+        start=poses(problem.start),
+        goal=poses(problem.goal),
+    )
+
+
+def mirrored(primitive):
+    """The run that goes to port where this one goes to starboard: the vessel takes forces, so they are flipped."""
+    commands, motion = primitive.commands, primitive.trajectory
+    return replace(
+        primitive,
+        commands=replace(commands, values=commands.values * FLIP),
+        entry_inputs=primitive.entry_inputs * FLIP,
+        trajectory=replace(motion, pose=motion.pose * FLIP, velocity=motion.velocity * FLIP),
+    )
+
+
+def test_a_mirrored_chart_with_mirrored_runs_costs_the_same(problem, cost_s):
+    assert problem.vessel.model.inputs == ("tau_x", "tau_y", "tau_psi")
+    other = moved(problem, lambda xy: xy * (-1.0, 1.0), lambda pose: pose * FLIP)
+    plan = plan_trial(replace(other, primitives=tuple(mirrored(item) for item in problem.primitives)))
+    assert plan.seconds("reposition") == pytest.approx(cost_s, abs=2 * problem.vessel.sample_time_s)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("angle", [0.7, -1.9, 3.0])
+def test_a_turned_chart_costs_nearly_the_same(problem, cost_s, angle):
+    c, s = np.cos(angle), np.sin(angle)
+    other = moved(
+        problem,
+        lambda xy: xy @ np.array([[c, -s], [s, c]]),
+        lambda pose: np.array([pose[0] * c - pose[1] * s, pose[0] * s + pose[1] * c, pose[2] + angle]),
+    )
+    assert plan_trial(other).seconds("reposition") == pytest.approx(cost_s, rel=TURNED)
