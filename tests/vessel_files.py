@@ -2,30 +2,11 @@
 
 from pathlib import Path
 
+from expdesign.studies.real_data_cases import SIDE, TANK
+
 Terms = tuple[tuple[str, str, str], ...]
 
-SIDE: Terms = tuple(
-    (equation, f"{letter}_{name}", expression)
-    for equation, letter in (("v", "Y"), ("r", "N"))
-    for name, expression in (
-        ("v", "v"),
-        ("r", "r"),
-        ("abs_v_v", "v*abs(v)"),
-        ("abs_r_r", "r*abs(r)"),
-        ("uv", "u*v"),
-        ("ur", "u*r"),
-        ("uud", "u*abs(u)*rudder1"),
-        ("nnd", "abs(n1)*n1*sin(rudder1)"),
-    )
-)
-KVLCC2_TERMS: Terms = (
-    ("u", "X_abs_u_u", "u*abs(u)"),
-    ("u", "X_vr", "v*r"),
-    ("u", "X_nn", "abs(n1)*n1"),
-    ("u", "X_rr", "r*r"),
-    ("u", "X_dd", "u*abs(u)*rudder1*rudder1"),
-    *SIDE,
-)
+KVLCC2_TERMS: Terms = TANK.terms
 ESSO_TERMS: Terms = (
     ("u", "X_u", "u"),
     ("u", "X_abs_u_u", "u*abs(u)"),
