@@ -10,8 +10,9 @@ from diagnosis_case import hidden_record, vessel_of
 from expdesign.diagnosis import CAUSES, Estimated, Finding
 from expdesign.diagnosis import diagnose as diagnose_record
 from expdesign.diagnosis.causes.shallow_water import in_deep_water, in_shallow_water
-from expdesign.diagnosis.extended import Surroundings, rates
 from expdesign.diagnosis.extension import as_extended, extend
+from expdesign.diagnosis.rates import rates
+from expdesign.diagnosis.surroundings import Surroundings
 from expdesign.dictionary import PrimitiveSpec, build_dictionary
 from expdesign.dictionary.build import family
 from expdesign.dictionary.spec import complete_settings

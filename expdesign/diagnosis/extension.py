@@ -9,7 +9,9 @@ from dataclasses import replace
 import numpy as np
 
 from expdesign.diagnosis.causes.missing_term import library
-from expdesign.diagnosis.extended import Extended, is_coriolis, is_thrust, members, reads_rudder
+from expdesign.diagnosis.extended import Extended
+from expdesign.diagnosis.followed import members
+from expdesign.diagnosis.parts import is_coriolis, is_thrust, reads_rudder
 from expdesign.estimation.tables import model_for
 from expdesign.signals import Record
 from expdesign.vessel import Actuator, Mounting, Response, Sensors, Term, Vessel, VesselModel

@@ -11,7 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from expdesign.diagnosis.extended import Extended, Surroundings, averaged, observed, rates, surroundings
+from expdesign.diagnosis.extended import Extended
+from expdesign.diagnosis.observed import averaged, observed
+from expdesign.diagnosis.rates import rates
+from expdesign.diagnosis.surroundings import Surroundings, surroundings
 from expdesign.diagnosis.windows import Windows
 from expdesign.values import Array
 

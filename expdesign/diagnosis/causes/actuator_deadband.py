@@ -7,7 +7,7 @@ import numpy as np
 from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.actuator_lag import input_groups
 from expdesign.diagnosis.causes.words import first, rounded
-from expdesign.diagnosis.extended import members
+from expdesign.diagnosis.followed import members
 from expdesign.values import Array
 
 QUANTILES = (0.1, 0.2, 0.35, 0.5)

@@ -17,7 +17,7 @@ from numpy.polynomial import Polynomial
 
 from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.words import rounded
-from expdesign.diagnosis.extended import is_coriolis, is_damping
+from expdesign.diagnosis.parts import is_coriolis, is_damping
 from expdesign.values import Array
 from expdesign.vessel import Term, VesselModel
 from expdesign.vessel.structures import SHOAL

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.words import first, rounded
-from expdesign.diagnosis.extended import is_thrust, reads_rudder
+from expdesign.diagnosis.parts import is_thrust, reads_rudder
 
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:

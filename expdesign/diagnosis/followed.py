@@ -1,0 +1,66 @@
+"""Inputs as the actuators of an extended model follow them: dead band, dead time, lag and offset, in this order."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.signal import lfilter
+
+from expdesign.diagnosis.extended import Extended
+from expdesign.diagnosis.windows import Windows
+from expdesign.values import Array
+
+
+def members(group: str, inputs: tuple[str, ...]) -> list[int]:
+    """Columns of the inputs that belong to a group."""
+    return [index for index, name in enumerate(inputs) if group in ("all", name) or name.rstrip("0123456789") == group]
+
+
+FINER = 4
+"""Steps within an integrator step in which moving actuators are followed: forces are not linear in angles."""
+
+
+def followed_inputs(ship: Extended, windows: Windows) -> tuple[tuple[Array, int], ...]:
+    """Per batch, the inputs after dead band, dead time, lag and offset, and how many rows an integrator step has."""
+    inputs = ship.model.inputs
+    moving = any(key.startswith(("delay:", "lag:")) and value for key, value in ship.effects.items())
+    finer = FINER if moving else 1
+    acting = tuple(np.repeat(rows, finer, axis=0) for rows in windows.batch_inputs)
+    for kind, change in (("deadband", _dead_band), ("delay", _delayed), ("lag", _lagged), ("offset", _offset)):
+        for key, value in ship.effects.items():
+            if key.startswith(kind + ":") and value != 0.0:
+                columns = members(key.split(":", 1)[1], inputs)
+                acting = tuple(_changed(rows, columns, change, value, windows.step_s / finer) for rows in acting)
+    return tuple((rows, finer) for rows in acting)
+
+
+def _changed(rows: Array, columns: list[int], change, value: float, step_s: float) -> Array:  # type: ignore[no-untyped-def]
+    result = np.array(rows)
+    result[:, columns] = change(result[:, columns], value, step_s)
+    return result
+
+
+def _dead_band(rows: Array, width: float, step_s: float) -> Array:
+    return np.where(np.abs(rows) < width, 0.0, rows)
+
+
+def _offset(rows: Array, value: float, step_s: float) -> Array:
+    return rows + value
+
+
+def _delayed(rows: Array, delay_s: float, step_s: float) -> Array:
+    """Held inputs late by any time: the mean over each step of what then acts."""
+    whole, share = divmod(max(delay_s, 0.0) / step_s, 1.0)
+    index = np.arange(len(rows)) - int(whole)
+    near, far = rows[np.maximum(index, 0)], rows[np.maximum(index - 1, 0)]
+    return (1 - share) * near + share * far
+
+
+def _lagged(rows: Array, lag_s: float, step_s: float) -> Array:
+    """First-order lag, the mean over each step."""
+    if lag_s <= 1e-9:
+        return rows
+    fade = np.exp(-step_s / lag_s)
+    mean_share = lag_s / step_s * (1 - fade)
+    ends = lfilter([1 - fade], [1.0, -fade], rows, axis=0, zi=fade * rows[:1])[0]
+    begins = np.concatenate([rows[:1], ends[:-1]])
+    return np.asarray(rows + (begins - rows) * mean_share)

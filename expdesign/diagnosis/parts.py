@@ -1,0 +1,159 @@
+"""The terms of an extended model, each with everything that scales it, and what kind of term it is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from expdesign.values import Array
+from expdesign.vessel import Term, VesselModel
+from expdesign.vessel.expressions import Evaluate, Expression, parse_expression
+from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS
+
+Effects = Mapping[str, float]
+AIR = {"u_q", "v_q"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Part:
+    """One term of the extended model with everything that scales it.
+
+    Attributes:
+        equation: u, v or r.
+        evaluate: its regressor.
+        factor: its parameter with all factors, as an acceleration.
+        after: change of the factor after the change point.
+        coriolis, damping, reads_air, reads_turn: what kind of term it is.
+    """
+
+    equation: str
+    evaluate: Evaluate
+    factor: float
+    after: float = 0.0
+    coriolis: bool = False
+    damping: bool = False
+    reads_air: bool = False
+    reads_turn: bool = False
+
+    def after_factor(self, around: Mapping[str, Array]) -> Array:
+        """The change of the factor at every time."""
+        return np.asarray(self.after * around["after"])
+
+
+def own_parts(model: VesselModel, effects: Effects) -> list[Part]:
+    """The model's own terms."""
+
+    def get(key: str) -> float:
+        return effects.get(key, 0.0)
+
+    parts = []
+    for kind, value in zip(_kinds(model), model.parameters.tolist(), strict=True):
+        name, equation = kind.name, kind.equation
+        whole, changed = value + get(f"theta:{name}"), get(f"change:theta:{name}")
+        if kind.thrust:
+            whole *= (1 + get("gain")) * (1.0 if kind.rudder else 1 + get("gain:propeller"))
+            changed += whole * get("change:gain")
+        elif kind.damping:
+            changed += whole * (get("change:damping") + get(f"change:damping_{equation}"))
+        parts.append(
+            Part(
+                equation=equation,
+                evaluate=kind.evaluate,
+                factor=whole / model.time_scale_s,
+                after=changed / model.time_scale_s,
+                coriolis=kind.coriolis,
+                damping=kind.damping,
+                reads_air=kind.air,
+                reads_turn=kind.turn,
+            )
+        )
+    return parts
+
+
+def added_parts(model: VesselModel, library: Mapping[str, Term], effects: Effects) -> list[Part]:
+    """Library terms that were added."""
+    known = (*MOTION_SIGNALS, *dict.fromkeys((*FORCE_SIGNALS, *model.inputs)))
+    parts = []
+    for key, value in effects.items():
+        if key.startswith("term:"):
+            term = library[key[5:]]
+            expression = _parsed(term.expression, known)
+            parts.append(
+                Part(
+                    equation=term.equation,
+                    evaluate=expression.evaluate,
+                    factor=value / model.time_scale_s,
+                    reads_air=bool(AIR & set(expression.signals)),
+                )
+            )
+    return parts
+
+
+@lru_cache(maxsize=512)
+def _parsed(text: str, known: tuple[str, ...]) -> Expression:
+    return parse_expression(text, signals=known)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Kind:
+    """What kind of term it is."""
+
+    name: str
+    equation: str
+    evaluate: Evaluate
+    thrust: bool
+    rudder: bool
+    damping: bool
+    coriolis: bool
+    air: bool
+    turn: bool
+
+
+@lru_cache(maxsize=64)
+def _kinds(model: VesselModel) -> tuple[Kind, ...]:
+    return tuple(
+        Kind(
+            name=term.name,
+            equation=term.equation,
+            evaluate=expression.evaluate,
+            thrust=is_thrust(expression, model),
+            rudder=reads_rudder(expression),
+            damping=is_damping(term, expression, model),
+            coriolis=is_coriolis(term),
+            air=bool(AIR & set(expression.signals)),
+            turn="tau_psi" in expression.signals,
+        )
+        for term, expression in zip(model.terms, model.expressions, strict=True)
+    )
+
+
+def ahead_force(signals: Mapping[str, Array], model: VesselModel) -> Array:
+    """tau_x, of rudder ships n |n| of their propellers."""
+    if any(set(e.signals) & set(FORCE_SIGNALS) for e in model.expressions):
+        return signals["tau_x"]
+    speeds = [signals[name] for name in model.inputs if name.rstrip("0123456789") == "n"]
+    return sum((np.abs(n) * n for n in speeds), np.zeros(1))
+
+
+def is_coriolis(term: Term) -> bool:
+    """X_vr and Y_ur: ratios of inertias, which a change of load nearly keeps."""
+    text = term.expression.replace(" ", "")
+    return (term.equation, text) in {("u", "v*r"), ("u", "r*v"), ("v", "u*r"), ("v", "r*u")}
+
+
+def is_thrust(expression: Expression, model: VesselModel) -> bool:
+    """It reads an input."""
+    return bool(set(expression.signals) & {*FORCE_SIGNALS, *model.inputs})
+
+
+def reads_rudder(expression: Expression) -> bool:
+    """It reads a rudder angle."""
+    return any(name.startswith("rudder") for name in expression.signals)
+
+
+def is_damping(term: Term, expression: Expression, model: VesselModel) -> bool:
+    """It resists: neither an input, nor air, nor Coriolis."""
+    return not (is_thrust(expression, model) or is_coriolis(term) or AIR & set(expression.signals))

@@ -1,0 +1,48 @@
+"""Equations of motion of an extended model."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from expdesign.conventions import OUTPUTS
+from expdesign.diagnosis.extended import Extended
+from expdesign.diagnosis.surroundings import Surroundings
+from expdesign.values import Array
+from expdesign.vessel import NUMPY
+
+
+def rates(ship: Extended, state: tuple[Array, ...], around: Surroundings) -> tuple[Array, ...]:
+    """d/dt of (u, v, r) or (u, v, r, roll, roll rate)."""
+    u, v, r = state[:3]
+    totals = _accelerations(ship, u, v, r, around)
+    if not ship.has_roll:
+        return tuple(totals)
+    roll, roll_rate = state[3:]
+    w0, damping = 2 * np.pi / ship.get("roll:period"), ship.get("roll:damping")
+    side = totals[1] + u * r
+    totals[1] = totals[1] + ship.get("roll:sway") * roll
+    totals[2] = totals[2] + ship.get("roll:yaw") * roll
+    return (*totals, roll_rate, w0**2 * (side - roll) - 2 * damping * w0 * roll_rate)
+
+
+def _accelerations(ship: Extended, u: Array, v: Array, r: Array, around: Surroundings) -> list[Array]:
+    """d/dt (u, v, r) without roll."""
+    signals: dict[str, Array] = {**around, "u": u, "v": v, "r": r}
+    if "u_c" in around:
+        signals["u"], signals["v"] = u - around["u_c"], v - around["v_c"]
+    if "u_w" in around:
+        signals["u_q"], signals["v_q"] = u - around["u_w"], v - around["v_w"]
+    totals = {name: np.zeros_like(u) for name in OUTPUTS}
+    steady = dict(totals)
+    for part in ship.parts:
+        value = part.factor * part.evaluate(signals, NUMPY)
+        if part.after:
+            value = value + part.after_factor(around) * part.evaluate(signals, NUMPY)
+        if part.damping and "shoal" in around:
+            value = value * (1 + ship.get("shallow:damping") * around["shoal"])
+        into = steady if part.coriolis else totals
+        into[part.equation] = into[part.equation] + value
+    if "lean" in around and not any(part.reads_turn for part in ship.parts):
+        totals["r"] = totals["r"] + around["lean"]
+    heavier = 1.0 if "shoal" not in around else 1 + ship.get("shallow:inertia") * around["shoal"]
+    return [totals[n] / ((1 + ship.get(f"inertia:{n}")) * heavier) + steady[n] for n in OUTPUTS]

@@ -1,0 +1,72 @@
+"""What acts on an extended model from outside: inputs, water, air, depth and time."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from expdesign.diagnosis.extended import Extended
+from expdesign.diagnosis.followed import followed_inputs
+from expdesign.diagnosis.parts import ahead_force
+from expdesign.diagnosis.windows import Windows
+from expdesign.values import Array
+from expdesign.vessel import NUMPY, VesselModel, generalised_force
+from expdesign.vessel.structures import FORCE_SIGNALS
+
+
+class Surroundings(dict[str, Array]):
+    """What acts on the ship at the integrator steps (w, k): inputs and forces by signal name, and besides.
+
+    `u_c v_c` water and `u_w v_w` air, their velocity in the b-frame [m/s], where they move;
+    `shoal`, draught over depth, and `after`, one after a change of the ship, where the model has such effects.
+    """
+
+    def at(self, step: int) -> Surroundings:
+        """One integrator step of every window."""
+        return Surroundings({name: values[:, step] for name, values in self.items()})
+
+    def before_last(self) -> Surroundings:
+        """All steps but the last."""
+        return Surroundings({name: values[:, :-1] for name, values in self.items()})
+
+
+def surroundings(ship: Extended, windows: Windows) -> Surroundings:
+    """Everything outside the ship, with the inputs as its actuators follow them."""
+    model, shape = ship.model, windows.heading.shape
+    names = (*dict.fromkeys((*model.inputs, *FORCE_SIGNALS)),)
+    signals = windows.gather(tuple(_acting(model, *rows) for rows in followed_inputs(ship, windows)))
+    table = Surroundings({n: np.broadcast_to(signals[..., i], shape) for i, n in enumerate(names)})
+    if ship.get("asymmetry"):
+        table["tau_psi"] = table["tau_psi"] + ship.get("asymmetry") * ahead_force(table, model)
+        table["lean"] = ship.get("asymmetry") * ahead_force(table, model)
+    north, east = ship.get("current:north"), ship.get("current:east")
+    if north or east:
+        table["u_c"], table["v_c"] = to_body(north, east, windows.heading)
+    if any(part.reads_air for part in ship.parts):
+        table["u_w"], table["v_w"] = _wind(ship, windows)
+    if any(key.startswith("shallow:") for key in ship.effects):
+        table["shoal"] = ship.draught_m / windows.depth_m
+    if "change:time" in ship.effects:
+        table["after"] = (windows.time_s >= ship.effects["change:time"]).astype(float)
+    return table
+
+
+def _acting(model: VesselModel, rows: Array, finer: int) -> Array:
+    """(k, m) inputs and forces, each its mean over the finer steps that it is known at."""
+    table = dict(zip(model.inputs, rows.T, strict=True))
+    forces = generalised_force(model.actuators, table, NUMPY)
+    table |= dict(zip(FORCE_SIGNALS, forces, strict=True))
+    columns = [np.broadcast_to(np.asarray(values, dtype=float), len(rows)) for values in table.values()]
+    return np.asarray(np.stack(columns, axis=-1).reshape(len(rows) // finer, finer, -1).mean(axis=1))
+
+
+def _wind(ship: Extended, windows: Windows) -> tuple[Array, Array]:
+    """Measured where it is, else the mean wind of the model."""
+    if windows.has_wind:
+        return np.nan_to_num(windows.wind[..., 0]), np.nan_to_num(windows.wind[..., 1])
+    return to_body(ship.get("wind:north"), ship.get("wind:east"), windows.heading)
+
+
+def to_body(north: Array | float, east: Array | float, heading: Array) -> tuple[Array, Array]:
+    """An n-frame vector in the b-frame."""
+    c, s = np.cos(heading), np.sin(heading)
+    return north * c + east * s, east * c - north * s
