@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
 import hidden_effects as sea
 import numpy as np
 
@@ -42,56 +45,90 @@ def vessel_of(
     return Vessel(name=ship, length_m=60.0, beam_m=12.0, draught_m=2.5, sample_time_s=sample_time_s, model=model)
 
 
-def hidden_record(
+@dataclass(frozen=True, kw_only=True)
+class Told:
+    """What is hidden in a trial: as in `hidden_effects`, and `factors` of parameters."""
+
+    effects: Mapping[str, float] = field(default_factory=dict)
+    faults: Mapping[str, float] = field(default_factory=dict)
+    factors: Mapping[str, float] = field(default_factory=dict)
+    current: tuple[float, float] = (0.0, 0.0)
+    wind: tuple[float, float] = (0.0, 0.0)
+
+
+def hidden_records(
     ship: str,
+    hidden: Sequence[Told],
     *,
     seed: int,
-    effects: dict[str, float] | None = None,
-    faults: dict[str, float] | None = None,
     relative_std: float = 0.0,
     batches: int = 6,
     samples: int = 300,
-    current: tuple[float, float] = (0.0, 0.0),
     step_s: float = 1.0,
     weather: sea.Weather | None = None,
     manoeuvre: str = "helmsman",
-    factors: dict[str, float] | None = None,
-    wind: tuple[float, float] = (0.0, 0.0),
     shoaling: bool = False,
-) -> Record:
-    """A trial with an effect hidden in it; parameters are drawn around the model's by their standard deviations.
+) -> list[Record]:
+    """A trial for each of what is hidden, otherwise the same; parameters are drawn around the model's.
 
     Args:
-        ship, seed, effects, faults, batches, samples, current, step_s, weather, wind: as in `hidden_effects`.
+        ship, seed, batches, samples, step_s, weather: as in `hidden_effects`.
+        hidden: what.
         relative_std: of every parameter.
         manoeuvre: of `hidden_effects.MANOEUVRES`.
-        factors: of single parameters, beside what is drawn.
         shoaling: the depth varies along the track and is recorded.
     """
     rng = np.random.default_rng(seed)
     drawn = {name: value * (1 + relative_std * rng.standard_normal()) for name, value in sea.SHIPS[ship].items()}
-    drawn |= {name: drawn[name] * factor for name, factor in (factors or {}).items()}
-    trial = sea.Trial(ship=ship, parameters=drawn, effects=effects or {}, current=current, wind=wind)
-    orders = sea.MANOEUVRES[manoeuvre](ship, batches, samples, step_s, rng)[None]
-    depth = sea.depths(batches, samples, step_s, rng) if shoaling else None
-    true = sea.sail([trial], orders, step_s, weather or sea.Weather(), rng, None if depth is None else depth[None])
-    told = {name: values[0] for name, values in sea.measure(true, step_s, sea.Sensors(), rng, [faults or {}]).items()}
-
-    def stacked(number: int, *names: str) -> np.ndarray:
-        return np.column_stack([told[name][number] for name in names])
-
-    return Record(
-        batches=tuple(
-            Batch(
-                name=f"run {number}",
-                sample_time_s=step_s,
-                input_names=sea.INPUTS[ship],
-                inputs=orders[0, number],
-                velocity=stacked(number, "u_mps", "v_mps", "r_radps"),
-                pose=stacked(number, "north_m", "east_m", "heading_rad"),
-                wind=stacked(number, "wind_u_mps", "wind_v_mps"),
-                depth_m=None if depth is None else depth[number],
-            )
-            for number in range(batches)
+    trials = [
+        sea.Trial(
+            ship=ship, effects=dict(one.effects), current=one.current, wind=one.wind,
+            parameters=drawn | {name: drawn[name] * factor for name, factor in one.factors.items()},
         )
-    )
+        for one in hidden
+    ]  # fmt: skip
+    orders = sea.MANOEUVRES[manoeuvre](ship, batches, samples, step_s, rng)
+    depth = sea.depths(batches, samples, step_s, rng) if shoaling else None
+    shape = (len(trials), batches, samples)
+    true = sea.sail(
+        trials, np.broadcast_to(orders, (*shape, orders.shape[-1])), step_s, weather or sea.Weather(), rng,
+        None if depth is None else np.broadcast_to(depth, shape),
+    )  # fmt: skip
+    told = sea.measure(true, step_s, sea.Sensors(), rng, [dict(one.faults) for one in hidden])
+
+    def stacked(trial: int, number: int, *names: str) -> np.ndarray:
+        return np.column_stack([told[name][trial, number] for name in names])
+
+    return [
+        Record(
+            batches=tuple(
+                Batch(
+                    name=f"run {number}",
+                    sample_time_s=step_s,
+                    input_names=sea.INPUTS[ship],
+                    inputs=orders[number],
+                    velocity=stacked(trial, number, "u_mps", "v_mps", "r_radps"),
+                    pose=stacked(trial, number, "north_m", "east_m", "heading_rad"),
+                    wind=stacked(trial, number, "wind_u_mps", "wind_v_mps"),
+                    depth_m=None if depth is None else depth[number],
+                )
+                for number in range(batches)
+            )
+        )
+        for trial in range(len(trials))
+    ]
+
+
+def hidden_record(
+    ship: str,
+    *,
+    effects: dict[str, float] | None = None,
+    faults: dict[str, float] | None = None,
+    factors: dict[str, float] | None = None,
+    current: tuple[float, float] = (0.0, 0.0),
+    wind: tuple[float, float] = (0.0, 0.0),
+    **options,
+) -> Record:
+    """One trial of `hidden_records`."""
+    one = Told(effects=effects or {}, faults=faults or {}, factors=factors or {}, current=current, wind=wind)
+    return hidden_records(ship, [one], **options)[0]

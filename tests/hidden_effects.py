@@ -1,8 +1,8 @@
 """Trials with an effect hidden in them, from a simulator of its own: nothing of the package makes this data.
 
 Ships are written out as equations, integrated by Runge-Kutta at a fifth of the sample time, in current and wind that
-vary as Gauss-Markov processes, and measured with white noise. All trials of a call are sailed side by side; every
-effect is neutral unless a trial sets it.
+vary as Gauss-Markov processes, and measured with white noise. All trials of a call are sailed side by side in the same
+weather, from the same state, and measured with the same noise; every effect is neutral unless a trial sets it.
 """
 
 from __future__ import annotations
@@ -122,24 +122,26 @@ def sail(trials: list[Trial], orders: np.ndarray, step_s: float, weather: Weathe
         depth: (n, b, k) water depth, or None for deep water.
 
     Effects: gain, kappa, asymmetry (yaw moment per ahead force), angle_offset (all azimuths or the rudder), lag_s,
-    delay_s, deadband (of the first input of every actuator), load_u load_v load_r, shallow_damping shallow_inertia
+    delay_s, deadband, load_u load_v load_r, shallow_damping shallow_inertia
     (times draught/depth, draught 2.5 m), roll_period_s roll_damping roll_sway roll_yaw, change_s (batches laid end to
-    end) with change_gain change_damping, and any name of TERMS. lag, delay and deadband act on the inputs named by
-    `acts_on` (bit mask).
+    end) with change_gain change_damping, and any name of TERMS. lag and delay act on the inputs named by `acts_on`,
+    the dead band on those named by `dead_on` (bit masks).
     """
     ship = trials[0].ship
     n, b, k, m = orders.shape
     e = {name: np.array([t.effects.get(name, 0.0) for t in trials])[:, None] for name in EFFECTS}
     th = {name: np.array([t.parameters[name] for t in trials])[:, None] for name in SHIPS[ship]}
-    acts = e["acts_on"].astype(int)
-    mask = np.stack([(acts >> j) & 1 for j in range(m)], axis=-1).astype(bool)  # (n, 1, m)
+    mask, small = (  # (n, 1, m)
+        np.stack([(e[name].astype(int) >> j) & 1 for j in range(m)], axis=-1).astype(bool)
+        for name in ("acts_on", "dead_on")
+    )
     h = step_s / SUBSTEPS
     mean_c = np.array([t.current for t in trials]).T[:, :, None]
     mean_w = np.array([t.wind for t in trials]).T[:, :, None]
-    vary_c, vary_w = (rng.standard_normal((2, n, b)) * s for s in (weather.current_std, weather.wind_std))
+    vary_c, vary_w = (rng.standard_normal((2, 1, b)) * s for s in (weather.current_std, weather.wind_std))
     fade_c, fade_w = np.exp(-h / weather.current_time_s), np.exp(-h / weather.wind_time_s)
-    psi0 = rng.uniform(-np.pi, np.pi, (n, b))
-    u0 = {"tug": 1.8, "barge": 1.9, "coaster": 3.0}[ship] * rng.uniform(0.7, 1.1, (n, b))
+    psi0 = rng.uniform(-np.pi, np.pi, (1, b)) * np.ones((n, 1))
+    u0 = {"tug": 1.8, "barge": 1.9, "coaster": 3.0}[ship] * rng.uniform(0.7, 1.1, (1, b)) * np.ones((n, 1))
     x = np.stack([np.zeros((n, b)), np.zeros((n, b)), psi0, u0, np.zeros((n, b)), np.zeros((n, b)),
                   np.zeros((n, b)), np.zeros((n, b))])  # fmt: skip
     held = orders[:, :, 0].copy()
@@ -151,7 +153,7 @@ def sail(trials: list[Trial], orders: np.ndarray, step_s: float, weather: Weathe
             late = np.where(mask, e["delay_s"][..., None], 0.0) * np.ones((n, b, 1))
             index = np.clip(np.floor((t - late + 1e-9) / step_s).astype(int), 0, k - 1)
             order = orders[rows[0], rows[1], index, rows[2]]
-            order = np.where(mask & (np.abs(order) < e["deadband"][..., None]), 0.0, order)
+            order = np.where(small & (np.abs(order) < e["deadband"][..., None]), 0.0, order)
             lag = np.where(mask, e["lag_s"][..., None], 0.0)
             fade = np.where(lag > 0, np.exp(-h / np.maximum(lag, 1e-9)), 0.0)
             middle = np.where(lag > 0, np.exp(-h / 2 / np.maximum(lag, 1e-9)), 0.0)
@@ -175,14 +177,14 @@ def sail(trials: list[Trial], orders: np.ndarray, step_s: float, weather: Weathe
             k2 = rates(x + h / 2 * k1)
             k3 = rates(x + h / 2 * k2)
             x = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + rates(x + h * k3))
-            vary_c = fade_c * vary_c + weather.current_std * np.sqrt(1 - fade_c**2) * rng.standard_normal((2, n, b))
-            vary_w = fade_w * vary_w + weather.wind_std * np.sqrt(1 - fade_w**2) * rng.standard_normal((2, n, b))
+            vary_c = fade_c * vary_c + weather.current_std * np.sqrt(1 - fade_c**2) * rng.standard_normal((2, 1, b))
+            vary_w = fade_w * vary_w + weather.wind_std * np.sqrt(1 - fade_w**2) * rng.standard_normal((2, 1, b))
     return out
 
 
 EFFECTS = (
-    "gain", "kappa", "asymmetry", "angle_offset", "lag_s", "delay_s", "deadband", "acts_on", "load_u", "load_v",
-    "load_r", "shallow_damping", "shallow_inertia", "roll_period_s", "roll_damping", "roll_sway", "roll_yaw",
+    "gain", "kappa", "asymmetry", "angle_offset", "lag_s", "delay_s", "deadband", "acts_on", "dead_on", "load_u",
+    "load_v", "load_r", "shallow_damping", "shallow_inertia", "roll_period_s", "roll_damping", "roll_sway", "roll_yaw",
     "change_s", "change_gain", "change_damping", *(name for name in TERMS),
 )  # fmt: skip
 
@@ -248,7 +250,7 @@ def measure(true: dict[str, np.ndarray], step_s: float, sensors: Sensors, rng: n
         return np.array([fault.get(name, 0.0) for fault in faults])[:, None, None]
 
     def noisy(values: np.ndarray, std: float) -> np.ndarray:
-        return values + std * rng.standard_normal(values.shape)
+        return values + std * rng.standard_normal((1, *values.shape[1:]))
 
     lever = of("lever_m")
     u, v, r = true["u"], true["v"] + lever * true["r"], true["r"]

@@ -22,6 +22,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -30,14 +31,14 @@ from joblib import Parallel, delayed
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 import hidden_effects as sea
-from diagnosis_case import hidden_record, vessel_of
+from diagnosis_case import Told, hidden_records, vessel_of
 
 from expdesign.diagnosis import CAUSES, diagnose
-from expdesign.diagnosis.accuracy import accuracy, first_states
+from expdesign.diagnosis.accuracy import WHOLE_S, first_states, pooled_fit, simulate_from_first
 from expdesign.diagnosis.candidate import Situation
 from expdesign.diagnosis.extension import as_extended
-from expdesign.diagnosis.joint import fit
 from expdesign.diagnosis.screening import screen
+from expdesign.diagnosis.search import settled
 from expdesign.diagnosis.windows import cut_windows
 from expdesign.signals import Record
 from expdesign.vessel import Vessel
@@ -63,9 +64,15 @@ class Hidden:
     without: tuple[str, ...] = ()
     truth: tuple[str, float] | None = None
 
+    def told(self) -> Told:
+        """For the generator."""
+        return Told(
+            effects=self.effects, faults=self.faults, factors=self.factors, current=self.current, wind=self.wind
+        )
+
     def scaled(self, by: float) -> Hidden:
         """The same, larger."""
-        fixed = ("acts_on", "roll_period_s", "roll_damping", "change_s")
+        fixed = ("acts_on", "dead_on", "roll_period_s", "roll_damping", "change_s")
         truth = self.truth
         if truth is not None and truth[0].startswith("delay"):
             by = _on_substeps(truth[1] * by) / truth[1]
@@ -128,7 +135,7 @@ def drawn_effect(cause: str, ship: str, rng: np.random.Generator, length_s: floa
                       truth=(f"{kind}_all_s", late))  # fmt: skip
     if cause == "actuator_deadband":
         which, width = {"tug": (0b1010, 0.2), "barge": (0b100, 12.0), "coaster": (0b10, 0.15)}[ship]
-        return Hidden(cause=cause, effects={"deadband": width * size, "acts_on": which})
+        return Hidden(cause=cause, effects={"deadband": width * size, "dead_on": which})
     if cause == "thruster_asymmetry":
         if ship == "barge":
             return Hidden(cause=cause, effects={"asymmetry": 0.6 * sign * size},
@@ -188,12 +195,11 @@ class Case:
     batches: int
     samples: int
 
-    def record(self, hidden: Hidden, relative_std: float = 0.0) -> Record:
-        """Data."""
-        return hidden_record(
-            self.ship, seed=self.seed, effects=hidden.effects, faults=hidden.faults, factors=hidden.factors,
-            current=hidden.current, wind=hidden.wind, shoaling=hidden.shoaling, relative_std=relative_std,
-            batches=self.batches, samples=self.samples, manoeuvre=self.manoeuvre,
+    def records(self, hidden: Sequence[Hidden], relative_std: float = 0.0) -> list[Record]:
+        """Data of trials that differ in what is hidden, all shoaling or none."""
+        return hidden_records(
+            self.ship, [one.told() for one in hidden], seed=self.seed, shoaling=hidden[0].shoaling,
+            relative_std=relative_std, batches=self.batches, samples=self.samples, manoeuvre=self.manoeuvre,
         )  # fmt: skip
 
     def vessel(self, hidden: Hidden, relative_std: float = 0.0) -> Vessel:
@@ -210,36 +216,48 @@ def drawn_case(ship: str, seed: int, rng: np.random.Generator) -> Case:
     )  # fmt: skip
 
 
-def mean_fit(case: Case, hidden: Hidden) -> float:
-    """Of the model that knows the generator's own parameters, over u, v, r [%]."""
-    vessel, record = case.vessel(hidden), case.record(hidden)
-    return float(np.clip(accuracy(as_extended(vessel, record), record).fit, -100, 100).mean())
+def mean_fits(vessel: Vessel, records: Sequence[Record]) -> list[float]:
+    """Of a model on each of the records, over u, v, r [%]; simulated as one record of many runs."""
+    joined = Record(batches=tuple(batch for record in records for batch in record.batches))
+    ship = as_extended(vessel, joined)
+    windows = cut_windows(ship.model, joined, longest_s=WHOLE_S)
+    motion = simulate_from_first(ship, windows)
+    parts = zip(*(np.split(item[..., :3], len(records)) for item in (motion.error, windows.measured)), strict=True)
+    return [float(np.clip(pooled_fit(error, measured), -100, 100).mean()) for error, measured in parts]
 
 
-def large_enough(case: Case, hidden: Hidden) -> tuple[Hidden, float]:
-    """The effect, enlarged until it costs what is asked; small ones may stay smaller, and then say so."""
-    clean = mean_fit(case, Hidden(cause="none", shoaling=hidden.shoaling))
+def large_enough(case: Case, hidden: Hidden) -> tuple[Hidden, float, Record]:
+    """The effect, enlarged until it costs what is asked, what it costs, and data of known parameters with it.
+
+    Small ones may stay smaller, and then say so.
+    """
+    sizes = [hidden]
     for _ in range(MOST_GROWTHS):
-        lost = clean - mean_fit(case, hidden)
-        if lost >= LEAST_POINTS:
-            break
-        hidden = hidden.scaled(GROWTH)
-    return hidden, lost
+        sizes.append(sizes[-1].scaled(GROWTH))
+    none = Hidden(cause="none", shoaling=hidden.shoaling)
+    calm, *records = case.records([none, *sizes])
+    (clean,) = mean_fits(case.vessel(none), [calm])
+    lost = [clean - fit for fit in mean_fits(case.vessel(hidden), records)]
+    chosen = next((index for index, points in enumerate(lost) if points >= LEAST_POINTS), MOST_GROWTHS)
+    return sizes[chosen], lost[chosen], records[chosen]
 
 
-def oracle(case: Case, hidden: Hidden, relative_std: float) -> float:
+def oracle(vessel: Vessel, record: Record, cause_name: str) -> float:
     """Smallest p of the true cause's candidates, times their number, beside the nuisance alone."""
-    record, vessel = case.record(hidden, relative_std), case.vessel(hidden, relative_std)
     ship = as_extended(vessel, record)
     windows = cut_windows(ship.model, record)
-    base = fit(ship, windows, (), starts=first_states(windows), steps=3)
+    base = settled(ship, windows, first_states(windows))
     situation = Situation(ship=ship, windows=windows)
-    mine = [
-        item for cause in CAUSES for item in cause.candidates(situation)
-        if item.cause == hidden.cause and (hidden.cause != "actuator_deadband" or item.finite)
-    ]  # fmt: skip
-    scored = screen(base, mine).scored
-    return min((item.p_value for item in scored), default=1.0) * max(1, len(scored)) if mine else float("nan")
+    mine = [item for cause in CAUSES for item in cause.candidates(situation) if item.cause == cause_name]
+    found = screen(base, mine, np.random.default_rng(0))
+    return min((item.p_value for item in found.scored), default=1.0) * found.tests if mine else float("nan")
+
+
+def another(case: Case, hidden: Hidden, rng: np.random.Generator) -> Hidden:
+    """A second effect that costs as much by itself."""
+    names = [n for n in NAMES if n not in (hidden.cause.split(":")[0], "wind", "thrust_advance_loss", "change_point")]
+    other = drawn_effect(str(rng.choice(names)), case.ship, rng, case.batches * float(case.samples))
+    return large_enough(case, other)[0]
 
 
 def tried(part: str, number: int, seed: int, only: str | None = None) -> dict[str, object]:
@@ -251,21 +269,22 @@ def tried(part: str, number: int, seed: int, only: str | None = None) -> dict[st
     case = drawn_case(ship, int(whole.generate_state(1)[0]), rng)
     uncertain = part == "uncertain" or (part == "clean" and number % 2 == 1)
     std = 0.1 if uncertain else 0.0
-    hidden, lost = Hidden(cause="none"), 0.0
+    hidden, lost, record = Hidden(cause="none"), 0.0, None
     if part != "clean":
-        hidden, lost = large_enough(case, drawn_effect(name, ship, rng, case.batches * float(case.samples)))
+        hidden, lost, record = large_enough(case, drawn_effect(name, ship, rng, case.batches * float(case.samples)))
     if part == "pairs":
-        others = [n for n in NAMES if n not in (name, "wind", "thrust_advance_loss", "change_point")]
-        other = drawn_effect(str(rng.choice(others)), ship, rng, case.batches * float(case.samples))
-        hidden = hidden.with_another(large_enough(case, other)[0])
+        hidden, record = hidden.with_another(another(case, hidden, rng)), None
     if part == "power":
-        hidden = hidden.scaled(float(10 ** rng.uniform(-2, -1)))
+        hidden, record = hidden.scaled(float(10 ** rng.uniform(-2, -1))), None
+    if record is None or std:
+        (record,) = case.records([hidden], std)
     row: dict[str, object] = {
-        "part": part, "number": number, "cause": hidden.cause, "ship": ship, "manoeuvre": case.manoeuvre,
-        "std": std, "lost": lost, "truth": hidden.truth, "effects": hidden.effects | hidden.faults | hidden.factors,
+        "part": part, "number": number, "seed": seed, "cause": hidden.cause, "ship": ship, "std": std, "lost": lost,
+        "manoeuvre": case.manoeuvre, "truth": hidden.truth,
+        "effects": hidden.effects | hidden.faults | hidden.factors,
     }  # fmt: skip
     try:
-        found = diagnose(case.vessel(hidden, std), case.record(hidden, std), seed=number)
+        found = diagnose(case.vessel(hidden, std), record, seed=number)
     except Exception as error:  # a crash is a result of the campaign, not its end
         return row | {"crash": f"{type(error).__name__}: {error}", "findings": [], "oracle": float("nan")}
     row["findings"] = [
@@ -275,7 +294,9 @@ def tried(part: str, number: int, seed: int, only: str | None = None) -> dict[st
         }
         for item in found.findings
     ]  # fmt: skip
-    row["oracle"] = float("nan") if part in ("clean", "pairs") else oracle(case, hidden, std)
+    row["oracle"] = (
+        float("nan") if part in ("clean", "pairs") else oracle(case.vessel(hidden, std), record, hidden.cause)
+    )
     return row
 
 
