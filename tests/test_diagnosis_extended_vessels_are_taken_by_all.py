@@ -9,7 +9,8 @@ from diagnosis_case import hidden_record, vessel_of
 
 from expdesign.diagnosis import CAUSES, Estimated, Finding
 from expdesign.diagnosis import diagnose as diagnose_record
-from expdesign.diagnosis.causes.shallow_water import in_deep_water, in_shallow_water
+from expdesign.diagnosis.accuracy import accuracy
+from expdesign.diagnosis.causes.shallow_water import in_shallow_water
 from expdesign.diagnosis.extension import as_extended, extend
 from expdesign.diagnosis.rates import rates
 from expdesign.diagnosis.surroundings import Surroundings
@@ -18,15 +19,13 @@ from expdesign.dictionary.build import family
 from expdesign.dictionary.spec import complete_settings
 from expdesign.estimation.methods import Settings, estimate
 from expdesign.estimation.replay import Integration, simulate_batch
-from expdesign.estimation.tables import model_for
+from expdesign.estimation.tables import model_for, with_depth
 from expdesign.export import vessel_toml
 from expdesign.export.diagnosis_page import diagnosis_html, extended_vessel
 from expdesign.information import score_primitives
 from expdesign.scenario import load_vessel
 from expdesign.signals import Record
 from expdesign.vessel import NUMPY, Limit
-from expdesign.workflows.after import with_depth
-from expdesign.workflows.diagnosed import carrying_depth, deep
 
 EFFECTS = {
     "parameters": {"theta:Y_v": -0.01},
@@ -48,7 +47,7 @@ EFFECTS = {
     "roll_coupling": {"roll:sway": 0.1, "roll:yaw": 0.01, "roll:period": 8.0, "roll:damping": 0.08},
     "change_point": {"change:time": 300.0, "change:gain": -0.2},
 }
-GROWTH = {"damping_growth": 0.8, "inertia_growth": 0.4}
+GROWTH = {"damping": 0.8, "inertia": 0.4}
 FREE = vessel_of("tug")
 BOUNDED = tuple(replace(one, limits=(Limit(low=-20.0, high=20.0), Limit())) for one in FREE.actuators)
 TUG = replace(FREE, model=replace(FREE.model, actuators=BOUNDED))
@@ -86,8 +85,7 @@ def as_found(clean, cause: str):
     """A diagnosis that found one cause, put together as `diagnose` does it."""
     final = as_extended(TUG, clean.record).having(EFFECTS[cause])
     extended, missing = extend(TUG, final, {})
-    found = replace(clean, extended=extended, findings=(finding(cause),), notes=missing)
-    return carrying_depth(found, TUG), final
+    return replace(clean, extended=extended, findings=(finding(cause),), notes=missing), final
 
 
 def test_every_cause_of_the_catalogue_is_tried():
@@ -116,9 +114,9 @@ def test_the_written_dependence_on_depth_is_the_one_found(clean):
     shoal = rng.uniform(0.0, TUG.draught_m / 4.0, 40)
     own = final.model.signals(velocity, velocity[:2], inputs, NUMPY)
     around = Surroundings({n: np.broadcast_to(x, 40) for n, x in own.items() if n not in ("u", "v", "r", "h")})
-    around["shoal"] = shoal
+    around["h"] = shoal
     wanted = rates(final, tuple(velocity), around)
-    record = with_depth(clean.record, found.extended)
+    record = with_depth(clean.record, found.extended.draught_m)
     driven = model_for(found.extended.model, record)
     given = driven.accelerations(velocity, velocity[:2], [*inputs, shoal])
     _, error = in_shallow_water(TUG.model, GROWTH, reach=TUG.draught_m / 4.0, known=TUG.model)
@@ -129,17 +127,14 @@ def test_deep_water_is_draught_over_depth_zero():
     model, error = in_shallow_water(TUG.model, GROWTH, reach=0.6, known=TUG.model)
     state = ((1.0, 0.2, 0.05), (2.0, -1.0), (5.0, 0.3, 4.0, -0.2))
     np.testing.assert_array_equal(model.accelerations(*state), TUG.model.accelerations(*state))
-    np.testing.assert_array_equal(in_deep_water(model).accelerations(*state), TUG.model.accelerations(*state))
-    assert in_deep_water(model).terms == TUG.model.terms
     assert model.reads_depth
-    assert not in_deep_water(model).reads_depth
     assert error < 2e-3
 
 
 def test_estimates_read_the_measured_depth():
     """Noise-free motion of a model that reads depth, simulated over its depths, gives its parameters back."""
     model, _ = in_shallow_water(TUG.model, GROWTH, reach=0.6, known=TUG.model)
-    record = with_depth(shoaling(), replace(TUG, model=model))
+    record = with_depth(shoaling(), TUG.draught_m)
     how = Integration("rk4", 4)
     batches = tuple(
         replace(batch, velocity=simulate_batch(model, batch, integration=how).velocity) for batch in record.batches
@@ -153,11 +148,27 @@ def test_estimates_read_the_measured_depth():
     assert np.abs(blind.values / truth - 1).max() > 0.05
 
 
-def test_without_a_finding_the_dependence_of_the_file_is_kept(clean):
+def test_a_dependence_on_depth_counts_as_known_however_the_depth_is_recorded():
+    """Python or command line: draught over depth among the inputs, or only the depth beside them."""
     model, _ = in_shallow_water(TUG.model, GROWTH, reach=0.6, known=TUG.model)
-    ship = replace(TUG, model=model)
-    found = replace(clean, extended=deep(ship), findings=())
-    assert carrying_depth(found, ship).extended.model.terms == model.terms
+    ship, record = replace(TUG, model=model), shoaling()
+    plain, beside = (as_extended(ship, data) for data in (record, with_depth(record, TUG.draught_m)))
+    assert plain.model.inputs == beside.model.inputs == TUG.model.inputs
+    found = accuracy(plain, record), accuracy(beside, with_depth(record, TUG.draught_m))
+    np.testing.assert_array_equal(found[0].rmse, found[1].rmse)
+    assert np.abs(found[0].rmse / accuracy(as_extended(TUG, record), record).rmse - 1).max() > 0.05
+    extended, _ = extend(ship, plain, {})
+    assert extended.model.terms == model.terms
+
+
+def test_growth_found_beyond_that_of_the_file_multiplies_it():
+    model, _ = in_shallow_water(TUG.model, {"damping": 0.5}, reach=0.6, known=TUG.model)
+    more, _ = in_shallow_water(model, {"damping": 0.4}, reach=0.6, known=model)
+    before, after = (dict(zip(item.names, item.terms, strict=True))["Y_v"].expression for item in (model, more))
+    assert (before, after) == ("(v)*(1 + 0.5*h)", "(v)*(1 + 0.9*h + 0.2*h*h)")
+    state = (1.0, 0.2, 0.05), (2.0, -1.0), (5.0, 0.3, 4.0, -0.2)
+    deep = [dict(zip(item.names, item.regressors(*state), strict=True))["Y_v"] for item in (TUG.model, more)]
+    assert deep[0] == deep[1]
 
 
 def test_the_page_of_a_lost_simulation_shows_no_astronomic_numbers(clean):

@@ -16,6 +16,9 @@ from expdesign.values import Array
 FIRST = 5
 HORIZONS_S = (2.0, 5.0, 10.0, 30.0, 60.0, 120.0, 300.0)
 WHOLE_S = 1e9
+MOST_SPREADS = 10.0
+"""Errors beyond so many standard deviations of what is measured count as that large: the simulation is lost, and by how
+much says nothing."""
 
 
 def first_states(windows: Windows, states: int = 3) -> Array:
@@ -48,15 +51,15 @@ def accuracy(ship: Extended, record: Record) -> Accuracy:
     columns = [OUTPUTS.index(name) for name in outputs]
     windows = cut_windows(ship.model, record, longest_s=WHOLE_S)
     motion = simulate_from_first(ship, windows)
-    error, measured = motion.error[..., columns], windows.measured[..., columns]
-    flat = measured.reshape(-1, len(columns))
-    shown = (measured - error).reshape(-1, len(columns))
+    measured = windows.measured[..., columns]
+    error = bounded(motion.error[..., columns], measured)
+    flat = error.reshape(-1, len(columns))
     horizons, growth = _growth(ship, record, columns)
     return Accuracy(
         outputs=outputs,
         fit=pooled_fit(error, measured),
-        rmse=np.sqrt(np.nanmean((flat - shown) ** 2, axis=0)),
-        bias=np.nanmean(flat - shown, axis=0),
+        rmse=np.sqrt(np.nanmean(flat**2, axis=0)),
+        bias=np.nanmean(flat, axis=0),
         horizons_s=horizons,
         growth=growth,
         per_batch=np.stack([fit_percent(m, m - e) for m, e in zip(measured, error, strict=True)]),
@@ -74,8 +77,18 @@ def sums(error: Array, measured: Array) -> tuple[Array, Array]:
     """(w, n) squared error and squared deviation from the mean of every window."""
     seen = np.isfinite(measured)
     mean = np.where(seen, measured, 0).sum(axis=1, keepdims=True) / np.maximum(seen.sum(axis=1, keepdims=True), 1)
-    lost = np.where(seen, np.clip(error, -1e6, 1e6) ** 2, 0.0).sum(axis=1)
+    lost = np.where(seen, bounded(error, measured) ** 2, 0.0).sum(axis=1)
     return lost, np.where(seen, (measured - mean) ** 2, 0.0).sum(axis=1)
+
+
+def bounded(error: Array, measured: Array) -> Array:
+    """Errors (w, s, n) no larger than `MOST_SPREADS` standard deviations of what is measured."""
+    seen = np.isfinite(measured)
+    count = np.maximum(seen.sum(axis=(0, 1)), 1)
+    mean = np.where(seen, measured, 0.0).sum(axis=(0, 1)) / count
+    spread = np.sqrt(np.where(seen, (measured - mean) ** 2, 0.0).sum(axis=(0, 1)) / count)
+    most = np.where(spread > 0, MOST_SPREADS * spread, np.inf)
+    return np.asarray(np.clip(error, -most, most))
 
 
 def _growth(ship: Extended, record: Record, columns: list[int]) -> tuple[Array, Array]:
@@ -87,8 +100,8 @@ def _growth(ship: Extended, record: Record, columns: list[int]) -> tuple[Array, 
         windows = cut_windows(ship.model, record, longest_s=horizon)
         if windows.measured.shape[1] < 4:
             continue
-        error = simulate_from_first(ship, windows).error[..., columns]
+        error = bounded(simulate_from_first(ship, windows).error[..., columns], windows.measured[..., columns])
         last = error[:, -max(1, error.shape[1] // 5) :]
-        rows.append(np.sqrt(np.nanmean(np.clip(last, -1e6, 1e6) ** 2, axis=(0, 1))))
+        rows.append(np.sqrt(np.nanmean(last**2, axis=(0, 1))))
         horizons.append(horizon)
     return np.array(horizons), np.array(rows).reshape(len(horizons), len(columns))

@@ -38,12 +38,14 @@ class Extended:
         model: driven by the recorded inputs.
         library: terms that the model lacks, by name.
         draught_m: of the ship [m].
+        shoalest: largest draught over depth in the data, 0 where no depth is known.
         effects: key -> value; what is left out is zero.
     """
 
     model: VesselModel
     library: Mapping[str, Term]
     draught_m: float
+    shoalest: float = 0.0
     effects: Effects = field(default_factory=dict)
     parts: tuple[Part, ...] = field(init=False, repr=False)
 

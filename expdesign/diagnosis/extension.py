@@ -9,19 +9,26 @@ from dataclasses import replace
 import numpy as np
 
 from expdesign.diagnosis.causes.missing_term import library
+from expdesign.diagnosis.causes.shallow_water import in_shallow_water
 from expdesign.diagnosis.extended import Extended
 from expdesign.diagnosis.followed import members
 from expdesign.diagnosis.parts import is_coriolis, is_thrust, reads_rudder
+from expdesign.errors import InputError
 from expdesign.estimation.tables import model_for
-from expdesign.signals import Record
+from expdesign.signals import Batch, Record
 from expdesign.vessel import Actuator, Mounting, Response, Sensors, Term, Vessel, VesselModel
+from expdesign.vessel.structures import SHOAL
 
 RESPONSES = {"lag": "lag_s", "delay": "delay_s", "deadband": "deadband", "offset": "offset"}
 
 
 def as_extended(vessel: Vessel, record: Record) -> Extended:
-    """The model in use, with the actuators, sensors and weather that its file states."""
-    model = model_for(vessel.model, record)
+    """The model in use, with the actuators, sensors and weather that its file states.
+
+    Raises:
+        InputError: draught over depth is an input of the record, but no depth is recorded.
+    """
+    model, shoalest = _driven(vessel, record)
     effects: dict[str, float] = {}
     for actuator in model.actuators:
         for signal, response in zip(actuator.signals, actuator.responses, strict=True):
@@ -43,7 +50,22 @@ def as_extended(vessel: Vessel, record: Record) -> Extended:
     for name, flow in (("current", weather.current_to), ("wind", weather.wind_to)):
         effects |= {f"{name}:north": float(flow[0]), f"{name}:east": float(flow[1])}
     known = {key: value for key, value in effects.items() if value}
-    return Extended(model=model, library=library(model), draught_m=vessel.draught_m, effects=known)
+    return Extended(model=model, library=library(model), draught_m=vessel.draught_m, shoalest=shoalest, effects=known)
+
+
+def _driven(vessel: Vessel, record: Record) -> tuple[VesselModel, float]:
+    """The model driven by the recorded inputs, and the largest draught over depth; depth is no input here."""
+    model = model_for(vessel.model, record)
+    depths = [batch.depth_m for batch in record.batches if batch.depth_m is not None]
+    if SHOAL in model.inputs and not depths and any(batch.inputs[:, _shoal(batch)].any() for batch in record.batches):
+        raise InputError(f"the record has {SHOAL}, draught over depth, among its inputs, expected depth_m beside them")
+    actuators = tuple(actuator for actuator in model.actuators if actuator.kind != "depth")
+    shoalest = float(np.nan_to_num(vessel.draught_m / np.concatenate(depths)).max()) if depths else 0.0
+    return replace(model, actuators=actuators) if SHOAL in model.inputs else model, shoalest
+
+
+def _shoal(batch: Batch) -> int:
+    return batch.input_names.index(SHOAL)
 
 
 def extend(vessel: Vessel, ship: Extended, std: Mapping[str, float]) -> tuple[Vessel, tuple[str, ...]]:
@@ -104,8 +126,6 @@ def _model(model: VesselModel, ship: Extended, std: Mapping[str, float]) -> tupl
         values.append(lean[1])
         stds.append(0.0)
     missing = []
-    if any(key.startswith("shallow:") for key in ship.effects):
-        missing.append("The dependence on depth is not in the vessel file, which describes deep water.")
     if ship.has_roll:
         missing.append("The roll mode is not in the vessel file, which has three degrees of freedom.")
     if "change:time" in ship.effects:
@@ -113,7 +133,21 @@ def _model(model: VesselModel, ship: Extended, std: Mapping[str, float]) -> tupl
     extended = replace(
         model, terms=tuple(terms), parameters=np.array(values, dtype=float), parameter_std=np.array(stds, dtype=float)
     )
-    return extended, tuple(missing)
+    extended, depths = _depths(extended, model, ship)
+    return extended, (*missing, *depths)
+
+
+def _depths(extended: VesselModel, known: VesselModel, ship: Extended) -> tuple[VesselModel, tuple[str, ...]]:
+    """The model with the dependence on depth that was found, and how far it holds."""
+    growth = {key.split(":")[1]: value for key, value in ship.effects.items() if key.startswith("shallow:")}
+    if not growth:
+        return extended, ()
+    deeper, error = in_shallow_water(extended, growth, reach=ship.shoalest, known=known)
+    rough = f"; its factors are polynomials, at most {100 * error:.1g} % off." if error > 1e-4 else "."
+    return deeper, (
+        f"The dependence on depth holds for draught over depth up to {ship.shoalest:.2f}, the shallowest in the data"
+        + rough,
+    )
 
 
 def _lean(model: VesselModel, ship: Extended) -> tuple[Term, float] | None:

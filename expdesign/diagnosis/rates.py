@@ -9,6 +9,7 @@ from expdesign.diagnosis.extended import Extended
 from expdesign.diagnosis.surroundings import Surroundings
 from expdesign.values import Array
 from expdesign.vessel import NUMPY
+from expdesign.vessel.structures import SHOAL
 
 
 def rates(ship: Extended, state: tuple[Array, ...], around: Surroundings) -> tuple[Array, ...]:
@@ -38,11 +39,11 @@ def _accelerations(ship: Extended, u: Array, v: Array, r: Array, around: Surroun
         value = part.factor * part.evaluate(signals, NUMPY)
         if part.after:
             value = value + part.after_factor(around) * part.evaluate(signals, NUMPY)
-        if part.damping and "shoal" in around:
-            value = value * (1 + ship.get("shallow:damping") * around["shoal"])
+        if part.damping and SHOAL in around:
+            value = value * (1 + ship.get("shallow:damping") * around[SHOAL])
         into = steady if part.coriolis else totals
         into[part.equation] = into[part.equation] + value
     if "lean" in around and not any(part.reads_turn for part in ship.parts):
         totals["r"] = totals["r"] + around["lean"]
-    heavier = 1.0 if "shoal" not in around else 1 + ship.get("shallow:inertia") * around["shoal"]
+    heavier = 1.0 if SHOAL not in around else 1 + ship.get("shallow:inertia") * around[SHOAL]
     return [totals[n] / ((1 + ship.get(f"inertia:{n}")) * heavier) + steady[n] for n in OUTPUTS]

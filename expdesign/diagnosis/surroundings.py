@@ -10,14 +10,14 @@ from expdesign.diagnosis.parts import ahead_force
 from expdesign.diagnosis.windows import Windows
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, VesselModel, generalised_force
-from expdesign.vessel.structures import FORCE_SIGNALS
+from expdesign.vessel.structures import FORCE_SIGNALS, SHOAL
 
 
 class Surroundings(dict[str, Array]):
     """What acts on the ship at the integrator steps (w, k): inputs and forces by signal name, and besides.
 
     `u_c v_c` water and `u_w v_w` air, their velocity in the b-frame [m/s], where they move;
-    `shoal`, draught over depth, and `after`, one after a change of the ship, where the model has such effects.
+    `h`, draught over depth, and `after`, one after a change of the ship, where the model reads such things.
     """
 
     def at(self, step: int) -> Surroundings:
@@ -43,8 +43,8 @@ def surroundings(ship: Extended, windows: Windows) -> Surroundings:
         table["u_c"], table["v_c"] = to_body(north, east, windows.heading)
     if any(part.reads_air for part in ship.parts):
         table["u_w"], table["v_w"] = _wind(ship, windows)
-    if any(key.startswith("shallow:") for key in ship.effects):
-        table["shoal"] = ship.draught_m / windows.depth_m
+    if model.reads_depth or any(key.startswith("shallow:") for key in ship.effects):
+        table[SHOAL] = np.nan_to_num(ship.draught_m / windows.depth_m)
     if "change:time" in ship.effects:
         table["after"] = (windows.time_s >= ship.effects["change:time"]).astype(float)
     return table

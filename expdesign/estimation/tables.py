@@ -30,8 +30,8 @@ def model_for(model: VesselModel, record: Record) -> VesselModel:
     for batch in record.batches:
         if batch.input_names != recorded:
             raise InputError(f"{batch.name} has inputs {', '.join(batch.input_names)}, expected {', '.join(recorded)}")
-    if SHOAL in recorded and SHOAL not in model.inputs:
-        model = replace(model, actuators=(*model.actuators, Actuator(kind="depth", number=1, limits=(Limit(),))))
+    if SHOAL in recorded:
+        model = in_depth(model)
     if set(model.inputs) <= set(recorded):
         return model
     needs = {name for expression in model.expressions for name in expression.signals} & set(model.inputs)
@@ -43,6 +43,25 @@ def model_for(model: VesselModel, record: Record) -> VesselModel:
         f"{record.batches[0].name} has inputs {', '.join(recorded)}, expected {', '.join(model.inputs)} "
         f"or {', '.join(FORCE_SIGNALS)}"
     )
+
+
+def with_depth(record: Record, draught_m: float) -> Record:
+    """The record with draught over depth as one more input, 0 where a batch has no depth, which is told."""
+    batches = []
+    for batch in record.batches:
+        shoal = np.zeros(len(batch)) if batch.depth_m is None else draught_m / batch.depth_m
+        inputs = np.column_stack([batch.inputs, shoal])
+        batches.append(replace(batch, inputs=inputs, input_names=(*batch.input_names, SHOAL)))
+    missing = [batch.name for batch in record.batches if batch.depth_m is None]
+    told = [f"{', '.join(missing)}: no depth_m is measured; the model's dependence on depth is that of deep water."]
+    return replace(record, batches=tuple(batches), notes=(*record.notes, *(told if missing else [])))
+
+
+def in_depth(model: VesselModel) -> VesselModel:
+    """The model with draught over depth as one more input, as records and commands have it that tell the depth."""
+    if SHOAL in model.inputs:
+        return model
+    return replace(model, actuators=(*model.actuators, Actuator(kind="depth", number=1, limits=(Limit(),))))
 
 
 def inputs_of(model: VesselModel, batch: Batch) -> Array:

@@ -136,8 +136,7 @@ def tried(case: Case, data: Path, *, seed: int = 0) -> Tried:
     """
     record = runs(case, data, case.used)
     fitted = fitted_vessel(case, record, wind=False)
-    with np.errstate(over="ignore", invalid="ignore"):  # over whole runs the fitted model is lost, as tankers' are
-        found = diagnose(fitted, record, seed=seed)
+    found = diagnose(fitted, record, seed=seed)
     groups = {name: runs(case, data, beginnings) for name, beginnings in HELD_OUT[case.folder].items()}
 
     def errors(vessel: Vessel) -> dict[str, Array]:

@@ -16,6 +16,7 @@ from expdesign import __version__
 from expdesign.assessment import NO_TESTS, Assessment, Wish, assess
 from expdesign.conventions import Array
 from expdesign.errors import FileError, InputError
+from expdesign.estimation.tables import with_depth
 from expdesign.export import (
     FORMATS,
     build_route,
@@ -40,7 +41,7 @@ from expdesign.signals import Commands, Record
 from expdesign.simulation import Environment, WeatherSeries, draw_environment, draw_weather, measure
 from expdesign.simulation import simulate as simulate_run
 from expdesign.vessel import Vessel, column_name
-from expdesign.vessel.structures import FORCE_SIGNALS, SHOAL
+from expdesign.vessel.structures import FORCE_SIGNALS
 from expdesign.workflows.outcome import Outcome, Progress, TextTable, silent, within
 
 
@@ -210,19 +211,7 @@ def measured(data: Sequence[Path], vessel: Vessel, *, velocity: str = "auto") ->
         heading_std_rad=vessel.sensors.heading_rad or None,
         outputs=vessel.model.outputs,
     )
-    return with_depth(record, vessel) if vessel.model.reads_depth else record
-
-
-def with_depth(record: Record, vessel: Vessel) -> Record:
-    """The record with draught over depth as one more input, 0 where a batch has no depth, which is told."""
-    batches = []
-    for batch in record.batches:
-        shoal = np.zeros(len(batch)) if batch.depth_m is None else vessel.draught_m / batch.depth_m
-        inputs = np.column_stack([batch.inputs, shoal])
-        batches.append(replace(batch, inputs=inputs, input_names=(*batch.input_names, SHOAL)))
-    missing = [batch.name for batch in record.batches if batch.depth_m is None]
-    told = [f"{', '.join(missing)}: no depth_m is measured; the model's dependence on depth is that of deep water."]
-    return replace(record, batches=tuple(batches), notes=(*record.notes, *(told if missing else [])))
+    return with_depth(record, vessel.draught_m) if vessel.model.reads_depth else record
 
 
 def _header(path: Path) -> set[str]:

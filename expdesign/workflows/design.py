@@ -19,6 +19,7 @@ from expdesign.durations import (
     solve_durations,
 )
 from expdesign.errors import InputError
+from expdesign.estimation.tables import with_depth
 from expdesign.information import MEAN_SUBTRACTIONS, PrimitiveInformation, estimated_parameters
 from expdesign.information.augmented import score_augmented
 from expdesign.information.outcome_gradients import outcome_gradients
@@ -206,6 +207,7 @@ def _prior(case: Scenario, parameters: tuple[str, ...], stated: Mapping[str, flo
         prior += stated_information(known, noise, dimension=dimension, samples=samples)
     if wish.prior_data:
         record = load_records(wish.prior_data, vessel_inputs=model.inputs, outputs=model.outputs)
+        record = with_depth(record, case.vessel.draught_m) if model.reads_depth else record
         batches = recorded_information(
             record,
             model,

@@ -4,23 +4,17 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
-
-import numpy as np
 
 from expdesign import __version__
 from expdesign.diagnosis import Diagnosis, Proposal
 from expdesign.diagnosis import diagnose as diagnose_record
-from expdesign.diagnosis.causes.shallow_water import SHALLOW_WATER, in_deep_water, in_shallow_water
 from expdesign.dictionary import build_dictionary
 from expdesign.errors import InputError
 from expdesign.export import write_files
 from expdesign.export.diagnosis_page import diagnosis_html, diagnosis_json, diagnosis_tables, extended_vessel
 from expdesign.export.diagnosis_page.results import accuracy_entry, finding_entry
 from expdesign.scenario import load_scenario, load_vessel
-from expdesign.signals import Record
-from expdesign.vessel import Vessel
 from expdesign.workflows.after import measured
 from expdesign.workflows.outcome import Outcome, Progress, TextTable, silent, within
 
@@ -50,9 +44,9 @@ def diagnose(
         raise InputError("no data files are given, expected one or more CSV files")
     progress("reading the data", 0.02)
     ship = load_vessel(vessel)
-    record = measured(data, deep(ship), velocity=velocity)
+    record = measured(data, ship, velocity=velocity)
     proposals = _proposals(scenario) if scenario else ()
-    found = diagnosed(ship, record, seed=seed, proposals=proposals, progress=within(progress, 0.05, 0.9))
+    found = diagnose_record(ship, record, seed=seed, proposals=proposals, progress=within(progress, 0.05, 0.9))
     progress("drawing the page", 0.9)
     command = _command(data, vessel, scenario, velocity, seed)
     files = {
@@ -63,52 +57,6 @@ def diagnose(
     written = write_files(out or Path("runs") / data[0].stem, files)
     progress("done", 1.0)
     return Outcome(files=written, summary=_summary(found), tables=_tables(found))
-
-
-def diagnosed(
-    ship: Vessel, record: Record, *, seed: int, proposals: Sequence[Proposal], progress: Progress = silent
-) -> Diagnosis:
-    """A diagnosis whose extended vessel has the dependence on depth, too, where there is one.
-
-    A dependence that the vessel's file states already is taken out before and estimated anew; where the data show none
-    it is kept as it was.
-    """
-    found = diagnose_record(deep(ship), record, seed=seed, proposals=proposals, progress=progress)
-    return carrying_depth(found, ship)
-
-
-def deep(ship: Vessel) -> Vessel:
-    """The vessel as it is in deep water."""
-    return replace(ship, model=in_deep_water(ship.model)) if ship.model.reads_depth else ship
-
-
-def carrying_depth(found: Diagnosis, ship: Vessel) -> Diagnosis:
-    """The diagnosis with shallow water in the extended vessel: as found, else as the vessel's file states it."""
-    growth = {
-        one.name: one.value for item in found.findings if item.cause == SHALLOW_WATER.name for one in item.estimates
-    }
-    stated = ship.model.reads_depth
-    notes = [NOTE_STATED] if stated else []
-    model = found.extended.model
-    if growth:
-        depths = np.concatenate([batch.depth_m for batch in found.record.batches if batch.depth_m is not None])
-        reach = float(ship.draught_m / np.nanmin(depths))
-        model, error = in_shallow_water(model, growth, reach=reach, known=found.vessel.model)
-        notes.append(
-            f"The dependence on depth holds for draught over depth up to {reach:.2f}, the shallowest in the data"
-            + (f"; its factors are polynomials, at most {100 * error:.1g} % off." if error > 1e-4 else ".")
-        )
-    elif stated:
-        own = {term.name: term for term in ship.model.terms}
-        model = replace(model, terms=tuple(own.get(term.name, term) for term in model.terms))
-        notes.append(NOTE_KEPT)
-    kept = [note for note in found.notes if not (growth and note.startswith(NOT_WRITTEN))]
-    return replace(found, extended=replace(found.extended, model=model), notes=(*kept, *notes))
-
-
-NOT_WRITTEN = "The dependence on depth is not in the vessel file"
-NOTE_STATED = "The model's dependence on depth was left out and looked for anew: it was compared as in deep water."
-NOTE_KEPT = "The data show no dependence on depth: the extended model keeps the one that the vessel file had."
 
 
 def _proposals(scenario: Path) -> tuple[Proposal, ...]:

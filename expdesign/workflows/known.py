@@ -10,6 +10,7 @@ import numpy as np
 from expdesign.assessment import Assessed, Wish, assess
 from expdesign.durations import DurationDesign
 from expdesign.errors import Diverged, NoAnswer, NotInformative
+from expdesign.estimation.tables import in_depth
 from expdesign.estimation.values import Estimate
 from expdesign.export.known import Purchase
 from expdesign.information.expected import TrialPart, expected_covariance
@@ -18,6 +19,7 @@ from expdesign.signals import Commands, Record
 from expdesign.simulation import Environment
 from expdesign.values import Array
 from expdesign.vessel import Vessel
+from expdesign.vessel.structures import SHOAL
 from expdesign.workflows.outcome import Progress
 
 MATTERS = 1.05
@@ -34,7 +36,7 @@ def updated(
 
     Args:
         vessel: as known before.
-        record: the data.
+        record: the data, draught over depth among its inputs where the model reads depth.
         fixed: parameters that are not to be estimated.
         prior_counts: whether the vessel's standard deviations are knowledge to be combined with the estimate.
         progress: told what is done.
@@ -100,7 +102,7 @@ def combined(vessel: Vessel, told: Estimate, *, prior_counts: bool) -> Vessel:
 
 def data_parts(record: Record, vessel: Vessel) -> tuple[TrialPart, ...]:
     """The data so far as parts of a trial: their commands, from their first velocity and heading."""
-    inputs = vessel.model.inputs
+    inputs = in_recorded_depth(vessel).model.inputs
     return tuple(
         TrialPart(
             commands=Commands(
@@ -115,10 +117,18 @@ def data_parts(record: Record, vessel: Vessel) -> tuple[TrialPart, ...]:
     )
 
 
-def plan_part(plan: Plan) -> TrialPart:
-    """The whole track of a plan as one part of a trial."""
-    motion = plan.trajectory
-    return TrialPart(commands=plan.commands, velocity=motion.velocity[0], heading_rad=float(motion.pose[0, 2]))
+def in_recorded_depth(vessel: Vessel) -> Vessel:
+    """The vessel in the depth that data tell, beside its inputs, where its model reads depth; others as they are."""
+    return replace(vessel, model=in_depth(vessel.model)) if vessel.model.reads_depth else vessel
+
+
+def plan_part(plan: Plan, vessel: Vessel) -> TrialPart:
+    """The whole track of a plan as one part of a trial, in deep water as all plans are."""
+    motion, commands = plan.trajectory, plan.commands
+    if vessel.model.reads_depth:
+        deep = np.column_stack([commands.values, np.zeros(len(commands))])
+        commands = replace(commands, names=(*commands.names, SHOAL), values=deep)
+    return TrialPart(commands=commands, velocity=motion.velocity[0], heading_rad=float(motion.pose[0, 2]))
 
 
 def expected_std(

@@ -17,6 +17,7 @@ from expdesign.dictionary import build_primitive
 from expdesign.dictionary.spec import PrimitiveSpec
 from expdesign.durations import DurationDesign, efficiencies
 from expdesign.errors import Diverged, FileError, InputError, NoAnswer, UnknownName
+from expdesign.estimation.tables import with_depth
 from expdesign.export import vessel_toml, write_files
 from expdesign.export.known import Known, replan_json
 from expdesign.information import estimated_parameters
@@ -30,7 +31,7 @@ from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
 from expdesign.workflows.design import design_summary, designed
 from expdesign.workflows.grown import growth_summary
-from expdesign.workflows.known import data_parts, expected_std, plan_part, purchases, updated
+from expdesign.workflows.known import data_parts, expected_std, in_recorded_depth, plan_part, purchases, updated
 from expdesign.workflows.outcome import Outcome, Progress, TextTable, silent, within
 from expdesign.workflows.trial import built_route, plan_summary, planned, ready, report_content, trial_files
 
@@ -153,6 +154,7 @@ def present_state(
         heading_std_rad=ship.sensors.heading_rad or None,
         outputs=ship.model.outputs,
     )
+    record = with_depth(record, ship.draught_m) if ship.model.reads_depth else record
     pose = present_pose(last_fix(data[-1]), ship, first)
     sailed_s = float(sum(len(batch) * batch.sample_time_s for batch in record.batches))
     left_s = _left(first, sailed_s, remaining_s)
@@ -308,11 +310,12 @@ def known_of(state: PresentState, case: Scenario, design: DurationDesign, plan: 
     """What was known before, is known now and will be after the rest."""
     first, ship, subtraction = state.first.vessel, state.ship, case.design.mean_subtraction
     names = estimated_parameters(ship.model, case.design.fixed_parameters)
-    so_far = data_parts(state.record, ship)
+    so_far, rest = data_parts(state.record, ship), plan_part(plan, ship)
+    sailing = in_recorded_depth(ship)
     weather, words = weather_for_rest(state.first.environment, ship.environment)
 
     def told(*parts: object) -> Array:
-        return expected_std(ship, parts, names, environment=weather, mean_subtraction=subtraction)  # type: ignore[arg-type]
+        return expected_std(sailing, parts, names, environment=weather, mean_subtraction=subtraction)  # type: ignore[arg-type]
 
     values = {item: dict(zip(item.names, item.parameters.tolist(), strict=True)) for item in (first.model, ship.model)}
     return Known(
@@ -332,7 +335,7 @@ def known_of(state: PresentState, case: Scenario, design: DurationDesign, plan: 
         now=np.array([values[ship.model][name] for name in names]),
         stated=np.array([_stated(first).get(name, 0.0) for name in names]),
         so_far=told(*so_far),
-        after=told(*so_far, plan_part(plan)),
+        after=told(*so_far, rest),
         purchases=purchases(design, names),
     )
 

@@ -3,7 +3,8 @@
 Found, the growth becomes a factor of the model's terms: a term ``u`` turns into ``(u)*(1 + 0.8*h)``, where the signal
 `h` is draught over depth. Parameters keep their names and values, which are those of deep water, and planning goes on
 as before. Inertia divides, which the language of terms cannot; its factor 1 / (1 + b h) is a polynomial of third order
-that is exact in deep water and nearly so down to the least depth in the data.
+that is exact in deep water and nearly so down to the least depth in the data. A dependence on depth that the model has
+already counts as known: what is looked for is growth beyond it, and what is found multiplies it.
 """
 
 from __future__ import annotations
@@ -23,11 +24,11 @@ from expdesign.vessel import Term, VesselModel
 from expdesign.vessel.structures import SHOAL
 
 LEAST_VARIATION = 0.01
-DAMPING, INERTIA = "damping_growth", "inertia_growth"
-"""Names of the estimates in results."""
+DAMPING, INERTIA = "damping", "inertia"
 ORDER = 3
-WRITTEN = re.compile(rf"\((.+)\)\*\(1(?: \+ [-+.e\d]+(?:\*{SHOAL})+)+\)")
-"""A term times a factor as it is written here."""
+WRITTEN = re.compile(rf"\((.+)\)\*\(1((?: \+ [-+.e\d]+(?:\*{SHOAL})+)+)\)")
+POWER = re.compile(rf" \+ ([-+.e\d]+)((?:\*{SHOAL})+)")
+"""A term times a factor as it is written here, and one power in that factor."""
 
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
@@ -54,11 +55,11 @@ SHALLOW_WATER = Cause(name="shallow_water", candidates=_candidates, explain=_exp
 def in_shallow_water(
     model: VesselModel, growth: Mapping[str, float], *, reach: float, known: VesselModel
 ) -> tuple[VesselModel, float]:
-    """The model with its dependence on depth, and the largest relative error of the factors that say it.
+    """The model with more dependence on depth, and the largest relative error of the factors that say it.
 
     Args:
-        model: for deep water.
-        growth: "damping_growth" and "inertia_growth" per unit of draught over depth; what is left out is zero.
+        model: with the terms that were found.
+        growth: "damping" and "inertia" per unit of draught over depth; what is left out is zero.
         reach: largest draught over depth in the data.
         known: the model diagnosed, without the terms that were found; only its own terms are damping that grows.
     """
@@ -70,17 +71,6 @@ def in_shallow_water(
         factor = lighter * damping if grows else lighter
         terms.append(term if is_coriolis(term) else _times(term, factor))
     return replace(model, terms=tuple(terms)), error
-
-
-def in_deep_water(model: VesselModel) -> VesselModel:
-    """The model with draught over depth zero in all its terms; factors as written here disappear from them."""
-    terms = tuple(replace(term, expression=_deep(term.expression)) for term in model.terms)
-    return replace(model, terms=terms)
-
-
-def _deep(expression: str) -> str:
-    written = WRITTEN.fullmatch(expression)
-    return written.group(1) if written else re.sub(rf"\b{SHOAL}\b", "0", expression)
 
 
 def _inverse(growth: float, reach: float) -> tuple[Polynomial, float]:
@@ -98,9 +88,21 @@ def _inverse(growth: float, reach: float) -> tuple[Polynomial, float]:
 
 
 def _times(term: Term, factor: Polynomial) -> Term:
-    """The term times a polynomial of draught over depth."""
+    """The term times a polynomial of draught over depth; a factor that it has already is multiplied."""
+    plain, known = _taken_apart(term.expression)
     powers = [
-        "*".join([f"{value:.9g}", *([SHOAL] * order)]) for order, value in enumerate(factor.coef.tolist()) if value
+        "*".join([f"{value:.9g}", *([SHOAL] * order)])
+        for order, value in enumerate((known * factor).coef.tolist())
+        if value
     ]
-    text = term.expression if len(powers) == 1 else f"({term.expression})*({' + '.join(powers)})"
+    text = plain if len(powers) == 1 else f"({plain})*({' + '.join(powers)})"
     return replace(term, expression=text)
+
+
+def _taken_apart(expression: str) -> tuple[str, Polynomial]:
+    """An expression without its factor as written here, and that factor; one where there is none."""
+    written = WRITTEN.fullmatch(expression)
+    if not written:
+        return expression, Polynomial([1.0])
+    powers = {len(match[2]) // (1 + len(SHOAL)): float(match[1]) for match in POWER.finditer(written[2])}
+    return written[1], Polynomial([1.0, *(powers.get(order, 0.0) for order in range(1, max(powers) + 1))])
