@@ -46,6 +46,11 @@ WRONG_CHARTS = [
     (collection(feature("land", square(0.1), BOW_TIE)), "feature 1 (layer 'land')", "crosses itself at 0.00200 N"),
     (collection(feature("land", square(0.1), square(0.1, lon_deg=1.0))), None, "has a hole outside its outline"),
     ({"type": "Polygon", "coordinates": [BOW_TIE]}, "feature 1 (layer 'land')", "crosses itself"),
+    (collection(feature("land", square(0.1), square(0.05), square(0.05))), None, "crosses itself"),
+    (collection(feature("land", square(0.1), square(0.05), square(0.02))), None, "has a hole inside a hole"),
+    (collection(feature("land", square(0.1)), feature("land", [[0, 0], [1, 1], [2, 2], [0, 0]])), None, "no area"),
+    (collection(feature("land", square(0.1), square(0.1))), "feature 1 (layer 'land')", "encloses no area"),
+    ({"type": "Polygon", "coordinates": [[[-180, -80], [180, -80], [180, 80], [-180, 80]]]}, None, "encloses no area"),
     ({**square_chart(), "crs": {"properties": {"name": "EPSG:25832"}}}, "crs", "is 'EPSG:25832', expected longitude"),
 ]
 
@@ -123,6 +128,42 @@ def test_outlines_that_touch_themselves_keep_their_area(area):
     by_hand = _water(area, collection(outer, *(feature("land", part) for part in apart)))
     assert touching.water.symmetric_difference(by_hand.water).area < 1e-6
     assert touching.notes == ("chart.geojson: 1 polygons that touch themselves taken apart where they touch",)
+
+
+def test_flaws_that_leave_no_doubt_about_land_and_water_are_mended(area):
+    """A hole along the shore is a bay, a spike without width is none, an islet counted twice is there once."""
+    outer = feature("land", square(0.02), square(0.008))
+    bay_hole = [[0, 0.001], [0.002, 0.001], [0.002, 0.002], [0, 0.002], [0, 0.001]]
+    shell = [[0, 0], [0.003, 0], [0.003, 0.003], [0, 0.003], [0, 0]]
+    bay = [
+        [0, 0],
+        [0.003, 0],
+        [0.003, 0.003],
+        [0, 0.003],
+        [0, 0.002],
+        [0.002, 0.002],
+        [0.002, 0.001],
+        [0, 0.001],
+        [0, 0],
+    ]
+    spike = [*shell[:3], [0.004, 0.004], *shell[2:]]
+    notch = [*shell[:3], [0.001, 0.001], *shell[2:]]
+    flawed = {"bay": ([shell, bay_hole], [bay]), "spike": ([spike], [shell]), "notch": ([notch], [shell])}
+    for rings, drawn_well in flawed.values():
+        mended = _water(area, collection(outer, feature("land", *rings)))
+        clean = _water(area, collection(outer, feature("land", *drawn_well)))
+        assert mended.water.symmetric_difference(clean.water).area < 1e-6
+        assert "taken apart where they touch" in mended.notes[0]
+
+
+@pytest.mark.parametrize("size_deg", [1e-5, 1e-4, 1e-3])
+def test_a_crossing_of_a_metre_on_a_long_coast_is_still_refused(area, size_deg):
+    """However large the land is, what a small crossing encloses stays in doubt."""
+    loop = [[0.0, -0.5], [size_deg, -0.5 - size_deg], [0.0, -0.5 - size_deg], [size_deg, -0.5]]
+    coast = [[-0.5, -0.5], *loop, [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5]]
+    _write(area, collection(feature("land", coast)))
+    with pytest.raises(FileError, match="crosses itself"):
+        load_area(area, draught_m=1.0)
 
 
 def test_overlapping_parts_count_once_and_islands_in_lakes_in_islands_alternate(area):

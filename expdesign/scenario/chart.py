@@ -25,8 +25,11 @@ REPEATED = "repeated points removed"
 CLOSED = "rings closed"
 SPLIT = "polygons that touch themselves taken apart where they touch"
 MOVED = "polygons moved by a full turn: the chart crosses the antimeridian"
-HARMLESS = ("Ring Self-intersection", "Interior is disconnected")
+ROUNDING = 1e-13
+"""Area that is no more than rounding, for outlines of about a degree: a tenth of a square decimetre [deg2]."""
 WORDS = {
+    "Ring Self-intersection": "crosses itself",
+    "Interior is disconnected": "crosses itself",
     "Self-intersection": "crosses itself",
     "Hole lies outside shell": "has a hole outside its outline",
     "Holes are nested": "has a hole inside a hole",
@@ -132,20 +135,25 @@ def _continuous(rings: list[Array], entry: Entry) -> list[Array]:
 
 
 def _valid(polygon: shapely.Polygon, entry: Entry, repairs: Counter[str]) -> list[shapely.Polygon]:
-    """The polygon itself, or its parts when it only touches itself."""
+    """The polygon itself, or its parts when it only touches itself.
+
+    Its parts, the union of what the outline encloses less that of the holes, have the polygon's area only where no
+    place is enclosed twice and none the wrong way round: then all readings of the outline agree.
+    """
     if shapely.is_valid(polygon):
         return [polygon]
     reason, lon, lat = _reason(polygon)
-    parts = [part for part in shapely.get_parts(shapely.make_valid(polygon)) if part.geom_type == "Polygon"]
-    if reason in HARMLESS and math.isclose(sum(part.area for part in parts), polygon.area, rel_tol=1e-9):
+    where = f" at {place_text(lat, lon)}" if math.isfinite(lon) else ""
+    mended = shapely.make_valid(polygon, method="structure", keep_collapsed=False)
+    parts = [part for part in shapely.get_parts(mended) if part.geom_type == "Polygon"]
+    west, south, east, north = polygon.bounds
+    rounding = ROUNDING * max(1.0, polygon.length * max(east - west, north - south) / 100)
+    if sum(part.area for part in parts) <= rounding:
+        raise entry.error(f"encloses no area{where}, expected an outline of land or water")
+    if abs(sum(part.area for part in parts) - polygon.area) <= rounding:
         repairs[SPLIT] += 1
         return parts
-    what = (
-        WORDS["Self-intersection"]
-        if reason in HARMLESS
-        else WORDS.get(reason, f"is no proper polygon ({reason.lower()})")
-    )
-    where = f" at {place_text(lat, lon)}" if math.isfinite(lon) else ""
+    what = WORDS.get(reason, f"is no proper polygon ({reason.lower()})")
     raise entry.error(f"{what}{where}, expected outlines that neither cross nor overlap themselves")
 
 
