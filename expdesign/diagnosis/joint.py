@@ -218,6 +218,7 @@ def fit(
     steps: int = 8,
     colour_order: int | None = None,
     flat: tuple[str, ...] = (),
+    near: Linear | None = None,
 ) -> Fit:
     """Gauss-Newton with the colour found anew in every step.
 
@@ -230,6 +231,7 @@ def fit(
         steps: Gauss-Newton steps.
         colour_order: of the autoregressions, or None to choose.
         flat: uncertain parameters whose prior is dropped.
+        near: linearised motion of a ship alike over the same windows, for speed.
     """
     uncertain = tuple(key for key in uncertain_keys(ship) if key not in free)
     keys = (*free, *uncertain)
@@ -239,13 +241,13 @@ def fit(
     starts = _fitting_starts(starts, ship.states)
     best: Fit | None = None
     for step in range(steps + 1):
-        motion = simulate_windows(ship, windows, starts)
+        motion = simulate_windows(ship, windows, starts, near=near)
         if motion.diverged:
             if best is None:
                 raise FloatingPointError
             ship, starts = _halfway(best, ship, starts)
             continue
-        linear = linearise(motion)
+        linear = near = linearise(motion)
         pushes = [push_of(linear, ship.having({k: ship.get(k) + d}), d) for k in keys for d in [step_of(ship, k)]]
         columns = build_columns(linear, pushes, wander=windows.has_heading)
         if noise is None or step == 0:
@@ -257,10 +259,10 @@ def fit(
             ship, starts = _halfway(best, ship, starts)
             continue
         pull = found.s - precision * now
-        near = (
+        close = (
             float(pull @ np.linalg.lstsq(found.A + np.diag(precision), pull, rcond=None)[0]) < CLOSE if keys else True
         )
-        last = step == steps or (near and step > 0)
+        last = step == steps or (close and step > 0)
         if step == 1 or last:
             noise = _colours(columns, noise, precision, ship, keys, colour_order)
             found = marginal(grams(columns, noise), columns, noise)

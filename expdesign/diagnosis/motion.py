@@ -20,6 +20,9 @@ from expdesign.values import Array
 
 LARGEST_SPEED = 60.0
 NUDGE = 1e-5
+MOST_ROUNDS, LOST, NEAR, SETTLED = 12, 5.0, 3e-3, 1e-8
+"""Of a simulation of all steps at once: rounds; growth of the change with which it is given up; change below which the
+transition matrices need not be found anew; change with which it is done."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -53,28 +56,73 @@ class Motion:
         return not bool(np.abs(self.states).max() < LARGEST_SPEED)
 
 
-def simulate_windows(ship: Extended, windows: Windows, start: Array) -> Motion:
+def simulate_windows(ship: Extended, windows: Windows, start: Array, *, near: Linear | None = None) -> Motion:
     """Runge-Kutta of order four with inputs held over every step.
 
     Args:
         ship: model and effects.
         windows: w windows.
         start: (w, n) initial states.
+        near: linearised motion of a ship alike, which makes it quicker and no different.
     """
     around = surroundings(ship, windows)
-    states = np.empty((len(start), windows.steps, ship.states))
-    states[:, 0] = start
-    x, h = tuple(start.T), windows.step_s
-    turned = np.zeros(states.shape[:2])
     with np.errstate(over="ignore", invalid="ignore"):
-        for step in range(windows.steps - 1):
-            x, turn = _rk4(ship, x, around.at(step), h)
-            states[:, step + 1] = np.stack(x, axis=-1)
-            turned[:, step + 1] = turned[:, step] + turn
-    states = np.nan_to_num(states, nan=1e3, posinf=1e3, neginf=-1e3)
+        states = None if near is None else _all_at_once(ship, windows, around, start, near)
+        states = _step_by_step(ship, windows, around, start) if states is None else states
+        turns = _rk4(ship, tuple(np.moveaxis(states[:, :-1], -1, 0)), around.before_last(), windows.step_s)[1]
+    turned = np.zeros(states.shape[:2])
+    turned[:, 1:] = np.cumsum(turns, axis=1)
+    states = np.clip(np.nan_to_num(states, nan=1e3, posinf=1e3, neginf=-1e3), -1e3, 1e3)
     turned = np.nan_to_num(turned, nan=1e3, posinf=1e3, neginf=-1e3)
     shown = observed(ship, states, windows, turned)
     return Motion(ship=ship, windows=windows, around=around, states=states, turned=turned, shown=shown)
+
+
+def _step_by_step(ship: Extended, windows: Windows, around: Surroundings, start: Array) -> Array:
+    """(w, k, n)."""
+    states = np.empty((len(start), windows.steps, ship.states))
+    states[:, 0] = start
+    x = tuple(start.T)
+    for step in range(windows.steps - 1):
+        x, _ = _rk4(ship, x, around.at(step), windows.step_s)
+        states[:, step + 1] = np.stack(x, axis=-1)
+    return states
+
+
+def _all_at_once(ship: Extended, windows: Windows, around: Surroundings, start: Array, near: Linear) -> Array | None:
+    """(w, k, n) by Newton's method for all steps as one system of equations, or None when that does not settle soon.
+
+    Every step is made at once from where the last round left it; what they miss each other by is handed on by the
+    transition matrices of the motion nearby. It ends where the steps join, which is what they do step by step.
+
+    Source: P. Bellen and M. Zennaro, Journal of Computational and Applied Mathematics 25 (1989), 341-350.
+    """
+    states = near.motion.states
+    if states.shape != (len(start), windows.steps, ship.states):
+        return None
+    middle, last, onward = around.before_last(), np.inf, near.onward
+    for number in range(MOST_ROUNDS):
+        made = np.stack(_rk4(ship, tuple(np.moveaxis(states[:, :-1], -1, 0)), middle, windows.step_s)[0], axis=-1)
+        change = _handed_on(onward, start - states[:, 0], made - states[:, 1:])
+        size = float(np.abs(change).max())
+        if not size < min(LOST * last, LARGEST_SPEED):
+            return None
+        states, last = states + change, size
+        if size < SETTLED:
+            return states
+        if size > NEAR and number < MOST_ROUNDS / 2:
+            onward, _ = _transitions(_jacobian(ship, (states[:, :-1] + states[:, 1:]) / 2, middle), windows.step_s)
+    return None
+
+
+def _handed_on(onward: Array, first: Array, missed: Array) -> Array:
+    """(w, k, n) what gaps (w, k - 1, n) between steps and at the start amount to."""
+    change = np.empty((missed.shape[1] + 1, *first.shape, 1))
+    change[0, ..., 0] = first
+    gaps, matrices = np.moveaxis(missed, 1, 0)[..., None], np.ascontiguousarray(np.moveaxis(onward, 1, 0))
+    for step, (matrix, gap) in enumerate(zip(matrices, gaps, strict=True)):
+        np.add(matrix @ change[step], gap, out=change[step + 1])
+    return np.moveaxis(change[..., 0], 0, 1)
 
 
 def _rk4(ship: Extended, x: tuple[Array, ...], around: Surroundings, h: float) -> tuple[tuple[Array, ...], Array]:
@@ -110,23 +158,32 @@ class Linear:
 
 def linearise(motion: Motion) -> Linear:
     """Transition matrices from finite differences of the rates, all steps at once."""
-    n, h = motion.ship.states, motion.windows.step_s
     ends = (motion.states[:, :-1], motion.states[:, 1:])
     around = motion.around.before_last()
     slopes = np.stack([_rates(motion.ship, end, around) for end in ends])
-    jacobian = np.empty((*slopes.shape[1:], n))
+    jacobian = (_jacobian(motion.ship, ends[0], around) + _jacobian(motion.ship, ends[1], around)) / 2
+    onward, driven = _transitions(jacobian, motion.windows.step_s)
+    return Linear(motion=motion, onward=onward, driven=driven, slopes=slopes)
+
+
+def _jacobian(ship: Extended, states: Array, around: Surroundings) -> Array:
+    """(w, k, n, n) derivatives of the rates, by central differences."""
+    n = ship.states
+    jacobian = np.empty((*states.shape, n))
     for axis in range(n):
         step = np.zeros(n)
         step[axis] = NUDGE
-        pair = [_rates(motion.ship, end + step, around) - _rates(motion.ship, end - step, around) for end in ends]
-        jacobian[..., axis] = (pair[0] + pair[1]) / (4 * NUDGE)
+        jacobian[..., axis] = (_rates(ship, states + step, around) - _rates(ship, states - step, around)) / (2 * NUDGE)
+    return jacobian
+
+
+def _transitions(jacobian: Array, h: float) -> tuple[Array, Array]:
+    """Transition over a step, and the effect of a constant acceleration over it, to fourth order."""
     A = jacobian * h
-    eye = np.eye(n)
+    eye = np.eye(A.shape[-1])
     A2 = A @ A
     A3 = A2 @ A
-    onward = eye + A + A2 / 2 + A3 / 6 + A3 @ A / 24
-    driven = h * (eye + A / 2 + A2 / 6 + A3 / 24)
-    return Linear(motion=motion, onward=onward, driven=driven, slopes=slopes)
+    return eye + A + A2 / 2 + A3 / 6 + A3 @ A / 24, h * (eye + A / 2 + A2 / 6 + A3 / 24)
 
 
 def _rates(ship: Extended, states: Array, around: Surroundings) -> Array:

@@ -119,7 +119,8 @@ def settled(ship: Extended, windows: Windows, starts: Array) -> Fit:
     found = fit(ship, windows, (), starts=starts, steps=SETTLING)
     if not found.keys:
         return found
-    return fit(found.ship, windows, (), starts=found.starts, noise=found.noise, steps=SETTLING)
+    return fit(found.ship, windows, (), starts=found.starts, noise=found.noise, steps=SETTLING,
+               near=found.linear)  # fmt: skip
 
 
 def _same_as_any(candidate: Candidate, others: list[Candidate]) -> bool:
@@ -135,7 +136,8 @@ def superfluous(steps: list[Step], windows: Windows, tests: float) -> int | None
         kept = tuple(key for key in whole.keys[: whole.free] if key not in own)
         ship = replace(whole.ship, effects={key: v for key, v in whole.ship.effects.items() if key not in own})
         try:
-            less = fit(ship, windows, kept, starts=whole.starts, noise=whole.noise, colour_order=whole.noise.order)
+            less = fit(ship, windows, kept, starts=whole.starts, noise=whole.noise, colour_order=whole.noise.order,
+                       near=whole.linear)  # fmt: skip
         except (FloatingPointError, np.linalg.LinAlgError):
             continue
         lost = _gain(less, whole, whole)
@@ -209,7 +211,7 @@ def contend(base: Fit, windows: Windows, scored: Scored) -> Contender | None:
     before = tuple(key for key in base.keys[: base.free] if key not in keys)
     try:
         found = fit(base.ship.having({**start, **fixed}), windows, (*before, *keys), starts=base.starts,
-                    noise=base.noise, colour_order=base.noise.order)  # fmt: skip
+                    noise=base.noise, colour_order=base.noise.order, near=base.linear)  # fmt: skip
         gain = _gain(base, found, found)
     except (FloatingPointError, np.linalg.LinAlgError):
         return None
