@@ -90,6 +90,7 @@ class Batch:
         wind: (k, 2) relative wind in the b-frame, the air's velocity past the ship as (u_q, v_q) = velocity - wind,
             or None when not measured.
         depth_m: (k,) water depth, or None.
+        derived: those of u, v, r that come from the pose rather than from a sensor of their own, as far as is known.
         first_row: row of the file (header is row 1) that the first sample comes from, 0 when not from a file.
     """
 
@@ -101,6 +102,7 @@ class Batch:
     pose: Array | None = None
     wind: Array | None = None
     depth_m: Array | None = None
+    derived: tuple[str, ...] = ()
     first_row: int = 0
 
     def __post_init__(self) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.extended import Extended
 from expdesign.diagnosis.motion import Motion, simulate_windows
+from expdesign.diagnosis.observed import behind
 from expdesign.diagnosis.values import Accuracy
 from expdesign.diagnosis.windows import Windows, cut_windows
 from expdesign.estimation.fit import fit_percent
@@ -39,6 +40,7 @@ def first_states(windows: Windows, states: int = 3) -> Array:
 def simulate_from_first(ship: Extended, windows: Windows) -> Motion:
     """Every window from its own first measured state."""
     start = first_states(windows, ship.states)
+    start[:, :3] = behind(ship, start[:, :3])
     for axis, name in enumerate(OUTPUTS):
         if name not in ship.model.outputs:
             start[:, axis] = 0.0

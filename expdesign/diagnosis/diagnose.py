@@ -259,8 +259,8 @@ def _notes(windows: Windows, vessel: Vessel) -> tuple[str, ...]:
         notes.append("No heading is measured: current and wind cannot be told from what the ship does by itself.")
     if not windows.has_depth:
         notes.append("No depth is measured: shallow water was not tested.")
-    if windows.derived:
-        notes.append("Velocities are derived from the pose: the scale of a rate gyro was not tested.")
+    if "r" in windows.derived:
+        notes.append("The yaw rate is derived from the heading: the scale of a rate gyro was not tested.")
     if not (vessel.model.parameter_std > 0).any():
         notes.append("The vessel file states no parameter_std: its parameters count as known.")
     return tuple(notes)

@@ -14,7 +14,11 @@ Effects, by key:
     shallow:damping, shallow:inertia          growth per unit of draught over depth
     roll:sway, roll:yaw   acceleration per rad of roll; roll:period [s] and roll:damping say which roll
     change:time           [s]; change:gain, change:damping_u/v/r, change:theta:NAME act after it
-    heading_bias          [rad], lever:forward/starboard [m], gyro (share), late:u/v/r/psi/position [s]   (sensors)
+    heading_bias [rad], lever:forward/starboard [m], gyro (share), late:u/v/r/psi/position [s]   (sensors)
+
+Measured sway is v + u sin(heading_bias): velocities that come from the pose are turned so by a compass that shows too
+little, others by a sensor whose axes lie anticlockwise of the ship's. The lever is that of the position's antenna or of
+the velocity sensor likewise.
 
 A GROUP is the stem of input names ("n", "a", "rudder", "tau_x", ...), one input, or "all".
 """
@@ -38,6 +42,7 @@ class Extended:
         model: driven by the recorded inputs.
         library: terms that the model lacks, by name.
         draught_m: of the ship [m].
+        derived: those of u, v, r that the data derive from the pose, by its sensors.
         shoalest: largest draught over depth in the data, 0 where no depth is known.
         effects: key -> value; what is left out is zero.
     """
@@ -45,6 +50,7 @@ class Extended:
     model: VesselModel
     library: Mapping[str, Term]
     draught_m: float
+    derived: tuple[str, ...] = ()
     shoalest: float = 0.0
     effects: Effects = field(default_factory=dict)
     parts: tuple[Part, ...] = field(init=False, repr=False)

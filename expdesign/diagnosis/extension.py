@@ -13,10 +13,11 @@ from expdesign.diagnosis.causes.shallow_water import in_shallow_water
 from expdesign.diagnosis.extended import Extended
 from expdesign.diagnosis.followed import members
 from expdesign.diagnosis.parts import is_coriolis, is_thrust, reads_rudder
+from expdesign.diagnosis.windows import derived_outputs
 from expdesign.errors import InputError
 from expdesign.estimation.tables import model_for
 from expdesign.signals import Batch, Record
-from expdesign.vessel import Actuator, Mounting, Response, Sensors, Term, Vessel, VesselModel
+from expdesign.vessel import Actuator, Response, Sensors, Term, Vessel, VesselModel
 from expdesign.vessel.structures import SHOAL
 
 RESPONSES = {"lag": "lag_s", "delay": "delay_s", "deadband": "deadband", "offset": "offset"}
@@ -34,23 +35,38 @@ def as_extended(vessel: Vessel, record: Record) -> Extended:
         for signal, response in zip(actuator.signals, actuator.responses, strict=True):
             for kind, name in RESPONSES.items():
                 effects[f"{kind}:{signal}"] = float(getattr(response, name))
-    sensors = vessel.sensors
-    effects |= {
-        "heading_bias": -sensors.heading_bias_rad,
-        "gyro": sensors.yaw_rate_scale - 1.0,
-        "lever:forward": sensors.velocity.forward_m,
-        "lever:starboard": sensors.velocity.starboard_m,
-        "late:u": sensors.velocity.delay_s,
-        "late:v": sensors.velocity.delay_s,
-        "late:r": sensors.yaw_rate.delay_s,
-        "late:psi": sensors.heading.delay_s,
-        "late:position": sensors.position.delay_s,
-    }
+    derived = derived_outputs(record)
+    effects |= _sensed(vessel.sensors, derived)
     weather = vessel.environment
     for name, flow in (("current", weather.current_to), ("wind", weather.wind_to)):
         effects |= {f"{name}:north": float(flow[0]), f"{name}:east": float(flow[1])}
     known = {key: value for key, value in effects.items() if value}
-    return Extended(model=model, library=library(model), draught_m=vessel.draught_m, shoalest=shoalest, effects=known)
+    return Extended(
+        model=model,
+        library=library(model),
+        draught_m=vessel.draught_m,
+        derived=derived,
+        shoalest=shoalest,
+        effects=known,
+    )
+
+
+def _sensed(sensors: Sensors, derived: tuple[str, ...]) -> dict[str, float]:
+    """What a file says of the sensors that the data come from."""
+    from_pose = "u" in derived
+    place = sensors.position if from_pose else sensors.velocity
+    velocity_s = 0.0 if from_pose else sensors.velocity.delay_s
+    return {
+        "heading_bias": -(sensors.heading_bias_rad if from_pose else sensors.velocity_angle_rad),
+        "gyro": 0.0 if "r" in derived else sensors.yaw_rate_scale - 1.0,
+        "lever:forward": place.forward_m,
+        "lever:starboard": place.starboard_m,
+        "late:u": velocity_s,
+        "late:v": velocity_s,
+        "late:r": 0.0 if "r" in derived else sensors.yaw_rate.delay_s,
+        "late:psi": sensors.heading.delay_s,
+        "late:position": sensors.position.delay_s if from_pose else 0.0,
+    }
 
 
 def _driven(vessel: Vessel, record: Record) -> tuple[VesselModel, float]:
@@ -205,23 +221,19 @@ def _plain(response: Response) -> dict[str, float]:
 def _sensors(sensors: Sensors, ship: Extended) -> Sensors:
     get = ship.get
 
-    def late(key: str) -> float:
-        return max(get(key), 0.0)
+    def late(*keys: str) -> float:
+        return max(0.0, *(get(key) for key in keys))
 
-    velocity = max(late("late:u"), late("late:v"))
-    mounted = replace(
-        sensors.velocity, forward_m=get("lever:forward"), starboard_m=get("lever:starboard"), delay_s=velocity
-    )
-    position: Mounting = replace(sensors.position, delay_s=late("late:position"))
-    return replace(
-        sensors,
-        heading_bias_rad=0.0 - get("heading_bias"),
-        yaw_rate_scale=1.0 + get("gyro"),
-        velocity=mounted,
-        position=position,
-        heading=replace(sensors.heading, delay_s=late("late:psi")),
-        yaw_rate=replace(sensors.yaw_rate, delay_s=late("late:r")),
-    )
+    lever = {"forward_m": get("lever:forward"), "starboard_m": get("lever:starboard")}
+    sensors = replace(sensors, heading=replace(sensors.heading, delay_s=late("late:psi")))
+    if "r" not in ship.derived:
+        yaw_rate = replace(sensors.yaw_rate, delay_s=late("late:r"))
+        sensors = replace(sensors, yaw_rate_scale=1.0 + get("gyro"), yaw_rate=yaw_rate)
+    if "u" in ship.derived:
+        position = replace(sensors.position, **lever, delay_s=late("late:position"))
+        return replace(sensors, heading_bias_rad=0.0 - get("heading_bias"), position=position)
+    velocity = replace(sensors.velocity, **lever, delay_s=late("late:u", "late:v"))
+    return replace(sensors, velocity_angle_rad=0.0 - get("heading_bias"), velocity=velocity)
 
 
 def public_name(key: str, ship: Extended) -> tuple[str, float, float, str]:

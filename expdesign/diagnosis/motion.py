@@ -259,10 +259,10 @@ def _shown(linear: Linear, moved: Array) -> Array:
     motion = linear.motion
     if not any(key.startswith(("heading", "lever", "gyro", "late")) for key in motion.ship.effects):
         values = moved[:, :, :: motion.windows.steps_per_sample, :3]
-        if motion.windows.derived:
-            values = np.moveaxis(averaged(np.moveaxis(values, -1, 0)), 0, -1)
-            return np.concatenate([values, values[..., 2:]], axis=-1)
-        return np.concatenate([values, averaged(values[..., 2])[..., None]], axis=-1)
+        seen = [
+            averaged(values[..., i]) if n in motion.windows.derived else values[..., i] for i, n in enumerate("uvr")
+        ]
+        return np.stack([*seen, averaged(values[..., 2])], axis=-1)
     size = 1e-4
     still = observed(motion.ship, motion.states, motion.windows)
     return np.stack(

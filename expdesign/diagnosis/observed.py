@@ -20,30 +20,39 @@ def observed(ship: Extended, states: Array, windows: Windows, turned: Array | No
     """
     u, v, r = np.moveaxis(states[:, :: windows.steps_per_sample, :3], -1, 0)
     u, v = u - ship.get("lever:starboard") * r, v + ship.get("lever:forward") * r
-    bias = ship.get("heading_bias")
-    if bias:
-        u, v = u * np.cos(bias) - v * np.sin(bias), v * np.cos(bias) + u * np.sin(bias)
-    late = ship.get("late:psi")
-    if late:
-        turned = r * late
-        u, v = u * np.cos(turned) - v * np.sin(turned), v * np.cos(turned) + u * np.sin(turned)
-    channels = {"u": u, "v": v, "r": (1 + ship.get("gyro")) * r, "psi_rate": r}
-    for name in channels if windows.derived else ("psi_rate",):
-        channels[name] = averaged(channels[name])
-    if turned is not None:
-        channels["psi_rate"] = differenced(turned[:, :: windows.steps_per_sample], channels["psi_rate"], windows)
-        channels["r"] = (1 + ship.get("gyro")) * channels["psi_rate"] if windows.derived else channels["r"]
+    headings = None if turned is None else turned[:, :: windows.steps_per_sample]
+    from_position = {"u", "v"} & set(windows.derived)
+    if from_position:
+        u, v = (averaged(u), averaged(v)) if headings is None else averaged_on_course(u, v, headings)
+    u, v = _turned(u, v, ship.get("heading_bias"))
+    if from_position and ship.get("late:psi"):
+        u, v = _turned(u, v, r * ship.get("late:psi"))
+    channels = {"u": u, "v": v, "r": (1 + ship.get("gyro")) * r, "psi_rate": averaged(r)}
+    if headings is not None:
+        channels["psi_rate"] = differenced(headings, channels["psi_rate"], windows)
+    if "r" in windows.derived:
+        channels["r"] = channels["psi_rate"]
     for name, keys in LATE.items():
         delay = sum(ship.get(f"late:{key}") for key in keys)
         if delay:
             channels[name] = _shifted(channels[name], delay / windows.sample_s)
-    if ship.get("late:position") and windows.derived:
-        turned = -r * ship.get("late:position")
-        channels["u"], channels["v"] = (
-            channels["u"] * np.cos(turned) - channels["v"] * np.sin(turned),
-            channels["v"] * np.cos(turned) + channels["u"] * np.sin(turned),
-        )
+    if from_position and ship.get("late:position"):
+        channels["u"], channels["v"] = _turned(channels["u"], channels["v"], -r * ship.get("late:position"))
     return np.stack(list(channels.values()), axis=-1)
+
+
+def behind(ship: Extended, shown: Array) -> Array:
+    """(w, 3) velocities of the ship where its sensors, but for what is late, show these (w, 3)."""
+    u, v, r = shown.T
+    r = r / (1 + ship.get("gyro"))
+    u, v = _turned(u, v, -ship.get("heading_bias"))
+    return np.stack([u + ship.get("lever:starboard") * r, v - ship.get("lever:forward") * r, r], axis=-1)
+
+
+def _turned(u: Array, v: Array, angle: Array | float) -> tuple[Array, Array]:
+    """Velocities along axes that lie anticlockwise of the ship's by an angle: surge leaks into sway as u sin(angle)."""
+    c, s = np.cos(angle), np.sin(angle)
+    return u * c - v * s, v * c + u * s
 
 
 LATE = {"u": ("u", "position"), "v": ("v", "position"), "r": ("r", "psi"), "psi_rate": ("psi",)}
@@ -61,6 +70,16 @@ def averaged(values: Array) -> Array:
     result = values.copy()
     result[..., 1:-1] = (values[..., :-2] + 4 * values[..., 1:-1] + values[..., 2:]) / 6
     return result
+
+
+def averaged_on_course(u: Array, v: Array, heading: Array) -> tuple[Array, Array]:
+    """What central differences of positions see: the mean velocity over two samples, along the axes of the middle one.
+
+    The ship turns meanwhile, so that the mean of u and v along their own axes would be another one.
+    """
+    c, s = np.cos(heading), np.sin(heading)
+    north, east = averaged(u * c - v * s), averaged(u * s + v * c)
+    return north * c + east * s, east * c - north * s
 
 
 def _shifted(values: Array, samples: float) -> Array:

@@ -40,7 +40,7 @@ def surroundings(ship: Extended, windows: Windows) -> Surroundings:
         table["lean"] = ship.get("asymmetry") * ahead_force(table, model)
     north, east = ship.get("current:north"), ship.get("current:east")
     if north or east:
-        table["u_c"], table["v_c"] = to_body(north, east, windows.heading)
+        table["u_c"], table["v_c"] = to_body(north, east, true_heading(ship, windows))
     if any(part.reads_air for part in ship.parts):
         table["u_w"], table["v_w"] = _wind(ship, windows)
     if model.reads_depth or any(key.startswith("shallow:") for key in ship.effects):
@@ -63,7 +63,12 @@ def _wind(ship: Extended, windows: Windows) -> tuple[Array, Array]:
     """Measured where it is, else the mean wind of the model."""
     if windows.has_wind:
         return np.nan_to_num(windows.wind[..., 0]), np.nan_to_num(windows.wind[..., 1])
-    return to_body(ship.get("wind:north"), ship.get("wind:east"), windows.heading)
+    return to_body(ship.get("wind:north"), ship.get("wind:east"), true_heading(ship, windows))
+
+
+def true_heading(ship: Extended, windows: Windows) -> Array:
+    """(w, k) heading, that of a wrong compass put right: where velocities come from the pose, the compass is wrong."""
+    return windows.heading + ship.get("heading_bias") if "u" in ship.derived else windows.heading
 
 
 def to_body(north: Array | float, east: Array | float, heading: Array) -> tuple[Array, Array]:

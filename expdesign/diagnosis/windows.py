@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from expdesign.conventions import OUTPUTS
 from expdesign.estimation.tables import inputs_of
+from expdesign.records import central_difference
 from expdesign.signals import Batch, Record
 from expdesign.values import Array
 from expdesign.vessel import VesselModel
@@ -43,7 +44,7 @@ class Windows:
         depth_m: (w, k), inf where not known.
         time_s: (w, k) time since the first batch began, batches laid end to end.
         has_heading, has_wind, has_depth: whether these are measured.
-        derived: velocities are central differences of the pose.
+        derived: those of u, v, r that come from the pose.
         names: of the batches.
     """
 
@@ -60,7 +61,7 @@ class Windows:
     has_heading: bool
     has_wind: bool
     has_depth: bool
-    derived: bool
+    derived: tuple[str, ...]
     names: tuple[str, ...]
 
     @property
@@ -123,7 +124,7 @@ def cut_windows(model: VesselModel, record: Record, *, longest_s: float | None =
     limit = LONGEST if longest_s is None else max(12, round(longest_s / (merged * sample_s)))
     pieces = [(b, low, high) for b, part in enumerate(parts) for low, high in _cut(part.samples, limit)]
     size = max(high - low for _, low, high in pieces)
-    derived = all(_is_derived(batch) for batch in record.batches)
+    derived = derived_outputs(record)
     starts = np.concatenate([[0.0], np.cumsum([len(batch) * sample_s for batch in record.batches])])
     rows: dict[str, list[Array]] = {name: [] for name in ROWS}
     for b, low, high in pieces:
@@ -131,7 +132,7 @@ def cut_windows(model: VesselModel, record: Record, *, longest_s: float | None =
         index = np.minimum(np.arange(low * between, (low + size) * between), high * between - 1)
         rows["batch"].append(np.array(float(b)))
         rows["first"].append(np.array(float(low * between)))
-        rows["measured"].append(_filled(part.measured(derived)[low:high], size))
+        rows["measured"].append(_filled(part.measured("r" in derived)[low:high], size))
         rows["heading"].append(part.heading[index])
         rows["wind"].append(part.wind[index])
         rows["depth_m"].append(part.depth[index])
@@ -180,7 +181,7 @@ class _Part:
         self.depth = self._between(self._centred(depth))
 
     def measured(self, derived: bool) -> Array:
-        """(s, 4) channels."""
+        """(s, 4) channels; the heading tells nothing more where the yaw rate is derived from it."""
         velocity = self._centred(self.batch.velocity)
         rate = np.full(len(self.batch), np.nan)
         if not derived and self.batch.pose is not None and len(self.batch) > 2:
@@ -227,11 +228,18 @@ def _middles(values: Array) -> Array:
     return np.concatenate([(values[:-1] + values[1:]) / 2, values[-1:]])
 
 
-def _is_derived(batch: Batch) -> bool:
+def derived_outputs(record: Record) -> tuple[str, ...]:
+    """Those of u, v, r that come from the pose in every batch, as these say or as central differences show."""
+    found = [{*batch.derived, *_differences(batch)} for batch in record.batches]
+    return tuple(name for name in OUTPUTS if all(name in names for names in found))
+
+
+def _differences(batch: Batch) -> tuple[str, ...]:
     """Velocities that agree with central differences of the pose far better than noise would let them."""
     if batch.pose is None or len(batch) < 8:
-        return False
-    rate = (batch.pose[2:, 2] - batch.pose[:-2, 2]) / (2 * batch.sample_time_s)
-    apart = np.nanmedian(np.abs(rate - batch.velocity[1:-1, 2]))
-    jitter = np.nanmedian(np.abs(np.diff(rate, 2)))
-    return bool(apart < 1e-6 * (jitter + 1e-12) or apart < 1e-9)
+        return ()
+    rates = central_difference(batch.pose, batch.sample_time_s)
+    apart = np.median(np.abs(rates - batch.velocity[1:-1]), axis=0)
+    jitter = np.median(np.abs(np.diff(rates, 2, axis=0)), axis=0)
+    same = (apart < 1e-6 * (jitter + 1e-12)) | (apart < 1e-9)
+    return tuple(name for name, found in zip(OUTPUTS, same.tolist(), strict=True) if found)

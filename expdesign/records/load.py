@@ -162,5 +162,6 @@ def _batch(
         pose=table.stack(*POSE_COLUMNS)[kept] if set(POSE_COLUMNS) & set(table.columns) else None,
         wind=wind[kept] if wind is not None else None,
         depth_m=depth[kept] if depth is not None else None,
+        derived=tuple(output for output, origin in origins.items() if origin != MEASURED),
         first_row=table.first_row + kept.start,
     )

@@ -126,6 +126,7 @@ class SensorsTable(Table):
     wind_mps: NonNegative = 0.0
     wind_angle_rad: NonNegative = 0.0
     heading_bias_rad: HalfTurn = 0.0
+    velocity_angle_rad: HalfTurn = 0.0
     yaw_rate_scale: Positive = 1.0
     wind_sensor: Literal["cartesian", "vane"] = "cartesian"
     position_forward_m: Number = 0.0

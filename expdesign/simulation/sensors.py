@@ -37,7 +37,7 @@ def observe(sensors: Sensors, states: Array, air: Array, noise: Array, *, sample
     """What sensors tell of a motion.
 
         position = north/east + R(heading) (forward, starboard)       heading = heading + bias
-        u = u - r starboard     v = v + r forward                      r = scale r
+        u = u - r starboard     v = v + r forward, along axes turned from the ship's by an angle     r = scale r
         (u_q, v_q) likewise for the place of the wind sensor
 
     all late by each sensor's delay, held over its interval, plus noise; a vane's noise is on speed and angle, and
@@ -81,7 +81,11 @@ def _heading(sensors: Sensors, states: Array, air: Array) -> tuple[Array, ...]:
 
 
 def _velocity(sensors: Sensors, states: Array, air: Array) -> tuple[Array, ...]:
-    return _moved(sensors.velocity, states[:, 3], states[:, 4], states[:, 5])
+    u, v = _moved(sensors.velocity, states[:, 3], states[:, 4], states[:, 5])
+    if not sensors.velocity_angle_rad:
+        return u, v
+    c, s = np.cos(sensors.velocity_angle_rad), np.sin(sensors.velocity_angle_rad)
+    return c * u + s * v, c * v - s * u
 
 
 def _yaw_rate(sensors: Sensors, states: Array, air: Array) -> tuple[Array, ...]:

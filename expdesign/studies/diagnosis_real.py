@@ -85,6 +85,7 @@ def averaged_over(batch: Batch, every: int, longest_s: float) -> Batch:
         velocity=velocity,
         pose=means(batch.pose),
         wind=means(batch.wind),
+        derived=batch.derived,
     )
 
 

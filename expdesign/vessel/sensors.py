@@ -47,6 +47,7 @@ class Sensors:
         wind_mps: of each component of a cartesian wind sensor, or of a vane's speed.
         wind_angle_rad: of a vane's angle.
         heading_bias_rad: measured heading less true heading.
+        velocity_angle_rad: from the bow to the velocity sensor's own forward axis, clockwise; it measures along that.
         yaw_rate_scale: measured yaw rate over true yaw rate.
         wind_sensor: "cartesian" measures the components of the relative wind, "vane" its speed and angle.
         position, heading, velocity, yaw_rate, wind: where, how late and how often each is measured.
@@ -59,6 +60,7 @@ class Sensors:
     wind_mps: float = 0.0
     wind_angle_rad: float = 0.0
     heading_bias_rad: float = 0.0
+    velocity_angle_rad: float = 0.0
     yaw_rate_scale: float = 1.0
     wind_sensor: str = "cartesian"
     position: Mounting = CENTRAL
@@ -72,8 +74,9 @@ class Sensors:
             value = getattr(self, name)
             if not 0 <= value < math.inf:
                 raise InputError(f"sensors.{name} is {value:g}, expected a standard deviation of 0 or more")
-        if not math.isfinite(self.heading_bias_rad):
-            raise InputError(f"sensors.heading_bias_rad is {self.heading_bias_rad:g}, expected a finite angle")
+        for name in ("heading_bias_rad", "velocity_angle_rad"):
+            if not math.isfinite(getattr(self, name)):
+                raise InputError(f"sensors.{name} is {getattr(self, name):g}, expected a finite angle")
         if not 0 < self.yaw_rate_scale < math.inf:
             raise InputError(f"sensors.yaw_rate_scale is {self.yaw_rate_scale:g}, expected more than 0")
         if self.wind_sensor not in WIND_SENSORS:

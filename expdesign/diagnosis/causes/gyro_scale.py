@@ -8,7 +8,7 @@ from expdesign.diagnosis.causes.words import first, rounded
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     windows = situation.windows
-    if situation.has("gyro") or windows.derived or "r" not in situation.ship.model.outputs:
+    if situation.has("gyro") or "r" in windows.derived or "r" not in situation.ship.model.outputs:
         return ()
     return (Candidate(cause="gyro_scale", free={"gyro": 0.0}),)
 

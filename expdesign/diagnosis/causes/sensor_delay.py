@@ -12,9 +12,12 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     if any(key.startswith("late:") for key in situation.ship.effects):
         return ()
     outputs = situation.ship.model.outputs
-    signals = ["psi", "position"] if situation.windows.derived else list(outputs)
+    derived = set(situation.windows.derived)
+    signals = [name for name in outputs if name not in derived]
+    signals += ["psi"] if derived else []
+    signals += ["position"] if derived & {"u", "v"} else []
     found = [Candidate(cause="sensor_delay", free={f"late:{name}": 0.0}) for name in signals]
-    if not situation.windows.derived and {"u", "v"} <= set(outputs):
+    if {"u", "v"} <= set(signals):
         found.append(Candidate(cause="sensor_delay", free={"late:u": 0.0, "late:v": 0.0}))
     return tuple(found)
 

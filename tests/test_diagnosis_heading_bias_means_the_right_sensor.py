@@ -1,0 +1,88 @@
+"""A turned compass and a turned velocity sensor: which of them it can be depends on where velocities come from.
+
+Both make measured sway v + u sin(bias). Whatever is found goes into the vessel file so that its sensors, simulated by
+the package's own measurement, show the same.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnosis_case import vessel_of
+
+from expdesign.diagnosis.accuracy import accuracy
+from expdesign.diagnosis.causes import CAUSES
+from expdesign.diagnosis.extension import as_extended, extend
+from expdesign.diagnosis.observed import observed
+from expdesign.diagnosis.windows import cut_windows, derived_outputs
+from expdesign.records import load_records
+from expdesign.signals import Commands
+from expdesign.simulation import CALM, measure, simulate
+from expdesign.vessel import Mounting, Sensors
+
+BIAS = 0.06
+SHIP = vessel_of("barge")
+
+
+def trial(folder, sensors: Sensors, *, pose_only: bool):
+    """A noise-free trial of the barge as its own sensors record it, read from a file."""
+    rng = np.random.default_rng(3)
+    values = np.repeat(rng.uniform([6, -6, -60], [20, 6, 60], (12, 3)), 25, axis=0)
+    commands = Commands(sample_time_s=1.0, names=("tau_x", "tau_y", "tau_psi"), values=values)
+    sailed = simulate(SHIP, commands, velocity=(1.5, 0.0, 0.0), substeps=5)
+    columns = measure(replace(SHIP, sensors=sensors), commands, sailed, environment=CALM, rng=rng)
+    kept = {n: v for n, v in columns.items() if not (pose_only and n in ("u_mps", "v_mps", "r_radps"))}
+    path = folder / f"trial-{pose_only}.csv"
+    rows = "\n".join(",".join(f"{x:.12g}" for x in row) for row in zip(*kept.values(), strict=True))
+    path.write_text(",".join(kept) + "\n" + rows + "\n", encoding="utf-8")
+    return load_records([path], vessel_inputs=SHIP.model.inputs), sailed
+
+
+FAULTS = {
+    "compass": (Sensors(heading_bias_rad=-BIAS), True),
+    "velocity sensor": (Sensors(velocity_angle_rad=-BIAS), False),
+    "antenna": (Sensors(position=Mounting(forward_m=4.0, starboard_m=-1.0)), True),
+    "place of the velocity sensor": (Sensors(velocity=Mounting(forward_m=4.0, starboard_m=-1.0)), False),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_stated_fault_of_a_sensor_explains_the_data_it_makes(fault, tmp_path):
+    """Without noise what is left is integration and differencing; ignoring the fault leaves much more."""
+    sensors, pose_only = FAULTS[fault]
+    record, _ = trial(tmp_path, sensors, pose_only=pose_only)
+    knowing, blind = (accuracy(as_extended(ship, record), record) for ship in (replace(SHIP, sensors=sensors), SHIP))
+    assert (knowing.rmse < 0.006).all()
+    assert blind.rmse[1] > 5 * knowing.rmse[1]
+
+
+@pytest.mark.parametrize("pose_only", [True, False])
+def test_a_fault_of_the_other_sensor_is_not_seen(pose_only, tmp_path):
+    """A compass does not turn velocities that a sensor of their own measures, and the other way round."""
+    sensors = Sensors(velocity_angle_rad=-BIAS) if pose_only else Sensors(heading_bias_rad=-BIAS)
+    record, _ = trial(tmp_path, sensors, pose_only=pose_only)
+    assert set(derived_outputs(record)) == (set("uvr") if pose_only else set())
+    assert as_extended(replace(SHIP, sensors=sensors), record).get("heading_bias") == 0.0
+
+
+@pytest.mark.parametrize("pose_only", [True, False])
+def test_what_is_found_is_written_to_the_sensor_that_does_it(pose_only, tmp_path):
+    record, _ = trial(tmp_path, Sensors(), pose_only=pose_only)
+    found = as_extended(SHIP, record).having({"heading_bias": BIAS, "lever:forward": 2.0})
+    ship, _ = extend(SHIP, found, {})
+    named = ("heading_bias_rad", "velocity_angle_rad")[:: 1 if pose_only else -1]
+    assert [getattr(ship.sensors, name) for name in named] == [-BIAS, 0.0]
+    assert as_extended(ship, record).effects == found.effects
+    again, _ = trial(tmp_path, ship.sensors, pose_only=pose_only)
+    assert (accuracy(as_extended(ship, again), again).rmse < 0.006).all()
+
+
+def test_surge_leaks_into_sway_by_the_sine_of_the_bias(tmp_path):
+    record, _ = trial(tmp_path, Sensors(), pose_only=False)
+    ship = as_extended(SHIP, record).having({"heading_bias": BIAS})
+    windows = cut_windows(ship.model, record)
+    states = np.zeros((len(windows.batch), windows.steps, 3))
+    states[..., 0] = 2.0
+    shown = observed(ship, states, windows)
+    np.testing.assert_allclose(shown[..., 1], 2.0 * np.sin(BIAS), rtol=1e-12)
+    assert "heading_bias" in {cause.name for cause in CAUSES}
