@@ -8,6 +8,7 @@ from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.extended import Extended
 from expdesign.diagnosis.motion import Motion, simulate_windows
 from expdesign.diagnosis.observed import behind
+from expdesign.diagnosis.spread import spread
 from expdesign.diagnosis.values import Accuracy
 from expdesign.diagnosis.windows import Windows, cut_windows
 from expdesign.estimation.fit import fit_percent
@@ -70,9 +71,9 @@ def accuracy(ship: Extended, record: Record) -> Accuracy:
 
 def pooled_fit(error: Array, measured: Array) -> Array:
     """(n,) fit [%] over several windows (w, s, n), each around its own mean."""
-    lost, spread = sums(error, measured)
+    lost, varied = sums(error, measured)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(100 * (1 - np.sqrt(lost.sum(axis=0) / spread.sum(axis=0))))
+        return np.asarray(100 * (1 - np.sqrt(lost.sum(axis=0) / varied.sum(axis=0))))
 
 
 def sums(error: Array, measured: Array) -> tuple[Array, Array]:
@@ -85,11 +86,8 @@ def sums(error: Array, measured: Array) -> tuple[Array, Array]:
 
 def bounded(error: Array, measured: Array) -> Array:
     """Errors (w, s, n) no larger than `MOST_SPREADS` standard deviations of what is measured."""
-    seen = np.isfinite(measured)
-    count = np.maximum(seen.sum(axis=(0, 1)), 1)
-    mean = np.where(seen, measured, 0.0).sum(axis=(0, 1)) / count
-    spread = np.sqrt(np.where(seen, (measured - mean) ** 2, 0.0).sum(axis=(0, 1)) / count)
-    most = np.where(spread > 0, MOST_SPREADS * spread, np.inf)
+    size = spread(measured)
+    most = np.where(size > 0, MOST_SPREADS * size, np.inf)
     return np.asarray(np.clip(error, -most, most))
 
 

@@ -18,6 +18,7 @@ from expdesign.diagnosis.gain import HeldOut, gained, held_out
 from expdesign.diagnosis.joint import Fit
 from expdesign.diagnosis.motion import linearise, start_responses
 from expdesign.diagnosis.search import Search, Step, search
+from expdesign.diagnosis.spread import spread
 from expdesign.diagnosis.tell_apart import Proposal, most_telling, standard_proposals
 from expdesign.diagnosis.values import Accuracy, Diagnosis, Estimated, Finding
 from expdesign.diagnosis.windows import Windows, cut_windows
@@ -114,8 +115,8 @@ def _steady_time(ship: Extended, windows: Windows) -> float:
     motion = simulate_from_first(ship, windows)
     if motion.diverged:
         return windows.steps * windows.step_s / 2
-    spread = np.nanstd(windows.measured[..., :3].reshape(-1, 3), axis=0)
-    scale = np.where(np.isfinite(spread) & (spread > 0), spread, 1.0)
+    size = spread(windows.measured[..., :3])
+    scale = np.where(size > 0, size, 1.0)
     answers = np.moveaxis(start_responses(linearise(motion))[..., :3], 0, -1) * scale / scale[:, None]
     size = np.linalg.norm(answers, axis=(2, 3)) / np.sqrt(3.0)
     grown = (size > LARGEST_GROWTH).any(axis=0)

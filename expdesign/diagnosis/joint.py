@@ -14,6 +14,7 @@ import numpy as np
 from expdesign.diagnosis.extended import Extended
 from expdesign.diagnosis.motion import Linear, Push, linearise, push_of, responses, simulate_windows, start_responses
 from expdesign.diagnosis.noise import Noise, fit_colour, hats, wander_covariance, whitened
+from expdesign.diagnosis.spread import spread
 from expdesign.diagnosis.windows import Windows
 from expdesign.values import Array
 
@@ -353,8 +354,8 @@ def _colours(
 ) -> Noise:
     """Colour of what is left after the best linear answer, twice."""
     if noise is None:
-        spread = np.nanstd(columns.error, axis=(0, 1)) if columns.error.size else np.ones(4)
-        noise = Noise(filters=np.ones((4, 1)), std=np.where(np.isfinite(spread) & (spread > 0), spread, np.inf))
+        size = spread(columns.error)
+        noise = Noise(filters=np.ones((4, 1)), std=np.where(size > 0, size, np.inf))
         passes = 3
     else:
         passes = 1
