@@ -57,6 +57,7 @@ class LegProblem:
         hull_arm_m: points this far ahead and astern of the origin must keep to corridor and circle too.
         top_speed_mps, yaw_rate_radps: bounds on speed over ground, in any direction, and yaw rate at the nodes.
         lateral_mps2: bound on surge speed times yaw rate.
+        node_s: least time between nodes; 0 for the sample time.
     """
 
     vessel: Vessel
@@ -79,6 +80,7 @@ class LegProblem:
     top_speed_mps: float
     yaw_rate_radps: float
     lateral_mps2: float
+    node_s: float = 0.0
 
     def __post_init__(self) -> None:
         seal(self, start="6", end="6", start_inputs="m", end_inputs="m", states="j 6", inputs="j m")
@@ -95,7 +97,7 @@ def solve_leg(problem: LegProblem) -> Array | None:
     sample_s = problem.vessel.sample_time_s
     for stretch in (1.0, 1.6, 3.0):
         guess_s = stretch * problem.duration_s
-        nodes = next((n for n in NODES if n >= guess_s / sample_s), NODES[-1])
+        nodes = next((n for n in NODES if n >= guess_s / max(sample_s, problem.node_s)), NODES[-1])
         block = max(1, round(guess_s / (nodes * sample_s)))
         fastest = _program(problem.vessel, problem.environment, nodes, block, True)
         found = fastest.solve(_respaced(problem, nodes), guess_s / (nodes * block))

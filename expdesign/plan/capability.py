@@ -9,16 +9,34 @@ import numpy as np
 
 from expdesign.conventions import wrap_angle
 from expdesign.dictionary.build import drift, trim
-from expdesign.errors import NoPlan
+from expdesign.errors import InputError, NoAnswer, NoPlan
+from expdesign.plan.steady_turns import SteadyTurn, side_by_side, steady_turns
 from expdesign.plan.values import PlanSettings
+from expdesign.signals import Commands
+from expdesign.simulation import Approach, Conduct, simulate, steady_ahead, stopping
 from expdesign.values import Array
-from expdesign.vessel import Vessel, force_matrix
+from expdesign.vessel import Vessel, direct_terms, force_matrix
 
 USABLE = 0.9
 """Share of the largest steady speed, and of the largest steady yaw rate, that repositioning counts on."""
 
 LATERAL_MPS2 = 0.03 * 9.81
 """Lateral acceleration of turns on legs: small enough not to heel the ship."""
+
+HELM_SHARE = 0.65
+"""Share of the hardest helm at which ships turn on legs: the rest is for getting into turns and out of them."""
+
+SLOW_SHARE = 0.5
+"""The slowest speed, in transit speeds, at which a ship with a helm must still turn as tightly as legs ask."""
+
+RUN_UP = 1.0
+"""Hull lengths that a ship with a helm goes straight and steady, helm as it holds the course, before each run."""
+
+SETTLE = 2.0
+"""Hull lengths before that in which what is left of a turn dies out under the helmsman's hand."""
+
+OVERSHOOT = 1.3
+"""Largest yaw rate on the way into a turn, in those of the steady one: a thumb rule that bounds the search."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,6 +53,11 @@ class Capability:
         agile: the actuators push in every direction at once, so the vessel turns on the spot and goes sideways; others
             sail arcs of the turning radius.
         lateral_mps2: largest surge speed times yaw rate on legs.
+        approach: how a ship that is steered by a helm goes straight at transit speed; None for vessels that the
+            generalised force steers.
+        turns: its steady turns with the engines at that order.
+        stopping_m: distance in which it stops from there with the engines full astern.
+        run_up_m: straight before each run: room to settle, and a steady approach.
     """
 
     top_speed_mps: float
@@ -45,6 +68,10 @@ class Capability:
     spot_rate_radps: float = 0.0
     agile: bool = False
     lateral_mps2: float = LATERAL_MPS2
+    approach: Approach | None = None
+    turns: tuple[SteadyTurn, ...] = ()
+    stopping_m: float = 0.0
+    run_up_m: float = 0.0
 
     @property
     def swing_radps(self) -> float:
@@ -70,14 +97,12 @@ def capability(vessel: Vessel, settings: PlanSettings, *, current_mps: float = 0
                 f"the model of vessel {vessel.name!r} has no {output} equation and cannot {motion}: its primitives "
                 "can be scored and given durations, but a plan needs a model that can be steered"
             )
+    if needs_helm(vessel):
+        return _helmed_capability(vessel, settings, current_mps)
     top = _largest(lambda u: _holds(vessel, (u, 0.0, 0.0)), start=1e-3 * vessel.length_m)
     if top is None:
         raise NoPlan(f"vessel {vessel.name!r} cannot hold any speed ahead with its actuators and nominal model")
-    transit = settings.transit_speed_mps or USABLE * top
-    if transit > top:
-        raise NoPlan(f"plan.transit_speed_mps is {transit:g}, vessel {vessel.name!r} reaches {top:.3g} m/s")
-    if current_mps >= transit:
-        raise NoPlan(f"the mean current of {current_mps:.3g} m/s is not slower than repositioning at {transit:.3g} m/s")
+    transit = _transit_speed(vessel, settings, top, current_mps)
     yaw = _largest(lambda r: _holds(vessel, (transit, 0.0, r)), start=1e-4 * transit / vessel.length_m)
     if yaw is None:
         raise NoPlan(f"vessel {vessel.name!r} cannot turn at {transit:.3g} m/s with its actuators and nominal model")
@@ -100,6 +125,119 @@ def capability(vessel: Vessel, settings: PlanSettings, *, current_mps: float = 0
         agile=agile,
         lateral_mps2=max(LATERAL_MPS2, 1.01 * transit * min(USABLE * yaw, 2.0 * transit / radius)),
     )
+
+
+def needs_helm(vessel: Vessel) -> bool:
+    """Whether no inverse model steers it: its model reads actuators directly, or they cannot push every way."""
+    return bool(direct_terms(vessel.model)) or bool(np.linalg.matrix_rank(force_matrix(vessel.actuators)) < 3)
+
+
+def _transit_speed(vessel: Vessel, settings: PlanSettings, top: float, current_mps: float) -> float:
+    transit = settings.transit_speed_mps or USABLE * top
+    if transit > top:
+        raise NoPlan(f"plan.transit_speed_mps is {transit:g}, vessel {vessel.name!r} reaches {top:.3g} m/s")
+    if current_mps >= transit:
+        raise NoPlan(f"the mean current of {current_mps:.3g} m/s is not slower than repositioning at {transit:.3g} m/s")
+    return transit
+
+
+def _helmed_capability(vessel: Vessel, settings: PlanSettings, current_mps: float) -> Capability:
+    """Capability of a ship that is steered by a helm, by simulating it."""
+    top = _largest(lambda speed: _goes_ahead(vessel, speed), start=1e-3 * vessel.length_m)
+    if top is None:
+        raise NoPlan(f"vessel {vessel.name!r} cannot hold any speed ahead on a straight course with its actuators")
+    transit = _transit_speed(vessel, settings, top, current_mps)
+    approach = steady_ahead(vessel, transit)
+    turns = steady_turns(approach)
+    pairs = side_by_side(turns)
+    if not pairs:
+        raise NoPlan(
+            f"vessel {vessel.name!r} has no steady turn to both sides at {transit:.3g} m/s: its helm is "
+            f"{approach.helm.description}"
+        )
+    radius = _leg_radius_m(vessel, settings, (pairs, side_by_side(steady_turns(_slower(approach)))), transit)
+    fastest = max(abs(turn.yaw_rate_radps) for turn in turns)
+    return Capability(
+        top_speed_mps=top,
+        transit_speed_mps=transit,
+        turning_radius_m=radius,
+        yaw_rate_radps=OVERSHOOT * max(fastest, transit / radius),
+        acceleration_mps2=_simulated_acceleration(approach),
+        lateral_mps2=max(LATERAL_MPS2, OVERSHOOT * transit**2 / radius),
+        approach=approach,
+        turns=turns,
+        stopping_m=_stopping_m(vessel, transit),
+        run_up_m=(SETTLE + RUN_UP) * vessel.length_m,
+    )
+
+
+def _goes_ahead(vessel: Vessel, speed: float) -> bool:
+    try:
+        steady_ahead(vessel, speed)
+    except InputError:
+        return False
+    return True
+
+
+def _slower(approach: Approach) -> Approach:
+    return steady_ahead(approach.helm.vessel, SLOW_SHARE * approach.speed_mps)
+
+
+def _leg_radius_m(
+    vessel: Vessel,
+    settings: PlanSettings,
+    at_speeds: tuple[list[tuple[SteadyTurn, SteadyTurn]], ...],
+    transit: float,
+) -> float:
+    """The wished radius, or what the ship turns on to both sides, at transit speed and slower, with helm to spare."""
+    tightest = max(max(turn.radius_m for turn in pairs[-1]) for pairs in at_speeds if pairs)
+    wish = settings.turning_radius_m
+    if wish is not None and wish < tightest:
+        raise NoPlan(
+            f"plan.turning_radius_m is {wish:g}, at {transit:.3g} m/s vessel {vessel.name!r} needs {tightest:.3g} m or "
+            "more with its helm hard over"
+        )
+    found = [tightest, 1.5 * vessel.length_m]
+    for pairs in at_speeds:
+        most = max((pair[1].helm_rad for pair in pairs), default=0.0)
+        eased = [pair for pair in pairs if pair[1].helm_rad <= HELM_SHARE * most and _gentle(pair)]
+        found += [max(turn.radius_m for turn in (eased or pairs[:1])[-1])] if pairs else []
+    return wish or max(found)
+
+
+def _gentle(pair: tuple[SteadyTurn, SteadyTurn]) -> bool:
+    return all(abs(turn.surge_mps * turn.yaw_rate_radps) <= LATERAL_MPS2 for turn in pair)
+
+
+def _simulated_acceleration(approach: Approach) -> float:
+    """The constant acceleration that loses as much time as full ahead from rest to the approach's speed [m/s2]."""
+    helm, speed = approach.helm, approach.speed_mps
+    step_s = helm.vessel.sample_time_s
+    count = int(np.ceil(200 * helm.vessel.length_m / speed / step_s))
+    orders = np.minimum(1.0, np.arange(1, count + 1) * step_s * helm.drive_rate)
+    rows = np.array([helm.inputs(order, approach.angle_rad) for order in orders.tolist()])
+    commands = Commands(sample_time_s=step_s, names=helm.vessel.model.inputs, values=rows)
+    track = simulate(helm.vessel, commands, standing=np.array(helm.inputs(0.0, approach.angle_rad)))
+    there = int(np.argmax(track.velocity[:, 0] >= 0.98 * speed)) or count
+    lost_s = there * step_s - float(np.abs(track.velocity[:there, 0]).sum()) * step_s / speed
+    return speed / (2 * max(lost_s, step_s))
+
+
+def _stopping_m(vessel: Vessel, speed: float) -> float:
+    """Way of a stop from a steady speed [m].
+
+    Raises:
+        NoPlan: the ship does not stop, so it cannot come to rest at a goal.
+    """
+    for astern in (1.0, 0.0):
+        try:
+            _, track = stopping(vessel, astern=astern, conduct=Conduct(speed_mps=speed))
+        except InputError:  # the engines do not go astern
+            continue
+        except NoAnswer as error:
+            raise NoPlan(f"vessel {vessel.name!r} cannot be stopped at the goal: {error}") from None
+        return float(np.hypot(*np.diff(track.pose[:, :2], axis=0).T).sum())
+    raise NoPlan(f"vessel {vessel.name!r} cannot be stopped at the goal")
 
 
 def turn_loss_s(ship: Capability, first_rad: Array, second_rad: Array) -> Array:

@@ -72,14 +72,23 @@ def continuations(space: SearchSpace, beam: PartialPlans, q: int) -> list[Option
 
 
 def _run_up(space: SearchSpace, last: int, q: int) -> float:
-    """Straight before a run [m]: one hull length to settle, more after failures."""
+    """Straight before a run [m]: one hull length to settle, or the ship's own run-up, more after failures."""
     before = space.stamps[last].name if last >= 0 else ""
-    return space.hull_m * (1.0 + space.run_up.get((before, space.stamps[q].name), 0.0))
+    more_m = space.hull_m * space.run_up.get((before, space.stamps[q].name), 0.0)
+    return max(space.hull_m, space.ship.run_up_m) + more_m
+
+
+def _departures(space: SearchSpace, beam: PartialPlans) -> Array:
+    """(b, 3) places where partial plans end, and headings; courses for ships whose way bends on as they straighten."""
+    if space.ship.approach is None:
+        return beam.pose
+    drift = np.array([*(item.exit_drift_rad for item in space.stamps), 0.0])[beam.last]
+    return np.asarray(beam.pose + drift[:, None] * np.array([0.0, 0.0, 1.0]))
 
 
 def _arcs(space: SearchSpace, beam: PartialPlans, able: np.ndarray, q: int, runup: Array, change_s: Array) -> Options:
     turn, extra = (grid.ravel() for grid in np.meshgrid(TURNS, STRAIGHTS * space.hull_m))
-    pose = np.repeat(beam.pose[able], len(turn), axis=0)
+    pose = np.repeat(_departures(space, beam)[able], len(turn), axis=0)
     turns, straight = np.tile(turn, len(able)), np.tile(extra, len(able)) + np.repeat(runup, len(turn))
     length = space.ship.turning_radius_m * np.abs(turns) + straight
     leg_s = length / space.ship.transit_speed_mps + np.repeat(change_s, len(turn))
@@ -216,7 +225,7 @@ def clear_options(space: SearchSpace, plans: PartialPlans, options: Options) -> 
         clear &= ~(near & (np.abs(wrap_angle(start[:, 2] - bad[2])) < 0.2))
     clear &= space.field.at(run_ends(space, primitive, start)[:, :2]) >= space.leg_margin_m
     arcs = np.flatnonzero(clear & ~np.isnan(turn))
-    clear[arcs] = _arcs_clear(space, plans.pose[options.parent[arcs]], turn[arcs], start[arcs])
+    clear[arcs] = _arcs_clear(space, _departures(space, plans)[options.parent[arcs]], turn[arcs], start[arcs])
     lines = np.flatnonzero(clear & options.straight)
     clear[lines] = _lines_clear(space, plans.pose[options.parent[lines]], start[lines])
     for q in np.unique(primitive[clear]):

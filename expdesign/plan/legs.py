@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from expdesign.plan.curves import curved_leg, find_path
+from expdesign.plan.helmed_legs import helmed_leg
 from expdesign.plan.leg_values import LegTask, LegWater, leg_trajectory
 from expdesign.plan.manoeuvres import agile_leg
 from expdesign.values import Array
@@ -13,10 +14,13 @@ __all__ = ["LegTask", "LegWater", "find_leg", "find_path", "leg_trajectory"]
 def find_leg(task: LegTask, water: LegWater) -> Array | None:
     """Commands (k, m) that take the vessel from one state to the other in safe water, or None when none is found.
 
-    Agile vessels turn where they are and go the shortest way; others, and agile ones that find no such leg, sail
-    Dubins curves. The end commands of azimuths without angle limits may be whole turns away from the wished ones.
+    Ships that are steered by a helm sail arcs that they can turn on, with a run-up before each run. Agile vessels turn
+    where they are and go the shortest way; others, and agile ones that find no such leg, sail Dubins curves. The end
+    commands of azimuths without angle limits may be whole turns away from the wished ones.
     """
     if water.parted(task.start[:2], task.end[:2]):
         return None
+    if water.ship.approach is not None:
+        return helmed_leg(task, water)
     found = agile_leg(task, water) if water.ship.agile else None
     return curved_leg(task, water) if found is None else found

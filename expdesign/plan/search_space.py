@@ -30,6 +30,7 @@ class Stamp:
         displacement: (3,) forward m, starboard m, turn rad through water.
         duration_s: of one run [s].
         entry_mps, exit_mps: surge speed at its ends.
+        exit_drift_rad: course less heading at its end, through water.
     """
 
     name: str
@@ -40,6 +41,7 @@ class Stamp:
     duration_s: float
     entry_mps: float
     exit_mps: float
+    exit_drift_rad: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -105,6 +107,7 @@ def stamp(primitive: Primitive, room_m: Array, *, length_m: float, beam_m: float
         duration_s=primitive.duration_s,
         entry_mps=float(primitive.entry_velocity[0]),
         exit_mps=float(primitive.exit_velocity[0]),
+        exit_drift_rad=float(np.arctan2(primitive.exit_velocity[1], max(primitive.exit_velocity[0], 1e-9))),
     )
 
 

@@ -2,7 +2,8 @@
 
 The helm turns all rudders together. A vessel without rudders steers with the common angle of its azimuth thrusters:
 those abaft amidships ("stern", or all where none is abaft), or every one ("all"). A vessel known only by generalised
-forces steers as if one thruster at its stern, half a length abaft amidships, gave all of its thrust.
+forces steers as if one thruster at its stern, half a length abaft amidships, gave all of its thrust. One with fixed
+propellers on both sides and nothing else to steer with lets them turn at different speeds.
 """
 
 from __future__ import annotations
@@ -50,9 +51,11 @@ class Helm:
 
     @property
     def means(self) -> str:
-        """What steers: "rudder", "azimuth", "force", or "" where nothing does."""
+        """What steers: "rudder", "azimuth", "force", "propeller", or "" where nothing does."""
         kinds = [actuator.kind for actuator in self.vessel.actuators]
-        return next((kind for kind in ("rudder", "azimuth", "force") if kind in kinds), "")
+        sides = {np.sign(actuator.starboard_m) for actuator in self.vessel.actuators if actuator.kind == "propeller"}
+        kinds = [kind for kind in kinds if kind != "propeller"] + ["propeller"] * ({-1.0, 1.0} <= sides)
+        return next((kind for kind in ("rudder", "azimuth", "force", "propeller") if kind in kinds), "")
 
     @property
     def steering(self) -> tuple[Actuator, ...]:
@@ -69,6 +72,7 @@ class Helm:
             "rudder": f"rudder angle ({names})",
             "azimuth": f"common angle of the {'stern ' if self.thrusters == 'stern' else ''}thrusters ({names})",
             "force": "angle of all thrust, as if it were given at the stern",
+            "propeller": f"sine of the angle: difference of engine orders between the sides and their mean ({names})",
         }.get(self.means, "none")
 
     def inputs(self, drive: float, angle_rad: float) -> list[float]:
@@ -76,13 +80,17 @@ class Helm:
 
         Args:
             drive: engine order from -1, full astern, to 1, full ahead: the share of each actuator's limit.
-            angle_rad: helm, in the sense of the actuators' own angles.
+            angle_rad: helm, in the sense of the actuators' own angles; where propellers steer, its sine is added to the
+                engine orders to port and taken from those to starboard, as far as there is any left.
         """
         row: list[float] = []
         steering = self.steering
         for actuator in self.vessel.actuators:
             turned = angle_rad if actuator in steering else 0.0
-            thrust = 0.0 if actuator.kind in ("tunnel", "rudder") else _share(actuator.limits[0], drive)
+            order = drive
+            if turned and self.means == "propeller":
+                order = min(1.0, max(-1.0, drive - float(np.sign(actuator.starboard_m)) * math.sin(turned)))
+            thrust = 0.0 if actuator.kind in ("tunnel", "rudder") else _share(actuator.limits[0], order)
             side = thrust * math.sin(turned)
             row += {
                 "rudder": [turned],
@@ -99,6 +107,8 @@ class Helm:
 
     def angle_rate(self, drive: float) -> float:
         """Largest change of the helm angle per second [rad/s] at an engine order."""
+        if self.means == "propeller":
+            return self.drive_rate
         if self.means != "force":
             return min((actuator.limits[-1].rate for actuator in self.steering), default=math.inf)
         limits = self.steering[0].limits
@@ -119,6 +129,8 @@ class Helm:
 
     def hardest(self, drive: float, *, up_to_rad: float = math.radians(35.0)) -> float:
         """Largest helm angle to both sides [rad] that all actuators can give, `up_to_rad` at most."""
+        if self.means == "propeller":
+            return up_to_rad
         if self.means != "force":
             reaches = [min(-a.limits[-1].low, a.limits[-1].high) for a in self.steering]
             return min([up_to_rad, *reaches])
@@ -126,6 +138,14 @@ class Helm:
         thrust, arm = abs(_share(self.steering[0].limits[0], drive)), self.vessel.length_m / 2
         most = min(-side.low, side.high, -turn.low / arm, turn.high / arm)
         return min(up_to_rad, math.asin(min(1.0, max(0.0, most) / max(thrust, 1e-300))))
+
+    def acceleration(self, motion: tuple[float, float, float], drive: float, angle_rad: float) -> list[float]:
+        """d/dt (u, v, r) at a motion (u, v, r) through calm water under orders that have stood for long."""
+        given = [
+            float(past_deadband(command, response.deadband)) + response.offset
+            for command, response in zip(self.inputs(drive, angle_rad), self.vessel.responses, strict=True)
+        ]
+        return [float(a) for a in self.vessel.model.accelerations(motion, motion[:2], given, SCALAR)]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -178,7 +198,7 @@ def steady_ahead(vessel: Vessel, speed_mps: float | None = None, *, thrusters: s
     drive, sway, angle = _balance(helm, speed, _engine_order(helm, speed))
     helm.check(drive, angle)
     tilt = 1e-3
-    right, left = (_acceleration(helm, (speed, sway, 0.0), drive, angle + side * tilt)[2] for side in (1, -1))
+    right, left = (helm.acceleration((speed, sway, 0.0), drive, angle + side * tilt)[2] for side in (1, -1))
     felt = abs(right - left) > 1e-12 * (abs(right) + abs(left)) and right != left
     return Approach(
         helm=helm,
@@ -198,7 +218,7 @@ def service_speed(vessel: Vessel, *, thrusters: str = "stern") -> float:
     helm = Helm(vessel=vessel, thrusters=thrusters)
 
     def gain(speed: float) -> float:
-        return _acceleration(helm, (speed, 0.0, 0.0), SERVICE_SHARE, 0.0)[0]
+        return helm.acceleration((speed, 0.0, 0.0), SERVICE_SHARE, 0.0)[0]
 
     grid = np.linspace(0.0, FASTEST_MPS, 601)
     gains = [gain(speed) for speed in grid.tolist()]
@@ -215,18 +235,9 @@ def _share(limit: Limit, drive: float) -> float:
     return drive * (limit.high if drive >= 0 else abs(limit.low))
 
 
-def _acceleration(helm: Helm, motion: tuple[float, float, float], drive: float, angle: float) -> list[float]:
-    model = helm.vessel.model
-    given = [
-        float(past_deadband(command, response.deadband)) + response.offset
-        for command, response in zip(helm.inputs(drive, angle), helm.vessel.responses, strict=True)
-    ]
-    return [float(a) for a in model.accelerations(motion, motion[:2], given, SCALAR)]
-
-
 def _engine_order(helm: Helm, speed: float) -> float:
     def gain(drive: float) -> float:
-        return _acceleration(helm, (speed, 0.0, 0.0), drive, 0.0)[0]
+        return helm.acceleration((speed, 0.0, 0.0), drive, 0.0)[0]
 
     idle, full = gain(0.0), gain(1.0)
     if full < -STEADY * speed or idle > STEADY * speed:
@@ -239,12 +250,12 @@ def _engine_order(helm: Helm, speed: float) -> float:
 
 def _balance(helm: Helm, speed: float, drive: float) -> tuple[float, float, float]:
     """Engine order, sway speed and helm of the straight course, from the engine order of a symmetric vessel."""
-    if max(map(abs, _acceleration(helm, (speed, 0.0, 0.0), drive, 0.0)[1:])) <= STEADY * speed:
+    if max(map(abs, helm.acceleration((speed, 0.0, 0.0), drive, 0.0)[1:])) <= STEADY * speed:
         return drive, 0.0, 0.0
     sways = "v" in helm.vessel.model.outputs
 
     def excess(x: Array) -> list[float]:
-        surge, sway, yaw = _acceleration(helm, (speed, x[2] if sways else 0.0, 0.0), x[0], x[1])
+        surge, sway, yaw = helm.acceleration((speed, x[2] if sways else 0.0, 0.0), x[0], x[1])
         return [surge, yaw, sway] if sways else [surge, yaw]
 
     found = root(excess, [drive, 0.0, 0.0][: 3 if sways else 2], tol=1e-14)
