@@ -11,7 +11,7 @@ from expdesign.errors import Diverged, InputError
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation.actuation import deliver
 from expdesign.simulation.environment import CALM, Environment, WeatherSeries, weather_rows
-from expdesign.simulation.motion import State, integrator_step, motion_rates, rk4_step
+from expdesign.simulation.motion import State, begun, integrator_step, motion_rates, rk4_step
 from expdesign.simulation.program import STATES, RatesProgram, march
 from expdesign.values import Array
 from expdesign.vessel import SCALAR, Vessel
@@ -54,7 +54,7 @@ def simulate(
     current, wind = (rows.tolist() for rows in weather_rows(environment, len(commands)))
     theta = vessel.model.parameters.tolist()
     step_s = commands.sample_time_s / substeps
-    state: State = tuple(float(x) for x in (*pose, *velocity))
+    state: State = begun(vessel.model, tuple(float(x) for x in (*pose, *velocity)))
     rows = [state]
     for delivered, water, air in zip(_delivered(vessel, commands, substeps, standing), current, wind, strict=True):
 
@@ -69,7 +69,7 @@ def simulate(
             )
         rows.append(state)
     table: Array = np.array(rows)
-    return Trajectory(sample_time_s=commands.sample_time_s, pose=table[:, :3], velocity=table[:, 3:])
+    return Trajectory(sample_time_s=commands.sample_time_s, pose=table[:, :3], velocity=table[:, 3:6])
 
 
 def simulate_many(
@@ -90,7 +90,7 @@ def simulate_many(
         vessel: gives structure and actuators.
         commands: k samples, held, for all runs alike; or (n, k, m) in the model's order.
         pose, velocity: (n, 3) start states.
-        current_to, wind_to: (n, 2) steady n-frame velocities.
+        current_to, wind_to: n-frame velocities, (n, 2) when steady, or (k, n, 2) sample by sample.
         parameters: (n, p) in the model's own form.
         standing: commands that stood before the first sample, (m,) or with commands of their own (n, m); None for those
             of the first sample.
@@ -108,12 +108,14 @@ def simulate_many(
     given = deliver(vessel.responses, told, sample_time_s=sample_time_s, substeps=substeps, standing=before)
     runs = len(pose)
     program = RatesProgram(vessel.model, runs=runs, parameters=parameters)
-    program.sea[...] = np.concatenate([current_to.T, wind_to.T])
-    start, result = np.concatenate([pose.T, velocity.T]), np.empty((len(told) + 1, runs, STATES))
+    weather = [np.broadcast_to(item, (len(told), runs, 2)) for item in (current_to, wind_to)]
+    sea = np.concatenate(weather, axis=-1).swapaxes(1, 2)  # (k, 4, n)
+    start, result = np.array(begun(vessel.model, (*pose.T, *velocity.T))), np.empty((len(told) + 1, runs, STATES))
     states = march(program, given, start, step=rk4_step, step_s=sample_time_s / substeps, substeps=substeps)
     with np.errstate(over="ignore", invalid="ignore"):
-        for row, state in zip(result, states, strict=True):
-            row[...] = state.T
+        for row, state, now in zip(result, states, (*sea, sea[-1:]), strict=True):
+            row[...] = state[:STATES].T
+            program.sea[...] = now
     settled = np.abs(result[..., 3:]).max(axis=(0, 2)) < LARGEST_SPEED
     result[:, ~settled] = np.nan
     return result

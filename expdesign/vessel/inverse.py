@@ -41,8 +41,30 @@ def required_force(model: VesselModel, velocity: Array, acceleration: Array) -> 
         return np.stack(list(totals.values()), axis=-1) / model.time_scale_s
 
     free = response(np.zeros(3))
+    if _same_push_at_any_speed(model):  # one small inverse instead of one for every velocity
+        return np.asarray((acceleration - free) @ np.linalg.pinv(_push_at_rest(model)).T, dtype=float)
     gain = np.stack([response(unit) - free for unit in np.eye(3)], axis=-1)  # (..., 3 outputs, 3 forces)
     return np.asarray((np.linalg.pinv(gain) @ (acceleration - free)[..., None])[..., 0], dtype=float)
+
+
+def _same_push_at_any_speed(model: VesselModel) -> bool:
+    """Whether no term multiplies a force by a motion."""
+    forces = {*FORCE_SIGNALS}
+    return not any(forces & {*x.signals} and {*x.signals} - forces for x in model.expressions)
+
+
+def _push_at_rest(model: VesselModel) -> Array:
+    """(3, 3) acceleration of (u, v, r) for unit forces at rest."""
+    rest = dict.fromkeys((*MOTION_SIGNALS, *FORCE_SIGNALS, SHOAL), 0.0)
+
+    def response(force: Array) -> Array:
+        table = rest | dict(zip(FORCE_SIGNALS, force.tolist(), strict=True))
+        totals = dict.fromkeys(("u", "v", "r"), 0.0)
+        for term, expression, value in zip(model.terms, model.expressions, model.parameters, strict=True):
+            totals[term.equation] += float(value * expression.evaluate(table, NUMPY))
+        return np.array(list(totals.values())) / model.time_scale_s
+
+    return np.stack([response(unit) - response(np.zeros(3)) for unit in np.eye(3)], axis=-1)
 
 
 def direct_terms(model: VesselModel) -> tuple[str, ...]:
@@ -72,7 +94,12 @@ def force_matrix(actuators: tuple[Actuator, ...]) -> Array:
 
 
 def allocate(
-    actuators: tuple[Actuator, ...], force: Array, *, sample_time_s: float, before: Array | None = None
+    actuators: tuple[Actuator, ...],
+    force: Array,
+    *,
+    sample_time_s: float,
+    before: Array | None = None,
+    near: Array | None = None,
 ) -> Array:
     """Commands (..., k, m) for wished generalised forces (..., k, 3): smallest thrusts, then limits and rates.
 
@@ -84,12 +111,13 @@ def allocate(
         force: (..., k, 3) tau_x, tau_y, tau_psi.
         sample_time_s: time between rows [s].
         before: (..., m) commands standing before the first row, from which rates count; None for no rate limit there.
+        near: (..., m) commands to whose angles azimuths keep as near as they can; None for those of the row before.
     """
     wished = force @ np.linalg.pinv(force_matrix(actuators)).T  # (..., k, c)
     bounds = _bounds(actuators, sample_time_s)
     rows, last = [], before
     for row in np.moveaxis(wished, -2, 0):
-        last = _reached(bounds, _wished_commands(actuators, row, last), last)
+        last = _reached(bounds, _wished_commands(actuators, row, last if near is None else near), last)
         rows.append(last)
     return np.stack(rows, axis=-2)
 
