@@ -126,6 +126,36 @@ def test_a_signal_interrupts_the_work(number: signal.Signals) -> None:
     assert process.returncode == 130
 
 
+def test_ctrl_c_while_the_program_loads_is_one_line() -> None:
+    early = """
+import builtins, signal, sys
+from expdesign.cli import main
+real = builtins.__import__
+def pressed(name, *rest):
+    if name == "typer":
+        signal.raise_signal(signal.SIGINT)
+    return real(name, *rest)
+builtins.__import__ = pressed
+sys.exit(main())
+"""
+    done = subprocess.run([sys.executable, "-c", early], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (130, "expdesign: error: interrupted, nothing half-written\n")
+
+
+def test_ctrl_c_pressed_twice_is_one_line() -> None:
+    impatient = ASLEEP.replace(
+        "sys.exit(main(", "import atexit, signal\natexit.register(signal.raise_signal, signal.SIGINT)\nsys.exit(main("
+    ).replace('main(["run", "any.toml"])', "main()")
+    with subprocess.Popen(
+        [sys.executable, "-c", impatient, "run", "any.toml"], stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stderr is not None
+        assert "asleep" in process.stderr.readline()
+        process.send_signal(signal.SIGINT)
+        assert process.stderr.read() == "expdesign: error: interrupted, nothing half-written\n"
+    assert process.returncode == 130
+
+
 def test_the_termination_handler_is_given_back(capsys: pytest.CaptureFixture[str]) -> None:
     before = signal.getsignal(signal.SIGTERM)
     main(["--version"])

@@ -1,6 +1,7 @@
 """Files appear whole or not at all, whatever happens while they are written."""
 
 import os
+import signal
 from pathlib import Path
 
 import pytest
@@ -78,6 +79,51 @@ def test_folders_made_for_the_files_are_gone_again_after_a_failure(
     with pytest.raises(KeyboardInterrupt):
         write_files(tmp_path / "runs" / "one", FILES)
     assert content(tmp_path) == {}
+
+
+@pytest.mark.parametrize("step", ["fsync", "link", "replace", "unlink"])
+@pytest.mark.parametrize("count", [1, 2, 3, 4])
+def test_ctrl_c_at_any_step_leaves_all_old_files_or_all_new_ones(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: str, count: int
+) -> None:
+    """Pressed twice, too: it waits while files are put in place, and tidying up is not broken off."""
+    older = dict.fromkeys(FILES, b"old")
+    for name, text in older.items():
+        (tmp_path / name).write_bytes(text)
+    calls = 0
+    owner = os if step in ("fsync", "link") else Path
+    real = getattr(owner, step)
+
+    def interrupted(*arguments: object, **options: object) -> object:
+        nonlocal calls
+        calls += 1
+        if calls >= count:
+            signal.raise_signal(signal.SIGINT)
+        return real(*arguments, **options)
+
+    monkeypatch.setattr(owner, step, interrupted)
+    before = signal.getsignal(signal.SIGINT)
+    new = {name: text.encode() if isinstance(text, str) else text for name, text in FILES.items()}
+    happened = count <= len(FILES) or step == "unlink"
+    if happened:
+        with pytest.raises(KeyboardInterrupt):
+            write_files(tmp_path, FILES)
+    else:
+        write_files(tmp_path, FILES)
+    assert content(tmp_path) == (older if step == "fsync" and count < len(FILES) else new)
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_an_ignored_signal_stays_ignored(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in a command that was started with nohup or in the background."""
+    real = os.fsync
+    monkeypatch.setattr(os, "fsync", lambda number: (signal.raise_signal(signal.SIGINT), real(number)))
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        write_files(tmp_path, FILES)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert set(content(tmp_path)) == set(FILES)
 
 
 def test_a_folder_that_cannot_be_made_is_named(tmp_path: Path) -> None:

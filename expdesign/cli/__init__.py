@@ -3,6 +3,19 @@
 Results and summaries go to stdout; progress, messages and errors to stderr. Whatever goes wrong is one line.
 """
 
-from expdesign.cli.entry import main
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
 
 __all__ = ["main"]
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command; arguments and exit status as of `expdesign.cli.entry.main`."""
+    try:
+        from expdesign.cli.entry import main as run_command  # takes a moment, in which Ctrl-C counts, too
+    except KeyboardInterrupt:
+        sys.stderr.write("expdesign: error: interrupted, nothing half-written\n")
+        return 130
+    return run_command(argv)

@@ -46,6 +46,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     except typer.TyperException as error:
         return _fail(_usage(error), WRONG_INPUT)
     except KeyboardInterrupt:
+        if argv is None:  # the process ends: pressed once more, Ctrl-C must not end in a traceback
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
         return _fail("interrupted, nothing half-written", INTERRUPTED)
     except BrokenPipeError:
         return _reader_left()

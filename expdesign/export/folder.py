@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
+import threading
 import uuid
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -69,9 +71,9 @@ def write_files(folder: Path, files: Mapping[str, str | bytes]) -> tuple[Path, .
     mark = uuid.uuid4().hex[:12]
     slots = [_slot(folder, name, mark) for name in files]
     contents = [content.encode() if isinstance(content, str) else content for content in files.values()]
-    with _made(folder):
+    with _interruptions_wait() as stop_here, _made(folder):
         try:
-            _write_beside(slots, contents)
+            _write_beside(slots, contents, stop_here)
             _put_in_place(slots)
         except OSError as error:
             raise FileError(folder, "", f"cannot be written: {error.strerror or error}") from None
@@ -86,9 +88,37 @@ def _slot(folder: Path, name: str, mark: str) -> _Slot:
     return _Slot(folder / name, folder / f".{name}.{mark}.new", folder / f".{name}.{mark}.old")
 
 
-def _write_beside(slots: list[_Slot], contents: list[bytes]) -> None:
+@contextmanager
+def _interruptions_wait() -> Iterator[Callable[[], None]]:
+    """Let Ctrl-C and termination wait for the end of the block, where they act as they would have.
+
+    Yields a function to be called where stopping is safe: it raises KeyboardInterrupt when one of them came.
+    """
+    came: list[int] = []
+
+    def stop_here() -> None:
+        if came:
+            raise KeyboardInterrupt
+
+    def deliver() -> None:
+        if came:
+            signal.raise_signal(came[0])
+
+    with ExitStack() as stack:
+        if threading.current_thread() is threading.main_thread():  # in others nothing interrupts
+            stack.callback(deliver)
+            for number in (signal.SIGINT, signal.SIGTERM):
+                handler = signal.getsignal(number)
+                if handler not in (signal.SIG_IGN, None):
+                    stack.callback(signal.signal, number, handler)
+                    signal.signal(number, lambda number, frame: came.append(number))
+        yield stop_here
+
+
+def _write_beside(slots: list[_Slot], contents: list[bytes], stop_here: Callable[[], None]) -> None:
     try:
         for slot, content in zip(slots, contents, strict=True):
+            stop_here()
             slot.write(content)
     except BaseException:
         for slot in slots:
