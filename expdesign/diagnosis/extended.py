@@ -12,7 +12,7 @@ Effects, by key:
     lag:GROUP, delay:GROUP, deadband:GROUP    of a group of inputs [s], [s], [unit of the input]
     inertia:u/v/r         inertia too small by this share
     shallow:damping, shallow:inertia          growth per unit of draught over depth
-    roll:sway, roll:yaw   acceleration per rad of roll; roll:period [s] and roll:damping say which roll
+    roll:sway, roll:yaw   acceleration per unit of roll; roll:period [s] and roll:damping say which (`vessel.roll`)
     change:time           [s]; change:gain, change:damping_u/v/r, change:theta:NAME act after it
     heading_bias [rad], lever:forward/starboard [m], gyro (share), late:u/v/r/psi/position [s]   (sensors)
 
@@ -27,11 +27,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 from expdesign.diagnosis.parts import Effects, Part, added_parts, own_parts
-from expdesign.vessel import Term, VesselModel
+from expdesign.vessel import Roll, Term, VesselModel
 
 ANGLE_STEMS = ("a", "rudder")
+ROLL = {"roll:period": "period_s", "roll:damping": "damping_ratio", "roll:sway": "Y_phi", "roll:yaw": "N_phi"}
+"""Effect -> attribute of a `Roll`."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -74,6 +77,13 @@ class Extended:
     def has_roll(self) -> bool:
         """Roll is part of the motion."""
         return "roll:period" in self.effects
+
+    @cached_property
+    def roll(self) -> Roll | None:
+        """The mode."""
+        if not self.has_roll:
+            return None
+        return Roll(**{name: self.get(key) for key, name in ROLL.items()})
 
     @property
     def states(self) -> int:

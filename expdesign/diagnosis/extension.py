@@ -10,14 +10,14 @@ import numpy as np
 
 from expdesign.diagnosis.causes.missing_term import library
 from expdesign.diagnosis.causes.shallow_water import in_shallow_water
-from expdesign.diagnosis.extended import Extended
+from expdesign.diagnosis.extended import ROLL, Extended
 from expdesign.diagnosis.followed import members
 from expdesign.diagnosis.parts import is_coriolis, is_thrust, reads_rudder
 from expdesign.diagnosis.windows import derived_outputs
 from expdesign.errors import InputError
 from expdesign.estimation.tables import model_for
 from expdesign.signals import Batch, Record
-from expdesign.vessel import Actuator, Response, Sensors, Term, Vessel, VesselModel
+from expdesign.vessel import Actuator, Response, Roll, Sensors, Term, Vessel, VesselModel
 from expdesign.vessel.structures import SHOAL
 
 RESPONSES = {"lag": "lag_s", "delay": "delay_s", "deadband": "deadband", "offset": "offset"}
@@ -36,7 +36,7 @@ def as_extended(vessel: Vessel, record: Record) -> Extended:
             for kind, name in RESPONSES.items():
                 effects[f"{kind}:{signal}"] = float(getattr(response, name))
     derived = derived_outputs(record)
-    effects |= _sensed(vessel.sensors, derived)
+    effects |= _sensed(vessel.sensors, derived) | _rolled(model.roll)
     weather = vessel.environment
     for name, flow in (("current", weather.current_to), ("wind", weather.wind_to)):
         effects |= {f"{name}:north": float(flow[0]), f"{name}:east": float(flow[1])}
@@ -78,6 +78,11 @@ def _driven(vessel: Vessel, record: Record) -> tuple[VesselModel, float]:
     actuators = tuple(actuator for actuator in model.actuators if actuator.kind != "depth")
     shoalest = float(np.nan_to_num(vessel.draught_m / np.concatenate(depths)).max()) if depths else 0.0
     return replace(model, actuators=actuators) if SHOAL in model.inputs else model, shoalest
+
+
+def _rolled(roll: Roll | None) -> dict[str, float]:
+    """What a file says of roll."""
+    return {} if roll is None else {key: float(getattr(roll, name)) for key, name in ROLL.items()}
 
 
 def _shoal(batch: Batch) -> int:
@@ -142,13 +147,20 @@ def _model(model: VesselModel, ship: Extended, std: Mapping[str, float]) -> tupl
         values.append(lean[1])
         stds.append(0.0)
     missing = []
-    if ship.has_roll:
-        missing.append("The roll mode is not in the vessel file, which has three degrees of freedom.")
     if "change:time" in ship.effects:
         missing.append("The vessel file describes the ship after the change.")
     extended = replace(
-        model, terms=tuple(terms), parameters=np.array(values, dtype=float), parameter_std=np.array(stds, dtype=float)
+        model,
+        terms=tuple(terms),
+        parameters=np.array(values, dtype=float),
+        parameter_std=np.array(stds, dtype=float),
+        roll=ship.roll,
     )
+    if ship.has_roll:
+        missing.append(
+            "The vessel file has the oscillation as [model.roll]: simulate, score, durations, indices and diagnose "
+            "follow it; estimate and plans need a vessel file without that table, and say so."
+        )
     extended, depths = _depths(extended, model, ship)
     return extended, (*missing, *depths)
 
@@ -262,8 +274,7 @@ def public_name(key: str, ship: Extended) -> tuple[str, float, float, str]:
         return "time_s", 1.0, 0.0, "s"
     if kind == "change":
         return f"{rest}_factor", 1.0, 1.0, ""
-    unit = {"roll:period": "s"}.get(key, "")
-    return f"roll_{rest}" + (f"_{unit}" if unit else ""), 1.0, 0.0, unit
+    return {"roll:period": "roll_period_s", "roll:damping": "roll_damping_ratio"}.get(key, ROLL[key]), 1.0, 0.0, ""
 
 
 def finite(value: float) -> float | None:

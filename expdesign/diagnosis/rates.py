@@ -16,14 +16,9 @@ def rates(ship: Extended, state: tuple[Array, ...], around: Surroundings) -> tup
     """d/dt of (u, v, r) or (u, v, r, roll, roll rate)."""
     u, v, r = state[:3]
     totals = _accelerations(ship, u, v, r, around)
-    if not ship.has_roll:
+    if ship.roll is None:
         return tuple(totals)
-    roll, roll_rate = state[3:]
-    w0, damping = 2 * np.pi / ship.get("roll:period"), ship.get("roll:damping")
-    side = totals[1] + u * r
-    totals[1] = totals[1] + ship.get("roll:sway") * roll
-    totals[2] = totals[2] + ship.get("roll:yaw") * roll
-    return (*totals, roll_rate, w0**2 * (side - roll) - 2 * damping * w0 * roll_rate)
+    return ship.roll.rates(tuple(totals), u * r, state[3:])
 
 
 def _accelerations(ship: Extended, u: Array, v: Array, r: Array, around: Surroundings) -> list[Array]:

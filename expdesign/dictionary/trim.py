@@ -28,6 +28,8 @@ def drift(vessel: Vessel, velocity: Array, inputs: Array) -> Array:
     """Acceleration (..., 3) at a velocity (..., 3) through calm water under given commands (..., m)."""
     motion, held = np.moveaxis(velocity, -1, 0), np.moveaxis(inputs, -1, 0)
     parts = vessel.model.accelerations(motion, motion[:2], held, NUMPY)
+    if vessel.model.roll is not None:
+        parts = vessel.model.roll.standing(parts, motion[0] * motion[2])
     return np.stack(np.broadcast_arrays(*parts), axis=-1)
 
 

@@ -21,7 +21,7 @@ from expdesign.vessel import Operators, VesselModel
 CASADI = Operators(ca.fabs, ca.sin, ca.cos)
 STEPS = {"euler": euler_step, "rk4": rk4_step}
 Simulate = Callable[[Array, Array, Array], Array]
-"""(parameters (p,), start state (6,), inputs (k, m)) -> states (k, 6); calm water."""
+"""(parameters (p,), start state (6 or 8,), inputs (k, m)) -> states (k, 6 or 8); calm water."""
 BLOCK_INSTRUCTIONS = 20_000
 """Size of the flat functions that simulations are cut into."""
 
@@ -34,7 +34,7 @@ def batch_simulator(
     Where `windy`, two columns follow the model's inputs: the n-frame wind to north and east [m/s].
     """
     m, p = len(model.inputs), len(model.terms)
-    x, theta, drive = ca.SX.sym("x", 6), ca.SX.sym("p", p), ca.SX.sym("i", m + 2 * windy)
+    x, theta, drive = ca.SX.sym("x", model.states), ca.SX.sym("p", p), ca.SX.sym("i", m + 2 * windy)
     wind = (drive[m], drive[m + 1]) if windy else (0.0, 0.0)
 
     def rates(state: tuple[Any, ...]) -> tuple[Any, ...]:

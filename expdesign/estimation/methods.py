@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from expdesign.errors import Diverged, UnknownName
+from expdesign.errors import Diverged, InputError, UnknownName
 from expdesign.estimation.instruments import InstrumentModel, apart_from_start
 from expdesign.estimation.null_space import NullSpace
 from expdesign.estimation.output_error import Fitting, minimise_output_error
@@ -88,6 +88,10 @@ class Settings:
 
 
 STARTS = ("nominal", "ls")
+ROLLS = (
+    "the vessel's model has a roll mode, [model.roll], beside which nothing is estimated; expected a vessel file "
+    "without that table, or expdesign diagnose, which judges parameters beside it"
+)
 
 
 def method_named(name: str) -> Method:
@@ -112,11 +116,13 @@ def estimate(record: Record, model: VesselModel, *, method: str = "iv", settings
         settings: the rest.
 
     Raises:
-        InputError: the data lack what the method needs.
+        InputError: the data lack what the method needs, or the model has a roll mode.
         NotInformative: parameters that the data cannot tell apart; the message names the combinations.
         Diverged: the model that the first instruments come from is unstable.
     """
     chosen, choices = method_named(method), settings or Settings()
+    if model.roll is not None:
+        raise InputError(ROLLS)
     layout = build_layout(
         model_for(model, record),
         record,

@@ -12,6 +12,8 @@ from expdesign.errors import Diverged, InputError, UnknownName
 from expdesign.estimation._casadi import STEPS, Simulate, batch_simulator
 from expdesign.estimation.tables import inputs_of, model_for
 from expdesign.signals import Batch, Record, Trajectory
+from expdesign.simulation.motion import begun
+from expdesign.simulation.program import STATES
 from expdesign.simulation.run import LARGEST_SPEED
 from expdesign.values import Array
 from expdesign.vessel import VesselModel
@@ -62,7 +64,7 @@ class Replay:
             Diverged: a speed passed what ships reach, or stopped being a number.
             InputError: the first velocity, or an input, is not measured.
         """
-        start = start_state(self.model, batch)
+        start = np.array(begun(self.model, tuple(start_state(self.model, batch))))
         inputs = inputs_of(self.model, batch)
         if self.windy:
             inputs = np.concatenate([inputs, np.zeros((len(batch), 2)) if wind_to is None else wind_to], axis=1)
@@ -73,7 +75,7 @@ class Replay:
         if wild.any():
             time_s = int(np.argmax(wild)) * batch.sample_time_s
             raise Diverged(f"{batch.name}: the model's simulation diverges after {time_s:.1f} s")
-        return states
+        return np.asarray(states[:, :STATES])
 
 
 def build_replay(

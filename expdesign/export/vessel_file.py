@@ -117,6 +117,8 @@ def _model(model: VesselModel) -> Iterator[str]:
     known = {name: std for name, std in zip(model.names, stds, strict=True) if std > 0}
     if known:
         yield from ("", *_table("[model.parameter_std]", known))
+    if model.roll is not None:
+        yield from ("", *_table("[model.roll]", vars(model.roll)))
 
 
 def _table(head: str, entries: Mapping[str, str | float]) -> list[str]:

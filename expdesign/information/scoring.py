@@ -25,7 +25,8 @@ from expdesign.information.moments import (
 )
 from expdesign.information.primitive_information import PrimitiveInformation
 from expdesign.simulation import CALM, Environment, deliver, rk4_step, simulate, to_body
-from expdesign.simulation.program import RatesProgram, march
+from expdesign.simulation.motion import begun
+from expdesign.simulation.program import STATES, RatesProgram, march
 from expdesign.simulation.run import LARGEST_SPEED, SUBSTEPS
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, Vessel
@@ -251,10 +252,11 @@ def _simulated(
     """
     shape = (len(parameters), len(headings), entry.shape[1])
     current_b = to_body(environment.current_to, headings[:, None], NUMPY)
-    start = (0.0, 0.0, headings[:, None], entry[0] + current_b[0], entry[1] + current_b[1], entry[2])
-    first = np.array([np.broadcast_to(value, shape).reshape(-1) for value in start])
+    at_entry = (0.0, 0.0, headings[:, None], entry[0] + current_b[0], entry[1] + current_b[1], entry[2])
+    start = tuple(np.broadcast_to(value, shape).reshape(-1) for value in at_entry)
+    first = np.array(begun(vessel.model, start))
     own = np.repeat(parameters, shape[1] * shape[2], axis=0)
-    states = np.empty((len(given), *first.shape))
+    states = np.empty((len(given), STATES, first.shape[1]))
     size = shape[2] * max(1, MARCHED_AT_ONCE // shape[2])
     for begin in range(0, first.shape[1], size):
         some = slice(begin, begin + size)
@@ -262,19 +264,19 @@ def _simulated(
         program = RatesProgram(vessel.model, runs=runs, parameters=parameters[0] if len(parameters) == 1 else own[some])
         program.sea[...] = np.r_[environment.current_to, environment.wind_to][:, None]
         states[..., some] = _marched(program, given, first[:, some], sample_time_s / SUBSTEPS)
-    return states.reshape(len(states), 6, *shape)
+    return states.reshape(len(states), STATES, *shape)
 
 
 def _marched(program: RatesProgram, given: Array, start: Array, step_s: float) -> Array:
     """(k, 6, n) states at the start of every command; runs that diverge are nan throughout."""
-    states, largest = np.empty((len(given), *start.shape)), np.zeros(start.shape[1])
+    states, largest = np.empty((len(given), STATES, start.shape[1])), np.zeros(start.shape[1])
     with np.errstate(over="ignore", invalid="ignore"):
         marched = march(program, given, start, step=rk4_step, step_s=step_s, substeps=SUBSTEPS)
-        states[0] = next(marched)
+        states[0] = next(marched)[:STATES]
         for sample, state in enumerate(marched, start=1):
             largest = np.maximum(largest, np.abs(state[3:]).max(axis=0))
             if sample < len(states):
-                states[sample] = state
+                states[sample] = state[:STATES]
     states[..., ~(largest < LARGEST_SPEED)] = np.nan
     return states
 

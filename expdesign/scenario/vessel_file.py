@@ -32,6 +32,7 @@ from expdesign.vessel import (
     Limit,
     Mounting,
     Response,
+    Roll,
     Sensors,
     Term,
     Vessel,
@@ -153,6 +154,8 @@ def _model(table: ModelTable, actuators: tuple[Actuator, ...], sample_time_s: fl
     if missing:
         found = f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing"
         raise entry.at("parameters").error(f"{found}, expected every parameter of structure {table.structure!r}")
+    if table.roll is not None and not {"v", "r"} <= {term.equation for term in terms}:
+        raise entry.at("roll").error("needs terms of v and r, which roll acts on")
     return VesselModel(
         terms=terms,
         parameters=np.array([table.parameters[name] for name in names]),
@@ -160,6 +163,7 @@ def _model(table: ModelTable, actuators: tuple[Actuator, ...], sample_time_s: fl
         form=table.form,
         sample_time_s=sample_time_s,
         actuators=actuators,
+        roll=None if table.roll is None else Roll(**table.roll.model_dump()),
     )
 
 

@@ -106,6 +106,15 @@ class TermTable(Table):
     expression: Text = Field(description="what the parameter multiplies, e.g. 'u*abs(u)'")
 
 
+class RollTable(Table):
+    """`[model.roll]`: an oscillation in sway and yaw beside what the terms say."""
+
+    period_s: Positive = Field(description="the period of roll [s]")
+    damping_ratio: NonNegative = Field(description="its damping ratio")
+    Y_phi: Number = Field(description="sway acceleration per unit of roll")
+    N_phi: Number = Field(description="yaw acceleration per unit of roll")
+
+
 class ModelTable(Table):
     """`[model]`."""
 
@@ -114,6 +123,7 @@ class ModelTable(Table):
     parameters: dict[str, Number] = Field(description="a table [model.parameters] with a value for each parameter")
     parameter_std: dict[str, NonNegative] = Field(default={})
     terms: list[TermTable] = Field(default=[])
+    roll: RollTable | None = None
 
 
 class SensorsTable(Table):

@@ -22,7 +22,7 @@ from expdesign.signals import Batch
 from expdesign.simulation._numba import kernels
 from expdesign.simulation.actuation import deliver
 from expdesign.simulation.environment import Environment, vary
-from expdesign.simulation.motion import integrator_step
+from expdesign.simulation.motion import begun, integrator_step
 from expdesign.simulation.program import STATES, RatesProgram, march
 from expdesign.simulation.sensors import ROWS, noise_std, observe, prompt
 from expdesign.values import Array
@@ -125,7 +125,7 @@ def simulate_ensemble(
     )
     marching = partial(march, program, step=step, step_s=vessel.sample_time_s / substeps, substeps=substeps)
     draw = partial(_stretches, vessel, environment, rng=rng, engine=engine)
-    states, seen = _sailed(vessel, program, given, _start(pose, velocity, runs), marching=marching, draw=draw)
+    states, seen = _sailed(vessel, program, given, _start(vessel, pose, velocity, runs), marching=marching, draw=draw)
     return Ensemble(
         sample_time_s=vessel.sample_time_s,
         input_names=vessel.model.inputs,
@@ -160,7 +160,7 @@ def _sailed(
             stops = marching(given[part], state)
             winds = air[part] if late else air[: len(sea)]
             for row, wind, now in zip(states[part], winds, sea, strict=True):
-                row[...], program.sea[...], program.air = next(stops), now, wind
+                row[...], program.sea[...], program.air = next(stops)[:STATES], now, wind
             state = next(stops)
             if not late:
                 observe(vessel.sensors, states[part], winds, seen[part], sample_time_s=vessel.sample_time_s)
@@ -180,9 +180,10 @@ def _commands(vessel: Vessel, inputs: Array, runs: int) -> Array:
     return commands
 
 
-def _start(pose: Any, velocity: Any, runs: int) -> Array:
-    """(6, n)."""
-    return np.concatenate([np.broadcast_to(np.asarray(start, dtype=float), (runs, 3)).T for start in (pose, velocity)])
+def _start(vessel: Vessel, pose: Any, velocity: Any, runs: int) -> Array:
+    """(6 or 8, n)."""
+    parts = [np.broadcast_to(np.asarray(start, dtype=float), (runs, 3)).T for start in (pose, velocity)]
+    return np.array(begun(vessel.model, tuple(np.concatenate(parts))))
 
 
 def _stretches(

@@ -17,7 +17,7 @@ from expdesign.errors import Diverged, NoAnswer
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation.actuation import SampleMap, past_deadband, sample_map
 from expdesign.simulation.helm import Approach, Helm
-from expdesign.simulation.motion import State, motion_rates, rk4_step
+from expdesign.simulation.motion import State, begun, motion_rates, rk4_step
 from expdesign.simulation.run import LARGEST_SPEED, SUBSTEPS
 from expdesign.values import Array
 from expdesign.vessel import IDEAL, SCALAR, Vessel
@@ -103,7 +103,7 @@ def sail(approach: Approach, stages: Iterable[Stage], conduct: Conduct, what: st
     ahead = Stage(angle_rad=approach.angle_rad, drive=approach.drive, left=lambda time, _: lead_s - time)
     waiting = [ahead, *stages] if lead_s else list(stages)
     end_s = LONGEST * vessel.length_m / approach.speed_mps if conduct.duration_s is None else conduct.duration_s
-    state: State = (0.0, 0.0, 0.0, *approach.velocity.tolist())
+    state: State = begun(vessel.model, (0.0, 0.0, 0.0, *approach.velocity.tolist()))
     rows: list[list[float]] = []
     states, began_s, finished = [state], 0.0, False
     engine_room = _Delivery.standing(vessel, approach.inputs.tolist(), step_s)
@@ -124,7 +124,7 @@ def sail(approach: Approach, stages: Iterable[Stage], conduct: Conduct, what: st
         raise NoAnswer(f"{what}: vessel {vessel.name!r} does not come to the end of it within {end_s:.4g} s")
     table: Array = np.array(states)
     commands = Commands(sample_time_s=step_s, names=vessel.model.inputs, values=np.array(rows))
-    return commands, Trajectory(sample_time_s=step_s, pose=table[:, :3], velocity=table[:, 3:])
+    return commands, Trajectory(sample_time_s=step_s, pose=table[:, :3], velocity=table[:, 3:6])
 
 
 def _share_left(

@@ -1,6 +1,7 @@
 """Equations of motion and their integrators, written once for floats, NumPy arrays and CasADi symbols.
 
-State (north, east, heading, u, v, r): pose in the n-frame, velocity over ground in the b-frame.
+State (north, east, heading, u, v, r): pose in the n-frame, velocity over ground in the b-frame. Models with a roll mode
+have two states more, roll and its rate, see `vessel.roll`.
 
 Source: T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control (2011), (2.26); F. Ljungberg, doctoral
 thesis, Linköping University, (3.18) and (3.58).
@@ -36,7 +37,7 @@ def relative_velocity(state: State, current_to: Any, wind_to: Any, ops: Operator
 
 
 def _relative(state: State, current_to: Any, wind_to: Any, c: Any, s: Any) -> tuple[State, State]:
-    *_, u, v, r = state
+    u, v, r = state[3:6]
     u_c, v_c = _turned(current_to, c, s)
     u_w, v_w = _turned(wind_to, c, s)
     return (u - u_c, v - v_c, r), (u - u_w, v - v_w)
@@ -52,11 +53,19 @@ def motion_rates(
     ops: Operators = NUMPY,
     parameters: Any = None,
 ) -> State:
-    """Time derivative of the state under held inputs and steady n-frame current and wind."""
-    _, _, heading, u, v, r = state
+    """Time derivative of the state, (6,) or with roll (8,), under held inputs and steady n-frame current and wind."""
+    _, _, heading, u, v, r, *roll = state
     c, s = ops.cos(heading), ops.sin(heading)
     water, air = _relative(state, current_to, wind_to, c, s)
-    return (u * c - v * s, u * s + v * c, r, *model.accelerations(water, air, inputs, ops, parameters))
+    rates = model.accelerations(water, air, inputs, ops, parameters)
+    if model.roll is not None:
+        rates = model.roll.rates(rates, u * r, tuple(roll))
+    return (u * c - v * s, u * s + v * c, r, *rates)
+
+
+def begun(model: VesselModel, state: State) -> State:
+    """A state that a model's motion begins from, (6,): upright where it has a roll mode."""
+    return (*state, *(0.0 * x for x in state[: model.states - len(state)]))
 
 
 def euler_step(rates: Rates, state: State, step_s: Any) -> State:

@@ -20,15 +20,14 @@ from expdesign.values import Array
 from expdesign.vessel import VesselModel
 
 STATES = 6
-OUT = STATES + 4
-OWN = OUT + STATES + 2
-"""Rows of memory: state, sea, results (rates and relative wind), then parameters of the runs' own, inputs and more."""
+"""Of a motion: pose and velocity."""
 
 
 class RatesProgram:
     """Rates of motion of n runs: `hold` inputs, `select` a row of them, then call `rates`, as often as need be.
 
-    All memory is one table with a row of n numbers for each value.
+    All memory is one table with a row of n numbers for each value: state, sea, results (rates and relative wind), then
+    parameters of the runs' own, inputs and more. The state has two rows more than `STATES` where the model rolls.
 
     Attributes:
         sea: (4, n) n-frame current and wind to north and east [m/s]; write into it.
@@ -47,8 +46,11 @@ class RatesProgram:
             engine: "numpy", or "numba" which does the calls of a step in compiled code.
         """
         theta = model.parameters if parameters is None else parameters
-        self._tape = tape = Tape()
-        state, sea = tape.given("state", STATES), tape.given("sea", 4)
+        self._tape, self._states = Tape(), model.states
+        self._out = self._states + 4
+        self._first = self._out + self._states + 2
+        tape = self._tape
+        state, sea = tape.given("state", self._states), tape.given("sea", 4)
         inputs = tape.given("input", len(model.inputs))
         values = theta.tolist() if theta.ndim == 1 else tape.given("parameter", len(model.terms))
         rates = motion_rates(model, state, inputs, current_to=sea[:2], wind_to=sea[2:], ops=SYMBOLIC, parameters=values)
@@ -62,10 +64,11 @@ class RatesProgram:
         for row, number in constants.items():
             memory[row] = number
         if self._own:
-            memory[OWN : OWN + self._own] = theta.T
-        self._state, self.sea, self._results = memory[:STATES], memory[STATES:OUT], memory[OUT:OWN]
+            memory[self._first : self._first + self._own] = theta.T
+        self._state, self.sea = memory[: self._states], memory[self._states : self._out]
+        self._results = memory[self._out : self._first]
         self.air: Array | None = None
-        first = OWN + self._own
+        first = self._first + self._own
         self._current, self._table = memory[first : first + len(self._held)], np.zeros((0, 0, 0))
         self._run = prepared(codes, memory, constants, engine)
 
@@ -91,15 +94,15 @@ class RatesProgram:
         self._current.reshape(rows, self._current.shape[1] // own, own)[...] = held[:, None]
 
     def rates(self, state: tuple[Array, ...]) -> tuple[Array, ...]:
-        """Time derivative of the state, (6, n) each, packed as one entry so that every integrator takes them.
+        """Time derivative of the state, (6 or 8, n) each, packed as one entry so that every integrator takes them.
 
         The next call overwrites it.
         """
         self._state[...] = state[0]
         self._run()
         if self.air is not None:
-            self.air[...], self.air = self._results[STATES:], None
-        return (self._results[:STATES],)
+            self.air[...], self.air = self._results[self._states :], None
+        return (self._results[: self._states],)
 
     def _split(self) -> tuple[set[int], list[int]]:
         """Places that rest on inputs and constants alone, and those among them that the motion reads."""
@@ -116,8 +119,8 @@ class RatesProgram:
 
         A row is used again once nobody reads what it holds.
         """
-        entries, begins = self._tape.entries, {"state": 0, "sea": STATES, "parameter": OWN}
-        first = OWN + self._own
+        entries, begins = self._tape.entries, {"state": 0, "sea": self._states, "parameter": self._first}
+        first = self._first + self._own
         where = {place: first + index for index, place in enumerate(self._held)}
         rows, constants = first + len(self._held), dict[int, float]()
         last = {argument: place for place in self._places for argument in entries[place].arguments}
@@ -132,7 +135,7 @@ class RatesProgram:
                 operands = [where[argument] for argument in entry.arguments]
                 free += [where[a] for a in {*entry.arguments} & temporary if last[a] == place]
                 if place in results:
-                    where[place] = OUT + results.index(place)
+                    where[place] = self._out + results.index(place)
                 elif free:
                     where[place] = free.pop()
                 else:
@@ -140,7 +143,7 @@ class RatesProgram:
                 if place not in results:
                     temporary.add(place)
                 codes.append((OPERATIONS.index(entry.name), operands[0], operands[-1], where[place]))
-        for row, place in enumerate(results, start=OUT):
+        for row, place in enumerate(results, start=self._out):
             if where[place] != row:
                 codes.append((OPERATIONS.index("positive"), where[place], where[place], row))
         return np.array(codes), rows, constants
@@ -173,7 +176,7 @@ def prepared(codes: Array, memory: Array, constants: Mapping[int, float], engine
 def march(
     program: RatesProgram, given: Array, state: Array, *, step: Step, step_s: float, substeps: int
 ) -> Iterator[Array]:
-    """The state (6, n) at every sample, then at the end of the last one.
+    """The state (6 or 8, n) at every sample, then at the end of the last one.
 
     While it stands at a sample, the caller may set the program's `sea` and `air`.
 
@@ -181,7 +184,7 @@ def march(
         program: of the runs.
         given: (k, substeps, m, n), or 1 in place of substeps where inputs are held over a sample, or in place of n
             where runs share them.
-        state: (6, n) at the first sample.
+        state: (6 or 8, n) at the first sample.
         step: of the integrator.
         step_s: its length [s].
         substeps: steps per sample.

@@ -15,6 +15,7 @@ from expdesign.vessel.environment import CALM, STEADY, Environment, Variation
 from expdesign.vessel.expressions import NUMPY, SCALAR, Operators
 from expdesign.vessel.inverse import allocate, direct_terms, force_matrix, required_force, within_limits
 from expdesign.vessel.model import VesselModel
+from expdesign.vessel.roll import Roll
 from expdesign.vessel.sensors import CENTRAL, SENSORS, Mounting, Sensors
 from expdesign.vessel.structures import STRUCTURES, TERMS, Term, structure_terms
 from expdesign.vessel.vessel import Vessel
@@ -36,6 +37,7 @@ __all__ = [
     "Mounting",
     "Operators",
     "Response",
+    "Roll",
     "Sensors",
     "Term",
     "Variation",

@@ -18,6 +18,7 @@ from expdesign.errors import InputError, UnknownName
 from expdesign.values import Array, readonly
 from expdesign.vessel.actuators import Actuator, generalised_force
 from expdesign.vessel.expressions import NUMPY, Expression, Operators, Signals, parse_expression
+from expdesign.vessel.roll import Roll
 from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS, SHOAL, Term
 
 
@@ -32,6 +33,7 @@ class VesselModel:
         form: "discrete" (parameters hold the sample time) or "continuous".
         sample_time_s: of the discrete form [s].
         actuators: they turn commands into generalised forces.
+        roll: a mode that oscillates beside what the terms say, or None.
     """
 
     terms: tuple[Term, ...]
@@ -40,6 +42,7 @@ class VesselModel:
     form: str
     sample_time_s: float
     actuators: tuple[Actuator, ...]
+    roll: Roll | None = None
     expressions: tuple[Expression, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -74,6 +77,11 @@ class VesselModel:
     def inputs(self) -> tuple[str, ...]:
         """Actuator signals in command order."""
         return tuple(name for actuator in self.actuators for name in actuator.signals)
+
+    @property
+    def states(self) -> int:
+        """Pose and velocity, and with a roll mode its angle and rate."""
+        return 6 if self.roll is None else 8
 
     @property
     def time_scale_s(self) -> float:
@@ -111,7 +119,10 @@ class VesselModel:
     def accelerations(
         self, velocity_r: Any, velocity_q: Any, inputs: Any, ops: Operators = NUMPY, parameters: Any = None
     ) -> tuple[Any, Any, Any]:
-        """d/dt (u, v, r) [m/s2, m/s2, rad/s2]; arguments as in `regressors`, other parameter values optional."""
+        """d/dt (u, v, r) [m/s2, m/s2, rad/s2] by the terms, without roll.
+
+        Arguments are as in `regressors`, other parameter values optional.
+        """
         theta = self.parameters if parameters is None else parameters
         totals: dict[str, Any] = dict.fromkeys(OUTPUTS, 0.0)
         values = self.regressors(velocity_r, velocity_q, inputs, ops)

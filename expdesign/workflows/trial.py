@@ -11,6 +11,7 @@ from expdesign.dictionary import build_dictionary
 from expdesign.dictionary.wishes import strayed
 from expdesign.durations import DurationDesign, efficiencies, with_repeats
 from expdesign.durations.growing_values import Growth
+from expdesign.errors import InputError
 from expdesign.export import (
     STANDARD,
     Route,
@@ -38,6 +39,7 @@ from expdesign.workflows.outcome import Outcome, Progress, TextTable, silent, wi
 def run(scenario: Path, out: Path | None, *, seed: int = 0, progress: Progress = silent) -> Outcome:
     """The main job: score, durations, plan, verification, route files and report, into `out` or runs/<scenario>."""
     case = _load(scenario, progress)
+    check_plannable(case)
     information, growth = ready(case, seed=seed, progress=within(progress, 0.02, 0.1))
     design = designed(case, information, seed=seed, progress=within(progress, 0.1, 0.13))
     compared = efficiencies(design)
@@ -101,6 +103,7 @@ def plan(
 ) -> Outcome:
     """One verified trajectory with the runs of a durations file, or of the optimal durations."""
     case = _load(scenario, progress)
+    check_plannable(case)
     information, _ = ready(case, seed=seed, progress=within(progress, 0.02, 0.1))
     design = designed(case, information, seed=seed)
     if durations is not None:
@@ -141,6 +144,7 @@ def planned(
     progress: Progress = silent,
 ) -> Plan:
     """The verified trial of a scenario."""
+    check_plannable(case)
     problem = PlanProblem(
         vessel=case.vessel,
         area=case.area,
@@ -153,6 +157,15 @@ def planned(
         seed=seed,
     )
     return plan_trial(problem, progress=progress)
+
+
+def check_plannable(case: Scenario) -> None:
+    """Raise InputError for a vessel that plans cannot be made for."""
+    if case.vessel.model.roll is not None:
+        raise InputError(
+            f"vessel {case.vessel.name!r} has a roll mode, [model.roll], which plans do not follow; expected a vessel "
+            "file without that table for planning, and the one with it as the truth of a simulation"
+        )
 
 
 def _load(scenario: Path, progress: Progress) -> Scenario:

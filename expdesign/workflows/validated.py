@@ -46,6 +46,11 @@ def validate_design(
     if integrator not in INTEGRATORS:
         raise InputError(f"--integrator is {integrator}, expected one of {', '.join(INTEGRATORS)}")
     case = load_scenario(scenario)
+    if case.vessel.model.roll is not None:
+        raise InputError(
+            f"vessel {case.vessel.name!r} has a roll mode, [model.roll], which {method} does not estimate beside; "
+            "expected it in the vessel of --truth only"
+        )
     information = scored(case, progress=within(progress, 0.0, 0.05))
     design = designed(case, information)
     primitives = tuple(item.primitive for item in information)
@@ -92,7 +97,7 @@ def _identity(rehearsal: Rehearsal) -> tuple[object, ...]:
     """Everything that the trials depend on."""
     arrays = [(item.name, item.commands.values, item.entry_velocity) for item in rehearsal.primitives]
     ships = [
-        (ship.model.names, ship.model.parameters, ship.sensors, ship.responses)
+        (ship.model.names, ship.model.parameters, ship.sensors, ship.responses, ship.model.roll)
         for ship in (rehearsal.truth, rehearsal.nominal)
     ]
     weather = rehearsal.environment
