@@ -8,6 +8,7 @@ Communications of the ACM 22 (1979), 560-570.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,17 +46,8 @@ class Ways:
 
         Points outside the water are joined to its nearest point by a straight line.
         """
-        inside = [self.nearest(point) for point in (start, end)]
-        nodes = np.concatenate([self.corners, inside])
+        nodes, distance, before = self._least(start, end, lambda step: np.hypot(*step.T))
         n = len(self.corners)
-        sight = [self.sees(point, nodes) for point in inside]
-        tails = np.concatenate([np.full(len(seen), n + k) for k, seen in enumerate(sight)])
-        heads = np.concatenate(sight)
-        rows, columns = self.lengths.nonzero()
-        away = np.hypot(*(nodes[tails] - nodes[heads]).T)
-        data = np.r_[self.lengths.data, away] + 1e-12
-        graph = coo_matrix((data, (np.r_[rows, tails], np.r_[columns, heads])), shape=(n + 2, n + 2)).tocsr()
-        distance, before = dijkstra(graph, directed=False, indices=n, return_predecessors=True)
         if not np.isfinite(distance[n + 1]):
             return None
         chain = [n + 1]
@@ -64,6 +56,35 @@ class Ways:
         way = np.array([start, *nodes[chain[::-1]], end])
         moved = np.r_[True, np.hypot(*np.diff(way, axis=0).T) > 1e-9]
         return way[moved]
+
+    def least(self, start: Array, end: Array, cost: Callable[[Array], Array]) -> float:
+        """Least cost of the ways between two points (2,), infinite when there is none.
+
+        Exact for costs of straight steps (k, 2) that grow with their length and obey the triangle inequality, in one
+        direction perhaps more than in the other: the best ways then bend at corners only. For points outside the water
+        it is that from its nearest points.
+        """
+        _, least, _ = self._least(start, end, cost)
+        return float(least[len(self.corners) + 1])
+
+    def _least(self, start: Array, end: Array, cost: Callable[[Array], Array]) -> tuple[Array, Array, np.ndarray]:
+        """Corners and the nearest points to both ends, least costs from the start to all, and the node before each."""
+        inside = [self.nearest(point) for point in (start, end)]
+        nodes = np.concatenate([self.corners, inside])
+        n = len(self.corners)
+        rows, columns = self.lengths.nonzero()
+        tails, heads = [rows, columns], [columns, rows]
+        for k, point in enumerate(inside):
+            seen = self.sees(point, nodes)
+            tails += [np.full(len(seen), n + k), seen]
+            heads += [seen, np.full(len(seen), n + k)]
+        tail, head = np.concatenate(tails), np.concatenate(heads)
+        once = np.unique(tail * (n + 2) + head)  # the ends may see each other twice
+        tail, head = once // (n + 2), once % (n + 2)
+        data = cost(nodes[head] - nodes[tail]) + 1e-12
+        graph = coo_matrix((data, (tail, head)), shape=(n + 2, n + 2)).tocsr()
+        least, before = dijkstra(graph, indices=n, return_predecessors=True)
+        return nodes, least, before
 
     def length_m(self, start: Array, end: Array) -> float:
         """Length of the taut string [m], infinite when there is none."""
