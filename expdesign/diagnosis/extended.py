@@ -5,7 +5,7 @@ Effects, by key:
     theta:NAME            change of a model parameter
     term:NAME             coefficient of a library term that the model lacks
     current:north/east    steady current [m/s]
-    wind:north/east       mean wind where none is measured [m/s]
+    wind:north/east       mean wind where none is measured [m/s]; wind:speed [m/s] and wind:toward [rad] likewise
     gain, gain:propeller  thrust too strong by this share; all terms of inputs, or those without a rudder
     asymmetry             yaw moment per unit of ahead force: the thrust's line of action passes this far to port [m]
     offset:GROUP          added to the angles of a group of inputs [rad]

@@ -13,6 +13,7 @@ from expdesign.diagnosis.causes.shallow_water import in_shallow_water
 from expdesign.diagnosis.extended import ROLL, Extended
 from expdesign.diagnosis.followed import members
 from expdesign.diagnosis.parts import is_coriolis, is_thrust, reads_rudder
+from expdesign.diagnosis.surroundings import mean_wind
 from expdesign.diagnosis.windows import derived_outputs
 from expdesign.errors import InputError
 from expdesign.estimation.tables import model_for
@@ -103,7 +104,7 @@ def extend(vessel: Vessel, ship: Extended, std: Mapping[str, float]) -> tuple[Ve
     weather = replace(
         vessel.environment,
         current_to=np.array([get("current:north"), get("current:east")]),
-        wind_to=np.array([get("wind:north"), get("wind:east")]),
+        wind_to=np.array(mean_wind(ship)),
     )
     return (
         replace(
@@ -263,6 +264,8 @@ def public_name(key: str, ship: Extended) -> tuple[str, float, float, str]:
         "lever": (f"{rest}_m", "m"), "late": (f"{rest}_delay_s", "s"), "heading_bias": ("heading_bias_rad", "rad"),
         "shallow": (f"{rest}_growth", ""), "asymmetry": ("thrust_offset_m", "m"), "term": (rest, ""),
     }  # fmt: skip
+    if key == "wind:toward":
+        return "toward_rad", 1.0, 0.0, "rad"
     if kind in fixed:
         name, unit = fixed[kind]
         return name, 1.0, 0.0, unit

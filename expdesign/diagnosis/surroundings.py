@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from expdesign.diagnosis.extended import Extended
@@ -63,7 +65,13 @@ def _wind(ship: Extended, windows: Windows) -> tuple[Array, Array]:
     """Measured where it is, else the mean wind of the model."""
     if windows.has_wind:
         return np.nan_to_num(windows.wind[..., 0]), np.nan_to_num(windows.wind[..., 1])
-    return to_body(ship.get("wind:north"), ship.get("wind:east"), true_heading(ship, windows))
+    return to_body(*mean_wind(ship), true_heading(ship, windows))
+
+
+def mean_wind(ship: Extended) -> tuple[float, float]:
+    """Velocity to north and east of the wind where none is measured [m/s]."""
+    speed, toward = ship.get("wind:speed"), ship.get("wind:toward")
+    return ship.get("wind:north") + speed * math.cos(toward), ship.get("wind:east") + speed * math.sin(toward)
 
 
 def true_heading(ship: Extended, windows: Windows) -> Array:

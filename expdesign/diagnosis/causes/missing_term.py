@@ -23,7 +23,8 @@ MORE_TERMS = (
     Term("r", "N_abs_r_r", "abs(r)*r"),
 )
 """Second-order modulus terms that manoeuvring models often have beside the built-in ones."""
-ADVANCE_LOSS = "X_kappa"
+ADVANCE_LOSS = ("X_kappa", "X_un", "X_unn")
+"""Terms by which thrust falls with the speed of advance."""
 AIR = ("W_abs_u_u", "W_abs_v_v", "W_uv")
 
 
@@ -37,7 +38,7 @@ def library(model: VesselModel) -> Mapping[str, Term]:
         for term, expression in zip(model.terms, model.expressions, strict=True)
     ]
     found = {}
-    for term in (*TERMS.values(), *MORE_TERMS):
+    for term in (*TERMS.values(), *MORE_TERMS, *_advance(model)):
         if term.name in model.names or term.equation not in model.outputs:
             continue
         if not _readable(term, model):
@@ -46,6 +47,41 @@ def library(model: VesselModel) -> Mapping[str, Term]:
         if not any(term.equation == equation and _parallel(values, other) for equation, other in own):
             found[term.name] = term
     return found
+
+
+def _advance(model: VesselModel) -> tuple[Term, ...]:
+    """Advance loss of propellers that drive the model by their speeds, not through tau_x.
+
+    Thrust rho n^2 D^4 K_T(J) with K_T linear in J = u / (n D) has a term in u |n|; a wake that slows with the thrust
+    makes it u n |n| rather.
+
+    Source: A. F. Molland, S. R. Turnock, D. A. Hudson, Ship Resistance and Propulsion (2011), ch. 12, for K_T(J).
+    """
+    read = {name for term, e in zip(model.terms, model.expressions, strict=True) if term.equation == "u"
+            for name in e.signals}  # fmt: skip
+    speeds = [name for name in model.inputs if name.rstrip("0123456789") == "n" and name in read]
+    if not speeds:
+        return ()
+    return (
+        Term("u", "X_un", " + ".join(f"u*abs({name})" for name in speeds)),
+        Term("u", "X_unn", " + ".join(f"u*abs({name})*{name}" for name in speeds)),
+    )
+
+
+def own_advance_terms(model: VesselModel) -> list[str]:
+    """Names of the model's terms that are an advance loss, whatever they are called."""
+    rng = np.random.default_rng(0)
+    names = (*MOTION_SIGNALS, *dict.fromkeys((*FORCE_SIGNALS, *model.inputs)))
+    table = {name: rng.standard_normal(12) for name in names}
+    losses = [
+        parse_expression(term.expression, signals=names).evaluate(table, NUMPY)
+        for term in (TERMS["X_kappa"], *_advance(model))
+    ]
+    return [
+        term.name
+        for term, expression in zip(model.terms, model.expressions, strict=True)
+        if term.equation == "u" and any(_parallel(expression.evaluate(table, NUMPY), loss) for loss in losses)
+    ]
 
 
 def _readable(term: Term, model: VesselModel) -> bool:
@@ -63,7 +99,7 @@ def lacking(situation: Situation, *, air: bool) -> list[str]:
     return [
         name
         for name in situation.ship.library
-        if (name in AIR) == air and name != ADVANCE_LOSS and not situation.has(f"term:{name}")
+        if (name in AIR) == air and name not in ADVANCE_LOSS and not situation.has(f"term:{name}")
     ]
 
 

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
-from expdesign.diagnosis.causes.missing_term import ADVANCE_LOSS
+from expdesign.diagnosis.causes.missing_term import ADVANCE_LOSS, own_advance_terms
 from expdesign.diagnosis.causes.words import first, rounded
 
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     ship = situation.ship
-    keys = [f"theta:{ADVANCE_LOSS}"] if ADVANCE_LOSS in ship.model.names else []
-    keys += [f"term:{name}" for name in ship.library if name == ADVANCE_LOSS or name.startswith("X_un")]
+    if any(key in ship.effects for key in (f"term:{name}" for name in ADVANCE_LOSS)):
+        return ()
+    keys = [f"theta:{name}" for name in own_advance_terms(ship.model)]
+    keys += [f"term:{name}" for name in ADVANCE_LOSS if name in ship.library]
     return tuple(Candidate(cause="thrust_advance_loss", free={key: 0.0}) for key in keys if key not in ship.effects)
 
 
