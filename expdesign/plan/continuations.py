@@ -78,20 +78,21 @@ def _run_up(space: SearchSpace, last: int, q: int) -> float:
     return max(space.hull_m, space.ship.run_up_m) + more_m
 
 
-def _departures(space: SearchSpace, beam: PartialPlans) -> Array:
-    """(b, 3) places where partial plans end, and headings; courses for ships whose way bends on as they straighten."""
-    if space.ship.approach is None:
-        return beam.pose
-    drift = np.array([*(item.exit_drift_rad for item in space.stamps), 0.0])[beam.last]
-    return np.asarray(beam.pose + drift[:, None] * np.array([0.0, 0.0, 1.0]))
+def _departures(space: SearchSpace, beam: PartialPlans) -> tuple[Array, Array]:
+    """(b, 3) places from which ships go on, with courses for headings, and (b,) how long it takes to come to that."""
+    if space.recoveries is None:
+        return beam.pose, np.zeros(len(beam.pose))
+    steps = np.vstack([space.recoveries, np.zeros(4)])[beam.last]
+    return _moved(beam.pose, steps[:, :3]), steps[:, 3]
 
 
 def _arcs(space: SearchSpace, beam: PartialPlans, able: np.ndarray, q: int, runup: Array, change_s: Array) -> Options:
     turn, extra = (grid.ravel() for grid in np.meshgrid(TURNS, STRAIGHTS * space.hull_m))
-    pose = np.repeat(_departures(space, beam)[able], len(turn), axis=0)
+    departures, checked_s = _departures(space, beam)
+    pose = np.repeat(departures[able], len(turn), axis=0)
     turns, straight = np.tile(turn, len(able)), np.tile(extra, len(able)) + np.repeat(runup, len(turn))
     length = space.ship.turning_radius_m * np.abs(turns) + straight
-    leg_s = length / space.ship.transit_speed_mps + np.repeat(change_s, len(turn))
+    leg_s = length / space.ship.transit_speed_mps + np.repeat(change_s + checked_s[able], len(turn))
     start = _arc_end(pose, turns, straight, space.ship.turning_radius_m)
     parent = np.repeat(able, len(turn))
     return _options(q, parent, start, leg_s, turn=turns)
@@ -174,12 +175,13 @@ def _moved(pose: Array, step: Array) -> Array:
 
 def _transits(space: SearchSpace, beam: PartialPlans, able: np.ndarray, q: int, change_s: Array) -> Options:
     parents, starts, times = [], [], []
-    for index, wait in zip(able, change_s, strict=True):
-        points, along = _way_points(space, beam.pose[index], WAYS)
+    departures, checked_s = _departures(space, beam)
+    for index, wait in zip(able, change_s + checked_s[able], strict=True):
+        points, along = _way_points(space, departures[index], WAYS)
         if not len(points):
             continue
         heading = np.arctan2(points[:, 3], points[:, 2])
-        first = np.abs(wrap_angle(heading[:1] - beam.pose[index, 2]))
+        first = np.abs(wrap_angle(heading[:1] - departures[index, 2]))
         for offset in WAY_OFFSETS:
             length = along + space.ship.turning_radius_m * (abs(offset) + first)
             starts.append(np.column_stack([points[:, :2], heading + offset]))
@@ -225,7 +227,7 @@ def clear_options(space: SearchSpace, plans: PartialPlans, options: Options) -> 
         clear &= ~(near & (np.abs(wrap_angle(start[:, 2] - bad[2])) < 0.2))
     clear &= space.field.at(run_ends(space, primitive, start)[:, :2]) >= space.leg_margin_m
     arcs = np.flatnonzero(clear & ~np.isnan(turn))
-    clear[arcs] = _arcs_clear(space, _departures(space, plans)[options.parent[arcs]], turn[arcs], start[arcs])
+    clear[arcs] = _arcs_clear(space, _departures(space, plans)[0][options.parent[arcs]], turn[arcs], start[arcs])
     lines = np.flatnonzero(clear & options.straight)
     clear[lines] = _lines_clear(space, plans.pose[options.parent[lines]], start[lines])
     for q in np.unique(primitive[clear]):

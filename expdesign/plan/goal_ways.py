@@ -67,7 +67,7 @@ def build_goal_ways(ways: Ways, field: ClearanceField, goal: Array) -> GoalWays 
         field: its grid; thinned to `TABLE_CELLS`.
         goal: place.
     """
-    nodes, distance, following = _from_goal(ways, goal)
+    nodes, distance, following = ways_to(ways, goal)
     grid = field.thinned(TABLE_CELLS)
     shape = grid.clearance_m.shape
     cells = grid.centre(np.arange(grid.clearance_m.size))
@@ -84,7 +84,7 @@ def build_goal_ways(ways: Ways, field: ClearanceField, goal: Array) -> GoalWays 
     return GoalWays(field=grid, distance_m=filled, turn=first, nodes=nodes, following=following)
 
 
-def _from_goal(ways: Ways, goal: Array) -> tuple[Array, Array, np.ndarray]:
+def ways_to(ways: Ways, goal: Array) -> tuple[Array, Array, np.ndarray]:
     """Nodes (n, 2), the goal last, their distances to it and the next node of each."""
     inside = ways.nearest(goal)
     nodes = np.concatenate([ways.corners, inside[None]])
@@ -104,11 +104,11 @@ def _tabled(ways: Ways, points: Array, nodes: Array, distance: Array) -> tuple[A
     length, turn = np.full(len(points), np.inf), np.zeros(len(points), dtype=int)
     for first in range(0, len(points), CHUNK):
         part = slice(first, first + CHUNK)
-        length[part], turn[part] = _first_bends(ways, points[part], nodes, distance)
+        length[part], turn[part] = first_bends(ways, points[part], nodes, distance)
     return length, turn
 
 
-def _first_bends(ways: Ways, points: Array, nodes: Array, distance: Array) -> tuple[Array, np.ndarray]:
+def first_bends(ways: Ways, points: Array, nodes: Array, distance: Array) -> tuple[Array, np.ndarray]:
     """The same for some points: nodes are tried from the best on until one is in sight."""
     total = np.hypot(*np.moveaxis(points[:, None] - nodes, -1, 0)) + distance
     length, turn = np.full(len(points), np.inf), np.zeros(len(points), dtype=int)

@@ -1,8 +1,9 @@
 """Legs of ships that are steered by a helm: straight off, arcs that the ship can turn on, straight into the next run.
 
-The path is a Dubins curve of the ship's own turning radius between straights: one to gather way, one in which the turn
-dies out and, before a goal, the ship stops. Optimisation starts from steady turns along it. The last stretch before a
-run is the run-up of the standard trials: steady speed, helm as it holds the course, engines as the run begins with.
+First the helmsman checks what swing the ship has. From there the path is a Dubins curve of the ship's own turning
+radius between straights: one to gather way, one in which the turn dies out and, before a goal, the ship stops.
+Optimisation starts from steady turns along it. The last stretch before a run is the run-up of the standard trials:
+steady speed, helm as it holds the course, engines as the run begins with.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from expdesign.plan.leg_values import (
     nearest_turns,
     room_beside,
 )
+from expdesign.plan.recovery import Recovery, recover
 from expdesign.plan.ways import polyline_length
 from expdesign.simulation import to_body
 from expdesign.values import Array
@@ -45,11 +47,12 @@ def helmed_leg(task: LegTask, water: LegWater) -> Array | None:
     """Commands (k, m) from one state to the other, the run-up to a run included, or None."""
     before_run, samples = _run_up(task, water)
     tail = np.tile(task.end_inputs, (samples, 1))
-    for straights in _shortest_first(before_run, water):
+    check = recover(task.start, task.past, water)
+    for straights in _shortest_first(check.states[-1], before_run, water):
         path = _path(before_run, water, straights)
         if path is None:
             continue
-        problem = _problem(before_run, water, path)
+        problem = _problem(before_run, water, check, path)
         values = solve_leg(problem)
         if values is None:
             continue
@@ -106,10 +109,10 @@ class Straights:
         return self.off_m + polyline_length(curve[:, :2]) + self.into_m
 
 
-def _shortest_first(task: LegTask, water: LegWater) -> list[Straights]:
+def _shortest_first(start: Array, task: LegTask, water: LegWater) -> list[Straights]:
     """What is tried: of paths hardly longer than the shortest those with the longest straights, then the others."""
     length, radius = water.vessel.length_m, water.ship.turning_radius_m
-    first, last = _course_pose(task.start, water), _course_pose(task.end, water)
+    first, last = _course_pose(start, water), _course_pose(task.end, water)
     stopping = np.hypot(*_through_water(water, task.end)) < SLOW * water.ship.transit_speed_mps
     tries = [
         Straights(
@@ -154,9 +157,9 @@ def _straight(pose: Array, length_m: float, hull_m: float) -> Array:
     return np.stack([_moved(pose, float(ahead)) for ahead in along])
 
 
-def _problem(task: LegTask, water: LegWater, path: Array) -> LegProblem:
+def _problem(task: LegTask, water: LegWater, check: Recovery, path: Array) -> LegProblem:
     vessel, ship = water.vessel, water.ship
-    states, inputs, places, duration_s = _guess(task, water, path)
+    states, inputs, places, duration_s = _guess(task, water, check, path)
     end_inputs = nearest_turns(vessel, task.end_inputs, inputs[-1])
     turned = 2 * np.pi * np.round((states[-1, 2] - task.end[2]) / (2 * np.pi))
     end = np.r_[task.end[:2], task.end[2] + turned, task.end[3:]]
@@ -191,31 +194,44 @@ def _problem(task: LegTask, water: LegWater, path: Array) -> LegProblem:
     )
 
 
-def _guess(task: LegTask, water: LegWater, path: Array) -> tuple[Array, Array, Array, float]:
-    """States (j + 1, 6), commands (j + 1, m), places with courses (j + 1, 3) at even times, and the time they take.
+def _guess(task: LegTask, water: LegWater, check: Recovery, path: Array) -> tuple[Array, Array, Array, float]:
+    """States (j + 1, 6), commands (j + 1, m), places with courses (j + 1, 3) at even times, and the time they take."""
+    time_s, states, inputs, course = _steady_along(check.states[-1], task.end, water, path)
+    lead_s = np.arange(len(check.commands)) * water.vessel.sample_time_s
+    before = check.states[:-1]
+    drift = np.where(before[:, 3] > 0, np.arctan2(before[:, 4], np.maximum(before[:, 3], 1e-9)), 0.0)
+    time_s = np.r_[lead_s, len(lead_s) * water.vessel.sample_time_s + time_s]
+    states, inputs = np.vstack([before, states]), np.vstack([check.commands, inputs])
+    course = np.r_[before[:, 2] + drift, course]
+    nodes = int(np.clip(np.ceil(time_s[-1] * water.ship.transit_speed_mps / (0.5 * water.vessel.length_m)), 24, 160))
+    even = np.linspace(0.0, time_s[-1], nodes + 1)
+    whole = np.column_stack([states, course, inputs])
+    rows = np.stack([np.interp(even, time_s, column) for column in whole.T], axis=1)
+    return rows[:, :6], rows[:, 7:], rows[:, [0, 1, 6]], float(time_s[-1])
 
-    Every node is in the steady turn of its place, slowed down by it; sway, yaw rate and helm are those of the turn.
+
+def _steady_along(start: Array, end: Array, water: LegWater, path: Array) -> tuple[Array, Array, Array, Array]:
+    """Times (k,), states (k, 6), commands (k, m) and courses (k,) along a path from one state (6,) to another.
+
+    Every point is in the steady turn of its place, slowed down by it; sway, yaw rate and helm are those of the turn.
     """
     ship, approach = water.ship, water.ship.approach
     assert approach is not None
     along = np.r_[0.0, np.cumsum(np.hypot(*np.diff(path[:, :2], axis=0).T))]
-    curvature = _eased(along, path[:, 2], SMOOTHED * water.vessel.length_m)
-    helm, slowed, drift = _turn_at(ship, curvature)
-    speed = _speeds(task, ship, along, slowed * ship.transit_speed_mps)
+    bend = _eased(along, path[:, 2], SMOOTHED * water.vessel.length_m)
+    helm, slowed, drift = _turn_at(ship, bend)
+    speed = _speeds((start, end), ship, along, slowed * ship.transit_speed_mps)
     time_s = np.r_[0.0, np.cumsum(np.diff(along) * 2 / (speed[1:] + speed[:-1]))]
-    nodes = int(np.clip(np.ceil(along[-1] / (0.5 * water.vessel.length_m)), 24, 160))
-    even = np.linspace(0.0, time_s[-1], nodes + 1)
-    rows = [np.interp(even, time_s, column) for column in (*path.T, speed, curvature, helm, drift)]
-    places, (pace, bend, over, leeway) = np.stack(rows[:3], axis=1), rows[3:]
     states = np.column_stack(
-        [places[:, :2], places[:, 2] - leeway, pace * np.cos(leeway), pace * np.sin(leeway), bend * pace]
+        [path[:, :2], path[:, 2] - drift, speed * np.cos(drift), speed * np.sin(drift), bend * speed]
     )
-    orders = _engine_orders(ship, pace, np.gradient(pace, even))
     inputs = [
         approach.helm.inputs(order, approach.angle_rad + approach.starboard * angle)
-        for order, angle in zip(orders.tolist(), over.tolist(), strict=True)
+        for order, angle in zip(
+            _engine_orders(ship, speed, np.gradient(speed, time_s)).tolist(), helm.tolist(), strict=True
+        )
     ]
-    return states, np.array(inputs), places, float(time_s[-1])
+    return time_s, states, np.array(inputs), path[:, 2]
 
 
 def _eased(along: Array, course: Array, window_m: float) -> Array:
@@ -245,9 +261,9 @@ def _turn_at(ship: Capability, curvature: Array) -> tuple[Array, Array, Array]:
     return helm, slowed, drift
 
 
-def _speeds(task: LegTask, ship: Capability, along: Array, most: Array) -> Array:
-    """(k,) speeds along the path that gathering way, turns and stopping allow [m/s]."""
-    first, last = (float(np.hypot(*state[3:5])) for state in (task.start, task.end))
+def _speeds(ends: tuple[Array, Array], ship: Capability, along: Array, most: Array) -> Array:
+    """(k,) speeds along the path between two states (6,) that gathering way, turns and stopping allow [m/s]."""
+    first, last = (float(np.hypot(*state[3:5])) for state in ends)
     braking = ship.transit_speed_mps**2 / (2 * max(ship.stopping_m, 1e-9))
     gathered = np.sqrt(first**2 + 2 * ship.acceleration_mps2 * along)
     stopping = np.sqrt(last**2 + 2 * braking * (along[-1] - along))

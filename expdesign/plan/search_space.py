@@ -30,7 +30,6 @@ class Stamp:
         displacement: (3,) forward m, starboard m, turn rad through water.
         duration_s: of one run [s].
         entry_mps, exit_mps: surge speed at its ends.
-        exit_drift_rad: course less heading at its end, through water.
     """
 
     name: str
@@ -41,7 +40,6 @@ class Stamp:
     duration_s: float
     entry_mps: float
     exit_mps: float
-    exit_drift_rad: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -58,6 +56,8 @@ class SearchSpace:
         leg_margin_m: clearance that leg centre lines need on the grid [m].
         current_to: (2,) mean current [m/s].
         run_up: extra straight before a run, by (name before, name) in hull lengths; grows where a leg failed.
+        recoveries: (q, 4) what each run is followed by before the ship goes straight: way ahead m, to starboard m,
+            course from the heading at the run's end rad, time s; None where ships need nothing of the kind.
         refused: (b, 3) start poses that turned out unreachable or unsafe; none is tried near them again.
     """
 
@@ -70,6 +70,7 @@ class SearchSpace:
     hull_m: float
     leg_margin_m: float
     current_to: Array
+    recoveries: Array | None = None
     run_up: Mapping[tuple[str, str], float] = dataclasses.field(default_factory=dict)
     refused: Array = dataclasses.field(default_factory=lambda: np.zeros((0, 3)))
 
@@ -107,7 +108,6 @@ def stamp(primitive: Primitive, room_m: Array, *, length_m: float, beam_m: float
         duration_s=primitive.duration_s,
         entry_mps=float(primitive.entry_velocity[0]),
         exit_mps=float(primitive.exit_velocity[0]),
-        exit_drift_rad=float(np.arctan2(primitive.exit_velocity[1], max(primitive.exit_velocity[0], 1e-9))),
     )
 
 

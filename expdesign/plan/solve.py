@@ -25,13 +25,14 @@ from expdesign.plan.legs import LegTask, LegWater, find_leg, leg_trajectory
 from expdesign.plan.lower_bound import reposition_bound_s
 from expdesign.plan.placement import place_runs
 from expdesign.plan.realised import realised_efficiencies
+from expdesign.plan.recovery import displaced, recover
 from expdesign.plan.safety import leave_water_probability
 from expdesign.plan.search_space import SearchSpace, Stamp, refusing, stamp
 from expdesign.plan.timeline import Timeline
 from expdesign.plan.uncertainty import stray_m
 from expdesign.plan.values import Leg, Placement, Plan, PlanSettings
 from expdesign.signals import Commands, Trajectory
-from expdesign.simulation import Environment, to_body
+from expdesign.simulation import CALM, Environment, to_body
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, Vessel
 
@@ -178,7 +179,18 @@ def _search_space(problem: PlanProblem, water: LegWater) -> SearchSpace:
         hull_m=vessel.length_m,
         leg_margin_m=margin,
         current_to=problem.environment.current_to,
+        recoveries=_recoveries(problem, water),
     )
+
+
+def _recoveries(problem: PlanProblem, water: LegWater) -> Array | None:
+    """What follows each run before a ship with a helm goes straight, in calm water; None for others."""
+    if water.ship.approach is None:
+        return None
+    calm = replace(water, environment=CALM)
+    runs = [(last_state(item.trajectory), item.commands.values) for item in _used(problem)]
+    step_s = problem.vessel.sample_time_s
+    return np.array([displaced(recover(state, calm.remembered(values), calm), step_s) for state, values in runs])
 
 
 def _stamps(problem: PlanProblem, grid: ClearanceField) -> tuple[Stamp, ...]:

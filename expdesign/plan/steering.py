@@ -1,13 +1,15 @@
-"""The helmsman of legs: keeps one ship, or many drawn ones at once, on a reference that waits for a ship that lags.
+"""The helmsman: keeps one ship, or many drawn ones at once, on a reference that waits for a ship that lags.
 
 The reference gives a pose and a velocity for every sample. Where the ship is off it, a velocity towards it is wished
 for; the acceleration that leads to the wished velocity within a few seconds is turned into forces by the nominal model,
-and these into commands within limits and rates. The helmsman knows the forecast's mean current and the true state.
+and these into commands within limits and rates. The helmsman knows the forecast's mean current and the true state, and,
+where told to, the acceleration that his model does not explain: weather, and parameters that are not the nominal ones.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -15,12 +17,16 @@ from expdesign.conventions import wrap_angle
 from expdesign.plan.capability import Capability
 from expdesign.simulation import Environment
 from expdesign.values import Array, seal
-from expdesign.vessel import Vessel, allocate, required_force
+from expdesign.vessel import Vessel, allocate, force_matrix, required_force
 
 CATCH_UP = 0.3
 """Largest speed towards the reference, in transit speeds."""
 LEAD = 4.0
 """Time constant of the way back to the reference, in those of the velocities."""
+SLOWEST, FASTEST = 0.2, 3.0
+"""Pace of a reference that stays abeam of a ship, in samples."""
+LEARN = 3.0
+"""Time constant in which an unexplained force is believed, in those of the velocities."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -45,11 +51,32 @@ class Reference:
     def pace(self, sample: Array, states: Array, reach_m: float) -> Array:
         """(n,) samples to move on by: one, less where a ship (n, 6) has fallen behind by some of `reach_m`."""
         wanted = self.at(sample)
-        c, s = np.cos(wanted[:, 2]), np.sin(wanted[:, 2])
-        along = (wanted[:, 3] * c - wanted[:, 4] * s, wanted[:, 3] * s + wanted[:, 4] * c)
-        speed = np.hypot(*along) + 1e-9
-        behind = ((wanted[:, 0] - states[:, 0]) * along[0] + (wanted[:, 1] - states[:, 1]) * along[1]) / speed
+        along = over_ground(wanted)
+        speed = np.hypot(*along.T) + 1e-9
+        behind = ((wanted[:, :2] - states[:, :2]) * along).sum(axis=1) / speed
         return np.asarray(np.clip(1.5 - behind / reach_m, 0.0, 1.0))
+
+    def abreast(self, sample: Array, states: Array, *, step_m: float) -> Array:
+        """(n,) samples to move on by so that the reference stays abeam of each ship (n, 6), and does not stand still.
+
+        Args:
+            sample: (n,) where references are.
+            states: where ships are.
+            step_m: least distance that counts as one sample's, for references that hardly move.
+        """
+        wanted = self.at(sample)
+        along = over_ground(wanted)
+        speed = np.hypot(*along.T) + 1e-9
+        behind = ((wanted[:, :2] - states[:, :2]) * along).sum(axis=1) / speed
+        row = np.clip(sample.astype(int), 0, len(self.states) - 2)
+        step = np.maximum(np.hypot(*(self.states[row + 1, :2] - self.states[row, :2]).T), step_m)
+        return np.asarray(np.clip(-behind / step, SLOWEST, FASTEST))
+
+
+def over_ground(states: Array) -> Array:
+    """(n, 2) velocities to north and east of states (n, 6)."""
+    c, s = np.cos(states[:, 2]), np.sin(states[:, 2])
+    return np.stack([states[:, 3] * c - states[:, 4] * s, states[:, 3] * s + states[:, 4] * c], axis=1)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -71,33 +98,76 @@ class Helmsman:
         """Time constant wished for velocities [s]."""
         return max(self.ship.settle_s, 3.0 * self.vessel.sample_time_s)
 
-    def commands(self, wanted: Array, states: Array, before: Array) -> Array:
-        """(n, m) commands that bring states (n, 6) towards wanted ones (n, 6), rates counted from `before` (n, m)."""
-        error = wanted[:, :2] - states[:, :2]
-        c, s = np.cos(wanted[:, 2]), np.sin(wanted[:, 2])
-        ground = np.stack([wanted[:, 3] * c - wanted[:, 4] * s, wanted[:, 3] * s + wanted[:, 4] * c], axis=1)
-        back = error / (LEAD * self.answer_s)
+    @cached_property
+    def sideways(self) -> bool:
+        """Whether the actuators push every way, so that a ship need not point where it goes."""
+        return bool(np.linalg.matrix_rank(force_matrix(self.vessel.actuators)) == 3)
+
+    def commands(
+        self, wanted: Array, states: Array, before: Array, *, felt: Array | None = None, near: Array | None = None
+    ) -> Array:
+        """(n, m) commands that bring states (n, 6) towards wanted ones (n, 6).
+
+        Args:
+            wanted, states: pose and velocity over ground.
+            before: (n, m) commands standing, from which rates count.
+            felt: (n, 3) acceleration that the model does not explain, by `unexplained`; None for none.
+            near: (n, m) commands to whose angles azimuths keep; None for those standing.
+        """
+        through = self._velocity_through_water(wanted, states)
+        moving = self._in_body(states)
+        c, s = np.cos(states[:, 2]), np.sin(states[:, 2])
+        ahead, abeam = through[:, 0] * c + through[:, 1] * s, through[:, 1] * c - through[:, 0] * s
+        heading, abeam = (wanted[:, 2], abeam) if self.sideways else (self._pointing(wanted, through), moving[:, 1])
+        turn = wrap_angle(heading - states[:, 2]) / (2.0 * self.answer_s)
+        fastest = max(self.ship.spot_rate_radps, self.ship.yaw_rate_radps)
+        wish = np.column_stack([ahead, abeam, np.clip(wanted[:, 5] + turn, -fastest, fastest)])
+        gain = (wish - moving) / self.answer_s
+        force = required_force(self.vessel.model, moving, gain if felt is None else gain - felt)
+        force = force if self.sideways else force @ self._without_sway.T
+        actuators, sample_s = self.vessel.actuators, self.vessel.sample_time_s
+        told = allocate(actuators, force[:, None], sample_time_s=sample_s, before=before, near=near)
+        return np.asarray(told[:, 0])
+
+    def unexplained(self, felt: Array, before: Array, states: Array, delivered: Array) -> Array:
+        """(n, 3) acceleration beyond what the nominal model says of the actuators, believed little by little.
+
+        Args:
+            felt: (n, 3) as believed so far.
+            before, states: (n, 6) one sample ago and now.
+            delivered: (n, m) of the actuators in between.
+        """
+        old, new = self._in_body(before), self._in_body(states)
+        moving = tuple(((old + new) / 2).T)
+        told = self.vessel.model.accelerations(moving, moving[:2], tuple(delivered.T))
+        known = np.column_stack([np.broadcast_to(part, len(felt)) for part in told])
+        share = min(1.0, self.vessel.sample_time_s / (LEARN * self.answer_s))
+        return np.asarray(felt + share * ((new - old) / self.vessel.sample_time_s - known - felt))
+
+    def _velocity_through_water(self, wanted: Array, states: Array) -> Array:
+        """(n, 2) wished velocity through water to north and east: the reference's, and some towards it."""
+        back = (wanted[:, :2] - states[:, :2]) / (LEAD * self.answer_s)
         most = CATCH_UP * self.ship.transit_speed_mps
         back *= np.minimum(1.0, most / np.maximum(np.hypot(*back.T), 1e-12))[:, None]
-        through = ground + back - self.environment.current_to
-        through *= np.minimum(1.0, self.ship.transit_speed_mps / np.maximum(np.hypot(*through.T), 1e-12))[:, None]
-        moving = self._in_body(np.column_stack([states[:, 3:5], states[:, 5]]), states[:, 2])
-        turn = wrap_angle(wanted[:, 2] - states[:, 2]) / (2.0 * self.answer_s)
-        fastest = max(self.ship.spot_rate_radps, self.ship.yaw_rate_radps)
-        c, s = np.cos(states[:, 2]), np.sin(states[:, 2])
-        wish = np.column_stack(
-            [
-                through[:, 0] * c + through[:, 1] * s,
-                through[:, 1] * c - through[:, 0] * s,
-                np.clip(wanted[:, 5] + turn, -fastest, fastest),
-            ]
-        )
-        force = required_force(self.vessel.model, moving, (wish - moving) / self.answer_s)
-        actuators, sample_s = self.vessel.actuators, self.vessel.sample_time_s
-        return np.asarray(allocate(actuators, force[:, None], sample_time_s=sample_s, before=before)[:, 0])
+        steady = over_ground(wanted) - self.environment.current_to
+        fastest, speed = self.ship.transit_speed_mps, np.hypot(*steady.T)
+        limit = np.where(speed > 1.001 * fastest, 1.02 * speed, fastest)
+        through = steady + back
+        return np.asarray(through * np.minimum(1.0, limit / np.maximum(np.hypot(*through.T), 1e-12))[:, None])
 
-    def _in_body(self, velocity: Array, heading: Array) -> Array:
+    def _pointing(self, wanted: Array, through: Array) -> Array:
+        """(n,) headings of ships that go where they point; those that hardly move keep the wanted one."""
+        moves = np.hypot(*through.T) > 0.05 * self.ship.transit_speed_mps
+        return np.where(moves, np.arctan2(through[:, 1], through[:, 0]), wanted[:, 2])
+
+    @cached_property
+    def _without_sway(self) -> Array:
+        """(3, 3) the nearest force with the same surge and yaw that actuators which cannot push every way can give."""
+        matrix = force_matrix(self.vessel.actuators)
+        return np.asarray(matrix @ np.linalg.pinv(matrix[[0, 2]]) @ np.eye(3)[[0, 2]])
+
+    def _in_body(self, states: Array) -> Array:
         """(n, 3) velocities through water from those over ground."""
         north, east = self.environment.current_to
-        c, s = np.cos(heading), np.sin(heading)
-        return np.asarray(velocity - np.column_stack([north * c + east * s, east * c - north * s, 0.0 * c]))
+        c, s = np.cos(states[:, 2]), np.sin(states[:, 2])
+        return np.asarray(states[:, 3:] - np.column_stack([north * c + east * s, east * c - north * s, 0.0 * c]))

@@ -6,25 +6,29 @@ import numpy as np
 
 from expdesign.dictionary import Primitive
 from expdesign.errors import NoPlan
+from expdesign.plan.fleet import Truths
 from expdesign.plan.footprint import disc_points
-from expdesign.simulation import Environment, draw_environment, simulate_many
+from expdesign.simulation import Environment, Variation, draw_environment, simulate_many
+from expdesign.simulation.environment import vary
 from expdesign.values import Array
 from expdesign.vessel import Vessel
 
 FEWEST_DRAWS, MOST_DRAWS = 200, 2000
 
 
-def draw_truths(
-    vessel: Vessel, environment: Environment, draws: int, rng: np.random.Generator
-) -> tuple[Array, Array, Array]:
-    """Parameters (n, p), currents (n, 2) and winds (n, 2) drawn from the prior and the forecast.
+def draw_truths(vessel: Vessel, environment: Environment, draws: int, rng: np.random.Generator) -> Truths:
+    """Parameters, mean currents and mean winds drawn from the prior and the forecast.
 
     Parameters are normal and independent with the vessel file's standard deviations.
     """
     p = len(vessel.model.parameters)
     parameters = vessel.model.parameters + vessel.model.parameter_std * rng.standard_normal((draws, p))
     weather = [draw_environment(environment, rng) for _ in range(draws)]
-    return parameters, np.array([x.current_to for x in weather]), np.array([x.wind_to for x in weather])
+    return Truths(
+        parameters=parameters,
+        current_to=np.array([x.current_to for x in weather]),
+        wind_to=np.array([x.wind_to for x in weather]),
+    )
 
 
 def stray_m(
@@ -58,7 +62,7 @@ def stray_m(
             f"plan.confidence is too high to be estimated: each run would have to keep to its room in {confidence:.6g} "
             f"of all cases, which {draws} drawn vessels cannot tell"
         )
-    parameters, current, wind = draw_truths(vessel, environment, draws, rng)
+    truths, samples = draw_truths(vessel, environment, draws, rng), len(primitive.commands)
     heading = rng.uniform(-np.pi, np.pi, draws)
     c, s = np.cos(heading), np.sin(heading)
     drift = environment.current_to
@@ -68,9 +72,9 @@ def stray_m(
         primitive.commands,
         pose=np.stack([0 * c, 0 * c, heading], axis=1),
         velocity=primitive.entry_velocity + along,
-        current_to=current,
-        wind_to=wind,
-        parameters=parameters,
+        current_to=truths.current_to + _varying(vessel, environment.current_variation, (samples, draws, 2), rng),
+        wind_to=truths.wind_to + _varying(vessel, environment.wind_variation, (samples, draws, 2), rng),
+        parameters=truths.parameters,
         standing=primitive.entry_inputs,
     )
     time_s = primitive.trajectory.time_s[:, None, None]
@@ -81,6 +85,15 @@ def stray_m(
     drawn = disc_points(pose_b.reshape(-1, 3), centres_m).reshape(*pose_b.shape[:2], -1, 2)
     apart = np.hypot(*np.moveaxis(drawn - nominal[:, None], -1, 0)).max(axis=-1)  # (k + 1, n)
     return _radius(apart, confidence, primitive.name)
+
+
+def _varying(
+    vessel: Vessel, variation: Variation, shape: tuple[int, int, int], rng: np.random.Generator
+) -> Array | float:
+    """(k, n, 2) what a current or a wind does round its mean; nothing where it is steady."""
+    if variation.std_mps == 0.0:
+        return 0.0
+    return vary(variation, rng.standard_normal(shape), sample_time_s=vessel.sample_time_s)
 
 
 def _radius(apart: Array, confidence: float, name: str) -> Array:

@@ -10,9 +10,9 @@ import numpy as np
 from expdesign.errors import InputError
 from expdesign.values import Array
 from expdesign.vessel.actuators import Actuator
-from expdesign.vessel.expressions import NUMPY
+from expdesign.vessel.expressions import NUMPY, Expression
 from expdesign.vessel.model import VesselModel
-from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS, SHOAL
+from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS, SHOAL, Term
 
 
 def required_force(model: VesselModel, velocity: Array, acceleration: Array) -> Array:
@@ -36,7 +36,7 @@ def required_force(model: VesselModel, velocity: Array, acceleration: Array) -> 
     def response(force: Array) -> Array:
         table = signals | dict(zip(FORCE_SIGNALS, force, strict=True))
         totals: dict[str, Any] = dict.fromkeys(("u", "v", "r"), np.zeros(velocity.shape[:-1]))
-        for term, expression, value in zip(model.terms, model.expressions, model.parameters, strict=True):
+        for term, expression, value in _acting(model):
             totals[term.equation] = totals[term.equation] + value * expression.evaluate(table, NUMPY)
         return np.stack(list(totals.values()), axis=-1) / model.time_scale_s
 
@@ -50,7 +50,13 @@ def required_force(model: VesselModel, velocity: Array, acceleration: Array) -> 
 def _same_push_at_any_speed(model: VesselModel) -> bool:
     """Whether no term multiplies a force by a motion."""
     forces = {*FORCE_SIGNALS}
-    return not any(forces & {*x.signals} and {*x.signals} - forces for x in model.expressions)
+    return not any(forces & {*x.signals} and {*x.signals} - forces for _, x, _ in _acting(model))
+
+
+def _acting(model: VesselModel) -> list[tuple[Term, Expression, float]]:
+    """Terms with their expressions and parameters, those left out that do nothing."""
+    rows = zip(model.terms, model.expressions, model.parameters.tolist(), strict=True)
+    return [(term, expression, value) for term, expression, value in rows if value != 0.0]
 
 
 def _push_at_rest(model: VesselModel) -> Array:
@@ -60,7 +66,7 @@ def _push_at_rest(model: VesselModel) -> Array:
     def response(force: Array) -> Array:
         table = rest | dict(zip(FORCE_SIGNALS, force.tolist(), strict=True))
         totals = dict.fromkeys(("u", "v", "r"), 0.0)
-        for term, expression, value in zip(model.terms, model.expressions, model.parameters, strict=True):
+        for term, expression, value in _acting(model):
             totals[term.equation] += float(value * expression.evaluate(table, NUMPY))
         return np.array(list(totals.values())) / model.time_scale_s
 
@@ -167,15 +173,18 @@ def _wished_commands(actuators: tuple[Actuator, ...], row: Array, last: Array | 
 
 WAYS_ROUND = np.array([(half, turns) for half in (0.0, math.pi) for turns in (-1.0, 0.0, 1.0)]).T
 """Thrust ahead or reversed, and whole turns from the nearest: (2, 6)."""
+HALVES = np.array([(half, 0.0) for half in (0.0, math.pi)]).T
+"""The same where no limit keeps an angle from the nearest turn: (2, 2)."""
 
 
 def _polar(ahead: Array, side: Array, reference: Array, actuator: Actuator) -> list[Array]:
     """Propeller speed and angle that come closest to a thrust within limits, by the shortest turn."""
     speeds, angles = actuator.limits
+    halves, turns = WAYS_ROUND if math.isfinite(angles.high - angles.low) else HALVES
     wish, bearing = np.hypot(ahead, side), np.arctan2(side, ahead)
-    base = bearing[..., None] + WAYS_ROUND[0]  # (..., 6)
+    base = bearing[..., None] + halves  # (..., 6 or 2)
     whole = np.round((reference[..., None] - base) / (2 * math.pi))
-    base = base + 2 * math.pi * (whole + WAYS_ROUND[1])
+    base = base + 2 * math.pi * (whole + turns)
     angle = np.minimum(np.maximum(base, angles.low), angles.high)
     along = np.cos(angle - bearing[..., None])
     speed = np.minimum(np.maximum(wish[..., None] * along, speeds.low), speeds.high)

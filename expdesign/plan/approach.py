@@ -1,0 +1,209 @@
+"""From wherever a run has ended to the beginning of the next: many ships at once, each at its own point of the way.
+
+The procedure is that of `expdesign.plan.run_up`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from expdesign.plan.fleet import Fleet
+from expdesign.plan.leg_values import LegWater
+from expdesign.plan.run_up import ROUNDS, planned_stretch, run_up, tolerances, under_way
+from expdesign.plan.steering import LEAD, Helmsman, Reference, over_ground
+from expdesign.plan.ways_back import Convoy, WaysTo, build_ways_to
+from expdesign.values import Array
+
+ON_STRETCH, ON_WAY, BEGUN, ABORTED, OUT = range(5)
+"""What a ship does: follows a reference, goes round, has come to the start, has given up, takes no part."""
+PATIENCE = 3.0
+"""Times what a stretch or a way takes that a ship may spend on it, besides `SPARE`."""
+SPARE = 10.0
+"""Time constants of the way back to a reference that a ship may spend besides."""
+LEAST_STEP = 0.2
+"""What a slow reference moves in a sample at least, in samples at transit speed."""
+HELD = 0.5
+"""Share of the tolerances within which a ship that stands still begins; all of them after half of `SPARE`."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Approach:
+    """How n ships came to the start of a run.
+
+    Attributes:
+        poses: (t, n, 3) at every sample; ships that had begun or given up stay where they were.
+        begun: (n,) in place; the others among those that sailed gave up.
+        rounds: (n,) times gone round.
+        samples: (n,) that it took.
+        felt: (n, 3) acceleration that each helmsman's model does not explain, as he believes in the end.
+    """
+
+    poses: Array
+    begun: np.ndarray
+    rounds: np.ndarray
+    samples: np.ndarray
+    felt: Array
+
+
+class Pilot:
+    """Steers a fleet along one planned leg, and round to its run-up where need be."""
+
+    def __init__(
+        self, helm: Helmsman, water: LegWater, track: Array, *, sailing: np.ndarray, inputs: Array, last: bool
+    ) -> None:
+        """Ships stand wherever they are.
+
+        Args:
+            helm, water: who steers, and where ways lead.
+            track: (k + 1, 6) the planned leg.
+            sailing: (n,) ships that take part.
+            inputs: (m,) commands with which the run begins: azimuths keep near their angles.
+            last: the leg leads to the goal: coming there is enough.
+        """
+        n, planned, runs_up = len(sailing), planned_stretch(helm, track, goes_on=not last), run_up(helm, water, track)
+        self._helm, self._water, self._inputs, self._last = helm, water, inputs, last
+        self._wanted, self._moves, self._within = track[-1], under_way(helm, track[-1]), tolerances(water)
+        self._reference = Reference(states=np.concatenate([planned.states, runs_up.states]))
+        self._first, self._arrival = len(planned.states), len(planned.states) + runs_up.arrival
+        length_m = float(np.hypot(*(runs_up.states[0] - track[-1])[:2]))
+        reach_m = np.clip(length_m / 3, self._within.position_m / 2, helm.vessel.length_m)
+        self._convoy, self._ways = Convoy(helm, runs_up.states[0], n, reach_m=reach_m), None
+        self._turning = _turns_freely(helm)
+        self.doing = np.where(sailing, ON_STRETCH, OUT)
+        self._sample, self._end, self._most = np.zeros(n), np.full(n, planned.arrival), np.full(n, self._first - 1)
+        self.rounds, self.samples = np.zeros(n, dtype=int), np.zeros(n, dtype=int)
+        self._spent, self._limit = np.zeros(n), np.full(n, self._allowed(len(track)))
+
+    def sail(self, fleet: Fleet, felt: Array) -> Approach:
+        """Until every ship has begun or given up, with the accelerations felt so far (n, 3)."""
+        poses = [fleet.states[:, :3]]
+        self._rejoin(fleet.states)
+        while (moving := self._looked(fleet)).any():
+            before, wanted = fleet.states, self._next(fleet.states)
+            near = self._near(fleet.given)
+            fleet.advance(self._helm.commands(wanted, before, fleet.given, felt=felt, near=near), moving)
+            learnt = self._helm.unexplained(felt, before, fleet.states, fleet.delivered)
+            felt = np.where(moving[:, None], learnt, felt)
+            self.samples += moving
+            self._spent += moving
+            poses.append(fleet.states[:, :3])
+        return Approach(
+            poses=np.array(poses),
+            begun=self.doing == BEGUN,
+            rounds=self.rounds,
+            samples=self.samples,
+            felt=felt,
+        )
+
+    def _looked(self, fleet: Fleet) -> np.ndarray:
+        """Decide what every ship does from here; (n,) whether it sails on."""
+        states, late = fleet.states, self._spent > self._limit
+        self.doing[fleet.lost & (self.doing < BEGUN)] = ABORTED
+        on = self.doing == ON_STRETCH
+        passed, good = self._at_start(states)
+        self.doing[on & passed & good] = BEGUN
+        self.doing[(self.doing == ON_WAY) & late] = ABORTED
+        self._run_up((self.doing == ON_WAY) & self._convoy.arrived(states))
+        self._go_round(on & (self.doing == ON_STRETCH) & (passed | late), states)
+        return np.asarray(self.doing < BEGUN)
+
+    def _at_start(self, states: Array) -> tuple[np.ndarray, np.ndarray]:
+        """(n,) whether a ship is as near to the start as it will come this time, and whether it may begin then."""
+        used, at_end = self._within.used(states, self._wanted), self._sample >= self._end
+        if self._last:
+            return at_end, at_end
+        if not self._moves:
+            waited = self._spent > self._limit - self._spare / 2
+            return at_end & ((used <= HELD) | ((used <= 1.0) & waited)), used <= 1.0
+        ground = over_ground(self._wanted[None])[0]
+        speed, sample_s = float(np.hypot(*ground)) + 1e-9, self._helm.vessel.sample_time_s
+        along = (states[:, :2] - self._wanted[:2]) @ ground / speed
+        close = self._sample >= self._end - self._helm.vessel.length_m / speed / sample_s
+        abeam = close & (along >= -speed * sample_s / 2)
+        return abeam | (self._sample >= self._most), used <= 1.0
+
+    def _run_up(self, ships: np.ndarray) -> None:
+        self.doing[ships] = ON_STRETCH
+        self._sample[ships], self._end[ships] = self._first, self._arrival
+        self._most[ships], self._spent[ships] = len(self._reference.states) - 1, 0
+        self._limit[ships] = self._allowed(self._arrival - self._first)
+
+    def _rejoin(self, states: Array) -> None:
+        """Ships that do not see the planned leg's beginning go round at once."""
+        first = self._reference.states[0, :2]
+        strayed = (self.doing == ON_STRETCH) & (np.hypot(*(states[:, :2] - first).T) > self._within.position_m)
+        some = np.flatnonzero(strayed)
+        if len(some):
+            strayed[some] = ~self._tree.in_sight(states[some, :2], np.tile(first, (len(some), 1)))
+            self._go_round(strayed, states)
+
+    def _go_round(self, ships: np.ndarray, states: Array) -> None:
+        """Set ships off to the run-up; those that went round often enough, or have no way, give up."""
+        self.doing[ships] = ABORTED
+        some = np.flatnonzero(ships & (self.rounds < ROUNDS))
+        if not len(some):
+            return
+        self.rounds[some] += 1
+        for ship, way in zip(some, self._tree.find(states[some, :2]), strict=True):
+            if way is not None:
+                self.doing[ship] = ON_WAY
+                self._convoy.set_off(ship, way)
+        sample_m = self._helm.ship.transit_speed_mps * self._helm.vessel.sample_time_s
+        self._spent[some] = 0
+        self._limit[some] = self._allowed(self._convoy.length_m[some] / sample_m)
+
+    @property
+    def _tree(self) -> WaysTo:
+        if self._ways is None:
+            self._ways = build_ways_to(self._water.narrowest_ways, self._convoy.goal[:2])
+        return self._ways
+
+    def _near(self, given: Array) -> Array:
+        """(n, m) commands to whose angles azimuths keep: those of the run for ships that come to it under way."""
+        ready = self._inputs + whole_turns(given - self._inputs, self._turning)
+        return np.where((self._moves & (self.doing == ON_STRETCH))[:, None], ready, given)
+
+    def _next(self, states: Array) -> Array:
+        """(n, 6) what is wanted of each ship over the next sample; references move on."""
+        on = self.doing == ON_STRETCH
+        pace = self._reference.abreast(self._sample, states, step_m=self._least_step_m)
+        self._sample = np.where(on, np.minimum(self._sample + pace, self._most), self._sample)
+        soon = np.minimum(self._sample + self._helm.answer_s / self._helm.vessel.sample_time_s, self._most)
+        wanted = self._reference.at(self._sample)
+        wanted[:, 3:] = self._reference.at(soon)[:, 3:]  # a ship answers late: her speed is asked for beforehand
+        return np.where(on[:, None], wanted, self._convoy.wanted(states))
+
+    @property
+    def _least_step_m(self) -> float:
+        return LEAST_STEP * self._helm.ship.transit_speed_mps * self._helm.vessel.sample_time_s
+
+    @property
+    def _spare(self) -> float:
+        return SPARE * LEAD * self._helm.answer_s / self._helm.vessel.sample_time_s
+
+    def _allowed(self, samples: Array | float) -> Array | float:
+        return PATIENCE * samples + self._spare
+
+
+def _turns_freely(helm: Helmsman) -> np.ndarray:
+    """(m,) which commands are angles of azimuths without limits."""
+    names = zip(helm.vessel.model.inputs, helm.vessel.limits, strict=True)
+    return np.array([name.startswith("a") and not np.isfinite([x.low, x.high]).any() for name, x in names])
+
+
+def whole_turns(difference: Array, turning: np.ndarray) -> Array:
+    """(n, m) whole turns nearest to differences of angles; nothing for other commands."""
+    return np.asarray(np.where(turning, 2 * np.pi * np.round(difference / (2 * np.pi)), 0.0))
+
+
+def open_loop(helm: Helmsman, fleet: Fleet, values: Array, sailing: np.ndarray) -> Array:
+    """(k + 1, n, 3) poses of ships that are given commands (k, m), from those standing on, within the rates."""
+    poses = [fleet.states[:, :3]]
+    told = values + whole_turns(fleet.given - values[0], _turns_freely(helm))[:, None]
+    reach = np.array([limit.rate for limit in helm.vessel.limits]) * helm.vessel.sample_time_s
+    for row in told.swapaxes(0, 1):
+        fleet.advance(np.clip(row, fleet.given - reach, fleet.given + reach), sailing)
+        poses.append(fleet.states[:, :3])
+    return np.array(poses)

@@ -1,0 +1,139 @@
+"""Drawn ships in drawn weather, moved on sample by sample under commands of their own.
+
+Each ship has parameters of its own, a current and a wind that keep their drawn means or vary round them, and actuators
+that deliver as the vessel's file says. Ships that are told to wait keep everything but the weather.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from expdesign.simulation import Environment, rk4_step, sample_map
+from expdesign.simulation.actuation import SampleMap, past_deadband
+from expdesign.simulation.environment import vary
+from expdesign.simulation.program import RatesProgram
+from expdesign.simulation.run import LARGEST_SPEED, SUBSTEPS
+from expdesign.values import Array, seal
+from expdesign.vessel import IDEAL, Vessel
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Truths:
+    """What is true of n ships.
+
+    Attributes:
+        parameters: (n, p) in the model's own form.
+        current_to, wind_to: (n, 2) means of their trials [m/s].
+    """
+
+    parameters: Array
+    current_to: Array
+    wind_to: Array
+
+    def __post_init__(self) -> None:
+        seal(self, parameters="n p", current_to="n 2", wind_to="n 2")
+
+
+class Fleet:
+    """n ships at sea.
+
+    Attributes:
+        vessel: which all of them are taken for.
+        states: (n, 6) pose in the n-frame and velocity over ground in the b-frame.
+        given: (n, m) commands standing.
+        delivered: (n, m) what the actuators gave over the last sample, on average.
+        lost: (n,) ships whose motion has left all bounds; they stay where they were.
+    """
+
+    def __init__(
+        self,
+        vessel: Vessel,
+        environment: Environment,
+        truths: Truths,
+        *,
+        state: Array,
+        standing: Array,
+        rng: np.random.Generator,
+    ) -> None:
+        """All ships begin in one state (6,) with commands (m,) that have stood for long.
+
+        Args:
+            vessel: structure, actuators, sample time.
+            environment: how current and wind vary.
+            truths: what is true of each ship.
+            state, standing: at the beginning.
+            rng: the weather's chance.
+        """
+        runs = len(truths.parameters)
+        self.vessel, self._rng = vessel, rng
+        self.states: Array = np.tile(state, (runs, 1))
+        self.given: Array = np.tile(standing, (runs, 1))
+        self.lost = np.zeros(runs, dtype=bool)
+        self._actuators = [_Signal(vessel, column, self.given[:, column]) for column in range(self.given.shape[1])]
+        self.delivered = self.given.copy()
+        self._variations = (environment.current_variation, environment.wind_variation)
+        self._means = (truths.current_to, truths.wind_to)
+        self._varied: list[Array | None] = [None, None]
+        self._program = RatesProgram(vessel.model, runs=runs, parameters=truths.parameters)
+
+    def advance(self, commands: Array, moving: np.ndarray) -> None:
+        """One sample with commands (n, m) for the ships that move (n,); the others wait."""
+        moving = moving & ~self.lost
+        held = np.where(moving[:, None], commands, self.given)
+        rows = [signal.deliver(column, moving) for signal, column in zip(self._actuators, held.T, strict=True)]
+        given = np.stack(rows, axis=1)  # (substeps, m, n)
+        self._program.sea[...] = self._weather()
+        self._program.hold(given)
+        state = self.states.T
+        step_s = self.vessel.sample_time_s / SUBSTEPS
+        with np.errstate(over="ignore", invalid="ignore"):
+            for part in range(SUBSTEPS):
+                self._program.select(part)
+                (state,) = rk4_step(self._rates, (state,), step_s)
+            settled = np.abs(state[3:]).max(axis=0) < LARGEST_SPEED
+        self.lost |= moving & ~settled
+        moved = moving & settled
+        self.states = np.where(moved[:, None], state.T, self.states)
+        self.given = np.where(moved[:, None], held, self.given)
+        self.delivered = np.where(moved[:, None], given.mean(axis=0).T, self.delivered)
+
+    def _rates(self, state: tuple[Array, ...]) -> tuple[Array, ...]:
+        return (self._program.rates(state)[0].copy(),)
+
+    def _weather(self) -> Array:
+        """(4, n) current and wind of the next sample."""
+        rows = []
+        draw = partial(vary, sample_time_s=self.vessel.sample_time_s)
+        for index, (variation, mean) in enumerate(zip(self._variations, self._means, strict=True)):
+            if variation.std_mps == 0.0:
+                rows.append(mean.T)
+                continue
+            normal = self._rng.standard_normal((1, *mean.shape))
+            self._varied[index] = now = draw(variation, normal, before=self._varied[index])[0]
+            rows.append((mean + now).T)
+        return np.concatenate(rows)
+
+
+class _Signal:
+    """One actuator signal of n ships: what it delivers in each integrator step, sample after sample."""
+
+    def __init__(self, vessel: Vessel, column: int, standing: Array) -> None:
+        response = vessel.responses[column]
+        self._ideal = response == IDEAL
+        self._map: SampleMap = sample_map(response, sample_time_s=vessel.sample_time_s, substeps=SUBSTEPS)
+        self._value = past_deadband(standing, response.deadband)
+        self._told = np.tile(self._value, (self._map.lateness + 1, 1))
+        """(lateness + 1, n) commands past the dead band, the latest last."""
+
+    def deliver(self, command: Array, moving: np.ndarray) -> Array:
+        """(substeps, n) means of what the ships that move get of commands (n,)."""
+        if self._ideal:
+            return np.broadcast_to(command, (SUBSTEPS, len(command)))
+        history = np.concatenate([self._told, past_deadband(command, self._map.deadband)[None]])
+        seen = np.stack([self._value, history[0], history[1]])
+        self._told = np.where(moving, history[1:], self._told)
+        self._value = np.where(moving, self._map.end @ seen, self._value)
+        return np.asarray(self._map.means @ seen + self._map.offset)

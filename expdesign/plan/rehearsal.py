@@ -1,0 +1,102 @@
+"""Whole trials of drawn ships in drawn weather, sailed as the plan says they are sailed.
+
+The procedure is that of `expdesign.plan.run_up`: legs steered from wherever a run has ended, runs open loop from the
+state the ship really has, a way round to the run-up where she is not in place. One draw is one trial: the same
+parameters, mean current and mean wind throughout; current and wind vary round these as the forecast says.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from expdesign.plan.approach import Pilot, open_loop
+from expdesign.plan.fleet import Fleet
+from expdesign.plan.hull_watch import HullWatch
+from expdesign.plan.leg_values import LegWater
+from expdesign.plan.run_up import tolerances
+from expdesign.plan.steering import Helmsman
+from expdesign.plan.uncertainty import draw_truths
+from expdesign.plan.values import Leg
+from expdesign.signals import Commands, Trajectory
+from expdesign.values import Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Trials:
+    """What happened to n trials, leg by leg.
+
+    A trial ends where the hull leaves allowed water or where the ship gives up to begin a run.
+
+    Attributes:
+        left: (legs, n) whether the hull left allowed water on a leg.
+        aborted: (legs, n) whether the ship gave up on a leg.
+        rounds: (legs, n) times gone round on a leg.
+        samples: (legs, n) that legs took.
+        used: (legs, n) largest share of a tolerance used up where a run began; nan where none did.
+    """
+
+    left: np.ndarray
+    aborted: np.ndarray
+    rounds: np.ndarray
+    samples: np.ndarray
+    used: Array
+
+    @property
+    def completed(self) -> np.ndarray:
+        """(n,) trials that came to the goal."""
+        return ~(self.left | self.aborted).any(axis=0)
+
+
+def sail_trials(
+    water: LegWater,
+    *,
+    commands: Commands,
+    trajectory: Trajectory,
+    legs: Sequence[Leg],
+    draws: int,
+    rng: np.random.Generator,
+) -> Trials:
+    """Sail drawn trials of a plan.
+
+    Args:
+        water: who sails, in which forecast and area, and where ways may lead.
+        commands, trajectory, legs: the plan.
+        draws: number of trials.
+        rng: all chance.
+    """
+    vessel, track = water.vessel, np.hstack([trajectory.pose, trajectory.velocity])
+    helm = Helmsman(vessel=vessel, environment=water.environment, ship=water.ship)
+    truths = draw_truths(vessel, water.environment, draws, rng)
+    fleet = Fleet(
+        vessel, water.environment, truths, state=track[0], standing=np.zeros(len(vessel.limits)), rng=rng
+    )
+    watch, within = HullWatch(area=water.area, vessel=vessel), tolerances(water)
+    sailing, felt = np.ones(draws, dtype=bool), np.zeros((draws, 3))
+    shape = (len(legs), draws)
+    left, aborted = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
+    rounds, samples, used = np.zeros(shape, dtype=int), np.zeros(shape, dtype=int), np.full(shape, np.nan)
+    for index, leg in enumerate(legs):
+        values = commands.values[leg.first : leg.last]
+        if leg.kind == "primitive":
+            used[index] = np.where(sailing, within.used(fleet.states, track[leg.first]), np.nan)
+            poses, begun = open_loop(helm, fleet, values, sailing), sailing & ~fleet.lost
+            samples[index] = np.where(sailing, len(values), 0)
+        else:
+            pilot = Pilot(
+                helm,
+                water,
+                track[leg.first : leg.last + 1],
+                sailing=sailing,
+                inputs=values[-1],
+                last=index == len(legs) - 1,
+            )
+            found = pilot.sail(fleet, felt)
+            felt, poses, begun = found.felt, found.poses, found.begun
+            rounds[index], samples[index] = found.rounds, found.samples
+        left[index] = sailing & (watch.leaves(poses) | fleet.lost)
+        aborted[index] = sailing & ~begun & ~left[index]
+        sailing = sailing & begun & ~left[index]
+    return Trials(left=left, aborted=aborted, rounds=rounds, samples=samples, used=used)
