@@ -9,10 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from expdesign.plan._ompl import dubins_curve
 from expdesign.plan.fleet import Fleet
 from expdesign.plan.leg_values import LegWater
-from expdesign.plan.run_up import ROUNDS, planned_stretch, run_up, tolerances, under_way
-from expdesign.plan.steering import LEAD, Helmsman, Reference, over_ground
+from expdesign.plan.run_up import MISSED, ROUNDS, planned_stretch, run_up, tolerances, under_way
+from expdesign.plan.steering import CATCH_UP, LEAD, Helmsman, Reference
 from expdesign.plan.ways_back import Convoy, WaysTo, build_ways_to
 from expdesign.values import Array
 
@@ -24,6 +25,8 @@ SPARE = 10.0
 """Time constants of the way back to a reference that a ship may spend besides."""
 LEAST_STEP = 0.2
 """What a slow reference moves in a sample at least, in samples at transit speed."""
+MADE_GOOD = 0.5
+"""Share of a leg's time that a ship may need to come back to it."""
 HELD = 0.5
 """Share of the tolerances within which a ship that stands still begins; all of them after half of `SPARE`."""
 
@@ -37,6 +40,7 @@ class Approach:
         begun: (n,) in place; the others among those that sailed gave up.
         rounds: (n,) times gone round.
         samples: (n,) that it took.
+        missed: (n,) number in `MISSED` of what those that gave up could not keep.
         felt: (n, 3) acceleration that each helmsman's model does not explain, as he believes in the end.
     """
 
@@ -44,6 +48,7 @@ class Approach:
     begun: np.ndarray
     rounds: np.ndarray
     samples: np.ndarray
+    missed: np.ndarray
     felt: Array
 
 
@@ -68,12 +73,13 @@ class Pilot:
         self._reference = Reference(states=np.concatenate([planned.states, runs_up.states]))
         self._first, self._arrival = len(planned.states), len(planned.states) + runs_up.arrival
         length_m = float(np.hypot(*(runs_up.states[0] - track[-1])[:2]))
-        reach_m = np.clip(length_m / 3, self._within.position_m / 2, helm.vessel.length_m)
+        reach_m = np.clip(length_m / 5, self._within.position_m / 2, helm.vessel.length_m)
         self._convoy, self._ways = Convoy(helm, runs_up.states[0], n, reach_m=reach_m), None
         self._turning = _turns_freely(helm)
         self.doing = np.where(sailing, ON_STRETCH, OUT)
         self._sample, self._end, self._most = np.zeros(n), np.full(n, planned.arrival), np.full(n, self._first - 1)
         self.rounds, self.samples = np.zeros(n, dtype=int), np.zeros(n, dtype=int)
+        self._missed = np.full(n, MISSED.index("time"))
         self._spent, self._limit = np.zeros(n), np.full(n, self._allowed(len(track)))
 
     def sail(self, fleet: Fleet, felt: Array) -> Approach:
@@ -94,6 +100,7 @@ class Pilot:
             begun=self.doing == BEGUN,
             rounds=self.rounds,
             samples=self.samples,
+            missed=self._missed,
             felt=felt,
         )
 
@@ -104,6 +111,8 @@ class Pilot:
         on = self.doing == ON_STRETCH
         passed, good = self._at_start(states)
         self.doing[on & passed & good] = BEGUN
+        worst = self._within.used(states, self._wanted).argmax(axis=1)
+        self._missed = np.where(on & passed, worst, np.where(late, MISSED.index("time"), self._missed))
         self.doing[(self.doing == ON_WAY) & late] = ABORTED
         self._run_up((self.doing == ON_WAY) & self._convoy.arrived(states))
         self._go_round(on & (self.doing == ON_STRETCH) & (passed | late), states)
@@ -111,18 +120,13 @@ class Pilot:
 
     def _at_start(self, states: Array) -> tuple[np.ndarray, np.ndarray]:
         """(n,) whether a ship is as near to the start as it will come this time, and whether it may begin then."""
-        used, at_end = self._within.used(states, self._wanted), self._sample >= self._end
+        used, at_end = self._within.used(states, self._wanted).max(axis=1), self._sample >= self._end
         if self._last:
             return at_end, at_end
         if not self._moves:
             waited = self._spent > self._limit - self._spare / 2
             return at_end & ((used <= HELD) | ((used <= 1.0) & waited)), used <= 1.0
-        ground = over_ground(self._wanted[None])[0]
-        speed, sample_s = float(np.hypot(*ground)) + 1e-9, self._helm.vessel.sample_time_s
-        along = (states[:, :2] - self._wanted[:2]) @ ground / speed
-        close = self._sample >= self._end - self._helm.vessel.length_m / speed / sample_s
-        abeam = close & (along >= -speed * sample_s / 2)
-        return abeam | (self._sample >= self._most), used <= 1.0
+        return self._sample >= self._end - 1.0, used <= 1.0
 
     def _run_up(self, ships: np.ndarray) -> None:
         self.doing[ships] = ON_STRETCH
@@ -131,12 +135,16 @@ class Pilot:
         self._limit[ships] = self._allowed(self._arrival - self._first)
 
     def _rejoin(self, states: Array) -> None:
-        """Ships that do not see the planned leg's beginning go round at once."""
-        first = self._reference.states[0, :2]
-        strayed = (self.doing == ON_STRETCH) & (np.hypot(*(states[:, :2] - first).T) > self._within.position_m)
+        """Ships go round at once that are farther off than the leg's time makes good, or do not see its beginning."""
+        first, helm = self._reference.states[0, :2], self._helm
+        off_m = np.hypot(*(states[:, :2] - first).T)
+        leg_s = self._end[0] * helm.vessel.sample_time_s
+        good_m = max(self._within.position_m, MADE_GOOD * CATCH_UP * helm.ship.transit_speed_mps * leg_s)
+        strayed = (self.doing == ON_STRETCH) & (off_m > self._within.position_m)
         some = np.flatnonzero(strayed)
         if len(some):
-            strayed[some] = ~self._tree.in_sight(states[some, :2], np.tile(first, (len(some), 1)))
+            seen = self._tree.in_sight(states[some, :2], np.tile(first, (len(some), 1)))
+            strayed[some] = ~seen | ((off_m[some] > good_m) & (not self._last))
             self._go_round(strayed, states)
 
     def _go_round(self, ships: np.ndarray, states: Array) -> None:
@@ -149,10 +157,16 @@ class Pilot:
         for ship, way in zip(some, self._tree.find(states[some, :2]), strict=True):
             if way is not None:
                 self.doing[ship] = ON_WAY
-                self._convoy.set_off(ship, way)
+                self._convoy.set_off(ship, way if self._helm.sideways else self._curved(way, states[ship]))
         sample_m = self._helm.ship.transit_speed_mps * self._helm.vessel.sample_time_s
         self._spent[some] = 0
         self._limit[some] = self._allowed(self._convoy.length_m[some] / sample_m)
+
+    def _curved(self, way: Array, state: Array) -> Array:
+        """(k, 2) the way of a ship that is steered by a helm from a state (6,): its own turns where there is room."""
+        radius, goal = self._helm.ship.turning_radius_m, self._convoy.goal[:3]
+        curve = dubins_curve(state[:3], goal, radius_m=radius, spacing_m=self._helm.vessel.length_m)[:, :2]
+        return curve if self._tree.holds(curve) else way
 
     @property
     def _tree(self) -> WaysTo:

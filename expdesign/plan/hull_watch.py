@@ -29,26 +29,29 @@ class HullWatch:
     area: SeaArea
     vessel: Vessel
 
-    def leaves(self, poses: Array) -> np.ndarray:
-        """(n,) whether the hull, or what it sweeps from one sample to the next, ever reaches outside.
+    def leaves(self, poses: Array) -> Array:
+        """(n, 2) where the hull, or what it sweeps from one sample to the next, first reaches outside; nan where never.
 
         Places at least a hull's radius from anything forbidden, at both samples, are not looked at more closely.
 
         Args:
-            poses: (k, n, 3) sample by sample.
+            poses: (k, n, 3) sample by sample; ships that stay where they are are not looked at.
         """
         far = shapely.contains_xy(self._deep, poses[..., 1], poses[..., 0])  # (k, n)
         moved = np.hypot(*np.moveaxis(np.diff(poses[..., :2], axis=0), -1, 0))
         turned = np.diff(poses[..., 2], axis=0) != 0
         close = ((moved > 0) | turned) & ~(far[:-1] & far[1:] & (moved < self._radius / 2))
         steps, ships = np.nonzero(close)
-        gone = np.zeros(poses.shape[1], dtype=bool)
+        place: Array = np.full((poses.shape[1], 2), np.nan)
         for first in range(0, len(steps), CHUNK):
             step, ship = steps[first : first + CHUNK], ships[first : first + CHUNK]
             corners = [hull_outlines(poses[step + later, ship], self.vessel.hull_b) for later in (0, 1)]
             spans = shapely.convex_hull(shapely.multipoints(np.concatenate(corners, axis=1)))
-            gone[ship[~shapely.contains_properly(self._water, spans)]] = True
-        return gone
+            outside = ~shapely.contains_properly(self._water, spans)
+            gone, earliest = np.unique(ship[outside], return_index=True)
+            fresh = np.isnan(place[gone, 0])
+            place[gone[fresh]] = poses[step[outside][earliest[fresh]], gone[fresh], :2]
+        return place
 
     @cached_property
     def _water(self) -> shapely.MultiPolygon:
@@ -57,8 +60,10 @@ class HullWatch:
 
     @cached_property
     def _deep(self) -> shapely.Geometry:
-        """Where a hull's middle is so far from the shore that no heading reaches it, nor half a radius' step between two
-        such places: from the middle of that step a corner is sqrt(1.05**2 - 0.25**2) > 1 radii away."""
+        """Where a hull's middle is so far from the shore that no heading reaches it, nor a step between such places.
+
+        From the middle of a step of half a radius a corner is sqrt(1.05**2 - 0.25**2) > 1 radii away.
+        """
         inner = self.area.water.buffer(-1.05 * self._radius)
         shapely.prepare(inner)
         return inner

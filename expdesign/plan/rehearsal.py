@@ -36,6 +36,8 @@ class Trials:
         rounds: (legs, n) times gone round on a leg.
         samples: (legs, n) that legs took.
         used: (legs, n) largest share of a tolerance used up where a run began; nan where none did.
+        missed: (legs, n) number in `MISSED` of what kept ships that gave up from beginning.
+        place: (legs, n, 2) where hulls left allowed water; nan where they did not.
     """
 
     left: np.ndarray
@@ -43,6 +45,8 @@ class Trials:
     rounds: np.ndarray
     samples: np.ndarray
     used: Array
+    missed: np.ndarray
+    place: Array
 
     @property
     def completed(self) -> np.ndarray:
@@ -70,18 +74,17 @@ def sail_trials(
     vessel, track = water.vessel, np.hstack([trajectory.pose, trajectory.velocity])
     helm = Helmsman(vessel=vessel, environment=water.environment, ship=water.ship)
     truths = draw_truths(vessel, water.environment, draws, rng)
-    fleet = Fleet(
-        vessel, water.environment, truths, state=track[0], standing=np.zeros(len(vessel.limits)), rng=rng
-    )
+    fleet = Fleet(vessel, water.environment, truths, state=track[0], standing=np.zeros(len(vessel.limits)), rng=rng)
     watch, within = HullWatch(area=water.area, vessel=vessel), tolerances(water)
     sailing, felt = np.ones(draws, dtype=bool), np.zeros((draws, 3))
     shape = (len(legs), draws)
     left, aborted = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
-    rounds, samples, used = np.zeros(shape, dtype=int), np.zeros(shape, dtype=int), np.full(shape, np.nan)
+    rounds, samples, missed = (np.zeros(shape, dtype=int) for _ in range(3))
+    used, place = np.full(shape, np.nan), np.full((*shape, 2), np.nan)
     for index, leg in enumerate(legs):
         values = commands.values[leg.first : leg.last]
         if leg.kind == "primitive":
-            used[index] = np.where(sailing, within.used(fleet.states, track[leg.first]), np.nan)
+            used[index] = np.where(sailing, within.used(fleet.states, track[leg.first]).max(axis=1), np.nan)
             poses, begun = open_loop(helm, fleet, values, sailing), sailing & ~fleet.lost
             samples[index] = np.where(sailing, len(values), 0)
         else:
@@ -95,8 +98,9 @@ def sail_trials(
             )
             found = pilot.sail(fleet, felt)
             felt, poses, begun = found.felt, found.poses, found.begun
-            rounds[index], samples[index] = found.rounds, found.samples
-        left[index] = sailing & (watch.leaves(poses) | fleet.lost)
+            rounds[index], samples[index], missed[index] = found.rounds, found.samples, found.missed
+        place[index] = np.where(fleet.lost[:, None] & sailing[:, None], poses[-1, :, :2], watch.leaves(poses))
+        left[index] = sailing & ~np.isnan(place[index, :, 0])
         aborted[index] = sailing & ~begun & ~left[index]
         sailing = sailing & begun & ~left[index]
-    return Trials(left=left, aborted=aborted, rounds=rounds, samples=samples, used=used)
+    return Trials(left=left, aborted=aborted, rounds=rounds, samples=samples, used=used, missed=missed, place=place)

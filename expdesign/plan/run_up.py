@@ -32,8 +32,12 @@ AFTER = 1.0
 """Hull lengths past the start that a reference goes on steadily."""
 REST = 0.05
 """Speed over ground in transit speeds, and yaw rate in the largest, up to which a run begins from a standstill."""
-TURNS = 6.0
-"""Turning radii that a run-up is longer for ships that cannot go sideways."""
+STRAIGHT = 6.0
+"""Hull lengths of the run-up of ships that are steered by a helm."""
+
+
+MISSED = ("position", "heading", "speed", "yaw rate", "time")
+"""What can keep a ship from beginning a run: one of the tolerances, or that she does not come there in time."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,16 +55,15 @@ class Tolerances:
     yaw_rate_radps: float
 
     def used(self, states: Array, wanted: Array) -> Array:
-        """(n,) largest share of a tolerance that states (n, 6) use up, by a wanted one (6,); up to 1 is in place."""
+        """(n, 4) shares of the tolerances that states (n, 6) use up, by a wanted one (6,); up to 1 each is in place."""
         apart = over_ground(states) - over_ground(wanted[None])
-        return np.max(
+        return np.column_stack(
             [
                 np.hypot(*(states[:, :2] - wanted[:2]).T) / self.position_m,
                 np.abs(wrap_angle(states[:, 2] - wanted[2])) / self.heading_rad,
                 np.hypot(*apart.T) / self.speed_mps,
                 np.abs(states[:, 5] - wanted[5]) / self.yaw_rate_radps,
-            ],
-            axis=0,
+            ]
         )
 
 
@@ -111,7 +114,7 @@ def run_up(helm: Helmsman, water: LegWater, leg: Array) -> Stretch:
     samples = RUN_UP * LEAD * helm.answer_s / sample_s
     if not helm.sideways:
         speed = max(float(np.hypot(*wanted[3:5])), 0.5 * helm.ship.transit_speed_mps)
-        samples += TURNS * helm.ship.turning_radius_m / speed / sample_s
+        samples = STRAIGHT * helm.vessel.length_m / speed / sample_s
     for share in SHORTER:
         count = max(2, round(share * samples))
         before = steady_states(helm, wanted, np.arange(-count, 0)) if moves else slowing(helm, wanted, count)
@@ -154,7 +157,8 @@ def slowing(helm: Helmsman, wanted: Array, count: int) -> Array:
     """(count, 6) states on the way to a stop, straight ahead, gently."""
     ship, sample_s = helm.ship, helm.vessel.sample_time_s
     time_s = sample_s * np.arange(count, 0, -1)
-    brake, cruise = ship.acceleration_mps2 / 4, ship.transit_speed_mps / 2
+    cruise = ship.transit_speed_mps / 2
+    brake = ship.acceleration_mps2 / 4 if helm.sideways else cruise**2 / (2 * ship.stopping_m)
     slowed = np.minimum(time_s, cruise / brake)
     distance = brake * slowed**2 / 2 + cruise * (time_s - slowed)
     states: Array = np.tile(wanted, (count, 1))

@@ -1,82 +1,124 @@
-"""The chance that a run leaves the allowed water when the vessel is not quite the nominal one.
+"""The promise of a plan: the chance that the hull leaves allowed water in the trial as it is sailed, and where.
 
-How the helm is taken to react: every run begins at its planned pose and entry velocity, because the leg before it is
-steered; during the run the commands are given open loop. Legs are steered along the plan and not part of this chance.
+It comes from whole trials (`expdesign.plan.rehearsal`): runs open loop from the states that ships really have, legs and
+ways back to run-ups steered, the hull against the chart at every step. Trials broken off because a run could not be
+begun are counted apart: they end in allowed water, but they do not end at the goal.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
-import shapely
+from scipy.stats import beta
 
 from expdesign.plan.area import SeaArea
-from expdesign.plan.footprint import hull_outlines
-from expdesign.plan.uncertainty import draw_truths
-from expdesign.plan.values import Leg
+from expdesign.plan.leg_values import LegWater
+from expdesign.plan.rehearsal import Trials, sail_trials
+from expdesign.plan.run_up import MISSED, ROUNDS, tolerances
+from expdesign.plan.values import Leg, LegOutcome, Rehearsal
 from expdesign.signals import Commands, Trajectory
-from expdesign.simulation import Environment, simulate_many
 from expdesign.values import Array
-from expdesign.vessel import Vessel
 
-DRAWS = 300
-LOOK_EVERY_M = 0.25
-"""Hull lengths the ship moves, by its planned speed, between looks at the chart."""
+TRIALS = 200
+"""Of a plan that is being made."""
+MOST_ABORTED = 0.5
+"""Share of trials broken off from which on a plan is none: the ship in the middle does not come to the goal."""
+MOST = 0.95
+"""Share of trials that `most` is about, and confidence of the upper limit."""
 
 
-def leave_water_probability(
-    vessel: Vessel,
-    area: SeaArea,
-    environment: Environment,
+def rehearse(
+    water: LegWater,
     *,
     commands: Commands,
     trajectory: Trajectory,
     legs: Sequence[Leg],
     rng: np.random.Generator,
-    draws: int = DRAWS,
-) -> tuple[float, tuple[float | None, ...]]:
-    """Share of drawn vessels, currents and winds for which some run's hull leaves the allowed water, and for each leg.
+    draws: int = TRIALS,
+) -> tuple[Rehearsal, Trials]:
+    """Sail drawn trials of a plan and tell what happened to them.
 
-    Legs between runs have no share, None.
-
-    One draw is one trial: the same parameters (normal, independent, standard deviations of the vessel file), current
-    and wind in all its runs. Its standard error is sqrt(p (1 - p) / draws). Runs that diverge count as leaving.
+    The shares' standard errors are sqrt(p (1 - p) / draws).
     """
-    parameters, current, wind = draw_truths(vessel, environment, draws, rng)
-    shapely.prepare(area.water)
-    left = np.zeros(draws, dtype=bool)
-    shares: list[float | None] = []
-    for leg in legs:
-        if leg.kind != "primitive":
-            shares.append(None)
-            continue
-        run = Commands(
-            sample_time_s=commands.sample_time_s, names=commands.names, values=commands.values[leg.first : leg.last]
-        )
-        states = simulate_many(
-            vessel,
-            run,
-            pose=np.tile(trajectory.pose[leg.first], (draws, 1)),
-            velocity=np.tile(trajectory.velocity[leg.first], (draws, 1)),
-            current_to=current,
-            wind_to=wind,
-            parameters=parameters,
-            standing=commands.values[leg.first - 1] if leg.first else None,
-        )
-        leaves = _leaves(area, vessel, states)
-        left |= leaves
-        shares.append(float(leaves.mean()))
-    return float(left.mean()), tuple(shares)
+    trials = sail_trials(water, commands=commands, trajectory=trajectory, legs=legs, draws=draws, rng=rng)
+    within, sample_s = tolerances(water), commands.sample_time_s
+    gone, done = int(trials.left.any(axis=0).sum()), trials.completed
+    extra = (trials.samples.sum(axis=0)[done] - len(commands)) * sample_s
+    found = Rehearsal(
+        trials=draws,
+        left=gone / draws,
+        left_most=upper_limit(gone, draws),
+        aborted=float(trials.aborted.any(axis=0).mean()),
+        reasons=_reasons(legs, trials),
+        extra_median_s=float(np.median(extra)) if len(extra) else float("nan"),
+        extra_most_s=float(np.quantile(extra, MOST)) if len(extra) else float("nan"),
+        rounds=ROUNDS,
+        position_m=within.position_m,
+        heading_rad=within.heading_rad,
+        speed_mps=within.speed_mps,
+        yaw_rate_radps=within.yaw_rate_radps,
+        legs=tuple(_leg_outcome(trials, index, sample_s) for index in range(len(legs))),
+    )
+    return found, trials
 
 
-def _leaves(area: SeaArea, vessel: Vessel, states: Array) -> np.ndarray:
-    """(n,) whether the hull, or what it sweeps between looks, ever reaches outside, from states (k, n, 6)."""
-    speed = np.hypot(states[..., 3], states[..., 4]) + np.abs(states[..., 5]) * vessel.length_m / 2
-    every = max(1, int(LOOK_EVERY_M * vessel.length_m / (np.nanquantile(speed, 0.9) * vessel.sample_time_s + 1e-9)))
-    looked = np.unique(np.r_[np.arange(0, len(states), every), len(states) - 1])
-    pose = states[looked, :, :3]
-    lost = np.isnan(pose).any(axis=(0, 2))
-    corners = hull_outlines(np.nan_to_num(pose).reshape(-1, 3), vessel.hull_b).reshape(*pose.shape[:2], -1, 2)
-    spans = shapely.convex_hull(shapely.multipoints(np.concatenate([corners[:-1], corners[1:]], axis=2)))
-    return np.asarray(lost | ~shapely.contains_properly(area.water, spans).all(axis=0))
+def upper_limit(count: int, trials: int, *, confidence: float = MOST) -> float:
+    """The share that would show `count` cases or fewer among trials with a chance of only 1 - confidence.
+
+    Source: C. J. Clopper and E. S. Pearson, Biometrika 26 (1934), 404-413.
+    """
+    return 1.0 if count >= trials else float(beta.ppf(confidence, count + 1, trials - count))
+
+
+def broken_promise(found: Rehearsal, trials: Trials, legs: Sequence[Leg], area: SeaArea, *, confidence: float) -> str:
+    """What is wrong with a plan, with the leg and the place where it is worst; "" when it keeps its promise."""
+    if found.left > 1.0 - confidence + 1e-12:
+        worst = worst_leg(trials)
+        lat, lon = area.frame.to_degrees(np.nanmedian(trials.place[worst], axis=0))
+        return (
+            f"{found.left:.1%} of {found.trials} drawn trials leave allowed water, more than plan.confidence = "
+            f"{confidence:g} allows, most of them ({trials.left[worst].mean():.1%}) {described(legs, worst)} near "
+            f"{lat:.5f}, {lon:.5f}"
+        )
+    if found.aborted > MOST_ABORTED:
+        return f"{found.aborted:.1%} of {found.trials} drawn trials are broken off: {'; '.join(found.reasons)}"
+    return ""
+
+
+def worst_leg(trials: Trials) -> int:
+    """Index of the leg on which most trials leave allowed water."""
+    return int(trials.left.mean(axis=1).argmax())
+
+
+def described(legs: Sequence[Leg], index: int) -> str:
+    """In a run or on a leg, which one, counted as on the run cards."""
+    number = sum(leg.kind == "primitive" for leg in legs[: index + 1])
+    leg = legs[index]
+    if leg.kind == "primitive":
+        return f"in run {number}, {leg.name!r},"
+    return "on the leg to the goal" if index == len(legs) - 1 else f"on the way to run {number + 1}, {leg.name!r},"
+
+
+def _reasons(legs: Sequence[Leg], trials: Trials) -> tuple[str, ...]:
+    """Where trials were broken off, and why."""
+    rows = []
+    for index, aborted in enumerate(trials.aborted):
+        if aborted.any():
+            causes = Counter(trials.missed[index][aborted].tolist())
+            told = ", ".join(f"{MISSED[cause]} {count / len(aborted):.1%}" for cause, count in causes.most_common())
+            rows.append(f"{described(legs, index)} {aborted.mean():.1%} (out of tolerance: {told})")
+    return tuple(rows)
+
+
+def _leg_outcome(trials: Trials, index: int, sample_s: float) -> LegOutcome:
+    sailed = trials.samples[index] > 0
+    times: Array = trials.samples[index][sailed] * sample_s if sailed.any() else np.zeros(1)
+    return LegOutcome(
+        left=float(trials.left[index].mean()),
+        aborted=float(trials.aborted[index].mean()),
+        rounds=float(trials.rounds[index][sailed].mean()) if sailed.any() else 0.0,
+        median_s=float(np.median(times)),
+        most_s=float(np.quantile(times, MOST)),
+    )

@@ -26,11 +26,12 @@ from expdesign.plan.lower_bound import reposition_bound_s
 from expdesign.plan.placement import place_runs
 from expdesign.plan.realised import realised_efficiencies
 from expdesign.plan.recovery import displaced, recover
-from expdesign.plan.safety import leave_water_probability
+from expdesign.plan.rehearsal import Trials
+from expdesign.plan.safety import broken_promise, rehearse, worst_leg
 from expdesign.plan.search_space import SearchSpace, Stamp, refusing, stamp
 from expdesign.plan.timeline import Timeline
 from expdesign.plan.uncertainty import stray_m
-from expdesign.plan.values import Leg, Placement, Plan, PlanSettings
+from expdesign.plan.values import Leg, Placement, Plan, PlanSettings, Rehearsal, Verification
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import CALM, Environment, to_body
 from expdesign.values import Array
@@ -43,6 +44,9 @@ TRY_S = 2.0
 the same plan as a fast one."""
 LAST_RESORT = 10.0
 """Time budgets by the clock after which the search ends whatever the count."""
+
+REPLANS, WIDER = 2, 1.4
+"""Plans made anew, with so much more room where trials of the last one leave the water, before giving up."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -75,14 +79,22 @@ def plan_trial(problem: PlanProblem, *, progress: Progress = lambda what, share:
         NoPlan: no way, no room, or no dynamically feasible leg; the message names what and where.
     """
     progress("measuring the water", 0.0)
-    water = _water(problem)
+    water = leg_water(problem)
     space = _search_space(problem, water)
-    line = _sail_all(problem, water, space, progress)
-    commands, trajectory, legs = line.joined(
-        sample_time_s=problem.vessel.sample_time_s, names=problem.vessel.model.inputs
-    )
-    progress("verifying", 0.9)
-    return _finished(problem, water, commands, trajectory, legs)
+    for replan in range(REPLANS + 1):
+        line = _sail_all(problem, water, space, progress)
+        sailed = line.joined(sample_time_s=problem.vessel.sample_time_s, names=problem.vessel.model.inputs)
+        progress("verifying", 0.85)
+        verification = _verified(problem, *sailed)
+        progress("rehearsing whole trials", 0.9)
+        rehearsal, trials = _rehearsed(problem, water, *sailed)
+        broken = broken_promise(rehearsal, trials, sailed[2], problem.area, confidence=problem.settings.confidence)
+        if not broken:
+            return _finished(problem, water, *sailed, verification=verification, rehearsal=rehearsal)
+        if replan == REPLANS or not trials.left.any():
+            raise NoPlan(f"the plan found does not keep its promise: {broken}; more plan.clearance_m helps")
+        water, space = _wider(problem, water, space, trials, sailed[2], broken)
+    raise AssertionError("the last plan is returned or refused")
 
 
 def lattice_reference(problem: PlanProblem, *, spacing_m: float, suboptimality: float = 0.02) -> LatticePlan:
@@ -93,21 +105,19 @@ def lattice_reference(problem: PlanProblem, *, spacing_m: float, suboptimality: 
     Raises:
         NoPlan: the lattice is too coarse for the water, or there is no way.
     """
-    space = _search_space(problem, _water(problem))
+    space = _search_space(problem, leg_water(problem))
     counts = [_repeats(problem)[item.name] for item in space.stamps]
     lattice = build_lattice(space, counts, problem.start, spacing_m=spacing_m)
     return search_lattice(lattice, suboptimality=suboptimality)
 
 
-def _finished(
-    problem: PlanProblem, water: LegWater, commands: Commands, trajectory: Trajectory, legs: tuple[Leg, ...]
-) -> Plan:
-    vessel, area, environment = problem.vessel, problem.area, problem.environment
-    sailed = {"commands": commands, "trajectory": trajectory, "legs": legs}
+def _verified(
+    problem: PlanProblem, commands: Commands, trajectory: Trajectory, legs: tuple[Leg, ...]
+) -> Verification:
     verification = verify_plan(
-        vessel,
-        area,
-        environment,
+        problem.vessel,
+        problem.area,
+        problem.environment,
         commands=commands,
         trajectory=trajectory,
         legs=legs,
@@ -119,23 +129,65 @@ def _finished(
     )
     if not verification.verified:
         raise NoPlan("the plan found does not pass its own verification: " + "; ".join(verification.problems))
+    return verification
+
+
+def _rehearsed(
+    problem: PlanProblem, water: LegWater, commands: Commands, trajectory: Trajectory, legs: tuple[Leg, ...]
+) -> tuple[Rehearsal, Trials]:
     rng = np.random.default_rng(problem.seed)
-    leaving, leaving_by_leg = leave_water_probability(vessel, area, environment, rng=rng, **sailed)  # type: ignore[arg-type]
-    if leaving > 1.0 - problem.settings.confidence + 1e-12:
-        raise NoPlan(
-            f"{leaving:.1%} of drawn vessels leave allowed water during the runs of the plan found, more than "
-            f"plan.confidence = {problem.settings.confidence:g} allows: more plan.clearance_m helps"
+    return rehearse(water, commands=commands, trajectory=trajectory, legs=legs, rng=rng)
+
+
+def _wider(
+    problem: PlanProblem,
+    water: LegWater,
+    space: SearchSpace,
+    trials: Trials,
+    legs: tuple[Leg, ...],
+    broken: str,
+) -> tuple[LegWater, SearchSpace]:
+    """More room where trials leave the water most: for that run, or for all legs.
+
+    Raises:
+        NoPlan: with more room there is no way at all.
+    """
+    worst = legs[worst_leg(trials)]
+    if worst.kind == "primitive":
+        stamps = tuple(
+            replace(item, room_m=WIDER * item.room_m) if item.name == worst.name else item for item in space.stamps
         )
-    placed, realised = realised_efficiencies(vessel, problem.design, environment, **sailed)  # type: ignore[arg-type]
+        return water, replace(space, stamps=stamps)
+    wide = replace(water, clearance_m=water.clearance_m + (WIDER - 1.0) * problem.vessel.length_m)
+    try:
+        found = _search_space(problem, wide)
+    except NoPlan:
+        raise NoPlan(f"{broken}; and there is no way to the goal that keeps farther off") from None
+    return wide, replace(found, stamps=space.stamps)
+
+
+def _finished(
+    problem: PlanProblem,
+    water: LegWater,
+    commands: Commands,
+    trajectory: Trajectory,
+    legs: tuple[Leg, ...],
+    *,
+    verification: Verification,
+    rehearsal: Rehearsal,
+) -> Plan:
+    sailed = {"commands": commands, "trajectory": trajectory, "legs": legs}
+    placed, realised = realised_efficiencies(problem.vessel, problem.design, problem.environment, **sailed)  # type: ignore[arg-type]
     return Plan(
-        area=area,
+        area=problem.area,
         **sailed,  # type: ignore[arg-type]
         reposition_bound_s=_reposition_bound_s(problem, water),
-        leave_water_probability=leaving,
-        leave_water_by_leg=leaving_by_leg,
+        leave_water_probability=rehearsal.left,
+        leave_water_by_leg=tuple(leg.left for leg in rehearsal.legs),
         design_efficiency_placed=placed,
         design_efficiency_realised=realised,
         verification=verification,
+        rehearsal=rehearsal,
     )
 
 
@@ -143,7 +195,8 @@ def _repeats(problem: PlanProblem) -> dict[str, int]:
     return dict(zip(problem.design.problem.names, problem.design.repeats, strict=True))
 
 
-def _water(problem: PlanProblem) -> LegWater:
+def leg_water(problem: PlanProblem) -> LegWater:
+    """Who sails, in what, where: what all legs of the problem share."""
     ship = capability(problem.vessel, problem.settings, current_mps=float(np.hypot(*problem.environment.current_to)))
     # a ship that stands the turns of the runs stands them on legs
     turns = [item.trajectory.velocity[:, 0] * item.trajectory.velocity[:, 2] for item in _used(problem)]

@@ -15,9 +15,10 @@ import numpy as np
 
 from expdesign.conventions import wrap_angle
 from expdesign.plan.capability import Capability
+from expdesign.plan.helm_orders import HelmOrders
 from expdesign.simulation import Environment
 from expdesign.values import Array, seal
-from expdesign.vessel import Vessel, allocate, force_matrix, required_force
+from expdesign.vessel import Vessel, allocate, required_force
 
 CATCH_UP = 0.3
 """Largest speed towards the reference, in transit speeds."""
@@ -95,13 +96,14 @@ class Helmsman:
 
     @property
     def answer_s(self) -> float:
-        """Time constant wished for velocities [s]."""
-        return max(self.ship.settle_s, 3.0 * self.vessel.sample_time_s)
+        """Time constant wished for velocities [s]; of ships with a helm the time of a hull length at transit speed."""
+        own = self.ship.settle_s if self.sideways else self.vessel.length_m / self.ship.transit_speed_mps
+        return max(own, 3.0 * self.vessel.sample_time_s)
 
-    @cached_property
+    @property
     def sideways(self) -> bool:
-        """Whether the actuators push every way, so that a ship need not point where it goes."""
-        return bool(np.linalg.matrix_rank(force_matrix(self.vessel.actuators)) == 3)
+        """Whether forces in every direction steer it, so that a ship need not point where it goes."""
+        return self.ship.approach is None
 
     def commands(
         self, wanted: Array, states: Array, before: Array, *, felt: Array | None = None, near: Array | None = None
@@ -116,15 +118,17 @@ class Helmsman:
         """
         through = self._velocity_through_water(wanted, states)
         moving = self._in_body(states)
+        felt = np.zeros((len(states), 3)) if felt is None else felt
+        if not self.sideways:
+            turn = self._pointing(wanted, through) - states[:, 2]
+            wish = np.column_stack([np.hypot(*through.T), turn, wanted[:, 5]])
+            return self._orders.commands(wish, moving, before, felt)
         c, s = np.cos(states[:, 2]), np.sin(states[:, 2])
         ahead, abeam = through[:, 0] * c + through[:, 1] * s, through[:, 1] * c - through[:, 0] * s
-        heading, abeam = (wanted[:, 2], abeam) if self.sideways else (self._pointing(wanted, through), moving[:, 1])
-        turn = wrap_angle(heading - states[:, 2]) / (2.0 * self.answer_s)
+        turn = wrap_angle(wanted[:, 2] - states[:, 2]) / (2.0 * self.answer_s)
         fastest = max(self.ship.spot_rate_radps, self.ship.yaw_rate_radps)
         wish = np.column_stack([ahead, abeam, np.clip(wanted[:, 5] + turn, -fastest, fastest)])
-        gain = (wish - moving) / self.answer_s
-        force = required_force(self.vessel.model, moving, gain if felt is None else gain - felt)
-        force = force if self.sideways else force @ self._without_sway.T
+        force = required_force(self.vessel.model, moving, (wish - moving) / self.answer_s - felt)
         actuators, sample_s = self.vessel.actuators, self.vessel.sample_time_s
         told = allocate(actuators, force[:, None], sample_time_s=sample_s, before=before, near=near)
         return np.asarray(told[:, 0])
@@ -161,10 +165,8 @@ class Helmsman:
         return np.where(moves, np.arctan2(through[:, 1], through[:, 0]), wanted[:, 2])
 
     @cached_property
-    def _without_sway(self) -> Array:
-        """(3, 3) the nearest force with the same surge and yaw that actuators which cannot push every way can give."""
-        matrix = force_matrix(self.vessel.actuators)
-        return np.asarray(matrix @ np.linalg.pinv(matrix[[0, 2]]) @ np.eye(3)[[0, 2]])
+    def _orders(self) -> HelmOrders:
+        return HelmOrders(vessel=self.vessel, ship=self.ship)
 
     def _in_body(self, states: Array) -> Array:
         """(n, 3) velocities through water from those over ground."""

@@ -17,7 +17,7 @@ class PlanSettings:
 
     Attributes:
         clearance_m: least distance from the hull to anything forbidden [m].
-        confidence: share of sampled truths whose runs must stay in safe water, between 0 and 1.
+        confidence: share of drawn trials that must stay in allowed water from start to goal, between 0 and 1.
         time_budget_s: buys tries of other places when a leg or a run fails, one for every two seconds, so that a slow
             machine finds the same plan as a fast one; by the clock the search ends after ten times as long [s].
         transit_speed_mps: speed of repositioning legs, or None for nine tenths of what the actuators allow.
@@ -72,6 +72,62 @@ class Verification:
         return not self.problems
 
 
+@dataclass(frozen=True, kw_only=True)
+class LegOutcome:
+    """What drawn trials did on one leg.
+
+    Attributes:
+        left, aborted: shares of all trials in which the hull left allowed water here, or the ship gave up here to begin
+            the run that follows.
+        rounds: times that a ship went round for the run that follows, on average over those that sailed the leg.
+        median_s, most_s: time it took, in the middle and in 95 % of them [s].
+    """
+
+    left: float
+    aborted: float
+    rounds: float
+    median_s: float
+    most_s: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rehearsal:
+    """Whole trials of drawn ships in drawn weather, sailed by the procedure of `expdesign.plan.run_up`.
+
+    Attributes:
+        trials: how many.
+        left: share in which the hull left allowed water, on a run or on the way to one.
+        left_most: the share is below this with 95 % confidence (Clopper and Pearson 1934).
+        aborted: share broken off in allowed water because a run could not be begun within tolerance.
+        reasons: one sentence for each leg on which trials were broken off.
+        extra_median_s, extra_most_s: time beyond the plan's, in the middle and in 95 % of the trials that came to the
+            goal [s]; nan when none did.
+        rounds: most times that a ship goes round for one run.
+        position_m, heading_rad, speed_mps, yaw_rate_radps: tolerances within which runs begin.
+        legs: what happened on each.
+    """
+
+    trials: int
+    left: float
+    left_most: float
+    aborted: float
+    reasons: tuple[str, ...]
+    extra_median_s: float
+    extra_most_s: float
+    rounds: int
+    position_m: float
+    heading_rad: float
+    speed_mps: float
+    yaw_rate_radps: float
+    legs: tuple[LegOutcome, ...]
+
+    @property
+    def error(self) -> float:
+        """Standard error of `left` [share of trials]; at least that of half a trial."""
+        share = min(max(self.left, 0.5 / self.trials), 1.0 - 0.5 / self.trials)
+        return float(np.sqrt(share * (1.0 - share) / self.trials))
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Plan:
     """One continuous trial from start to goal.
@@ -82,12 +138,14 @@ class Plan:
         trajectory: k + 1 samples.
         legs: in time order, without gaps.
         reposition_bound_s: no plan with these runs repositions in less time [s].
-        leave_water_probability: chance that a primitive run open loop leaves safe water, or None if not computed.
-        leave_water_by_leg: the same for each leg; None for legs between runs, or () if not computed.
+        leave_water_probability: chance that the hull leaves allowed water in the trial as it is sailed, by
+            `rehearsal`, or None if not computed.
+        leave_water_by_leg: the same for each leg, or () if not computed.
         design_efficiency_realised: efficiency of the whole trajectory's information, by the design's criterion, against
             the optimal design's in the time asked for; None where the track alone cannot tell.
         verification: what the independent check found.
         design_efficiency_placed: as realised, of the runs alone, with the headings in wind and the entries they got.
+        rehearsal: the trials that the chances come from.
     """
 
     area: SeaArea
@@ -100,6 +158,7 @@ class Plan:
     verification: Verification
     leave_water_by_leg: tuple[float | None, ...] = ()
     design_efficiency_placed: float | None = None
+    rehearsal: Rehearsal | None = None
 
     @property
     def sample_leg(self) -> np.ndarray:

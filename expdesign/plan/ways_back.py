@@ -25,6 +25,10 @@ BRAKING = 0.5
 """Share of the mean acceleration between rest and transit speed that is used for slowing down."""
 CRAB = 0.5
 """Speed sideways and astern, in transit speeds."""
+TURNED_RAD = 0.15
+"""Difference from the heading wanted at the place within which a ship has come to it, if she hardly turns any more."""
+PURSUED = 1.5
+"""Hull lengths ahead on its way at which a ship with a helm aims."""
 REACH = 0.4
 """Hull lengths from a bend at which a ship has come to it."""
 
@@ -62,6 +66,10 @@ class WaysTo:
             chain.append(self.nodes[node])
         way = np.array([*chain, self.place])
         return way[np.r_[True, np.hypot(*np.diff(way, axis=0).T) > 1e-6]]
+
+    def holds(self, way: Array) -> bool:
+        """Whether a way (k, 2) stays in the water."""
+        return bool(shapely.covers(self.ways.water, shapely.LineString(way[:, ::-1])))
 
     def in_sight(self, points: Array, others: Array) -> np.ndarray:
         """(n,) whether straight lines between places (n, 2) stay in the water."""
@@ -105,7 +113,7 @@ class Convoy:
         self._way[ship, :count] = way
         length = np.hypot(*steps.T)
         self._left[ship, :count] = np.r_[np.cumsum(length[::-1])[::-1], 0.0]
-        self._bend[ship] = TURNED_OFF * fastest
+        self._bend[ship] = TURNED_OFF * fastest if self._helm.sideways else fastest
         if count > 2:
             turn = np.abs(wrap_angle(np.diff(np.arctan2(steps[:, 1], steps[:, 0]))))
             self._bend[ship, 1 : count - 1] = fastest * np.maximum(TURNED_OFF, np.cos(np.minimum(turn, np.pi / 2)))
@@ -115,8 +123,13 @@ class Convoy:
         """(n,) ships that have come to the place and, if they can turn there, point as wanted."""
         helm = self._helm
         there = np.hypot(*(states[:, :2] - self.goal[:2]).T) < self._reach_m
-        turned = np.abs(wrap_angle(states[:, 2] - self.goal[2])) < 0.3
-        return np.asarray(there & (turned if helm.sideways else True))
+        turned = np.abs(wrap_angle(states[:, 2] - self.goal[2])) < TURNED_RAD
+        turned &= np.abs(states[:, 5]) < TURNED_RAD / (2.0 * helm.answer_s)
+        if helm.sideways:
+            return np.asarray(there & turned)
+        ahead = np.stack([np.cos(self.goal[2]), np.sin(self.goal[2])])
+        on_last = self._left[np.arange(len(states)), self._next] <= 0.0
+        return np.asarray(there | (on_last & ((states[:, :2] - self.goal[:2]) @ ahead > 0.0)))
 
     def wanted(self, states: Array) -> Array:
         """(n, 6) where each ship should be and how it should move now: on its way, at a speed that it can lose."""
@@ -124,7 +137,9 @@ class Convoy:
         length, fastest = helm.vessel.length_m, helm.ship.transit_speed_mps
         last = (self._left <= 0.0).argmax(axis=1)
         ahead = np.hypot(*(self._way[everyone, self._next] - states[:, :2]).T)
-        self._next = np.where((ahead < REACH * length) & (self._next < last), self._next + 1, self._next)
+        there, before = self._way[everyone, self._next], self._way[everyone, self._next - 1]
+        passed = ((there - states[:, :2]) * (there - before)).sum(axis=1) <= 0.0
+        self._next = np.where(((ahead < REACH * length) | passed) & (self._next < last), self._next + 1, self._next)
         there, before = self._way[everyone, self._next], self._way[everyone, self._next - 1]
         offset = there - states[:, :2]
         ahead = np.hypot(*offset.T)
@@ -138,14 +153,16 @@ class Convoy:
         leg = there - before
         leg = leg / np.maximum(np.hypot(*leg.T), 1e-9)[:, None]
         across = offset - (offset * leg).sum(axis=1)[:, None] * leg
-        pursued = leg * np.maximum(length, 1e-9) + across  # one hull length ahead on the way
-        pursued = np.where((near | (ahead < length))[:, None], offset, pursued)
+        look = length if helm.sideways else PURSUED * length
+        pursued = leg * look + across  # a point ahead on the way
+        if helm.sideways:
+            pursued = np.where((near | (ahead < look))[:, None], offset, pursued)
         course = pursued / np.maximum(np.hypot(*pursued.T), 1e-9)[:, None]
         through = course * speed[:, None] - helm.environment.current_to
         pointing = np.arctan2(through[:, 1], through[:, 0])
         heading = np.where(near & helm.sideways, self.goal[2], pointing)
         off = np.cos(np.minimum(np.abs(wrap_angle(heading - states[:, 2])), np.pi / 2))
-        ground = course * (speed * np.where(near, 1.0, np.maximum(off, TURNED_OFF)))[:, None]
+        ground = course * (speed * np.where(near | (not helm.sideways), 1.0, np.maximum(off, TURNED_OFF)))[:, None]
         c, s = np.cos(heading), np.sin(heading)
         return np.column_stack(
             [
