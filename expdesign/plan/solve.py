@@ -111,9 +111,7 @@ def lattice_reference(problem: PlanProblem, *, spacing_m: float, suboptimality: 
     return search_lattice(lattice, suboptimality=suboptimality)
 
 
-def _verified(
-    problem: PlanProblem, commands: Commands, trajectory: Trajectory, legs: tuple[Leg, ...]
-) -> Verification:
+def _verified(problem: PlanProblem, commands: Commands, trajectory: Trajectory, legs: tuple[Leg, ...]) -> Verification:
     verification = verify_plan(
         problem.vessel,
         problem.area,
