@@ -20,7 +20,8 @@ from expdesign.diagnosis.motion import linearise, start_responses
 from expdesign.diagnosis.search import Search, Step, search
 from expdesign.diagnosis.spread import spread
 from expdesign.diagnosis.tell_apart import Proposal, most_telling, standard_proposals
-from expdesign.diagnosis.values import Accuracy, Diagnosis, Estimated, Finding
+from expdesign.diagnosis.values import Diagnosis, Estimated, Finding
+from expdesign.diagnosis.verdict import error_falls, verdict
 from expdesign.diagnosis.windows import Windows, cut_windows
 from expdesign.errors import Diverged, NotInformative
 from expdesign.signals import Record
@@ -72,7 +73,8 @@ def diagnose(
     progress("looking for manoeuvres that tell causes apart", 0.92)
     proposed = proposals or standard_proposals(windows, ship.model.inputs, windows.sample_s)
     findings = tuple(
-        _finding(step, held[index], held[index + 1], windows, proposed, rng) for index, step in enumerate(found.steps)
+        _finding(step, found.last, held[index], held[index + 1], windows, proposed, rng)
+        for index, step in enumerate(found.steps)
     )
     last = found.last if found.steps else found.first
     final = last.ship if found.steps else ship
@@ -87,7 +89,7 @@ def diagnose(
         before=before,
         after=after,
         findings=tuple(findings[index] for index in order),
-        verdict=_verdict([findings[index] for index in order], before),
+        verdict=verdict([findings[index] for index in order], before),
         simulated_before=motion.shown,
         simulated_after=simulate_from_first(final, windows).shown,
         errors={step.chosen.candidate.cause: step.before.linear.motion.error for step in found.steps},
@@ -192,15 +194,19 @@ def cause_of(name: str) -> Cause:
 
 
 def _finding(
-    step: Step, before: HeldOut, after: HeldOut, windows: Windows, proposals: Sequence[Proposal],
+    step: Step, last: Fit, before: HeldOut, after: HeldOut, windows: Windows, proposals: Sequence[Proposal],
     rng: np.random.Generator,
 ) -> Finding:  # fmt: skip
+    """A step of the search in words; its numbers are estimated together with those of all other steps."""
     chosen = step.chosen
     gain, interval = gained(before, after, rng)
-    values: dict[str, tuple[float, float]] = {key: (chosen.fit.value(key), chosen.fit.std(key)) for key in chosen.keys}
+    values: dict[str, tuple[float, float]] = {
+        key: (last.value(key), last.std(key)) if key in last.keys else (last.value(key), chosen.fit.std(key))
+        for key in chosen.keys
+    }
     if chosen.searched is not None:
         key, error = chosen.searched
-        values[key] = (chosen.fit.value(key), error)
+        values[key] = (last.value(key), error)
     cause = cause_of(chosen.candidate.cause)
     telling = None
     if step.rivals:
@@ -212,11 +218,12 @@ def _finding(
         p_value=step.p_value,
         fit_before=before.fit,
         fit_after=after.fit,
+        falls=error_falls(chosen.fit.ship.model.outputs, before, after, rng),
         gain=gain,
         gain_interval=interval,
         not_distinguishable_from=tuple(rival.candidate.cause for rival in step.rivals),
         would_tell_apart=telling,
-        explanation=cause.explain(values),
+        explanation=cause.explain(values, last.ship),
         suspect=cause.suspect,
         worth=chosen.gain,
     )
@@ -232,26 +239,6 @@ def _estimates(values: Values, ship: Extended) -> tuple[Estimated, ...]:
 
 def _stds(found: Fit) -> dict[str, float]:
     return {key: found.std(key) for key in found.keys}
-
-
-def _verdict(findings: Sequence[Finding], before: Accuracy) -> str:
-    fits = ", ".join(f"{name} {value:.0f} %" for name, value in zip(before.outputs, before.fit.tolist(), strict=True))
-    if not findings:
-        return f"Nothing is wrong that this data can show: the simulation fits with {fits}."
-    names = [finding.cause for finding in findings]
-    listed = names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
-    after = float(sum(finding.gain for finding in findings))
-    sure = (
-        ""
-        if not findings[0].not_distinguishable_from
-        else (
-            f" ({findings[0].cause} cannot be told from {', '.join(findings[0].not_distinguishable_from)} on this data)"
-        )
-    )
-    return (
-        f"The simulation, which fits with {fits}, lacks {listed}{sure}; mending gains {after:.1f} points of fit on "
-        f"runs that were held out."
-    )
 
 
 def _notes(windows: Windows, vessel: Vessel) -> tuple[str, ...]:

@@ -42,6 +42,22 @@ class Estimated:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Fall:
+    """The share by which the simulated error of one output falls on batches that were not used to estimate.
+
+    Attributes:
+        output: u, v or r.
+        share: 1 for no error left, 0 for no change, negative for a larger error.
+        low, high: 95 % interval, bootstrap over batches.
+    """
+
+    output: str
+    share: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Finding:
     """One thing that the simulation gets wrong.
 
@@ -50,6 +66,7 @@ class Finding:
         estimates: its numbers.
         p_value: corrected for all causes tried.
         fit_before, fit_after: (n,) simulated fit [%] of batches that were not used to estimate, without and with it.
+        falls: of the error, per output.
         gain: mean over outputs of the difference; gain_interval: 95 %, bootstrap over batches.
         not_distinguishable_from: causes that explain the data as well.
         would_tell_apart: the manoeuvre for which they and this cause disagree most per minute, or None.
@@ -63,6 +80,7 @@ class Finding:
     p_value: float
     fit_before: Array
     fit_after: Array
+    falls: tuple[Fall, ...]
     gain: float
     gain_interval: tuple[float, float]
     not_distinguishable_from: tuple[str, ...]

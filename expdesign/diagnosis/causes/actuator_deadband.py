@@ -7,6 +7,7 @@ import numpy as np
 from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.actuator_lag import input_groups
 from expdesign.diagnosis.causes.words import first, rounded
+from expdesign.diagnosis.extended import Extended
 from expdesign.diagnosis.followed import members
 from expdesign.values import Array
 
@@ -42,7 +43,7 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     return tuple(found)
 
 
-def _explain(values: Values) -> str:
+def _explain(values: Values, _ship: Extended) -> str:
     key, value, std = first(values)
     return f"The ship does not answer {key.split(':')[1]} commands smaller than {rounded(value, std)}: a dead band."
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.actuator_lag import followers
 from expdesign.diagnosis.causes.words import first, rounded
+from expdesign.diagnosis.extended import Extended
 
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     return followers(situation, "delay", "actuator_delay")
 
 
-def _explain(values: Values) -> str:
+def _explain(values: Values, _ship: Extended) -> str:
     key, value, std = first(values)
     return (
         f"The error comes in bursts of fixed length after each change of command: {key.split(':')[1]} inputs act "

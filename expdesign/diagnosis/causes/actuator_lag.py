@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.words import first, rounded
+from expdesign.diagnosis.extended import Extended
 
 SAMPLES = (0.5, 2.0, 6.0)
 
@@ -36,7 +37,7 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     return followers(situation, "lag", "actuator_lag")
 
 
-def _explain(values: Values) -> str:
+def _explain(values: Values, _ship: Extended) -> str:
     key, value, std = first(values)
     return (
         f"The error follows every change of command and dies out: {key.split(':')[1]} inputs lag behind their commands "

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.words import first, rounded
+from expdesign.diagnosis.extended import Extended
+
+DEGREES = 57.29578
 
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
@@ -12,12 +15,18 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     return (Candidate(cause="heading_bias", free={"heading_bias": 0.0}),)
 
 
-def _explain(values: Values) -> str:
+def _explain(values: Values, ship: Extended) -> str:
     _, value, std = first(values)
-    degrees = 57.29578
+    size, less = rounded(DEGREES * abs(value), DEGREES * std), value > 0
+    leak = "Measured sway contains surge speed, v_measured = v + u sin(bias)"
+    if "u" in ship.derived:
+        return f"{leak}: velocities come from positions and heading, and the compass shows {size} degrees too " + (
+            "little." if less else "much."
+        )
     return (
-        f"Measured sway contains surge speed: v_measured = v + u sin(bias) with a bias of "
-        f"{rounded(degrees * value, degrees * std)} degrees. The sensor is misaligned, the ship is not."
+        f"{leak}: the axes of the velocity sensor lie {size} degrees to {'port' if less else 'starboard'} of the "
+        f"ship's. Where velocities were turned with the compass before they were recorded, the compass shows that much "
+        f"too {'little' if less else 'much'} instead."
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.words import listed
+from expdesign.diagnosis.extended import Extended
 
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
@@ -19,10 +20,11 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     return tuple(found)
 
 
-def _explain(values: Values) -> str:
+def _explain(values: Values, ship: Extended) -> str:
+    sensor = "the antenna of the positions" if "u" in ship.derived else "the velocity sensor"
     return (
-        f"Measured velocities contain yaw rate times a length: the sensor is {listed(values, ' m')} of the point that "
-        f"the model describes."
+        f"Measured velocities contain yaw rate times a length: {sensor} is not where the model counts from, but "
+        f"{listed(values, ' m')} of it."
     )
 
 

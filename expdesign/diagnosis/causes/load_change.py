@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.words import rounded
+from expdesign.diagnosis.extended import Extended
 
 WORDS = {"u": "surge", "v": "sway", "r": "yaw"}
 
@@ -18,7 +19,7 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     return tuple(Candidate(cause="load_change", free={f"inertia:{n}": 0.0 for n in group}) for group in groups)
 
 
-def _explain(values: Values) -> str:
+def _explain(values: Values, _ship: Extended) -> str:
     parts = ", ".join(
         f"{WORDS[key[-1]]} by {rounded(100 * value, 100 * std)} %" for key, (value, std) in values.items()
     )

@@ -8,6 +8,7 @@ import numpy as np
 
 from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.words import rounded
+from expdesign.diagnosis.extended import Extended
 from expdesign.vessel import NUMPY, TERMS, Term, VesselModel
 from expdesign.vessel.expressions import parse_expression
 from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS
@@ -109,7 +110,7 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     )
 
 
-def _explain(values: Values) -> str:
+def _explain(values: Values, _ship: Extended) -> str:
     ((key, (value, std)),) = values.items()
     return f"The error follows a regressor that the model does not have: the term {key[5:]}, {rounded(value, std)}."
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.words import rounded
+from expdesign.diagnosis.extended import Extended
 
 NAMED = ("X_kappa", "W_abs_u_u", "W_abs_v_v", "W_uv")
 """Parameters whose change has a physical name in the catalogue: advance loss and wind."""
@@ -18,7 +19,7 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     return tuple(Candidate(cause="parameters", free=dict.fromkeys(group, 0.0)) for group in dict.fromkeys(groups))
 
 
-def _explain(values: Values) -> str:
+def _explain(values: Values, _ship: Extended) -> str:
     changes = ", ".join(f"{key[6:]} by {rounded(value, std)}" for key, (value, std) in values.items())
     return f"The structure fits, its numbers do not: the data want parameters changed ({changes})."
 

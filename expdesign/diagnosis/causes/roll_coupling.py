@@ -6,6 +6,7 @@ import numpy as np
 
 from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.words import rounded
+from expdesign.diagnosis.extended import Extended
 
 COUNT = 14
 DAMPING = 0.08
@@ -27,7 +28,7 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     )
 
 
-def _explain(values: Values) -> str:
+def _explain(values: Values, _ship: Extended) -> str:
     period, std = values["roll:period"]
     return (
         f"Sway or yaw oscillate with a period of {rounded(period, std)} s, as a rolling ship makes them. Roll is not "

@@ -4,8 +4,15 @@ from __future__ import annotations
 
 from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.words import first, rounded
+from expdesign.diagnosis.extended import Extended
 
-NAMES = {"psi": "the heading", "position": "the position"}
+NAMES = {
+    "u": "the speed ahead",
+    "v": "the speed to starboard",
+    "r": "the yaw rate",
+    "psi": "the heading",
+    "position": "the position",
+}
 
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
@@ -22,7 +29,7 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     return tuple(found)
 
 
-def _explain(values: Values) -> str:
+def _explain(values: Values, _ship: Extended) -> str:
     parts = " and ".join(
         f"{NAMES.get(key[5:], key[5:])} is recorded {rounded(value, std)} s late"
         for key, (value, std) in values.items()

@@ -18,6 +18,7 @@ from numpy.polynomial import Polynomial
 
 from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.words import rounded
+from expdesign.diagnosis.extended import Extended
 from expdesign.diagnosis.parts import is_coriolis, is_damping
 from expdesign.values import Array
 from expdesign.vessel import Term, VesselModel
@@ -42,7 +43,7 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     return tuple(Candidate(cause="shallow_water", free={f"shallow:{n}": 0.0 for n in group}) for group in groups)
 
 
-def _explain(values: Values) -> str:
+def _explain(values: Values, _ship: Extended) -> str:
     half = ", ".join(
         f"{key.split(':')[1]} is {rounded(50 * value, 50 * std)} % larger" for key, (value, std) in values.items()
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.missing_term import ADVANCE_LOSS, own_advance_terms
 from expdesign.diagnosis.causes.words import first, rounded
+from expdesign.diagnosis.extended import Extended
 
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
@@ -16,7 +17,7 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     return tuple(Candidate(cause="thrust_advance_loss", free={key: 0.0}) for key in keys if key not in ship.effects)
 
 
-def _explain(values: Values) -> str:
+def _explain(values: Values, _ship: Extended) -> str:
     key, value, std = first(values)
     way = "falls" if value < 0 else "grows"
     return f"The thrust error {way} with surge speed times thrust: {key.split(':')[1]} is off by {rounded(value, std)}."

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.words import first, rounded
+from expdesign.diagnosis.extended import Extended
 from expdesign.diagnosis.parts import is_thrust, reads_rudder
 
 
@@ -18,7 +19,7 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     return tuple(found)
 
 
-def _explain(values: Values) -> str:
+def _explain(values: Values, _ship: Extended) -> str:
     _, value, std = first(values)
     way = "stronger" if value > 0 else "weaker"
     return (

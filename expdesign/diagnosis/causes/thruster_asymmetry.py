@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.words import first, rounded
-from expdesign.diagnosis.extended import ANGLE_STEMS
+from expdesign.diagnosis.extended import ANGLE_STEMS, Extended
 
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
@@ -18,7 +18,7 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     return (lean, *(Candidate(cause="thruster_asymmetry", free={f"offset:{group}": 0.0}) for group in groups))
 
 
-def _explain(values: Values) -> str:
+def _explain(values: Values, _ship: Extended) -> str:
     key, value, std = first(values)
     if key == "asymmetry":
         return (

@@ -9,6 +9,7 @@ import numpy as np
 from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.missing_term import lacking
 from expdesign.diagnosis.causes.words import listed, rounded
+from expdesign.diagnosis.extended import Extended
 
 TAKEN_MPS, WAYS, FINER = 10.0, 8, 7
 """Of a wind that is not measured: its speed, directions looked in, and steps between them."""
@@ -67,7 +68,7 @@ def _of_unknown_wind(situation: Situation, terms: list[str]) -> list[Candidate]:
     ]
 
 
-def _explain(values: Values) -> str:
+def _explain(values: Values, _ship: Extended) -> str:
     if "wind:toward" in values:
         toward, std = (math.degrees(number) for number in values["wind:toward"])
         drag = {key: pair for key, pair in values.items() if key != "wind:toward"}
