@@ -47,13 +47,17 @@ def vessel_of(
 
 @dataclass(frozen=True, kw_only=True)
 class Told:
-    """What is hidden in a trial: as in `hidden_effects`, and `factors` of parameters."""
+    """What is hidden in a trial: as in `hidden_effects`, and `factors` of parameters.
+
+    Parameters are drawn around the model's with `relative_std` first.
+    """
 
     effects: Mapping[str, float] = field(default_factory=dict)
     faults: Mapping[str, float] = field(default_factory=dict)
     factors: Mapping[str, float] = field(default_factory=dict)
     current: tuple[float, float] = (0.0, 0.0)
     wind: tuple[float, float] = (0.0, 0.0)
+    relative_std: float = 0.0
 
 
 def hidden_records(
@@ -61,7 +65,6 @@ def hidden_records(
     hidden: Sequence[Told],
     *,
     seed: int,
-    relative_std: float = 0.0,
     batches: int = 6,
     samples: int = 300,
     step_s: float = 1.0,
@@ -69,21 +72,23 @@ def hidden_records(
     manoeuvre: str = "helmsman",
     shoaling: bool = False,
 ) -> list[Record]:
-    """A trial for each of what is hidden, otherwise the same; parameters are drawn around the model's.
+    """A trial for each of what is hidden, otherwise the same.
 
     Args:
         ship, seed, batches, samples, step_s, weather: as in `hidden_effects`.
         hidden: what.
-        relative_std: of every parameter.
         manoeuvre: of `hidden_effects.MANOEUVRES`.
         shoaling: the depth varies along the track and is recorded.
     """
     rng = np.random.default_rng(seed)
-    drawn = {name: value * (1 + relative_std * rng.standard_normal()) for name, value in sea.SHIPS[ship].items()}
+    chance = {name: rng.standard_normal() for name in sea.SHIPS[ship]}
     trials = [
         sea.Trial(
             ship=ship, effects=dict(one.effects), current=one.current, wind=one.wind,
-            parameters=drawn | {name: drawn[name] * factor for name, factor in one.factors.items()},
+            parameters={
+                name: value * (1 + one.relative_std * chance[name]) * one.factors.get(name, 1.0)
+                for name, value in sea.SHIPS[ship].items()
+            },
         )
         for one in hidden
     ]  # fmt: skip
@@ -127,8 +132,12 @@ def hidden_record(
     factors: dict[str, float] | None = None,
     current: tuple[float, float] = (0.0, 0.0),
     wind: tuple[float, float] = (0.0, 0.0),
+    relative_std: float = 0.0,
     **options,
 ) -> Record:
     """One trial of `hidden_records`."""
-    one = Told(effects=effects or {}, faults=faults or {}, factors=factors or {}, current=current, wind=wind)
+    one = Told(
+        effects=effects or {}, faults=faults or {}, factors=factors or {}, current=current, wind=wind,
+        relative_std=relative_std,
+    )  # fmt: skip
     return hidden_records(ship, [one], **options)[0]

@@ -7,12 +7,13 @@ from scipy.stats import chi2
 
 from expdesign.diagnosis.accuracy import first_states
 from expdesign.diagnosis.candidate import Candidate
+from expdesign.diagnosis.contenders import contend, opening
 from expdesign.diagnosis.extension import as_extended, extend
 from expdesign.diagnosis.joint import fit
 from expdesign.diagnosis.motion import linearise, push_of, responses, simulate_windows
 from expdesign.diagnosis.noise import FLOOR, Noise, fit_colour, hats, whitened
 from expdesign.diagnosis.screening import Scored, Screening
-from expdesign.diagnosis.search import Step, contend, settled, superfluous
+from expdesign.diagnosis.search import Step, settled, superfluous
 from expdesign.diagnosis.windows import cut_windows
 
 SMALL = {"theta:X_u": 1e-5, "current:north": 1e-4, "gain": 1e-4, "inertia:v": 1e-4, "heading_bias": 1e-4}
@@ -111,7 +112,8 @@ def test_a_stand_in_is_superfluous_beside_the_true_cause_and_the_true_cause_is_n
         before = fit(extended, windows, (), starts=first_states(windows))
         steps = []
         for candidate in order:
-            chosen = contend(before, windows, Scored(candidate=candidate, statistic=0.0, p_value=1.0, step=np.zeros(1)))
+            scored = Scored(candidate=candidate, statistic=0.0, p_value=1.0, step=np.zeros(1))
+            chosen = contend(before, windows, opening(before, scored))
             assert chosen is not None
             steps.append(
                 Step(chosen=chosen, p_value=0.0, rivals=(), before=before, screening=Screening(scored=(), tests=1.0))

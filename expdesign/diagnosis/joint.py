@@ -82,7 +82,7 @@ def grams(columns: Columns, noise: Noise) -> Grams:
     w = error.shape[0]
     seen = np.isfinite(error)
     e = np.where(seen, error, 0.0).reshape(w, -1)
-    X = (whitened(columns.values, noise) * seen).reshape(len(columns.values), w, -1)
+    X = (whitened(columns.values, noise) * seen).reshape(len(columns.values), w, e.shape[1])
     S = np.moveaxis((whitened(columns.starts, noise) * seen).reshape(len(columns.starts), w, -1), 0, -1)
     SS = np.swapaxes(S, 1, 2) @ S
     scale = np.trace(SS, axis1=1, axis2=2)[:, None, None] / SS.shape[1]

@@ -81,7 +81,7 @@ def fit_colour(remainder: Array, *, order: int | None = None) -> Noise:
 
     Args:
         remainder: nan where not measured.
-        order: None to choose it by Schwarz's criterion.
+        order: None to choose it by Schwarz's criterion; zero for white noise.
     """
     longest = remainder.shape[1] // SHORTEST_PER_ORDER
     orders = [p for p in ORDERS if p <= max(1, longest)] if order is None else [order]
@@ -98,7 +98,7 @@ def fit_colour(remainder: Array, *, order: int | None = None) -> Noise:
             target, past = rows[:, 0], rows[:, 1 : p + 1]
             floor = FLOOR * float(np.mean(target**2))
             moments = past.T @ past + floor * len(rows) * np.eye(p)
-            taps = np.linalg.lstsq(moments, past.T @ target, rcond=None)[0]
+            taps = np.linalg.lstsq(moments, past.T @ target, rcond=None)[0] if p else np.zeros(0)
             filters[channel, 1:] = -taps
             variance = float(np.mean((target - past @ taps) ** 2)) + floor * (1.0 + float(taps @ taps))
             std[channel] = max(np.sqrt(variance), 1e-12)

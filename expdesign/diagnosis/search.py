@@ -10,49 +10,40 @@ from scipy.stats import chi2
 
 from expdesign.diagnosis.candidate import Candidate, Situation
 from expdesign.diagnosis.causes import CAUSES
+from expdesign.diagnosis.contenders import (
+    PRICE,
+    Contender,
+    Opening,
+    contend,
+    gain_over,
+    judged,
+    opened_closely,
+    opening,
+    seen_closely,
+)
 from expdesign.diagnosis.extended import Extended
-from expdesign.diagnosis.joint import Fit, fit, profile_cost
+from expdesign.diagnosis.joint import Fit, fit
 from expdesign.diagnosis.screening import LEVEL, Scored, Screening, screen
 from expdesign.diagnosis.windows import Windows
 from expdesign.values import Array
 
 Progress = Callable[[str, float], None]
 SHORTLIST = 7
-FINER = 11
 PER_CAUSE = 2
-PRICE = 5.0
-"""Of every estimated number, in units of twice the log likelihood: a cause with fewer numbers is to be preferred."""
 AS_GOOD = 5.0
 """Twice the log likelihood by which the runner-up may trail and still count as not distinguishable: a wrong cause that
 truly trails by d comes out ahead by more than this with a probability below Phi(-sqrt(AS_GOOD))."""
 CLEARLY_LESS, MARGIN = 0.4, 20.0
 """Candidates with less than this share of the largest statistic, and by more than this, are not fitted."""
+STRONG = 0.15
+"""Share of the remainder from which on an effect is large, and looked at in short windows, too."""
+CERTAIN = 2
+"""Candidates that are fitted in long windows whatever short ones say of them."""
 MOST_FINDINGS = 6
 SETTLING = 12
 """Gauss-Newton steps, at most, before anything is tested."""
 MOST_RETURNS = 4
 """How often the search goes back to take an addition out that later ones made superfluous."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Contender:
-    """A candidate fitted with everything that was found before.
-
-    Attributes:
-        candidate: which.
-        fit: of all windows.
-        gain: fall of twice the negative log likelihood.
-        worth: the same less the price of its numbers.
-        keys: its own free effects.
-        searched: the effect found by trying values, with its standard error.
-    """
-
-    candidate: Candidate
-    fit: Fit
-    gain: float
-    worth: float
-    keys: tuple[str, ...]
-    searched: tuple[str, float] | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -88,7 +79,8 @@ def search(ship: Extended, windows: Windows, starts: Array, rng: np.random.Gener
     """Add causes until nothing significant is left; take those out again that later ones made superfluous.
 
     A cause that only stood in for another loses its worth once that is found. The search then returns to where it was
-    added and goes on without it, so that what is left does not depend on it.
+    added and goes on without it, so that what is left does not depend on it. Many parameters at once explain nearly
+    anything: before they are added, fewer numbers are given the chance to explain as much one after the other.
     """
     base = first = settled(ship, windows, starts)
     steps: list[Step] = []
@@ -98,17 +90,56 @@ def search(ship: Extended, windows: Windows, starts: Array, rng: np.random.Gener
         rounds += 1
         share = 1.0 - 0.7**rounds
         progress(f"testing causes, round {rounds}", share)
-        found = screen(base, [c for c in _candidates(base, windows) if not _same_as_any(c, refused)], rng)
-        step = _step(base, windows, found, _within(progress, share))
+        step, found = _round(base, windows, refused, rng, _within(progress, share))
         if step is None or len(steps) == MOST_FINDINGS:
             return Search(steps=tuple(steps), first=first, last=base, final_screening=found)
-        steps.append(step)
-        base = step.chosen.fit
+        steps += _fewer(step, windows, refused, rng, _within(progress, share)) if _is_block(step.chosen) else [step]
+        del steps[MOST_FINDINGS:]
+        base = steps[-1].chosen.fit
         idle = superfluous(steps, windows, found.tests) if len(refused) < MOST_RETURNS else None
         if idle is not None:
             refused.append(steps[idle].chosen.candidate)
             base = steps[idle].before
             del steps[idle:]
+
+
+def _round(
+    base: Fit,
+    windows: Windows,
+    refused: list[Candidate],
+    rng: np.random.Generator,
+    progress: Progress,
+    *,
+    most: int = 99,
+) -> tuple[Step | None, Screening]:
+    """Test and fit candidates of no more than so many numbers."""
+    candidates = [c for c in _candidates(base, windows) if not _same_as_any(c, refused) and len(c.free) <= most]
+    found = screen(base, candidates, rng)
+    return _step(base, windows, found, progress), found
+
+
+def _is_block(chosen: Contender) -> bool:
+    """Several parameters at once."""
+    return chosen.candidate.cause == "parameters" and len(chosen.keys) > 1
+
+
+def _fewer(
+    block: Step, windows: Windows, refused: list[Candidate], rng: np.random.Generator, progress: Progress
+) -> list[Step]:
+    """Causes of fewer numbers, one after the other, that are worth more than a block of parameters; or the block."""
+    size, base, path, numbers = len(block.chosen.keys), block.before, list[Step](), 0
+    while numbers < size and len(path) < MOST_FINDINGS:
+        step, _ = _round(base, windows, refused, rng, progress, most=size - 1)
+        if step is None:
+            break
+        path.append(step)
+        numbers += len(step.chosen.candidate.free)
+        base = step.chosen.fit
+    if all(step.chosen.candidate.cause == "parameters" for step in path):
+        return [block]
+    whole, other = block.chosen.fit, base
+    worth = max(gain_over(whole, other, judge) for judge in (whole, other)) - PRICE * (numbers - size)
+    return path if worth > 0 else [block]
 
 
 def settled(ship: Extended, windows: Windows, starts: Array) -> Fit:
@@ -140,7 +171,7 @@ def superfluous(steps: list[Step], windows: Windows, tests: float) -> int | None
                        near=whole.linear)  # fmt: skip
         except (FloatingPointError, np.linalg.LinAlgError):
             continue
-        lost = _gain(less, whole, whole)
+        lost = gain_over(less, whole, whole)
         if tests * float(chi2.sf(max(lost, 0.0), max(1, len(own)))) > LEVEL or lost < PRICE * len(own):
             return index
     return None
@@ -162,14 +193,14 @@ def _candidates(base: Fit, windows: Windows) -> list[Candidate]:
 
 
 def _step(base: Fit, windows: Windows, found: Screening, progress: Progress) -> Step | None:
-    shortlist = _shortlist(found)
+    openings, far = _openings(base, windows, found)
     contenders: list[Contender] = []
-    for index, scored in enumerate(shortlist):
-        progress(f"fitting {scored.candidate.cause}", index / len(shortlist))
-        contender = contend(base, windows, scored)
+    for index, first in enumerate(openings):
+        progress(f"fitting {first.scored.candidate.cause}", index / len(openings))
+        contender = contend(base, windows, first, far=far)
         if contender is not None:
             contenders.append(contender)
-    contenders = _judged(base, contenders)
+    contenders = judged(base, contenders)
     for chosen in contenders[:1]:
         p_value = min(1.0, found.tests * float(chi2.sf(max(chosen.gain, 0.0), max(1, len(chosen.keys)))))
         if p_value > LEVEL:
@@ -183,6 +214,25 @@ def _step(base: Fit, windows: Windows, found: Screening, progress: Progress) -> 
     return None
 
 
+def _openings(base: Fit, windows: Windows, found: Screening) -> tuple[list[Opening], bool]:
+    """What to fit, and whether it is far from the model as it stands: then short windows tell where to begin."""
+    shortlist = _shortlist(found)
+    closely = seen_closely(base, windows)
+    near = None if closely is None else screen(closely, [item.candidate for item in found.scored])
+    if closely is None or near is None or _share(near, closely) < STRONG:
+        return [opening(base, scored) for scored in shortlist], False
+    certain = shortlist[:CERTAIN]
+    seen = {id(item.candidate) for item in certain}
+    others = [item for item in _shortlist(near) if id(item.candidate) not in seen]
+    return opened_closely(closely, [*certain, *others], len(certain)), True
+
+
+def _share(found: Screening, base: Fit) -> float:
+    """Share of the remainder that the best candidate explains."""
+    rows = int(np.isfinite(base.columns.error).sum())
+    return max((item.statistic for item in found.scored), default=0.0) / rows
+
+
 def _shortlist(found: Screening) -> list[Scored]:
     """The best candidates of the best causes."""
     ranked = sorted(found.scored, key=lambda item: PRICE * item.candidate.size - item.statistic)
@@ -191,7 +241,7 @@ def _shortlist(found: Screening) -> list[Scored]:
     least = CLEARLY_LESS * max((item.statistic for item in ranked), default=0.0) - MARGIN
     for scored in ranked:
         cause = scored.candidate.cause
-        if (scored.p_value * found.tests > 1.0 or scored.statistic < least) and kept:
+        if scored.p_value * found.tests > 1.0 or scored.statistic < least:
             continue
         if cause not in count and len(count) == SHORTLIST:
             continue
@@ -199,79 +249,3 @@ def _shortlist(found: Screening) -> list[Scored]:
             kept.append(scored)
             count[cause] = count.get(cause, 0) + 1
     return kept
-
-
-def contend(base: Fit, windows: Windows, scored: Scored) -> Contender | None:
-    """Fit a candidate together with everything found before."""
-    candidate, searched = scored.candidate, (None if scored.candidate.grid is None else _searched(base, scored))
-    fixed = dict(candidate.fixed) if searched is None else {**candidate.fixed, searched[0]: searched[1]}
-    start = dict(candidate.free) if candidate.finite else {key: base.ship.get(key) for key in candidate.free}
-    extra = tuple(key for key in ("roll:period",) if key in candidate.fixed)
-    keys = tuple(key for key in (*candidate.free, *extra) if searched is None or key != searched[0])
-    before = tuple(key for key in base.keys[: base.free] if key not in keys)
-    try:
-        found = fit(base.ship.having({**start, **fixed}), windows, (*before, *keys), starts=base.starts,
-                    noise=base.noise, colour_order=base.noise.order, near=base.linear)  # fmt: skip
-        gain = _gain(base, found, found)
-    except (FloatingPointError, np.linalg.LinAlgError):
-        return None
-    counted = len(keys) + (searched is not None)
-    return Contender(
-        candidate=candidate,
-        fit=found,
-        gain=gain,
-        worth=gain - PRICE * counted,
-        keys=keys,
-        searched=None if searched is None else (searched[0], searched[2]),
-    )
-
-
-def _searched(base: Fit, scored: Scored) -> tuple[str, float, float]:
-    """Key, best value and standard error of the effect that is found by trying values."""
-    assert scored.candidate.grid is not None
-    key, values = scored.candidate.grid
-    best, std, width = values[0], float("nan"), 0.0
-    for _ in range(2):
-        tried = [_at(scored.candidate, key, value) for value in values]
-        results = {_value(item.candidate, key): item.statistic for item in screen(base, tried).scored}
-        if not results:
-            break
-        found = np.array(sorted(results))
-        statistics = np.array([results[value] for value in found])
-        best = float(found[np.argmax(statistics)])
-        width = float(np.min(np.diff(found))) if len(found) > 1 else 0.0
-        inside = found[statistics > statistics.max() - chi2.isf(LEVEL, 1)]
-        std = max(float(np.ptp(inside)) / 4.0, width / 3.5)
-        place = int(np.argmax(statistics))
-        low, high = found[max(place - 1, 0)], found[min(place + 1, len(found) - 1)]
-        values = tuple(np.linspace(low, high, FINER).tolist())
-    return key, best, std
-
-
-def _at(candidate: Candidate, key: str, value: float) -> Candidate:
-    if key in candidate.free:
-        return replace(candidate, free={**candidate.free, key: value})
-    return replace(candidate, fixed={**candidate.fixed, key: value})
-
-
-def _value(candidate: Candidate, key: str) -> float:
-    return candidate.free.get(key, candidate.fixed.get(key, 0.0))
-
-
-def _gain(base: Fit, found: Fit, judge: Fit) -> float:
-    """Fall of twice the negative log likelihood, both fits under the noise of a third."""
-    return profile_cost(base, judge.noise) - profile_cost(found, judge.noise)
-
-
-def _judged(base: Fit, contenders: list[Contender]) -> list[Contender]:
-    """Contenders by worth, all under the noise of the best."""
-    if not contenders:
-        return []
-    judge = max(contenders, key=lambda item: item.worth).fit
-    without = profile_cost(base, judge.noise)
-    judged = []
-    for item in contenders:
-        gain = without - profile_cost(item.fit, judge.noise)
-        judged.append(replace(item, gain=gain, worth=gain - (item.gain - item.worth)))
-    contenders = judged
-    return sorted(contenders, key=lambda item: -item.worth)

@@ -8,8 +8,9 @@ slow disturbances show as what they are.
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,8 @@ CHANNELS = (*OUTPUTS, "psi_rate")
 COARSEST_S, SHARE_OF_TIME_CONSTANT = 1.0, 0.4
 LONGEST = 700
 """Samples per window, at most."""
+FEWEST = 4
+"""Samples per window, at least."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -95,6 +98,22 @@ class Windows:
         others = {name: getattr(self, name) for name in self.__dataclass_fields__ if name not in ROWS}
         return Windows(**parts, **others)
 
+    def shortened(self, samples: int) -> Windows:
+        """The same data in windows of fewer samples, the last of each filled up."""
+        s, between = self.measured.shape[1], self.steps_per_sample
+        size = -(-s // -(-s // samples))
+        parts: dict[str, list[Array]] = {name: [] for name in ROWS}
+        for low in range(0, s, size):
+            index = np.minimum(np.arange(low * between, (low + size) * between), self.steps - 1)
+            rows = np.full((len(self.batch), size, self.measured.shape[2]), np.nan)
+            rows[:, : min(size, s - low)] = self.measured[:, low : low + size]
+            values = {"batch": self.batch, "first": self.first + low * between, "measured": rows}
+            for name in ROWS:
+                parts[name].append(values[name] if name in values else getattr(self, name)[:, index])
+        joined: dict[str, Any] = {name: np.concatenate(items) for name, items in parts.items()}
+        whole = replace(self, **joined)
+        return whole.picked(np.isfinite(whole.measured[..., :3]).any(axis=2).sum(axis=1) >= FEWEST)
+
 
 ROWS = ("batch", "first", "measured", "heading", "wind", "depth_m", "time_s")
 
@@ -153,7 +172,7 @@ def cut_windows(model: VesselModel, record: Record, *, longest_s: float | None =
 def _cut(samples: int, limit: int) -> list[tuple[int, int]]:
     count = -(-samples // limit)
     edges = np.linspace(0, samples, count + 1).round().astype(int).tolist()
-    return [(low, high) for low, high in itertools.pairwise(edges) if high - low >= 4]
+    return [(low, high) for low, high in itertools.pairwise(edges) if high - low >= FEWEST]
 
 
 def _filled(values: Array, size: int) -> Array:

@@ -64,11 +64,12 @@ class Hidden:
     without: tuple[str, ...] = ()
     truth: tuple[str, float] | None = None
 
-    def told(self) -> Told:
+    def told(self, relative_std: float) -> Told:
         """For the generator."""
         return Told(
-            effects=self.effects, faults=self.faults, factors=self.factors, current=self.current, wind=self.wind
-        )
+            effects=self.effects, faults=self.faults, factors=self.factors, current=self.current, wind=self.wind,
+            relative_std=relative_std,
+        )  # fmt: skip
 
     def scaled(self, by: float) -> Hidden:
         """The same, larger."""
@@ -195,12 +196,14 @@ class Case:
     batches: int
     samples: int
 
-    def records(self, hidden: Sequence[Hidden], relative_std: float = 0.0) -> list[Record]:
-        """Data of trials that differ in what is hidden, all shoaling or none."""
-        return hidden_records(
-            self.ship, [one.told() for one in hidden], seed=self.seed, shoaling=hidden[0].shoaling,
-            relative_std=relative_std, batches=self.batches, samples=self.samples, manoeuvre=self.manoeuvre,
+    def records(self, hidden: Sequence[Hidden], *stds: float) -> list[list[Record]]:
+        """Data of trials that differ in what is hidden, all shoaling or none, for every std of the parameters."""
+        told = [one.told(std) for std in stds for one in hidden]
+        records = hidden_records(
+            self.ship, told, seed=self.seed, shoaling=hidden[0].shoaling, batches=self.batches, samples=self.samples,
+            manoeuvre=self.manoeuvre,
         )  # fmt: skip
+        return [records[low : low + len(hidden)] for low in range(0, len(records), len(hidden))]
 
     def vessel(self, hidden: Hidden, relative_std: float = 0.0) -> Vessel:
         """The model in use."""
@@ -226,8 +229,8 @@ def mean_fits(vessel: Vessel, records: Sequence[Record]) -> list[float]:
     return [float(np.clip(pooled_fit(error, measured), -100, 100).mean()) for error, measured in parts]
 
 
-def large_enough(case: Case, hidden: Hidden) -> tuple[Hidden, float, Record]:
-    """The effect, enlarged until it costs what is asked, what it costs, and data of known parameters with it.
+def large_enough(case: Case, hidden: Hidden, std: float = 0.0) -> tuple[Hidden, float, Record]:
+    """The effect, enlarged until it costs what is asked, what it costs with known parameters, and data with it.
 
     Small ones may stay smaller, and then say so.
     """
@@ -235,11 +238,11 @@ def large_enough(case: Case, hidden: Hidden) -> tuple[Hidden, float, Record]:
     for _ in range(MOST_GROWTHS):
         sizes.append(sizes[-1].scaled(GROWTH))
     none = Hidden(cause="none", shoaling=hidden.shoaling)
-    calm, *records = case.records([none, *sizes])
+    (calm, *records), (_, *chosen_from) = case.records([none, *sizes], 0.0, std)
     (clean,) = mean_fits(case.vessel(none), [calm])
     lost = [clean - fit for fit in mean_fits(case.vessel(hidden), records)]
     chosen = next((index for index, points in enumerate(lost) if points >= LEAST_POINTS), MOST_GROWTHS)
-    return sizes[chosen], lost[chosen], records[chosen]
+    return sizes[chosen], lost[chosen], chosen_from[chosen]
 
 
 def oracle(vessel: Vessel, record: Record, cause_name: str) -> float:
@@ -271,13 +274,14 @@ def tried(part: str, number: int, seed: int, only: str | None = None) -> dict[st
     std = 0.1 if uncertain else 0.0
     hidden, lost, record = Hidden(cause="none"), 0.0, None
     if part != "clean":
-        hidden, lost, record = large_enough(case, drawn_effect(name, ship, rng, case.batches * float(case.samples)))
+        effect = drawn_effect(name, ship, rng, case.batches * float(case.samples))
+        hidden, lost, record = large_enough(case, effect, std)
     if part == "pairs":
         hidden, record = hidden.with_another(another(case, hidden, rng)), None
     if part == "power":
         hidden, record = hidden.scaled(float(10 ** rng.uniform(-2, -1))), None
-    if record is None or std:
-        (record,) = case.records([hidden], std)
+    if record is None:
+        ((record,),) = case.records([hidden], std)
     row: dict[str, object] = {
         "part": part, "number": number, "seed": seed, "cause": hidden.cause, "ship": ship, "std": std, "lost": lost,
         "manoeuvre": case.manoeuvre, "truth": hidden.truth,
