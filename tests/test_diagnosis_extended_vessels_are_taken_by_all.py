@@ -178,6 +178,6 @@ def test_the_page_of_a_lost_simulation_shows_no_astronomic_numbers(clean):
     found = replace(clean, before=before, findings=(finding("wind"),), errors={"wind": clean.windows.measured})
     page = diagnosis_html(found, command="made up", version="0")
     text = re.sub(r"<svg.*?</svg>", "", page, flags=re.DOTALL)
-    assert "below \N{MINUS SIGN}500" in text
+    assert text.count("lost") >= 3
     assert not re.search(r"\binf\b|e\+\d|100000000", text)
-    assert "parts from the ship" in text
+    assert "parts from the ship altogether" in text

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from expdesign.diagnosis import Diagnosis, Finding
+from expdesign.diagnosis.values import Fall
+from expdesign.diagnosis.verdict import LOST_FIT, fits, lacking, lost, manoeuvre, worth
 from expdesign.export.diagnosis_page.figures import growth_figure, suspect_figure, window_figure
 from expdesign.export.diagnosis_page.wording import titled, worded
 from expdesign.export.estimates import plus_minus
@@ -14,8 +16,6 @@ from expdesign.export.report.figures.style import report_style
 
 SHOWN = 4
 """Stretches of data drawn."""
-ASTRAY = -500.0
-"""Fit [%] below which its size says no more."""
 UNTOLD = "\N{EN DASH}"
 
 
@@ -31,8 +31,8 @@ def diagnosis_html(found: Diagnosis, *, command: str, version: str) -> str:
     return page.render(
         found=found,
         findings=[_finding(item, found) for item in found.findings],
-        verdict=_verdict(found),
-        astray=bool((found.before.fit < ASTRAY).any() or (found.after.fit < ASTRAY).any()),
+        before=fits(found.before),
+        astray=lost(found.before) or lost(found.after),
         outputs=", ".join(found.before.outputs),
         tested=[(titled(cause), p_value) for cause, p_value in found.screened],
         accuracy=_accuracy(found),
@@ -64,7 +64,7 @@ def _accuracy(found: Diagnosis) -> list[tuple[str, ...]]:
         unit, factor = ("\N{DEGREE SIGN}/s", float(np.degrees(1.0))) if name == "r" else ("m/s", 1.0)
         cells = [f"{name} [{unit}]"]
         for item in (found.before, found.after):
-            if not float(item.fit[index]) >= ASTRAY:
+            if not float(item.fit[index]) >= LOST_FIT:
                 cells += [_fit(float(item.fit[index])), UNTOLD, UNTOLD]
                 continue
             cells += [
@@ -78,7 +78,7 @@ def _accuracy(found: Diagnosis) -> list[tuple[str, ...]]:
 
 def _finding(item: Finding, found: Diagnosis) -> dict[str, object]:
     low, high = item.gain_interval
-    fits = [
+    rows = [
         f"{name} {_fit(float(a))} \N{RIGHTWARDS ARROW} {_fit(float(b))}"
         for name, a, b in zip(found.before.outputs, item.fit_before, item.fit_after, strict=True)
     ]
@@ -93,34 +93,21 @@ def _finding(item: Finding, found: Diagnosis) -> dict[str, object]:
         "chance": _chance(item.p_value),
         "gain": words.number(item.gain, 1),
         "interval": f"{words.number(low, 1)} to {words.number(high, 1)}",
-        "fits": fits,
-        "rivals": item.not_distinguishable_from,
-        "telling": item.would_tell_apart,
+        "fits": rows,
+        "worth": worth(item),
+        "falls": [_fall(fall) for fall in item.falls if np.isfinite(fall.share)],
+        "rivals": [lacking(name) for name in item.not_distinguishable_from],
+        "telling": None if item.would_tell_apart is None else manoeuvre(item.would_tell_apart),
     }
 
 
-def _verdict(found: Diagnosis) -> str:
-    """The verdict with names as titles, and without fits that only say that the simulation is lost."""
-    if not (found.before.fit < ASTRAY).any() or not found.findings:
-        text = found.verdict
-        for cause in sorted({item.cause for item in found.findings}, key=len, reverse=True):
-            title = titled(cause)
-            text = text.replace(cause, title[0].lower() + title[1:])
-        return text
-    titles = [titled(item.cause) for item in found.findings]
-    names = [title[0].lower() + title[1:] for title in titles]
-    listed = names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
-    gain = sum(item.gain for item in found.findings)
-    return (
-        f"Simulated over whole runs, the model in use parts from the ship altogether. It lacks {listed}; mending gains "
-        f"{words.number(float(gain), 1)} points of fit on runs that were held out."
-    )
+def _fall(item: Fall) -> str:
+    shares = (words.number(100 * value, 0) for value in (item.share, item.low, item.high))
+    return "{} {}{nb}% ({} to {}{nb}%)".format(item.output, *shares, nb=words.NB)
 
 
 def _fit(value: float) -> str:
-    return (
-        f"below {words.number(ASTRAY, 0)}{words.NB}%" if not value >= ASTRAY else f"{words.number(value, 1)}{words.NB}%"
-    )
+    return "lost" if not value >= LOST_FIT else f"{words.number(value, 1)}{words.NB}%"
 
 
 def _chance(p_value: float) -> str:

@@ -49,6 +49,10 @@ def finding_entry(item: Finding, outputs: Sequence[str]) -> dict[str, Any]:
         "p_value": _finite(item.p_value),
         "fit_before": _named(outputs, item.fit_before),
         "fit_after": _named(outputs, item.fit_after),
+        "error_falls_by": {
+            fall.output: {"share": _finite(fall.share), "interval": [_finite(fall.low), _finite(fall.high)]}
+            for fall in item.falls
+        },
         "gain": _finite(item.gain),
         "gain_interval": [_finite(value) for value in item.gain_interval],
         "not_distinguishable_from": list(item.not_distinguishable_from),

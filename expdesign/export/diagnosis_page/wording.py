@@ -35,10 +35,11 @@ NAMES = {
     "starboard_m": "sensor to starboard of amidships",
     "factor": "factor, where 1 is right",
     "time_s": "time of the change",
-    "roll_sway": "sway acceleration per radian of roll",
-    "roll_yaw": "yaw acceleration per radian of roll",
+    "Y_phi": "push on sway, per side acceleration that would hold the roll",
+    "N_phi": "push on yaw, per side acceleration that would hold the roll",
     "roll_period_s": "period of the oscillation",
-    "roll_damping": "damping ratio of the oscillation",
+    "roll_damping_ratio": "damping ratio of the oscillation",
+    "toward_rad": "direction that the wind blows to",
 }
 OUTPUTS = {"u": "surge", "v": "sway", "r": "yaw", "psi": "heading"}
 PATTERNS = (
