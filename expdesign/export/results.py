@@ -21,7 +21,7 @@ from expdesign.durations.values import DurationDesign
 from expdesign.export.fence import build_fence
 from expdesign.export.planned import require_verified
 from expdesign.information.primitive_information import PrimitiveInformation
-from expdesign.plan.values import Leg, Plan
+from expdesign.plan.values import Leg, Plan, Promise
 from expdesign.simulation.environment import Environment
 from expdesign.values import Array
 from expdesign.vessel import Variation, Vessel, column_name
@@ -185,6 +185,7 @@ def plan_json(plan: Plan, *, scenario: str, vessel: Vessel, environment: Environ
             "clearance_required_m": clearance_m,
             "fence": _fence_entry(plan, vessel, clearance_m),
             "leave_water_probability": plan.leave_water_probability,
+            "drawn_trials": _promise_entry(plan.promise),
             "design_efficiency_placed": plan.design_efficiency_placed,
             "design_efficiency_realised": plan.design_efficiency_realised,
             "verified": check.verified,
@@ -210,6 +211,43 @@ def _fence_entry(plan: Plan, vessel: Vessel, clearance_m: float) -> dict[str, An
     return None if fence is None else {"inside": fence.inside, "outside": fence.outside}
 
 
+def _promise_entry(promise: Promise | None) -> dict[str, Any] | None:
+    """What whole trials of drawn ships came to; shares of all trials, times beyond the plan's."""
+    if promise is None:
+        return None
+    return {
+        "trials": promise.trials,
+        "leave_water_share": promise.left,
+        "leave_water_standard_error": promise.error,
+        "leave_water_upper_95": promise.left_most,
+        "aborted_share": promise.aborted,
+        "aborted_where": list(promise.reasons),
+        "extra_time_median_s": _finite(promise.extra_median_s),
+        "extra_time_95_s": _finite(promise.extra_most_s),
+        "goes_round_at_most": promise.rounds,
+        "run_begins_within": {
+            "position_m": promise.position_m,
+            "heading_rad": promise.heading_rad,
+            "velocity_mps": promise.speed_mps,
+            "yaw_rate_radps": promise.yaw_rate_radps,
+        },
+    }
+
+
+def _sailed_entry(plan: Plan, index: int) -> dict[str, float | None]:
+    """What drawn trials did on a leg."""
+    if plan.promise is None:
+        return {"leave_water_probability": dict(enumerate(plan.leave_water_by_leg)).get(index)}
+    leg = plan.promise.legs[index]
+    return {
+        "leave_water_probability": leg.left,
+        "aborted_share": leg.aborted,
+        "goes_round_mean": leg.rounds,
+        "sailed_median_s": leg.median_s,
+        "sailed_95_s": leg.most_s,
+    }
+
+
 def _leg_entry(plan: Plan, index: int, leg: Leg) -> dict[str, Any]:
     return {
         "index": index,
@@ -218,7 +256,7 @@ def _leg_entry(plan: Plan, index: int, leg: Leg) -> dict[str, Any]:
         "start": _state(plan, leg.first),
         "end": _state(plan, leg.last),
         "duration_s": sample_seconds(leg.last - leg.first, plan.commands.sample_time_s),
-        "leave_water_probability": dict(enumerate(plan.leave_water_by_leg)).get(index),
+        **_sailed_entry(plan, index),
     }
 
 

@@ -1,6 +1,6 @@
 """How a ship comes to the beginning of a run: run-ups on the planned heading, and when she is in place.
 
-The procedure that a plan's promise rests on, the same in run cards, report and rehearsal:
+The procedure that a plan's promise rests on, the same in run cards, report and drawn trials:
 
 1. Each run is sailed open loop from the state the ship really has.
 2. After it she rejoins the planned leg from where she is, in a straight line of sight, and follows it, steered.

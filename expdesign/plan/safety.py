@@ -1,7 +1,7 @@
 """The promise of a plan: the chance that the hull leaves allowed water in the trial as it is sailed, and where.
 
-It comes from whole trials (`expdesign.plan.rehearsal`): runs open loop from the states that ships really have, legs and
-ways back to run-ups steered, the hull against the chart at every step. Trials broken off because a run could not be
+It comes from whole trials (`expdesign.plan.drawn_trials`): runs open loop from the states that ships really have, legs
+and ways back to run-ups steered, the hull against the chart at every step. Trials broken off because a run could not be
 begun are counted apart: they end in allowed water, but they do not end at the goal.
 """
 
@@ -14,10 +14,10 @@ import numpy as np
 from scipy.stats import beta
 
 from expdesign.plan.area import SeaArea
+from expdesign.plan.drawn_trials import Trials, sail_trials
 from expdesign.plan.leg_values import LegWater
-from expdesign.plan.rehearsal import Trials, sail_trials
 from expdesign.plan.run_up import MISSED, ROUNDS, tolerances
-from expdesign.plan.values import Leg, LegOutcome, Rehearsal
+from expdesign.plan.values import Leg, LegOutcome, Promise
 from expdesign.signals import Commands, Trajectory
 from expdesign.values import Array
 
@@ -29,7 +29,7 @@ MOST = 0.95
 """Share of trials that `most` is about, and confidence of the upper limit."""
 
 
-def rehearse(
+def promised(
     water: LegWater,
     *,
     commands: Commands,
@@ -37,7 +37,7 @@ def rehearse(
     legs: Sequence[Leg],
     rng: np.random.Generator,
     draws: int = TRIALS,
-) -> tuple[Rehearsal, Trials]:
+) -> tuple[Promise, Trials]:
     """Sail drawn trials of a plan and tell what happened to them.
 
     The shares' standard errors are sqrt(p (1 - p) / draws).
@@ -46,7 +46,7 @@ def rehearse(
     within, sample_s = tolerances(water), commands.sample_time_s
     gone, done = int(trials.left.any(axis=0).sum()), trials.completed
     extra = (trials.samples.sum(axis=0)[done] - len(commands)) * sample_s
-    found = Rehearsal(
+    found = Promise(
         trials=draws,
         left=gone / draws,
         left_most=upper_limit(gone, draws),
@@ -72,7 +72,7 @@ def upper_limit(count: int, trials: int, *, confidence: float = MOST) -> float:
     return 1.0 if count >= trials else float(beta.ppf(confidence, count + 1, trials - count))
 
 
-def broken_promise(found: Rehearsal, trials: Trials, legs: Sequence[Leg], area: SeaArea, *, confidence: float) -> str:
+def broken_promise(found: Promise, trials: Trials, legs: Sequence[Leg], area: SeaArea, *, confidence: float) -> str:
     """What is wrong with a plan, with the leg and the place where it is worst; "" when it keeps its promise."""
     if found.left > 1.0 - confidence + 1e-12:
         worst = worst_leg(trials)

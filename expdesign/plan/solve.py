@@ -15,6 +15,7 @@ from expdesign.errors import NoPlan
 from expdesign.plan.area import SeaArea
 from expdesign.plan.capability import capability
 from expdesign.plan.checks import verify_plan
+from expdesign.plan.drawn_trials import Trials
 from expdesign.plan.field import ClearanceField, clearance_field, narrowest_passage
 from expdesign.plan.footprint import covering_discs, swept_area
 from expdesign.plan.goal_ways import build_goal_ways
@@ -26,12 +27,11 @@ from expdesign.plan.lower_bound import reposition_bound_s
 from expdesign.plan.placement import place_runs
 from expdesign.plan.realised import realised_efficiencies
 from expdesign.plan.recovery import displaced, recover
-from expdesign.plan.rehearsal import Trials
-from expdesign.plan.safety import broken_promise, rehearse, worst_leg
+from expdesign.plan.safety import broken_promise, promised, worst_leg
 from expdesign.plan.search_space import SearchSpace, Stamp, refusing, stamp
 from expdesign.plan.timeline import Timeline
 from expdesign.plan.uncertainty import stray_m
-from expdesign.plan.values import Leg, Placement, Plan, PlanSettings, Rehearsal, Verification
+from expdesign.plan.values import Leg, Placement, Plan, PlanSettings, Promise, Verification
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import CALM, Environment, to_body
 from expdesign.values import Array
@@ -86,11 +86,11 @@ def plan_trial(problem: PlanProblem, *, progress: Progress = lambda what, share:
         sailed = line.joined(sample_time_s=problem.vessel.sample_time_s, names=problem.vessel.model.inputs)
         progress("verifying", 0.85)
         verification = _verified(problem, *sailed)
-        progress("rehearsing whole trials", 0.9)
-        rehearsal, trials = _rehearsed(problem, water, *sailed)
-        broken = broken_promise(rehearsal, trials, sailed[2], problem.area, confidence=problem.settings.confidence)
+        progress("sailing drawn trials", 0.9)
+        promise, trials = _promised(problem, water, *sailed)
+        broken = broken_promise(promise, trials, sailed[2], problem.area, confidence=problem.settings.confidence)
         if not broken:
-            return _finished(problem, water, *sailed, verification=verification, rehearsal=rehearsal)
+            return _finished(problem, water, *sailed, verification=verification, promise=promise)
         if replan == REPLANS or not trials.left.any():
             raise NoPlan(f"the plan found does not keep its promise: {broken}; more plan.clearance_m helps")
         water, space = _wider(problem, water, space, trials, sailed[2], broken)
@@ -130,11 +130,11 @@ def _verified(problem: PlanProblem, commands: Commands, trajectory: Trajectory, 
     return verification
 
 
-def _rehearsed(
+def _promised(
     problem: PlanProblem, water: LegWater, commands: Commands, trajectory: Trajectory, legs: tuple[Leg, ...]
-) -> tuple[Rehearsal, Trials]:
+) -> tuple[Promise, Trials]:
     rng = np.random.default_rng(problem.seed)
-    return rehearse(water, commands=commands, trajectory=trajectory, legs=legs, rng=rng)
+    return promised(water, commands=commands, trajectory=trajectory, legs=legs, rng=rng)
 
 
 def _wider(
@@ -172,7 +172,7 @@ def _finished(
     legs: tuple[Leg, ...],
     *,
     verification: Verification,
-    rehearsal: Rehearsal,
+    promise: Promise,
 ) -> Plan:
     sailed = {"commands": commands, "trajectory": trajectory, "legs": legs}
     placed, realised = realised_efficiencies(problem.vessel, problem.design, problem.environment, **sailed)  # type: ignore[arg-type]
@@ -180,12 +180,12 @@ def _finished(
         area=problem.area,
         **sailed,  # type: ignore[arg-type]
         reposition_bound_s=_reposition_bound_s(problem, water),
-        leave_water_probability=rehearsal.left,
-        leave_water_by_leg=tuple(leg.left for leg in rehearsal.legs),
+        leave_water_probability=promise.left,
+        leave_water_by_leg=tuple(leg.left for leg in promise.legs),
         design_efficiency_placed=placed,
         design_efficiency_realised=realised,
         verification=verification,
-        rehearsal=rehearsal,
+        promise=promise,
     )
 
 

@@ -91,8 +91,8 @@ class LegOutcome:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rehearsal:
-    """Whole trials of drawn ships in drawn weather, sailed by the procedure of `expdesign.plan.run_up`.
+class Promise:
+    """What whole trials of drawn ships in drawn weather came to, sailed by the procedure of `expdesign.plan.run_up`.
 
     Attributes:
         trials: how many.
@@ -139,13 +139,13 @@ class Plan:
         legs: in time order, without gaps.
         reposition_bound_s: no plan with these runs repositions in less time [s].
         leave_water_probability: chance that the hull leaves allowed water in the trial as it is sailed, by
-            `rehearsal`, or None if not computed.
+            `promise`, or None if not computed.
         leave_water_by_leg: the same for each leg, or () if not computed.
         design_efficiency_realised: efficiency of the whole trajectory's information, by the design's criterion, against
             the optimal design's in the time asked for; None where the track alone cannot tell.
         verification: what the independent check found.
         design_efficiency_placed: as realised, of the runs alone, with the headings in wind and the entries they got.
-        rehearsal: the trials that the chances come from.
+        promise: what drawn trials of the plan came to; None if not computed.
     """
 
     area: SeaArea
@@ -158,7 +158,7 @@ class Plan:
     verification: Verification
     leave_water_by_leg: tuple[float | None, ...] = ()
     design_efficiency_placed: float | None = None
-    rehearsal: Rehearsal | None = None
+    promise: Promise | None = None
 
     @property
     def sample_leg(self) -> np.ndarray:

@@ -29,7 +29,7 @@ from expdesign.export.cards import cards_html
 from expdesign.export.report import ReportContent, report_html
 from expdesign.information import PrimitiveInformation, estimated_parameters, score_primitives
 from expdesign.plan.solve import PlanProblem, plan_trial
-from expdesign.plan.values import Plan
+from expdesign.plan.values import Plan, Promise
 from expdesign.scenario import Scenario, load_repeats, load_scenario
 from expdesign.workflows.design import design_summary, design_tables, designed
 from expdesign.workflows.grown import grown, growth_files, growth_summary, growth_tables
@@ -252,5 +252,18 @@ def plan_summary(plan: Plan) -> dict[str, object]:
         "distance_m": plan.trajectory.distance_m,
         "least_clearance_m": plan.verification.clearance_min_m,
         "leave_water_probability": plan.leave_water_probability,
+        **_promise_summary(plan.promise),
         "design_efficiency_realised": plan.design_efficiency_realised,
+    }
+
+
+def _promise_summary(promise: Promise | None) -> dict[str, object]:
+    """What drawn trials came to besides leaving allowed water; nothing where none were sailed."""
+    if promise is None:
+        return {}
+    return {
+        "drawn_trials": promise.trials,
+        "aborted_share": promise.aborted,
+        "extra_time_median_s": promise.extra_median_s,
+        "extra_time_95_s": promise.extra_most_s,
     }

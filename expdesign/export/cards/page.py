@@ -9,6 +9,7 @@ from expdesign.export.report import tables, words
 from expdesign.export.report.content import ReportContent, primitive_runs
 from expdesign.export.report.figures.chart import chart
 from expdesign.export.report.figures.style import report_style
+from expdesign.export.report.procedure import day_sentence, procedure_sentences
 
 
 def cards_html(content: ReportContent) -> str:
@@ -31,6 +32,8 @@ def cards_html(content: ReportContent) -> str:
         depths=bool(content.plan.area.depths),
         chart=overview,
         agenda=tables.agenda(content),
+        procedure=procedure_sentences(content.plan.promise),
+        day=day_sentence(content.plan.promise, content.plan.commands.duration_s),
         total=words.duration(content.plan.commands.duration_s),
         current=words.current(content.environment.current_to, content.environment.current_std_mps),
         wind=words.wind(content.environment.wind_to, content.environment.wind_std_mps),

@@ -16,6 +16,7 @@ from expdesign.export.report.figures.timeline import timeline_figure
 from expdesign.export.report.figures.uncertainty import uncertainty_figure
 from expdesign.export.report.glossary import GLOSSARY
 from expdesign.export.report.growth import growth_rows, growth_sentences
+from expdesign.export.report.procedure import day_sentence, procedure_sentences
 from expdesign.export.report.progress import known_rows, known_sentences
 from expdesign.export.report.trust import chain
 from expdesign.export.report.uncertainty import Expected, expected, measures_velocity
@@ -70,6 +71,7 @@ def report_html(content: ReportContent) -> str:
         chain=chain(content, short_of_optimum=criteria.short_of_optimum(content)),
         conditions=conditions(content),
         checks=tables.checks(content),
+        procedure=procedure_sentences(content.plan.promise),
         growth=[] if content.growth is None else growth_rows(content.growth),
         grown=("", "") if content.growth is None else growth_sentences(content.growth),
         glossary=GLOSSARY,
@@ -120,6 +122,7 @@ def summary(content: ReportContent) -> list[str]:
         f"{words.duration(total)} and {words.distance(plan.trajectory.distance_m)} from start to goal: "
         f"{words.counted(runs, 'informative run')} taking {words.duration(plan.seconds('primitive'))}, and "
         f"{words.duration(plan.seconds('reposition'))} of repositioning{bound if plan.reposition_bound_s > 0 else ''}.",
+        *([day] if (day := day_sentence(plan.promise, total)) else []),
         verdict,
         *depths,
         _design_sentence(content),

@@ -8,10 +8,10 @@ import numpy as np
 
 from expdesign.export.report import words
 from expdesign.export.report.content import ReportContent, primitive_runs
+from expdesign.export.report.procedure import aborted_words, extra_words, left_words
 from expdesign.export.report.uncertainty import Expected
 from expdesign.information.primitive_information import PrimitiveInformation
-from expdesign.plan.safety import DRAWS
-from expdesign.plan.values import Leg, Plan
+from expdesign.plan.values import Leg, Plan, Promise
 
 REST_MPS, REST_RADPS = 0.02, 0.0005
 
@@ -172,17 +172,31 @@ def checks(content: ReportContent) -> list[Check]:
             passed=None,
         ),
     ]
-    if plan.leave_water_probability is not None:
-        allowed = 1.0 - content.confidence
-        rows.append(
-            Check(
-                what="Chance that a run, sailed open loop, leaves allowed water",
-                found=_share_of_draws(plan.leave_water_probability),
-                required=f"at most {words.percent(allowed)}",
-                passed=plan.leave_water_probability <= allowed + 1e-12,
-            )
-        )
-    return rows
+    return rows if plan.promise is None else [*rows, *_promise_checks(plan.promise, 1.0 - content.confidence)]
+
+
+def _promise_checks(promise: Promise, allowed: float) -> list[Check]:
+    """What drawn ships in drawn weather did with the plan."""
+    return [
+        Check(
+            what="Chance that the hull leaves allowed water in the trial as it is sailed, runs and ways between them",
+            found=left_words(promise),
+            required=f"at most {words.percent(allowed)}",
+            passed=promise.left <= allowed + 1e-12,
+        ),
+        Check(
+            what="Trials broken off because a run could not be begun within tolerance",
+            found=aborted_words(promise),
+            required="",
+            passed=None,
+        ),
+        Check(
+            what="Time beyond the plan's, for coming back to the starts of runs",
+            found=extra_words(promise),
+            required="",
+            passed=None,
+        ),
+    ]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -259,11 +273,3 @@ def excitation_sentence(content: ReportContent) -> str:
         f"The excitation condition holds {where}: elsewhere noisy velocities bias the estimates of terms with a "
         "modulus, also those by instrumental variables; output error avoids it where only sensors disturb."
     )
-
-
-def _share_of_draws(probability: float) -> str:
-    """The share in drawn ships; none at all bounds the chance by three in the number drawn, at 95 % confidence."""
-    left = round(probability * DRAWS)
-    if left == 0:
-        return f"none of {DRAWS} drawn ships, so below {words.percent(3 / DRAWS)}"
-    return f"{words.percent(probability)}, {left} of {DRAWS} drawn ships"
