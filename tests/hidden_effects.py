@@ -36,6 +36,7 @@ TERMS = {
 }  # fmt: skip
 """Terms that may be hidden: regressors by name; the first letter tells the equation."""
 SUBSTEPS = 5
+MOST = 100.0
 
 
 @dataclass
@@ -177,6 +178,7 @@ def sail(trials: list[Trial], orders: np.ndarray, step_s: float, weather: Weathe
             k2 = rates(x + h / 2 * k1)
             k3 = rates(x + h / 2 * k2)
             x = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + rates(x + h * k3))
+            x[3:] = np.clip(x[3:], -MOST, MOST)  # ships made unstable, which nobody looks at any further
             vary_c = fade_c * vary_c + weather.current_std * np.sqrt(1 - fade_c**2) * rng.standard_normal((2, 1, b))
             vary_w = fade_w * vary_w + weather.wind_std * np.sqrt(1 - fade_w**2) * rng.standard_normal((2, 1, b))
     return out

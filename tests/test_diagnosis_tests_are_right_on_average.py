@@ -12,7 +12,7 @@ from expdesign.diagnosis.extension import as_extended, extend
 from expdesign.diagnosis.joint import fit
 from expdesign.diagnosis.motion import linearise, push_of, responses, simulate_windows
 from expdesign.diagnosis.noise import FLOOR, Noise, fit_colour, hats, whitened
-from expdesign.diagnosis.screening import Scored, Screening
+from expdesign.diagnosis.screening import Scored
 from expdesign.diagnosis.search import Step, settled, superfluous
 from expdesign.diagnosis.windows import cut_windows
 
@@ -112,14 +112,12 @@ def test_a_stand_in_is_superfluous_beside_the_true_cause_and_the_true_cause_is_n
         before = fit(extended, windows, (), starts=first_states(windows))
         steps = []
         for candidate in order:
-            scored = Scored(candidate=candidate, statistic=0.0, p_value=1.0, step=np.zeros(1))
+            scored = Scored(candidate=candidate, statistic=0.0, p_value=1.0, step=np.zeros(1), tests=20.0)
             chosen = contend(before, windows, opening(before, scored))
             assert chosen is not None
-            steps.append(
-                Step(chosen=chosen, p_value=0.0, rivals=(), before=before, screening=Screening(scored=(), tests=1.0))
-            )
+            steps.append(Step(chosen=chosen, p_value=0.0, rivals=(), before=before, screening=()))
             before = chosen.fit
-        assert superfluous(steps, windows, tests=20.0) == idle
+        assert superfluous(steps, windows) == idle
 
 
 def test_what_uncertain_parameters_explain_is_gone_before_anything_is_tested():

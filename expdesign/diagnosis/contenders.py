@@ -37,6 +37,7 @@ class Contender:
         worth: the same less the price of its numbers.
         keys: its own free effects.
         searched: the effect found by trying values, with its standard error.
+        tests: what its p-value is to be multiplied with, for all that was tried.
     """
 
     candidate: Candidate
@@ -45,6 +46,12 @@ class Contender:
     worth: float
     keys: tuple[str, ...]
     searched: tuple[str, float] | None = None
+    tests: float = 1.0
+
+    @property
+    def p_value(self) -> float:
+        """Corrected for all that was tried."""
+        return min(1.0, self.tests * float(chi2.sf(max(self.gain, 0.0), max(1, len(self.keys)))))
 
 
 def seen_closely(base: Fit, windows: Windows, long_s: float = COARSE_S) -> Fit | None:
@@ -155,6 +162,7 @@ def contend(base: Fit, windows: Windows, first: Opening, *, far: bool = False) -
         worth=gain - PRICE * counted,
         keys=first.keys,
         searched=first.searched,
+        tests=first.scored.tests,
     )
 
 
@@ -188,7 +196,7 @@ def _searched(base: Fit, scored: Scored) -> tuple[str, float, float]:
     best, std, width = values[0], float("nan"), 0.0
     for _ in range(2):
         tried = [_at(scored.candidate, key, value) for value in values]
-        results = {_value(item.candidate, key): item.statistic for item in screen(base, tried).scored}
+        results = {_value(item.candidate, key): item.statistic for item in screen(base, tried)}
         if not results:
             break
         found = np.array(sorted(results))

@@ -19,6 +19,7 @@ from expdesign.diagnosis.joint import Fit
 from expdesign.diagnosis.motion import linearise, start_responses
 from expdesign.diagnosis.search import Search, Step, search
 from expdesign.diagnosis.spread import spread
+from expdesign.diagnosis.support import check_support, still_inputs
 from expdesign.diagnosis.tell_apart import Proposal, most_telling, standard_proposals
 from expdesign.diagnosis.values import Diagnosis, Estimated, Finding
 from expdesign.diagnosis.verdict import error_falls, verdict
@@ -28,7 +29,6 @@ from expdesign.signals import Record
 from expdesign.vessel import Vessel
 
 Progress = Callable[[str, float], None]
-FEWEST_SAMPLES = 100
 UNITS = 4
 SHORTENINGS, SHORTEST, LARGEST_GROWTH = 4, 30, 6.0
 """Rounds and fewest samples of shortening windows of unstable models, and how much an error may grow in them."""
@@ -62,7 +62,7 @@ def diagnose(
     progress("simulating the model in use", 0.0)
     ship = as_extended(vessel, record)
     windows = _windows(ship, record)
-    _check(ship, windows, record)
+    check_support(ship, windows)
     before = accuracy(ship, record)
     motion = simulate_from_first(ship, windows)
     if motion.diverged:
@@ -93,7 +93,11 @@ def diagnose(
         simulated_before=motion.shown,
         simulated_after=simulate_from_first(final, windows).shown,
         errors={step.chosen.candidate.cause: step.before.linear.motion.error for step in found.steps},
-        notes=(*_notes(windows, vessel), *_settled_note(found, ship, windows, held[0]), *missing),
+        notes=(
+            *_notes(windows, vessel, still_inputs(ship, windows)),
+            *_settled_note(found, ship, windows, held[0]),
+            *missing,
+        ),
         screened=_screened(found),
     )
 
@@ -124,29 +128,6 @@ def _steady_time(ship: Extended, windows: Windows) -> float:
     grown = (size > LARGEST_GROWTH).any(axis=0)
     samples = int(np.argmax(grown)) if grown.any() else len(grown)
     return max(samples, SHORTEST) * windows.sample_s if grown.any() else windows.steps * windows.step_s
-
-
-def _check(ship: Extended, windows: Windows, record: Record) -> None:
-    samples = int(np.isfinite(windows.measured[..., :3]).any(axis=2).sum())
-    if samples < FEWEST_SAMPLES:
-        seconds = samples * windows.sample_s
-        raise NotInformative(
-            f"the data are too short for a diagnosis: {samples} samples of {windows.sample_s:g} s ({seconds:.0f} s), "
-            f"expected {FEWEST_SAMPLES} or more"
-        )
-    rows = np.concatenate(windows.batch_inputs)
-    still = [n for n, low, high in zip(ship.model.inputs, rows.min(0), rows.max(0), strict=True) if high - low <= 1e-9]
-    if len(still) == rows.shape[1]:
-        raise NotInformative(
-            f"the data cannot support a diagnosis: no input changes ({', '.join(still)}), so a steady run is all there "
-            f"is; expected runs in which {', '.join(still)} vary",
-            parameters=tuple(still),
-        )
-    for name in ship.model.outputs:
-        column = windows.measured[..., OUTPUTS.index(name)]
-        if not np.isfinite(column).any():
-            raise NotInformative(f"the data cannot support a diagnosis: {name} is not measured")
-    del record
 
 
 def _held_out(found: Search, ship: Extended, windows: Windows, tell: Callable[[float], None]) -> list[HeldOut]:
@@ -241,7 +222,7 @@ def _stds(found: Fit) -> dict[str, float]:
     return {key: found.std(key) for key in found.keys}
 
 
-def _notes(windows: Windows, vessel: Vessel) -> tuple[str, ...]:
+def _notes(windows: Windows, vessel: Vessel, still: Sequence[str]) -> tuple[str, ...]:
     notes = []
     if not windows.has_heading:
         notes.append("No heading is measured: current and wind cannot be told from what the ship does by itself.")
@@ -249,6 +230,10 @@ def _notes(windows: Windows, vessel: Vessel) -> tuple[str, ...]:
         notes.append("No depth is measured: shallow water was not tested.")
     if "r" in windows.derived:
         notes.append("The yaw rate is derived from the heading: the scale of a rate gyro was not tested.")
+    if still:
+        notes.append(
+            f"{', '.join(still)} never change{'s' if len(still) == 1 else ''}: what acts through them is not seen."
+        )
     if not (vessel.model.parameter_std > 0).any():
         notes.append("The vessel file states no parameter_std: its parameters count as known.")
     return tuple(notes)
@@ -269,7 +254,6 @@ def _settled_note(found: Search, ship: Extended, windows: Windows, settled: Held
 
 def _screened(found: Search) -> tuple[tuple[str, float], ...]:
     best: dict[str, float] = {}
-    for item in found.final_screening.scored:
-        p_value = min(1.0, item.p_value * found.final_screening.tests)
-        best[item.candidate.cause] = min(p_value, best.get(item.candidate.cause, 1.0))
+    for item in found.final_screening:
+        best[item.candidate.cause] = min(item.corrected, best.get(item.candidate.cause, 1.0))
     return tuple(sorted(best.items(), key=lambda pair: pair[1]))

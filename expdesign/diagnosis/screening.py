@@ -3,15 +3,17 @@
 A candidate's score is what the whitened error, less what parameters, wandering current and initial states can explain,
 has in common with the answer to it. All scores together are Gaussian when nothing is wrong, with a covariance that is
 known; drawing from it tells how small the smallest of all p-values gets by chance, however much candidates resemble
-each other.
+each other. Every cause of the catalogue gets the same share of false alarms: a cause with one candidate does not pay
+for another that has to be looked for at many times and places.
 
-Source: P. H. Westfall and S. S. Young, Resampling-Based Multiple Testing (1993); C. R. Rao (1948) for the score test.
+Sources: C. R. Rao (1948) for the score test; P. H. Westfall and S. S. Young, Resampling-Based Multiple Testing (1993);
+C. R. Genovese, K. Roeder and L. Wasserman, Biometrika 93 (2006), 509-524, for shares of the level.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import chi2
@@ -38,29 +40,23 @@ class Scored:
         statistic: chi-squared with `candidate.size` degrees of freedom when nothing is wrong.
         p_value: of this candidate alone.
         step: (size,) the linear estimate of its free effects; for finite ones the share of the first guess.
+        tests: what its p-value is to be multiplied with, for all that was tried.
     """
 
     candidate: Candidate
     statistic: float
     p_value: float
     step: Array
+    tests: float = 1.0
+
+    @property
+    def corrected(self) -> float:
+        """The p-value for all that was tried."""
+        return min(1.0, self.p_value * self.tests)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Screening:
-    """All tests, best first.
-
-    Attributes:
-        scored: by p-value.
-        tests: effective number of independent tests among them: multiplies p-values.
-    """
-
-    scored: tuple[Scored, ...]
-    tests: float
-
-
-def screen(base: Fit, candidates: Sequence[Candidate], rng: np.random.Generator | None = None) -> Screening:
-    """Test every candidate against the fit without it; without `rng` nothing is said of how many tests these are."""
+def screen(base: Fit, candidates: Sequence[Candidate], rng: np.random.Generator | None = None) -> tuple[Scored, ...]:
+    """Tests of every candidate against the fit without it, best first; without `rng` not corrected for their number."""
     pushes = [push_of(base.linear, base.ship.having({k: base.ship.get(k) + d}), d) for k in base.keys
               for d in [step_of(base.ship, k)]]  # fmt: skip
     shared: dict[object, int] = {}
@@ -103,22 +99,35 @@ def screen(base: Fit, candidates: Sequence[Candidate], rng: np.random.Generator 
             )
         )
         halves.append((index, half / size[index][:, None]))
-    tests = _effective_tests(A, halves, rng) if scored and rng is not None else 1.0
-    return Screening(scored=tuple(sorted(scored, key=lambda item: item.p_value)), tests=tests)
+    if scored and rng is not None:
+        tests = _effective_tests(A, halves, [item.candidate.cause.split(":")[0] for item in scored], rng)
+        scored = [replace(item, tests=number) for item, number in zip(scored, tests, strict=True)]
+    return tuple(sorted(scored, key=lambda item: item.p_value * item.tests))
 
 
-def _effective_tests(A: Array, halves: list[tuple[Array, Array]], rng: np.random.Generator) -> float:
-    """How many times likelier the smallest p-value is to fall below a level than a single one."""
+def _effective_tests(
+    A: Array, halves: list[tuple[Array, Array]], causes: Sequence[str], rng: np.random.Generator
+) -> list[float]:
+    """How many times likelier it is that some p-value of a cause, and of any cause, falls below a level than one."""
     size = np.sqrt(np.maximum(np.diag(A), 1e-300))  # sizes may span more digits than numbers have
     values, vectors = np.linalg.eigh((A + A.T) / 2 / np.outer(size, size))
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     drawn = rng.standard_normal((DRAWS, len(A))) @ root.T * size
-    smallest = np.ones(DRAWS)
-    by_size: dict[int, list[Array]] = {}
-    for index, half in halves:
-        by_size.setdefault(len(index), []).append(((drawn[:, index] @ half) ** 2).sum(axis=1))
-    for freedom, statistics in by_size.items():
-        smallest = np.minimum(smallest, chi2.sf(np.max(statistics, axis=0), freedom))
+    largest: dict[tuple[str, int], Array] = {}
+    for cause, (index, half) in zip(causes, halves, strict=True):
+        statistic, key = ((drawn[:, index] @ half) ** 2).sum(axis=1), (cause, len(index))
+        largest[key] = np.maximum(largest[key], statistic) if key in largest else statistic
+    smallest: dict[str, Array] = {}
+    for (cause, freedom), statistic in largest.items():
+        p_values = chi2.sf(statistic, freedom)
+        smallest[cause] = np.minimum(smallest[cause], p_values) if cause in smallest else p_values
+    own = {cause: _times_likelier(p_values) for cause, p_values in smallest.items()}
+    every = _times_likelier(np.min([own[cause] * p_values for cause, p_values in smallest.items()], axis=0))
+    return [own[cause] * every for cause in causes]
+
+
+def _times_likelier(smallest: Array) -> float:
+    """How many times likelier a smallest p-value is to fall below the level than a single one."""
     return float(max(1.0, LEVEL / max(float(np.quantile(smallest, LEVEL)), TINY)))
 
 

@@ -23,7 +23,7 @@ from expdesign.diagnosis.contenders import (
 )
 from expdesign.diagnosis.extended import Extended
 from expdesign.diagnosis.joint import Fit, fit
-from expdesign.diagnosis.screening import LEVEL, Scored, Screening, screen
+from expdesign.diagnosis.screening import LEVEL, Scored, screen
 from expdesign.diagnosis.windows import Windows
 from expdesign.values import Array
 
@@ -62,7 +62,7 @@ class Step:
     p_value: float
     rivals: tuple[Contender, ...]
     before: Fit
-    screening: Screening
+    screening: tuple[Scored, ...]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -72,7 +72,7 @@ class Search:
     steps: tuple[Step, ...]
     first: Fit
     last: Fit
-    final_screening: Screening
+    final_screening: tuple[Scored, ...]
 
 
 def search(ship: Extended, windows: Windows, starts: Array, rng: np.random.Generator, progress: Progress) -> Search:
@@ -96,7 +96,7 @@ def search(ship: Extended, windows: Windows, starts: Array, rng: np.random.Gener
         steps += _fewer(step, windows, refused, rng, _within(progress, share)) if _is_block(step.chosen) else [step]
         del steps[MOST_FINDINGS:]
         base = steps[-1].chosen.fit
-        idle = superfluous(steps, windows, found.tests) if len(refused) < MOST_RETURNS else None
+        idle = superfluous(steps, windows) if len(refused) < MOST_RETURNS else None
         if idle is not None:
             refused.append(steps[idle].chosen.candidate)
             base = steps[idle].before
@@ -111,7 +111,7 @@ def _round(
     progress: Progress,
     *,
     most: int = 99,
-) -> tuple[Step | None, Screening]:
+) -> tuple[Step | None, tuple[Scored, ...]]:
     """Test and fit candidates of no more than so many numbers."""
     candidates = [c for c in _candidates(base, windows) if not _same_as_any(c, refused) and len(c.free) <= most]
     found = screen(base, candidates, rng)
@@ -159,7 +159,7 @@ def _same_as_any(candidate: Candidate, others: list[Candidate]) -> bool:
     return any(candidate.cause == other.cause and set(candidate.free) == set(other.free) for other in others)
 
 
-def superfluous(steps: list[Step], windows: Windows, tests: float) -> int | None:
+def superfluous(steps: list[Step], windows: Windows) -> int | None:
     """The earliest addition without which the last fit is as good as chance makes it."""
     whole = steps[-1].chosen.fit
     for index, step in enumerate(steps[:-1]):
@@ -172,7 +172,7 @@ def superfluous(steps: list[Step], windows: Windows, tests: float) -> int | None
         except (FloatingPointError, np.linalg.LinAlgError):
             continue
         lost = gain_over(less, whole, whole)
-        if tests * float(chi2.sf(max(lost, 0.0), max(1, len(own)))) > LEVEL or lost < PRICE * len(own):
+        if step.chosen.tests * float(chi2.sf(max(lost, 0.0), max(1, len(own)))) > LEVEL or lost < PRICE * len(own):
             return index
     return None
 
@@ -192,7 +192,7 @@ def _candidates(base: Fit, windows: Windows) -> list[Candidate]:
     ]
 
 
-def _step(base: Fit, windows: Windows, found: Screening, progress: Progress) -> Step | None:
+def _step(base: Fit, windows: Windows, found: tuple[Scored, ...], progress: Progress) -> Step | None:
     openings, far = _openings(base, windows, found)
     contenders: list[Contender] = []
     for index, first in enumerate(openings):
@@ -201,24 +201,21 @@ def _step(base: Fit, windows: Windows, found: Screening, progress: Progress) -> 
         if contender is not None:
             contenders.append(contender)
     contenders = judged(base, contenders)
-    for chosen in contenders[:1]:
-        p_value = min(1.0, found.tests * float(chi2.sf(max(chosen.gain, 0.0), max(1, len(chosen.keys)))))
-        if p_value > LEVEL:
-            return None
-        rivals: dict[str, Contender] = {}
-        for other in contenders[1:]:
-            apart = chosen.worth - other.worth
-            if other.candidate.cause != chosen.candidate.cause and apart < AS_GOOD:
-                rivals.setdefault(other.candidate.cause, other)
-        return Step(chosen=chosen, p_value=p_value, rivals=tuple(rivals.values()), before=base, screening=found)
-    return None
+    chosen = next((item for item in contenders if item.p_value <= LEVEL), None)
+    if chosen is None:
+        return None
+    rivals: dict[str, Contender] = {}
+    for other in contenders:
+        if other.candidate.cause != chosen.candidate.cause and chosen.worth - other.worth < AS_GOOD:
+            rivals.setdefault(other.candidate.cause, other)
+    return Step(chosen=chosen, p_value=chosen.p_value, rivals=tuple(rivals.values()), before=base, screening=found)
 
 
-def _openings(base: Fit, windows: Windows, found: Screening) -> tuple[list[Opening], bool]:
+def _openings(base: Fit, windows: Windows, found: tuple[Scored, ...]) -> tuple[list[Opening], bool]:
     """What to fit, and whether it is far from the model as it stands: then short windows tell where to begin."""
     shortlist = _shortlist(found)
     closely = seen_closely(base, windows)
-    near = None if closely is None else screen(closely, [item.candidate for item in found.scored])
+    near = None if closely is None else screen(closely, [item.candidate for item in found])
     if closely is None or near is None or _share(near, closely) < STRONG:
         return [opening(base, scored) for scored in shortlist], False
     certain = shortlist[:CERTAIN]
@@ -227,21 +224,21 @@ def _openings(base: Fit, windows: Windows, found: Screening) -> tuple[list[Openi
     return opened_closely(closely, [*certain, *others], len(certain)), True
 
 
-def _share(found: Screening, base: Fit) -> float:
+def _share(found: tuple[Scored, ...], base: Fit) -> float:
     """Share of the remainder that the best candidate explains."""
     rows = int(np.isfinite(base.columns.error).sum())
-    return max((item.statistic for item in found.scored), default=0.0) / rows
+    return max((item.statistic for item in found), default=0.0) / rows
 
 
-def _shortlist(found: Screening) -> list[Scored]:
+def _shortlist(found: tuple[Scored, ...]) -> list[Scored]:
     """The best candidates of the best causes."""
-    ranked = sorted(found.scored, key=lambda item: PRICE * item.candidate.size - item.statistic)
+    ranked = sorted(found, key=lambda item: PRICE * item.candidate.size - item.statistic)
     kept: list[Scored] = []
     count: dict[str, int] = {}
     least = CLEARLY_LESS * max((item.statistic for item in ranked), default=0.0) - MARGIN
     for scored in ranked:
         cause = scored.candidate.cause
-        if scored.p_value * found.tests > 1.0 or scored.statistic < least:
+        if scored.p_value * scored.tests > 1.0 or scored.statistic < least:
             continue
         if cause not in count and len(count) == SHORTLIST:
             continue

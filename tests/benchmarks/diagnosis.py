@@ -253,7 +253,7 @@ def oracle(vessel: Vessel, record: Record, cause_name: str) -> float:
     situation = Situation(ship=ship, windows=windows)
     mine = [item for cause in CAUSES for item in cause.candidates(situation) if item.cause == cause_name]
     found = screen(base, mine, np.random.default_rng(0))
-    return min((item.p_value for item in found.scored), default=1.0) * found.tests if mine else float("nan")
+    return min((item.corrected for item in found), default=1.0) if mine else float("nan")
 
 
 def another(case: Case, hidden: Hidden, rng: np.random.Generator) -> Hidden:
