@@ -82,7 +82,9 @@ def _departures(space: SearchSpace, beam: PartialPlans) -> tuple[Array, Array]:
     """(b, 3) places from which ships go on, with courses for headings, and (b,) how long it takes to come to that."""
     if space.recoveries is None:
         return beam.pose, np.zeros(len(beam.pose))
-    steps = np.vstack([space.recoveries, np.zeros(4)])[beam.last]
+    steps = np.vstack([space.recoveries, [space.hull_m, 0.0, 0.0, space.hull_m / space.ship.transit_speed_mps]])[
+        beam.last
+    ]
     return _moved(beam.pose, steps[:, :3]), steps[:, 3]
 
 

@@ -27,7 +27,7 @@ from expdesign.plan.leg_values import (
     nearest_turns,
     room_beside,
 )
-from expdesign.plan.recovery import Recovery, recover
+from expdesign.plan.recovery import OFF, Recovery, recover
 from expdesign.plan.ways import polyline_length
 from expdesign.simulation import to_body
 from expdesign.values import Array
@@ -36,7 +36,7 @@ from expdesign.vessel import NUMPY
 SLOW = 0.3
 """Transit speeds below which a ship is about to gather way or to stop."""
 STRAIGHTS = ((1.0, 2.0, 1.0), (1.0, 1.0, 0.7), (0.5, 0.5, 0.4), (0.0, 0.0, 0.1))
-"""What is tried: hull lengths straight off, `SETTLE` lengths before a run-up, ways of a crash stop before a goal."""
+"""What is tried: shares of `OFF`, of `SETTLE` before a run-up, and ways of a crash stop before a goal."""
 NODE = 0.25
 """Time between nodes, in that of a hull length at transit speed."""
 SMOOTHED = 1.0
@@ -110,7 +110,10 @@ class Straights:
 
 
 def _shortest_first(start: Array, task: LegTask, water: LegWater) -> list[Straights]:
-    """What is tried: of paths hardly longer than the shortest those with the longest straights, then the others."""
+    """What is tried: of paths hardly longer than the shortest those with the longest straights, then others.
+
+    Not those with a turn all round for want of length: another place for the run is better.
+    """
     length, radius = water.vessel.length_m, water.ship.turning_radius_m
     first, last = _course_pose(start, water), _course_pose(task.end, water)
     stopping = np.hypot(*_through_water(water, task.end)) < SLOW * water.ship.transit_speed_mps
@@ -118,14 +121,14 @@ def _shortest_first(start: Array, task: LegTask, water: LegWater) -> list[Straig
         Straights(
             first=first,
             last=last,
-            off_m=off * length,
+            off_m=off * OFF * length,
             into_m=stop * water.ship.stopping_m if stopping else settle * SETTLE * length,
         )
         for off, settle, stop in STRAIGHTS
     ]
     lengths = [item.length_m(radius) for item in tries]
     longer = np.maximum(np.array(lengths) - min(lengths) - radius / 2, 0.0)
-    return [tries[index] for index in np.argsort(longer, kind="stable")]
+    return [tries[index] for index in np.argsort(longer, kind="stable") if longer[index] < 2 * radius]
 
 
 def _path(task: LegTask, water: LegWater, straights: Straights) -> Array | None:

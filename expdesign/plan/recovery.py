@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from expdesign.plan.capability import Capability
 from expdesign.plan.leg_values import LegWater, last_state
 from expdesign.values import Array, seal
 from expdesign.vessel import within_limits
@@ -18,6 +19,8 @@ CHECK = 3.0
 """Helm against the swing, per yaw rate, in times of a hull length at transit speed."""
 CHECKED = 0.05
 """Yaw rate at which a swing counts as checked, in that of a leg's turns."""
+OFF = 1.0
+"""Hull lengths straight off before the first turn: what the helm does shows that much later."""
 LONGEST = 8.0
 """Time after which the helmsman goes on whatever is left, in that of a hull length at transit speed."""
 
@@ -56,11 +59,14 @@ def recover(state: Array, past: Array, water: LegWater) -> Recovery:
     return Recovery(states=np.array(states), commands=np.array(rows[1:]).reshape(-1, len(vessel.limits)))
 
 
-def displaced(recovery: Recovery, sample_time_s: float) -> Array:
-    """(4,) way ahead and to starboard [m], course at its end from the first heading [rad], and time [s]."""
+def displaced(recovery: Recovery, ship: Capability, *, sample_time_s: float, hull_m: float) -> Array:
+    """(4,) from a state until the ship can be in a turn of its choice: recovery, and a straight while the helm bites.
+
+    Way ahead and to starboard [m], course at its end from the first heading [rad], and time [s].
+    """
     first, last = recovery.states[0], recovery.states[-1]
     c, s = math.cos(first[2]), math.sin(first[2])
-    north, east = last[:2] - first[:2]
-    drift = math.atan2(last[4], last[3]) if last[3] > 0 else 0.0
-    turned = last[2] - first[2] + drift
-    return np.array([north * c + east * s, east * c - north * s, turned, len(recovery.commands) * sample_time_s])
+    course = last[2] + (math.atan2(last[4], last[3]) if last[3] > 0 else 0.0)
+    north, east = last[:2] - first[:2] + OFF * hull_m * np.array([math.cos(course), math.sin(course)])
+    time_s = len(recovery.commands) * sample_time_s + OFF * hull_m / ship.transit_speed_mps
+    return np.array([north * c + east * s, east * c - north * s, course - first[2], time_s])

@@ -240,8 +240,9 @@ def _recoveries(problem: PlanProblem, water: LegWater) -> Array | None:
         return None
     calm = replace(water, environment=CALM)
     runs = [(last_state(item.trajectory), item.commands.values) for item in _used(problem)]
-    step_s = problem.vessel.sample_time_s
-    return np.array([displaced(recover(state, calm.remembered(values), calm), step_s) for state, values in runs])
+    scales = {"sample_time_s": problem.vessel.sample_time_s, "hull_m": problem.vessel.length_m}
+    checks = [recover(state, calm.remembered(values), calm) for state, values in runs]
+    return np.array([displaced(check, water.ship, **scales) for check in checks])
 
 
 def _stamps(problem: PlanProblem, grid: ClearanceField) -> tuple[Stamp, ...]:
