@@ -14,6 +14,7 @@ from expdesign.diagnosis.extended import Extended
 from expdesign.diagnosis.joint import Fit, fit, profile_cost
 from expdesign.diagnosis.motion import simulate_windows
 from expdesign.diagnosis.screening import LEVEL, Scored, screen
+from expdesign.diagnosis.spread import spread
 from expdesign.diagnosis.windows import Windows
 from expdesign.values import Array
 
@@ -185,7 +186,8 @@ def _nearer(
 def _badness(base: Fit, windows: Windows, ship: Extended) -> float:
     """Squared error of a simulation from the measured beginnings, in units of the measured spread."""
     motion = simulate_windows(ship, windows, first_states(windows, ship.states), near=base.linear)
-    scale = np.nanstd(windows.measured, axis=(0, 1))
+    size = spread(windows.measured)
+    scale = np.where(size > 0, size, np.inf)
     return np.inf if motion.diverged else float(np.nansum((motion.error / scale) ** 2))
 
 

@@ -8,7 +8,6 @@ from itertools import pairwise
 
 import numpy as np
 
-from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.accuracy import accuracy, first_states, simulate_from_first
 from expdesign.diagnosis.candidate import Cause, Values
 from expdesign.diagnosis.causes import CAUSES
@@ -24,7 +23,7 @@ from expdesign.diagnosis.tell_apart import Proposal, most_telling, standard_prop
 from expdesign.diagnosis.values import Diagnosis, Estimated, Finding
 from expdesign.diagnosis.verdict import error_falls, verdict
 from expdesign.diagnosis.windows import Windows, cut_windows
-from expdesign.errors import Diverged, NotInformative
+from expdesign.errors import Diverged
 from expdesign.signals import Record
 from expdesign.vessel import Vessel
 
@@ -231,9 +230,8 @@ def _notes(windows: Windows, vessel: Vessel, still: Sequence[str]) -> tuple[str,
     if "r" in windows.derived:
         notes.append("The yaw rate is derived from the heading: the scale of a rate gyro was not tested.")
     if still:
-        notes.append(
-            f"{', '.join(still)} never change{'s' if len(still) == 1 else ''}: what acts through them is not seen."
-        )
+        verb = "changes" if len(still) == 1 else "change"
+        notes.append(f"{', '.join(still)} never {verb}: what acts through them alone is not seen.")
     if not (vessel.model.parameter_std > 0).any():
         notes.append("The vessel file states no parameter_std: its parameters count as known.")
     return tuple(notes)

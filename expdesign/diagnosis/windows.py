@@ -120,8 +120,9 @@ ROWS = ("batch", "first", "measured", "heading", "wind", "depth_m", "time_s")
 
 def fastest_rate(model: VesselModel, record: Record) -> float:
     """Largest linear damping rate of the model at the measured speeds [1/s]."""
-    speed = np.nanmean([np.nanmean(np.abs(batch.velocity), axis=0) for batch in record.batches], axis=0)
-    base = np.where(np.isfinite(speed), speed, 0.0)
+    speeds = np.abs(np.concatenate([batch.velocity for batch in record.batches]))
+    seen = np.isfinite(speeds)
+    base = np.where(seen, speeds, 0.0).sum(axis=0) / np.maximum(seen.sum(axis=0), 1)
     inputs = np.concatenate([inputs_of(model, batch) for batch in record.batches]).mean(axis=0)
     rates = []
     for axis in range(3):
