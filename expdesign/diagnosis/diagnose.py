@@ -11,6 +11,7 @@ import numpy as np
 from expdesign.diagnosis.accuracy import accuracy, first_states, simulate_from_first
 from expdesign.diagnosis.candidate import Cause, Values
 from expdesign.diagnosis.causes import CAUSES
+from expdesign.diagnosis.clusters import widened
 from expdesign.diagnosis.extended import Extended
 from expdesign.diagnosis.extension import as_extended, extend, public_name
 from expdesign.diagnosis.gain import HeldOut, gained, held_out
@@ -69,6 +70,7 @@ def diagnose(
     found = search(ship, windows, first_states(windows), rng, lambda what, share: progress(what, 0.05 + 0.6 * share))
     held = _held_out(found, ship, windows, lambda share: progress("measuring the gain on held-out runs", share))
     found = _worthwhile(found, held, rng)
+    found = replace(found, last=widened(found.last, windows.batch))
     progress("looking for manoeuvres that tell causes apart", 0.92)
     proposed = proposals or standard_proposals(windows, ship.model.inputs, windows.sample_s)
     findings = tuple(
