@@ -12,8 +12,7 @@ from expdesign.dictionary.build import drift, trim
 from expdesign.errors import InputError, NoAnswer, NoPlan
 from expdesign.plan.steady_turns import SteadyTurn, side_by_side, steady_turns
 from expdesign.plan.values import PlanSettings
-from expdesign.signals import Commands
-from expdesign.simulation import Approach, Conduct, simulate, steady_ahead, stopping
+from expdesign.simulation import Approach, Conduct, simulate_many, steady_ahead, stopping
 from expdesign.values import Array
 from expdesign.vessel import Vessel, direct_terms, force_matrix
 
@@ -34,6 +33,9 @@ RUN_UP = 1.0
 
 SETTLE = 2.0
 """Hull lengths before that in which what is left of a turn dies out under the helmsman's hand."""
+
+GATHERING = 200.0
+"""Hull lengths at transit speed in whose time a ship that gathers way is watched."""
 
 OVERSHOOT = 1.3
 """Largest yaw rate on the way into a turn, in those of the steady one: a thumb rule that bounds the search."""
@@ -211,15 +213,23 @@ def _gentle(pair: tuple[SteadyTurn, SteadyTurn]) -> bool:
 
 def _simulated_acceleration(approach: Approach) -> float:
     """The constant acceleration that loses as much time as full ahead from rest to the approach's speed [m/s2]."""
-    helm, speed = approach.helm, approach.speed_mps
-    step_s = helm.vessel.sample_time_s
-    count = int(np.ceil(200 * helm.vessel.length_m / speed / step_s))
+    helm, speed, vessel = approach.helm, approach.speed_mps, approach.helm.vessel
+    step_s = vessel.sample_time_s
+    count = int(np.ceil(GATHERING * vessel.length_m / speed / step_s))
     orders = np.minimum(1.0, np.arange(1, count + 1) * step_s * helm.drive_rate)
     rows = np.array([helm.inputs(order, approach.angle_rad) for order in orders.tolist()])
-    commands = Commands(sample_time_s=step_s, names=helm.vessel.model.inputs, values=rows)
-    track = simulate(helm.vessel, commands, standing=np.array(helm.inputs(0.0, approach.angle_rad)))
-    there = int(np.argmax(track.velocity[:, 0] >= 0.98 * speed)) or count
-    lost_s = there * step_s - float(np.abs(track.velocity[:there, 0]).sum()) * step_s / speed
+    surge = simulate_many(
+        vessel,
+        rows[None],
+        pose=np.zeros((1, 3)),
+        velocity=np.zeros((1, 3)),
+        current_to=np.zeros((1, 2)),
+        wind_to=np.zeros((1, 2)),
+        parameters=vessel.model.parameters[None],
+        standing=np.array([helm.inputs(0.0, approach.angle_rad)]),
+    )[:, 0, 3]
+    there = int(np.argmax(surge >= 0.98 * speed)) or count
+    lost_s = there * step_s - float(np.abs(surge[:there]).sum()) * step_s / speed
     return speed / (2 * max(lost_s, step_s))
 
 
