@@ -136,7 +136,7 @@ def opened_closely(closely: Fit, shortlist: Sequence[Scored], certain: int) -> l
     ]
 
 
-def contend(base: Fit, windows: Windows, first: Opening, *, far: bool = False) -> Contender | None:
+def contend(base: Fit, windows: Windows, first: Opening, *, far: bool = False, steps: int = 8) -> Contender | None:
     """Fit a candidate together with everything found before.
 
     Args:
@@ -144,13 +144,14 @@ def contend(base: Fit, windows: Windows, first: Opening, *, far: bool = False) -
         windows: data.
         first: where to begin.
         far: from far away, by way of windows of middle length.
+        steps: Gauss-Newton steps.
     """
     keys = _kept(base, first.keys)
     try:
         ship, starts = _nearer(base, windows, first.effects, keys) if far else (None, base.starts)
         found = fit(
             base.ship.having(first.effects) if ship is None else ship, windows, keys, starts=starts, noise=base.noise,
-            colour_order=base.noise.order, near=base.linear,
+            colour_order=base.noise.order, near=base.linear, steps=steps,
         )  # fmt: skip
         gain = gain_over(base, found, found)
     except (FloatingPointError, np.linalg.LinAlgError):
@@ -165,6 +166,22 @@ def contend(base: Fit, windows: Windows, first: Opening, *, far: bool = False) -
         searched=first.searched,
         tests=first.scored.tests,
     )
+
+
+def finished(base: Fit, windows: Windows, rough: Contender) -> Contender:
+    """The same with its fit led to the end."""
+    fitted = rough.fit
+    if fitted.converged:
+        return rough
+    try:
+        found = fit(
+            fitted.ship, windows, fitted.keys[: fitted.free], starts=fitted.starts, noise=fitted.noise,
+            colour_order=fitted.noise.order, near=fitted.linear,
+        )  # fmt: skip
+    except (FloatingPointError, np.linalg.LinAlgError):
+        return rough
+    gain = gain_over(base, found, found)
+    return replace(rough, fit=found, gain=gain, worth=gain - (rough.gain - rough.worth))
 
 
 def _nearer(

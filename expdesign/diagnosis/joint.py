@@ -20,7 +20,7 @@ from expdesign.values import Array
 
 WANDER_MPS = (0.0, 0.005, 0.01, 0.02, 0.035, 0.06, 0.1, 0.2)
 WANDER_TIMES_S = (60.0, 150.0, 400.0, 1000.0)
-SPACING_S = 10.0
+SPACING_S = 20.0
 MOST_HATS = 24
 CLOSE = 0.05
 """A fit has converged when the next step would lower twice the negative log likelihood by less than this."""
@@ -173,6 +173,7 @@ class Fit:
         cost: weighted squared error at the end, while fitting.
         linear, columns: at the end.
         precision: (c,) prior precision of the numbers.
+        converged: a further step would hardly lower the cost.
     """
 
     ship: Extended
@@ -185,6 +186,7 @@ class Fit:
     linear: Linear
     columns: Columns
     precision: Array
+    converged: bool
 
     def value(self, key: str) -> float:
         """Estimate."""
@@ -276,7 +278,7 @@ def fit(
         move = covariance @ pull
         best = Fit(
             ship=ship, keys=keys, free=len(free), covariance=covariance, starts=starts, noise=noise,
-            cost=cost, linear=linear, columns=columns, precision=precision,
+            cost=cost, linear=linear, columns=columns, precision=precision, converged=close,
         )  # fmt: skip
         if last:
             break

@@ -20,6 +20,8 @@ from expdesign.values import Array
 
 LARGEST_SPEED = 60.0
 NUDGE = 1e-5
+INNER, OUTER = {"theta", "term", "gain", "inertia"}, {"lever", "gyro"}
+"""Kinds of effects that change neither surroundings nor sensors, and those that change sensors alone."""
 MOST_ROUNDS, LOST, NEAR, SETTLED = 12, 5.0, 3e-3, 1e-8
 """Of a simulation of all steps at once: rounds; growth of the change with which it is given up; change below which the
 transition matrices need not be found anew; change with which it is done."""
@@ -207,15 +209,25 @@ class Push:
 def push_of(linear: Linear, changed: Extended, per: float) -> Push:
     """What a change of effects does along the path, divided by `per`."""
     motion = linear.motion
-    windows = motion.windows
-    sensor = observed(changed, motion.states, windows, motion.turned) - motion.shown
-    around = surroundings(changed, windows).before_last()
-    ends = (motion.states[:, :-1], motion.states[:, 1:])
-    force = np.mean([_rates(changed, end, around) for end in ends], axis=0) - linear.slopes.mean(axis=0)
+    kinds = {key.split(":")[0] for key in _differing(motion.ship, changed)}
+    sensor = force = np.zeros(1)
+    if kinds - INNER:
+        sensor = observed(changed, motion.states, motion.windows, motion.turned) - motion.shown
+    if kinds - OUTER:
+        known = not kinds - INNER and ("u_w" in motion.around or not any(part.reads_air for part in changed.parts))
+        around = (motion.around if known else surroundings(changed, motion.windows)).before_last()
+        ends = (motion.states[:, :-1], motion.states[:, 1:])
+        force = np.mean([_rates(changed, end, around) for end in ends], axis=0) - linear.slopes.mean(axis=0)
     return Push(
         force=force / per if np.any(force) else None,
         sensor=sensor / per if np.any(sensor) else None,
     )
+
+
+def _differing(one: Extended, other: Extended) -> set[str]:
+    """Effects that two ships do not share."""
+    keys = {*one.effects, *other.effects}
+    return {key for key in keys if one.effects.get(key) != other.effects.get(key)}
 
 
 def responses(linear: Linear, pushes: Sequence[Push]) -> Array:

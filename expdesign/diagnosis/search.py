@@ -15,6 +15,7 @@ from expdesign.diagnosis.contenders import (
     Contender,
     Opening,
     contend,
+    finished,
     gain_over,
     judged,
     opened_closely,
@@ -35,6 +36,8 @@ AS_GOOD = 5.0
 truly trails by d comes out ahead by more than this with a probability below Phi(-sqrt(AS_GOOD))."""
 CLEARLY_LESS, MARGIN = 0.4, 20.0
 """Candidates with less than this share of the largest statistic, and by more than this, are not fitted."""
+FIRST_STEPS, LEADING = 3, 0.6
+"""Gauss-Newton steps after which candidates that gain less than this share of the most are given up."""
 STRONG = 0.15
 """Share of the remainder from which on an effect is large, and looked at in short windows, too."""
 CERTAIN = 2
@@ -197,10 +200,12 @@ def _step(base: Fit, windows: Windows, found: tuple[Scored, ...], progress: Prog
     contenders: list[Contender] = []
     for index, first in enumerate(openings):
         progress(f"fitting {first.scored.candidate.cause}", index / len(openings))
-        contender = contend(base, windows, first, far=far)
+        contender = contend(base, windows, first, far=far, steps=FIRST_STEPS)
         if contender is not None:
             contenders.append(contender)
     contenders = judged(base, contenders)
+    least = LEADING * max((item.gain for item in contenders), default=0.0) - MARGIN
+    contenders = judged(base, [finished(base, windows, item) for item in contenders if item.gain > least])
     chosen = next((item for item in contenders if item.p_value <= LEVEL), None)
     if chosen is None:
         return None

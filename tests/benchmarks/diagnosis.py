@@ -272,19 +272,20 @@ def tried(part: str, number: int, seed: int, only: str | None = None) -> dict[st
     case = drawn_case(ship, int(whole.generate_state(1)[0]), rng)
     uncertain = part == "uncertain" or (part == "clean" and number % 2 == 1)
     std = 0.1 if uncertain else 0.0
-    hidden, lost, record = Hidden(cause="none"), 0.0, None
+    hidden, lost, record, scale = Hidden(cause="none"), 0.0, None, 1.0
     if part != "clean":
         effect = drawn_effect(name, ship, rng, case.batches * float(case.samples))
         hidden, lost, record = large_enough(case, effect, std)
     if part == "pairs":
         hidden, record = hidden.with_another(another(case, hidden, rng)), None
     if part == "power":
-        hidden, record = hidden.scaled(float(10 ** rng.uniform(-2, -1))), None
+        scale = float(10 ** rng.uniform(-2, -1))
+        hidden, record = hidden.scaled(scale), None
     if record is None:
         ((record,),) = case.records([hidden], std)
     row: dict[str, object] = {
-        "part": part, "number": number, "seed": seed, "cause": hidden.cause, "ship": ship, "std": std, "lost": lost,
-        "manoeuvre": case.manoeuvre, "truth": hidden.truth,
+        "part": part, "number": number, "seed": seed, "scale": scale, "cause": hidden.cause, "ship": ship, "std": std,
+        "lost": lost, "manoeuvre": case.manoeuvre, "truth": hidden.truth,
         "effects": hidden.effects | hidden.faults | hidden.factors,
     }  # fmt: skip
     try:
@@ -350,6 +351,20 @@ def table(rows: list[dict]) -> None:
     print(f"estimates within 3 std: {share(sum(within), len(within))}")
 
 
+def curves(rows: list[dict]) -> None:
+    """Power against size: shares found in bins of equal number, by the oracle, uncorrected and corrected, and by us."""
+    print(f"{'size':>14}{'n':>4}{'oracle 5 %':>18}{'oracle 5 %/30':>18}{'any finding':>18}{'right one':>18}")
+    rows = sorted(rows, key=lambda row: row["scale"])
+    for part in np.array_split(np.arange(len(rows)), min(5, max(1, len(rows) // 8))):
+        some = [rows[index] for index in part]
+        counts = (
+            sum(row["oracle"] < 0.05 for row in some), sum(row["oracle"] < 0.05 / 30 for row in some),
+            sum(bool(row["findings"]) for row in some), sum(judged(row)["listed"] for row in some),
+        )  # fmt: skip
+        shares = "".join(f"{share(count, len(some)):>18}" for count in counts)
+        print(f"{some[0]['scale']:7.3f}-{some[-1]['scale']:6.3f}{len(some):4}{shares}")
+
+
 def report(part: str, rows: list[dict]) -> None:
     """What a part of the campaign says."""
     print(f"\n{part}: {len(rows)} trials, {sum('crash' in row for row in rows)} failed")
@@ -369,6 +384,7 @@ def report(part: str, rows: list[dict]) -> None:
         weak = [row for row in rows if row["oracle"] < 0.05]
         print(f"oracle finds: {share(len(weak), len(rows))}")
         print(f"found, of these, by the diagnosis: {share(sum(judged(row)['listed'] for row in weak), len(weak))}")
+        curves(rows)
         return
     table(rows)
 
@@ -381,10 +397,18 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--ship", choices=tuple(sea.SHIPS))
+    parser.add_argument("--first", type=int, default=0, help="number of the first trial")
     parser.add_argument("--log", type=Path)
+    parser.add_argument("--read", type=Path, nargs="+", help="report on logs instead of running anything")
     chosen = parser.parse_args()
+    if chosen.read:
+        rows = [json.loads(line) for path in chosen.read for line in path.read_text().splitlines()]
+        for part in PARTS:
+            if some := [row for row in rows if row["part"] == part]:
+                report(part, some)
+        return
     for part in PARTS if chosen.part == "all" else (chosen.part,):
-        work = (delayed(tried)(part, number, chosen.seed, chosen.ship) for number in range(chosen.trials))
+        work = (delayed(tried)(part, number, chosen.seed, chosen.ship) for number in range(chosen.first, chosen.trials))
         rows = []
         for row in Parallel(n_jobs=chosen.jobs, return_as="generator_unordered")(work):
             rows.append(row)
