@@ -55,6 +55,22 @@ class Diverged(NoAnswer):
     """A simulation left the range in which its numbers mean anything."""
 
 
+class SpeedOutOfReach(InputError):
+    """A steady speed is asked for that the engines do not give.
+
+    Attributes:
+        reached_mps: what they give.
+    """
+
+    def __init__(self, message: str, *, reached_mps: float) -> None:
+        self.reached_mps = reached_mps
+        super().__init__(message)
+
+
+class Unreachable(NoAnswer):
+    """A manoeuvre must begin with a motion that the vessel cannot hold; the message names it and what can be held."""
+
+
 class NotInformative(NoAnswer):
     """The experiment cannot tell some parameters apart.
 

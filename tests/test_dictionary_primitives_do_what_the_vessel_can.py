@@ -8,7 +8,7 @@ import pytest
 from design_case import example_dictionary, force_actuator, resampled, spec, vessel, with_limit
 
 from expdesign.dictionary import Primitive, PrimitiveSpec, build_primitive, family
-from expdesign.errors import InputError
+from expdesign.errors import Unreachable
 from expdesign.simulation import simulate
 from expdesign.values import Array
 from expdesign.vessel import Limit, Vessel
@@ -83,7 +83,9 @@ def test_an_entry_state_is_held_up_to_the_very_limit_and_refused_beyond():
     ship, request, needed = vessel("azimuth-30m"), REQUESTS[1], 0.2 * 1.2 / 0.01
     enough, short = (with_limit(ship, Limit(low=-99, high=share * needed)) for share in (1.0, 0.99))
     assert build_primitive(enough, request).entry_inputs[0] == pytest.approx(needed)
-    with pytest.raises(InputError, match=r"^primitive 'deceleration': the actuators cannot hold .* 24, .* 23\.76, 0$"):
+    reached = r"u = 1.2 m/s, v = 0 m/s; in that direction they reach u = 1.188 m/s"
+    says = rf"^primitive 'deceleration': the actuators cannot hold its entry state {reached}.* 24, .* 23\.76, 0$"
+    with pytest.raises(Unreachable, match=says):
         build_primitive(short, request)
 
 

@@ -11,7 +11,7 @@ import shapely
 from plan_case import area, ship
 
 from expdesign.dictionary import PrimitiveSpec, build_primitive, complete_settings, family
-from expdesign.errors import InputError, NoPlan
+from expdesign.errors import NoPlan, Unreachable
 from expdesign.plan import LocalFrame, PlanSettings
 from expdesign.plan.solve import PlanProblem, plan_trial
 from expdesign.simulation import CALM, Environment
@@ -88,7 +88,7 @@ def test_a_current_as_fast_as_the_ship_is_named():
 def test_an_approach_speed_beyond_the_ship_names_the_run_and_what_is_lacking():
     kind = family("deceleration")
     given = complete_settings(kind, {"duration_s": 60.0, "speed_mps": 50.0})
-    with pytest.raises(InputError, match=r"^primitive 'stop': .* cannot hold its entry state u = 50 m/s") as e:
+    with pytest.raises(Unreachable, match=r"^primitive 'stop': .* cannot hold its entry state u = 50 m/s") as e:
         build_primitive(ship(), PrimitiveSpec(name="stop", family="deceleration", settings=given))
     needed, given_x = (float(x) for x in re.search(r"tau_x = (\S+), .*they give (\S+),", str(e.value)).groups())
     assert needed > given_x > 0

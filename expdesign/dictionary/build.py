@@ -9,8 +9,8 @@ import numpy as np
 from expdesign.dictionary.families import FAMILIES
 from expdesign.dictionary.primitive import Primitive
 from expdesign.dictionary.spec import Excitation, Family, PrimitiveSpec
-from expdesign.dictionary.trim import STEADY, drift, lost, trim
-from expdesign.errors import InputError, UnknownName
+from expdesign.dictionary.trim import STEADY, drift, lost, motion_text, reach_text, trim
+from expdesign.errors import InputError, SpeedOutOfReach, UnknownName, Unreachable
 from expdesign.signals import Commands
 from expdesign.simulation import simulate
 from expdesign.values import Array
@@ -43,15 +43,17 @@ def build_primitive(vessel: Vessel, spec: PrimitiveSpec) -> Primitive:
     wished velocities it differs from them.
 
     Raises:
-        InputError: the run is shorter than two samples, the actuators cannot hold its entry state, or the family asks
-            for what the vessel cannot do; the message names the primitive and, where it has one, its file and key.
+        InputError: the run is shorter than two samples, or the family asks for what the vessel cannot do; the message
+            names the primitive and, where it has one, its file and key.
+        Unreachable: the actuators cannot hold its entry state; the message also tells what they reach.
         Diverged: the nominal model is unstable under the commands.
     """
     try:
         found = excitation(vessel, spec)
-    except InputError as error:
-        before = f"{spec.place}: " if spec.place else ""
-        raise InputError(f"{before}primitive {spec.name!r}: {error}") from None
+    except (InputError, Unreachable) as error:
+        named = f"{spec.place}: primitive {spec.name!r}" if spec.place else f"primitive {spec.name!r}"
+        kind = Unreachable if isinstance(error, Unreachable | SpeedOutOfReach) else InputError
+        raise kind(f"{named}: {error}") from None
     commands = Commands(sample_time_s=vessel.sample_time_s, names=vessel.model.inputs, values=found.commands)
     return Primitive(
         name=spec.name,
@@ -67,7 +69,7 @@ def excitation(vessel: Vessel, spec: PrimitiveSpec) -> Excitation:
     """Entry state and commands (k, m) of a request, within limits and rates.
 
     Raises:
-        InputError: as in `build_primitive`.
+        InputError, SpeedOutOfReach, Unreachable: as in `build_primitive`.
     """
     kind = family(spec.family)
     count = round(spec.settings["duration_s"] / vessel.sample_time_s)
@@ -83,7 +85,7 @@ def excitation(vessel: Vessel, spec: PrimitiveSpec) -> Excitation:
     velocities = wished_velocities(vessel, spec)
     inputs, values = follow(vessel, velocities)
     if lost(vessel, velocities[0], inputs) > STEADY:
-        raise InputError(_not_held(vessel, velocities[0]))
+        raise Unreachable(_not_held(vessel, velocities[0]))
     return Excitation(velocity=velocities[0], inputs=inputs, commands=values)
 
 
@@ -146,6 +148,6 @@ def _not_held(vessel: Vessel, velocity: Array) -> str:
     inputs = trim(vessel, velocity)
     given = generalised_force(vessel.actuators, dict(zip(vessel.model.inputs, inputs, strict=True)), NUMPY)
     return (
-        f"the actuators cannot hold its entry state u = {velocity[0]:g} m/s, v = {velocity[1] + 0.0:g} m/s: "
+        f"the actuators cannot hold its entry state {motion_text(velocity)}; {reach_text(vessel, velocity)}: "
         f"needed tau_x = {wanted[0]:.4g}, tau_y = {wanted[1]:.4g}, they give {given[0]:.4g}, {given[1]:.4g}"
     )

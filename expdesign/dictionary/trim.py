@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import least_squares
 
-from expdesign.errors import InputError
+from expdesign.errors import Unreachable
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, Vessel, allocate, direct_terms, required_force
 
 STEADY = 1e-6
 """Share of its speed that a vessel may lose or gain per sample where a state counts as held."""
+SHARES = (0.9, 0.75, 0.5, 0.25, 0.1, 0.03, 0.01)
+"""Where the search for the largest share of a velocity that can be held begins."""
 STARTS = (0.05, 0.4, 0.9)
 """Shares of full thrust that the search for commands of a direct model starts from."""
 
@@ -43,15 +45,41 @@ def hold(vessel: Vessel, velocity: Array) -> Array:
     """Commands (m,) that hold a velocity (3,) through calm water.
 
     Raises:
-        InputError: the actuators cannot.
+        Unreachable: the actuators cannot.
     """
     inputs = trim(vessel, velocity)
     if lost(vessel, velocity, inputs) > STEADY:
-        raise InputError(
-            f"the actuators cannot hold its entry state u = {velocity[0]:g} m/s, v = {velocity[1] + 0.0:g} m/s, "
-            f"r = {velocity[2] + 0.0:g} rad/s"
+        raise Unreachable(
+            f"the actuators cannot hold its entry state {motion_text(velocity)}; {reach_text(vessel, velocity)}"
         )
     return inputs
+
+
+def held_share(vessel: Vessel, velocity: Array) -> float:
+    """The largest share of a velocity (3,), in steps down from all of it, that the actuators hold; 0 for none."""
+
+    def holds(share: float) -> bool:
+        return bool(lost(vessel, share * velocity, trim(vessel, share * velocity)) <= STEADY)
+
+    if holds(1.0):
+        return 1.0
+    high, low = 1.0, next((share for share in SHARES if holds(share)), 0.0)
+    while low and high - low > 1e-4 * low:
+        middle = (low + high) / 2
+        low, high = (middle, high) if holds(middle) else (low, middle)
+    return low
+
+
+def motion_text(velocity: Array) -> str:
+    """A velocity (3,) for messages."""
+    turn = f", r = {velocity[2]:.4g} rad/s" if velocity[2] else ""
+    return f"u = {velocity[0]:.4g} m/s, v = {velocity[1] + 0.0:.4g} m/s{turn}"
+
+
+def reach_text(vessel: Vessel, velocity: Array) -> str:
+    """What of a velocity (3,) the actuators hold, for messages."""
+    share = held_share(vessel, velocity)
+    return f"in that direction they reach {motion_text(share * velocity)}" if share else "they reach nothing like it"
 
 
 def _direct_trim(vessel: Vessel, velocity: Array) -> Array:

@@ -10,11 +10,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.optimize import brentq, root
 
-from expdesign.errors import InputError, UnknownName
+from expdesign.errors import InputError, SpeedOutOfReach, UnknownName
 from expdesign.simulation.actuation import past_deadband
 from expdesign.values import Array, seal
 from expdesign.vessel import SCALAR, Actuator, Limit, Vessel
@@ -240,12 +241,31 @@ def _engine_order(helm: Helm, speed: float) -> float:
         return helm.acceleration((speed, 0.0, 0.0), drive, 0.0)[0]
 
     idle, full = gain(0.0), gain(1.0)
-    if full < -STEADY * speed or idle > STEADY * speed:
-        found = f"loses {-full:.3g} m/s2 at full ahead" if full < 0 else f"gains {idle:.3g} m/s2 without thrust"
-        raise InputError(f"vessel {helm.vessel.name!r} cannot hold {speed:g} m/s: it {found}; choose another speed")
+    named = f"vessel {helm.vessel.name!r} cannot hold {speed:g} m/s"
+    if full < -STEADY * speed:
+        reached = _fastest(helm, speed)
+        raise SpeedOutOfReach(
+            f"{named}: it loses {-full:.3g} m/s2 at full ahead and reaches {reached:.4g} m/s; choose another speed",
+            reached_mps=reached,
+        )
+    if idle > STEADY * speed:
+        raise InputError(f"{named}: it gains {idle:.3g} m/s2 without thrust; choose another speed")
     if idle * full >= 0:
         return 0.0 if abs(idle) <= abs(full) else 1.0
     return float(brentq(gain, 0.0, 1.0, xtol=1e-14))
+
+
+def _fastest(helm: Helm, below: float) -> float:
+    """The largest steady speed under one that full ahead does not hold [m/s], 0 where there is none."""
+
+    def gain(speed: float) -> float:
+        return helm.acceleration((speed, 0.0, 0.0), 1.0, 0.0)[0]
+
+    grid = np.linspace(below, 0.0, 101)
+    for high, low in pairwise(grid.tolist()):
+        if gain(low) > 0:
+            return float(brentq(gain, low, high, xtol=1e-12))
+    return 0.0
 
 
 def _balance(helm: Helm, speed: float, drive: float) -> tuple[float, float, float]:

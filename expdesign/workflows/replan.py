@@ -16,7 +16,7 @@ from expdesign.conventions import to_n_frame
 from expdesign.dictionary import build_primitive
 from expdesign.dictionary.spec import PrimitiveSpec
 from expdesign.durations import DurationDesign, efficiencies
-from expdesign.errors import Diverged, FileError, InputError, NoAnswer, UnknownName
+from expdesign.errors import Diverged, FileError, InputError, NoAnswer, UnknownName, Unreachable
 from expdesign.estimation.tables import with_depth
 from expdesign.export import vessel_toml, write_files
 from expdesign.export.known import Known, replan_json
@@ -289,7 +289,7 @@ def _possible(
         try:
             build_primitive(ship, spec)
             kept.append(spec)
-        except (InputError, Diverged) as error:
+        except (InputError, Diverged, Unreachable) as error:
             if spec.name in needed:
                 raise
             why = str(error)
