@@ -211,8 +211,8 @@ class Case:
 
 
 def drawn_case(ship: str, seed: int, rng: np.random.Generator) -> Case:
-    """Manoeuvres and their lengths: 20 to 30 minutes."""
-    batches = int(rng.integers(4, 8))
+    """Manoeuvres and their lengths: 20 to 30 minutes in 8 to 12 runs."""
+    batches = int(rng.integers(8, 13))
     return Case(
         ship=ship, seed=seed, manoeuvre=str(rng.choice(list(sea.MANOEUVRES))), batches=batches,
         samples=int(rng.uniform(1200, 1800) / batches),
