@@ -66,7 +66,7 @@ def held_out(found: Fit | None, ship: Extended, windows: Windows, tell: Callable
         test = np.isin(unit, fold)
         model = ship if found is None or test.all() else _fitted(found, windows, ~test)
         part = windows.picked(test)
-        motion = simulate_from_first(model, part)
+        motion = simulate_from_first(model, part, None if found is None else found.linear.picked(test))
         some = sums(motion.error[..., columns], part.measured[..., columns])
         for which, rows in zip((lost, spread), some, strict=True):
             np.add.at(which, np.searchsorted(names, unit[test]), rows)
@@ -78,7 +78,7 @@ def _fitted(found: Fit, windows: Windows, train: NDArray[np.bool_]) -> Extended:
     try:
         return fit(
             found.ship, windows.picked(train), free, starts=found.starts[train], noise=found.noise, steps=1,
-            colour_order=found.noise.order,
+            colour_order=found.noise.order, near=found.linear.picked(train),
         ).ship  # fmt: skip
     except (FloatingPointError, np.linalg.LinAlgError):
         return found.ship

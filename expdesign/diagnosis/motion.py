@@ -7,9 +7,10 @@ the simulated path; all causes share one linearisation, so hundreds of them cost
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from expdesign.diagnosis.extended import Extended
 from expdesign.diagnosis.observed import averaged, observed
@@ -156,6 +157,18 @@ class Linear:
     onward: Array
     driven: Array
     slopes: Array
+
+    def picked(self, keep: NDArray[np.bool_]) -> Linear:
+        """Only some of the windows, by a mask (w,)."""
+        motion = replace(
+            self.motion,
+            windows=self.motion.windows.picked(keep),
+            around=Surroundings({name: values[keep] for name, values in self.motion.around.items()}),
+            states=self.motion.states[keep],
+            turned=self.motion.turned[keep],
+            shown=self.motion.shown[keep],
+        )
+        return Linear(motion=motion, onward=self.onward[keep], driven=self.driven[keep], slopes=self.slopes[:, keep])
 
 
 def linearise(motion: Motion) -> Linear:
