@@ -12,7 +12,7 @@ from expdesign.diagnosis.extension import as_extended, extend
 from expdesign.diagnosis.joint import fit
 from expdesign.diagnosis.motion import linearise, push_of, responses, simulate_windows
 from expdesign.diagnosis.noise import FLOOR, Noise, fit_colour, hats, whitened
-from expdesign.diagnosis.screening import Scored
+from expdesign.diagnosis.screening import Scored, _effective_tests
 from expdesign.diagnosis.search import Step, settled, superfluous
 from expdesign.diagnosis.windows import cut_windows
 
@@ -36,6 +36,42 @@ def test_linear_answers_are_differences_of_simulations():
             answer = responses(linear, [push_of(linear, changed, 1.0)])[0]
             difference = simulate_windows(changed, windows, start).shown - motion.shown
             assert np.abs(answer - difference).max() < 0.02 * np.abs(difference).max(), (ship, key)
+
+
+def test_all_steps_at_once_are_the_steps_one_by_one():
+    """Newton's method over all steps ends where Runge-Kutta goes, near and far from the motion it begins with."""
+    for ship in ("barge", "tug", "coaster"):
+        extended, windows = case(ship)
+        start = first_states(windows)
+        near = linearise(simulate_windows(extended, windows, start))
+        for effects in ({"gain": 0.01}, {"gain": -0.4, "inertia:v": 0.5}, {"lag:all": 6.0, "current:north": 0.5}):
+            changed = extended.having(effects)
+            one = simulate_windows(changed, windows, start + 0.1)
+            other = simulate_windows(changed, windows, start + 0.1, near=near)
+            assert np.abs(one.states - other.states).max() < 1e-7, (ship, effects)
+            assert np.abs(one.turned - other.turned).max() < 1e-6, (ship, effects)
+
+
+def test_shortened_windows_hold_the_same_data():
+    """Every measurement once, each with the inputs and the heading that it had."""
+    extended, windows = case("barge")
+    short = windows.shortened(40)
+    assert short.measured.shape[1] == 38  # 150 samples in four windows
+    assert np.isclose(np.nansum(short.measured), np.nansum(windows.measured))
+    motion = simulate_windows(extended, windows, first_states(windows))
+    joints = motion.states[short.batch.astype(int), short.first.astype(int)]
+    again = simulate_windows(extended, short, joints)
+    errors = [np.sort(item.error[..., :3][np.isfinite(item.error[..., :3])]) for item in (motion, again)]
+    assert np.allclose(*errors, atol=1e-9)
+
+
+def test_causes_have_equal_shares_of_false_alarms():
+    """One candidate against twenty, all independent: closed forms; quantiles of 2000 draws have 10 % standard error."""
+    halves = [(np.array([index]), np.ones((1, 1))) for index in range(21)]
+    factors = _effective_tests(np.eye(21), halves, ["one", *["many"] * 20], np.random.default_rng(0))
+    every = 0.05 / (1 - 0.95**0.5)
+    assert np.allclose(factors[0], every, rtol=0.4)
+    assert np.allclose(factors[1:], every * 0.05 / (1 - 0.95**0.05), rtol=0.4)
 
 
 def test_colour_of_an_autoregression_with_the_white_floor_is_whitened():
