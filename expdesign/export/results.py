@@ -226,7 +226,6 @@ def _promise_entry(promise: Promise | None) -> dict[str, Any] | None:
         "extra_time_95_s": _finite(promise.extra_most_s),
         "goes_round_at_most": promise.rounds,
         "run_begins_within": {
-            "position_m": promise.position_m,
             "heading_rad": promise.heading_rad,
             "velocity_mps": promise.speed_mps,
             "yaw_rate_radps": promise.yaw_rate_radps,
@@ -241,6 +240,7 @@ def _sailed_entry(plan: Plan, index: int) -> dict[str, float | None]:
     leg = plan.promise.legs[index]
     return {
         "leave_water_probability": leg.left,
+        "begins_within_m": leg.position_m,
         "aborted_share": leg.aborted,
         "goes_round_mean": leg.rounds,
         "sailed_median_s": leg.median_s,

@@ -12,7 +12,7 @@ import numpy as np
 from expdesign.plan._ompl import dubins_curve
 from expdesign.plan.fleet import Fleet
 from expdesign.plan.leg_values import LegWater
-from expdesign.plan.run_up import MISSED, ROUNDS, planned_stretch, run_up, tolerances, under_way
+from expdesign.plan.run_up import AFTER, MISSED, ROUNDS, Tolerances, planned_stretch, run_up, under_way
 from expdesign.plan.steering import CATCH_UP, LEAD, Helmsman, Reference
 from expdesign.plan.ways_back import Convoy, WaysTo, build_ways_to
 from expdesign.values import Array
@@ -56,20 +56,30 @@ class Pilot:
     """Steers a fleet along one planned leg, and round to its run-up where need be."""
 
     def __init__(
-        self, helm: Helmsman, water: LegWater, track: Array, *, sailing: np.ndarray, inputs: Array, last: bool
+        self,
+        helm: Helmsman,
+        water: LegWater,
+        track: Array,
+        *,
+        within: Tolerances,
+        sailing: np.ndarray,
+        inputs: Array,
+        last: bool,
     ) -> None:
         """Ships stand wherever they are.
 
         Args:
             helm, water: who steers, and where ways lead.
             track: (k + 1, 6) the planned leg.
+            within: what is in place at its end.
             sailing: (n,) ships that take part.
             inputs: (m,) commands with which the run begins: azimuths keep near their angles.
             last: the leg leads to the goal: coming there is enough.
         """
-        n, planned, runs_up = len(sailing), planned_stretch(helm, track, goes_on=not last), run_up(helm, water, track)
+        after_m = 0.0 if last else max(AFTER * helm.vessel.length_m, within.position_m)
+        n, planned, runs_up = len(sailing), planned_stretch(helm, track, after_m), run_up(helm, water, track, after_m)
         self._helm, self._water, self._inputs, self._last = helm, water, inputs, last
-        self._wanted, self._moves, self._within = track[-1], under_way(helm, track[-1]), tolerances(water)
+        self._wanted, self._moves, self._within = track[-1], under_way(helm, track[-1]), within
         self._reference = Reference(states=np.concatenate([planned.states, runs_up.states]))
         self._first, self._arrival = len(planned.states), len(planned.states) + runs_up.arrival
         length_m = float(np.hypot(*(runs_up.states[0] - track[-1])[:2]))
@@ -120,13 +130,15 @@ class Pilot:
 
     def _at_start(self, states: Array) -> tuple[np.ndarray, np.ndarray]:
         """(n,) whether a ship is as near to the start as it will come this time, and whether it may begin then."""
-        used, at_end = self._within.used(states, self._wanted).max(axis=1), self._sample >= self._end
+        shares, at_end = self._within.used(states, self._wanted), self._sample >= self._end
+        used = shares.max(axis=1)
         if self._last:
             return at_end, at_end
         if not self._moves:
             waited = self._spent > self._limit - self._spare / 2
             return at_end & ((used <= HELD) | ((used <= 1.0) & waited)), used <= 1.0
-        return self._sample >= self._end - 1.0, used <= 1.0
+        gone_by = (self._sample >= self._most) | (shares[:, 0] > 1.0)
+        return (self._sample >= self._end - 1.0) & ((used <= 1.0) | gone_by), used <= 1.0
 
     def _run_up(self, ships: np.ndarray) -> None:
         self.doing[ships] = ON_STRETCH
@@ -139,7 +151,7 @@ class Pilot:
         first, helm = self._reference.states[0, :2], self._helm
         off_m = np.hypot(*(states[:, :2] - first).T)
         leg_s = self._end[0] * helm.vessel.sample_time_s
-        good_m = max(self._within.position_m, MADE_GOOD * CATCH_UP * helm.ship.transit_speed_mps * leg_s)
+        good_m = self._within.position_m + MADE_GOOD * CATCH_UP * helm.ship.transit_speed_mps * leg_s
         strayed = (self.doing == ON_STRETCH) & (off_m > self._within.position_m)
         some = np.flatnonzero(strayed)
         if len(some):
@@ -154,19 +166,22 @@ class Pilot:
         if not len(some):
             return
         self.rounds[some] += 1
-        for ship, way in zip(some, self._tree.find(states[some, :2]), strict=True):
-            if way is not None:
+        ways = self._tree.find(states[some, :2]) if self._helm.sideways else [self._curve(x) for x in states[some]]
+        for ship, way in zip(some, ways, strict=True):
+            if way is None:
+                self._missed[ship] = MISSED.index("no way round")
+            else:
                 self.doing[ship] = ON_WAY
-                self._convoy.set_off(ship, way if self._helm.sideways else self._curved(way, states[ship]))
+                self._convoy.set_off(ship, way)
         sample_m = self._helm.ship.transit_speed_mps * self._helm.vessel.sample_time_s
         self._spent[some] = 0
         self._limit[some] = self._allowed(self._convoy.length_m[some] / sample_m)
 
-    def _curved(self, way: Array, state: Array) -> Array:
-        """(k, 2) the way of a ship that is steered by a helm from a state (6,): its own turns where there is room."""
-        radius, goal = self._helm.ship.turning_radius_m, self._convoy.goal[:3]
-        curve = dubins_curve(state[:3], goal, radius_m=radius, spacing_m=self._helm.vessel.length_m)[:, :2]
-        return curve if self._tree.holds(curve) else way
+    def _curve(self, state: Array) -> Array | None:
+        """(k, 2) the way of a ship that is steered by a helm from a state (6,), on turns that it can sail, or None."""
+        radius, goal, length = self._helm.ship.turning_radius_m, self._convoy.goal, self._helm.vessel.length_m
+        curve = dubins_curve(state[:3], goal[:3], radius_m=radius, spacing_m=length)[:, :2]
+        return curve if self._tree.holds(curve) else None
 
     @property
     def _tree(self) -> WaysTo:
@@ -182,12 +197,17 @@ class Pilot:
     def _next(self, states: Array) -> Array:
         """(n, 6) what is wanted of each ship over the next sample; references move on."""
         on = self.doing == ON_STRETCH
+        wanted = np.zeros((len(on), 6))
+        if (self.doing == ON_WAY).any():
+            wanted = self._convoy.wanted(states)
+        if not on.any():
+            return wanted
         pace = self._reference.abreast(self._sample, states, step_m=self._least_step_m)
         self._sample = np.where(on, np.minimum(self._sample + pace, self._most), self._sample)
         soon = np.minimum(self._sample + self._helm.answer_s / self._helm.vessel.sample_time_s, self._most)
-        wanted = self._reference.at(self._sample)
-        wanted[:, 3:] = self._reference.at(soon)[:, 3:]  # a ship answers late: her speed is asked for beforehand
-        return np.where(on[:, None], wanted, self._convoy.wanted(states))
+        now = self._reference.at(self._sample)
+        now[:, 3:] = self._reference.at(soon)[:, 3:]  # a ship answers late: her speed is asked for beforehand
+        return np.where(on[:, None], now, wanted)
 
     @property
     def _least_step_m(self) -> float:

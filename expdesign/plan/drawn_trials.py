@@ -13,10 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.plan.approach import Pilot, open_loop
+from expdesign.plan.checks import hull_clearance
 from expdesign.plan.fleet import Fleet
 from expdesign.plan.hull_watch import HullWatch
 from expdesign.plan.leg_values import LegWater
-from expdesign.plan.run_up import tolerances
+from expdesign.plan.run_up import Tolerances, tolerances
 from expdesign.plan.steering import Helmsman
 from expdesign.plan.uncertainty import draw_truths
 from expdesign.plan.values import Leg
@@ -38,6 +39,7 @@ class Trials:
         used: (legs, n) largest share of a tolerance used up where a run began; nan where none did.
         missed: (legs, n) number in `MISSED` of what kept ships that gave up from beginning.
         place: (legs, n, 2) where hulls left allowed water; nan where they did not.
+        within: in place at the beginning of each leg.
     """
 
     left: np.ndarray
@@ -47,6 +49,7 @@ class Trials:
     used: Array
     missed: np.ndarray
     place: Array
+    within: tuple[Tolerances, ...]
 
     @property
     def completed(self) -> np.ndarray:
@@ -75,7 +78,7 @@ def sail_trials(
     helm = Helmsman(vessel=vessel, environment=water.environment, ship=water.ship)
     truths = draw_truths(vessel, water.environment, draws, rng)
     fleet = Fleet(vessel, water.environment, truths, state=track[0], standing=np.zeros(len(vessel.limits)), rng=rng)
-    watch, within = HullWatch(area=water.area, vessel=vessel), tolerances(water)
+    watch, within = HullWatch(area=water.area, vessel=vessel), start_tolerances(water, trajectory, legs)
     sailing, felt = np.ones(draws, dtype=bool), np.zeros((draws, 3))
     shape = (len(legs), draws)
     left, aborted = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
@@ -84,7 +87,7 @@ def sail_trials(
     for index, leg in enumerate(legs):
         values = commands.values[leg.first : leg.last]
         if leg.kind == "primitive":
-            used[index] = np.where(sailing, within.used(fleet.states, track[leg.first]).max(axis=1), np.nan)
+            used[index] = np.where(sailing, within[index].used(fleet.states, track[leg.first]).max(axis=1), np.nan)
             poses, begun = open_loop(helm, fleet, values, sailing), sailing & ~fleet.lost
             samples[index] = np.where(sailing, len(values), 0)
         else:
@@ -92,6 +95,7 @@ def sail_trials(
                 helm,
                 water,
                 track[leg.first : leg.last + 1],
+                within=within[min(index + 1, len(legs) - 1)],
                 sailing=sailing,
                 inputs=values[-1],
                 last=index == len(legs) - 1,
@@ -103,4 +107,14 @@ def sail_trials(
         left[index] = sailing & ~np.isnan(place[index, :, 0])
         aborted[index] = sailing & ~begun & ~left[index]
         sailing = sailing & begun & ~left[index]
-    return Trials(left=left, aborted=aborted, rounds=rounds, samples=samples, used=used, missed=missed, place=place)
+    return Trials(
+        left=left, aborted=aborted, rounds=rounds, samples=samples, used=used, missed=missed, place=place, within=within
+    )
+
+
+def start_tolerances(water: LegWater, trajectory: Trajectory, legs: Sequence[Leg]) -> tuple[Tolerances, ...]:
+    """Within which each leg begins; for runs by the room that the hull has round all of the planned run."""
+    clearance = hull_clearance(water.area, trajectory, water.vessel.hull_b)
+    spare = [float(clearance[leg.first : leg.last + 1].min()) - water.clearance_m for leg in legs]
+    runs = [leg.kind == "primitive" for leg in legs]
+    return tuple(tolerances(water, room if run else 0.0) for room, run in zip(spare, runs, strict=True))

@@ -74,6 +74,7 @@ class Fleet:
         self.lost = np.zeros(runs, dtype=bool)
         self._actuators = [_Signal(vessel, column, self.given[:, column]) for column in range(self.given.shape[1])]
         self.delivered = self.given.copy()
+        self._prompt = all(response == IDEAL for response in vessel.responses)
         self._variations = (environment.current_variation, environment.wind_variation)
         self._means = (truths.current_to, truths.wind_to)
         self._varied: list[Array | None] = [None, None]
@@ -83,15 +84,15 @@ class Fleet:
         """One sample with commands (n, m) for the ships that move (n,); the others wait."""
         moving = moving & ~self.lost
         held = np.where(moving[:, None], commands, self.given)
-        rows = [signal.deliver(column, moving) for signal, column in zip(self._actuators, held.T, strict=True)]
-        given = np.stack(rows, axis=1)  # (substeps, m, n)
+        given = held.T[None] if self._prompt else self._delivered(held, moving)  # (substeps or 1, m, n)
         self._program.sea[...] = self._weather()
         self._program.hold(given)
         state = self.states.T
         step_s = self.vessel.sample_time_s / SUBSTEPS
         with np.errstate(over="ignore", invalid="ignore"):
             for part in range(SUBSTEPS):
-                self._program.select(part)
+                if part < len(given):
+                    self._program.select(part)
                 (state,) = rk4_step(self._rates, (state,), step_s)
             settled = np.abs(state[3:]).max(axis=0) < LARGEST_SPEED
         self.lost |= moving & ~settled
@@ -99,6 +100,10 @@ class Fleet:
         self.states = np.where(moved[:, None], state.T, self.states)
         self.given = np.where(moved[:, None], held, self.given)
         self.delivered = np.where(moved[:, None], given.mean(axis=0).T, self.delivered)
+
+    def _delivered(self, held: Array, moving: np.ndarray) -> Array:
+        rows = [signal.deliver(column, moving) for signal, column in zip(self._actuators, held.T, strict=True)]
+        return np.stack(rows, axis=1)
 
     def _rates(self, state: tuple[Array, ...]) -> tuple[Array, ...]:
         return (self._program.rates(state)[0].copy(),)

@@ -24,6 +24,8 @@ ROUNDS = 4
 """Times that a ship goes round for one run before the trial is broken off."""
 OFF_PLACE, OFF_HEADING_RAD, OFF_SPEED, OFF_YAW_RATE = 0.2, float(np.radians(3.0)), 0.1, 0.1
 """Tolerances: in hull lengths; [rad]; in transit speeds; in the largest yaw rate on legs."""
+ROOM_SHARE, FARTHEST_OFF = 0.25, 1.0
+"""Share of the room besides the clearance that the position of a run's start may take up; hull lengths at most."""
 RUN_UP = 3.0
 """Time constants of the way back to the track that a run-up lasts."""
 SHORTER = (1.0, 0.75, 0.5, 0.35, 0.25)
@@ -36,8 +38,8 @@ STRAIGHT = 6.0
 """Hull lengths of the run-up of ships that are steered by a helm."""
 
 
-MISSED = ("position", "heading", "speed", "yaw rate", "time")
-"""What can keep a ship from beginning a run: one of the tolerances, or that she does not come there in time."""
+MISSED = ("position", "heading", "speed", "yaw rate", "time", "no way round")
+"""What can keep a ship from beginning a run: a tolerance, that she does not come there in time, or no way round."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,11 +69,15 @@ class Tolerances:
         )
 
 
-def tolerances(water: LegWater) -> Tolerances:
-    """Of a vessel, by its length and its speeds on legs."""
-    ship = water.ship
+def tolerances(water: LegWater, spare_m: float = 0.0) -> Tolerances:
+    """Of a run, by the vessel's length and its speeds on legs, and by the room there is besides the clearance.
+
+    Information does not depend on where a run begins. So where there is room, a ship need not come back to a place
+    only to begin there: a share of the room may be used up, at most a hull length.
+    """
+    ship, length_m = water.ship, water.vessel.length_m
     return Tolerances(
-        position_m=OFF_PLACE * water.vessel.length_m,
+        position_m=float(np.clip(ROOM_SHARE * spare_m, OFF_PLACE * length_m, FARTHEST_OFF * length_m)),
         heading_rad=OFF_HEADING_RAD,
         speed_mps=OFF_SPEED * ship.transit_speed_mps,
         yaw_rate_radps=OFF_YAW_RATE * max(ship.yaw_rate_radps, ship.spot_rate_radps),
@@ -94,15 +100,15 @@ class Stretch:
         seal(self, states="k 6")
 
 
-def planned_stretch(helm: Helmsman, track: Array, *, goes_on: bool) -> Stretch:
+def planned_stretch(helm: Helmsman, track: Array, after_m: float) -> Stretch:
     """A planned leg (k + 1, 6), which goes on steadily past its end where a run begins there under way."""
-    after = _after(helm, track[-1]) if goes_on and under_way(helm, track[-1]) else 0
+    after = _after(helm, track[-1], after_m)
     more = steady_states(helm, track[-1], np.arange(1, after + 1))
     return Stretch(states=np.concatenate([track, more]), arrival=len(track) - 1)
 
 
-def run_up(helm: Helmsman, water: LegWater, leg: Array) -> Stretch:
-    """The run-up to the end of a planned leg (k + 1, 6).
+def run_up(helm: Helmsman, water: LegWater, leg: Array, after_m: float) -> Stretch:
+    """The run-up to the end of a planned leg (k + 1, 6), and so far past it [m].
 
     Straight, or as the run begins; where no such stretch keeps its clearance, the last of the planned leg itself. A
     run that begins at rest needs none if the ship can go sideways: she comes to a stop on the spot.
@@ -122,7 +128,7 @@ def run_up(helm: Helmsman, water: LegWater, leg: Array) -> Stretch:
             break
     else:
         before = leg[max(0, len(leg) - 1 - round(samples)) : -1]
-    more = steady_states(helm, wanted, np.arange(1, (_after(helm, wanted) if moves else 0) + 1))
+    more = steady_states(helm, wanted, np.arange(1, _after(helm, wanted, after_m) + 1))
     return Stretch(states=np.concatenate([before, wanted[None], more]), arrival=len(before))
 
 
@@ -167,7 +173,9 @@ def slowing(helm: Helmsman, wanted: Array, count: int) -> Array:
     return states
 
 
-def _after(helm: Helmsman, state: Array) -> int:
-    """Samples in which a ship goes `AFTER` lengths, at most half a run-up."""
+def _after(helm: Helmsman, state: Array, after_m: float) -> int:
+    """Samples in which a ship under way goes some metres, at most a run-up; none for one that stands still."""
+    if not under_way(helm, state):
+        return 0
     speed, sample_s = float(np.hypot(*state[3:5])) + 1e-9, helm.vessel.sample_time_s
-    return int(np.ceil(min(AFTER * helm.vessel.length_m / speed, RUN_UP * LEAD * helm.answer_s / 2) / sample_s))
+    return int(np.ceil(min(after_m / speed, RUN_UP * LEAD * helm.answer_s) / sample_s)) if after_m else 0

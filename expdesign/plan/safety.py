@@ -16,15 +16,13 @@ from scipy.stats import beta
 from expdesign.plan.area import SeaArea
 from expdesign.plan.drawn_trials import Trials, sail_trials
 from expdesign.plan.leg_values import LegWater
-from expdesign.plan.run_up import MISSED, ROUNDS, tolerances
+from expdesign.plan.run_up import MISSED, ROUNDS
 from expdesign.plan.values import Leg, LegOutcome, Promise
 from expdesign.signals import Commands, Trajectory
 from expdesign.values import Array
 
 TRIALS = 200
 """Of a plan that is being made."""
-MOST_ABORTED = 0.5
-"""Share of trials broken off from which on a plan is none: the ship in the middle does not come to the goal."""
 MOST = 0.95
 """Share of trials that `most` is about, and confidence of the upper limit."""
 
@@ -43,7 +41,7 @@ def promised(
     The shares' standard errors are sqrt(p (1 - p) / draws).
     """
     trials = sail_trials(water, commands=commands, trajectory=trajectory, legs=legs, draws=draws, rng=rng)
-    within, sample_s = tolerances(water), commands.sample_time_s
+    within, sample_s = trials.within[0], commands.sample_time_s
     gone, done = int(trials.left.any(axis=0).sum()), trials.completed
     extra = (trials.samples.sum(axis=0)[done] - len(commands)) * sample_s
     found = Promise(
@@ -55,7 +53,6 @@ def promised(
         extra_median_s=float(np.median(extra)) if len(extra) else float("nan"),
         extra_most_s=float(np.quantile(extra, MOST)) if len(extra) else float("nan"),
         rounds=ROUNDS,
-        position_m=within.position_m,
         heading_rad=within.heading_rad,
         speed_mps=within.speed_mps,
         yaw_rate_radps=within.yaw_rate_radps,
@@ -82,8 +79,8 @@ def broken_promise(found: Promise, trials: Trials, legs: Sequence[Leg], area: Se
             f"{confidence:g} allows, most of them ({trials.left[worst].mean():.1%}) {described(legs, worst)} near "
             f"{lat:.5f}, {lon:.5f}"
         )
-    if found.aborted > MOST_ABORTED:
-        return f"{found.aborted:.1%} of {found.trials} drawn trials are broken off: {'; '.join(found.reasons)}"
+    if not trials.completed.any():
+        return f"none of {found.trials} drawn trials comes to the goal: broken off {'; '.join(found.reasons)}"
     return ""
 
 
@@ -116,6 +113,7 @@ def _leg_outcome(trials: Trials, index: int, sample_s: float) -> LegOutcome:
     sailed = trials.samples[index] > 0
     times: Array = trials.samples[index][sailed] * sample_s if sailed.any() else np.zeros(1)
     return LegOutcome(
+        position_m=trials.within[index].position_m,
         left=float(trials.left[index].mean()),
         aborted=float(trials.aborted[index].mean()),
         rounds=float(trials.rounds[index][sailed].mean()) if sailed.any() else 0.0,

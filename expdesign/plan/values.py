@@ -81,6 +81,7 @@ class LegOutcome:
             the run that follows.
         rounds: times that a ship went round for the run that follows, on average over those that sailed the leg.
         median_s, most_s: time it took, in the middle and in 95 % of them [s].
+        position_m: distance from the planned start within which a run begins.
     """
 
     left: float
@@ -88,6 +89,7 @@ class LegOutcome:
     rounds: float
     median_s: float
     most_s: float
+    position_m: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,7 +105,7 @@ class Promise:
         extra_median_s, extra_most_s: time beyond the plan's, in the middle and in 95 % of the trials that came to the
             goal [s]; nan when none did.
         rounds: most times that a ship goes round for one run.
-        position_m, heading_rad, speed_mps, yaw_rate_radps: tolerances within which runs begin.
+        heading_rad, speed_mps, yaw_rate_radps: tolerances within which runs begin, besides the position's of each leg.
         legs: what happened on each.
     """
 
@@ -115,7 +117,6 @@ class Promise:
     extra_median_s: float
     extra_most_s: float
     rounds: int
-    position_m: float
     heading_rad: float
     speed_mps: float
     yaw_rate_radps: float

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from expdesign.errors import InputError
-from expdesign.values import Array
+from expdesign.values import Array, readonly
 from expdesign.vessel.actuators import Actuator
 from expdesign.vessel.expressions import NUMPY, Expression
 from expdesign.vessel.model import VesselModel
@@ -42,7 +43,7 @@ def required_force(model: VesselModel, velocity: Array, acceleration: Array) -> 
 
     free = response(np.zeros(3))
     if _same_push_at_any_speed(model):  # one small inverse instead of one for every velocity
-        return np.asarray((acceleration - free) @ np.linalg.pinv(_push_at_rest(model)).T, dtype=float)
+        return np.asarray((acceleration - free) @ _inverse_at_rest(model).T, dtype=float)
     gain = np.stack([response(unit) - free for unit in np.eye(3)], axis=-1)  # (..., 3 outputs, 3 forces)
     return np.asarray((np.linalg.pinv(gain) @ (acceleration - free)[..., None])[..., 0], dtype=float)
 
@@ -57,6 +58,12 @@ def _acting(model: VesselModel) -> list[tuple[Term, Expression, float]]:
     """Terms with their expressions and parameters, those left out that do nothing."""
     rows = zip(model.terms, model.expressions, model.parameters.tolist(), strict=True)
     return [(term, expression, value) for term, expression, value in rows if value != 0.0]
+
+
+@lru_cache(maxsize=16)
+def _inverse_at_rest(model: VesselModel) -> Array:
+    """(3, 3) force for unit accelerations of (u, v, r) at rest."""
+    return readonly(np.linalg.pinv(_push_at_rest(model)))
 
 
 def _push_at_rest(model: VesselModel) -> Array:
@@ -99,6 +106,12 @@ def force_matrix(actuators: tuple[Actuator, ...]) -> Array:
     return np.array(columns).T if columns else np.zeros((3, 0))
 
 
+@lru_cache(maxsize=16)
+def _inverse_force_matrix(actuators: tuple[Actuator, ...]) -> Array:
+    """(c, 3) smallest unit commands for generalised forces."""
+    return readonly(np.linalg.pinv(force_matrix(actuators)))
+
+
 def allocate(
     actuators: tuple[Actuator, ...],
     force: Array,
@@ -119,7 +132,7 @@ def allocate(
         before: (..., m) commands standing before the first row, from which rates count; None for no rate limit there.
         near: (..., m) commands to whose angles azimuths keep as near as they can; None for those of the row before.
     """
-    wished = force @ np.linalg.pinv(force_matrix(actuators)).T  # (..., k, c)
+    wished = force @ _inverse_force_matrix(actuators).T  # (..., k, c)
     bounds = _bounds(actuators, sample_time_s)
     rows, last = [], before
     for row in np.moveaxis(wished, -2, 0):

@@ -14,7 +14,7 @@ from expdesign.export.cards.orders import order_columns, order_rows
 from expdesign.export.report import words
 from expdesign.export.report.content import ReportContent, Run, relative_information
 from expdesign.export.report.tables import settings_sentence
-from expdesign.plan.values import Leg, Promise
+from expdesign.plan.values import Leg, Plan
 from expdesign.values import Array
 from expdesign.vessel import column_name
 
@@ -186,21 +186,23 @@ def _approach(content: ReportContent, first: int) -> list[tuple[str, str]]:
         ("Speed over ground", words.speed(float(np.hypot(*velocity[:2])))),
         ("Sway; yaw rate", f"{sway}{words.NB}m/s; {rate}{words.NB}\N{DEGREE SIGN}/s"),
         ("Steady before", words.duration(steady_s(content, first))),
-        *_within(plan.promise),
+        *_within(plan, first),
     ]
 
 
-def _within(promise: Promise | None) -> list[tuple[str, str]]:
-    """How far from all this a run may begin; nothing where no trials were drawn."""
+def _within(plan: Plan, first: int) -> list[tuple[str, str]]:
+    """How far from all this the run that begins at a sample may begin; nothing where no trials were drawn."""
+    promise = plan.promise
     if promise is None:
         return []
+    off_m = next(item.position_m for leg, item in zip(plan.legs, promise.legs, strict=True) if leg.first == first)
     heading, rate = (
         words.significant(math.degrees(value), 2) for value in (promise.heading_rad, promise.yaw_rate_radps)
     )
     return [
         (
             "Begin within",
-            f"{words.distance(promise.position_m)}; {heading}{words.NB}\N{DEGREE SIGN}; "
+            f"{words.distance(off_m)}; {heading}{words.NB}\N{DEGREE SIGN}; "
             f"{words.number(promise.speed_mps)}{words.NB}m/s; {rate}{words.NB}\N{DEGREE SIGN}/s; else go round",
         )
     ]

@@ -32,7 +32,7 @@ def cards_html(content: ReportContent) -> str:
         depths=bool(content.plan.area.depths),
         chart=overview,
         agenda=tables.agenda(content),
-        procedure=procedure_sentences(content.plan.promise),
+        procedure=procedure_sentences(content.plan),
         day=day_sentence(content.plan.promise, content.plan.commands.duration_s),
         total=words.duration(content.plan.commands.duration_s),
         current=words.current(content.environment.current_to, content.environment.current_std_mps),

@@ -71,7 +71,7 @@ def report_html(content: ReportContent) -> str:
         chain=chain(content, short_of_optimum=criteria.short_of_optimum(content)),
         conditions=conditions(content),
         checks=tables.checks(content),
-        procedure=procedure_sentences(content.plan.promise),
+        procedure=procedure_sentences(content.plan),
         growth=[] if content.growth is None else growth_rows(content.growth),
         grown=("", "") if content.growth is None else growth_sentences(content.growth),
         glossary=GLOSSARY,

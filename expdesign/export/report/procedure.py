@@ -5,14 +5,15 @@ from __future__ import annotations
 import math
 
 from expdesign.export.report import words
-from expdesign.plan.values import Promise
+from expdesign.plan.values import Plan, Promise
 
 
-def procedure_sentences(promise: Promise | None) -> list[str]:
+def procedure_sentences(plan: Plan) -> list[str]:
     """What the crew does between runs, one sentence for each step; none where nothing is promised."""
+    promise = plan.promise
     if promise is None:
         return []
-    within = tolerance_sentence(promise)
+    within = _tolerances(promise, [leg.kind == "primitive" for leg in plan.legs])
     return [
         "Run: give the orders of the card open loop, from the state the ship really has.",
         "After it: come back to the planned leg from wherever the run has ended, and follow it, steered. Where the leg "
@@ -24,10 +25,13 @@ def procedure_sentences(promise: Promise | None) -> list[str]:
     ]
 
 
-def tolerance_sentence(promise: Promise) -> str:
+def _tolerances(promise: Promise, runs: list[bool]) -> str:
     """Within which a run may begin."""
+    off = [leg.position_m for leg, run in zip(promise.legs, runs, strict=True) if run] or [math.nan]
+    least, most = words.distance(min(off)), words.distance(max(off))
+    position = least if least == most else f"what its card says ({least} to {most}, by the room there is)"
     return (
-        f"the position is within {words.distance(promise.position_m)} of the planned start, the heading within "
+        f"the position is within {position} of the planned start, the heading within "
         f"{words.significant(math.degrees(promise.heading_rad), 2)}{words.NB}\N{DEGREE SIGN}, the velocity over ground "
         f"within {words.speed(promise.speed_mps)} and the yaw rate within "
         f"{words.significant(math.degrees(promise.yaw_rate_radps), 2)}{words.NB}\N{DEGREE SIGN}/s of the planned ones"
