@@ -31,6 +31,8 @@ LACKS = {
     "roll_coupling": "an oscillation like roll",
     "change_point": "a change of the ship on the way",
 }
+VISIBLE = 0.01
+"""Share of an error below which its fall is not worth a number."""
 WORDS = {"u": "surge", "v": "sway", "r": "yaw"}
 MANOEUVRES = {
     "zigzag": "a zig-zag", "zigzag_long": "a long zig-zag", "turning_circle": "a turning circle",
@@ -88,8 +90,8 @@ def worth(item: Finding) -> str:
         return f"gains {item.gain:.1f} points of fit"
     best = max(known, key=lambda fall: fall.share)
     interval = f"({_percent(best.low)} to {_percent(best.high)} %)"
-    if best.share <= 0:
-        return f"leaves the {WORDS[best.output]} error as it is, {interval} of it less"
+    if best.share < VISIBLE:
+        return "takes no whole per cent off any error, as its test sees more than noisy velocities show"
     way = "halves" if abs(best.share - 0.5) < 0.025 else "cuts"
     by = "" if way == "halves" else f" by {_percent(best.share)} %"
     return f"{way} the {WORDS[best.output]} error{by} {interval}"

@@ -1,0 +1,64 @@
+"""The one sentence of a diagnosis says what is lacking, by how much which error falls, and what would tell."""
+
+import numpy as np
+import pytest
+
+from expdesign.diagnosis import CAUSES
+from expdesign.diagnosis.gain import HeldOut
+from expdesign.diagnosis.values import Accuracy, Fall, Finding
+from expdesign.diagnosis.verdict import LACKS, error_falls, verdict
+
+OUTPUTS = ("u", "v", "r")
+BEFORE = Accuracy(
+    outputs=OUTPUTS, fit=np.array([60.0, 55.0, 90.0]), rmse=np.ones(3), bias=np.zeros(3), horizons_s=np.zeros(0),
+    growth=np.zeros((0, 3)), per_batch=np.zeros((1, 3)),
+)  # fmt: skip
+
+
+def finding(cause: str, falls=((0.1, 0.0, 0.2), (0.5, 0.42, 0.58), (0.0, -0.1, 0.1)), rivals=(), telling=None):
+    return Finding(
+        cause=cause, estimates=(), p_value=1e-6, fit_before=np.zeros(3), fit_after=np.ones(3),
+        falls=tuple(Fall(output=n, share=s, low=a, high=b) for n, (s, a, b) in zip(OUTPUTS, falls, strict=True)),
+        gain=1.0, gain_interval=(0.5, 1.5), not_distinguishable_from=tuple(rivals), would_tell_apart=telling,
+        explanation="", suspect="time", worth=30.0,
+    )  # fmt: skip
+
+
+def test_a_cause_with_a_rival_is_told_whole():
+    assert verdict([finding("wind", rivals=["current"], telling="turning_circle")], BEFORE) == (
+        "The simulation lacks wind; adding it halves the sway error (42 to 58 %) on runs it has not seen; a turning "
+        "circle would tell wind from a current, which explains this data as well."
+    )
+
+
+def test_several_causes_each_have_their_own_number():
+    some = [finding("missing_term:Y_r"), finding("gyro_scale", falls=((0.0, 0, 0), (0.0, 0, 0), (0.3, 0.25, 0.36)))]
+    assert verdict(some, BEFORE) == (
+        "The simulation lacks the term Y_r and the scale of the rate gyro; on runs it has not seen, adding the term "
+        "Y_r halves the sway error (42 to 58 %) and the scale of the rate gyro cuts the yaw error by 30 % (25 to 36 %)."
+    )
+
+
+@pytest.mark.parametrize("share", [0.004, 0.0, -0.02])
+def test_what_no_picture_shows_is_not_given_a_number(share):
+    text = verdict([finding("current", falls=((share, -0.1, 0.1),) * 3)], BEFORE)
+    assert "takes no whole per cent off any error" in text
+
+
+def test_nothing_found_says_how_good_it_is_and_a_lost_one_that_it_is_lost():
+    assert verdict([], BEFORE).startswith("Nothing is wrong that this data can show: it accounts for 60 % of surge")
+    lost = Accuracy(**{**vars(BEFORE), "fit": np.array([-66608676.0, 50.0, 10.0])})
+    assert "parts from the ship altogether" in verdict([], lost)
+    assert "66608676" not in verdict([], lost)
+
+
+def test_every_cause_of_the_catalogue_has_words():
+    assert {cause.name for cause in CAUSES} - {"missing_term"} == set(LACKS)
+
+
+def test_the_fall_of_an_error_is_that_of_its_root_mean_square():
+    before = HeldOut(lost=np.array([[4.0, 1.0], [12.0, 1.0]]), spread=np.ones((2, 2)))
+    after = HeldOut(lost=np.array([[1.0, 1.0], [3.0, 1.0]]), spread=np.ones((2, 2)))
+    falls = error_falls(("u", "v"), before, after, np.random.default_rng(0))
+    assert [fall.share for fall in falls] == pytest.approx([0.5, 0.0])
+    assert [(fall.low, fall.high) for fall in falls] == [pytest.approx((0.5, 0.5)), pytest.approx((0.0, 0.0))]
