@@ -6,7 +6,7 @@ import pytest
 import shapely
 from scenario_files import collection, feature, spoil, square, square_chart, write_scenario
 
-from expdesign.errors import FileError
+from expdesign.errors import FileError, NoPlan
 from expdesign.scenario import load_area, load_scenario
 
 BOW_TIE = [[0.001, 0.001], [0.003, 0.003], [0.003, 0.001], [0.001, 0.003], [0.001, 0.001]]
@@ -237,6 +237,65 @@ def test_depth_layers_admit_only_water_deep_enough_for_draught_and_margin(tmp_pa
     assert not loaded.land.intersects(wreck)
     spoil(path, "depth_layers = {seabed5m = 5.0, seabed20m = 20}", "")
     assert load_area(path, draught_m=50.0).depth_rule.startswith("Depth is not checked")
+
+
+def _of_depth(depth_m, ring, **properties):
+    return {**feature("sea", ring), "properties": {"DRVAL1": depth_m, **properties}}
+
+
+def _with_keys(area, *lines):
+    area.write_text('[area]\nname = "a"\n[chart]\ngeojson = "chart.geojson"\n' + "\n".join(lines), encoding="utf-8")
+
+
+def test_areas_with_a_depth_of_their_own_admit_water_deep_enough_and_the_least_depth_counts(area):
+    """As electronic charts give them; beside them, features without a depth are land."""
+    _with_keys(area, 'depth_property = "DRVAL1"')
+    island = {**feature("x", square(0.001, lon_deg=0.004)), "properties": {"DRVAL1": None, "name": "islet"}}
+    deep, shoal = _of_depth(10, square(0.01)), _of_depth(1.5, square(0.002))
+    loaded = _water(area, collection(deep, shoal, _of_depth(20.0, square(0.001)), island))
+    by_hand = shapely.Polygon(square(0.01)).difference(
+        shapely.union_all([shapely.Polygon(ring) for ring in (square(0.002), square(0.001, lon_deg=0.004))])
+    )
+    assert loaded.water.area == pytest.approx(by_hand.area * 111_319.49 * 110_574.4, rel=1e-4)
+    assert len(loaded.land.geoms) == 1
+    assert loaded.depth_rule.startswith("Allowed water lies where DRVAL1 is at least 10 m for 1 m draught")
+    assert [depth for depth, _ in loaded.depths] == [1.5, 10, 20]
+    only_depths = _water(area, collection(deep, shoal))
+    assert only_depths.land.is_empty
+    with pytest.raises(NoPlan, match=r"chart.depth_property: no layer is as deep as .*the deepest is 'DRVAL1 = 10'"):
+        load_area(area, draught_m=30.0)
+
+
+def test_the_layer_may_stand_under_another_name(area):
+    """The same chart with its layers under another property is the same water; what is none is told with known ones."""
+    rings = [square(0.02), square(0.008)]
+    plain = _water(area, collection(feature("land", *rings), feature("sea", square(0.001))))
+    _with_keys(area, 'layer_property = "objectType"')
+    named = [
+        {**feature("x", *part), "properties": {"objectType": name}}
+        for name, part in (("land", rings), ("sea", [square(0.001)]))
+    ]
+    assert _water(area, collection(*named)).water.equals(plain.water)
+    _with_keys(area, 'depth_property = "DRVAL"')
+    _write(area, collection(_of_depth(10, square(0.01))))
+    with pytest.raises(FileError, match=r"chart.depth_property: is 'DRVAL', .*DRVAL1"):
+        load_area(area, draught_m=1.0)
+    _with_keys(area, 'depth_property = "DRVAL1"', "depth_layers = {sea = 5.0}")
+    with pytest.raises(FileError, match=r"chart.depth_property: stands beside depth_layers"):
+        load_area(area, draught_m=1.0)
+    _with_keys(area, 'depth_property = "DRVAL1"')
+    _write(area, collection(_of_depth("ten", square(0.01))))
+    with pytest.raises(FileError, match=r"feature 1 .*has DRVAL1 = 'ten', expected a depth in metres"):
+        load_area(area, draught_m=1.0)
+
+
+def test_a_chart_without_layers_says_that_all_of_it_counts_as_land(area):
+    """Depth areas of a chart whose layers are not named would else only be a puzzle."""
+    _write(area, collection(_of_depth(10, square(0.01))))
+    with pytest.raises(
+        NoPlan, match=r"all of it is land; chart.geojson: no feature names its layer, so 1 count as land"
+    ):
+        load_area(area, draught_m=1.0)
 
 
 def test_chart_edges_are_straight_in_latitude_and_longitude(area):

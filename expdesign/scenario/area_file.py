@@ -59,7 +59,7 @@ def load_area(path: Path | str, *, draught_m: float) -> SeaArea:
             source=source,
         )
     except NoPlan as error:
-        raise NoPlan(f"{path}: {error}") from None
+        raise NoPlan("; ".join((f"{path}: {error}", *found.notes))) from None
 
 
 def _open_chart(file: AreaTable, draught_m: float, given: Box | None, entry: Entry) -> OpenChart:

@@ -24,7 +24,9 @@ class ChartTable(Table):
     geojson: Text | None = None
     s57: Text | None = None
     land_layers: list[Text] = Field(default=["land"])
+    layer_property: Text = "layer"
     depth_layers: dict[str, Number] | None = None
+    depth_property: Text | None = None
     hazard_margin_m: Positive = 25.0
     air_draught_m: Positive | None = None
     notice: str = ""

@@ -1,13 +1,13 @@
 """GeoJSON files to features and the rings of their polygons; nothing about geometry is judged here.
 
-Source of the format: RFC 7946; the layer of a feature is its property "layer".
+Source of the format: RFC 7946; which of its properties names the layer of a feature, the caller says.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -27,17 +27,25 @@ class Feature:
         entry: the file and the number of the feature in it, from 1.
         layer: name of its layer.
         geometry: the GeoJSON geometry.
+        properties: what else the file says of it.
+        assumed: the file names no layer at all, so that all is taken to be land.
     """
 
     entry: Entry
     layer: str
     geometry: Mapping[str, Any]
+    properties: Mapping[str, Any] = field(default_factory=dict)
+    assumed: bool = False
 
 
-def read_features(path: Path) -> tuple[Feature, ...]:
+def read_features(path: Path, *, layer_property: str = "layer") -> tuple[Feature, ...]:
     """The features of a GeoJSON file: a FeatureCollection, a Feature or a bare geometry.
 
     Bare geometries, and features of a file in which none names a layer, are land.
+
+    Args:
+        path: the file.
+        layer_property: the property that names the layer of a feature.
 
     Raises:
         FileError: unreadable, not GeoJSON, not in longitude and latitude, or without features.
@@ -54,7 +62,7 @@ def read_features(path: Path) -> tuple[Feature, ...]:
     rows = content.get("features") if kind == "FeatureCollection" else [content]
     if not isinstance(rows, list):
         raise entry.at("features").error("is missing or no list, expected a list of features")
-    features = tuple(_features(rows, path))
+    features = tuple(_features(rows, path, layer_property))
     if not features:
         raise entry.at("features").error("is empty, expected at least one polygon")
     return features
@@ -107,16 +115,16 @@ def _check_reference_system(content: Mapping[str, Any], entry: Entry) -> None:
         raise entry.error(f"is {shown(name)}, expected longitude and latitude in WGS84 (CRS84)")
 
 
-def _features(rows: list[Any], path: Path) -> Iterator[Feature]:
+def _features(rows: list[Any], path: Path, key: str) -> Iterator[Feature]:
     """Features that have a geometry."""
-    named = any(_layer(row) is not None for row in rows)
+    named = any(_properties(row).get(key) is not None for row in rows)
     for number, row in enumerate(rows, start=1):
         entry = Entry(path, f"feature {number}")
         if not isinstance(row, dict) or row.get("type") != "Feature":
             raise entry.error("is no GeoJSON feature, expected an object with type 'Feature'")
-        layer = _layer(row) if named else LAYER_OF_BARE_POLYGONS
+        layer = _properties(row).get(key) if named else LAYER_OF_BARE_POLYGONS
         if not isinstance(layer, str):
-            found = "has no property 'layer'" if layer is None else f"has the layer {shown(layer)}"
+            found = f"has no property {key!r}" if layer is None else f"has the {key} {shown(layer)}"
             raise entry.error(f"{found}, expected the name of its layer")
         geometry = row.get("geometry")
         if geometry is None:
@@ -124,12 +132,12 @@ def _features(rows: list[Any], path: Path) -> Iterator[Feature]:
         if not isinstance(geometry, dict) or geometry.get("type") not in GEOMETRY_TYPES:
             found = shown(geometry.get("type") if isinstance(geometry, dict) else geometry)
             raise entry.error(f"has a geometry of type {found}, expected Polygon or MultiPolygon")
-        yield Feature(_named(path, number, layer), layer, geometry)
+        yield Feature(_named(path, number, layer), layer, geometry, _properties(row), assumed=not named)
 
 
-def _layer(row: object) -> object:
+def _properties(row: object) -> Mapping[str, Any]:
     properties = row.get("properties") if isinstance(row, dict) else None
-    return properties.get("layer") if isinstance(properties, dict) else None
+    return properties if isinstance(properties, dict) else {}
 
 
 def _named(path: Path, number: int, layer: str) -> Entry:

@@ -21,6 +21,7 @@ from expdesign.scenario.metres import Box, around, in_metres
 from expdesign.scenario.s57 import BUOYS, DANGERS, DEPTHS, OVERHEAD, SOLID, Cell, Feature57, read_cell
 from expdesign.scenario.tables import Entry
 
+GEOJSON_ONLY = ("land_layers", "layer_property", "depth_layers", "depth_property")
 THIN_M = 1.0
 """Half the width given to walls and pontoons drawn as lines."""
 
@@ -42,7 +43,7 @@ class CellRules:
 
 def open_cell(file: AreaTable, *, draught_m: float, entry: Entry) -> OpenChart:
     """The cell that an area file names with `chart.s57`."""
-    for name in [name for name in ("land_layers", "depth_layers") if name in file.chart.model_fields_set]:
+    for name in [name for name in GEOJSON_ONLY if name in file.chart.model_fields_set]:
         raise entry.at(name).error("stands beside s57, expected it with geojson only: a cell knows its own layers")
     path = entry.at("s57").file(file.chart.s57 or "")
     cell = read_cell(path)
