@@ -23,7 +23,7 @@ def mean_of_runs(rng: np.random.Generator, *, runs: int = RUNS, apart: float = A
     m = marginal(grams(columns, noise), columns, noise)
     return Fit(
         ship=None, keys=("mean",), free=1, covariance=np.linalg.inv(m.A), starts=np.zeros((runs, 3)), noise=noise,
-        cost=0.0, linear=None, columns=columns, precision=np.zeros(1),
+        cost=0.0, linear=None, columns=columns, precision=np.zeros(1), converged=True,
     )  # type: ignore[arg-type]  # fmt: skip
 
 

@@ -89,7 +89,7 @@ def opening(base: Fit, scored: Scored) -> Opening:
     searched = None if candidate.grid is None else _searched(base, scored)
     fixed = dict(candidate.fixed) if searched is None else {**candidate.fixed, searched[0]: searched[1]}
     start = dict(candidate.free) if candidate.finite else {key: base.ship.get(key) for key in candidate.free}
-    extra = tuple(key for key in ("roll:period",) if key in candidate.fixed)
+    extra = tuple(key for key in ("roll:period", "roll:damping") if key in candidate.fixed)
     keys = tuple(key for key in (*candidate.free, *extra) if searched is None or key != searched[0])
     return Opening(
         scored=scored,

@@ -152,7 +152,7 @@ def cut_windows(model: VesselModel, record: Record, *, longest_s: float | None =
         index = np.minimum(np.arange(low * between, (low + size) * between), high * between - 1)
         rows["batch"].append(np.array(float(b)))
         rows["first"].append(np.array(float(low * between)))
-        rows["measured"].append(_filled(part.measured("r" in derived)[low:high], size))
+        rows["measured"].append(_filled(part.measured(derived)[low:high], size))
         rows["heading"].append(part.heading[index])
         rows["wind"].append(part.wind[index])
         rows["depth_m"].append(part.depth[index])
@@ -200,13 +200,22 @@ class _Part:
         depth = np.full(len(batch), np.inf) if batch.depth_m is None else batch.depth_m
         self.depth = self._between(self._centred(depth))
 
-    def measured(self, derived: bool) -> Array:
-        """(s, 4) channels; the heading tells nothing more where the yaw rate is derived from it."""
-        velocity = self._centred(self.batch.velocity)
-        rate = np.full(len(self.batch), np.nan)
-        if not derived and self.batch.pose is not None and len(self.batch) > 2:
-            rate[1:-1] = (self.batch.pose[2:, 2] - self.batch.pose[:-2, 2]) / (2 * self.batch.sample_time_s)
-        return np.column_stack([velocity, self._centred(rate)])
+    def measured(self, derived: tuple[str, ...]) -> Array:
+        """(s, 4) channels; the heading tells nothing more where the yaw rate is derived from it.
+
+        What comes from the pose is compared as central differences, however it was smoothed: smoothing leaves an error
+        whose colour no short filter undoes. Means over too few samples, at the ends, are left out.
+        """
+        velocity, rate = self.batch.velocity.copy(), np.full(len(self.batch), np.nan)
+        if self.batch.pose is not None and len(self.batch) > 2:
+            rates = central_difference(self.batch.pose, self.batch.sample_time_s)
+            columns = [OUTPUTS.index(name) for name in derived]
+            velocity[1:-1, columns] = rates[:, columns]
+            rate[1:-1] = np.nan if "r" in derived else rates[:, 2]
+        channels = self._centred(np.column_stack([velocity, rate]))
+        middle = self.merged * np.arange(len(channels))
+        channels[(middle < self.merged // 2) | (middle >= len(self.batch) - self.merged // 2)] = np.nan
+        return channels
 
     def _blocks(self, values: Array) -> Array:
         """Held inputs averaged over the samples that one step of comparison takes."""
