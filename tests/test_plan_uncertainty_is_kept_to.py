@@ -9,11 +9,15 @@ from plan_case import area, ship
 from test_plan_verification_catches_what_is_wrong import primitive
 
 from expdesign.errors import NoPlan
+from expdesign.plan.approach import open_loop
+from expdesign.plan.capability import capability
+from expdesign.plan.fleet import Fleet
 from expdesign.plan.footprint import covering_discs
-from expdesign.plan.safety import leave_water_probability
-from expdesign.plan.uncertainty import stray_m
-from expdesign.plan.values import Leg
-from expdesign.simulation import CALM, Environment
+from expdesign.plan.hull_watch import HullWatch
+from expdesign.plan.steering import Helmsman
+from expdesign.plan.uncertainty import draw_truths, stray_m
+from expdesign.plan.values import PlanSettings
+from expdesign.simulation import CALM, Environment, Variation
 
 CENTRES = covering_discs(30.0, 9.0)[0]
 
@@ -51,6 +55,17 @@ def test_an_uncertain_current_strays_like_its_rayleigh_quantile():
     assert exact * 0.85 - 4 * error < end < exact + 4 * error
 
 
+def test_a_current_that_never_changes_while_it_varies_strays_like_an_uncertain_one():
+    # a process that forgets nothing is a mean drawn once: the same current, known in another way
+    vessel = certain(ship())
+    held = Environment(current_variation=Variation(std_mps=0.05, correlation_s=1e9))
+    draws, confidence = 4000, 0.9
+    drawn, varied = stray(vessel, Environment(current_std_mps=0.05), draws=draws), stray(vessel, held, draws=draws)
+    density = (1 - confidence) * np.sqrt(-2 * np.log(1 - confidence)) / (60.0 * 0.05)
+    error = np.sqrt(confidence * (1 - confidence) / draws) / density
+    assert abs(drawn[-1] - varied[-1]) < 4 * np.sqrt(2) * error
+
+
 def test_higher_confidence_needs_more_room():
     low, high = stray(ship(), confidence=0.5), stray(ship(), confidence=0.99)
     assert (high[1:] > low[1:]).all()
@@ -65,19 +80,15 @@ def test_a_prior_of_unstable_ships_is_refused_with_its_reason():
 
 
 def leave(vessel, water, environment=CALM, draws=400):
-    run = primitive(vessel)
-    total, by_leg = leave_water_probability(
-        vessel,
-        area(water),
-        environment,
-        commands=run.commands,
-        trajectory=run.trajectory,
-        legs=(Leg(kind="primitive", name="go", first=0, last=len(run.commands)),),
-        rng=np.random.default_rng(1),
-        draws=draws,
-    )
-    assert by_leg == (total,)
-    return total
+    """Share of drawn ships whose hull leaves the water in an acceleration from the origin, sailed open loop."""
+    run, rng = primitive(vessel), np.random.default_rng(1)
+    truths = draw_truths(vessel, environment, draws, rng)
+    state, standing = np.r_[run.trajectory.pose[0], run.trajectory.velocity[0]], run.entry_inputs
+    fleet = Fleet(vessel, environment, truths, state=state, standing=standing, rng=rng)
+    helm = Helmsman(vessel=vessel, environment=environment, ship=capability(vessel, PlanSettings()))
+    poses = open_loop(helm, fleet, run.commands.values, np.ones(draws, dtype=bool))
+    watch = HullWatch(area=area(water), vessel=vessel)
+    return float((fleet.lost | ~np.isnan(watch.leaves(poses)[:, 0])).mean())
 
 
 def test_a_certain_ship_leaves_never_or_always():
