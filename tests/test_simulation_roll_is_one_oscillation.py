@@ -107,6 +107,8 @@ def test_what_does_not_follow_roll_says_so(tmp_path):
         estimate(record, SHIP.model)
     with pytest.raises(InputError, match=r"roll mode.*does not follow"):
         ROLL.rates((0.0, 0.0, 0.0), 0.0, ())
+    with pytest.raises(InputError, match="expected integrator rk4"):
+        simulate(SHIP, COMMANDS, integrator="euler", substeps=1)
     with pytest.raises(InputError, match="period_s is -1"):
         replace(ROLL, period_s=-1.0)
     scenario, vessel = tmp_path / "scenario.toml", tmp_path / "vessel.toml"

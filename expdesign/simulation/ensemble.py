@@ -111,8 +111,9 @@ def simulate_ensemble(
     Raises:
         ShapeError: inputs that do not fit.
         UnknownName: no such integrator.
+        InputError: Euler's map for a model that rolls.
     """
-    step = integrator_step(integrator)
+    step = integrator_step(integrator, vessel.model)
     commands = _commands(vessel, inputs, runs)
     standing = None if standing is None else np.asarray(standing, dtype=float).reshape(commands.shape[2], 1)
     program = RatesProgram(vessel.model, runs=runs, parameters=parameters, engine=engine)

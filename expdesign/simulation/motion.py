@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from expdesign.errors import UnknownName
+from expdesign.errors import InputError, UnknownName
 from expdesign.vessel import NUMPY, Operators, VesselModel
 
 State = tuple[Any, ...]
@@ -91,12 +91,15 @@ def rk4_step(rates: Rates, state: State, step_s: Any) -> State:
 STEPS: dict[str, Step] = {"rk4": rk4_step, "euler": euler_step}
 
 
-def integrator_step(name: str) -> Step:
-    """A step by the integrator's name.
+def integrator_step(name: str, model: VesselModel) -> Step:
+    """A step by the integrator's name, for a model.
 
     Raises:
         UnknownName: there is none.
+        InputError: Euler's map for a model that rolls, whose oscillation it would make grow.
     """
     if name not in STEPS:
         raise UnknownName("integrator", name, known=STEPS)
+    if name == "euler" and model.roll is not None:
+        raise InputError("the vessel's model has a roll mode, [model.roll], expected integrator rk4 rather than euler")
     return STEPS[name]

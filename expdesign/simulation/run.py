@@ -50,7 +50,7 @@ def simulate(
         InputError: commands of another vessel.
     """
     _check_inputs(vessel, commands)
-    step = integrator_step(integrator)
+    step = integrator_step(integrator, vessel.model)
     current, wind = (rows.tolist() for rows in weather_rows(environment, len(commands)))
     theta = vessel.model.parameters.tolist()
     step_s = commands.sample_time_s / substeps
