@@ -203,7 +203,7 @@ def _leg_radius_m(
     for pairs in at_speeds:
         most = max((pair[1].helm_rad for pair in pairs), default=0.0)
         eased = [pair for pair in pairs if pair[1].helm_rad <= HELM_SHARE * most and _gentle(pair)]
-        found += [max(turn.radius_m for turn in (eased or pairs[:1])[-1])] if pairs else []
+        found.append(max(turn.radius_m for turn in eased[-1]) if eased else transit**2 / LATERAL_MPS2)
     return wish or max(found)
 
 
