@@ -11,7 +11,7 @@ import expdesign
 ROOT = Path(expdesign.__file__).parent
 
 FLOORS = (
-    ("errors",),
+    ("errors", "interruptions"),
     ("conventions", "values"),
     ("signals",),
     ("vessel",),

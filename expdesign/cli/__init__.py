@@ -8,13 +8,16 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
+from expdesign.interruptions import interruptions_wait
+
 __all__ = ["main"]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; arguments and exit status as of `expdesign.cli.entry.main`."""
     try:
-        from expdesign.cli.entry import main as run_command  # takes a moment, in which Ctrl-C counts, too
+        with interruptions_wait():
+            from expdesign.cli.entry import main as run_command  # takes a moment, in which Ctrl-C counts, too
     except KeyboardInterrupt:
         sys.stderr.write("expdesign: error: interrupted, nothing half-written\n")
         return 130

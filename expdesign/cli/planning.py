@@ -12,6 +12,7 @@ import typer
 
 from expdesign.cli.app import Json, Out, OutBeside, PlanFile, Quiet, ScenarioFile, Seed, app, carry_out
 from expdesign.cli.arguments import check_out
+from expdesign.interruptions import interruptions_wait
 
 
 @app.command()
@@ -20,7 +21,8 @@ def run(scenario: ScenarioFile, out: Out = None, seed: Seed = 0, quiet: Quiet = 
 
     Example: expdesign run scenarios/helsinki.toml
     """
-    from expdesign import workflows
+    with interruptions_wait():
+        from expdesign import workflows
 
     carry_out("run", lambda tell: workflows.run(scenario, check_out(out), seed=seed, progress=tell), quiet, json)
 
@@ -31,7 +33,8 @@ def score(scenario: ScenarioFile, out: Out = None, seed: Seed = 0, quiet: Quiet 
 
     Writes dictionary.json.
     """
-    from expdesign import workflows
+    with interruptions_wait():
+        from expdesign import workflows
 
     carry_out("score", lambda tell: workflows.score(scenario, check_out(out), seed=seed, progress=tell), quiet, json)
 
@@ -52,7 +55,8 @@ def durations(
 
     Writes durations.json; with --grow also growth.json and dictionary-grown.toml, which any scenario can name.
     """
-    from expdesign import workflows
+    with interruptions_wait():
+        from expdesign import workflows
 
     carry_out(
         "durations",
@@ -78,7 +82,8 @@ def plan(
 
     Writes plan.json, track.csv and commands.csv.
     """
-    from expdesign import workflows
+    with interruptions_wait():
+        from expdesign import workflows
 
     carry_out(
         "plan",
@@ -120,7 +125,8 @@ def export(
 
     Example: expdesign export runs/helsinki/plan.json --format rtz gpx
     """
-    from expdesign import workflows
+    with interruptions_wait():
+        from expdesign import workflows
 
     carry_out(
         "export",
@@ -144,6 +150,7 @@ def check_route(
     json: Json = False,
 ) -> None:
     """Check route files beyond what their schemas can: ids, names, order of schedules, ranges, size."""
-    from expdesign import workflows
+    with interruptions_wait():
+        from expdesign import workflows
 
     carry_out("check-route", lambda tell: workflows.check_routes(tuple(files)), quiet, json)

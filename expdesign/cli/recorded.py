@@ -12,6 +12,7 @@ import typer
 
 from expdesign.cli.app import Json, Quiet, Seed, app, carry_out
 from expdesign.cli.arguments import check_out
+from expdesign.interruptions import interruptions_wait
 
 
 @app.command()
@@ -95,7 +96,8 @@ def estimate(
 
     Example: expdesign estimate zigzag.csv circle.csv --vessel ship.toml --method ls iv --test other.csv
     """
-    from expdesign import workflows
+    with interruptions_wait():
+        from expdesign import workflows
 
     carry_out(
         "estimate",
@@ -160,7 +162,8 @@ def diagnose(
 
     Example: expdesign diagnose zigzag.csv circle.csv --vessel ship.toml
     """
-    from expdesign import workflows
+    with interruptions_wait():
+        from expdesign import workflows
 
     carry_out(
         "diagnose",
@@ -221,7 +224,8 @@ def indices(
 
     Example: expdesign indices zigzag.csv circle.csv --vessel ship.toml
     """
-    from expdesign import workflows
+    with interruptions_wait():
+        from expdesign import workflows
 
     carry_out(
         "indices",
@@ -275,7 +279,8 @@ def mine(
 
     Example: expdesign mine voyage.csv --vessel ship.toml --piece 120 --keep 10
     """
-    from expdesign import workflows
+    with interruptions_wait():
+        from expdesign import workflows
 
     carry_out(
         "mine",

@@ -12,6 +12,7 @@ import typer
 
 from expdesign.cli.app import Json, Out, OutBeside, PlanFile, Quiet, ScenarioFile, Seed, app, carry_out
 from expdesign.cli.arguments import check_out
+from expdesign.interruptions import interruptions_wait
 
 
 @app.command()
@@ -33,7 +34,8 @@ def simulate(
 
     Writes measured.csv.
     """
-    from expdesign import workflows
+    with interruptions_wait():
+        from expdesign import workflows
 
     carry_out(
         "simulate",
@@ -72,7 +74,8 @@ def validate(
 
     Writes validation.json and validation.html. An interrupted call goes on where it stopped.
     """
-    from expdesign import workflows
+    with interruptions_wait():
+        from expdesign import workflows
 
     carry_out(
         "validate",
@@ -123,7 +126,8 @@ def whatif(
 
     Example: expdesign whatif scenarios/helsinki.toml scenarios/variants/half-an-hour.toml
     """
-    from expdesign import workflows
+    with interruptions_wait():
+        from expdesign import workflows
 
     carry_out(
         "whatif",
@@ -187,7 +191,8 @@ def replan(
 
     Example: expdesign replan scenarios/story.toml --data measured.csv --vessel vessel-extended.toml --remaining 480
     """
-    from expdesign import workflows
+    with interruptions_wait():
+        from expdesign import workflows
 
     carry_out(
         "replan",

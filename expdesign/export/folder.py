@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import os
 import shutil
-import signal
-import threading
 import uuid
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from expdesign.errors import FileError
+from expdesign.interruptions import interruptions_wait
 
 
 @dataclass(frozen=True)
@@ -71,7 +70,7 @@ def write_files(folder: Path, files: Mapping[str, str | bytes]) -> tuple[Path, .
     mark = uuid.uuid4().hex[:12]
     slots = [_slot(folder, name, mark) for name in files]
     contents = [content.encode() if isinstance(content, str) else content for content in files.values()]
-    with _interruptions_wait() as stop_here, _made(folder):
+    with interruptions_wait() as stop_here, _made(folder):
         try:
             _write_beside(slots, contents, stop_here)
             _put_in_place(slots)
@@ -86,33 +85,6 @@ def _slot(folder: Path, name: str, mark: str) -> _Slot:
     if (folder / name).is_dir():
         raise FileError(folder / name, "", "is a folder, expected a file or nothing")
     return _Slot(folder / name, folder / f".{name}.{mark}.new", folder / f".{name}.{mark}.old")
-
-
-@contextmanager
-def _interruptions_wait() -> Iterator[Callable[[], None]]:
-    """Let Ctrl-C and termination wait for the end of the block, where they act as they would have.
-
-    Yields a function to be called where stopping is safe: it raises KeyboardInterrupt when one of them came.
-    """
-    came: list[int] = []
-
-    def stop_here() -> None:
-        if came:
-            raise KeyboardInterrupt
-
-    def deliver() -> None:
-        if came:
-            signal.raise_signal(came[0])
-
-    with ExitStack() as stack:
-        if threading.current_thread() is threading.main_thread():  # in others nothing interrupts
-            stack.callback(deliver)
-            for number in (signal.SIGINT, signal.SIGTERM):
-                handler = signal.getsignal(number)
-                if handler not in (signal.SIG_IGN, None):
-                    stack.callback(signal.signal, number, handler)
-                    signal.signal(number, lambda number, frame: came.append(number))
-        yield stop_here
 
 
 def _write_beside(slots: list[_Slot], contents: list[bytes], stop_here: Callable[[], None]) -> None:
