@@ -277,7 +277,8 @@ def public_name(key: str, ship: Extended) -> tuple[str, float, float, str]:
         return "time_s", 1.0, 0.0, "s"
     if kind == "change":
         return f"{rest}_factor", 1.0, 1.0, ""
-    return {"roll:period": "roll_period_s", "roll:damping": "roll_damping_ratio"}.get(key, ROLL[key]), 1.0, 0.0, ""
+    unit = {"roll:period": "s", "roll:yaw": "rad/m"}.get(key, "")
+    return {"roll:period": "roll_period_s", "roll:damping": "roll_damping_ratio"}.get(key, ROLL[key]), 1.0, 0.0, unit
 
 
 def finite(value: float) -> float | None:
