@@ -17,6 +17,7 @@ from typer.main import get_command
 from expdesign.cli.arguments import repeat_option
 from expdesign.cli.commands import app
 from expdesign.errors import InputError, NoAnswer
+from expdesign.interruptions import interruptions_wait
 
 LISTS = ("--format", "--method", "--fixed", "--test", "--data", "--interest")
 """Options that take several values."""
@@ -58,7 +59,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _invoke(arguments: list[str]) -> int:
-    command = get_command(app)
+    with interruptions_wait():  # annotations are evaluated: Python ends by the signal itself when that is broken off
+        command = get_command(app)
     try:
         with command.make_context("expdesign", arguments) as context:
             command.invoke(context)
