@@ -1,0 +1,136 @@
+"""Legs of ships with propeller and rudder: they arrive, within limits and rates, and end with a steady run-up."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from helm_case import catamaran, coaster, open_water
+
+from expdesign.plan.capability import RUN_UP
+from expdesign.plan.helmed_legs import _shortest_first
+from expdesign.plan.legs import LegTask, find_leg
+from expdesign.plan.recovery import displaced, recover
+from expdesign.signals import Commands
+from expdesign.simulation import simulate, steady_ahead
+
+SHIPS = {"coaster": coaster, "catamaran": catamaran}
+
+
+@cache
+def sailed(ship: str, case: str):
+    """(water, task, commands) of a leg, lengths in hulls."""
+    water = open_water(SHIPS[ship]())
+    vessel, length = water.vessel, water.vessel.length_m
+    ahead = steady_ahead(vessel, 0.8 * water.ship.transit_speed_mps)
+    still, rest = np.zeros(3), np.zeros(len(vessel.limits))
+    turn = water.ship.turns[-2]
+    turning = np.array([turn.surge_mps, turn.sway_mps, turn.yaw_rate_radps])
+    approach = water.ship.approach
+    over = np.array(approach.helm.inputs(approach.drive, approach.angle_rad + approach.starboard * turn.helm_rad))
+    start, before, end, after = {
+        "off from rest": ((0.0, 0.0, 0.0, *still), rest, (14 * length, 3 * length, 0.3, *ahead.velocity), ahead.inputs),
+        "after a turn": (
+            (0.0, 0.0, 0.0, *turning),
+            over,
+            (16 * length, 9 * length, 1.2, *ahead.velocity),
+            ahead.inputs,
+        ),
+        "to rest": ((0.0, 0.0, 0.0, *ahead.velocity), ahead.inputs, (20 * length, 6 * length, 0.5, *still), rest),
+    }[case]
+    task = LegTask(start=np.array(start), end=np.array(end), start_inputs=before, end_inputs=after, seed=1)
+    values = find_leg(task, water)
+    assert values is not None
+    return water, task, values
+
+
+BOTH = pytest.mark.parametrize(
+    ("ship", "case"),
+    [
+        ("coaster", "after a turn"),
+        ("coaster", "to rest"),
+        pytest.param("coaster", "off from rest", marks=pytest.mark.slow),
+        pytest.param("catamaran", "after a turn", marks=pytest.mark.slow),
+    ],
+)
+ONE = pytest.mark.parametrize("ship", ["coaster", pytest.param("catamaran", marks=pytest.mark.slow)])
+
+
+@BOTH
+def test_the_commands_sailed_with_a_tenth_of_the_step_arrive(ship, case):
+    water, task, values = sailed(ship, case)
+    vessel = water.vessel
+    commands = Commands(sample_time_s=vessel.sample_time_s, names=vessel.model.inputs, values=values)
+    coarse, fine = (
+        simulate(vessel, commands, pose=task.start[:3], velocity=task.start[3:], substeps=substeps)
+        for substeps in (2, 20)
+    )
+    length = vessel.length_m
+    assert np.hypot(*(fine.pose - coarse.pose)[:, :2].T).max() < length / 30
+    assert np.hypot(*(fine.pose[-1] - task.end[:3])[:2]) < length / 100
+    assert np.abs(fine.pose[-1, 2] - task.end[2]) < 0.01
+    np.testing.assert_allclose(fine.velocity[-1, :2], task.end[3:5], atol=0.01 * water.ship.transit_speed_mps)
+
+
+@BOTH
+def test_limits_and_rates_hold_from_the_commands_standing_before_to_those_wanted_after(ship, case):
+    water, task, values = sailed(ship, case)
+    steps = np.diff(np.vstack([task.start_inputs, values]), axis=0)
+    for index, limit in enumerate(water.vessel.limits):
+        assert values[:, index].min() >= limit.low - 1e-6
+        assert values[:, index].max() <= limit.high + 1e-6
+        assert np.abs(steps[:, index]).max() <= limit.rate * water.vessel.sample_time_s * (1 + 1e-6)
+    np.testing.assert_allclose(values[-1], task.end_inputs, atol=1e-6)
+
+
+@BOTH
+def test_no_leg_asks_for_more_than_the_helm_gives(ship, case):
+    water, task, values = sailed(ship, case)
+    track = water.sail(task.start, values, task.past)
+    speed, rate = np.hypot(*track.velocity[:, :2].T), np.abs(track.velocity[:, 2])
+    hardest = max(abs(turn.yaw_rate_radps) for turn in water.ship.turns)
+    slack = 1.02 * max(hardest, abs(task.start[5]))
+    assert rate.max() <= max(water.ship.yaw_rate_radps, slack)
+    assert speed.max() <= 1.01 * max(water.ship.transit_speed_mps, speed[0])
+    moving = speed > 0.05 * water.ship.transit_speed_mps
+    assert rate[~moving].max(initial=0.0) < 0.3 * hardest  # nothing turns it where it stands
+    planned = [item.length_m(water.ship.turning_radius_m) for item in _shortest_first(task.start, task, water)]
+    sailed_m = speed.sum() * water.vessel.sample_time_s
+    assert sailed_m < max(planned) + 6 * water.vessel.length_m
+
+
+@ONE
+def test_a_run_begins_after_a_steady_run_up_with_its_own_commands(ship):
+    water, task, values = sailed(ship, "after a turn")
+    track = water.sail(task.start, values, task.past)
+    count = int(np.ceil(RUN_UP * water.vessel.length_m / task.end[3] / water.vessel.sample_time_s))
+    np.testing.assert_allclose(values[-count:], np.tile(task.end_inputs, (count, 1)), atol=1e-6)
+    steady = track.velocity[-count - 1 :]
+    np.testing.assert_allclose(steady, np.tile(task.end[3:], (count + 1, 1)), atol=2e-3 * task.end[3])
+    assert np.hypot(*(track.pose[-1] - track.pose[-count - 1])[:2]) >= 0.99 * RUN_UP * water.vessel.length_m
+
+
+@ONE
+def test_a_swing_is_checked_on_the_side_where_the_ship_turned(ship):
+    water, task, _ = sailed(ship, "after a turn")
+    check = recover(task.start, task.past, water)
+    assert abs(check.states[-1, 5]) < 0.1 * abs(task.start[5])
+    scales = {"sample_time_s": water.vessel.sample_time_s, "hull_m": water.vessel.length_m}
+    ahead, starboard, turned, time_s = displaced(check, water.ship, **scales)
+    assert ahead > 0
+    assert starboard > 0
+    assert turned > 0
+    mirrored = task.start * [1, -1, -1, 1, -1, -1]
+    over = task.past[-1].copy()
+    over = over[::-1] if ship == "catamaran" else over * [1, -1]
+    other = displaced(recover(mirrored, over[None], water), water.ship, **scales)
+    np.testing.assert_allclose(other, [ahead, -starboard, -turned, time_s], rtol=1e-6)
+
+
+@pytest.mark.parametrize("ship", SHIPS)
+def test_a_ship_that_goes_straight_needs_no_check(ship):
+    water = open_water(SHIPS[ship]())
+    ahead = steady_ahead(water.vessel, 0.8 * water.ship.transit_speed_mps)
+    check = recover(np.r_[0.0, 0.0, 1.0, ahead.velocity], ahead.inputs[None], water)
+    assert len(check.commands) == 0
