@@ -84,11 +84,11 @@ def telling(item: Finding) -> str:
 
 
 def worth(item: Finding) -> str:
-    """What adding a finding does, e.g. "cuts the sway error by 52 % (45 to 60 %)", by the output it helps most."""
+    """What adding a finding does, e.g. "cuts the sway error by 52 % (45 to 60 %)", by the output it surely helps most."""
     known = [fall for fall in item.falls if np.isfinite(fall.share)]
     if not known:
         return f"gains {item.gain:.1f} points of fit"
-    best = max(known, key=lambda fall: fall.share)
+    best = max(known, key=lambda fall: fall.low)
     interval = f"({_percent(best.low)} to {_percent(best.high)} %)"
     if best.share < VISIBLE:
         return "takes no whole per cent off any error, as its test sees more than noisy velocities show"
