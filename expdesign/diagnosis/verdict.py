@@ -84,7 +84,7 @@ def telling(item: Finding) -> str:
 
 
 def worth(item: Finding) -> str:
-    """What adding a finding does, e.g. "cuts the sway error by 52 % (45 to 60 %)", by the output it surely helps most."""
+    """What adding it does to the output it surely helps most, e.g. "cuts the sway error by 52 % (45 to 60 %)"."""
     known = [fall for fall in item.falls if np.isfinite(fall.share)]
     if not known:
         return f"gains {item.gain:.1f} points of fit"
