@@ -75,8 +75,8 @@ def finding(cause: str) -> Finding:
     numbers = GROWTH if cause == "shallow_water" else {}
     estimates = tuple(Estimated(name=name, value=value, std=0.1, unit="") for name, value in numbers.items())
     return Finding(
-        cause=cause, estimates=estimates, p_value=1e-6, fit_before=np.zeros(3), fit_after=np.ones(3), falls=(), gain=1.0,
-        gain_interval=(0.5, 1.5), not_distinguishable_from=(), would_tell_apart=None, explanation="made up",
+        cause=cause, estimates=estimates, p_value=1e-6, fit_before=np.zeros(3), fit_after=np.ones(3), falls=(),
+        gain=1.0, gain_interval=(0.5, 1.5), not_distinguishable_from=(), would_tell_apart=None, explanation="made up",
         suspect="time", worth=30.0,
     )  # fmt: skip
 
