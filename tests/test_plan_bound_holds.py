@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import permutations
+from itertools import pairwise, permutations
 
 import numpy as np
 import pytest
@@ -13,8 +13,9 @@ from test_plan_verification_catches_what_is_wrong import primitive
 
 from expdesign.plan.legs import LegTask, find_leg
 from expdesign.plan.lower_bound import Carry, Headway, carry, joint_losses, reposition_bound_s, time_to_sail_s
-from expdesign.plan.speed_changes import SpeedChanges, speed_changes
-from expdesign.simulation import CALM, Environment
+from expdesign.plan.speed_changes import LegEnd, SpeedChanges, least_loss, leg_end
+from expdesign.signals import Commands
+from expdesign.simulation import CALM, Environment, simulate
 from expdesign.vessel import NUMPY
 
 OPEN = shapely.box(-1000, -1000, 1000, 1000)
@@ -24,11 +25,13 @@ STILL = Headway(speed_mps=1.0, current_to=np.zeros(2))
 """A metre takes a second."""
 
 
-def steady(rate_mps2: float, top_mps: float) -> SpeedChanges:
-    """Changes of speed at one rate."""
-    return SpeedChanges(
-        edges_mps=np.linspace(0, top_mps, 8), faster_mps2=np.full(7, rate_mps2), slower_mps2=np.full(7, rate_mps2)
+def steady(speed_mps: float, rate_mps2: float, top_mps: float) -> LegEnd:
+    """An end of a leg where speed changes at one rate, whatever the commands."""
+    rates = np.full((1, 7), rate_mps2)
+    changes = SpeedChanges(
+        edges_mps=np.linspace(0, top_mps, 8), until_s=np.array([np.inf]), faster_mps2=rates, slower_mps2=rates
     )
+    return LegEnd(speed_mps=speed_mps, inputs=None, changes=changes)
 
 
 def to_sail(water, carries, repeats, ends=ENDS, margin_m=5.0) -> float:
@@ -161,42 +164,70 @@ def test_with_and_against_a_current_the_bound_is_the_way_by_the_speed_over_groun
     assert bound_s == pytest.approx(truth, abs=1e-6)
 
 
-def test_the_cheapest_assignment_of_speeds_is_the_least_over_all_orders():
-    rng = np.random.default_rng(0)
-    for _ in range(20):
-        changes = steady(0.2, 1.3)
-        exits, entries = rng.choice(changes.edges_mps, (2, 5))  # exact there, averaged over bands between
-        lost, least = joint_losses(exits, entries, changes)
-        costs = [
-            sum((1.3 - (a + b) / 2) * abs(a - b) / 0.2 for a, b in zip(exits, order, strict=True))
-            for order in permutations(entries)
-        ]
-        times = [sum(np.abs(exits - order) / 0.2) for order in permutations(entries)]
-        assert lost == pytest.approx(min(costs))
-        assert least == pytest.approx(min(times))
+@pytest.mark.parametrize("counts", [(1, 1, 1), (2, 1, 2), (3,), (1, 4)])
+def test_the_losses_counted_are_those_of_the_best_order(counts):
+    rng = np.random.default_rng(len(counts))
+    losses = rng.uniform(0, 5, (len(counts) + 1, len(counts) + 1))
+    runs = np.repeat(np.arange(len(counts)), counts)
+    totals = [
+        losses[0, order[0]] + sum(losses[a + 1, b] for a, b in pairwise(order)) + losses[order[-1] + 1, -1]
+        for order in permutations(runs.tolist())
+    ]
+    assert joint_losses(losses, counts) == pytest.approx(min(totals))
+
+
+def test_where_orders_are_too_many_the_losses_counted_are_less():
+    losses = np.random.default_rng(0).uniform(0, 5, (21, 21))
+    order = [0, *np.random.default_rng(1).permutation(20).tolist()]
+    some = losses[0, order[1]] + sum(losses[a + 1, b] for a, b in pairwise(order[1:])) + losses[order[-1] + 1, -1]
+    assert 0 <= joint_losses(losses, [1] * 20) <= some
 
 
 def test_changing_speed_loses_what_constant_acceleration_loses():
-    lost, least = joint_losses(np.array([0.0]), np.array([0.0]), steady(0.5, 1.0))
-    assert (lost, least) == (0.0, 0.0)  # no leg is needed between equal speeds
-    lost, least = joint_losses(np.array([0.0]), np.array([1.0]), steady(0.5, 1.0))
-    assert (lost, least) == pytest.approx((2.0 - 1.0, 2.0))  # 2 s for 1 m
+    step_s = 0.1  # a hundredth of the time that the ship's engines take to full
+    for first, last in ((0.0, 1.0), (1.0, 0.0), (0.4, 0.9), (0.0, 0.0), (0.7, 0.7)):
+        lost, least = least_loss(steady(first, 0.5, 1.0), steady(last, 0.5, 1.0), ship())
+        change_s = abs(last - first) / 0.5
+        assert least <= change_s + 1e-9  # no more than the truth, and little less
+        assert lost <= change_s * (1 - (first + last) / 2) + 1e-9
+        assert least == pytest.approx(change_s, abs=3 * step_s)
+        assert lost == pytest.approx(change_s * (1 - (first + last) / 2), abs=3 * step_s)
 
 
 def test_no_change_of_speed_drawn_is_faster_than_told():
     vessel, rng = ship(), np.random.default_rng(1)
-    told = speed_changes(vessel, CALM, speed_mps=1.36, yaw_rate_radps=0.3)
+    told = leg_end(vessel, CALM, 0.0, None, top_mps=1.36, yaw_rate_radps=0.3).changes
     speed, way, n = 1.36 * np.sqrt(rng.uniform(1e-6, 1, 200_000)), rng.uniform(-np.pi, np.pi, 200_000), 200_000
     u, v, r = speed * np.cos(way), speed * np.sin(way), rng.uniform(-0.3, 0.3, n)
     inputs = tuple(rng.choice([-15.0, 15.0], n) if k % 2 == 0 else rng.uniform(-np.pi, np.pi, n) for k in range(4))
     surge, sway, _ = vessel.model.accelerations((u, v, r), (u, v), inputs, NUMPY)
     rate = surge * np.cos(way) + sway * np.sin(way)
-    band = np.minimum(np.searchsorted(told.edges_mps, speed) - 1, len(told.faster_mps2) - 1)
-    assert (rate <= told.faster_mps2[band]).all()
-    assert (-rate <= told.slower_mps2[band]).all()
+    band = np.minimum(np.searchsorted(told.edges_mps, speed) - 1, told.faster_mps2.shape[1] - 1)
+    assert (rate <= told.faster_mps2[-1, band]).all()
+    assert (-rate <= told.slower_mps2[-1, band]).all()
     # full ahead against what drags is as fast as it goes
     ahead = vessel.model.accelerations((0.0, 0.0, 0.0), (0.0, 0.0), (15.0, 0.0, 15.0, 0.0), NUMPY)[0]
-    assert ahead <= told.faster_mps2[0] <= 1.11 * ahead
+    assert ahead <= told.faster_mps2[-1, 0] <= 1.11 * ahead
+
+
+def test_simulated_ships_whose_commands_move_at_their_rates_stay_between_the_speeds_told():
+    vessel, rng = ship(), np.random.default_rng(2)
+    rates = np.array([limit.rate for limit in vessel.limits])
+    for standing, speed in ((np.array([8.0, 0.0, 8.0, 0.0]), 0.8), (np.array([-3.0, 1.5, 2.0, -0.5]), 0.3)):
+        told = leg_end(vessel, CALM, speed, standing, top_mps=1.36, yaw_rate_radps=0.4).changes
+        most, least = told.most(speed, 0.1 * np.arange(301)), told.least(speed, 0.1 * np.arange(301))
+        for _ in range(40):
+            # mostly hard ahead or astern, the angles wandering
+            steps = np.where(rng.uniform(size=(30, 4)) < 0.7, rng.choice([-1.0, 1.0], 4), rng.uniform(-1, 1, (30, 4)))
+            values = standing + np.cumsum(rates * steps, axis=0)
+            values[:, ::2] = values[:, ::2].clip(-15.0, 15.0)
+            orders = Commands(sample_time_s=1.0, names=vessel.model.inputs, values=values)
+            track = simulate(vessel, orders, velocity=np.array([speed, 0.0, 0.0]))
+            sailed = np.hypot(*track.velocity[:, :2].T)
+            allowed = (np.abs(track.velocity[:, 2]) <= 0.4) & (sailed <= 1.36)
+            known = np.cumprod(allowed).astype(bool)
+            assert (sailed[known] <= most[::10][known] + 1e-6).all()
+            assert (sailed[known] >= least[::10][known] - 1e-6).all()
 
 
 @pytest.mark.parametrize("seed", range(2))

@@ -10,8 +10,9 @@ inside W grown by d, so the legs together with the chords of such runs, and with
 start to goal through that water: the time of the fastest way is no more than that of the legs, and what legs would
 need for those chords and paths at the headings that suit them best. This is so whatever d is; the best d counts.
 
-Speeds at the ends of legs cost time besides: a leg that begins or ends slower than the fastest leg loses distance while
-it changes speed. Which leg joins which runs is left to the plan; the cheapest assignment counts.
+Speeds and commands at the ends of legs cost time besides: a leg that begins or ends slower than the fastest leg loses
+distance while it changes speed, and actuators move no faster than their rates. Which leg joins which runs is left to
+the plan; the cheapest order counts.
 
 Source: E. Zermelo, Über das Navigationsproblem bei ruhender oder veränderlicher Windverteilung, ZAMM 11 (1931),
 114-124.
@@ -19,7 +20,7 @@ Source: E. Zermelo, Über das Navigationsproblem bei ruhender oder veränderlich
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,7 +29,8 @@ from scipy.optimize import linear_sum_assignment
 
 from expdesign.dictionary import Primitive
 from expdesign.plan.area import SeaArea
-from expdesign.plan.speed_changes import SpeedChanges, speed_changes
+from expdesign.plan.cheapest_orders import cheapest_orders, place_values
+from expdesign.plan.speed_changes import LegEnd, least_loss, leg_end
 from expdesign.plan.ways import build_ways, simplified
 from expdesign.simulation import Environment, simulate_many
 from expdesign.values import Array, seal
@@ -118,9 +120,9 @@ def reposition_bound_s(
     carries = {item.name: carry(vessel, item, environment, headway) for item in runs}
     counts = {item.name: repeats[item.name] for item in runs}
     way_s = time_to_sail_s(area, clearance_m + vessel.beam_m / 2, carries, counts, ends, headway, vessel.length_m / 30)
-    exits, entries = _joint_speeds(runs, counts)
-    changes = speed_changes(vessel, environment, speed_mps=speed_mps, yaw_rate_radps=yaw_rate_radps)
-    lost_m, least_s = joint_losses(exits, entries, changes)
+    firsts, lasts = _leg_ends(vessel, environment, runs, speed_mps, yaw_rate_radps)
+    losses = np.array([[least_loss(first, last, vessel) for last in lasts] for first in firsts])
+    lost_m, least_s = (joint_losses(losses[..., k], list(counts.values())) for k in (0, 1))
     return float(max(0.0, least_s, way_s + lost_m / (speed_mps + headway.current_mps)))
 
 
@@ -224,27 +226,33 @@ def _stray_m(track: Array) -> float:
     return float(apart.max()) + float(np.hypot(*(track[-1] - track[0]))) / 400
 
 
-def _joint_speeds(runs: list[Primitive], repeats: Mapping[str, int]) -> tuple[Array, Array]:
-    """Speeds at which legs begin and end."""
-    times = [repeats[item.name] for item in runs]
-    exits = np.repeat([float(np.hypot(*item.exit_velocity[:2])) for item in runs], times)
-    entries = np.repeat([float(np.hypot(*item.entry_velocity[:2])) for item in runs], times)
-    return np.r_[0.0, exits], np.r_[entries, 0.0]
+def _leg_ends(
+    vessel: Vessel, environment: Environment, runs: list[Primitive], top_mps: float, yaw_rate_radps: float
+) -> tuple[list[LegEnd], list[LegEnd]]:
+    """Where legs begin, the start first, and where they end, the goal last."""
+
+    def end(velocity: Array, inputs: Array | None) -> LegEnd:
+        speed = float(np.hypot(*velocity[:2]))
+        return leg_end(vessel, environment, speed, inputs, top_mps=top_mps, yaw_rate_radps=yaw_rate_radps)
+
+    rest = end(np.zeros(3), None)
+    firsts = [end(item.exit_velocity, item.commands.values[-1]) for item in runs]
+    return [rest, *firsts], [*(end(item.entry_velocity, item.commands.values[0]) for item in runs), rest]
 
 
-def joint_losses(exits: Array, entries: Array, changes: SpeedChanges) -> tuple[float, float]:
-    """What changing speed costs at least in the cheapest assignment of legs.
+def joint_losses(losses: Array, counts: Sequence[int]) -> float:
+    """What legs lose at least together, over all orders of the runs, or over all assignments where those are many.
 
     Args:
-        exits, entries: (n,) speeds at which legs begin and end [m/s].
-        changes: how fast speeds change.
-
-    Returns:
-        Distance lost against the fastest leg [m], and least time of all changes [s].
+        losses: (q + 1, q + 1) of a leg; rows by the run before, the start first, columns by the run after, the goal
+            last.
+        counts: (q,) of each run, one at least.
     """
-    pairs = exits[:, None] + 0 * entries, entries + 0 * exits[:, None]
-    totals = [
-        float(matrix[linear_sum_assignment(matrix)].sum())
-        for matrix in (changes.lost_m(*pairs), changes.least_s(*pairs))
-    ]
-    return totals[0], totals[1]
+    if not len(counts):
+        return float(losses[0, 0])
+    table = cheapest_orders(losses[1:, :-1], losses[1:, -1], counts)
+    if table is None:
+        every = np.repeat(np.repeat(losses, [1, *counts], axis=0), [*counts, 1], axis=1)
+        return float(every[linear_sum_assignment(every)].sum())
+    one_less = len(table) - 1 - place_values(counts)
+    return float((losses[0, :-1] + table[one_less, np.arange(len(counts))]).min())

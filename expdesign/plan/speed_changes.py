@@ -1,4 +1,4 @@
-"""How fast a vessel can change its speed at most, and what that loses."""
+"""How fast a vessel can change its speed at most where a leg begins or ends, and what that loses."""
 
 from __future__ import annotations
 
@@ -6,98 +6,204 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from expdesign.conventions import wrap_angle
 from expdesign.simulation import Environment
 from expdesign.values import Array, seal
-from expdesign.vessel import NUMPY, Vessel
+from expdesign.vessel import IDEAL, NUMPY, Vessel
 
-BANDS = 16
+BANDS = 12
 """Bands of speed with a largest acceleration each."""
-STATES = 1500
-"""Motions and commands drawn in each band."""
-CLIMBS, BEST = 6, 60
+STAGES = np.array([0.1, 0.2, 0.35, 0.6, 1.0])
+"""Shares of the time in which actuators get from nothing to full: until then they reach only so far."""
+STATES = 240
+"""Motions and commands drawn for each band and stage."""
+CLIMBS, BEST = 5, 12
 """Rounds in which the best of them are varied, and how many are."""
 SPARE = 1.1
 """What the search may have missed."""
+STEP, MOST_STEPS = 0.01, 3000
+"""Steps of time, in those of the actuators from nothing to full, and their number in the longest leg looked at."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SpeedChanges:
-    """Largest rates of change of speed.
+    """Largest rates of change of speed after commands that stood, or before commands that will.
 
     Attributes:
         edges_mps: (k + 1,) speeds between bands, from 0 to that of the fastest leg.
-        faster_mps2, slower_mps2: (k,) largest rates, both positive.
+        until_s: (s,) ends of stages, the last infinite.
+        faster_mps2, slower_mps2: (s, k) largest rates, both positive.
     """
 
     edges_mps: Array
+    until_s: Array
     faster_mps2: Array
     slower_mps2: Array
 
     def __post_init__(self) -> None:
-        seal(self, edges_mps="e", faster_mps2="k", slower_mps2="k")
+        seal(self, edges_mps="e", until_s="s", faster_mps2="s k", slower_mps2="s k")
 
-    def least_s(self, first_mps: Array, last_mps: Array) -> Array:
-        """(...,) least time of changes of speed [s]."""
-        return self._change(first_mps, last_mps, np.diff(self.edges_mps))
+    def most(self, speed_mps: float, time_s: Array) -> Array:
+        """(n,) speed that is reached at most at even times (n,) from one, or from which one can be reached."""
+        return self._followed(speed_mps, time_s, self.faster_mps2, 1.0)
 
-    def lost_m(self, first_mps: Array, last_mps: Array) -> Array:
-        """(...,) distance lost in them against the fastest leg [m]; no leg between these speeds loses less.
+    def least(self, speed_mps: float, time_s: Array) -> Array:
+        """(n,) the same, at least."""
+        return self._followed(speed_mps, time_s, self.slower_mps2, -1.0)
 
-        Speeds on the way from one to the other are passed through, each for as long as its band takes at least.
-        """
-        short = self.edges_mps[-1] - (self.edges_mps[1:] + self.edges_mps[:-1]) / 2
-        return self._change(first_mps, last_mps, np.diff(self.edges_mps) * short)
-
-    def _change(self, first_mps: Array, last_mps: Array, worth: Array) -> Array:
-        """Integral over the speeds passed of a quantity that amounts to `worth` (k,) in each band at unit rate."""
-        passed = [np.r_[0.0, np.cumsum(worth / rate)] for rate in (self.faster_mps2, self.slower_mps2)]
-        up, down = (
-            np.interp(last_mps, self.edges_mps, sums) - np.interp(first_mps, self.edges_mps, sums) for sums in passed
+    def reversed(self) -> SpeedChanges:
+        """The same looked at backwards in time."""
+        return SpeedChanges(
+            edges_mps=self.edges_mps,
+            until_s=self.until_s,
+            faster_mps2=self.slower_mps2,
+            slower_mps2=self.faster_mps2,
         )
-        return np.asarray(np.where(np.asarray(last_mps) >= first_mps, up, -down))
+
+    def _followed(self, speed: float, time_s: Array, rates: Array, sign: float) -> Array:
+        # a step may lead into the next band: the larger rate of both counts
+        further = np.c_[rates[:, 1:], rates[:, -1:]] if sign > 0 else np.c_[rates[:, :1], rates[:, :-1]]
+        rates, step_s, top = np.maximum(rates, further), float(time_s[1] - time_s[0]), float(self.edges_mps[-1])
+        speeds = [min(speed, top)]
+        for stage in np.searchsorted(self.until_s, time_s[1:], side="left").tolist():
+            band = min(int(speeds[-1] / top * rates.shape[1]), rates.shape[1] - 1)
+            speeds.append(min(max(speeds[-1] + sign * float(rates[stage, band]) * step_s, 0.0), top))
+        return np.array(speeds)
 
 
-def speed_changes(vessel: Vessel, environment: Environment, *, speed_mps: float, yaw_rate_radps: float) -> SpeedChanges:
-    """The fastest changes of speed through water found among motions and commands, a tenth added.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LegEnd:
+    """Where a leg begins or ends.
 
-    They are looked for by drawing them, half of the commands at a limit, and by varying the best.
+    Attributes:
+        speed_mps: through water.
+        inputs: (m,) commands before it begins, or after it has ended; None for any.
+        changes: of speed, in the leg's direction of time.
+    """
+
+    speed_mps: float
+    inputs: Array | None
+    changes: SpeedChanges
+
+
+def leg_end(
+    vessel: Vessel,
+    environment: Environment,
+    speed_mps: float,
+    inputs: Array | None,
+    *,
+    top_mps: float,
+    yaw_rate_radps: float,
+) -> LegEnd:
+    """An end of legs, with the fastest changes of speed through water found among motions and commands, a tenth added.
+
+    They are looked for by drawing them, half of the commands at a limit, and by varying the best. Commands move no
+    faster than their rates from those at the end. Actuators that answer late may still show others: then any count.
 
     Args:
         vessel, environment: who, in what air.
-        speed_mps: of the fastest leg.
+        speed_mps, inputs: at the end.
+        top_mps: speed of the fastest leg.
         yaw_rate_radps: no turn is faster.
     """
-    edges = np.linspace(0.0, speed_mps, BANDS + 1)
-    found = [_most(vessel, environment, edges, yaw_rate_radps, sign) for sign in (1.0, -1.0)]
+    edges = np.linspace(0.0, top_mps, BANDS + 1)
+    until_s, boxes = _boxes(vessel, inputs)
+    wind = float(np.hypot(*(environment.wind_to - environment.current_to)))
+    found = [_most(vessel, boxes, edges, wind, yaw_rate_radps, sign) for sign in (1.0, -1.0)]
     least = 1e-3 * max(rate.max() for rate in found)  # a band that nothing passes through costs much, but not all
     faster, slower = (SPARE * np.maximum(rate, least) for rate in found)
-    return SpeedChanges(edges_mps=edges, faster_mps2=faster, slower_mps2=slower)
+    changes = SpeedChanges(edges_mps=edges, until_s=until_s, faster_mps2=faster, slower_mps2=slower)
+    return LegEnd(speed_mps=speed_mps, inputs=inputs, changes=changes)
 
 
-def _most(vessel: Vessel, environment: Environment, edges: Array, yaw_rate_radps: float, sign: float) -> Array:
-    """(k,) largest rate of change of speed found in each band, faster or slower."""
+def to_work_s(vessel: Vessel) -> float:
+    """Time of the slowest actuator from nothing to full, of those without limits over a quarter turn [s]."""
+    reach = [max(abs(limit.low), abs(limit.high)) for limit in vessel.limits]
+    times = [
+        (far if np.isfinite(far) else np.pi / 2) / limit.rate for far, limit in zip(reach, vessel.limits, strict=True)
+    ]
+    return max([*times, vessel.sample_time_s])
+
+
+def _boxes(vessel: Vessel, inputs: Array | None) -> tuple[Array, Array]:
+    """Ends of stages (s,) [s], the last infinite, and least and largest commands until then (s, 2, m)."""
+    limited = np.isfinite([limit.high - limit.low for limit in vessel.limits])
+    low, high = (
+        np.where(limited, [getattr(x, name) for x in vessel.limits], far)
+        for name, far in (("low", -np.pi), ("high", np.pi))
+    )
+    if inputs is None or any(response != IDEAL for response in vessel.responses):
+        return np.array([np.inf]), np.stack([low, high])[None]
+    until_s = to_work_s(vessel) * STAGES
+    rates = np.array([limit.rate for limit in vessel.limits])
+    # a command may move before the first sample of a leg is over
+    reach = np.minimum(rates * (until_s[:, None] + vessel.sample_time_s), np.where(limited, np.inf, np.pi))
+    lows = np.where(limited, np.maximum(inputs - reach, low), inputs - reach)
+    highs = np.where(limited, np.minimum(inputs + reach, high), inputs + reach)
+    return np.r_[until_s, np.inf], np.concatenate([np.stack([lows, highs], axis=1), np.stack([low, high])[None]])
+
+
+def _most(vessel: Vessel, boxes: Array, edges: Array, wind_mps: float, yaw_rate_radps: float, sign: float) -> Array:
+    """(s, k) largest rate of change of speed found in each stage and band, faster or slower."""
     rng = np.random.default_rng(0)
-    limits = [(x.low, x.high) if np.isfinite(x.high - x.low) else (-np.pi, np.pi) for x in vessel.limits]
-    wind = float(np.hypot(*(environment.wind_to - environment.current_to)))
-    size, bands = 4 + len(limits), len(edges) - 1
-    shares = rng.uniform(-0.5, 1.5, (STATES, bands, size))
+    shares = rng.uniform(-0.5, 1.5, (STATES, len(boxes), len(edges) - 1, 4 + boxes.shape[-1]))
     shares[..., :4] = (shares[..., :4] + 0.5) / 2
     shares = shares.clip(0.0, 1.0)
+    most = np.full(shares.shape[1:3], -np.inf)
     for spread in 0.3 * 0.5 ** np.arange(CLIMBS):
-        rates = sign * _rates(vessel, shares, edges, np.array(limits), wind, yaw_rate_radps)
-        best = np.take_along_axis(shares, np.argsort(-rates, axis=0)[:BEST, :, None], axis=0)
+        rates = sign * _rates(vessel, shares, boxes, edges, wind_mps, yaw_rate_radps)
+        most = np.maximum(most, rates.max(axis=0))
+        order = np.argpartition(-rates, BEST, axis=0)[:BEST]
+        best = np.take_along_axis(shares, order[..., None], axis=0)
         varied = np.repeat(best, STATES // BEST, axis=0)
-        shares = np.concatenate([best, varied + spread * rng.standard_normal(varied.shape)]).clip(0.0, 1.0)
-    return np.asarray((sign * _rates(vessel, shares, edges, np.array(limits), wind, yaw_rate_radps)).max(axis=0))
+        shares = (varied + spread * rng.standard_normal(varied.shape)).clip(0.0, 1.0)
+    rates = sign * _rates(vessel, shares, boxes, edges, wind_mps, yaw_rate_radps)
+    most = np.maximum(most, rates.max(axis=0))
+    return np.asarray(np.maximum.accumulate(most, axis=0))  # what a smaller reach can do, a larger one can
 
 
-def _rates(vessel: Vessel, shares: Array, edges: Array, limits: Array, wind_mps: float, yaw_rate_radps: float) -> Array:
-    """(n, k) rates of change of speed through water, for speed, drift, wind, yaw rate and commands as shares."""
+def _rates(vessel: Vessel, shares: Array, boxes: Array, edges: Array, wind_mps: float, yaw_rate_radps: float) -> Array:
+    """(n, s, k) rates of change of speed through water, for speed, drift, wind, yaw rate and commands as shares."""
     speed = edges[:-1] + shares[..., 0] * np.diff(edges)
     drift, wind_from = 2 * np.pi * shares[..., 1], 2 * np.pi * shares[..., 2]
     r = yaw_rate_radps * (2 * shares[..., 3] - 1)
-    inputs = tuple(np.moveaxis(limits[:, 0] + shares[..., 4:] * (limits[:, 1] - limits[:, 0]), -1, 0))
+    low, high = boxes[:, 0, None], boxes[:, 1, None]
+    inputs = tuple(np.moveaxis(low + shares[..., 4:] * (high - low), -1, 0))
     u, v = speed * np.cos(drift), speed * np.sin(drift)
     air = (u - wind_mps * np.cos(wind_from), v - wind_mps * np.sin(wind_from))
     surge, sway, _ = vessel.model.accelerations((u, v, r), air, inputs, NUMPY)
     return np.asarray(surge * np.cos(drift) + sway * np.sin(drift))
+
+
+def least_loss(first: LegEnd, last: LegEnd, vessel: Vessel) -> tuple[float, float]:
+    """What no leg between two ends falls below: distance lost against the fastest leg [m], and time [s].
+
+    The speed at any time is at most what can be reached by then and what can still be shed, so the longer a leg, the
+    more is lost: the shortest one counts in which the one speed can become the other, and the one command the other.
+    """
+    step_s, back = STEP * to_work_s(vessel), last.changes.reversed()
+    moved_s = 0.0 if first.inputs is None or last.inputs is None else _moved_s(vessel, first.inputs, last.inputs)
+    time_s: Array = step_s * np.arange(MOST_STEPS, dtype=np.float64)
+    fast, slow = first.changes.most(first.speed_mps, time_s), first.changes.least(first.speed_mps, time_s)
+    shed, kept = back.most(last.speed_mps, time_s), back.least(last.speed_mps, time_s)
+    count = min(int(moved_s / step_s), MOST_STEPS - 1)
+    while count < MOST_STEPS - 1 and not _can_meet(fast, slow, shed, kept, count):
+        count += 1
+    sailed_m = step_s * float(np.minimum(fast[: count + 1], shed[count::-1]).sum())  # no less than the integral
+    least_s = step_s * max(0, count - 1)  # the step before was too short
+    return max(0.0, float(first.changes.edges_mps[-1]) * least_s - sailed_m), least_s
+
+
+def _can_meet(fast: Array, slow: Array, shed: Array, kept: Array, count: int) -> bool:
+    """Whether speeds from `slow` to `fast` since the beginning meet those from `kept` to `shed` until the end."""
+    most, least = np.minimum(fast[: count + 1], shed[count::-1]), np.maximum(slow[: count + 1], kept[count::-1])
+    return bool((least <= most + 1e-9).all())
+
+
+def _moved_s(vessel: Vessel, first: Array, last: Array) -> float:
+    """Time in which commands (m,) become others at their rates, less the two samples in which they may stand."""
+    turned = np.abs(first - last)
+    turns = ~np.isfinite([limit.high - limit.low for limit in vessel.limits])
+    turned[turns] = np.abs(wrap_angle(turned[turns]))
+    rates = np.array([limit.rate for limit in vessel.limits])
+    return max(0.0, float((turned / rates).max(initial=0.0)) - 2 * vessel.sample_time_s)
