@@ -91,7 +91,7 @@ def worth(item: Finding) -> str:
     best = max(known, key=lambda fall: fall.low)
     interval = f"({_percent(best.low)} to {_percent(best.high)} %)"
     if best.share < VISIBLE:
-        return "takes no whole per cent off any error, as its test sees more than noisy velocities show"
+        return "takes less than 1 % off any error"
     way = "halves" if abs(best.share - 0.5) < 0.025 else "cuts"
     by = "" if way == "halves" else f" by {_percent(best.share)} %"
     return f"{way} the {WORDS[best.output]} error{by} {interval}"
@@ -108,6 +108,10 @@ def verdict(findings: Sequence[Finding], before: Accuracy) -> str:
     else:
         gains = [f"{'adding ' if not i else ''}{lacking(item.cause)} {worth(item)}" for i, item in enumerate(findings)]
         parts.append(f"on runs it has not seen, {listed(gains)}")
+    unseen = [item for item in findings if item.falls and all(not fall.share >= VISIBLE for fall in item.falls)]
+    if unseen:
+        names = "it" if len(findings) == 1 else listed([lacking(item.cause) for item in unseen])
+        parts.append(f"{names} shows in a test, not yet in velocities as noisy as these")
     parts += [text for item in findings if (text := telling(item))]
     return "; ".join(parts) + "."
 
