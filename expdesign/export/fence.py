@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from expdesign.plan.area import LocalFrame
+from expdesign.plan.area import LocalFrame, eroded
 from expdesign.values import Array
 
 DECIMALS = 7
@@ -62,7 +62,7 @@ def build_fence(
 def _simplified(
     water: shapely.Geometry, line: shapely.LineString, *, inset_m: float, slack_m: float
 ) -> shapely.Polygon | None:
-    inner = shapely.simplify(water.buffer(-inset_m, join_style="mitre"), slack_m, preserve_topology=True)
+    inner = shapely.simplify(eroded(water, inset_m, join_style="mitre"), slack_m, preserve_topology=True)
     parts = [part for part in shapely.get_parts(inner) if part.geom_type == "Polygon" and part.covers(line)]
     return shapely.orient_polygons(parts[0]) if parts else None
 

@@ -80,16 +80,20 @@ class SeaArea:
     depths: tuple[tuple[float, shapely.MultiPolygon], ...] = ()
 
     def safe_water(self, clearance_m: float) -> shapely.MultiPolygon:
-        """The water that a hull may touch when it must keep `clearance_m` from everything forbidden.
+        """The water that a hull may touch when it must keep `clearance_m` from everything forbidden."""
+        return as_multipolygon(eroded(self.water, clearance_m))
 
-        From a shore with many corners in a stretch as long as the clearance it is taken off in growing steps, each of
-        which smooths the shore for the next: the same is left, as discs add up to discs, in a tenth of the time.
-        """
-        water: shapely.Geometry = self.water
-        dense = DENSE * water.length < clearance_m * shapely.get_num_coordinates(water)
-        for share in STEPS if dense else (1.0,):
-            water = water.buffer(-share * clearance_m)
-        return as_multipolygon(water)
+
+def eroded(water: shapely.Geometry, distance_m: float, *, join_style: str = "round") -> shapely.Geometry:
+    """What of a water lies farther than a distance from its shore.
+
+    From a shore with many corners in a stretch as long as the distance it is taken off in growing steps, each of which
+    smooths the shore for the next: the same is left, as discs add up to discs, in a tenth of the time.
+    """
+    dense = DENSE * water.length < distance_m * shapely.get_num_coordinates(water)
+    for share in STEPS if dense else (1.0,):
+        water = shapely.buffer(water, -share * distance_m, quad_segs=16, join_style=join_style)
+    return water
 
 
 @dataclass(frozen=True, kw_only=True)
