@@ -6,6 +6,7 @@ The procedure is that of `expdesign.plan.run_up`.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -84,7 +85,7 @@ class Pilot:
         self._first, self._arrival = len(planned.states), len(planned.states) + runs_up.arrival
         length_m = float(np.hypot(*(runs_up.states[0] - track[-1])[:2]))
         reach_m = np.clip(length_m / 5, self._within.position_m / 2, helm.vessel.length_m)
-        self._convoy, self._ways = Convoy(helm, runs_up.states[0], n, reach_m=reach_m), None
+        self._convoy = Convoy(helm, runs_up.states[0], n, reach_m=float(reach_m))
         self._turning = _turns_freely(helm)
         self.doing = np.where(sailing, ON_STRETCH, OUT)
         self._sample, self._end, self._most = np.zeros(n), np.full(n, planned.arrival), np.full(n, self._first - 1)
@@ -167,7 +168,7 @@ class Pilot:
             return
         self.rounds[some] += 1
         ways = self._tree.find(states[some, :2]) if self._helm.sideways else [self._curve(x) for x in states[some]]
-        for ship, way in zip(some, ways, strict=True):
+        for ship, way in zip(some.tolist(), ways, strict=True):
             if way is None:
                 self._missed[ship] = MISSED.index("no way round")
             else:
@@ -183,11 +184,9 @@ class Pilot:
         curve = dubins_curve(state[:3], goal[:3], radius_m=radius, spacing_m=length)[:, :2]
         return curve if self._tree.holds(curve) else None
 
-    @property
+    @cached_property
     def _tree(self) -> WaysTo:
-        if self._ways is None:
-            self._ways = build_ways_to(self._water.narrowest_ways, self._convoy.goal[:2])
-        return self._ways
+        return build_ways_to(self._water.narrowest_ways, self._convoy.goal[:2])
 
     def _near(self, given: Array) -> Array:
         """(n, m) commands to whose angles azimuths keep: those of the run for ships that come to it under way."""

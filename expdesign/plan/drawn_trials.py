@@ -54,7 +54,7 @@ class Trials:
     @property
     def completed(self) -> np.ndarray:
         """(n,) trials that came to the goal."""
-        return ~(self.left | self.aborted).any(axis=0)
+        return np.asarray(~(self.left | self.aborted).any(axis=0))
 
 
 def sail_trials(
