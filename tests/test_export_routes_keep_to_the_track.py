@@ -13,7 +13,7 @@ import shapely
 
 from expdesign.errors import InputError, NoPlan
 from expdesign.export import PlannedTrack, Route, build_route, read_plan
-from expdesign.export.fence import fence_polygon
+from expdesign.export.fence import build_fence, fence_polygon
 from expdesign.plan.area import LocalFrame
 from expdesign.plan.values import Leg
 from expdesign.signals import Commands, Trajectory
@@ -216,3 +216,19 @@ def test_a_plan_read_from_its_files_brings_its_fence_and_its_route_stays_inside(
     assert route.fit.in_water is True
     legs = shapely.LineString(places(route)[:, ::-1])
     assert fence_polygon(route.fence, track.frame).covers(legs)
+
+
+def test_the_fence_holds_off_a_shore_of_very_many_corners() -> None:
+    """A jagged shore, a corner in every thirtieth of the inset: the fence lies in the water, half a beam off land."""
+    rng = np.random.default_rng(5)
+    angle = np.linspace(0, 2 * np.pi, 6000, endpoint=False)
+    radius = 300 + 20 * np.sin(5 * angle) + 0.2 * rng.normal(size=len(angle))
+    water = shapely.Polygon(np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1))
+    track = np.stack([np.linspace(-150, 150, 50), np.zeros(50)], axis=1)
+    frame = LocalFrame(60.0, 25.0)
+    fence = build_fence(track, water=water, beam_m=6.0, clearance_m=15.0, frame=frame)
+    assert fence is not None
+    polygon = fence_polygon(fence, frame)
+    assert water.covers(polygon)
+    assert polygon.covers(shapely.LineString(track[:, ::-1]))
+    assert polygon.boundary.distance(water.boundary) >= 6.0 / 2 - 0.05
