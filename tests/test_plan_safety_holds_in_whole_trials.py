@@ -1,48 +1,154 @@
-"""Whole trials of drawn ships, legs steered and runs open loop from where they really begin: few leave the water."""
+"""Whole trials of drawn ships: legs and ways round steered, runs open loop from where they really begin."""
 
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
+from plan_case import at_rest, leg_water
+from test_plan_verification_catches_what_is_wrong import primitive
 
 from expdesign import workflows
+from expdesign.plan.drawn_trials import Trials, sail_trials
+from expdesign.plan.legs import LegTask, find_leg, leg_trajectory
+from expdesign.plan.run_up import ROUNDS, tolerances
+from expdesign.plan.safety import broken_promise, promised
+from expdesign.plan.timeline import Timeline
+from expdesign.plan.values import Leg
 from expdesign.scenario import load_scenario
+from expdesign.simulation import Environment
 
 ROOT = Path(__file__).parents[1]
+OPEN = shapely.box(-400, -300, 400, 500)
+
+
+@cache
+def planned():
+    """Two accelerations from rest, 60 m apart, the second across the first, and back to the start; in open water."""
+    water = leg_water(OPEN)
+    run = primitive(water.vessel)
+    line = Timeline(begin=at_rest(0, 0, 0.0), begin_inputs=np.zeros(4))
+    line.sail(
+        "primitive", "go", run.commands.values, leg_trajectory(water, line.begin, run.commands.values, line.given)
+    )
+    for index, end in enumerate((at_rest(60, 60, np.pi / 2), at_rest(0, 0, 0.0))):
+        task = LegTask(start=line.state, end=end, start_inputs=line.inputs, end_inputs=np.zeros(4), seed=1)
+        leg = find_leg(task, water)
+        assert leg is not None
+        line.sail("reposition", "go" if index == 0 else "goal", leg, leg_trajectory(water, line.state, leg, line.given))
+        if index == 0:
+            values = run.commands.values + 2 * np.pi * np.round(line.inputs / (2 * np.pi)) * [0, 1, 0, 1]
+            line.sail("primitive", "go", values, leg_trajectory(water, line.state, values, line.given))
+    return line.joined(sample_time_s=1.0, names=water.vessel.model.inputs)
+
+
+def sailing(basin=OPEN, environment=None, *, certain=False, draws=30, seed=0):
+    commands, track, legs = planned()
+    water = leg_water(basin, clearance_m=5.0)
+    if environment is not None:
+        water = replace(water, environment=environment)
+    if certain:
+        model = replace(water.vessel.model, parameter_std=np.zeros(len(water.vessel.model.names)))
+        water = replace(water, vessel=replace(water.vessel, model=model))
+    rng = np.random.default_rng(seed)
+    return water, sail_trials(water, commands=commands, trajectory=track, legs=legs, draws=draws, rng=rng)
+
+
+def test_ships_that_are_as_planned_come_to_the_goal_without_going_round():
+    _, trials = sailing(certain=True, draws=3)
+    assert trials.completed.all()
+    assert not trials.rounds.any()
+    runs = [leg.kind == "primitive" for leg in planned()[2]]
+    assert (trials.used[runs] < 1.0).all()
+
+
+def test_every_trial_ends_in_one_way_and_runs_begin_within_tolerance():
+    weather = Environment(current_std_mps=0.25)
+    _, trials = sailing(environment=weather, draws=30)
+    ends = trials.left.sum(axis=0) + trials.aborted.sum(axis=0) + trials.completed
+    np.testing.assert_array_equal(ends, 1)
+    begun = ~np.isnan(trials.used)
+    assert (trials.used[begun] <= 1.0).all()
+    assert trials.rounds.max() <= ROUNDS
+    over = np.cumsum(trials.left | trials.aborted, axis=0)[:-1] > 0
+    assert not trials.samples[1:][over].any()  # nothing is sailed after the end
+
+
+def test_a_strange_current_makes_ships_go_round_and_costs_time():
+    commands, track, legs = planned()
+    calm = leg_water(OPEN, clearance_m=5.0)
+    windy = replace(calm, environment=Environment(current_std_mps=0.2))
+    few, many = (
+        promised(water, commands=commands, trajectory=track, legs=legs, rng=np.random.default_rng(1), draws=30)[0]
+        for water in (calm, windy)
+    )
+    assert many.legs[1].rounds >= few.legs[1].rounds
+    assert many.extra_median_s > few.extra_median_s
+
+
+def test_water_that_ends_on_a_run_is_left_there_and_the_message_says_where():
+    commands, track, legs = planned()
+    reach = float(track.pose[legs[0].last, 0])
+    water, trials = sailing(shapely.box(-400, -300, 400, reach), certain=True, draws=3)
+    assert trials.left[0].all()
+    assert not trials.samples[1:].any()
+    assert (np.abs(trials.place[0, :, 0] - reach) < water.vessel.length_m).all()
+    promise, trials = promised(
+        water, commands=commands, trajectory=track, legs=legs, rng=np.random.default_rng(0), draws=20
+    )
+    told = broken_promise(promise, trials, legs, water.area, confidence=0.95)
+    lat, lon = water.area.frame.to_degrees(np.nanmedian(trials.place[0], axis=0))
+    assert "in run 1, 'go'" in told
+    assert f"{lat:.5f}, {lon:.5f}" in told
+    assert promise.left == 1.0
+
+
+def test_a_promise_is_kept_or_broken_by_the_share_alone():
+    legs = (Leg(kind="reposition", name="a", first=0, last=1), Leg(kind="primitive", name="a", first=1, last=2))
+    left = np.zeros((2, 100), dtype=bool)
+    left[0, :5] = True
+    blank = np.zeros((2, 100), dtype=int)
+    trials = Trials(
+        left=left,
+        aborted=np.zeros_like(left),
+        rounds=blank,
+        samples=blank,
+        used=np.zeros((2, 100)),
+        missed=blank,
+        place=np.where(left[..., None], np.full(2, 10.0), np.nan),
+        within=(tolerances(leg_water(OPEN)),) * 2,
+    )
+    promise = replace(sailed_promise(), left=0.05)
+    sea = leg_water(OPEN).area
+    assert broken_promise(promise, trials, legs, sea, confidence=0.95) == ""
+    assert "on the way to run 1" in broken_promise(promise, trials, legs, sea, confidence=0.96)
+
+
+@cache
+def sailed_promise():
+    commands, track, legs = planned()
+    water = leg_water(OPEN, clearance_m=5.0)
+    return promised(water, commands=commands, trajectory=track, legs=legs, rng=np.random.default_rng(0), draws=4)[0]
 
 
 @pytest.mark.slow
-def test_runs_begun_in_place_keep_the_promise_and_runs_begun_elsewhere_need_not(monkeypatch):
+def test_the_promise_of_a_real_plan_holds_in_other_draws_and_without_breaks_it_need_not(monkeypatch):
     monkeypatch.syspath_prepend(str(ROOT / "tests" / "benchmarks"))
     import safety
 
     case = load_scenario(ROOT / "scenarios" / "narrows.toml")
     information = workflows.scored(case)
     plan = workflows.planned(case, information, workflows.designed(case, information))
-    in_place, unbroken = (
-        safety.sailed(case, plan, draws=100, in_place=wanted, rng=np.random.default_rng(3)) for wanted in (True, False)
+    water = safety.water_of(case, plan)
+    by_the_book, unbroken = (
+        safety.sailed(water, plan, draws=200, breaks=breaks, rng=np.random.default_rng(3)) for breaks in (True, False)
     )
     sys.modules.pop("safety")
-    share, error = safety.share_of("primitive", plan.legs, in_place.leaves)
-    assert share <= 1.0 - case.plan.confidence + 2 * error
-    runs = [leg.kind == "primitive" for leg in plan.legs]
-    assert np.median(in_place.off_m[runs]) < 0.1 * case.vessel.length_m
-    assert np.median(unbroken.off_m[runs]) > np.median(in_place.off_m[runs])
-    assert safety.share_of("primitive", plan.legs, unbroken.leaves)[0] > share
-
-
-def test_steady_motion_leads_through_the_planned_state_at_the_planned_time(monkeypatch):
-    monkeypatch.syspath_prepend(str(ROOT / "tests" / "benchmarks"))
-    import safety
-
-    wanted = np.array([10.0, -20.0, 0.7, 1.5, 0.2, 0.0])
-    states = safety.steady(wanted, np.arange(-60.0, 5.0))
-    sys.modules.pop("safety")
-    np.testing.assert_allclose(states[60], wanted)
-    moved = np.diff(states[:, :2], axis=0)
-    np.testing.assert_allclose(np.hypot(*moved.T), np.hypot(1.5, 0.2))
-    course = np.arctan2(moved[:, 1], moved[:, 0])
-    np.testing.assert_allclose(course, 0.7 + np.arctan2(0.2, 1.5))
+    assert by_the_book.left <= 1.0 - case.plan.confidence + 2 * by_the_book.error
+    assert unbroken.left >= by_the_book.left
+    assert unbroken.extra_median_s < by_the_book.extra_median_s
