@@ -36,6 +36,9 @@ AS_GOOD = 5.0
 truly trails by d comes out ahead by more than this with a probability below Phi(-sqrt(AS_GOOD))."""
 CLEARLY_LESS, MARGIN = 0.4, 20.0
 """Candidates with less than this share of the largest statistic, and by more than this, are not fitted."""
+ALARM = 0.025
+"""Corrected p-value up to which a cause is believed: half the share of false alarms promised, as p-values are right
+only for long data."""
 FIRST_STEPS, LEADING = 3, 0.6
 """Gauss-Newton steps after which candidates that gain less than this share of the most are given up."""
 STRONG = 0.15
@@ -206,7 +209,7 @@ def _step(base: Fit, windows: Windows, found: tuple[Scored, ...], progress: Prog
     contenders = judged(base, contenders)
     least = LEADING * max((item.gain for item in contenders), default=0.0) - MARGIN
     contenders = judged(base, [finished(base, windows, item) for item in contenders if item.gain > least])
-    chosen = next((item for item in contenders if item.p_value <= LEVEL), None)
+    chosen = next((item for item in contenders if item.p_value <= ALARM), None)
     if chosen is None:
         return None
     rivals: dict[str, Contender] = {}
