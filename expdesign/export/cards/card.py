@@ -158,6 +158,7 @@ def _orders_notes(content: ReportContent, leg: Leg, rows: list[tuple[str, ...]],
 SIGNS = {
     "n": "n: propeller speed, ahead positive.",
     "a": "a: direction of thrust, 0 ahead, 90 to starboard.",
+    "rudder": "rudder: 0 amidships; the sign is the vessel file's.",
 }
 """Stem of a signal -> what its sign means."""
 
