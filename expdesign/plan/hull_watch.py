@@ -64,7 +64,7 @@ class HullWatch:
 
         From the middle of a step of half a radius a corner is sqrt(1.05**2 - 0.25**2) > 1 radii away.
         """
-        inner = self.area.water.buffer(-1.05 * self._radius)
+        inner = self.area.safe_water(1.05 * self._radius)
         shapely.prepare(inner)
         return inner
 

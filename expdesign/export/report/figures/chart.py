@@ -29,7 +29,7 @@ from expdesign.export.report.figures.style import (
     new_figure,
     svg,
 )
-from expdesign.plan.area import SeaArea, as_multipolygon
+from expdesign.plan.area import SeaArea, as_multipolygon, eroded
 from expdesign.plan.values import Plan
 from expdesign.values import Array
 
@@ -89,7 +89,7 @@ def draw_sea(axes: Axes, area: SeaArea, box: Box, clearance_m: float) -> None:
     land = as_multipolygon(shapely.simplify(shapely.intersection(area.land, around), detail))
     axes.add_patch(_patch(land, facecolor=LAND, edgecolor="#8a7440", linewidth=0.5))
     if clearance_m > 0:
-        safe = as_multipolygon(shapely.simplify(near.buffer(-clearance_m), detail))
+        safe = as_multipolygon(shapely.simplify(eroded(near, clearance_m), detail))
         axes.add_patch(_patch(safe, facecolor="none", edgecolor=GREY, linewidth=0.7, linestyle=(0, (2, 2))))
 
 
