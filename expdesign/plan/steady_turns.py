@@ -95,7 +95,7 @@ def _solved(approach: Approach, angle: float, motion: Array) -> SteadyTurn | Non
         whole = np.zeros(3)
         whole[used] = share * scale
         rates = approach.helm.acceleration((whole[0], whole[1], whole[2]), approach.drive, helm_rad)
-        return np.array(rates)[used] * pace_s / scale
+        return np.asarray(np.array(rates)[used] * pace_s / scale)
 
     share = root(excess, motion[used] / scale, tol=1e-12).x
     whole = np.zeros(3)
