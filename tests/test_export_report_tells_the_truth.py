@@ -164,7 +164,7 @@ def test_information_of_the_primitives_adds_up_to_that_of_the_design(mean_subtra
     assert design.fractions @ information_rate(content) == pytest.approx(np.diag(whole), rel=1e-9)
     share = relative_information(content)
     assert share.max(axis=0) == pytest.approx(np.ones(p))
-    assert share.min() >= 0.0
+    assert share.min() >= -1e-12  # what tells nothing is zero but for rounding
 
 
 def test_labels_keep_apart_and_inside_when_there_is_room() -> None:
