@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.conventions import wrap_angle
-from expdesign.plan.capability import speed_loss_s, turn_loss_s
+from expdesign.plan.leg_times import LegTimes, joints
 from expdesign.plan.search_space import PartialPlans, SearchSpace
 from expdesign.values import Array
 
@@ -23,8 +23,8 @@ WAYS = np.array([5.0, 12.0, 25.0, 50.0, 100.0])
 """Stretches of the shortest way to the goal, in hull lengths; the whole way is always tried too."""
 AGILE_WAYS = np.array([1.0, 1.5, 2.5, 4.0, 7.0, 12.0, 25.0, 50.0, 100.0])
 """The same for agile vessels."""
-AGILE_STRAIGHTS = np.array([0.5, 1.0, 2.0, 5.0])
-"""Straight legs of agile vessels, beyond the run-up, in hull lengths."""
+AGILE_STRAIGHTS = np.array([1.0, 2.5, 6.0])
+"""Straight legs of agile vessels besides the best joints, beyond the run-up, in hull lengths."""
 COURSES = np.arange(6) * np.pi / 3
 """Courses of straight legs of agile vessels, from the heading that the run before ends with."""
 HEADINGS = np.arange(16) * np.pi / 8
@@ -65,8 +65,13 @@ def continuations(space: SearchSpace, beam: PartialPlans, q: int) -> list[Option
     """Every way to begin primitive q after each partial plan."""
     able = np.flatnonzero(beam.left[:, q] > 0)
     runup = np.array([_run_up(space, int(last), q) for last in beam.last[able]])
-    if space.ship.agile:
-        return [_at_once(space, beam, able, q), _straights(space, beam, able, q, runup), _ways(space, beam, able, q)]
+    if space.times is not None:
+        times, more_m = space.times, runup - space.hull_m
+        return [
+            _joints(space, times, beam, able, q, more_m),
+            _straights(space, times, beam, able, q, more_m),
+            _ways(space, times, beam, able, q),
+        ]
     change_s = np.abs(beam.exit_mps[able] - space.stamps[q].entry_mps) / space.ship.acceleration_mps2
     return [_arcs(space, beam, able, q, runup, change_s), _transits(space, beam, able, q, change_s)]
 
@@ -110,55 +115,80 @@ def _options(
     )
 
 
-def _at_once(space: SearchSpace, beam: PartialPlans, able: np.ndarray, q: int) -> Options:
-    """Runs that begin where the run before ended, after a turn on the spot; both at rest."""
-    slow = 0.05 * space.ship.transit_speed_mps
-    able = able[(beam.exit_mps[able] < slow) & (space.stamps[q].entry_mps < slow)]
-    parent, heading = np.repeat(able, len(HEADINGS)), np.tile(HEADINGS, len(able))
-    start = beam.pose[parent] + heading[:, None] * [0.0, 0.0, 1.0]
-    leg_s = space.ship.settle_s + 1.3 * np.abs(wrap_angle(heading)) / space.ship.swing_radps
-    return _options(q, parent, start, leg_s)
+def _joints(
+    space: SearchSpace, times: LegTimes, beam: PartialPlans, able: np.ndarray, q: int, more_m: Array
+) -> Options:
+    """Runs near the end of the one before, placed and headed as suits the joint."""
+    parents, steps, seconds = [np.zeros(0, dtype=int)], [np.zeros((0, 3))], [np.zeros(0)]
+    entry = np.array(space.stamps[q].entry_mps)
+    for (last, exit_mps), where in _alike(beam, able).items():
+        rule = space.joint_times(times, space.stamps[last].name if last >= 0 else "", space.stamps[q].name)
+        found, longer = joints(rule, exit_mps, float(entry)), float(more_m[where[0]])
+        step, leg_s = found.step, found.seconds
+        if longer:  # straight before the run
+            step = step + longer * np.column_stack([np.cos(step[:, 2]), np.sin(step[:, 2]), 0 * leg_s])
+            leg_s = rule.step_s(step, np.array(exit_mps), entry)
+        parents.append(np.repeat(able[where], len(leg_s)))
+        steps.append(np.tile(step, (len(where), 1)))
+        seconds.append(np.tile(leg_s, len(where)))
+    return _stepped(space, beam, q, *(np.concatenate(part) for part in (parents, steps, seconds)))
 
 
-def _straights(space: SearchSpace, beam: PartialPlans, able: np.ndarray, q: int, runup: Array) -> Options:
+def _alike(beam: PartialPlans, able: np.ndarray) -> dict[tuple[int, float], np.ndarray]:
+    """Rows of `able` by the run that was last and its speed at the end."""
+    keys = [(int(last), float(speed)) for last, speed in zip(beam.last[able], beam.exit_mps[able], strict=True)]
+    return {key: np.flatnonzero([other == key for other in keys]) for key in dict.fromkeys(keys)}
+
+
+def _stepped(space: SearchSpace, beam: PartialPlans, q: int, parent: np.ndarray, step: Array, leg_s: Array) -> Options:
+    """Options at steps through water (n, 3) from where partial plans end."""
+    start = _moved(beam.pose[parent], step)
+    start[:, :2] += leg_s[:, None] * space.current_to
+    return _options(q, parent, start, leg_s, straight=True)
+
+
+def _straights(
+    space: SearchSpace, times: LegTimes, beam: PartialPlans, able: np.ndarray, q: int, more_m: Array
+) -> Options:
     course, length, heading = (
         grid.ravel() for grid in np.meshgrid(COURSES, AGILE_STRAIGHTS * space.hull_m, HEADINGS, indexing="ij")
     )
     parent = np.repeat(able, len(course))
     course, heading = np.tile(course, len(able)), np.tile(heading, len(able))
-    length = np.tile(length, len(able)) + np.repeat(runup, len(parent) // max(len(able), 1)) - space.hull_m
-    length = length + (beam.exit_mps[parent] + space.stamps[q].entry_mps) * 1.5 * space.ship.settle_s
+    length = np.tile(length, len(able)) + np.repeat(more_m, len(parent) // max(len(able), 1))
     step = np.column_stack([length * np.cos(course), length * np.sin(course), heading])
-    leg_s = _agile_s(space, length, course, heading - course, beam.exit_mps[parent], q)
-    return _options(q, parent, _moved(beam.pose[parent], step), leg_s, straight=True)
+    leg_s = times.step_s(step, beam.exit_mps[parent], np.array(space.stamps[q].entry_mps))
+    return _stepped(space, beam, q, parent, step, leg_s)
 
 
-def _ways(space: SearchSpace, beam: PartialPlans, able: np.ndarray, q: int) -> Options:
+def _ways(space: SearchSpace, times: LegTimes, beam: PartialPlans, able: np.ndarray, q: int) -> Options:
     """Runs at points of the way to the goal, with any heading."""
-    parents, starts, times = [np.zeros(0, dtype=int)], [np.zeros((0, 3))], [np.zeros(0)]
+    parents, starts, seconds = [np.zeros(0, dtype=int)], [np.zeros((0, 3))], [np.zeros(0)]
+    entry = np.array(space.stamps[q].entry_mps)
     for index in able:
-        points, along = _way_points(space, beam.pose[index], AGILE_WAYS)
+        pose = beam.pose[index]
+        points, along = _way_points(space, pose, AGILE_WAYS)
         if not len(points):
             continue
         direction = np.arctan2(points[:, 3], points[:, 2])
         near = along < 10 * space.hull_m
-        to_point = np.arctan2(*(points[:, :2] - beam.pose[index, :2]).T[::-1])
-        first = np.where(near, to_point, direction[0]) - beam.pose[index, 2]
-        last = np.where(near, to_point, direction)
+        to_point = np.arctan2(*(points[:, :2] - pose[:2]).T[::-1])
+        first = pose[2] - np.where(near, to_point, direction[0])
         heading = direction[:, None] + HEADINGS
-        leg_s = _agile_s(space, along[:, None], first[:, None], heading - last[:, None], beam.exit_mps[index], q)
+        helped_m = (points[:, :2] - pose[:2]) @ space.current_to / times.speed_mps
+        leg_s = times.seconds(
+            np.maximum(along - helped_m, 0.0)[:, None],
+            first[:, None],
+            heading - np.where(near, to_point, direction)[:, None],
+            heading - pose[2],
+            beam.exit_mps[index],
+            entry,
+        )
         placed = np.repeat(points[:, :2], len(HEADINGS), axis=0)
         starts.append(np.column_stack([placed, heading.ravel()]))
-        times.append(leg_s.ravel())
+        seconds.append(leg_s.ravel())
         parents.append(np.full(len(placed), index))
-    return _options(q, np.concatenate(parents), np.concatenate(starts), np.concatenate(times))
-
-
-def _agile_s(space: SearchSpace, length: Array, first: Array, last: Array, exit_mps: Array, q: int) -> Array:
-    """Time of agile legs by what optimised ones take, from lengths and turns at both ends."""
-    way_s = length / space.ship.transit_speed_mps + turn_loss_s(space.ship, first, last)
-    spot_s = 1.3 * np.abs(wrap_angle(first + last)) / space.ship.swing_radps
-    return np.maximum(way_s, spot_s) + speed_loss_s(space.ship, exit_mps, np.array(space.stamps[q].entry_mps))
+    return _options(q, np.concatenate(parents), np.concatenate(starts), np.concatenate(seconds))
 
 
 def _arc_end(pose: Array, turn: Array, straight: Array, radius: float) -> Array:

@@ -14,8 +14,8 @@ import numpy as np
 
 from expdesign.conventions import wrap_angle
 from expdesign.errors import NoPlan
-from expdesign.plan.capability import turn_loss_s
 from expdesign.plan.continuations import Options, clear_options, continuations, joined, run_ends
+from expdesign.plan.orders_ahead import OrdersAhead, orders_ahead
 from expdesign.plan.search_space import PartialPlans, SearchSpace
 from expdesign.plan.values import Placement
 from expdesign.values import Array
@@ -49,16 +49,32 @@ def place_runs(
         cost_s=np.zeros(1),
         history=((),),
     )
+    ahead = _orders(space, repeats, start)
     for _ in range(int(np.sum(repeats))):
-        beam = _advance(space, beam, width)
-    final_s = beam.cost_s + _leg_to_goal_s(space, beam.pose)
+        beam = _advance(space, beam, width, ahead)
+    final_s = beam.cost_s + _leg_to_goal_s(space, beam)
     best = int(np.argmin(final_s))
     if not np.isfinite(final_s[best]):
         raise NoPlan("no way to the goal from where the last run ends")
     return tuple(Placement(primitive=names[q], pose=pose) for q, pose in beam.history[best])
 
 
-def _advance(space: SearchSpace, beam: PartialPlans, width: int) -> PartialPlans:
+def _orders(space: SearchSpace, repeats: Sequence[int], start: Array) -> OrdersAhead | None:
+    """What orders lose, for vessels for which that is known."""
+    if space.times is None:
+        return None
+    return orders_ahead(space, space.times, repeats, carried=is_carried(space, repeats, start))
+
+
+def is_carried(space: SearchSpace, repeats: Sequence[int], start: Array) -> bool:
+    """Whether the way to the goal is longer than what runs can carry the ship."""
+    carried_m = sum(
+        count * float(np.hypot(*item.displacement[:2])) for item, count in zip(space.stamps, repeats, strict=True)
+    )
+    return bool(space.goal_way.to_goal(start[None, :2])[0] > carried_m)
+
+
+def _advance(space: SearchSpace, beam: PartialPlans, width: int, ahead: OrdersAhead | None) -> PartialPlans:
     """The best partial plans with one more run each."""
     options = joined(
         [part for q in range(len(space.stamps)) if beam.left[:, q].any() for part in continuations(space, beam, q)]
@@ -67,7 +83,8 @@ def _advance(space: SearchSpace, beam: PartialPlans, width: int) -> PartialPlans
     left = beam.left[options.parent].copy()
     left[np.arange(len(left)), options.primitive] -= 1
     end = run_ends(space, options.primitive, options.start)
-    kept = _select(space, beam, options, end, left, cost + _rest_s(space, end, left), width)
+    rest_s = _rest_s(space, end, left) + (0.0 if ahead is None else ahead.seconds(left, options.primitive))
+    kept = _select(space, beam, options, end, left, cost + rest_s, width)
     if not len(kept):
         raise NoPlan(_what_blocks(space, beam))
     chosen = options[kept]
@@ -87,7 +104,8 @@ def _advance(space: SearchSpace, beam: PartialPlans, width: int) -> PartialPlans
 def _rest_s(space: SearchSpace, end: Array, left: np.ndarray) -> Array:
     """(n,) repositioning time still needed at least, by the way to the goal and what the runs left can carry [s]."""
     carried = left @ np.array([np.hypot(*item.displacement[:2]) for item in space.stamps])
-    ahead_m = space.goal_way.to_goal(end[:, :2]) - carried
+    helped_m = (space.goal[:2] - end[:, :2]) @ space.current_to / space.ship.transit_speed_mps
+    ahead_m = space.goal_way.to_goal(end[:, :2]) - carried - helped_m
     return np.asarray(np.clip(ahead_m, 0.0, None) / space.ship.transit_speed_mps)
 
 
@@ -113,14 +131,18 @@ def _select(
     return np.array(kept[:width], dtype=int)
 
 
-def _leg_to_goal_s(space: SearchSpace, pose: Array) -> Array:
-    """Estimated time of the last leg from poses (b, 3) to the goal [s]."""
+def _leg_to_goal_s(space: SearchSpace, beam: PartialPlans) -> Array:
+    """Estimated time of the last leg from where plans end to the goal [s]."""
+    pose = beam.pose
     distance = space.goal_way.to_goal(pose[:, :2])
-    direct = np.arctan2(space.goal[1] - pose[:, 1], space.goal[0] - pose[:, 0])
-    if space.ship.agile:
-        way_s = distance / space.ship.transit_speed_mps
-        return np.asarray(way_s + turn_loss_s(space.ship, direct - pose[:, 2], space.goal[2] - direct))
-    turns = np.abs(wrap_angle(direct - pose[:, 2])) + np.abs(wrap_angle(space.goal[2] - direct))
+    away = space.goal[:2] - pose[:, :2]
+    direct = np.arctan2(away[:, 1], away[:, 0])
+    first, last = pose[:, 2] - direct, space.goal[2] - direct
+    if space.times is not None:
+        helped_m = away @ space.current_to / space.times.speed_mps
+        way_m, turn = np.maximum(distance - helped_m, 0.0), space.goal[2] - pose[:, 2]
+        return space.times.seconds(way_m, first, last, turn, beam.exit_mps, np.zeros(1))
+    turns = np.abs(wrap_angle(first)) + np.abs(wrap_angle(last))
     return np.asarray((distance + space.ship.turning_radius_m * turns) / space.ship.transit_speed_mps)
 
 

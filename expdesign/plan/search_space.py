@@ -14,6 +14,7 @@ from expdesign.plan.capability import Capability
 from expdesign.plan.field import ClearanceField
 from expdesign.plan.footprint import covering_discs, disc_points, thinned_poses
 from expdesign.plan.goal_ways import GoalWays
+from expdesign.plan.leg_times import LegTimes
 from expdesign.plan.values import Placement
 from expdesign.values import Array
 
@@ -55,6 +56,8 @@ class SearchSpace:
         hull_m: hull length [m].
         leg_margin_m: clearance that leg centre lines need on the grid [m].
         current_to: (2,) mean current [m/s].
+        times: how long legs take, for agile vessels; None for others.
+        settle_s: time to settle of joints that were tried, by (name before, name); others take that of `times`.
         run_up: extra straight before a run, by (name before, name) in hull lengths; grows where a leg failed.
         recoveries: (q, 4) what each run is followed by before the ship goes straight: way ahead m, to starboard m,
             course from the heading at the run's end rad, time s; None where ships need nothing of the kind.
@@ -71,8 +74,14 @@ class SearchSpace:
     leg_margin_m: float
     current_to: Array
     recoveries: Array | None = None
+    times: LegTimes | None = None
+    settle_s: Mapping[tuple[str, str], float] = dataclasses.field(default_factory=dict)
     run_up: Mapping[tuple[str, str], float] = dataclasses.field(default_factory=dict)
     refused: Array = dataclasses.field(default_factory=lambda: np.zeros((0, 3)))
+
+    def joint_times(self, times: LegTimes, before: str, after: str) -> LegTimes:
+        """The rule for joints between two runs."""
+        return replace(times, settle_s=self.settle_s.get((before, after), times.settle_s))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

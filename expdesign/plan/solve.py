@@ -19,16 +19,19 @@ from expdesign.plan.drawn_trials import Trials
 from expdesign.plan.field import ClearanceField, clearance_field, narrowest_passage
 from expdesign.plan.footprint import covering_discs, swept_area
 from expdesign.plan.goal_ways import build_goal_ways
+from expdesign.plan.joint_trials import joints_of, settled
 from expdesign.plan.lattice import LatticePlan, search_lattice
 from expdesign.plan.lattice_moves import build_lattice
+from expdesign.plan.leg_times import leg_times
 from expdesign.plan.leg_values import last_state, leg_speed_mps
 from expdesign.plan.legs import LegTask, LegWater, find_leg, leg_trajectory
 from expdesign.plan.lower_bound import reposition_bound_s
-from expdesign.plan.placement import place_runs
+from expdesign.plan.placement import is_carried, place_runs
 from expdesign.plan.realised import realised_efficiencies
 from expdesign.plan.recovery import displaced, recover
 from expdesign.plan.safety import broken_promise, promised, worst_leg
 from expdesign.plan.search_space import SearchSpace, Stamp, refusing, stamp
+from expdesign.plan.speed_changes import leg_end
 from expdesign.plan.timeline import Timeline
 from expdesign.plan.uncertainty import stray_m
 from expdesign.plan.values import Leg, Placement, Plan, PlanSettings, Promise, Verification
@@ -42,6 +45,8 @@ GOAL = "goal"
 TRY_S = 2.0
 """Seconds of the time budget that count as one try of another place: effort is counted, so that a slow machine finds
 the same plan as a fast one."""
+JOINT_TRIALS, TRIAL_WIDTH = 4, 100
+"""Plans whose joints are tried before the search proper, and partial plans kept for them."""
 LAST_RESORT = 10.0
 """Time budgets by the clock after which the search ends whatever the count."""
 
@@ -80,7 +85,7 @@ def plan_trial(problem: PlanProblem, *, progress: Progress = lambda what, share:
     """
     progress("measuring the water", 0.0)
     water = leg_water(problem)
-    space = _search_space(problem, water)
+    space = _with_joints(problem, water, _search_space(problem, water), progress)
     for replan in range(REPLANS + 1):
         line = _sail_all(problem, water, space, progress)
         sailed = line.joined(sample_time_s=problem.vessel.sample_time_s, names=problem.vessel.model.inputs)
@@ -161,7 +166,7 @@ def _wider(
         found = _search_space(problem, wide)
     except NoPlan:
         raise NoPlan(f"{broken}; and there is no way to the goal that keeps farther off") from None
-    return wide, replace(found, stamps=space.stamps)
+    return wide, replace(found, stamps=space.stamps, settle_s=space.settle_s)
 
 
 def _finished(
@@ -220,13 +225,17 @@ def _search_space(problem: PlanProblem, water: LegWater) -> SearchSpace:
     way = build_goal_ways(water.narrowest_ways, grid, problem.goal[:2])
     if way is None or not water.candidate_ways(problem.start[:2], problem.goal[:2]):
         raise NoPlan(_no_way(problem, grid, margin))
+    ship = water.ship
+    rate = ship.spot_rate_radps + ship.yaw_rate_radps
+    changes = leg_end(vessel, CALM, 0.0, None, top_mps=ship.transit_speed_mps, yaw_rate_radps=rate).changes
     return SearchSpace(
         stamps=_stamps(problem, grid),
         frame=problem.area.frame,
         field=grid,
         goal_way=way,
         goal=problem.goal,
-        ship=water.ship,
+        ship=ship,
+        times=leg_times(vessel, ship, changes) if ship.agile else None,
         hull_m=vessel.length_m,
         leg_margin_m=margin,
         current_to=problem.environment.current_to,
@@ -307,6 +316,24 @@ def _sail_all(problem: PlanProblem, water: LegWater, space: SearchSpace, progres
         left[placement.primitive] -= 1
         progress(f"sailing {placement.primitive}", _share(total, left))
     return line
+
+
+def _with_joints(problem: PlanProblem, water: LegWater, space: SearchSpace, progress: Progress) -> SearchSpace:
+    """The space with the joints tried that plans would use, for vessels whose joints are the search's own."""
+    counts = [_repeats(problem)[item.name] for item in space.stamps]
+    runs = {item.name: item for item in _used(problem)}
+    for number in range(JOINT_TRIALS if space.times is not None else 0):
+        progress("trying joints between runs", 0.01 * (number + 1))
+        try:
+            placements = place_runs(space, counts, start=problem.start, width=TRIAL_WIDTH)
+        except NoPlan:  # the search proper keeps more, and says what is impossible
+            break
+        tried = joints_of(space, problem.start, "", placements)
+        if all(joint.pair in space.settle_s for joint in tried):
+            break
+        carried = is_carried(space, counts, problem.start)
+        space = settled(space, water, runs, tried, carried=carried, seed=problem.seed)
+    return space
 
 
 def _share(total: int, left: dict[str, int]) -> float:

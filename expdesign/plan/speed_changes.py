@@ -43,6 +43,11 @@ class SpeedChanges:
     def __post_init__(self) -> None:
         seal(self, edges_mps="e", until_s="s", faster_mps2="s k", slower_mps2="s k")
 
+    @property
+    def mean_mps2(self) -> float:
+        """Mean over all speeds of the largest rate at which speed was found to grow, actuators being anywhere."""
+        return float(self.faster_mps2[-1].mean()) / SPARE
+
     def most(self, speed_mps: float, time_s: Array) -> Array:
         """(n,) speed that is reached at most at even times (n,) from one, or from which one can be reached."""
         return self._followed(speed_mps, time_s, self.faster_mps2, 1.0)

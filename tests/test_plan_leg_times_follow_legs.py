@@ -1,0 +1,90 @@
+"""The rule for the time of legs: closed forms, symmetry, and agreement with optimised legs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+from plan_case import leg_water
+
+from expdesign.dictionary.build import trim
+from expdesign.plan.leg_times import SETTLE, LegTimes, joint_lost_s, joints, leg_times
+from expdesign.plan.legs import LegTask, find_leg
+from expdesign.plan.speed_changes import leg_end, to_work_s
+from expdesign.simulation import CALM
+
+RULE = LegTimes(speed_mps=2.0, push_mps2=0.5, swing_radps=0.25, settle_s=4.0, hull_m=20.0)
+REST = np.zeros(1)
+
+
+def test_from_rest_to_rest_a_leg_takes_what_a_pushed_point_takes():
+    far, near = (RULE.step_s(np.array([[d, 0.0, 0.0]]), REST, REST)[0] - 4.0 for d in (100.0, 4.5))
+    assert far == pytest.approx(100 / 2.0 + 2.0 / 0.5)
+    assert near == pytest.approx(2 * np.sqrt(4.5 / 0.5))
+
+
+def test_a_turn_on_the_spot_takes_its_angle_by_the_rate_either_way_round():
+    turns = np.array([0.5, -0.5, 3.0, -3.0, 2 * np.pi - 0.5])
+    steps = np.column_stack([0 * turns, 0 * turns, turns])
+    np.testing.assert_allclose(RULE.step_s(steps, REST, REST), 4.0 + np.array([0.5, 0.5, 3.0, 3.0, 0.5]) / 0.25)
+
+
+def test_going_on_as_before_loses_nothing_but_what_the_speed_falls_short():
+    for speed in (0.5, 1.0, 2.0):
+        way = speed * RULE.settle_s
+        spent = RULE.step_s(np.array([way, 0.0, 0.0]), np.array(speed), np.array(speed))
+        assert spent == pytest.approx(RULE.settle_s)
+
+
+def test_joints_on_offer_to_port_are_on_offer_to_starboard():
+    found = joints(RULE, 0.8, 1.2)
+    rows = {(*np.round(step, 6), round(seconds, 6)) for step, seconds in zip(found.step, found.seconds, strict=True)}
+    for forward, starboard, turn, seconds in rows:
+        other = (forward, -starboard, -turn % (2 * np.pi), seconds)
+        assert any(np.allclose(other, row, atol=1e-4) for row in rows)
+
+
+def test_mirrored_legs_take_as_long_and_so_do_reversed_ones():
+    rng = np.random.default_rng(0)
+    length, first, last, turn = rng.uniform(0, 100, 50), *rng.uniform(-3, 3, (3, 50))
+    begin, end = rng.uniform(0, 2, (2, 50))
+    seconds = RULE.seconds(length, first, last, turn, begin, end)
+    np.testing.assert_allclose(RULE.seconds(length, -first, -last, -turn, begin, end), seconds)
+    np.testing.assert_allclose(RULE.seconds(length, last, first, turn, end, begin), seconds)
+    assert (seconds >= (length - 4.0 * (begin + end) / 2) / 2.0).all()
+
+
+def test_no_joint_on_offer_is_beaten_by_another_with_its_turn_in_its_direction():
+    found, lost = joints(RULE, 1.0, 0.5), joint_lost_s(RULE, 1.0, 0.5)
+    for step, seconds in zip(found.step, found.seconds, strict=True):
+        assert seconds == pytest.approx(float(RULE.step_s(step, np.array(1.0), np.array(0.5))))
+    assert (lost <= joint_lost_s(replace(RULE, settle_s=6.0), 1.0, 0.5) + 1e-9).all()
+
+
+def test_optimised_legs_take_about_as_long_as_the_rule_says():
+    water = leg_water(shapely.box(-1000, -1000, 1000, 1000))
+    rng, transit = np.random.default_rng(3), water.ship.transit_speed_mps
+    changes = leg_end(water.vessel, CALM, 0.0, None, top_mps=transit, yaw_rate_radps=0.3).changes
+    rule = leg_times(water.vessel, water.ship, changes)
+    assert rule.settle_s == pytest.approx(SETTLE * to_work_s(water.vessel))
+    ratios = []
+    for _ in range(6):
+        speeds = rng.choice([0.0, 0.4, 0.8], 2) * transit
+        course, turn, length = rng.normal(0, 0.6), rng.uniform(-np.pi, np.pi), rng.uniform(30, 120)
+        step = np.array([length * np.cos(course), length * np.sin(course), turn])
+        inputs = [trim(water.vessel, np.array([speed, 0.0, 0.0])) for speed in speeds]
+        task = LegTask(
+            start=np.array([0, 0, 0, speeds[0], 0, 0]),
+            end=np.array([*step, speeds[1], 0, 0]),
+            start_inputs=inputs[0],
+            end_inputs=inputs[1],
+            seed=1,
+        )
+        found = find_leg(task, water)
+        assert found is not None
+        ratios.append(len(found) / float(rule.step_s(step, speeds[:1], speeds[1:])[0]))
+    assert 0.85 < np.median(ratios) < 1.15
+    assert min(ratios) > 0.6
+    assert max(ratios) < 1.7
