@@ -1,4 +1,4 @@
-"""A run that begins faster than the vessel goes ends with status 3; the line names it, its speed and what is reached."""
+"""A run that begins faster than the vessel goes ends with status 3; the line names it and both speeds."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from expdesign.simulation import Approach
 from expdesign.values import Array
 from expdesign.vessel import Vessel, within_limits
 
-QUICK = 0.8
+QUICK = 1.2
 """Natural frequency wished for in courses, in that of a hull length at transit speed."""
 DAMPED = 0.9
 """Damping wished for in courses."""
@@ -63,7 +63,8 @@ class HelmOrders:
         approach = self._approach
         quick = QUICK / self.pace_s
         turn = np.clip(wrap_angle(wish[:, 1]), -FARTHEST_RAD, FARTHEST_RAD)
-        missing = quick**2 * turn + 2 * DAMPED * quick * (wish[:, 2] - moving[:, 2]) - felt[:, 2]
+        damping = 2 * DAMPED * quick - self._own_damping
+        missing = quick**2 * turn + damping * (wish[:, 2] - moving[:, 2]) - felt[:, 2]
         bite = self._bite * np.maximum(moving[:, 0] / self.ship.transit_speed_mps, SLOWEST) ** 2
         change = np.interp(wish[:, 2], *self._turns) + missing / bite
         return np.asarray(approach.angle_rad + approach.starboard * np.clip(change, -self._hardest, self._hardest))
@@ -111,6 +112,13 @@ class HelmOrders:
             for side in (1, -1)
         ]
         return max(float(sides[0] - sides[1]) / (2 * tilt), 1e-12)
+
+    @cached_property
+    def _own_damping(self) -> float:
+        """What the ship herself damps yaw rates by, sway following [1/s]; negative for course-unstable ones."""
+        rates, angles = self._turns
+        nearest = int(np.abs(rates[rates != 0.0]).argmin())
+        return float(self._bite * angles[rates != 0.0][nearest] / rates[rates != 0.0][nearest])
 
     @cached_property
     def _turns(self) -> tuple[Array, Array]:

@@ -34,7 +34,7 @@ AFTER = 1.0
 """Hull lengths past the start that a reference goes on steadily."""
 REST = 0.05
 """Speed over ground in transit speeds, and yaw rate in the largest, up to which a run begins from a standstill."""
-STRAIGHT = 6.0
+STRAIGHT = 8.0
 """Hull lengths of the run-up of ships that are steered by a helm."""
 
 
