@@ -14,7 +14,8 @@ from expdesign.cli import main
 from expdesign.errors import FileError, InputError, NoAnswer, NoPlan
 
 ASLEEP = """
-import sys, time, types, expdesign
+import signal, sys, time, types, expdesign
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a test run in the background would ignore it
 from expdesign.cli import main
 def run(scenario, out, *, seed, progress):
     progress("asleep", 0.5)
