@@ -35,6 +35,8 @@ SHORTENINGS, SHORTEST, LARGEST_GROWTH = 4, 30, 6.0
 LEAST_GAIN, PLAIN_GAIN = 0.1, 1.0
 """Points of simulated fit on held-out runs, mean over outputs: what causes beside the first must gain at least, and
 what suffices even when its interval, of few runs perhaps, reaches zero."""
+MOST_HARM = 0.5
+"""Points that the first may cost at the lower end of its interval."""
 
 
 def diagnose(
@@ -157,13 +159,20 @@ def _onward(tell: Callable[[float], None], low: float, part: float) -> Callable[
 def _worthwhile(found: Search, held: Sequence[HeldOut], rng: np.random.Generator) -> Search:
     """Up to the first cause that mends nothing where it was not fitted, or so little that it may be nothing.
 
-    The first cause is sure by its test, which sees more than a simulation shows, unless it surely makes things worse.
-    For others significance alone is not enough: once a large error is mended, what is left shows every small difference
-    between any model and a ship. Little gains count when their interval leaves zero out.
+    The first cause is sure by its test, which sees more than a simulation shows, unless it makes things worse, or may
+    by more than a little: where no model is right, as with real ships, something is always significant. For others
+    significance alone is not enough: once a large error is mended, what is left shows every small difference between
+    any model and a ship. Little gains count when their interval leaves zero out.
     """
     results = [gained(one, other, rng) for one, other in pairwise(held)]
+
+    def mends(first: bool, gain: float, low: float, high: float) -> bool:
+        if first and high >= 0.0 and low > -MOST_HARM:
+            return True
+        return gain > LEAST_GAIN and (gain > PLAIN_GAIN or low > 0.0)
+
     good = [
-        _only_moves(step, found) or (high >= 0 if index == 0 else gain > LEAST_GAIN and (gain > PLAIN_GAIN or low > 0))
+        _only_moves(step, found) or mends(index == 0, gain, low, high)
         for index, (step, (gain, (low, high))) in enumerate(zip(found.steps, results, strict=True))
     ]
     count = int(np.argmin([*good, False]))
