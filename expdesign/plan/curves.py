@@ -10,8 +10,8 @@ import numpy as np
 from expdesign.plan._casadi import LegProblem, solve_leg
 from expdesign.plan._ompl import Clear, dubins_curve, search_dubins
 from expdesign.plan.capability import Capability
-from expdesign.plan.footprint import covering_discs
-from expdesign.plan.leg_values import LegTask, LegWater, acceptable, leg_speed_mps, nearest_turns, room_beside
+from expdesign.plan.leg_problem import leg_problem
+from expdesign.plan.leg_values import LegTask, LegWater, acceptable, nearest_turns
 from expdesign.values import Array
 from expdesign.vessel import Vessel, allocate, required_force
 
@@ -84,36 +84,16 @@ def _leg_problem(task: LegTask, water: LegWater, path: Array) -> LegProblem:
     vessel, ship = water.vessel, water.ship
     reference, duration_s = _timed(path, task.start[3], task.end[3], ship, vessel.length_m)
     guess = _guessed_inputs(vessel, reference, task.start_inputs, duration_s)
-    end_inputs = nearest_turns(vessel, task.end_inputs, guess[-1])
-    path_nodes = reference[:, :3].copy()
-    end = np.r_[task.end[:2], reference[-1, 2], task.end[3:]]
-    reference[0], reference[-1], guess[-1] = task.start, end, end_inputs
-    side = np.stack([-np.sin(reference[:, 2]), np.cos(reference[:, 2])], axis=-1)
-    current = float(np.hypot(*water.environment.current_to))
-    centres, disc_m = covering_discs(vessel.length_m, vessel.beam_m)
-    margin = water.clearance_m + disc_m + water.field.cell_m / 2
-    port, starboard = (room_beside(water, reference[:, :2], sign * side, margin) for sign in (-1.0, 1.0))
-    return LegProblem(
-        vessel=vessel,
-        environment=water.environment,
-        start=task.start,
-        end=end,
-        start_inputs=task.start_inputs,
-        end_inputs=end_inputs,
-        past=task.past,
-        delivered=water.delivered(task.past),
+    guess[-1] = nearest_turns(vessel, task.end_inputs, guess[-1])
+    return leg_problem(
+        task,
+        water,
+        end=np.r_[task.end[:2], reference[-1, 2], task.end[3:]],
         states=reference,
         inputs=guess,
+        path=reference[:, :3],
         duration_s=duration_s,
-        time_scale_s=vessel.length_m / ship.transit_speed_mps,
-        path=path_nodes,
-        room_port_m=port,
-        room_starboard_m=starboard,
-        circle=np.r_[task.start[:2], np.inf],
-        hull_arm_m=float(centres[-1]),
-        top_speed_mps=leg_speed_mps(ship.transit_speed_mps, (task.start[3:], task.end[3:])) + current,
-        yaw_rate_radps=max(ship.yaw_rate_radps, 1.02 * abs(task.start[5]), 1.02 * abs(task.end[5])),
-        lateral_mps2=max(ship.lateral_mps2, *(1.05 * abs(end[3] * end[5]) for end in (task.start, task.end))),
+        turning_rate_radps=ship.yaw_rate_radps,
     )
 
 

@@ -16,16 +16,14 @@ from expdesign.plan._casadi import LegProblem, solve_leg
 from expdesign.plan._ompl import dubins_curve
 from expdesign.plan.capability import RUN_UP, SETTLE, Capability
 from expdesign.plan.curves import find_path
-from expdesign.plan.footprint import covering_discs
+from expdesign.plan.leg_problem import leg_problem
 from expdesign.plan.leg_values import (
     ARRIVAL,
     LegTask,
     LegWater,
     acceptable,
     last_state,
-    leg_speed_mps,
     nearest_turns,
-    room_beside,
 )
 from expdesign.plan.recovery import OFF, Recovery, recover
 from expdesign.plan.ways import polyline_length
@@ -161,39 +159,20 @@ def _straight(pose: Array, length_m: float, hull_m: float) -> Array:
 
 
 def _problem(task: LegTask, water: LegWater, check: Recovery, path: Array) -> LegProblem:
-    vessel, ship = water.vessel, water.ship
+    ship = water.ship
     states, inputs, places, duration_s = _guess(task, water, check, path)
-    end_inputs = nearest_turns(vessel, task.end_inputs, inputs[-1])
     turned = 2 * np.pi * np.round((states[-1, 2] - task.end[2]) / (2 * np.pi))
-    end = np.r_[task.end[:2], task.end[2] + turned, task.end[3:]]
-    states[0], states[-1], inputs[0], inputs[-1] = task.start, end, task.start_inputs, end_inputs
-    side = np.stack([-np.sin(places[:, 2]), np.cos(places[:, 2])], axis=-1)
-    centres, disc_m = covering_discs(vessel.length_m, vessel.beam_m)
-    margin = water.clearance_m + disc_m + water.field.cell_m / 2
-    port, starboard = (room_beside(water, places[:, :2], sign * side, margin) for sign in (-1.0, 1.0))
-    return LegProblem(
-        vessel=vessel,
-        environment=water.environment,
-        start=task.start,
-        end=end,
-        start_inputs=task.start_inputs,
-        end_inputs=end_inputs,
-        past=task.past,
-        delivered=water.delivered(task.past),
+    inputs[0], inputs[-1] = task.start_inputs, nearest_turns(water.vessel, task.end_inputs, inputs[-1])
+    return leg_problem(
+        task,
+        water,
+        end=np.r_[task.end[:2], task.end[2] + turned, task.end[3:]],
         states=states,
         inputs=inputs,
-        duration_s=duration_s,
-        time_scale_s=vessel.length_m / ship.transit_speed_mps,
         path=places,
-        room_port_m=port,
-        room_starboard_m=starboard,
-        circle=np.r_[task.start[:2], np.inf],
-        hull_arm_m=float(centres[-1]),
-        top_speed_mps=leg_speed_mps(ship.transit_speed_mps, (task.start[3:], task.end[3:]))
-        + float(np.hypot(*water.environment.current_to)),
-        yaw_rate_radps=max(ship.yaw_rate_radps, 1.02 * abs(task.start[5]), 1.02 * abs(task.end[5])),
-        lateral_mps2=max(ship.lateral_mps2, *(1.05 * abs(x[3] * x[5]) for x in (task.start, task.end))),
-        node_s=NODE * vessel.length_m / ship.transit_speed_mps,
+        duration_s=duration_s,
+        turning_rate_radps=ship.yaw_rate_radps,
+        node_s=NODE * water.vessel.length_m / ship.transit_speed_mps,
     )
 
 

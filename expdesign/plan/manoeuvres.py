@@ -13,15 +13,13 @@ import numpy as np
 from expdesign.conventions import wrap_angle
 from expdesign.plan._casadi import LegProblem, solve_leg
 from expdesign.plan.capability import Capability, joint_m, speed_loss_s, turn_loss_s
-from expdesign.plan.footprint import covering_discs
+from expdesign.plan.leg_problem import hull_discs, leg_problem
 from expdesign.plan.leg_values import (
     LegTask,
     LegWater,
     acceptable,
     last_state,
-    leg_speed_mps,
     nearest_turns,
-    room_beside,
 )
 from expdesign.plan.steering import Helmsman, Reference
 from expdesign.plan.ways import polyline_length
@@ -206,45 +204,30 @@ def _problems(task: LegTask, water: LegWater, line: Line) -> Iterator[LegProblem
 
 
 def _problem(task: LegTask, water: LegWater, line: Line, turn: float) -> LegProblem:
-    vessel, ship = water.vessel, water.ship
+    ship = water.ship
     duration_s = _duration_s(task, ship, line, turn)
     states = _guess(task, line, turn, duration_s)
-    inputs = _guessed_inputs(task, water, states, duration_s)
     path = line.at(np.linspace(0.0, line.length_m, GUESS_NODES + 1))
-    centres, disc_m = covering_discs(vessel.length_m, vessel.beam_m)
-    arm, margin = float(centres[-1]), water.clearance_m + disc_m + water.field.cell_m / 2
-    circle = _circle(water, line, arm, margin)
-    side = np.stack([-np.sin(path[:, 2]), np.cos(path[:, 2])], axis=1)
-    port, starboard = (room_beside(water, path[:, :2], sign * side, margin) for sign in (-1.0, 1.0))
-    if circle is not None:
-        port = starboard = np.full(len(path), np.inf)
-    else:
-        sticking = max(abs(arm * np.sin(task.start[2] - path[0, 2])), abs(arm * np.sin(task.end[2] - path[-1, 2])))
-        port, starboard = np.maximum(port, 1.02 * sticking), np.maximum(starboard, 1.02 * sticking)
-    current = float(np.hypot(*water.environment.current_to))
-    rates = (ship.spot_rate_radps, ship.yaw_rate_radps, 1.02 * abs(task.start[5]), 1.02 * abs(task.end[5]))
-    lateral = [1.05 * abs(end[3] * end[5]) for end in (task.start, task.end)]
-    return LegProblem(
-        vessel=vessel,
-        environment=water.environment,
-        start=task.start,
+    problem = leg_problem(
+        task,
+        water,
         end=states[-1],
-        start_inputs=task.start_inputs,
-        end_inputs=inputs[-1],
-        past=task.past,
-        delivered=water.delivered(task.past),
         states=states,
-        inputs=inputs,
-        duration_s=duration_s,
-        time_scale_s=vessel.length_m / ship.transit_speed_mps,
+        inputs=_guessed_inputs(task, water, states, duration_s),
         path=path,
-        room_port_m=port,
-        room_starboard_m=starboard,
-        circle=np.r_[path[0, :2], np.inf] if circle is None else circle,
-        hull_arm_m=arm,
-        top_speed_mps=leg_speed_mps(ship.transit_speed_mps, (task.start[3:], task.end[3:])) + current,
-        yaw_rate_radps=max(rates),
-        lateral_mps2=max(ship.lateral_mps2, *lateral),
+        duration_s=duration_s,
+        turning_rate_radps=max(ship.spot_rate_radps, ship.yaw_rate_radps),
+    )
+    arm, margin = hull_discs(water)
+    circle = _circle(water, line, arm, margin)
+    if circle is not None:
+        free = np.full(len(path), np.inf)
+        return replace(problem, room_port_m=free, room_starboard_m=free, circle=circle)
+    sticking = max(abs(arm * np.sin(task.start[2] - path[0, 2])), abs(arm * np.sin(task.end[2] - path[-1, 2])))
+    return replace(
+        problem,
+        room_port_m=np.maximum(problem.room_port_m, 1.02 * sticking),
+        room_starboard_m=np.maximum(problem.room_starboard_m, 1.02 * sticking),
     )
 
 

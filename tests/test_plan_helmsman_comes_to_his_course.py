@@ -1,0 +1,33 @@
+"""A ship with a helm that is beside its track is steady on it by the end of a run-up, also when not the nominal one."""
+
+import numpy as np
+import pytest
+from helm_case import coaster, open_water
+
+from expdesign.conventions import wrap_angle
+from expdesign.plan.fleet import Fleet, Truths
+from expdesign.plan.run_up import OFF_HEADING_RAD, OFF_YAW_RATE, STRAIGHT
+from expdesign.plan.steering import Helmsman
+from expdesign.simulation import CALM
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_ship_beside_the_track_is_steady_on_it_when_the_run_begins(side):
+    vessel, water, count = coaster(), open_water(coaster()), 8
+    rng = np.random.default_rng(1)
+    model, speed = vessel.model, water.ship.transit_speed_mps
+    drawn = model.parameters * (1.0 + 0.1 * rng.uniform(-1, 1, (count, len(model.parameters))))
+    truths = Truths(parameters=drawn, current_to=np.zeros((count, 2)), wind_to=np.zeros((count, 2)))
+    start = np.array([0.0, side * vessel.length_m / 2, 0.0, speed, 0.0, 0.0])
+    standing = np.zeros(len(vessel.limits))
+    standing[0] = water.ship.approach.helm.inputs(water.ship.approach.drive, 0.0)[0]
+    fleet = Fleet(vessel, CALM, truths, state=start, standing=standing, rng=rng)
+    helm = Helmsman(vessel=vessel, environment=CALM, ship=water.ship)
+    felt, everyone = np.zeros((count, 3)), np.ones(count, dtype=bool)
+    for _ in range(int(STRAIGHT * vessel.length_m / speed / vessel.sample_time_s)):
+        before = fleet.states
+        wanted = np.column_stack([before[:, :1], 0 * before[:, :2], np.full((count, 1), speed), 0 * before[:, :2]])
+        fleet.advance(helm.commands(wanted, before, fleet.given, felt=felt), everyone)
+        felt = helm.unexplained(felt, before, fleet.states, fleet.delivered)
+    assert np.abs(wrap_angle(fleet.states[:, 2])).max() < OFF_HEADING_RAD
+    assert np.abs(fleet.states[:, 5]).max() < OFF_YAW_RATE * water.ship.yaw_rate_radps
