@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -16,6 +17,7 @@ from expdesign import __version__
 from expdesign.cli.arguments import parse_seed
 from expdesign.cli.progress import shown_progress
 from expdesign.cli.summary import as_json, print_summary
+from expdesign.interruptions import interruptions_wait
 
 if TYPE_CHECKING:
     from expdesign.workflows import Outcome, Progress
@@ -74,10 +76,12 @@ def expdesign(
     """
 
 
-def carry_out(name: str, work: Callable[[Progress], Outcome], quiet: bool, json: bool) -> None:
-    """Do the work of one command and say what came of it."""
+def carry_out(name: str, work: Callable[[ModuleType, Progress], Outcome], quiet: bool, json: bool) -> None:
+    """Do the work of one command, given the workflows and whom to tell of progress, and say what came of it."""
+    with interruptions_wait():
+        from expdesign import workflows
     with shown_progress(quiet=quiet) as progress:
-        outcome = work(progress)
+        outcome = work(workflows, progress)
     if json:
         typer.echo(as_json(name, outcome))
     elif not quiet:

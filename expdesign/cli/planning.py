@@ -1,6 +1,6 @@
 """Commands that design and plan a trial.
 
-Each hands its arguments to the workflow of the same name and loads the solvers only then.
+Each hands its arguments to the workflow of the same name.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ import typer
 
 from expdesign.cli.app import Json, Out, OutBeside, PlanFile, Quiet, ScenarioFile, Seed, app, carry_out
 from expdesign.cli.arguments import check_out
-from expdesign.interruptions import interruptions_wait
 
 
 @app.command()
@@ -21,10 +20,9 @@ def run(scenario: ScenarioFile, out: Out = None, seed: Seed = 0, quiet: Quiet = 
 
     Example: expdesign run scenarios/helsinki.toml
     """
-    with interruptions_wait():
-        from expdesign import workflows
-
-    carry_out("run", lambda tell: workflows.run(scenario, check_out(out), seed=seed, progress=tell), quiet, json)
+    carry_out(
+        "run", lambda workflows, tell: workflows.run(scenario, check_out(out), seed=seed, progress=tell), quiet, json
+    )
 
 
 @app.command()
@@ -33,10 +31,12 @@ def score(scenario: ScenarioFile, out: Out = None, seed: Seed = 0, quiet: Quiet 
 
     Writes dictionary.json.
     """
-    with interruptions_wait():
-        from expdesign import workflows
-
-    carry_out("score", lambda tell: workflows.score(scenario, check_out(out), seed=seed, progress=tell), quiet, json)
+    carry_out(
+        "score",
+        lambda workflows, tell: workflows.score(scenario, check_out(out), seed=seed, progress=tell),
+        quiet,
+        json,
+    )
 
 
 @app.command()
@@ -55,12 +55,9 @@ def durations(
 
     Writes durations.json; with --grow also growth.json and dictionary-grown.toml, which any scenario can name.
     """
-    with interruptions_wait():
-        from expdesign import workflows
-
     carry_out(
         "durations",
-        lambda tell: workflows.durations(scenario, check_out(out), grow=grow, seed=seed, progress=tell),
+        lambda workflows, tell: workflows.durations(scenario, check_out(out), grow=grow, seed=seed, progress=tell),
         quiet,
         json,
     )
@@ -82,12 +79,9 @@ def plan(
 
     Writes plan.json, track.csv and commands.csv.
     """
-    with interruptions_wait():
-        from expdesign import workflows
-
     carry_out(
         "plan",
-        lambda tell: workflows.plan(scenario, check_out(out), durations=durations, seed=seed, progress=tell),
+        lambda workflows, tell: workflows.plan(scenario, check_out(out), durations=durations, seed=seed, progress=tell),
         quiet,
         json,
     )
@@ -125,12 +119,9 @@ def export(
 
     Example: expdesign export runs/helsinki/plan.json --format rtz gpx
     """
-    with interruptions_wait():
-        from expdesign import workflows
-
     carry_out(
         "export",
-        lambda tell: workflows.export(
+        lambda workflows, tell: workflows.export(
             plan,
             check_out(out),
             formats=tuple(formats),
@@ -150,7 +141,4 @@ def check_route(
     json: Json = False,
 ) -> None:
     """Check route files beyond what their schemas can: ids, names, order of schedules, ranges, size."""
-    with interruptions_wait():
-        from expdesign import workflows
-
-    carry_out("check-route", lambda tell: workflows.check_routes(tuple(files)), quiet, json)
+    carry_out("check-route", lambda workflows, tell: workflows.check_routes(tuple(files)), quiet, json)

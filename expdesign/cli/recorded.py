@@ -1,6 +1,6 @@
 """Commands on measured data.
 
-Each hands its arguments to the workflow of the same name and loads the solvers only then.
+Each hands its arguments to the workflow of the same name.
 """
 
 from __future__ import annotations
@@ -12,14 +12,27 @@ import typer
 
 from expdesign.cli.app import Json, Quiet, Seed, app, carry_out
 from expdesign.cli.arguments import check_out
-from expdesign.interruptions import interruptions_wait
+
+DataFiles = Annotated[
+    list[Path], typer.Argument(metavar="DATA.csv ...", help="Measured runs; what is read is told in the README.")
+]
+Velocity = Annotated[
+    str,
+    typer.Option(
+        metavar="HOW",
+        help="Where u, v, r come from: measured; difference or smoothed from the pose; auto: measured where they "
+        "stand, else differences.",
+    ),
+]
+OutByData = Annotated[
+    Path | None,
+    typer.Option("--out", "-o", metavar="FOLDER", help="Where to write; runs/<first data file> when not given."),
+]
 
 
 @app.command()
 def estimate(
-    data: Annotated[
-        list[Path], typer.Argument(metavar="DATA.csv ...", help="Measured runs; what is read is told in the README.")
-    ],
+    data: DataFiles,
     vessel: Annotated[
         Path, typer.Option("--vessel", metavar="VESSEL.toml", help="Model structure, start values and sensors.")
     ],
@@ -40,14 +53,7 @@ def estimate(
         list[Path] | None,
         typer.Option("--test", metavar="FILE ...", help="Runs kept apart: simulated, but not used to estimate."),
     ] = None,
-    velocity: Annotated[
-        str,
-        typer.Option(
-            metavar="HOW",
-            help="Where u, v, r come from: measured; difference or smoothed from the pose; auto: measured where they "
-            "stand, else differences.",
-        ),
-    ] = "auto",
+    velocity: Velocity = "auto",
     mean: Annotated[
         str,
         typer.Option(
@@ -83,10 +89,7 @@ def estimate(
     constant: Annotated[
         bool, typer.Option("--constant", help="Give every run a constant force of its own in output error.")
     ] = False,
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", "-o", metavar="FOLDER", help="Where to write; runs/<first data file> when not given."),
-    ] = None,
+    out: OutByData = None,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
@@ -96,12 +99,9 @@ def estimate(
 
     Example: expdesign estimate zigzag.csv circle.csv --vessel ship.toml --method ls iv --test other.csv
     """
-    with interruptions_wait():
-        from expdesign import workflows
-
     carry_out(
         "estimate",
-        lambda tell: workflows.estimate(
+        lambda workflows, tell: workflows.estimate(
             tuple(data),
             check_out(out),
             vessel=vessel,
@@ -123,9 +123,7 @@ def estimate(
 
 @app.command()
 def diagnose(
-    data: Annotated[
-        list[Path], typer.Argument(metavar="DATA.csv ...", help="Measured runs; what is read is told in the README.")
-    ],
+    data: DataFiles,
     vessel: Annotated[
         Path,
         typer.Option(
@@ -140,18 +138,8 @@ def diagnose(
             help="Whose dictionary to search for manoeuvres that tell causes apart; standard ones when not given.",
         ),
     ] = None,
-    velocity: Annotated[
-        str,
-        typer.Option(
-            metavar="HOW",
-            help="Where u, v, r come from: measured; difference or smoothed from the pose; auto: measured where they "
-            "stand, else differences.",
-        ),
-    ] = "auto",
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", "-o", metavar="FOLDER", help="Where to write; runs/<first data file> when not given."),
-    ] = None,
+    velocity: Velocity = "auto",
+    out: OutByData = None,
     seed: Seed = 0,
     quiet: Quiet = False,
     json: Json = False,
@@ -162,12 +150,9 @@ def diagnose(
 
     Example: expdesign diagnose zigzag.csv circle.csv --vessel ship.toml
     """
-    with interruptions_wait():
-        from expdesign import workflows
-
     carry_out(
         "diagnose",
-        lambda tell: workflows.diagnose(
+        lambda workflows, tell: workflows.diagnose(
             tuple(data),
             check_out(out),
             vessel=vessel,
@@ -224,12 +209,9 @@ def indices(
 
     Example: expdesign indices zigzag.csv circle.csv --vessel ship.toml
     """
-    with interruptions_wait():
-        from expdesign import workflows
-
     carry_out(
         "indices",
-        lambda tell: workflows.indices(
+        lambda workflows, tell: workflows.indices(
             tuple(data or ()),
             check_out(out),
             vessel=vessel,
@@ -248,9 +230,7 @@ def indices(
 
 @app.command()
 def mine(
-    data: Annotated[
-        list[Path], typer.Argument(metavar="DATA.csv ...", help="Measured runs; what is read is told in the README.")
-    ],
+    data: DataFiles,
     vessel: Annotated[
         Path, typer.Option("--vessel", metavar="VESSEL.toml", help="Nominal model; its simulation gives instruments.")
     ],
@@ -265,11 +245,8 @@ def mine(
     mean: Annotated[
         str, typer.Option(metavar="HOW", help="Mean taken off the instruments, as in `estimate`.")
     ] = "complete",
-    velocity: Annotated[str, typer.Option(metavar="HOW", help="Where u, v, r come from, as in `estimate`.")] = "auto",
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", "-o", metavar="FOLDER", help="Where to write; runs/<first data file> when not given."),
-    ] = None,
+    velocity: Velocity = "auto",
+    out: OutByData = None,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
@@ -279,12 +256,9 @@ def mine(
 
     Example: expdesign mine voyage.csv --vessel ship.toml --piece 120 --keep 10
     """
-    with interruptions_wait():
-        from expdesign import workflows
-
     carry_out(
         "mine",
-        lambda tell: workflows.mine(
+        lambda workflows, tell: workflows.mine(
             tuple(data),
             check_out(out),
             vessel=vessel,

@@ -1,6 +1,6 @@
 """Commands around a plan: rehearsal, validation, variants, and the rest of a trial.
 
-Each hands its arguments to the workflow of the same name and loads the solvers only then.
+Each hands its arguments to the workflow of the same name.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ import typer
 
 from expdesign.cli.app import Json, Out, OutBeside, PlanFile, Quiet, ScenarioFile, Seed, app, carry_out
 from expdesign.cli.arguments import check_out
-from expdesign.interruptions import interruptions_wait
 
 
 @app.command()
@@ -34,12 +33,11 @@ def simulate(
 
     Writes measured.csv.
     """
-    with interruptions_wait():
-        from expdesign import workflows
-
     carry_out(
         "simulate",
-        lambda tell: workflows.simulate(plan, check_out(out), truth=truth, until_s=until, seed=seed, progress=tell),
+        lambda workflows, tell: workflows.simulate(
+            plan, check_out(out), truth=truth, until_s=until, seed=seed, progress=tell
+        ),
         quiet,
         json,
     )
@@ -74,12 +72,9 @@ def validate(
 
     Writes validation.json and validation.html. An interrupted call goes on where it stopped.
     """
-    with interruptions_wait():
-        from expdesign import workflows
-
     carry_out(
         "validate",
-        lambda tell: workflows.validate_design(
+        lambda workflows, tell: workflows.validate_design(
             scenario,
             check_out(out),
             truth=truth,
@@ -126,12 +121,9 @@ def whatif(
 
     Example: expdesign whatif scenarios/helsinki.toml scenarios/variants/half-an-hour.toml
     """
-    with interruptions_wait():
-        from expdesign import workflows
-
     carry_out(
         "whatif",
-        lambda tell: workflows.whatif(
+        lambda workflows, tell: workflows.whatif(
             scenario,
             tuple(variants),
             check_out(out),
@@ -191,12 +183,9 @@ def replan(
 
     Example: expdesign replan scenarios/story.toml --data measured.csv --vessel vessel-extended.toml --remaining 480
     """
-    with interruptions_wait():
-        from expdesign import workflows
-
     carry_out(
         "replan",
-        lambda tell: workflows.replan(
+        lambda workflows, tell: workflows.replan(
             scenario,
             check_out(out),
             data=tuple(data),
