@@ -60,6 +60,15 @@ class Told:
     relative_std: float = 0.0
 
 
+def drawn_parameters(ship: str, one: Told, rng: np.random.Generator) -> dict[str, float]:
+    """Parameters of the true ship."""
+    chance = {name: rng.standard_normal() for name in sea.SHIPS[ship]}
+    return {
+        name: value * (1 + one.relative_std * chance[name]) * one.factors.get(name, 1.0)
+        for name, value in sea.SHIPS[ship].items()
+    }
+
+
 def hidden_records(
     ship: str,
     hidden: Sequence[Told],
@@ -80,18 +89,13 @@ def hidden_records(
         manoeuvre: of `hidden_effects.MANOEUVRES`.
         shoaling: the depth varies along the track and is recorded.
     """
-    rng = np.random.default_rng(seed)
-    chance = {name: rng.standard_normal() for name in sea.SHIPS[ship]}
-    trials = [
-        sea.Trial(
-            ship=ship, effects=dict(one.effects), current=one.current, wind=one.wind,
-            parameters={
-                name: value * (1 + one.relative_std * chance[name]) * one.factors.get(name, 1.0)
-                for name, value in sea.SHIPS[ship].items()
-            },
+    trials = []
+    for one in hidden:
+        rng = np.random.default_rng(seed)
+        parameters = drawn_parameters(ship, one, rng)
+        trials.append(
+            sea.Trial(ship=ship, effects=dict(one.effects), current=one.current, wind=one.wind, parameters=parameters)
         )
-        for one in hidden
-    ]  # fmt: skip
     orders = sea.MANOEUVRES[manoeuvre](ship, batches, samples, step_s, rng)
     depth = sea.depths(batches, samples, step_s, rng) if shoaling else None
     shape = (len(trials), batches, samples)

@@ -244,8 +244,8 @@ def measure(true: dict[str, np.ndarray], step_s: float, sensors: Sensors, rng: n
             faults: list[dict[str, float]]) -> dict[str, np.ndarray]:  # fmt: skip
     """What the instruments record, (n, b, k) by column name.
 
-    Faults: heading_bias (v_meas = v + u sin(bias)), lever_m (v_meas = v + lever r), gyro (r_meas = (1 + gyro) r),
-    late_u, late_v, late_r (seconds).
+    Faults: heading_bias (v_meas = v + u sin(bias)), lever_m (antenna and velocity sensor this far forward of the
+    origin: v_meas = v + lever r), gyro (r_meas = (1 + gyro) r), late_u, late_v, late_r (seconds).
     """
 
     def of(name: str) -> np.ndarray:
@@ -261,8 +261,8 @@ def measure(true: dict[str, np.ndarray], step_s: float, sensors: Sensors, rng: n
     u, v = (late(values, of(f"late_{name}"), step_s) for name, values in (("u", u), ("v", v)))
     heading = true["heading"] - bias
     return {
-        "north_m": noisy(true["north"] - lever * np.sin(true["heading"]), sensors.position),
-        "east_m": noisy(true["east"] + lever * np.cos(true["heading"]), sensors.position),
+        "north_m": noisy(true["north"] + lever * np.cos(true["heading"]), sensors.position),
+        "east_m": noisy(true["east"] + lever * np.sin(true["heading"]), sensors.position),
         "heading_rad": noisy(heading, sensors.heading),
         "u_mps": noisy(u, sensors.velocity),
         "v_mps": noisy(v, sensors.velocity),

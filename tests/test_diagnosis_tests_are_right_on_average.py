@@ -13,7 +13,8 @@ from expdesign.diagnosis.joint import fit
 from expdesign.diagnosis.motion import linearise, push_of, responses, simulate_windows
 from expdesign.diagnosis.noise import FLOOR, Noise, fit_colour, hats, whitened
 from expdesign.diagnosis.screening import Scored, _effective_tests
-from expdesign.diagnosis.search import Step, settled, superfluous
+from expdesign.diagnosis.search import settled
+from expdesign.diagnosis.steps import Step, superfluous
 from expdesign.diagnosis.windows import cut_windows
 
 SMALL = {"theta:X_u": 1e-5, "current:north": 1e-4, "gain": 1e-4, "inertia:v": 1e-4, "heading_bias": 1e-4}

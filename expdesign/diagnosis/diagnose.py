@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 
 from expdesign.diagnosis.accuracy import accuracy, first_states, simulate_from_first
 from expdesign.diagnosis.candidate import Cause, Values
 from expdesign.diagnosis.causes import CAUSES
-from expdesign.diagnosis.clusters import widened
 from expdesign.diagnosis.extended import Extended
 from expdesign.diagnosis.extension import as_extended, extend, public_name
 from expdesign.diagnosis.gain import HeldOut, gained, held_out
 from expdesign.diagnosis.joint import Fit
+from expdesign.diagnosis.kept import LEAST_GAIN, kept, only_moves
 from expdesign.diagnosis.motion import linearise, start_responses
-from expdesign.diagnosis.search import Search, Step, search
+from expdesign.diagnosis.search import search
 from expdesign.diagnosis.spread import spread
+from expdesign.diagnosis.steps import Search, Step
 from expdesign.diagnosis.support import check_support, still_inputs
 from expdesign.diagnosis.tell_apart import Proposal, most_telling, standard_proposals
 from expdesign.diagnosis.values import Diagnosis, Estimated, Finding
@@ -32,11 +31,6 @@ Progress = Callable[[str, float], None]
 UNITS = 4
 SHORTENINGS, SHORTEST, LARGEST_GROWTH = 4, 30, 6.0
 """Rounds and fewest samples of shortening windows of unstable models, and how much an error may grow in them."""
-LEAST_GAIN, PLAIN_GAIN = 0.1, 1.0
-"""Points of simulated fit on held-out runs, mean over outputs: what causes beside the first must gain at least, and
-what suffices even when its interval, of few runs perhaps, reaches zero."""
-MOST_HARM = 0.5
-"""Points that the first may cost at the lower end of its interval."""
 
 
 def diagnose(
@@ -70,9 +64,11 @@ def diagnose(
     if motion.diverged:
         raise Diverged(f"vessel {vessel.name!r}: its simulation of the data diverges; the model is unstable")
     found = search(ship, windows, first_states(windows), rng, lambda what, share: progress(what, 0.05 + 0.6 * share))
-    held = _held_out(found, ship, windows, lambda share: progress("measuring the gain on held-out runs", share))
-    found = _worthwhile(found, held, rng)
-    found = replace(found, last=widened(found.last, windows.batch))
+
+    def measured(found: Search) -> list[HeldOut]:
+        return _held_out(found, ship, windows, lambda share: progress("measuring the gain on held-out runs", share))
+
+    found, held = kept(found, windows, measured, rng)
     progress("looking for manoeuvres that tell causes apart", 0.92)
     proposed = proposals or standard_proposals(windows, ship.model.inputs, windows.sample_s)
     findings = tuple(
@@ -138,7 +134,7 @@ def _held_out(found: Search, ship: Extended, windows: Windows, tell: Callable[[f
 
     What uncertain parameters mend by themselves is no merit of a cause, but of parameters beyond their bounds it is.
     """
-    settled = bool(found.first.keys) and not any(_only_moves(step, found) for step in found.steps[:1])
+    settled = bool(found.first.keys) and not any(only_moves(step, found) for step in found.steps[:1])
     fits: list[Fit | None] = [found.first if settled else None, *(step.chosen.fit for step in found.steps)]
     results = []
     for number, item in enumerate(fits):
@@ -147,37 +143,8 @@ def _held_out(found: Search, ship: Extended, windows: Windows, tell: Callable[[f
     return results
 
 
-def _only_moves(step: Step, found: Search) -> bool:
-    """It is of parameters that are free to move anyhow: it says that they moved too far, which gains nothing more."""
-    return set(step.chosen.keys) <= set(found.first.keys)
-
-
 def _onward(tell: Callable[[float], None], low: float, part: float) -> Callable[[float], None]:
     return lambda share: tell(low + part * share)
-
-
-def _worthwhile(found: Search, held: Sequence[HeldOut], rng: np.random.Generator) -> Search:
-    """Up to the first cause that mends nothing where it was not fitted, or so little that it may be nothing.
-
-    The first cause is sure by its test, which sees more than a simulation shows, unless it makes things worse, or may
-    by more than a little: where no model is right, as with real ships, something is always significant. For others
-    significance alone is not enough: once a large error is mended, what is left shows every small difference between
-    any model and a ship. Little gains count when their interval leaves zero out.
-    """
-    results = [gained(one, other, rng) for one, other in pairwise(held)]
-
-    def mends(first: bool, gain: float, low: float, high: float) -> bool:
-        if first and high >= 0.0 and low > -MOST_HARM:
-            return True
-        return gain > LEAST_GAIN and (gain > PLAIN_GAIN or low > 0.0)
-
-    good = [
-        _only_moves(step, found) or mends(index == 0, gain, low, high)
-        for index, (step, (gain, (low, high))) in enumerate(zip(found.steps, results, strict=True))
-    ]
-    count = int(np.argmin([*good, False]))
-    steps = found.steps[:count]
-    return replace(found, steps=steps, last=steps[-1].chosen.fit if steps else found.first)
 
 
 def cause_of(name: str) -> Cause:

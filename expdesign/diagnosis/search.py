@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
 
 from expdesign.diagnosis.candidate import Candidate, Situation
 from expdesign.diagnosis.causes import CAUSES
@@ -24,7 +22,8 @@ from expdesign.diagnosis.contenders import (
 )
 from expdesign.diagnosis.extended import Extended
 from expdesign.diagnosis.joint import Fit, fit
-from expdesign.diagnosis.screening import LEVEL, Scored, screen
+from expdesign.diagnosis.screening import Scored, screen
+from expdesign.diagnosis.steps import Search, Step, superfluous, without
 from expdesign.diagnosis.windows import Windows
 from expdesign.values import Array
 
@@ -50,35 +49,8 @@ SETTLING = 12
 """Gauss-Newton steps, at most, before anything is tested."""
 MOST_RETURNS = 4
 """How often the search goes back to take an addition out that later ones made superfluous."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Step:
-    """One round of the search.
-
-    Attributes:
-        chosen: what was added.
-        p_value: corrected for everything that was tried.
-        rivals: contenders of other causes that explain as much, best first.
-        before: the fit without it.
-        screening: all tests of the round.
-    """
-
-    chosen: Contender
-    p_value: float
-    rivals: tuple[Contender, ...]
-    before: Fit
-    screening: tuple[Scored, ...]
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Search:
-    """The whole search: its steps, the fit before and after, and the round that found nothing more."""
-
-    steps: tuple[Step, ...]
-    first: Fit
-    last: Fit
-    final_screening: tuple[Scored, ...]
+MOST_EXCHANGES = 2
+"""How often a cause is exchanged for what is worth more beside those found after it."""
 
 
 def search(ship: Extended, windows: Windows, starts: Array, rng: np.random.Generator, progress: Progress) -> Search:
@@ -87,16 +59,23 @@ def search(ship: Extended, windows: Windows, starts: Array, rng: np.random.Gener
     A cause that only stood in for another loses its worth once that is found. The search then returns to where it was
     added and goes on without it, so that what is left does not depend on it. Many parameters at once explain nearly
     anything: before they are added, fewer numbers are given the chance to explain as much one after the other.
+    When nothing more is found, whatever was chosen before others were known has to hold its place beside them.
     """
     base = first = settled(ship, windows, starts)
     steps: list[Step] = []
     refused: list[Candidate] = []
-    rounds = 0
+    rounds = exchanges = 0
     while True:
         rounds += 1
         share = 1.0 - 0.7**rounds
         progress(f"testing causes, round {rounds}", share)
         step, found = _round(base, windows, refused, rng, _within(progress, share))
+        if step is None and exchanges < MOST_EXCHANGES:
+            exchanges += 1
+            other = _exchanged(steps, windows, refused, rng, _within(progress, share))
+            if other is not None:
+                steps, base = other, other[-1].chosen.fit
+                continue
         if step is None or len(steps) == MOST_FINDINGS:
             return Search(steps=tuple(steps), first=first, last=base, final_screening=found)
         steps += _fewer(step, windows, refused, rng, _within(progress, share)) if _is_block(step.chosen) else [step]
@@ -148,6 +127,28 @@ def _fewer(
     return path if worth > 0 else [block]
 
 
+def _exchanged(
+    steps: list[Step], windows: Windows, refused: list[Candidate], rng: np.random.Generator, progress: Progress
+) -> list[Step] | None:
+    """The steps with one of them given up for what is worth more beside all others; None where each holds its place."""
+    for index, old in enumerate(steps[:-1]):
+        rest = without(steps, index, windows)
+        if rest is None:
+            continue
+        new, _ = _round(rest[-1].chosen.fit, windows, refused, rng, progress)
+        if new is not None and _is_worth_more(new.chosen, old.chosen, steps[-1].chosen.fit):
+            return [*rest, new]
+    return None
+
+
+def _is_worth_more(new: Contender, old: Contender, whole: Fit) -> bool:
+    """Whoever judges the noise; `whole` is the fit with the old one in it."""
+    if _same_as_any(new.candidate, [old.candidate]):
+        return False
+    dearer = (new.gain - new.worth) - (old.gain - old.worth)
+    return min(gain_over(whole, new.fit, judge) for judge in (whole, new.fit)) > dearer
+
+
 def settled(ship: Extended, windows: Windows, starts: Array) -> Fit:
     """The model in use at the likeliest values of its uncertain parameters, the colour found where they settled.
 
@@ -163,24 +164,6 @@ def settled(ship: Extended, windows: Windows, starts: Array) -> Fit:
 def _same_as_any(candidate: Candidate, others: list[Candidate]) -> bool:
     """The same effects, whatever their first guess."""
     return any(candidate.cause == other.cause and set(candidate.free) == set(other.free) for other in others)
-
-
-def superfluous(steps: list[Step], windows: Windows) -> int | None:
-    """The earliest addition without which the last fit is as good as chance makes it."""
-    whole = steps[-1].chosen.fit
-    for index, step in enumerate(steps[:-1]):
-        own = {*step.chosen.keys, *step.chosen.candidate.free, *step.chosen.candidate.fixed}
-        kept = tuple(key for key in whole.keys[: whole.free] if key not in own)
-        ship = replace(whole.ship, effects={key: v for key, v in whole.ship.effects.items() if key not in own})
-        try:
-            less = fit(ship, windows, kept, starts=whole.starts, noise=whole.noise, colour_order=whole.noise.order,
-                       near=whole.linear)  # fmt: skip
-        except (FloatingPointError, np.linalg.LinAlgError):
-            continue
-        lost = gain_over(less, whole, whole)
-        if step.chosen.tests * float(chi2.sf(max(lost, 0.0), max(1, len(own)))) > LEVEL or lost < PRICE * len(own):
-            return index
-    return None
 
 
 def _within(progress: Progress, share: float) -> Progress:

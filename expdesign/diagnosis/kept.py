@@ -1,0 +1,72 @@
+"""Which of the causes found are worth telling: those that mend something on runs that were not used to fit them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from expdesign.diagnosis.clusters import widened
+from expdesign.diagnosis.gain import HeldOut, gained
+from expdesign.diagnosis.steps import Search, Step, like_nothing, without
+from expdesign.diagnosis.windows import Windows
+
+LEAST_GAIN, PLAIN_GAIN = 0.1, 1.0
+"""Points of simulated fit on held-out runs, mean over outputs: what causes beside the first must gain at least, and
+what suffices even when its interval, of few runs perhaps, reaches zero."""
+MOST_HARM = 0.5
+"""Points that the first may cost at the lower end of its interval."""
+
+
+def kept(
+    found: Search, windows: Windows, measured: Callable[[Search], list[HeldOut]], rng: np.random.Generator
+) -> tuple[Search, list[HeldOut]]:
+    """What is told of a search: causes that are worth while, none of which might as well be nothing beside the others.
+
+    Args:
+        found: the search.
+        windows: data.
+        measured: errors on held-out runs of the model before any cause, then after every step.
+        rng: of the gains' intervals.
+
+    Returns:
+        The search with its last fit's standard errors as they are reported, and the errors that belong to it.
+    """
+    while True:
+        held = measured(found)
+        found = worthwhile(found, held, rng)
+        last = widened(found.last, windows.batch)
+        idle = like_nothing(found.steps, last)
+        rest = None if idle is None else without(list(found.steps), idle, windows)
+        if rest is None:
+            return replace(found, last=last), held
+        found = found.with_steps(tuple(rest))
+
+
+def only_moves(step: Step, found: Search) -> bool:
+    """It is of parameters that are free to move anyhow: it says that they moved too far, which gains nothing more."""
+    return set(step.chosen.keys) <= set(found.first.keys)
+
+
+def worthwhile(found: Search, held: Sequence[HeldOut], rng: np.random.Generator) -> Search:
+    """Up to the first cause that mends nothing where it was not fitted, or so little that it may be nothing.
+
+    The first cause is sure by its test, which sees more than a simulation shows, unless it makes things worse, or may
+    by more than a little: where no model is right, as with real ships, something is always significant. For others
+    significance alone is not enough: once a large error is mended, what is left shows every small difference between
+    any model and a ship. Little gains count when their interval leaves zero out.
+    """
+    results = [gained(one, other, rng) for one, other in pairwise(held)]
+    good = [
+        only_moves(step, found) or _mends(index == 0, gain, low, high)
+        for index, (step, (gain, (low, high))) in enumerate(zip(found.steps, results, strict=True))
+    ]
+    return found.with_steps(found.steps[: int(np.argmin([*good, False]))])
+
+
+def _mends(first: bool, gain: float, low: float, high: float) -> bool:
+    if first and high >= 0.0 and low > -MOST_HARM:
+        return True
+    return gain > LEAST_GAIN and (gain > PLAIN_GAIN or low > 0.0)

@@ -1,0 +1,128 @@
+"""What is told of a search: nothing that may harm on unseen runs, nothing that its own estimate calls nothing."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from diagnosis_case import hidden_record, vessel_of
+
+from expdesign.diagnosis.accuracy import first_states
+from expdesign.diagnosis.candidate import Candidate
+from expdesign.diagnosis.contenders import contend, opening
+from expdesign.diagnosis.extension import as_extended
+from expdesign.diagnosis.gain import HeldOut
+from expdesign.diagnosis.joint import fit
+from expdesign.diagnosis.kept import MOST_HARM, worthwhile
+from expdesign.diagnosis.screening import LEVEL, Scored
+from expdesign.diagnosis.search import search
+from expdesign.diagnosis.steps import Search, Step, like_nothing, wald, without
+from expdesign.diagnosis.windows import cut_windows
+
+SPREAD = np.ones((6, 3))
+
+
+def errors(fit_percent: np.ndarray | float) -> HeldOut:
+    """Of six runs with these fits (b, 1) or one fit, all outputs alike."""
+    return HeldOut(lost=SPREAD * (1.0 - np.asarray(fit_percent) / 100.0) ** 2, spread=SPREAD)
+
+
+def steps_of(*keys: str) -> Search:
+    """A search that found one cause for every key."""
+    steps = [SimpleNamespace(chosen=SimpleNamespace(keys=(key,), fit=key)) for key in keys]
+    return Search(steps=tuple(steps), first=SimpleNamespace(keys=()), last=None, final_screening=())  # type: ignore[arg-type]
+
+
+def kept_count(*fits: np.ndarray | float) -> int:
+    """How many of the causes are kept whose models have these fits on unseen runs, the model in use first."""
+    found = steps_of(*(f"effect {number}" for number in range(len(fits) - 1)))
+    return len(worthwhile(found, [errors(value) for value in fits], np.random.default_rng(0)).steps)
+
+
+def test_a_first_cause_that_may_cost_half_a_point_is_not_told():
+    """Fits of all runs alike have intervals of no width; runs that differ have one that reaches further down."""
+    assert kept_count(50.0, 50.0 - 0.9 * MOST_HARM) == 0  # certain to cost something
+    assert kept_count(50.0, 50.0) == 1  # its test alone sees it
+    runs = np.array([[-1.0], [-1.0], [-1.0], [1.0], [1.0], [1.0]])
+    assert kept_count(50.0, 50.0 + 0.2 * MOST_HARM * runs) == 1  # may cost, but never half a point
+    assert kept_count(50.0, 50.0 + 4.0 * MOST_HARM * runs) == 0  # as good on average, and may cost more
+
+
+def test_later_causes_gain_plainly_or_surely():
+    assert kept_count(50.0, 60.0, 60.05, 70.0) == 1  # nothing after what gains too little
+    assert kept_count(50.0, 60.0, 60.2) == 2
+    runs = np.array([[-1.0], [-1.0], [-1.0], [1.0], [1.0], [1.0]])
+    assert kept_count(50.0, 60.0, 60.2 + 3.0 * runs) == 1  # a little, and perhaps nothing
+    assert kept_count(50.0, 60.0, 62.0 + 6.0 * runs) == 2  # plainly
+
+
+@pytest.fixture(scope="module")
+def barge():
+    """Data of a barge with a weak thrust, and its model."""
+    record = hidden_record("barge", seed=43, batches=4, samples=150, effects={"gain": -0.12})
+    extended = as_extended(vessel_of("barge"), record)
+    return extended, cut_windows(extended.model, record)
+
+
+def added(base, windows, candidate: Candidate) -> Step:
+    scored = Scored(candidate=candidate, statistic=0.0, p_value=1.0, step=np.zeros(len(candidate.free)), tests=20.0)
+    chosen = contend(base, windows, opening(base, scored))
+    assert chosen is not None
+    return Step(chosen=chosen, p_value=0.0, rivals=(), before=base, screening=())
+
+
+def test_an_estimate_of_nothing_goes_and_the_rest_is_estimated_as_without_it(barge):
+    """A dead time that the ship does not have stands at zero; whichever place it was found in, it alone goes."""
+    extended, windows = barge
+    weak = Candidate(cause="thrust_gain", free={"gain": 0.0})
+    late = Candidate(cause="actuator_delay", free={"delay:all": 0.5}, finite=True)
+    before = fit(extended, windows, (), starts=first_states(windows))
+    alone = added(before, windows, weak)
+    for order, idle in (((weak, late), 1), ((late, weak), 0)):
+        steps, base = [], before
+        for candidate in order:
+            steps.append(added(base, windows, candidate))
+            base = steps[-1].chosen.fit
+        assert like_nothing(tuple(steps), base) == idle
+        (rest,) = without(steps, idle, windows) or ()
+        assert rest.before is before
+        assert rest.chosen.fit.value("gain") == pytest.approx(alone.chosen.fit.value("gain"), abs=1e-3)
+        assert like_nothing((rest,), rest.chosen.fit) is None
+
+
+def test_several_numbers_are_tested_together():
+    """Two estimates that say little apart and much together, and the other way round, by the chi-squared law."""
+    for correlation, values, clear in ((-0.95, (1.5, 1.5), True), (0.95, (1.5, 1.5), False), (0.0, (2.2, 0.1), False)):
+        last = SimpleNamespace(
+            keys=("a", "b"), covariance=np.array([[1.0, correlation], [correlation, 1.0]]),
+            value=dict(zip("ab", values, strict=True)).get,
+        )  # fmt: skip
+        chosen = SimpleNamespace(keys=("a", "b"), searched=None)
+        expected = np.exp(-0.5 * np.array(values) @ np.linalg.solve(last.covariance, values))
+        assert wald(chosen, last) == pytest.approx(expected)  # type: ignore[arg-type]
+        assert (expected < LEVEL) == clear
+
+
+def test_a_block_of_parameters_gives_way_to_the_one_number_behind_it(monkeypatch):
+    """Found before the change on the way that hid it, a heavier ship looks like a block of yaw parameters."""
+    effects = {"load_r": 0.35, "change_s": 700.0, "change_gain": 0.25}
+    record = hidden_record("barge", seed=44, batches=6, samples=200, effects=effects)
+    extended = as_extended(vessel_of("barge"), record)
+    windows = cut_windows(extended.model, record)
+    block = Candidate(cause="parameters", free={f"theta:{name}": 0.0 for name in ("N_r", "N_uv", "N_mu")})
+    change = Candidate(cause="change_point", free={"change:gain": 0.0}, fixed={"change:time": 700.0})
+    start = first_states(windows)
+    rounds = iter((block, change))
+    real = search.__globals__["_round"]
+
+    def scripted(base, windows, refused, rng, progress, *, most=99):
+        if most < 99:
+            return None, ()
+        candidate = next(rounds, None)
+        return (
+            real(base, windows, refused, rng, progress) if candidate is None else (added(base, windows, candidate), ())
+        )
+
+    monkeypatch.setitem(search.__globals__, "_round", scripted)
+    found = search(extended, windows, start, np.random.default_rng(0), lambda what, share: None)
+    assert {step.chosen.candidate.cause for step in found.steps} == {"change_point", "load_change"}
+    assert abs(found.last.value("inertia:r") - 0.35) < 3 * found.last.std("inertia:r") + 0.01
