@@ -157,8 +157,7 @@ def sail(trials: list[Trial], orders: np.ndarray, step_s: float, weather: Weathe
             order = np.where(small & (np.abs(order) < e["deadband"][..., None]), 0.0, order)
             lag = np.where(mask, e["lag_s"][..., None], 0.0)
             fade = np.where(lag > 0, np.exp(-h / np.maximum(lag, 1e-9)), 0.0)
-            middle = np.where(lag > 0, np.exp(-h / 2 / np.maximum(lag, 1e-9)), 0.0)
-            acting = order + (held - order) * middle
+            acting = order + (held - order) * (lag / h) * (1 - fade)  # mean over the step
             held = order + (held - order) * fade
             if part == 0:
                 c, s = np.cos(x[2]), np.sin(x[2])
