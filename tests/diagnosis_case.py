@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import hidden_effects as sea
 import numpy as np
 
+from expdesign.records import central_difference, smoothed_velocity
 from expdesign.signals import Batch, Record
 from expdesign.vessel import STRUCTURES, Actuator, Limit, Term, Vessel, VesselModel
 
@@ -145,3 +146,15 @@ def hidden_record(
         relative_std=relative_std,
     )  # fmt: skip
     return hidden_records(ship, [one], **options)[0]
+
+
+def from_pose(batch: Batch, *, smoothed: bool = False, wind: bool = True) -> Batch:
+    """A batch as it is read from a file without velocities."""
+    if smoothed:
+        found, kept = smoothed_velocity(batch.pose, batch.sample_time_s), slice(None)
+    else:
+        found, kept = central_difference(batch.pose, batch.sample_time_s), slice(1, -1)
+    return replace(
+        batch, velocity=found, pose=batch.pose[kept], inputs=batch.inputs[kept], derived=("u", "v", "r"),
+        wind=batch.wind[kept] if wind else None,
+    )  # fmt: skip

@@ -4,25 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_case import hidden_record, vessel_of
+from diagnosis_case import from_pose, hidden_record, vessel_of
 
 from expdesign.diagnosis import diagnose
-from expdesign.records import central_difference, smoothed_velocity
-from expdesign.signals import Batch, Record
+from expdesign.signals import Record
 
 AIR = ("W_abs_u_u", "W_abs_v_v", "W_uv")
-
-
-def from_pose(batch: Batch, *, smoothed: bool = False, wind: bool = True) -> Batch:
-    """A batch as it is read from a file without velocities."""
-    if smoothed:
-        found, kept = smoothed_velocity(batch.pose, batch.sample_time_s), slice(None)
-    else:
-        found, kept = central_difference(batch.pose, batch.sample_time_s), slice(1, -1)
-    return replace(
-        batch, velocity=found, pose=batch.pose[kept], inputs=batch.inputs[kept], derived=("u", "v", "r"),
-        wind=batch.wind[kept] if wind else None,
-    )  # fmt: skip
 
 
 def pose_only(ship: str, *, smoothed: bool = False, wind: bool = True, **options) -> Record:

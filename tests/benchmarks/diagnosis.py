@@ -9,8 +9,10 @@ the model with the generator's own parameters 5 points of simulated fit or more 
 - uncertain: parameters drawn around the model's by 10 % each, and the model says so;
 - clean: nothing hidden, known and uncertain by turns;
 - pairs: two effects at once, parameters known;
-- power: effects of 1, 3, 10 and 30 % of their size, found against an oracle, the score test of the one true cause at
-  5 %, without any correction.
+- varied: one effect, parameters known, recorded otherwise: velocities derived from the pose or measured, wind not
+  measured, one run or many, 1 to 10 Hz, all drawn;
+- power: effects of 3, 10, 30 and 100 % of the size that just costs 5 points, found against an oracle, the score test of
+  the one true cause at 5 %, without any correction.
 
 Columns: trials; the true cause first among the findings; the same or listed as not distinguishable from the first;
 among the findings at all; nothing found; estimate within three standard errors, of those named; other findings beside
@@ -31,7 +33,7 @@ from joblib import Parallel, delayed
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 import hidden_effects as sea
-from diagnosis_case import Told, drawn_parameters, hidden_records, vessel_of
+from diagnosis_case import Told, drawn_parameters, from_pose, hidden_records, vessel_of
 
 from expdesign.diagnosis import CAUSES, diagnose
 from expdesign.diagnosis.accuracy import WHOLE_S, first_states, pooled_fit, simulate_from_first
@@ -40,14 +42,16 @@ from expdesign.diagnosis.extension import as_extended
 from expdesign.diagnosis.screening import screen
 from expdesign.diagnosis.search import settled
 from expdesign.diagnosis.windows import cut_windows
-from expdesign.signals import Record
+from expdesign.signals import Batch, Record
 from expdesign.vessel import Vessel
 
 LEAST_POINTS, GROWTH, MOST_GROWTHS = 5.0, 1.5, 6
-LEVELS = (0.01, 0.03, 0.1, 0.3)
-"""Sizes in the power part, in shares of the size that costs the points asked."""
+LEVELS = (0.03, 0.1, 0.3, 1.0)
+"""Sizes in the power part, in shares of the size that just costs the points asked."""
+UNSEEN = {"gyro_scale": ("measured",), "sensor_delay": ("measured",)}
+"""Faults of sensors that other ways of recording do without."""
 AIR = ("W_abs_u_u", "W_abs_v_v", "W_uv")
-PARTS = ("known", "uncertain", "clean", "pairs", "power")
+PARTS = ("known", "uncertain", "clean", "pairs", "power", "varied")
 ALL = {"tug": 0b1111, "barge": 0b111, "coaster": 0b11}
 
 
@@ -108,6 +112,7 @@ class Hidden:
         kinds = {name: e.get(name, 0.0) for name in sea.TERMS} | {kappa: e.get("kappa", 0.0)}
         return {
             **{name: true.get(name, 0.0) + more for name, more in (dict.fromkeys(true, 0.0) | kinds).items()},
+            "toward_rad": float(np.arctan2(self.wind[1], self.wind[0])) % (2 * np.pi),
             "north_mps": self.current[0], "east_mps": self.current[1],
             **{f"{kind}_{group}_s": e.get(f"{kind}_s", 0.0) for kind in ("lag", "delay") for group in groups},
             **{f"deadband_{group}": e.get("deadband", 0.0) for group in angled},
@@ -206,19 +211,44 @@ class Case:
     manoeuvre: str
     batches: int
     samples: int
+    step_s: float = 1.0
+    recorded: str = "measured"
+    wind: bool = True
 
     def records(self, hidden: Sequence[Hidden], *stds: float) -> list[list[Record]]:
         """Data of trials that differ in what is hidden, all shoaling or none, for every std of the parameters."""
         told = [one.told(std) for std in stds for one in hidden]
         records = hidden_records(
             self.ship, told, seed=self.seed, shoaling=hidden[0].shoaling, batches=self.batches, samples=self.samples,
-            manoeuvre=self.manoeuvre,
+            manoeuvre=self.manoeuvre, step_s=self.step_s,
         )  # fmt: skip
+        records = [Record(batches=tuple(self._told(batch) for batch in record.batches)) for record in records]
         return [records[low : low + len(hidden)] for low in range(0, len(records), len(hidden))]
+
+    def _told(self, batch: Batch) -> Batch:
+        """What of a batch is recorded."""
+        if self.recorded == "measured":
+            return batch if self.wind else replace(batch, wind=None)
+        return from_pose(batch, smoothed=self.recorded == "smoothed", wind=self.wind)
 
     def vessel(self, hidden: Hidden, relative_std: float = 0.0) -> Vessel:
         """The model in use."""
-        return vessel_of(self.ship, relative_std=relative_std, without=hidden.without)
+        return vessel_of(self.ship, relative_std=relative_std, without=hidden.without, sample_time_s=self.step_s)
+
+    def truths(self, hidden: Hidden, std: float) -> dict[str, float]:
+        """What estimates ought to be; drag in a wind that nobody measured is for a speed that is taken."""
+        true = hidden.truths(self.ship, self.seed, std)
+        return {name: value for name, value in true.items() if self.wind or name not in AIR}
+
+    def varied(self, cause: str, rng: np.random.Generator) -> Case:
+        """The same trial, recorded otherwise."""
+        total_s, batches = self.batches * self.samples * self.step_s, int(rng.choice([1, 3, self.batches]))
+        step_s = float(rng.choice([1.0, 0.5] if batches == 1 else [1.0, 0.5, 0.2, 0.1]))
+        recorded = str(rng.choice(UNSEEN.get(cause, ("measured", "derived", "smoothed"))))
+        return replace(
+            self, batches=batches, samples=int(total_s / batches / step_s), step_s=step_s, recorded=recorded,
+            wind=bool(rng.integers(2)),
+        )  # fmt: skip
 
 
 def drawn_case(ship: str, seed: int, rng: np.random.Generator) -> Case:
@@ -240,19 +270,18 @@ def mean_fits(vessel: Vessel, records: Sequence[Record]) -> list[float]:
     return [float(np.clip(pooled_fit(error, measured), -100, 100).mean()) for error, measured in parts]
 
 
-def large_enough(case: Case, hidden: Hidden, std: float = 0.0) -> tuple[Hidden, float, Record]:
+def large_enough(case: Case, hidden: Hidden, std: float = 0.0, *, just: bool = False) -> tuple[Hidden, float, Record]:
     """The effect, enlarged until it costs what is asked, what it costs with known parameters, and data with it.
 
-    Small ones may stay smaller, and then say so.
+    Small ones may stay smaller, and then say so. With `just`, large ones are made smaller down to what is asked.
     """
-    sizes = [hidden]
-    for _ in range(MOST_GROWTHS):
-        sizes.append(sizes[-1].scaled(GROWTH))
+    powers = range(-MOST_GROWTHS if just else 0, MOST_GROWTHS + 1)
+    sizes = [hidden.scaled(GROWTH**power) for power in powers]
     none = Hidden(cause="none", shoaling=hidden.shoaling)
     (calm, *records), (_, *chosen_from) = case.records([none, *sizes], 0.0, std)
     (clean,) = mean_fits(case.vessel(none), [calm])
     lost = [clean - fit for fit in mean_fits(case.vessel(hidden), records)]
-    chosen = next((index for index, points in enumerate(lost) if points >= LEAST_POINTS), MOST_GROWTHS)
+    chosen = next((index for index, points in enumerate(lost) if points >= LEAST_POINTS), len(sizes) - 1)
     return sizes[chosen], lost[chosen], chosen_from[chosen]
 
 
@@ -286,18 +315,21 @@ def tried(part: str, number: int, seed: int, only: str | None = None) -> dict[st
     hidden, lost, record, scale = Hidden(cause="none"), 0.0, None, 1.0
     if part != "clean":
         effect = drawn_effect(name, ship, rng, case.batches * float(case.samples))
-        hidden, lost, record = large_enough(case, effect, std)
+        hidden, lost, record = large_enough(case, effect, std, just=part == "power")
     if part == "pairs":
         hidden, record = hidden.with_another(another(case, hidden, rng)), None
     if part == "power":
         scale = LEVELS[number // len(NAMES) % len(LEVELS)]
         hidden, record = hidden.scaled(scale), None
+    if part == "varied":
+        case, record = case.varied(name, rng), None
     if record is None:
         ((record,),) = case.records([hidden], std)
     row: dict[str, object] = {
         "part": part, "number": number, "seed": seed, "scale": scale, "cause": hidden.cause, "ship": ship, "std": std,
-        "lost": lost, "manoeuvre": case.manoeuvre, "truth": hidden.truths(ship, case.seed, std),
+        "lost": lost, "manoeuvre": case.manoeuvre, "truth": case.truths(hidden, std),
         "effects": hidden.effects | hidden.faults | hidden.factors,
+        "recorded": [case.recorded, case.wind, case.batches, case.step_s],
     }  # fmt: skip
     try:
         found = diagnose(case.vessel(hidden, std), record, seed=number)
@@ -422,6 +454,11 @@ def report(part: str, rows: list[dict]) -> None:
         curves(rows)
         return
     table(rows)
+    if part == "varied":
+        for place, what in enumerate(("velocities", "wind measured", "runs", "sample time")):
+            for value in sorted({row["recorded"][place] for row in rows}, key=str):
+                some = [judged(row)["listed"] for row in rows if row["recorded"][place] == value]
+                print(f"{what} {value}: {share(sum(some), len(some))}")
 
 
 def main() -> None:
