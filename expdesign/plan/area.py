@@ -18,6 +18,8 @@ from expdesign.values import Array
 
 DENSE = 10.0
 """Corners in a stretch of shore as long as the clearance, from which on it is taken off in steps."""
+ARC_SEGMENTS = 16
+"""Straight pieces in a quarter of a circle where corners are rounded."""
 STEPS = (1 / 16, 3 / 16, 3 / 4)
 """Shares of it."""
 
@@ -92,7 +94,7 @@ def eroded(water: shapely.Geometry, distance_m: float, *, join_style: str = "rou
     """
     dense = DENSE * water.length < distance_m * shapely.get_num_coordinates(water)
     for share in STEPS if dense else (1.0,):
-        water = shapely.buffer(water, -share * distance_m, quad_segs=16, join_style=join_style)
+        water = shapely.buffer(water, -share * distance_m, quad_segs=ARC_SEGMENTS, join_style=join_style)
     return water
 
 

@@ -18,11 +18,12 @@ from expdesign.plan.footprint import hull_polygons
 from expdesign.plan.values import Leg, Verification
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import Environment, simulate, to_body
+from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, Vessel
 
-FINE_SUBSTEPS = 10
-"""Integrator steps per sample of the re-simulation."""
+FINE_SUBSTEPS = 10 * SUBSTEPS
+"""Integrator steps per sample of the re-simulation: a tenth of those that plans are made with."""
 ENTRY_TOLERANCE = 0.02
 """Largest deviation of a run's entry velocity, relative to the vessel's speed in the plan."""
 
@@ -54,6 +55,7 @@ def verify_plan(
         repeats: how often each is to be run.
         start, goal: (3,) poses where the ship is to begin and end at rest through the water.
     """
+    misfit = _legs_problems(commands, legs, primitives)
     again = simulate(
         vessel,
         commands,
@@ -68,14 +70,16 @@ def verify_plan(
     problems = [
         *_motion_problems(vessel, trajectory, again),
         *_end_problems(vessel, environment, trajectory, start, goal),
+        *_end_problems(vessel, environment, again, start, goal, "re-simulated "),
         *_if(
             bool(clearance[worst] < clearance_m - 1e-6),
             f"the hull is {clearance[worst]:.2f} m from forbidden water, promised {clearance_m:g} m, "
             f"at {worst * commands.sample_time_s:.0f} s, {_place(area, trajectory.pose[worst])}",
         ),
-        *_if(excess > 1e-6, f"{excess_signal} passes its limit or rate by {excess:.2g} of its range"),
-        *_run_problems(commands, legs, primitives, repeats),
-        *_entry_problems(environment, trajectory, legs, primitives),
+        *_if(excess > 1e-6, f"{excess_signal} by {excess:.2g} of its range"),
+        *_repeat_problems(legs, repeats),
+        *(misfit or _run_problems(vessel, commands, legs, primitives)),
+        *(() if misfit else _entry_problems(environment, trajectory, legs, primitives)),
     ]
     return Verification(
         clearance_min_m=float(clearance[worst]),
@@ -87,9 +91,11 @@ def verify_plan(
 
 
 def hull_clearance(area: SeaArea, trajectory: Trajectory, hull_b: Array) -> Array:
-    """(k,) distance from the hull to forbidden water [m], negative by the hull's share outside times its length.
+    """(k,) distance from the hull to forbidden water [m].
 
-    Each sample's polygon spans the hull at this sample and the next, so nothing is passed between samples.
+    Each sample's polygon spans the hull at this sample and the next, and what its corners swing out between them is
+    taken off, so nothing is passed between samples. Where the hull lies in forbidden water: minus the side of a square
+    as large as the part that does.
     """
     hulls = hull_polygons(trajectory.pose, hull_b)
     corners = shapely.get_coordinates(hulls).reshape(len(hulls), -1, 2)
@@ -106,7 +112,13 @@ def hull_clearance(area: SeaArea, trajectory: Trajectory, hull_b: Array) -> Arra
     clearance[which] = distances
     outside = ~inside
     clearance[outside] = -np.sqrt(shapely.area(shapely.difference(spans[outside], water)))
-    return clearance
+    return clearance - _swing(trajectory.pose, hull_b)
+
+
+def _swing(pose: Array, hull_b: Array) -> Array:
+    """(k,) how far at most the arc of a corner leaves its chord between a sample and the next [m]."""
+    turned = np.abs(np.diff(pose[:, 2], append=pose[-1, 2]))
+    return np.asarray(np.hypot(*hull_b.T).max() * (1 - np.cos(np.minimum(turned, np.pi) / 2)))
 
 
 def _pieces(line: shapely.Geometry) -> np.ndarray:
@@ -117,77 +129,95 @@ def _pieces(line: shapely.Geometry) -> np.ndarray:
 
 def _motion_problems(vessel: Vessel, trajectory: Trajectory, again: Trajectory) -> list[str]:
     """Where the track is not the motion that the commands give."""
-    sailed, speed = _sailed(trajectory), np.abs(again.velocity).max(axis=0) + 1e-9
+    apart, speed = np.abs(again.pose - trajectory.pose), np.abs(again.velocity).max(axis=0) + 1e-9
     found = (
-        ("m", np.hypot(*(again.pose - trajectory.pose)[:, :2].T), np.maximum(vessel.length_m / 30, 0.001 * sailed)),
-        ("rad of heading", np.abs(again.pose - trajectory.pose)[:, 2], np.full(len(sailed), 0.02)),
-        ("of the largest speed", (np.abs(again.velocity - trajectory.velocity) / speed).max(axis=1), 0.02 + 0 * sailed),
+        ("m", np.hypot(*apart[:, :2].T), vessel.length_m / 30),
+        ("rad of heading", apart[:, 2], 0.02),
+        ("of the largest speed", (np.abs(again.velocity - trajectory.velocity) / speed).max(axis=1), 0.02),
     )
     problems = []
-    for what, apart, allowed in found:
-        worst = int(np.argmax(apart - allowed))
-        if apart[worst] > allowed[worst]:
+    for what, off, allowed in found:
+        worst = int(np.argmax(off))
+        if not off[worst] <= allowed:
             problems.append(
-                f"the re-simulated commands are {apart[worst]:.3g} {what} off the track at "
-                f"{worst * trajectory.sample_time_s:.0f} s, allowed {allowed[worst]:.3g}"
+                f"the re-simulated commands are {off[worst]:.3g} {what} off the track at "
+                f"{worst * trajectory.sample_time_s:.0f} s, allowed {allowed:.3g}"
             )
     return problems
 
 
 def _end_problems(
-    vessel: Vessel, environment: Environment, trajectory: Trajectory, start: Array, goal: Array
+    vessel: Vessel, environment: Environment, trajectory: Trajectory, start: Array, goal: Array, which: str = ""
 ) -> list[str]:
     """How the plan's ends differ from start and goal, at rest through the water."""
     problems = []
+    fastest = np.hypot(*trajectory.velocity[:, :2].T).max(), np.abs(trajectory.velocity[:, 2]).max()
+    slow, steady = ENTRY_TOLERANCE * np.array(fastest) + 1e-9
     for name, pose, index in (("start", start, 0), ("goal", goal, -1)):
         place, velocity = trajectory.pose[index], trajectory.velocity[index]
         off_m = float(np.hypot(*(place - pose)[:2]))
         turned = abs(float(wrap_angle(place[2] - pose[2])))
         u_c, v_c = to_body(environment.current_to, place[2], NUMPY)
-        moving = float(np.hypot(velocity[0] - u_c, velocity[1] - v_c))
-        slow = ENTRY_TOLERANCE * float(np.hypot(*trajectory.velocity[:, :2].T).max())
-        if off_m > vessel.length_m / 30 or turned > ENTRY_TOLERANCE or moving > slow:
+        moving, turning = float(np.hypot(velocity[0] - u_c, velocity[1] - v_c)), abs(float(velocity[2]))
+        if off_m > vessel.length_m / 30 or turned > ENTRY_TOLERANCE or moving > slow or turning > steady:
             problems.append(
-                f"the plan is {off_m:.2f} m and {turned:.3f} rad off the {name}, at {moving:.3f} m/s through the water"
+                f"the {which}plan is {off_m:.2f} m and {turned:.3f} rad off the {name}, at {moving:.3f} m/s through "
+                f"the water and turning at {turning:.4f} rad/s"
             )
     return problems
 
 
-def _sailed(trajectory: Trajectory) -> Array:
-    return np.asarray(np.r_[0.0, np.cumsum(np.hypot(*np.diff(trajectory.pose[:, :2], axis=0).T))])
-
-
 def _limit_excess(vessel: Vessel, commands: Commands) -> tuple[float, str]:
-    """The largest violation of a limit or a rate relative to the signal's range, and the signal."""
-    worst, where = 0.0, ""
+    """The largest violation of a limit or a rate relative to the signal's range, and which; all begin at zero."""
+    worst, which = 0.0, ""
     for name, limit, values in zip(commands.names, vessel.limits, commands.values.T, strict=True):
         span = limit.high - limit.low if np.isfinite(limit.high - limit.low) else 2 * np.pi
-        over = max(float((values - limit.high).max()), float((limit.low - values).max()))
-        first = [] if name.startswith("a") else [0.0]  # everything but an angle begins at rest
-        steps = np.abs(np.diff([*first, *values])).max(initial=0.0) - limit.rate * commands.sample_time_s
-        relative = max(over, float(steps)) / span
-        if relative > worst:
-            worst, where = relative, name
-    return worst, where
+        beyond = max(float((values - limit.high).max()), float((limit.low - values).max()))
+        steps = np.abs(np.diff([np.clip(0.0, limit.low, limit.high), *values]))
+        faster = float(steps.max()) - limit.rate * commands.sample_time_s
+        for excess, what in ((beyond, "limit"), (faster, "rate")):
+            if excess / span > worst:
+                worst, which = excess / span, f"{name} passes its {what}"
+    return worst, which
+
+
+def _repeat_problems(legs: Sequence[Leg], repeats: Mapping[str, int]) -> list[str]:
+    done = Counter(leg.name for leg in legs if leg.kind == "primitive")
+    return [
+        f"{name!r} is run {done[name]} times, the durations ask for {repeats.get(name, 0)}"
+        for name in sorted({*done, *repeats})
+        if done[name] != repeats.get(name, 0)
+    ]
+
+
+def _legs_problems(commands: Commands, legs: Sequence[Leg], primitives: Mapping[str, Primitive]) -> list[str]:
+    """Legs that do not make up the plan, or runs that are none of the dictionary's."""
+    problems = []
+    if [0, *(leg.last for leg in legs)] != [*(leg.first for leg in legs), len(commands)]:
+        problems.append("the legs do not follow each other without gaps from the first sample to the last")
+    for leg in legs:
+        if leg.kind == "primitive" and leg.name not in primitives:
+            problems.append(f"the dictionary has no {leg.name!r}")
+        elif leg.kind == "primitive" and leg.last - leg.first != len(primitives[leg.name].commands):
+            lasts, asked = leg.last - leg.first, len(primitives[leg.name].commands)
+            problems.append(f"{leg.name!r} at sample {leg.first} lasts {lasts} samples, the dictionary's {asked}")
+    return problems
 
 
 def _run_problems(
-    commands: Commands, legs: Sequence[Leg], primitives: Mapping[str, Primitive], repeats: Mapping[str, int]
+    vessel: Vessel, commands: Commands, legs: Sequence[Leg], primitives: Mapping[str, Primitive]
 ) -> list[str]:
+    """Runs whose commands are not the dictionary's, but for whole turns of angles without limits."""
+    unlimited = [not np.isfinite([limit.low, limit.high]).any() for limit in vessel.limits]
+    turning = [name.startswith("a") and free for name, free in zip(commands.names, unlimited, strict=True)]
     problems = []
-    done = Counter(leg.name for leg in legs if leg.kind == "primitive")
-    for name in {*done, *repeats}:
-        if done[name] != repeats.get(name, 0):
-            problems.append(f"{name!r} is run {done[name]} times, the durations ask for {repeats.get(name, 0)}")
     for leg in legs:
         if leg.kind == "primitive":
             apart = commands.values[leg.first : leg.last] - primitives[leg.name].commands.values
-            turns = 2 * np.pi * np.round(apart[0] / (2 * np.pi)) * [name.startswith("a") for name in commands.names]
+            turns = 2 * np.pi * np.round(apart[0] / (2 * np.pi)) * turning
             if np.abs(apart - turns).max() > 1e-9:
                 problems.append(f"the commands of {leg.name!r} at sample {leg.first} are not the dictionary's")
-    if [leg.first for leg in legs[1:]] != [leg.last for leg in legs[:-1]] or legs[-1].last != len(commands):
-        problems.append("the legs do not follow each other without gaps")
-    return sorted(problems)
+    return problems
 
 
 def _entry_problems(

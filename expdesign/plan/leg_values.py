@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 import shapely
 
-from expdesign.plan.area import SeaArea
+from expdesign.plan.area import ARC_SEGMENTS, SeaArea
 from expdesign.plan.capability import Capability
 from expdesign.plan.field import ClearanceField
 from expdesign.plan.footprint import swept_area
@@ -26,6 +26,8 @@ MEMORY = 20.0
 """Time constants after which a lagging actuator has forgotten: two parts in a thousand million are left."""
 ARRIVAL = 1e-3
 """Largest miss of a leg's end state, in hull lengths, and in transit speeds."""
+ROUND = 1.0 / float(np.cos(np.pi / (4 * ARC_SEGMENTS)))
+"""Taken off a shore by so much more, no rounded corner is nearer than asked: arcs are drawn inside their circles."""
 SPARES = (0.25, 0.1, 0.02)
 """Hull lengths that ways keep from the shore beyond clearance and half the beam: more gives smoother ways, less leads
 through narrower water."""
@@ -79,8 +81,10 @@ class LegWater:
 
     @cached_property
     def safe(self) -> shapely.MultiPolygon:
-        """Water that the hull may touch."""
-        safe = self.area.safe_water(self.clearance_m)
+        """Water that the hull may touch where a sample's hull and the next one's do, so that all between keep clear."""
+        turned = 2.0 * self.ship.yaw_rate_radps * self.vessel.sample_time_s  # runs turn faster than legs
+        swing_m = np.hypot(*self.vessel.hull_b.T).max() * (1 - np.cos(min(turned, np.pi) / 2))
+        safe = self.area.safe_water((self.clearance_m + float(swing_m)) * ROUND)
         shapely.prepare(safe)
         return safe
 
