@@ -10,11 +10,12 @@ from expdesign.diagnosis.accuracy import accuracy, first_states, simulate_from_f
 from expdesign.diagnosis.candidate import Cause, Values
 from expdesign.diagnosis.causes import CAUSES
 from expdesign.diagnosis.extended import Extended
-from expdesign.diagnosis.extension import as_extended, extend, public_name
+from expdesign.diagnosis.extension import as_extended, as_stated, extend, public_name
 from expdesign.diagnosis.gain import HeldOut, gained, held_out
 from expdesign.diagnosis.joint import Fit
 from expdesign.diagnosis.kept import LEAST_GAIN, kept, only_moves
 from expdesign.diagnosis.motion import linearise, start_responses
+from expdesign.diagnosis.notes import notes_on_data
 from expdesign.diagnosis.search import search
 from expdesign.diagnosis.spread import spread
 from expdesign.diagnosis.steps import Search, Step
@@ -93,7 +94,7 @@ def diagnose(
         simulated_after=simulate_from_first(final, windows).shown,
         errors={step.chosen.candidate.cause: step.before.linear.motion.error for step in found.steps},
         notes=(
-            *_notes(windows, vessel, still_inputs(ship, windows)),
+            *notes_on_data(vessel, record, windows, still_inputs(ship, windows)),
             *_settled_note(found, ship, windows, held[0]),
             *missing,
         ),
@@ -182,7 +183,7 @@ def _finding(
         gain_interval=interval,
         not_distinguishable_from=tuple(rival.candidate.cause for rival in step.rivals),
         would_tell_apart=telling,
-        explanation=cause.explain(values, last.ship),
+        explanation=cause.explain(values, last.ship) + as_stated(values, last.ship),
         suspect=cause.suspect,
         worth=chosen.gain,
     )
@@ -198,22 +199,6 @@ def _estimates(values: Values, ship: Extended) -> tuple[Estimated, ...]:
 
 def _stds(found: Fit) -> dict[str, float]:
     return {key: found.std(key) for key in found.keys}
-
-
-def _notes(windows: Windows, vessel: Vessel, still: Sequence[str]) -> tuple[str, ...]:
-    notes = []
-    if not windows.has_heading:
-        notes.append("No heading is measured: current and wind cannot be told from what the ship does by itself.")
-    if not windows.has_depth:
-        notes.append("No depth is measured: shallow water was not tested.")
-    if "r" in windows.derived:
-        notes.append("The yaw rate is derived from the heading: the scale of a rate gyro was not tested.")
-    if still:
-        verb = "changes" if len(still) == 1 else "change"
-        notes.append(f"{', '.join(still)} never {verb}: what acts through them alone is not seen.")
-    if not (vessel.model.parameter_std > 0).any():
-        notes.append("The vessel file states no parameter_std: its parameters count as known.")
-    return tuple(notes)
 
 
 def _settled_note(found: Search, ship: Extended, windows: Windows, settled: HeldOut) -> tuple[str, ...]:

@@ -21,11 +21,13 @@ little, others by a sensor whose axes lie anticlockwise of the ship's. The lever
 the velocity sensor likewise.
 
 A GROUP is the stem of input names ("n", "a", "rudder", "tau_x", ...), one input, or "all".
+
+What a vessel file states is where the search for a better value begins; every test is of the difference.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -48,6 +50,7 @@ class Extended:
         derived: those of u, v, r that the data derive from the pose, by its sensors.
         shoalest: largest draught over depth in the data, 0 where no depth is known.
         effects: key -> value; what is left out is zero.
+        stated: effects as the vessel file states them.
     """
 
     model: VesselModel
@@ -56,6 +59,7 @@ class Extended:
     derived: tuple[str, ...] = ()
     shoalest: float = 0.0
     effects: Effects = field(default_factory=dict)
+    stated: Effects = field(default_factory=dict)
     parts: tuple[Part, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -68,6 +72,15 @@ class Extended:
     def having(self, effects: Effects) -> Extended:
         """The same with some effects set to other values."""
         return replace(self, effects={**self.effects, **effects})
+
+    def without(self, keys: Set[str]) -> Extended:
+        """The same with some effects as the vessel file states them, if it does."""
+        others = {key: value for key, value in self.effects.items() if key not in keys}
+        return replace(self, effects=others | {key: value for key, value in self.stated.items() if key in keys})
+
+    def found(self, prefix: str) -> bool:
+        """Some effect whose key begins so is not as the vessel file has it."""
+        return any(key.startswith(prefix) and value != self.stated.get(key) for key, value in self.effects.items())
 
     def get(self, key: str) -> float:
         """Value of an effect."""

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -11,36 +10,29 @@ import numpy as np
 from expdesign.diagnosis.causes.missing_term import library
 from expdesign.diagnosis.causes.shallow_water import in_shallow_water
 from expdesign.diagnosis.extended import ROLL, Extended
-from expdesign.diagnosis.followed import members
-from expdesign.diagnosis.parts import is_coriolis, is_thrust, reads_rudder
+from expdesign.diagnosis.followed import grouped, members
+from expdesign.diagnosis.parts import is_coriolis, is_damping, is_thrust, reads_rudder
 from expdesign.diagnosis.surroundings import mean_wind
-from expdesign.diagnosis.windows import derived_outputs
+from expdesign.diagnosis.windows import derived_outputs, has_heading
 from expdesign.errors import InputError
 from expdesign.estimation.tables import model_for
 from expdesign.signals import Batch, Record
-from expdesign.vessel import Actuator, Response, Roll, Sensors, Term, Vessel, VesselModel
+from expdesign.vessel import Actuator, Environment, Response, Roll, Sensors, Term, Vessel, VesselModel
 from expdesign.vessel.structures import SHOAL
 
 RESPONSES = {"lag": "lag_s", "delay": "delay_s", "deadband": "deadband", "offset": "offset"}
 
 
 def as_extended(vessel: Vessel, record: Record) -> Extended:
-    """The model in use, with the actuators, sensors and weather that its file states.
+    """The model in use, with the actuators, sensors and weather that its file states; no weather without a heading.
 
     Raises:
         InputError: draught over depth is an input of the record, but no depth is recorded.
     """
     model, shoalest = _driven(vessel, record)
-    effects: dict[str, float] = {}
-    for actuator in model.actuators:
-        for signal, response in zip(actuator.signals, actuator.responses, strict=True):
-            for kind, name in RESPONSES.items():
-                effects[f"{kind}:{signal}"] = float(getattr(response, name))
     derived = derived_outputs(record)
-    effects |= _sensed(vessel.sensors, derived) | _rolled(model.roll)
-    weather = vessel.environment
-    for name, flow in (("current", weather.current_to), ("wind", weather.wind_to)):
-        effects |= {f"{name}:north": float(flow[0]), f"{name}:east": float(flow[1])}
+    effects = _answering(model) | _sensed(vessel.sensors, derived) | _rolled(model.roll)
+    effects |= _flowing(vessel.environment) if has_heading(record) else {}
     known = {key: value for key, value in effects.items() if value}
     return Extended(
         model=model,
@@ -49,7 +41,28 @@ def as_extended(vessel: Vessel, record: Record) -> Extended:
         derived=derived,
         shoalest=shoalest,
         effects=known,
+        stated=known,
     )
+
+
+def _answering(model: VesselModel) -> dict[str, float]:
+    """What a file says of how actuators answer."""
+    rows = [row for actuator in model.actuators for row in zip(actuator.signals, actuator.responses, strict=True)]
+    return {
+        f"{kind}:{group}": value
+        for kind, name in RESPONSES.items()
+        for group, value in grouped({signal: getattr(how, name) for signal, how in rows}, model.inputs).items()
+    }
+
+
+def _flowing(weather: Environment) -> dict[str, float]:
+    """What a file says of current and wind, which needs a heading to act in."""
+    flows = {"current": weather.current_to, "wind": weather.wind_to}
+    return {
+        f"{name}:{way}": float(part)
+        for name, flow in flows.items()
+        for way, part in zip(("north", "east"), flow, strict=True)
+    }
 
 
 def _sensed(sensors: Sensors, derived: tuple[str, ...]) -> dict[str, float]:
@@ -100,12 +113,11 @@ def extend(vessel: Vessel, ship: Extended, std: Mapping[str, float]) -> tuple[Ve
     """
     model, missing = _model(vessel.model, ship, std)
     actuators, more = _actuators(model.actuators, ship)
-    get = ship.get
-    weather = replace(
-        vessel.environment,
-        current_to=np.array([get("current:north"), get("current:east")]),
-        wind_to=np.array(mean_wind(ship)),
-    )
+    weather = vessel.environment
+    if _has(ship, "current:"):
+        weather = replace(weather, current_to=np.array([ship.get("current:north"), ship.get("current:east")]))
+    if _has(ship, "wind:"):
+        weather = replace(weather, wind_to=np.array(mean_wind(ship)))
     return (
         replace(
             vessel,
@@ -115,6 +127,10 @@ def extend(vessel: Vessel, ship: Extended, std: Mapping[str, float]) -> tuple[Ve
         ),
         (*missing, *more),
     )
+
+
+def _has(ship: Extended, prefix: str) -> bool:
+    return any(key.startswith(prefix) for key in ship.effects)
 
 
 def _model(model: VesselModel, ship: Extended, std: Mapping[str, float]) -> tuple[VesselModel, tuple[str, ...]]:
@@ -129,7 +145,7 @@ def _model(model: VesselModel, ship: Extended, std: Mapping[str, float]) -> tupl
         if is_thrust(expression, ship.model):
             factor *= (1 + get("gain")) * (1 + get("change:gain"))
             factor *= 1.0 if reads_rudder(expression) else 1 + get("gain:propeller")
-        elif not (is_coriolis(term) or {"u_q", "v_q"} & set(expression.signals)):
+        elif is_damping(term, expression, ship.model):
             factor *= 1 + get("change:damping") + get(f"change:damping_{term.equation}")
         if not is_coriolis(term):
             factor /= 1 + get(f"inertia:{term.equation}")
@@ -210,7 +226,7 @@ def _actuators(actuators: tuple[Actuator, ...], ship: Extended) -> tuple[tuple[A
         for index in members(group, recorded):
             if recorded[index] in own:
                 row = changes.setdefault(recorded[index], {})
-                row[RESPONSES[kind]] = row.get(RESPONSES[kind], 0.0) + value if ":" in key else value
+                row[RESPONSES[kind]] = row.get(RESPONSES[kind], 0.0) + value
             else:
                 lost.append(
                     f"{kind} of {recorded[index]} is not in the vessel file, whose actuators take other signals."
@@ -218,17 +234,11 @@ def _actuators(actuators: tuple[Actuator, ...], ship: Extended) -> tuple[tuple[A
     result = []
     for actuator in actuators:
         responses = tuple(
-            Response(**{**_plain(response), **changes.get(signal, {})})
+            Response(**changes.get(signal, {})) if signal in recorded else response
             for signal, response in zip(actuator.signals, actuator.responses, strict=True)
         )
         result.append(replace(actuator, responses=responses))
     return tuple(result), tuple(dict.fromkeys(lost))
-
-
-def _plain(response: Response) -> dict[str, float]:
-    """Responses of the old file are part of the effects already."""
-    del response
-    return {}
 
 
 def _sensors(sensors: Sensors, ship: Extended) -> Sensors:
@@ -247,6 +257,16 @@ def _sensors(sensors: Sensors, ship: Extended) -> Sensors:
         return replace(sensors, heading_bias_rad=0.0 - get("heading_bias"), position=position)
     velocity = replace(sensors.velocity, **lever, delay_s=late("late:u", "late:v"))
     return replace(sensors, velocity_angle_rad=0.0 - get("heading_bias"), velocity=velocity)
+
+
+def as_stated(keys: Iterable[str], ship: Extended) -> str:
+    """What the vessel file states of these effects, as a sentence to go on with; empty where it states nothing."""
+    told = []
+    for key in keys:
+        if key in ship.stated:
+            name, factor, offset, _ = public_name(key, ship)
+            told.append(f"{name} {offset + factor * ship.stated[key]:.3g}")
+    return f" The vessel file states {', '.join(told)}." if told else ""
 
 
 def public_name(key: str, ship: Extended) -> tuple[str, float, float, str]:
@@ -279,8 +299,3 @@ def public_name(key: str, ship: Extended) -> tuple[str, float, float, str]:
         return f"{rest}_factor", 1.0, 1.0, ""
     unit = {"roll:period": "s", "roll:yaw": "rad/m"}.get(key, "")
     return {"roll:period": "roll_period_s", "roll:damping": "roll_damping_ratio"}.get(key, ROLL[key]), 1.0, 0.0, unit
-
-
-def finite(value: float) -> float | None:
-    """A number or nothing."""
-    return value if math.isfinite(value) else None

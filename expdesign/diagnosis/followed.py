@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from scipy.signal import lfilter
 
@@ -13,6 +15,28 @@ from expdesign.values import Array
 def members(group: str, inputs: tuple[str, ...]) -> list[int]:
     """Columns of the inputs that belong to a group."""
     return [index for index, name in enumerate(inputs) if group in ("all", name) or name.rstrip("0123456789") == group]
+
+
+def input_groups(inputs: tuple[str, ...]) -> list[str]:
+    """All inputs, those of one stem, single ones; of groups with the same members the first."""
+    stems = sorted({name.rstrip("0123456789") for name in inputs})
+    groups = ["all", *(stems if len(stems) > 1 else []), *inputs]
+    taken: dict[tuple[int, ...], str] = {}
+    for group in groups:
+        taken.setdefault(tuple(members(group, inputs)), group)
+    return list(taken.values())
+
+
+def grouped(values: Mapping[str, float], inputs: tuple[str, ...]) -> dict[str, float]:
+    """Values of single inputs, zero where left out, said of the largest groups that share one; zeros are not said."""
+    left, found = list(inputs), dict[str, float]()
+    for group in input_groups(inputs):
+        names = [inputs[column] for column in members(group, inputs)]
+        shared = {values.get(name, 0.0) for name in names}
+        if set(names) <= set(left) and len(shared) == 1:
+            found[group] = shared.pop()
+            left = [name for name in left if name not in names]
+    return {group: value for group, value in found.items() if value}
 
 
 FINER = 4

@@ -32,7 +32,8 @@ def observed(ship: Extended, states: Array, windows: Windows, turned: Array | No
         channels["psi_rate"] = differenced(headings, channels["psi_rate"], windows)
     if "r" in windows.derived:
         channels["r"] = channels["psi_rate"]
-    for name, keys in LATE.items():
+    late = LATE | {"r": ("psi",)} if "r" in windows.derived else LATE
+    for name, keys in late.items():
         delay = sum(ship.get(f"late:{key}") for key in keys)
         if delay:
             channels[name] = _shifted(channels[name], delay / windows.sample_s)
@@ -55,7 +56,8 @@ def _turned(u: Array, v: Array, angle: Array | float) -> tuple[Array, Array]:
     return u * c - v * s, v * c + u * s
 
 
-LATE = {"u": ("u", "position"), "v": ("v", "position"), "r": ("r", "psi"), "psi_rate": ("psi",)}
+LATE = {"u": ("u", "position"), "v": ("v", "position"), "r": ("r",), "psi_rate": ("psi",)}
+"""Delays that shift a channel; that of a yaw rate from the heading is the heading's."""
 
 
 def differenced(turned: Array, otherwise: Array, windows: Windows) -> Array:

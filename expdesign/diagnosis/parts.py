@@ -14,7 +14,8 @@ from expdesign.vessel.expressions import Evaluate, Expression, parse_expression
 from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS
 
 Effects = Mapping[str, float]
-AIR = {"u_q", "v_q"}
+AIR_SIGNALS = frozenset({"u_q", "v_q"})
+"""Velocity through the air."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,7 +87,7 @@ def added_parts(model: VesselModel, library: Mapping[str, Term], effects: Effect
                     equation=term.equation,
                     evaluate=expression.evaluate,
                     factor=value / model.time_scale_s,
-                    reads_air=bool(AIR & set(expression.signals)),
+                    reads_air=bool(AIR_SIGNALS & set(expression.signals)),
                 )
             )
     return parts
@@ -123,7 +124,7 @@ def _kinds(model: VesselModel) -> tuple[Kind, ...]:
             rudder=reads_rudder(expression),
             damping=is_damping(term, expression, model),
             coriolis=is_coriolis(term),
-            air=bool(AIR & set(expression.signals)),
+            air=bool(AIR_SIGNALS & set(expression.signals)),
             turn="tau_psi" in expression.signals,
         )
         for term, expression in zip(model.terms, model.expressions, strict=True)
@@ -156,4 +157,4 @@ def reads_rudder(expression: Expression) -> bool:
 
 def is_damping(term: Term, expression: Expression, model: VesselModel) -> bool:
     """It resists: neither an input, nor air, nor Coriolis."""
-    return not (is_thrust(expression, model) or is_coriolis(term) or AIR & set(expression.signals))
+    return not (is_thrust(expression, model) or is_coriolis(term) or AIR_SIGNALS & set(expression.signals))

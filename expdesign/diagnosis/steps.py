@@ -83,10 +83,9 @@ def _less(whole: Fit, step: Step, windows: Windows) -> Fit | None:
     """A later fit without the effects of a step, all others estimated anew."""
     own = _own(step)
     kept = tuple(key for key in whole.keys[: whole.free] if key not in own)
-    ship = replace(whole.ship, effects={key: v for key, v in whole.ship.effects.items() if key not in own})
     try:
-        return fit(ship, windows, kept, starts=whole.starts, noise=whole.noise, colour_order=whole.noise.order,
-                   near=whole.linear)  # fmt: skip
+        return fit(whole.ship.without(own), windows, kept, starts=whole.starts, noise=whole.noise,
+                   colour_order=whole.noise.order, near=whole.linear)  # fmt: skip
     except (FloatingPointError, np.linalg.LinAlgError):
         return None
 
@@ -106,13 +105,15 @@ def like_nothing(steps: tuple[Step, ...], last: Fit) -> int | None:
 
 
 def wald(chosen: Contender, last: Fit) -> float:
-    """p-value of the joint estimate of a cause's sizes against all of them being zero."""
-    sized = [key for key in chosen.keys if key in last.keys and key not in SHAPE]
+    """p-value of the joint estimate of a cause's sizes against zero, or against what the vessel file states."""
+    stated = last.ship.stated
+    sized = [key for key in chosen.keys if key in last.keys and (key not in SHAPE or key in stated)]
     places = [last.keys.index(key) for key in sized]
-    values = np.array([last.value(key) for key in sized])
+    values = np.array([last.value(key) - stated.get(key, 0.0) for key in sized])
     statistic = float(values @ np.linalg.lstsq(last.covariance[np.ix_(places, places)], values, rcond=None)[0])
     freedom = len(sized)
     if chosen.searched is not None and chosen.searched[0] in chosen.candidate.free:
         key, error = chosen.searched
-        statistic, freedom = statistic + (last.value(key) / error) ** 2, freedom + 1
+        moved = last.value(key) - stated.get(key, 0.0)
+        statistic, freedom = statistic + (moved / error) ** 2, freedom + 1
     return float(chi2.sf(statistic, freedom)) if freedom else 0.0

@@ -46,7 +46,7 @@ def surroundings(ship: Extended, windows: Windows) -> Surroundings:
     if any(part.reads_air for part in ship.parts):
         table["u_w"], table["v_w"] = _wind(ship, windows)
     if model.reads_depth or any(key.startswith("shallow:") for key in ship.effects):
-        table[SHOAL] = np.nan_to_num(ship.draught_m / windows.depth_m)
+        table[SHOAL] = ship.draught_m / windows.depth_m
     if "change:time" in ship.effects:
         table["after"] = (windows.time_s >= ship.effects["change:time"]).astype(float)
     return table
@@ -64,7 +64,7 @@ def _acting(model: VesselModel, rows: Array, finer: int) -> Array:
 def _wind(ship: Extended, windows: Windows) -> tuple[Array, Array]:
     """Measured where it is, else the mean wind of the model."""
     if windows.has_wind:
-        return np.nan_to_num(windows.wind[..., 0]), np.nan_to_num(windows.wind[..., 1])
+        return windows.wind[..., 0], windows.wind[..., 1]
     return to_body(*mean_wind(ship), true_heading(ship, windows))
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from expdesign.conventions import OUTPUTS
+from expdesign.errors import InputError
 from expdesign.estimation.tables import inputs_of
 from expdesign.records import central_difference
 from expdesign.signals import Batch, Record
@@ -29,6 +30,8 @@ LONGEST = 700
 """Samples per window, at most."""
 FEWEST = 4
 """Samples per window, at least."""
+SAME_TIME = 1e-6
+"""Relative difference up to which sample times count as one."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -43,8 +46,9 @@ class Windows:
         first: (w,) first integrator step of each window in its batch.
         measured: (w, s, 4) channels; nan where not measured.
         heading: (w, k) measured heading in the middle of integrator steps, continuous; zero where there is none.
-        wind: (w, k, 2) likewise the wind in the b-frame from measured relative wind, nan where not measured.
-        depth_m: (w, k), inf where not known.
+        wind: (w, k, 2) likewise the wind in the b-frame from measured relative wind, the last one seen where a sample
+            lacks it, nan in batches without.
+        depth_m: (w, k), the last one seen where a sample lacks it, inf in batches without.
         time_s: (w, k) time since the first batch began, batches laid end to end.
         has_heading, has_wind, has_depth: whether these are measured.
         derived: those of u, v, r that come from the pose.
@@ -135,8 +139,12 @@ def fastest_rate(model: VesselModel, record: Record) -> float:
 
 
 def cut_windows(model: VesselModel, record: Record, *, longest_s: float | None = None) -> Windows:
-    """Windows of a record for a model driven by its inputs (`estimation.tables.model_for`)."""
-    sample_s = record.batches[0].sample_time_s
+    """Windows of a record for a model driven by its inputs (`estimation.tables.model_for`).
+
+    Raises:
+        InputError: batches of different sample times.
+    """
+    sample_s = _sample_time(record)
     step_s = min(COARSEST_S, SHARE_OF_TIME_CONSTANT / fastest_rate(model, record))
     merged = max(1, int(step_s / sample_s + 1e-9))
     between = max(1, int(np.ceil(merged * sample_s / step_s - 1e-9)))
@@ -161,13 +169,21 @@ def cut_windows(model: VesselModel, record: Record, *, longest_s: float | None =
         step_s=parts[0].step_s,
         steps_per_sample=between,
         batch_inputs=tuple(part.inputs for part in parts),
-        has_heading=all(batch.pose is not None and np.isfinite(batch.pose[:, 2]).all() for batch in record.batches),
-        has_wind=all(batch.wind is not None for batch in record.batches),
-        has_depth=all(batch.depth_m is not None for batch in record.batches),
+        has_heading=has_heading(record),
+        has_wind=all(_air(batch) is not None for batch in record.batches),
+        has_depth=all(_has_depth(batch) for batch in record.batches),
         derived=derived,
         names=tuple(batch.name for batch in record.batches),
         **{name: np.stack(values) for name, values in rows.items()},
     )
+
+
+def _sample_time(record: Record) -> float:
+    times = sorted({batch.sample_time_s for batch in record.batches})
+    if times[-1] > (1 + SAME_TIME) * times[0]:
+        found = ", ".join(f"{time:g} s" for time in times)
+        raise InputError(f"the batches have different sample times, found {found}; a diagnosis takes one for all")
+    return record.batches[0].sample_time_s
 
 
 def _cut(samples: int, limit: int) -> list[tuple[int, int]]:
@@ -195,10 +211,13 @@ class _Part:
         if not np.isfinite(heading).all():
             heading = np.cumsum(np.nan_to_num(batch.velocity[:, 2])) * batch.sample_time_s
         self.heading = _middles(self._between(self._centred(heading)))
-        wind = np.full((len(batch), 2), np.nan) if batch.wind is None else batch.velocity[:, :2] - batch.wind
+        wind = _air(batch)
+        wind = np.full((len(batch), 2), np.nan) if wind is None else held_wind(wind, heading)
         self.wind = _middles(self._between(self._centred(wind)))
-        depth = np.full(len(batch), np.inf) if batch.depth_m is None else batch.depth_m
-        self.depth = self._between(self._centred(depth))
+        self.depth = np.full(len(self.heading), np.inf)
+        if batch.depth_m is not None and _has_depth(batch):
+            depth = batch.depth_m[_last_seen(np.isfinite(batch.depth_m))]
+            self.depth = self._between(self._centred(depth))
 
     def measured(self, derived: tuple[str, ...]) -> Array:
         """(s, 4) channels; the heading tells nothing more where the yaw rate is derived from it.
@@ -250,6 +269,45 @@ class _Part:
             mixed = values[:, None] * (1 - share) + following[:, None] * share
         mixed[:, 0] = values
         return np.asarray(mixed.reshape(-1, *values.shape[1:]))
+
+
+def has_heading(record: Record) -> bool:
+    """Whether every sample has a measured heading."""
+    return all(batch.pose is not None and np.isfinite(batch.pose[:, 2]).all() for batch in record.batches)
+
+
+def _has_depth(batch: Batch) -> bool:
+    """Whether any depth is measured."""
+    return batch.depth_m is not None and bool(np.isfinite(batch.depth_m).any())
+
+
+def _air(batch: Batch) -> Array | None:
+    """(k, 2) velocity of the air over ground in the b-frame, nan where it or the ship's is not measured; or None."""
+    if batch.wind is None:
+        return None
+    air = batch.velocity[:, :2] - batch.wind
+    return air if np.isfinite(air).all(axis=1).any() else None
+
+
+def held_wind(air: Array, heading: Array) -> Array:
+    """(k, 2) wind in the b-frame with the last one seen, in the n-frame, where it is not measured."""
+    places = _last_seen(np.asarray(np.isfinite(air).all(axis=1)))
+    turned = heading - heading[places]
+    c, s, held = np.cos(turned), np.sin(turned), air[places]
+    return np.stack([held[:, 0] * c + held[:, 1] * s, held[:, 1] * c - held[:, 0] * s], axis=-1)
+
+
+def _last_seen(seen: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """(k,) place of the last sample seen at every one; of the first seen before that."""
+    places = np.maximum.accumulate(np.where(seen, np.arange(len(seen)), -1))
+    return np.asarray(np.where(places < 0, np.argmax(seen), places))
+
+
+def unseen_wind(record: Record) -> float:
+    """Share of the samples at which wind that is measured otherwise is not."""
+    airs = [air for batch in record.batches if (air := _air(batch)) is not None]
+    seen = np.concatenate([np.isfinite(air).all(axis=1) for air in airs]) if airs else np.ones(1, dtype=bool)
+    return float(1.0 - seen.mean())
 
 
 def _middles(values: Array) -> Array:

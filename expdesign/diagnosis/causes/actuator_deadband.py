@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
-from expdesign.diagnosis.causes.actuator_lag import input_groups
+from expdesign.diagnosis.causes.actuator_lag import open_groups
 from expdesign.diagnosis.causes.words import first, rounded
 from expdesign.diagnosis.extended import Extended
 from expdesign.diagnosis.followed import members
@@ -22,11 +22,9 @@ def between(widths: Array, levels: Array) -> list[float]:
 
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
-    if any(key.startswith("deadband:") for key in situation.ship.effects):
-        return ()
     inputs = situation.ship.model.inputs
     found = []
-    for group in input_groups(situation):
+    for group in open_groups(situation, "deadband"):
         columns = members(group, inputs)
         if len({inputs[c].rstrip("0123456789") for c in columns}) > 1:
             continue  # inputs of different units share no width

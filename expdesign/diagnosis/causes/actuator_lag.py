@@ -5,32 +5,35 @@ from __future__ import annotations
 from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.words import first, rounded
 from expdesign.diagnosis.extended import Extended
+from expdesign.diagnosis.followed import input_groups, members
 
 SAMPLES = (0.5, 2.0, 6.0)
+SHARES = (0.5, 1.5)
 
 
-def input_groups(situation: Situation) -> list[str]:
-    """All inputs, those of one stem, single ones."""
-    inputs = situation.ship.model.inputs
-    stems = sorted({name.rstrip("0123456789") for name in inputs})
-    groups = ["all", *(stems if len(stems) > 1 else []), *inputs]
-    taken: dict[frozenset[str], str] = {}
-    for group in groups:
-        which = frozenset(n for n in inputs if group in ("all", n) or n.rstrip("0123456789") == group)
-        taken.setdefault(which, group)
-    return list(taken.values())
+def open_groups(situation: Situation, kind: str) -> list[str]:
+    """Groups of inputs of which the vessel file states nothing of a kind, and those of which it states one value.
+
+    None once something of the kind was found: what is then left is another cause's.
+    """
+    ship = situation.ship
+    if ship.found(f"{kind}:"):
+        return []
+    inputs = ship.model.inputs
+    stated = {key.split(":", 1)[1] for key in ship.stated if key.startswith(f"{kind}:")}
+    taken = {column for group in stated for column in members(group, inputs)}
+    return [group for group in input_groups(inputs) if group in stated or not taken & {*members(group, inputs)}]
 
 
 def followers(situation: Situation, kind: str, cause: str) -> tuple[Candidate, ...]:
-    """A time of every group of inputs, tried at a few values."""
-    if any(key.startswith(f"{kind}:") for key in situation.ship.effects):
-        return ()
-    sample = situation.windows.sample_s
-    return tuple(
-        Candidate(cause=cause, free={f"{kind}:{group}": samples * sample}, finite=True)
-        for group in input_groups(situation)
-        for samples in SAMPLES
-    )
+    """A time of every group of inputs, tried at a few values; smaller and larger than what the vessel file states."""
+    sample, found = situation.windows.sample_s, []
+    for group in open_groups(situation, kind):
+        key = f"{kind}:{group}"
+        stated = situation.ship.stated.get(key)
+        times = [sample * number for number in SAMPLES] if stated is None else [stated * share for share in SHARES]
+        found += [Candidate(cause=cause, free={key: time}, finite=True) for time in times]
+    return tuple(found)
 
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:

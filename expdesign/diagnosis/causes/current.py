@@ -10,7 +10,7 @@ from expdesign.diagnosis.extended import Extended
 
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
-    if not situation.windows.has_heading or situation.has("current:north"):
+    if not situation.windows.has_heading:
         return ()
     return (Candidate(cause="current", free={"current:north": 0.0, "current:east": 0.0}),)
 

@@ -9,7 +9,7 @@ from expdesign.diagnosis.extended import Extended
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     windows = situation.windows
-    if situation.has("gyro") or "r" in windows.derived or "r" not in situation.ship.model.outputs:
+    if "r" in windows.derived or "r" not in situation.ship.model.outputs:
         return ()
     return (Candidate(cause="gyro_scale", free={"gyro": 0.0}),)
 

@@ -10,7 +10,7 @@ DEGREES = 57.29578
 
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
-    if situation.has("heading_bias") or not {"u", "v"} <= set(situation.ship.model.outputs):
+    if not {"u", "v"} <= set(situation.ship.model.outputs):
         return ()
     return (Candidate(cause="heading_bias", free={"heading_bias": 0.0}),)
 

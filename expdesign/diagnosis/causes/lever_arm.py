@@ -9,7 +9,7 @@ from expdesign.diagnosis.extended import Extended
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     outputs = set(situation.ship.model.outputs)
-    if any(key.startswith("lever:") for key in situation.ship.effects) or not {"v", "r"} <= outputs:
+    if situation.ship.found("lever:") or not {"v", "r"} <= outputs:
         return ()
     found = [Candidate(cause="lever_arm", free={"lever:forward": 0.0})]
     if "u" in outputs:

@@ -9,6 +9,7 @@ import numpy as np
 from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.words import rounded
 from expdesign.diagnosis.extended import Extended
+from expdesign.diagnosis.parts import AIR_SIGNALS
 from expdesign.vessel import NUMPY, TERMS, Term, VesselModel
 from expdesign.vessel.expressions import parse_expression
 from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS
@@ -27,6 +28,7 @@ MORE_TERMS = (
 ADVANCE_LOSS = ("X_kappa", "X_un", "X_unn")
 """Terms by which thrust falls with the speed of advance."""
 AIR = ("W_abs_u_u", "W_abs_v_v", "W_uv")
+"""Library terms of the air."""
 
 
 def library(model: VesselModel) -> Mapping[str, Term]:
@@ -82,6 +84,15 @@ def own_advance_terms(model: VesselModel) -> list[str]:
         term.name
         for term, expression in zip(model.terms, model.expressions, strict=True)
         if term.equation == "u" and any(_parallel(expression.evaluate(table, NUMPY), loss) for loss in losses)
+    ]
+
+
+def own_air_terms(model: VesselModel) -> list[str]:
+    """Names of the model's terms that read the air."""
+    return [
+        term.name
+        for term, expression in zip(model.terms, model.expressions, strict=True)
+        if AIR_SIGNALS & set(expression.signals)
     ]
 
 

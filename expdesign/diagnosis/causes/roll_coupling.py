@@ -6,7 +6,7 @@ import numpy as np
 
 from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.words import rounded
-from expdesign.diagnosis.extended import Extended
+from expdesign.diagnosis.extended import ROLL, Extended
 
 COUNT = 14
 DAMPING = 0.08
@@ -14,8 +14,10 @@ DAMPING = 0.08
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     outputs = set(situation.ship.model.outputs)
-    if situation.ship.has_roll or not {"v", "r"} <= outputs:
+    if situation.ship.found("roll:") or not {"v", "r"} <= outputs:
         return ()
+    if situation.ship.has_roll:  # the vessel file has a mode, which may be another
+        return (Candidate(cause="roll_coupling", free=dict.fromkeys(ROLL, 0.0)),)
     shortest = 4.0 * situation.windows.sample_s
     periods = np.geomspace(shortest, max(30.0 * shortest / 4, 2 * shortest), COUNT)
     return tuple(

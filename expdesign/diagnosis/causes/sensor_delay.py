@@ -16,7 +16,7 @@ NAMES = {
 
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
-    if any(key.startswith("late:") for key in situation.ship.effects):
+    if situation.ship.found("late:"):
         return ()
     outputs = situation.ship.model.outputs
     derived = set(situation.windows.derived)

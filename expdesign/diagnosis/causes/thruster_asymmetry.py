@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
+from expdesign.diagnosis.causes.actuator_lag import open_groups
 from expdesign.diagnosis.causes.words import first, rounded
 from expdesign.diagnosis.extended import ANGLE_STEMS, Extended
+from expdesign.diagnosis.followed import members
 
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     ship = situation.ship
-    if any(key.startswith(("offset", "asymmetry")) for key in ship.effects) or "r" not in ship.model.outputs:
+    if ship.found("offset:") or ship.found("asymmetry") or "r" not in ship.model.outputs:
         return ()
-    angles = [name for name in ship.model.inputs if name.rstrip("0123456789") in ANGLE_STEMS]
-    stems = {name.rstrip("0123456789") for name in angles}
-    groups = [*sorted(stems), *(angles if len(angles) > 1 else [])]
+    angles = {column for stem in ANGLE_STEMS for column in members(stem, ship.model.inputs)}
+    groups = [group for group in open_groups(situation, "offset") if {*members(group, ship.model.inputs)} <= angles]
     lean = Candidate(cause="thruster_asymmetry", free={"asymmetry": 0.0})
     return (lean, *(Candidate(cause="thruster_asymmetry", free={f"offset:{group}": 0.0}) for group in groups))
 

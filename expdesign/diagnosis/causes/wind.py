@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
-from expdesign.diagnosis.causes.missing_term import lacking
+from expdesign.diagnosis.causes.missing_term import lacking, own_air_terms
 from expdesign.diagnosis.causes.words import listed, rounded
 from expdesign.diagnosis.extended import Extended
 
@@ -19,23 +19,20 @@ DIRECTIONS = ((1.0, 0.0), (0.7, 0.7), (0.0, 1.0), (-0.7, 0.7), (-1.0, 0.0), (-0.
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     ship, windows = situation.ship, situation.windows
-    terms = [name for name in lacking(situation, air=True) if f"term:{name}" not in ship.effects]
-    reads_air = [
-        term.name
-        for term, expression in zip(ship.model.terms, ship.model.expressions, strict=True)
-        if {"u_q", "v_q"} & set(expression.signals)
-    ]
+    terms, reads_air = lacking(situation, air=True), own_air_terms(ship.model)
     found: list[Candidate] = []
     if windows.has_wind:
         if terms:
             found.append(Candidate(cause="wind", free={f"term:{name}": 0.0 for name in terms}))
             found += [Candidate(cause="wind", free={f"term:{name}": 0.0}) for name in terms if len(terms) > 1]
-        if reads_air and not terms:
+        if reads_air:
             found.append(Candidate(cause="wind", free={f"theta:{name}": 0.0 for name in reads_air}))
             found += [Candidate(cause="wind", free={f"theta:{name}": 0.0}) for name in reads_air if len(reads_air) > 1]
     elif windows.has_heading and terms and not reads_air:
         found += _of_unknown_wind(situation, terms)
-    elif windows.has_heading and reads_air and not situation.has("wind:north"):
+    elif windows.has_heading and reads_air:
+        if any(key.startswith("wind:") for key in ship.stated):
+            found.append(Candidate(cause="wind", free={"wind:north": 0.0, "wind:east": 0.0}))
         found += [
             Candidate(cause="wind", free={"wind:north": speed * n, "wind:east": speed * e}, finite=True)
             for speed in SPEEDS_MPS

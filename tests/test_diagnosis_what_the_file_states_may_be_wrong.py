@@ -1,0 +1,119 @@
+"""What a vessel file states of water, actuators and sensors is where a diagnosis begins, not where it ends."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnosis_case import hidden_record, vessel_of
+from scipy.stats import chi2
+
+from expdesign.diagnosis import diagnose
+from expdesign.diagnosis.accuracy import accuracy, first_states
+from expdesign.diagnosis.candidate import Candidate, Situation
+from expdesign.diagnosis.causes import CAUSES
+from expdesign.diagnosis.extended import Extended
+from expdesign.diagnosis.extension import as_extended, extend
+from expdesign.diagnosis.joint import fit
+from expdesign.diagnosis.screening import screen
+from expdesign.diagnosis.windows import cut_windows
+from expdesign.signals import Record
+from expdesign.vessel import Mounting, Response, Vessel
+
+EVERYTHING = {"current:north", "current:east", "lag:n", "delay:a", "deadband:a", "offset:a", "heading_bias", "gyro",
+              "lever:forward", "late:r"}  # fmt: skip
+
+
+def in_current(ship: str, north: float, east: float) -> Vessel:
+    vessel = vessel_of(ship)
+    return replace(vessel, environment=replace(vessel.environment, current_to=np.array([north, east])))
+
+
+def stating_everything() -> Vessel:
+    """The tug with a current, slow propellers, late and misaligned angles with a dead band, and wrong sensors."""
+    vessel = in_current("tug", 0.1, -0.05)
+    responses = Response(lag_s=2.0), Response(delay_s=1.0, deadband=0.05, offset=0.03)
+    actuators = tuple(replace(one, responses=responses) for one in vessel.model.actuators)
+    sensors = replace(
+        vessel.sensors, velocity=Mounting(forward_m=2.0), velocity_angle_rad=-0.02, yaw_rate_scale=1.04,
+        yaw_rate=replace(vessel.sensors.yaw_rate, delay_s=1.0),
+    )  # fmt: skip
+    return replace(vessel, model=replace(vessel.model, actuators=actuators), sensors=sensors)
+
+
+def candidates(ship: Extended, record: Record) -> list[Candidate]:
+    situation = Situation(ship=ship, windows=cut_windows(ship.model, record))
+    return [candidate for cause in CAUSES for candidate in cause.candidates(situation)]
+
+
+def test_whatever_is_stated_may_be_corrected():
+    """Every stated value is free in some candidate, and what is stated of propellers leaves angles to be tested."""
+    record = hidden_record("tug", seed=1, batches=2, samples=120)
+    ship = as_extended(stating_everything(), record)
+    assert set(ship.stated) == EVERYTHING
+    free = {key for candidate in candidates(ship, record) for key in candidate.free}
+    assert free >= EVERYTHING
+    assert {"lag:a", "lag:a1", "delay:n", "deadband:n"} <= free
+    assert not {"lag:all", "lag:n1", "offset:a1"} & free  # would act besides what is stated, and say so of no one value
+
+
+def test_what_was_found_is_not_sought_again_in_another_way():
+    record = hidden_record("tug", seed=1, batches=2, samples=120)
+    ship = as_extended(stating_everything(), record).having({"lag:n": 3.0, "late:r": 2.0, "lever:forward": 4.0})
+    assert not [c for c in candidates(ship, record) if c.cause in ("actuator_lag", "sensor_delay", "lever_arm")]
+
+
+def test_a_vessel_goes_through_a_diagnosis_that_finds_nothing_as_it_is():
+    record = hidden_record("tug", seed=1, batches=2, samples=120)
+    vessel = stating_everything()
+    again, missing = extend(vessel, as_extended(vessel, record), {})
+    assert missing == ()
+    assert again.model.actuators == vessel.model.actuators
+    assert again.sensors == vessel.sensors
+    np.testing.assert_array_equal(again.environment.current_to, vessel.environment.current_to)
+
+
+def test_the_current_of_another_day_is_found_and_written():
+    record = hidden_record("barge", seed=3, batches=4, samples=150, current=(-0.15, 0.1))
+    found = diagnose(in_current("barge", 0.15, 0.0), record)
+    assert [item.cause for item in found.findings] == ["current"]
+    for one, truth in zip(found.findings[0].estimates, (-0.15, 0.1), strict=True):
+        assert abs(one.value - truth) < 4 * one.std
+    assert "The vessel file states north_mps 0.15" in found.findings[0].explanation
+    values = [one.value for one in found.findings[0].estimates]
+    np.testing.assert_allclose(found.extended.environment.current_to, values)
+
+
+def test_a_current_that_is_as_stated_is_tested_against_what_is_stated():
+    """Its score statistic is chi-squared, at least no larger, over six trials; the threshold is its 99.9 % point."""
+    statistics = []
+    for seed in range(6):
+        record = hidden_record("barge", seed=600 + seed, batches=3, samples=120, current=(0.2, -0.1))
+        ship = as_extended(in_current("barge", 0.2, -0.1), record)
+        windows = cut_windows(ship.model, record)
+        base = fit(ship, windows, (), starts=first_states(windows))
+        sought = [c for c in candidates(ship, record) if c.cause == "current"]
+        statistics += [item.statistic for item in screen(base, sought)]
+    assert len(statistics) == 6
+    assert sum(statistics) < chi2.isf(1e-3, 12)
+
+
+def test_a_stated_current_is_left_out_where_no_heading_is_measured():
+    record = hidden_record("barge", seed=2, batches=2, samples=150)
+    blind = Record(batches=tuple(replace(batch, pose=None) for batch in record.batches))
+    vessel = in_current("barge", 0.3, 0.2)
+    one, other = (accuracy(as_extended(ship, blind), blind) for ship in (vessel, vessel_of("barge")))
+    np.testing.assert_array_equal(one.fit, other.fit)
+    again, _ = extend(vessel, as_extended(vessel, blind), {})
+    np.testing.assert_array_equal(again.environment.current_to, [0.3, 0.2])
+
+
+@pytest.mark.slow
+def test_a_lag_of_propellers_that_is_longer_than_stated_is_found():
+    record = hidden_record("coaster", seed=4, effects={"lag_s": 9.0, "acts_on": 0b01}, batches=6)
+    vessel = vessel_of("coaster")
+    first, *others = vessel.model.actuators
+    slow = replace(first, responses=(Response(lag_s=3.0),))
+    found = diagnose(replace(vessel, model=replace(vessel.model, actuators=(slow, *others))), record)
+    assert found.findings[0].cause == "actuator_lag"
+    (lag,) = found.findings[0].estimates
+    assert abs(lag.value - 9.0) < 4 * lag.std
