@@ -55,8 +55,8 @@ class LegProblem:
         room_port_m, room_starboard_m: (j + 1,) how far the origin may be from the path to either side.
         circle: (3,) north, east, radius that the hull's discs keep to; the radius may be infinite.
         hull_arm_m: points this far ahead and astern of the origin must keep to corridor and circle too.
-        top_speed_mps, yaw_rate_radps: bounds on speed over ground, in any direction, and yaw rate at the nodes.
-        lateral_mps2: bound on surge speed times yaw rate.
+        top_speed_mps, yaw_rate_radps: bounds on speed through water, in any direction, and yaw rate at the nodes.
+        lateral_mps2: bound on surge speed through water times yaw rate.
         node_s: least time between nodes; 0 for the sample time.
     """
 
@@ -169,7 +169,8 @@ class _Program:
             step = (inputs[int(index), 1:] - inputs[int(index), :-1]).T / self.input_scale[index]
             reach = self.limits[index].rate * self.block * h / self.input_scale[index]
             rows += [step - reach, -step - reach]
-        rows += [ca.sum1(x[3:5, 1:-1] ** 2).T, (x[3, 1:-1] * x[5, 1:-1]).T]
+        through = x[3:5, 1:-1] - self._current_b(x[2, 1:-1])
+        rows += [ca.sum1(through**2).T, (through[0, :] * x[5, 1:-1]).T]
         steps = ca.diff(u, 1, 1)
         cost = SMOOTHNESS * ca.sumsqr(steps) + SMALLNESS * ca.sumsqr(u) / j
         if self.free:
@@ -226,6 +227,14 @@ class _Program:
         model = self.vessel.model
         return lambda state: motion_rates(model, state, given, current_to=current, wind_to=wind, ops=CASADI)
 
+    def _current_b(self, heading: ca.MX) -> Any:
+        """(2, j) current ahead and to starboard at headings (1, j); 0 in still water."""
+        north, east = self.environment.current_to.tolist()
+        if not (north or east):
+            return 0
+        c, s = ca.cos(heading), ca.sin(heading)
+        return ca.vertcat(north * c + east * s, east * c - north * s)
+
     def _region(self, inner: ca.MX, path: ca.MX, circle: ca.MX, arm: ca.MX) -> list[ca.MX]:
         """Rows for origin, bow point and stern point: offset from the path, and squared distance from the circle."""
         side = ca.vertcat(-ca.sin(path[2, :]), ca.cos(path[2, :]))
@@ -254,7 +263,8 @@ class _Program:
         """Lower and upper bounds of states, commands and sample time."""
         j = self.nodes
         high = np.full((j + 1, 6), np.inf)
-        high[:, 3:] = [problem.top_speed_mps, problem.top_speed_mps, problem.yaw_rate_radps]
+        over_ground = problem.top_speed_mps + float(np.hypot(*self.environment.current_to))
+        high[:, 3:] = [over_ground, over_ground, problem.yaw_rate_radps]
         low = -high
         low[0] = high[0] = (problem.start - origin) / self.state_scale
         low[-1] = high[-1] = (problem.end - origin) / self.state_scale

@@ -24,12 +24,11 @@ from expdesign.plan.leg_values import (
     acceptable,
     last_state,
     nearest_turns,
+    through_water,
 )
 from expdesign.plan.recovery import OFF, Recovery, recover
 from expdesign.plan.ways import polyline_length
-from expdesign.simulation import to_body
 from expdesign.values import Array
-from expdesign.vessel import NUMPY
 
 SLOW = 0.3
 """Transit speeds below which a ship is about to gather way or to stop."""
@@ -62,9 +61,14 @@ def helmed_leg(task: LegTask, water: LegWater) -> Array | None:
     return None
 
 
+def _speed_mps(water: LegWater, state: Array) -> float:
+    """Speed through water at a state (6,)."""
+    return float(np.hypot(*through_water(water.environment, state)[:2]))
+
+
 def _run_up(task: LegTask, water: LegWater) -> tuple[LegTask, int]:
     """The leg up to the run-up, and the samples of that: none before a goal, or where wind would turn the ship."""
-    vessel, speed = water.vessel, float(np.hypot(*_through_water(water, task.end)))
+    vessel, speed = water.vessel, _speed_mps(water, task.end)
     samples = int(np.ceil(RUN_UP * vessel.length_m / max(speed, 1e-9) / vessel.sample_time_s))
     if speed < SLOW * water.ship.transit_speed_mps:
         return task, 0
@@ -74,12 +78,6 @@ def _run_up(task: LegTask, water: LegWater) -> tuple[LegTask, int]:
         return task, 0
     moved = track.pose[-1, :2] - track.pose[0, :2]
     return replace(task, end=np.r_[task.end[:2] - moved, task.end[2:]]), samples
-
-
-def _through_water(water: LegWater, state: Array) -> Array:
-    """(2,) surge and sway speed through water at a state (6,)."""
-    u_c, v_c = to_body(water.environment.current_to, state[2], NUMPY)
-    return np.array([state[3] - u_c, state[4] - v_c])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -114,7 +112,7 @@ def _shortest_first(start: Array, task: LegTask, water: LegWater) -> list[Straig
     """
     length, radius = water.vessel.length_m, water.ship.turning_radius_m
     first, last = _course_pose(start, water), _course_pose(task.end, water)
-    stopping = np.hypot(*_through_water(water, task.end)) < SLOW * water.ship.transit_speed_mps
+    stopping = _speed_mps(water, task.end) < SLOW * water.ship.transit_speed_mps
     tries = [
         Straights(
             first=first,
@@ -143,7 +141,7 @@ def _path(task: LegTask, water: LegWater, straights: Straights) -> Array | None:
 
 def _course_pose(state: Array, water: LegWater) -> Array:
     """(3,) place and course over ground of a state (6,); heading for course where it hardly moves."""
-    if np.hypot(*_through_water(water, state)) < SLOW * water.ship.transit_speed_mps:
+    if _speed_mps(water, state) < SLOW * water.ship.transit_speed_mps:
         return np.asarray(state[:3])
     return np.asarray(state[:3] + np.array([0.0, 0.0, np.arctan2(state[4], state[3])]))
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from expdesign.plan._casadi import LegProblem
 from expdesign.plan.footprint import covering_discs
-from expdesign.plan.leg_values import LegTask, LegWater, leg_speed_mps, room_beside
+from expdesign.plan.leg_values import LegTask, LegWater, leg_speed_mps, room_beside, through_water
 from expdesign.values import Array
 
 
@@ -43,8 +43,7 @@ def leg_problem(
     arm_m, margin_m = hull_discs(water)
     side = np.stack([-np.sin(path[:, 2]), np.cos(path[:, 2])], axis=-1)
     port, starboard = (room_beside(water, path[:, :2], sign * side, margin_m) for sign in (-1.0, 1.0))
-    ends = task.start, end
-    current = float(np.hypot(*water.environment.current_to))
+    ends = [through_water(water.environment, state) for state in (task.start, end)]
     return LegProblem(
         vessel=water.vessel,
         environment=water.environment,
@@ -63,8 +62,8 @@ def leg_problem(
         room_starboard_m=starboard,
         circle=np.r_[path[0, :2], np.inf],
         hull_arm_m=arm_m,
-        top_speed_mps=leg_speed_mps(fastest, tuple(state[3:] for state in ends)) + current,
-        yaw_rate_radps=max(turning_rate_radps, *(1.02 * abs(state[5]) for state in ends)),
-        lateral_mps2=max(water.ship.lateral_mps2, *(1.05 * abs(state[3] * state[5]) for state in ends)),
+        top_speed_mps=leg_speed_mps(fastest, ends),
+        yaw_rate_radps=max(turning_rate_radps, *(1.02 * abs(motion[2]) for motion in ends)),
+        lateral_mps2=max(water.ship.lateral_mps2, *(1.05 * abs(motion[0] * motion[2]) for motion in ends)),
         node_s=node_s,
     )

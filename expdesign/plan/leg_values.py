@@ -15,10 +15,10 @@ from expdesign.plan.field import ClearanceField
 from expdesign.plan.footprint import swept_area
 from expdesign.plan.ways import Ways, build_ways, polyline_length, simplified
 from expdesign.signals import Commands, Trajectory
-from expdesign.simulation import Environment, deliver, delivered_at_samples, simulate
+from expdesign.simulation import Environment, deliver, delivered_at_samples, simulate, to_body
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array, seal
-from expdesign.vessel import IDEAL, Vessel
+from expdesign.vessel import IDEAL, NUMPY, Vessel
 
 ROOM_M = 3.0
 """Hull lengths to either side beyond which a corridor is not widened."""
@@ -206,6 +206,12 @@ def last_state(track: Trajectory) -> Array:
     return np.asarray(np.r_[track.pose[-1], track.velocity[-1]])
 
 
+def through_water(environment: Environment, state: Array) -> Array:
+    """(3,) velocity through water of a state (6,), whose velocity is over ground."""
+    u_c, v_c = to_body(environment.current_to, state[2], NUMPY)
+    return np.asarray(state[3:] - np.array([u_c, v_c, 0.0]))
+
+
 def acceptable(start: Array, end: Array, water: LegWater, values: Array, before: Array) -> bool:
     """Whether commands, simulated from a state after others, arrive at another state and stay in safe water."""
     track = water.sail(start, values, before)
@@ -232,7 +238,10 @@ def room_beside(water: LegWater, centre: Array, side: Array, margin_m: float) ->
 
 
 def leg_speed_mps(transit_mps: float, ends: Iterable[Array]) -> float:
-    """Largest speed on a leg: transit speed, or 2 % above what its ends (3,) have, where they are faster."""
+    """Largest speed on a leg: transit speed, or 2 % above what its ends (3,) have, where they are faster.
+
+    All through water.
+    """
     steady = 1.001 * transit_mps
     fastest = max((float(np.hypot(*velocity[:2])) for velocity in ends), default=0.0)
     return 1.02 * fastest if fastest > steady else steady
