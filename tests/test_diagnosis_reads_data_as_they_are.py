@@ -9,7 +9,7 @@ from diagnosis_case import Told, from_pose, hidden_record, hidden_records, vesse
 from expdesign.diagnosis.accuracy import accuracy, first_states
 from expdesign.diagnosis.candidate import Situation
 from expdesign.diagnosis.causes import CAUSES
-from expdesign.diagnosis.extension import as_extended
+from expdesign.diagnosis.extension import as_extended, extend
 from expdesign.diagnosis.motion import simulate_windows
 from expdesign.diagnosis.notes import notes_on_data
 from expdesign.diagnosis.windows import cut_windows, held_wind
@@ -106,3 +106,11 @@ def test_an_advance_loss_of_any_name_is_one_cause_and_no_other():
     )  # fmt: skip
     found = causes_of(replace(vessel, model=model), hidden_record("coaster", seed=1, batches=2, samples=120))
     assert found[frozenset({"theta:X_loss"})] == {"thrust_advance_loss"}
+
+
+def test_a_yaw_moment_of_thrust_that_the_file_has_is_an_asymmetry_and_no_parameter():
+    record, vessel = hidden_record("barge", seed=1, batches=2, samples=120), vessel_of("barge")
+    again, _ = extend(vessel, as_extended(vessel, record).having({"asymmetry": 0.3}), {})
+    found = causes_of(again, record)
+    assert frozenset({"theta:N_tau_x"}) not in found
+    assert found[frozenset({"asymmetry"})] == {"thruster_asymmetry"}

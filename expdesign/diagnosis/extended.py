@@ -13,7 +13,7 @@ Effects, by key:
     inertia:u/v/r         inertia too small by this share
     shallow:damping, shallow:inertia          growth per unit of draught over depth
     roll:sway, roll:yaw   acceleration per unit of roll; roll:period [s] and roll:damping say which (`vessel.roll`)
-    change:time           [s]; change:gain, change:damping_u/v/r, change:theta:NAME act after it
+    change:time           [s]; change:gain, change:damping, change:damping_u/v/r act after it
     heading_bias [rad], lever:forward/starboard [m], gyro (share), late:u/v/r/psi/position [s]   (sensors)
 
 Measured sway is v + u sin(heading_bias): velocities that come from the pose are turned so by a compass that shows too

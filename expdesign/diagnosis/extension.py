@@ -8,16 +8,16 @@ from dataclasses import replace
 import numpy as np
 
 from expdesign.diagnosis.causes.missing_term import library
-from expdesign.diagnosis.causes.shallow_water import in_shallow_water
 from expdesign.diagnosis.extended import ROLL, Extended
 from expdesign.diagnosis.followed import grouped, members
-from expdesign.diagnosis.parts import is_coriolis, is_damping, is_thrust, reads_rudder
+from expdesign.diagnosis.found_model import found_model
+from expdesign.diagnosis.parts import ahead_force_text, turns_by_force
 from expdesign.diagnosis.surroundings import mean_wind
 from expdesign.diagnosis.windows import derived_outputs, has_heading
 from expdesign.errors import InputError
 from expdesign.estimation.tables import model_for
 from expdesign.signals import Batch, Record
-from expdesign.vessel import Actuator, Environment, Response, Roll, Sensors, Term, Vessel, VesselModel
+from expdesign.vessel import Actuator, Environment, Response, Roll, Sensors, Vessel, VesselModel, column_name
 from expdesign.vessel.structures import SHOAL
 
 RESPONSES = {"lag": "lag_s", "delay": "delay_s", "deadband": "deadband", "offset": "offset"}
@@ -111,8 +111,10 @@ def extend(vessel: Vessel, ship: Extended, std: Mapping[str, float]) -> tuple[Ve
         ship: with effects found.
         std: standard errors of effects.
     """
-    model, missing = _model(vessel.model, ship, std)
+    model, missing = found_model(vessel.model, ship, std)
     actuators, more = _actuators(model.actuators, ship)
+    if "u" not in ship.derived and ship.get("late:u") != ship.get("late:v"):
+        more = (*more, "The delay of u or v alone is written as one of the whole velocity sensor.")
     weather = vessel.environment
     if _has(ship, "current:"):
         weather = replace(weather, current_to=np.array([ship.get("current:north"), ship.get("current:east")]))
@@ -131,87 +133,6 @@ def extend(vessel: Vessel, ship: Extended, std: Mapping[str, float]) -> tuple[Ve
 
 def _has(ship: Extended, prefix: str) -> bool:
     return any(key.startswith(prefix) for key in ship.effects)
-
-
-def _model(model: VesselModel, ship: Extended, std: Mapping[str, float]) -> tuple[VesselModel, tuple[str, ...]]:
-    get = ship.get
-    values, stds = [], []
-    for term, expression, value, known in zip(
-        model.terms, model.expressions, model.parameters.tolist(), model.parameter_std.tolist(), strict=True
-    ):
-        key = f"theta:{term.name}"
-        whole = value + get(key) + get(f"change:{key}")
-        factor = 1.0
-        if is_thrust(expression, ship.model):
-            factor *= (1 + get("gain")) * (1 + get("change:gain"))
-            factor *= 1.0 if reads_rudder(expression) else 1 + get("gain:propeller")
-        elif is_damping(term, expression, ship.model):
-            factor *= 1 + get("change:damping") + get(f"change:damping_{term.equation}")
-        if not is_coriolis(term):
-            factor /= 1 + get(f"inertia:{term.equation}")
-        values.append(whole * factor)
-        stds.append(abs(factor) * (std.get(key, known)))
-    terms = list(model.terms)
-    for key, value in ship.effects.items():
-        if key.startswith("term:"):
-            term = ship.library[key[5:]]
-            terms.append(term)
-            values.append(value / (1 + get(f"inertia:{term.equation}")))
-            stds.append(std.get(key, 0.0))
-    lean = _lean(model, ship)
-    if lean is not None:
-        terms.append(lean[0])
-        values.append(lean[1])
-        stds.append(0.0)
-    missing = []
-    if "change:time" in ship.effects:
-        missing.append("The vessel file describes the ship after the change.")
-    extended = replace(
-        model,
-        terms=tuple(terms),
-        parameters=np.array(values, dtype=float),
-        parameter_std=np.array(stds, dtype=float),
-        roll=ship.roll,
-    )
-    if ship.has_roll:
-        missing.append(
-            "The vessel file has the oscillation as [model.roll]: simulate, score, durations, indices and diagnose "
-            "follow it; estimate and plans need a vessel file without that table, and say so."
-        )
-    extended, depths = _depths(extended, model, ship)
-    return extended, (*missing, *depths)
-
-
-def _depths(extended: VesselModel, known: VesselModel, ship: Extended) -> tuple[VesselModel, tuple[str, ...]]:
-    """The model with the dependence on depth that was found, and how far it holds."""
-    growth = {key.split(":")[1]: value for key, value in ship.effects.items() if key.startswith("shallow:")}
-    if not growth:
-        return extended, ()
-    deeper, error = in_shallow_water(extended, growth, reach=ship.shoalest, known=known)
-    rough = f"; its factors are polynomials, at most {100 * error:.1g} % off." if error > 1e-4 else "."
-    return deeper, (
-        f"The dependence on depth holds for draught over depth up to {ship.shoalest:.2f}, the shallowest in the data"
-        + rough,
-    )
-
-
-def _lean(model: VesselModel, ship: Extended) -> tuple[Term, float] | None:
-    """The yaw moment of ahead thrust as a term of its own."""
-    lean = ship.get("asymmetry")
-    if not lean:
-        return None
-    for term, expression, value in zip(model.terms, model.expressions, model.parameters.tolist(), strict=True):
-        if expression.signals == ("tau_psi",):
-            name = _unused("N_tau_x", model)
-            gain = (value + ship.get(f"theta:{term.name}")) * (1 + ship.get("gain")) / (1 + ship.get("inertia:r"))
-            return Term("r", name, "tau_x"), lean * gain
-    speeds = [name for name in model.inputs if name.rstrip("0123456789") == "n"]
-    expression_text = " + ".join(f"abs({name})*{name}" for name in speeds)
-    return Term("r", _unused("N_thrust", model), expression_text), lean * model.time_scale_s
-
-
-def _unused(name: str, model: VesselModel) -> str:
-    return name if name not in model.names else f"{name}_found"
 
 
 def _actuators(actuators: tuple[Actuator, ...], ship: Extended) -> tuple[tuple[Actuator, ...], tuple[str, ...]]:
@@ -275,27 +196,44 @@ def public_name(key: str, ship: Extended) -> tuple[str, float, float, str]:
     model = ship.model
     if kind == "theta":
         return rest, 1.0, float(model.parameters[model.names.index(rest)]), ""
-    if kind == "change" and rest.startswith("theta:"):
-        return f"{rest[6:]}_change", 1.0, 0.0, ""
-    fixed = {
-        "current": (f"{rest}_mps", "m/s"), "wind": (f"{rest}_mps", "m/s"),
-        "offset": (f"angle_offset_{rest}_rad", "rad"),
-        "lag": (f"lag_{rest}_s", "s"), "delay": (f"delay_{rest}_s", "s"), "deadband": (f"deadband_{rest}", ""),
-        "lever": (f"{rest}_m", "m"), "late": (f"{rest}_delay_s", "s"), "heading_bias": ("heading_bias_rad", "rad"),
-        "shallow": (f"{rest}_growth", ""), "asymmetry": ("thrust_offset_m", "m"), "term": (rest, ""),
-    }  # fmt: skip
-    if key == "wind:toward":
-        return "toward_rad", 1.0, 0.0, "rad"
-    if kind in fixed:
-        name, unit = fixed[kind]
-        return name, 1.0, 0.0, unit
-    if kind in ("gain", "gyro"):
-        return "factor", 1.0, 1.0, ""
-    if kind == "inertia":
-        return f"inertia_factor_{rest}", 1.0, 1.0, ""
-    if key == "change:time":
-        return "time_s", 1.0, 0.0, "s"
-    if kind == "change":
-        return f"{rest}_factor", 1.0, 1.0, ""
-    unit = {"roll:period": "s", "roll:yaw": "rad/m"}.get(key, "")
-    return {"roll:period": "roll_period_s", "roll:damping": "roll_damping_ratio"}.get(key, ROLL[key]), 1.0, 0.0, unit
+    if key in NAMES:
+        return NAMES[key][0], 1.0, 0.0, NAMES[key][1]
+    if kind == "deadband":
+        unit = _input_unit(rest, model)
+        return f"deadband_{rest}_{unit}" if unit else f"deadband_{rest}", 1.0, 0.0, unit
+    if key == "asymmetry":
+        return _lean_name(model)
+    if kind in PATTERNS:
+        name, offset, unit = PATTERNS[kind]
+        return name.format(rest), 1.0, offset, unit
+    return ROLL[key], 1.0, 0.0, "rad/m" if key == "roll:yaw" else ""
+
+
+NAMES = {
+    "wind:toward": ("toward_rad", "rad"), "change:time": ("time_s", "s"), "heading_bias": ("heading_bias_rad", "rad"),
+    "roll:period": ("roll_period_s", "s"), "roll:damping": ("roll_damping_ratio", ""),
+}  # fmt: skip
+"""Effect -> name in results and unit."""
+PATTERNS = {
+    "current": ("{}_mps", 0.0, "m/s"), "wind": ("{}_mps", 0.0, "m/s"), "offset": ("angle_offset_{}_rad", 0.0, "rad"),
+    "lag": ("lag_{}_s", 0.0, "s"), "delay": ("delay_{}_s", 0.0, "s"), "lever": ("{}_m", 0.0, "m"),
+    "late": ("{}_delay_s", 0.0, "s"), "shallow": ("{}_growth", 0.0, ""), "term": ("{}", 0.0, ""),
+    "gain": ("factor", 1.0, ""), "gyro": ("factor", 1.0, ""), "inertia": ("inertia_factor_{}", 1.0, ""),
+    "change": ("{}_factor", 1.0, ""),
+}  # fmt: skip
+"""Kind of effect -> name in results of one that ends in what stands for {}, what it is when nothing is wrong, unit."""
+
+
+def _input_unit(group: str, model: VesselModel) -> str:
+    """Unit of a group of inputs in names; generalised forces have none there."""
+    signal = model.inputs[members(group, model.inputs)[0]]
+    return column_name(signal)[len(signal) + 1 :]
+
+
+def _lean_name(model: VesselModel) -> tuple[str, float, float, str]:
+    """Name of the yaw moment of ahead force: a length where force makes moments, else what the model is driven by."""
+    if turns_by_force(model):
+        return "thrust_offset_m", 1.0, 0.0, "m"
+    if ahead_force_text(model) == "tau_x":
+        return "yaw_radps2_per_tau_x", 1.0, 0.0, ""
+    return "yaw_radps2_per_rps2", 1.0, 0.0, "rad/s\N{SUPERSCRIPT TWO} per rps\N{SUPERSCRIPT TWO}"

@@ -53,12 +53,12 @@ def own_parts(model: VesselModel, effects: Effects) -> list[Part]:
     parts = []
     for kind, value in zip(_kinds(model), model.parameters.tolist(), strict=True):
         name, equation = kind.name, kind.equation
-        whole, changed = value + get(f"theta:{name}"), get(f"change:theta:{name}")
+        whole, changed = value + get(f"theta:{name}"), 0.0
         if kind.thrust:
             whole *= (1 + get("gain")) * (1.0 if kind.rudder else 1 + get("gain:propeller"))
-            changed += whole * get("change:gain")
+            changed = whole * get("change:gain")
         elif kind.damping:
-            changed += whole * (get("change:damping") + get(f"change:damping_{equation}"))
+            changed = whole * (get("change:damping") + get(f"change:damping_{equation}"))
         parts.append(
             Part(
                 equation=equation,
@@ -88,6 +88,7 @@ def added_parts(model: VesselModel, library: Mapping[str, Term], effects: Effect
                     evaluate=expression.evaluate,
                     factor=value / model.time_scale_s,
                     reads_air=bool(AIR_SIGNALS & set(expression.signals)),
+                    reads_turn="tau_psi" in expression.signals,
                 )
             )
     return parts
@@ -137,6 +138,24 @@ def ahead_force(signals: Mapping[str, Array], model: VesselModel) -> Array:
         return signals["tau_x"]
     speeds = [signals[name] for name in model.inputs if name.rstrip("0123456789") == "n"]
     return sum((np.abs(n) * n for n in speeds), np.zeros(1))
+
+
+def ahead_force_text(model: VesselModel) -> str:
+    """The same as an expression."""
+    if any(set(e.signals) & set(FORCE_SIGNALS) for e in model.expressions):
+        return "tau_x"
+    return " + ".join(f"abs({name})*{name}" for name in model.inputs if name.rstrip("0123456789") == "n")
+
+
+def own_lean_terms(model: VesselModel) -> list[str]:
+    """Names of the model's terms by which ahead force turns it."""
+    text = ahead_force_text(model)
+    return [term.name for term in model.terms if term.equation == "r" and term.expression == text]
+
+
+def turns_by_force(model: VesselModel) -> bool:
+    """It reads tau_psi, so that a yaw moment acts as its inputs do."""
+    return any("tau_psi" in expression.signals for expression in model.expressions)
 
 
 def is_coriolis(term: Term) -> bool:

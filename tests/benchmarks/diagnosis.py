@@ -115,7 +115,7 @@ class Hidden:
             "toward_rad": float(np.arctan2(self.wind[1], self.wind[0])) % (2 * np.pi),
             "north_mps": self.current[0], "east_mps": self.current[1],
             **{f"{kind}_{group}_s": e.get(f"{kind}_s", 0.0) for kind in ("lag", "delay") for group in groups},
-            **{f"deadband_{group}": e.get("deadband", 0.0) for group in angled},
+            **{f"deadband_{group}{'' if ship == 'barge' else '_rad'}": e.get("deadband", 0.0) for group in angled},
             **{f"angle_offset_{group}_rad": e.get("angle_offset", 0.0) for group in angled},
             "thrust_offset_m": e.get("asymmetry", 0.0),
             **{f"inertia_factor_{axis}": 1 + e.get(f"load_{axis}", 0.0) for axis in "uvr"},

@@ -6,12 +6,13 @@ from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.missing_term import own_advance_terms, own_air_terms
 from expdesign.diagnosis.causes.words import rounded
 from expdesign.diagnosis.extended import Extended
+from expdesign.diagnosis.parts import own_lean_terms
 
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     """Single ones, all of an equation, all; but singly none whose change has a physical name in the catalogue."""
     model = situation.ship.model
-    named = {*own_advance_terms(model), *own_air_terms(model)}
+    named = {*own_advance_terms(model), *own_air_terms(model), *own_lean_terms(model)}
     groups: list[tuple[str, ...]] = [(f"theta:{name}",) for name in model.names if name not in named]
     for equation in model.outputs:
         groups.append(tuple(f"theta:{term.name}" for term in model.terms if term.equation == equation))

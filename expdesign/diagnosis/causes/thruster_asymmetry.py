@@ -7,6 +7,7 @@ from expdesign.diagnosis.causes.actuator_lag import open_groups
 from expdesign.diagnosis.causes.words import first, rounded
 from expdesign.diagnosis.extended import ANGLE_STEMS, Extended
 from expdesign.diagnosis.followed import members
+from expdesign.diagnosis.parts import ahead_force_text, turns_by_force
 
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
@@ -19,12 +20,20 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     return (lean, *(Candidate(cause="thruster_asymmetry", free={f"offset:{group}": 0.0}) for group in groups))
 
 
-def _explain(values: Values, _ship: Extended) -> str:
+def _explain(values: Values, ship: Extended) -> str:
     key, value, std = first(values)
+    side = "port" if value > 0 else "starboard"
+    if key == "asymmetry" and not turns_by_force(ship.model):
+        turn = "starboard" if value > 0 else "port"
+        return (
+            f"Thrust turns the ship to {turn} at zero angle: the yaw rate accelerates by {rounded(value, std)} "
+            f"rad/s\N{SUPERSCRIPT TWO} per {ahead_force_text(ship.model)}, as if thrust acted to {side} of the centre "
+            "line."
+        )
     if key == "asymmetry":
         return (
             f"A yaw moment in proportion to the ahead thrust: {rounded(value, std)} per unit of thrust, as if the "
-            f"thrust acted that far to {'port' if value > 0 else 'starboard'}. The ship turns at zero angle."
+            f"thrust acted that far to {side}. The ship turns at zero angle."
         )
     return (
         f"The angle of {key.split(':')[1]} is off by {rounded(57.29578 * value, 57.29578 * std)} degrees: the ship "

@@ -30,6 +30,8 @@ NAMES = {
     "damping_growth": "growth of damping per draught over depth",
     "inertia_growth": "growth of inertia per draught over depth",
     "thrust_offset_m": "line of thrust, to port of the centre line",
+    "yaw_radps2_per_rps2": "yaw acceleration per n|n| of the propellers",
+    "yaw_radps2_per_tau_x": "yaw acceleration per ahead force",
     "heading_bias_rad": "angle of misalignment",
     "forward_m": "sensor forward of amidships",
     "starboard_m": "sensor to starboard of amidships",
@@ -45,7 +47,7 @@ OUTPUTS = {"u": "surge", "v": "sway", "r": "yaw", "psi": "heading"}
 PATTERNS = (
     (re.compile(r"lag_(\w+)_s"), "time constant of {}"),
     (re.compile(r"delay_(\w+)_s"), "dead time of {}"),
-    (re.compile(r"deadband_(\w+)"), "width of the dead band of {}"),
+    (re.compile(r"deadband_(\w+?)(?:_rps|_rad)?"), "width of the dead band of {}"),
     (re.compile(r"angle_offset_(\w+)_rad"), "offset of {}"),
     (re.compile(r"(\w+)_delay_s"), "delay of the measured {}"),
     (re.compile(r"inertia_factor_(\w+)"), "factor of inertia in {}, where 1 is right"),
