@@ -328,8 +328,10 @@ def step_of(ship: Extended, key: str) -> float:
     kind = key.split(":")[0]
     if kind in ("theta", "term"):
         return 1e-4 * max(1e-4, _parameter_scale(ship, key))
-    if kind in ("lag", "delay", "deadband") or key.startswith("roll:"):
+    if kind in ("lag", "delay", "deadband"):
         return max(0.05 * value, 1e-6)
+    if kind == "roll":
+        return max(1e-3 * value, 1e-6)
     return 1e-6 if kind == "asymmetry" else 1e-4
 
 

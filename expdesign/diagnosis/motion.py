@@ -6,6 +6,7 @@ the simulated path; all causes share one linearisation, so hundreds of them cost
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -26,6 +27,10 @@ INNER, OUTER = {"theta", "term", "gain", "inertia"}, {"lever", "gyro"}
 MOST_ROUNDS, LOST, NEAR, SETTLED = 12, 5.0, 3e-3, 1e-8
 """Of a simulation of all steps at once: rounds; growth of the change with which it is given up; change below which the
 transition matrices need not be found anew; change with which it is done."""
+
+
+ROLL_ANGLE, MOST_PARTS = 0.25, 16
+"""Of a roll's oscillation that is followed in one part of a step [rad], and parts of a step."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -129,7 +134,17 @@ def _handed_on(onward: Array, first: Array, missed: Array) -> Array:
 
 
 def _rk4(ship: Extended, x: tuple[Array, ...], around: Surroundings, h: float) -> tuple[tuple[Array, ...], Array]:
-    """The state one step on, and the heading gained."""
+    """The state one step on, and the heading gained; roll that is quick beside the step is followed in parts of it."""
+    turn = 0.0 if ship.roll is None else 2 * math.pi * h / ship.roll.period_s
+    parts = min(max(1, math.ceil(turn / ROLL_ANGLE)), MOST_PARTS)
+    gained: Array | float = 0.0
+    for _ in range(parts):
+        x, more = _rk4_part(ship, x, around, h / parts)
+        gained = gained + more
+    return x, np.asarray(gained)
+
+
+def _rk4_part(ship: Extended, x: tuple[Array, ...], around: Surroundings, h: float) -> tuple[tuple[Array, ...], Array]:
 
     def ahead(slope: tuple[Array, ...], share: float) -> tuple[Array, ...]:
         return tuple(np.clip(a + share * h * b, -1e3, 1e3) for a, b in zip(x, slope, strict=True))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from expdesign.diagnosis.contenders import (
 )
 from expdesign.diagnosis.extended import Extended
 from expdesign.diagnosis.joint import Fit, fit
+from expdesign.diagnosis.profile import middle, sharpened
 from expdesign.diagnosis.screening import Scored, screen
 from expdesign.diagnosis.steps import Search, Step, superfluous, without
 from expdesign.diagnosis.windows import Windows
@@ -77,7 +79,8 @@ def search(ship: Extended, windows: Windows, starts: Array, rng: np.random.Gener
                 steps, base = other, other[-1].chosen.fit
                 continue
         if step is None or len(steps) == MOST_FINDINGS:
-            return Search(steps=tuple(steps), first=first, last=base, final_screening=found)
+            steps = _settled_together(steps)
+            return Search(steps=tuple(steps), first=first, last=base, final_screening=found).with_steps(tuple(steps))
         steps += _fewer(step, windows, refused, rng, _within(progress, share)) if _is_block(step.chosen) else [step]
         del steps[MOST_FINDINGS:]
         base = steps[-1].chosen.fit
@@ -149,6 +152,19 @@ def _is_worth_more(new: Contender, old: Contender, whole: Fit) -> bool:
     return min(gain_over(whole, new.fit, judge) for judge in (whole, new.fit)) > dearer
 
 
+def _settled_together(steps: list[Step]) -> list[Step]:
+    """Numbers that are found by trying values are found anew beside what was added after them."""
+    for index, step in enumerate(steps[:-1]):
+        if step.chosen.searched is None or not step.chosen.searched[1] > 0:
+            continue
+        key, std = step.chosen.searched
+        *others, last = steps
+        found, std = middle(last.chosen.fit, key, std)
+        others[index] = replace(step, chosen=replace(step.chosen, searched=(key, std)))
+        steps = [*others, replace(last, chosen=replace(last.chosen, fit=found))]
+    return steps
+
+
 def settled(ship: Extended, windows: Windows, starts: Array) -> Fit:
     """The model in use at the likeliest values of its uncertain parameters, the colour found where they settled.
 
@@ -199,7 +215,13 @@ def _step(base: Fit, windows: Windows, found: tuple[Scored, ...], progress: Prog
     for other in contenders:
         if other.candidate.cause != chosen.candidate.cause and chosen.worth - other.worth < AS_GOOD:
             rivals.setdefault(other.candidate.cause, other)
-    return Step(chosen=chosen, p_value=chosen.p_value, rivals=tuple(rivals.values()), before=base, screening=found)
+    return Step(
+        chosen=sharpened(chosen, base),
+        p_value=chosen.p_value,
+        rivals=tuple(rivals.values()),
+        before=base,
+        screening=found,
+    )
 
 
 def _openings(base: Fit, windows: Windows, found: tuple[Scored, ...]) -> tuple[list[Opening], bool]:

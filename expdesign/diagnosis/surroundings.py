@@ -48,7 +48,8 @@ def surroundings(ship: Extended, windows: Windows) -> Surroundings:
     if model.reads_depth or any(key.startswith("shallow:") for key in ship.effects):
         table[SHOAL] = ship.draught_m / windows.depth_m
     if "change:time" in ship.effects:
-        table["after"] = (windows.time_s >= ship.effects["change:time"]).astype(float)
+        since = windows.time_s + windows.step_s - ship.effects["change:time"]
+        table["after"] = np.clip(since / windows.step_s, 0.0, 1.0)  # share of the step
     return table
 
 
