@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from expdesign.diagnosis.extended import Extended
-from expdesign.diagnosis.motion import simulate_windows
+from expdesign.diagnosis.motion import Motion, simulate_windows
+from expdesign.diagnosis.surroundings import to_body
 from expdesign.diagnosis.windows import Windows
 from expdesign.values import Array
 
 HEADINGS = (0.0, np.pi / 2, np.pi, 3 * np.pi / 2)
+ROUNDS = 2
+"""Simulations after which the heading is known well enough: it depends a little on what acts by heading."""
+PROPOSED = 240
+"""Samples of a standard proposal."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -37,8 +42,9 @@ def most_telling(
 ) -> str | None:
     """Name of the proposal for which `one` and the nearest of the others disagree most per minute."""
     best: tuple[float, str] | None = None
+    wind = seen_wind(like)
     for proposal in proposals:
-        windows = _windows(proposal, like)
+        windows = _turning(one, _windows(proposal, like, wind), proposal, wind)
         shown = [_shown(ship, windows, proposal) for ship in (one, *others)]
         if any(values is None for values in shown):
             continue
@@ -51,19 +57,46 @@ def most_telling(
     return best[1] if best and best[0] > 0 else None
 
 
-def _shown(ship: Extended, windows: Windows, proposal: Proposal) -> Array | None:
+def seen_wind(like: Windows) -> Array | None:
+    """(2,) mean velocity of the air to north and east in data that measure it [m/s]."""
+    if not like.has_wind:
+        return None
+    c, s = np.cos(like.heading), np.sin(like.heading)
+    u, v = np.moveaxis(like.wind, -1, 0)
+    return np.array([np.mean(u * c - v * s), np.mean(u * s + v * c)])
+
+
+def _sailed(ship: Extended, windows: Windows, proposal: Proposal) -> Motion:
     start = np.zeros((len(HEADINGS), ship.states))
     start[:, :3] = proposal.velocity
-    motion = simulate_windows(ship, windows, start)
+    return simulate_windows(ship, windows, start)
+
+
+def _shown(ship: Extended, windows: Windows, proposal: Proposal) -> Array | None:
+    motion = _sailed(ship, windows, proposal)
     return None if motion.diverged else motion.shown
 
 
-def _windows(proposal: Proposal, like: Windows) -> Windows:
-    """A window per heading; the heading is that of a straight track, which suffices to rank manoeuvres."""
+def _turning(ship: Extended, windows: Windows, proposal: Proposal, wind: Array | None) -> Windows:
+    """The same with the heading as the ship turns: what is fixed in the n-frame comes from all sides in a circle."""
+    for _ in range(ROUNDS):
+        turned = _sailed(ship, windows, proposal).turned
+        heading = np.array(HEADINGS)[:, None] + turned
+        windows = replace(windows, heading=heading, wind=_air(wind, heading))
+    return windows
+
+
+def _air(wind: Array | None, heading: Array) -> Array:
+    """(w, k, 2) a steady wind in the b-frame; none where it is not measured."""
+    return np.zeros((*heading.shape, 2)) if wind is None else np.stack(to_body(wind[0], wind[1], heading), axis=-1)
+
+
+def _windows(proposal: Proposal, like: Windows, wind: Array | None) -> Windows:
+    """A window per heading, which does not change yet, in the mean wind."""
     substeps = max(1, int(np.ceil(proposal.sample_time_s / like.step_s - 1e-9)))
     inputs = np.repeat(proposal.inputs, substeps, axis=0)
     count, w = len(inputs), len(HEADINGS)
-    turn = proposal.velocity[2] * np.arange(count) * proposal.sample_time_s / substeps
+    heading = np.repeat(np.array(HEADINGS)[:, None], count, axis=1)
     return Windows(
         step_s=proposal.sample_time_s / substeps,
         steps_per_sample=substeps,
@@ -71,12 +104,12 @@ def _windows(proposal: Proposal, like: Windows) -> Windows:
         batch_inputs=(inputs,),
         first=np.zeros(w),
         measured=np.zeros((w, -(-count // substeps), 4)),
-        heading=np.array(HEADINGS)[:, None] + turn,
-        wind=np.zeros((w, count, 2)),
+        heading=heading,
+        wind=_air(wind, heading),
         depth_m=np.full((w, count), float(np.median(like.depth_m))),
         time_s=np.broadcast_to(1e9 + np.arange(count, dtype=float), (w, count)),
         has_heading=True,
-        has_wind=False,
+        has_wind=wind is not None,
         has_depth=False,
         derived=like.derived,
         names=(proposal.name,),
@@ -84,13 +117,12 @@ def _windows(proposal: Proposal, like: Windows) -> Windows:
 
 
 def standard_proposals(like: Windows, inputs: tuple[str, ...], sample_time_s: float) -> tuple[Proposal, ...]:
-    """Manoeuvres of the standard families within the inputs that the data use: each for two minutes or so."""
+    """Manoeuvres of the standard families within the inputs that the data use, each of as many compared samples."""
     rows = np.concatenate(like.batch_inputs)
     middle, low, high = np.median(rows, axis=0), np.quantile(rows, 0.05, axis=0), np.quantile(rows, 0.95, axis=0)
     velocity = np.nanmedian(like.measured[..., :3].reshape(-1, 3), axis=0)
     velocity = np.array([velocity[0], 0.0, 0.0])
-    duration = 120.0 * like.sample_s if like.sample_s < 1.0 else 240.0
-    count = max(40, round(duration / sample_time_s))
+    count = max(40, round(PROPOSED * like.sample_s / sample_time_s))
     time = np.arange(count) / count
     steering = [i for i, n in enumerate(inputs) if n.rstrip("0123456789") in ("a", "rudder", "tau_psi", "tau_y")]
     driving = [i for i in range(len(inputs)) if i not in steering]

@@ -6,15 +6,22 @@ import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from expdesign import __version__
 from expdesign.diagnosis import Diagnosis, Proposal
 from expdesign.diagnosis import diagnose as diagnose_record
 from expdesign.dictionary import build_dictionary
 from expdesign.errors import InputError
+from expdesign.estimation.tables import model_for
 from expdesign.export import write_files
 from expdesign.export.diagnosis_page import diagnosis_html, diagnosis_json, diagnosis_tables, extended_vessel
 from expdesign.export.diagnosis_page.results import accuracy_entry, finding_entry
 from expdesign.scenario import load_scenario, load_vessel
+from expdesign.signals import Commands
+from expdesign.values import Array
+from expdesign.vessel import NUMPY, Vessel, VesselModel, direct_terms, generalised_force
+from expdesign.vessel.structures import FORCE_SIGNALS, SHOAL
 from expdesign.workflows.after import measured
 from expdesign.workflows.outcome import Outcome, Progress, TextTable, silent, within
 
@@ -45,7 +52,7 @@ def diagnose(
     progress("reading the data", 0.02)
     ship = load_vessel(vessel)
     record = measured(data, ship, velocity=velocity)
-    proposals = _proposals(scenario) if scenario else ()
+    proposals = _proposals(scenario, model_for(ship.model, record)) if scenario else ()
     found = diagnose_record(ship, record, seed=seed, proposals=proposals, progress=within(progress, 0.05, 0.9))
     progress("drawing the page", 0.9)
     command = _command(data, vessel, scenario, velocity, seed)
@@ -59,17 +66,37 @@ def diagnose(
     return Outcome(files=written, summary=_summary(found), tables=_tables(found))
 
 
-def _proposals(scenario: Path) -> tuple[Proposal, ...]:
+def _proposals(scenario: Path, model: VesselModel) -> tuple[Proposal, ...]:
+    """The scenario's dictionary as commands of a model's inputs."""
     case = load_scenario(scenario)
     return tuple(
         Proposal(
             name=primitive.name,
-            inputs=primitive.commands.values,
+            inputs=as_inputs(primitive.commands, case.vessel, model),
             velocity=primitive.entry_velocity,
             sample_time_s=primitive.commands.sample_time_s,
         )
         for primitive in build_dictionary(case.vessel, case.dictionary)
     )
+
+
+def as_inputs(commands: Commands, vessel: Vessel, model: VesselModel) -> Array:
+    """(k, m) commands of a vessel as inputs of a model, which may be driven by the force that they give.
+
+    Raises:
+        InputError: they are not what drives the model.
+    """
+    wanted = tuple(name for name in model.inputs if name != SHOAL)
+    table = dict(zip(commands.names, commands.values.T, strict=True))
+    if wanted == FORCE_SIGNALS and not set(wanted) & set(table) and not direct_terms(vessel.model):
+        forces = generalised_force(vessel.model.actuators, table, NUMPY)
+        table = dict(zip(FORCE_SIGNALS, np.broadcast_arrays(*forces, commands.values[:, 0])[:3], strict=True))
+    if not set(wanted) <= set(table):
+        raise InputError(
+            f"the scenario's vessel {vessel.name!r} takes {', '.join(commands.names)}, the data drive the model by "
+            f"{', '.join(wanted)}; expected a scenario of the ship that the data are of"
+        )
+    return np.column_stack([table[name] for name in wanted])
 
 
 def _command(data: Sequence[Path], vessel: Path, scenario: Path | None, velocity: str, seed: int) -> str:
