@@ -94,7 +94,7 @@ def test_several_numbers_are_tested_together():
     for correlation, values, clear in ((-0.95, (1.5, 1.5), True), (0.95, (1.5, 1.5), False), (0.0, (2.2, 0.1), False)):
         last = SimpleNamespace(
             keys=("a", "b"), covariance=np.array([[1.0, correlation], [correlation, 1.0]]),
-            value=dict(zip("ab", values, strict=True)).get,
+            value=dict(zip("ab", values, strict=True)).get, ship=SimpleNamespace(stated={}),
         )  # fmt: skip
         chosen = SimpleNamespace(keys=("a", "b"), searched=None)
         expected = np.exp(-0.5 * np.array(values) @ np.linalg.solve(last.covariance, values))

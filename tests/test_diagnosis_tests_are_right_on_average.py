@@ -15,8 +15,8 @@ from expdesign.diagnosis.extension import as_extended, extend
 from expdesign.diagnosis.joint import fit
 from expdesign.diagnosis.motion import linearise, push_of, responses, simulate_windows
 from expdesign.diagnosis.noise import FLOOR, Noise, fit_colour, hats, whitened
-from expdesign.diagnosis.screening import Scored, _effective_tests
-from expdesign.diagnosis.search import settled
+from expdesign.diagnosis.screening import Scored, _effective_tests, screen
+from expdesign.diagnosis.search import _candidates, settled
 from expdesign.diagnosis.steps import Step, superfluous
 from expdesign.diagnosis.windows import cut_windows
 
@@ -220,3 +220,16 @@ def test_what_uncertain_parameters_explain_is_gone_before_anything_is_tested():
     truth = settled(known.having(wrong), windows, first_states(windows))
     found = settled(as_extended(vessel, record), windows, first_states(windows))
     assert np.abs(found.noise.std / truth.noise.std - 1).max() < 0.05
+
+
+def test_uncertain_parameters_that_moved_are_still_looked_at_as_causes():
+    """A ship's own advance loss far beyond its bounds: settling moves it, and leaves it to be named."""
+    record = hidden_record("tug", seed=9, batches=3, samples=150, effects={"kappa": -0.0025})
+    extended = as_extended(vessel_of("tug", relative_std=0.1), record)
+    windows = cut_windows(extended.model, record)
+    base = settled(extended, windows, first_states(windows))
+    own = [item for item in _candidates(base, windows) if item.cause == "thrust_advance_loss"]
+    assert [tuple(item.free) for item in own] == [("theta:X_kappa",)]
+    assert base.ship.get("theta:X_kappa") < -2 * 0.00025  # beyond two of its standard deviations
+    (found,) = screen(base, own)
+    assert found.p_value < 1e-6

@@ -14,7 +14,7 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
         return ()
     keys = [f"theta:{name}" for name in own_advance_terms(ship.model)]
     keys += [f"term:{name}" for name in ADVANCE_LOSS if name in ship.library]
-    return tuple(Candidate(cause="thrust_advance_loss", free={key: 0.0}) for key in keys if key not in ship.effects)
+    return tuple(Candidate(cause="thrust_advance_loss", free={key: 0.0}) for key in keys)
 
 
 def _explain(values: Values, _ship: Extended) -> str:
