@@ -26,6 +26,8 @@ SPARE = 10.0
 """Time constants of the way back to a reference that a ship may spend besides."""
 LEAST_STEP = 0.2
 """What a slow reference moves in a sample at least, in samples at transit speed."""
+COARSE = 5
+"""Samples between the points of a way back that is looked at beforehand."""
 MADE_GOOD = 0.5
 """Share of a leg's time that a ship may need to come back to it."""
 HELD = 0.5
@@ -148,7 +150,7 @@ class Pilot:
         self._limit[ships] = self._allowed(self._arrival - self._first)
 
     def _rejoin(self, states: Array) -> None:
-        """Ships go round at once that are farther off than the leg's time makes good, or do not see its beginning."""
+        """Ships go round at once that are farther off than the leg's time makes good, or would pass by danger coming back to it."""
         first, helm = self._reference.states[0, :2], self._helm
         off_m = np.hypot(*(states[:, :2] - first).T)
         leg_s = self._end[0] * helm.vessel.sample_time_s
@@ -156,9 +158,18 @@ class Pilot:
         strayed = (self.doing == ON_STRETCH) & (off_m > self._within.position_m)
         some = np.flatnonzero(strayed)
         if len(some):
-            seen = self._tree.in_sight(states[some, :2], np.tile(first, (len(some), 1)))
-            strayed[some] = ~seen | ((off_m[some] > good_m) & (not self._last))
+            clear = np.array([self._tree.holds(self._way_back(states[ship, :2])) for ship in some])
+            strayed[some] = ~clear | ((off_m[some] > good_m) & (not self._last))
             self._go_round(strayed, states)
+
+    def _way_back(self, place: Array) -> Array:
+        """(k, 2) about how a ship at a place comes back to the leg, while the leg goes on abeam of her."""
+        track, helm = self._reference.states[: self._first, :2], self._helm
+        off = place - track[0]
+        back_s = float(np.hypot(*off)) / (CATCH_UP * helm.ship.transit_speed_mps)
+        thinned = np.unique(np.r_[np.arange(0, self._first, COARSE), self._first - 1])
+        left = np.maximum(0.0, 1.0 - thinned * helm.vessel.sample_time_s / back_s)
+        return np.asarray((track[thinned] + left[:, None] * off)[: int((left > 0.0).sum()) + 1])
 
     def _go_round(self, ships: np.ndarray, states: Array) -> None:
         """Set ships off to the run-up; those that went round often enough, or have no way, give up."""

@@ -14,7 +14,7 @@ import shapely
 from expdesign.conventions import wrap_angle
 from expdesign.plan.goal_ways import first_bends, ways_to
 from expdesign.plan.steering import LEAD, Helmsman
-from expdesign.plan.ways import Ways, sight_lines
+from expdesign.plan.ways import Ways
 from expdesign.values import Array
 
 NEAR = 2.0
@@ -70,10 +70,6 @@ class WaysTo:
     def holds(self, way: Array) -> bool:
         """Whether a way (k, 2) stays in the water."""
         return bool(shapely.covers(self.ways.water, shapely.LineString(way[:, ::-1])))
-
-    def in_sight(self, points: Array, others: Array) -> np.ndarray:
-        """(n,) whether straight lines between places (n, 2) stay in the water."""
-        return np.asarray(shapely.covers(self.ways.water, sight_lines(points, others)))
 
 
 def build_ways_to(ways: Ways, place: Array) -> WaysTo:
