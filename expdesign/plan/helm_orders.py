@@ -21,8 +21,6 @@ SLOWEST = 0.3
 """Speed, in transit speeds, below which the helm is not taken to bite less."""
 FARTHEST_RAD = 1.0
 """Change of course that the helmsman answers to at most."""
-ANGLES = 41
-"""Helm angles of the table of commands."""
 ORDERS = np.linspace(-1.0, 1.0, 9)
 """Engine orders looked at."""
 
@@ -49,7 +47,7 @@ class HelmOrders:
             felt: (n, 3) acceleration that the model does not explain.
         """
         angle = self._helm(wish, moving, felt)
-        rows = self._rows(self._drive(wish[:, 0], moving, angle, felt[:, 0]), angle)
+        rows = self._approach.helm.rows(self._drive(wish[:, 0], moving, angle, felt[:, 0]), angle)
         actuators, sample_s = self.vessel.actuators, self.vessel.sample_time_s
         return within_limits(actuators, rows[:, None], sample_time_s=sample_s, before=before)[:, 0]
 
@@ -71,7 +69,7 @@ class HelmOrders:
 
     def _drive(self, speed: Array, moving: Array, angle: Array, felt: Array) -> Array:
         """(n,) engine orders by which the nominal model comes to the wished speed in the time of a hull length."""
-        given = np.stack([self._rows(np.full(len(angle), order), angle) for order in ORDERS])  # (o, n, m)
+        given = self._approach.helm.rows(ORDERS[:, None], angle)  # (o, n, m)
         motion = tuple(np.broadcast_to(column, given.shape[:2]) for column in moving.T)
         told = self.vessel.model.accelerations(motion, motion[:2], tuple(np.moveaxis(given, -1, 0)))[0]
         gains = np.maximum.accumulate(np.broadcast_to(told, given.shape[:2]), axis=0)
@@ -81,16 +79,6 @@ class HelmOrders:
         low, high = gains[above - 1, ships], gains[above, ships]
         share = np.clip((wanted - low) / np.maximum(high - low, 1e-12), 0.0, 1.0)
         return np.asarray(ORDERS[above - 1] + share * (ORDERS[above] - ORDERS[above - 1]))
-
-    def _rows(self, drive: Array, angle: Array) -> Array:
-        """(n, m) commands of engine orders and helm angles, from the table."""
-        angles, table = self._table
-        place = np.clip((angle - angles[0]) / (angles[1] - angles[0]), 0.0, len(angles) - 1.0)
-        row = np.minimum(place.astype(int), len(angles) - 2)
-        share = (place - row)[:, None]
-        ends = [part[row] * (1 - share) + part[row + 1] * share for part in table]
-        ahead = np.abs(drive)[:, None]
-        return np.asarray(ends[1] * (1 - ahead) + np.where(drive[:, None] < 0, ends[0], ends[2]) * ahead)
 
     @property
     def _approach(self) -> Approach:
@@ -126,11 +114,3 @@ class HelmOrders:
         rows = sorted([(turn.yaw_rate_radps, turn.helm_rad) for turn in self.ship.turns] + [(0.0, 0.0)])
         rates, angles = np.array(rows).T
         return rates, angles
-
-    @cached_property
-    def _table(self) -> tuple[Array, Array]:
-        """Helm angles, and (3, angles, m) commands full astern, stopped and full ahead at each."""
-        approach = self._approach
-        angles = np.linspace(-1.0, 1.0, ANGLES) * (self._hardest + abs(approach.angle_rad))
-        rows = [[approach.helm.inputs(drive, angle) for angle in angles.tolist()] for drive in (-1.0, 0.0, 1.0)]
-        return angles, np.array(rows)

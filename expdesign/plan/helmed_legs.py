@@ -205,13 +205,9 @@ def _steady_along(start: Array, end: Array, water: LegWater, path: Array) -> tup
     states = np.column_stack(
         [path[:, :2], path[:, 2] - drift, speed * np.cos(drift), speed * np.sin(drift), bend * speed]
     )
-    inputs = [
-        approach.helm.inputs(order, approach.angle_rad + approach.starboard * angle)
-        for order, angle in zip(
-            _engine_orders(ship, speed, np.gradient(speed, time_s)).tolist(), helm.tolist(), strict=True
-        )
-    ]
-    return time_s, states, np.array(inputs), path[:, 2]
+    orders = _engine_orders(ship, speed, np.gradient(speed, time_s))
+    inputs = approach.helm.rows(orders, approach.angle_rad + approach.starboard * helm)
+    return time_s, states, inputs, path[:, 2]
 
 
 def _eased(along: Array, course: Array, window_m: float) -> Array:

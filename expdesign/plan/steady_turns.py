@@ -67,11 +67,11 @@ def steady_turns(approach: Approach) -> tuple[SteadyTurn, ...]:
     shares = np.arange(1, HELMS + 1) / HELMS
     angles = hardest * np.r_[-shares[::-1], shares]
     count = max(2, math.ceil(SETTLING * vessel.length_m / approach.speed_mps / vessel.sample_time_s))
-    rows = [helm.inputs(approach.drive, approach.angle_rad + approach.starboard * angle) for angle in angles.tolist()]
+    rows = helm.rows(np.array(approach.drive), approach.angle_rad + approach.starboard * angles)
     runs, still = len(rows), np.zeros((len(rows), 2))
     states = simulate_many(
         vessel,
-        np.repeat(np.array(rows)[:, None], count, axis=1),
+        np.repeat(rows[:, None], count, axis=1),
         pose=np.zeros((runs, 3)),
         velocity=np.tile(approach.velocity, (runs, 1)),
         current_to=still,

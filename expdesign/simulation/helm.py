@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq, root
@@ -18,7 +19,7 @@ from scipy.optimize import brentq, root
 from expdesign.errors import InputError, SpeedOutOfReach, UnknownName
 from expdesign.simulation.actuation import past_deadband
 from expdesign.values import Array, seal
-from expdesign.vessel import SCALAR, Actuator, Limit, Vessel
+from expdesign.vessel import NUMPY, SCALAR, Actuator, Limit, Operators, Vessel
 
 THRUSTERS = ("stern", "all")
 SERVICE_SHARE = 0.85 ** (1 / 3)
@@ -84,19 +85,26 @@ class Helm:
             angle_rad: helm, in the sense of the actuators' own angles; where propellers steer, its sine is added to the
                 engine orders to port and taken from those to starboard, as far as there is any left.
         """
-        row: list[float] = []
-        steering = self.steering
+        return self._row(drive, angle_rad, SCALAR)
+
+    def rows(self, drive: Array, angle_rad: Array) -> Array:
+        """(..., m) the same for orders (...,) and angles (...,)."""
+        return np.stack(np.broadcast_arrays(*self._row(drive, angle_rad, NUMPY), drive + angle_rad)[:-1], axis=-1)
+
+    def _row(self, drive: Any, angle_rad: Any, ops: Operators) -> list[Any]:
+        row: list[Any] = []
+        steering, by_propellers = self.steering, self.means == "propeller"
         for actuator in self.vessel.actuators:
-            turned = angle_rad if actuator in steering else 0.0
-            order = drive
-            if turned and self.means == "propeller":
-                order = min(1.0, max(-1.0, drive - float(np.sign(actuator.starboard_m)) * math.sin(turned)))
-            thrust = 0.0 if actuator.kind in ("tunnel", "rudder") else _share(actuator.limits[0], order)
-            side = thrust * math.sin(turned)
+            turned, order = angle_rad if actuator in steering else 0.0, drive
+            if by_propellers and actuator in steering:
+                wish = drive - float(np.sign(actuator.starboard_m)) * ops.sin(turned)
+                order = (ops.abs(wish + 1.0) - ops.abs(wish - 1.0)) / 2  # no more than there is to either side
+            thrust = 0.0 if actuator.kind in ("tunnel", "rudder") else _share(actuator.limits[0], order, ops)
+            side = thrust * ops.sin(turned)
             row += {
                 "rudder": [turned],
                 "azimuth": [thrust, turned],
-                "force": [thrust * math.cos(turned), side, 0.0 - self.vessel.length_m / 2 * side],
+                "force": [thrust * ops.cos(turned), side, 0.0 - self.vessel.length_m / 2 * side],
             }.get(actuator.kind, [thrust])
         return row
 
@@ -113,7 +121,7 @@ class Helm:
         if self.means != "force":
             return min((actuator.limits[-1].rate for actuator in self.steering), default=math.inf)
         limits = self.steering[0].limits
-        thrust = max(abs(_share(limits[0], drive)), 1e-300)
+        thrust = max(abs(float(_share(limits[0], drive))), 1e-300)
         levers = (1.0, 1.0, self.vessel.length_m / 2)
         return min(limit.rate / (thrust * lever) for limit, lever in zip(limits, levers, strict=True))
 
@@ -232,8 +240,9 @@ def service_speed(vessel: Vessel, *, thrusters: str = "stern") -> float:
     )
 
 
-def _share(limit: Limit, drive: float) -> float:
-    return drive * (limit.high if drive >= 0 else abs(limit.low))
+def _share(limit: Limit, drive: Any, ops: Operators = SCALAR) -> Any:
+    ahead, astern = (drive + ops.abs(drive)) / 2, (drive - ops.abs(drive)) / 2
+    return limit.high * ahead + abs(limit.low) * astern
 
 
 def _engine_order(helm: Helm, speed: float) -> float:
