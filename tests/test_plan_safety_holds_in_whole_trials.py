@@ -14,14 +14,23 @@ from plan_case import at_rest, leg_water
 from test_plan_verification_catches_what_is_wrong import primitive
 
 from expdesign import workflows
+from expdesign.plan.approach import Pilot
+from expdesign.plan.approach import ARRIVED, Pilot
 from expdesign.plan.drawn_trials import Trials, sail_trials
+from expdesign.plan.fleet import Fleet
+from expdesign.plan.hull_watch import HullWatch
+from expdesign.plan.fleet import Fleet
 from expdesign.plan.legs import LegTask, find_leg, leg_trajectory
 from expdesign.plan.run_up import ROUNDS, tolerances
 from expdesign.plan.safety import broken_promise, promised
+from expdesign.plan.steering import Helmsman
+from expdesign.plan.steering import Helmsman
 from expdesign.plan.timeline import Timeline
+from expdesign.plan.uncertainty import draw_truths
+from expdesign.plan.uncertainty import Truths
 from expdesign.plan.values import Leg
 from expdesign.scenario import load_scenario
-from expdesign.simulation import Environment
+from expdesign.simulation import CALM, Environment
 
 ROOT = Path(__file__).parents[1]
 OPEN = shapely.box(-400, -300, 400, 500)
@@ -82,13 +91,42 @@ def test_every_trial_ends_in_one_way_and_runs_begin_within_tolerance():
 def test_a_strange_current_makes_ships_go_round_and_costs_time():
     commands, track, legs = planned()
     calm = leg_water(OPEN, clearance_m=5.0)
-    windy = replace(calm, environment=Environment(current_std_mps=0.2))
+    windy = replace(calm, environment=Environment(current_std_mps=0.5))
     few, many = (
         promised(water, commands=commands, trajectory=track, legs=legs, rng=np.random.default_rng(1), draws=30)[0]
         for water in (calm, windy)
     )
-    assert many.legs[1].rounds >= few.legs[1].rounds
+    assert sum(leg.rounds for leg in many.legs) > sum(leg.rounds for leg in few.legs)
     assert many.extra_median_s > few.extra_median_s
+
+
+def test_a_ship_whose_way_back_to_a_long_leg_passes_by_an_island_goes_round_it():
+    rocks = shapely.box(25, 80, 45, 130)
+    water = leg_water(shapely.box(-200, -200, 300, 700).difference(rocks), clearance_m=5.0)
+    task = LegTask(
+        start=at_rest(0, 0, 0.0), end=at_rest(500, 0, 0.0), start_inputs=np.zeros(4), end_inputs=np.zeros(4), seed=1
+    )
+    leg = find_leg(task, water)
+    track = leg_trajectory(water, task.start, leg)
+    helm = Helmsman(vessel=water.vessel, environment=CALM, ship=water.ship)
+    certain = Truths(
+        parameters=np.tile(water.vessel.model.parameters, (2, 1)), current_to=np.zeros((2, 2)), wind_to=np.zeros((2, 2))
+    )
+    fleet = Fleet(water.vessel, CALM, certain, state=task.start, standing=np.zeros(4), rng=np.random.default_rng(0))
+    fleet.states[:, 1] = [3.0, 65.0]  # both see the beginning of the leg
+    pilot = Pilot(
+        helm,
+        water,
+        np.hstack([track.pose, track.velocity]),
+        within=tolerances(water),
+        sailing=np.ones(2, dtype=bool),
+        inputs=np.zeros(4),
+        last=True,
+    )
+    found = pilot.sail(fleet, np.zeros((2, 3)))
+    np.testing.assert_array_equal(found.rounds, [0, 1])
+    assert found.begun.all()
+    assert np.isnan(HullWatch(area=water.area, vessel=water.vessel).leaves(found.poses)).all()
 
 
 def test_water_that_ends_on_a_run_is_left_there_and_the_message_says_where():
@@ -123,10 +161,51 @@ def test_a_promise_is_kept_or_broken_by_the_share_alone():
         place=np.where(left[..., None], np.full(2, 10.0), np.nan),
         within=(tolerances(leg_water(OPEN)),) * 2,
     )
-    promise = replace(sailed_promise(), left=0.05)
+    promise = replace(sailed_promise(), left=0.05, trials=100)
+    assert promise.error == pytest.approx(np.sqrt(0.05 * 0.95 / 100))
     sea = leg_water(OPEN).area
-    assert broken_promise(promise, trials, legs, sea, confidence=0.95) == ""
-    assert "on the way to run 1" in broken_promise(promise, trials, legs, sea, confidence=0.96)
+    kept, broken = 1.0 - 0.05 - 1.01 * promise.error, 1.0 - 0.05 - 0.99 * promise.error
+    assert broken_promise(promise, trials, legs, sea, confidence=kept) == ""
+    assert "on the way to run 1" in broken_promise(promise, trials, legs, sea, confidence=broken)
+    none = replace(promise, left=0.0)
+    assert broken_promise(none, trials, legs, sea, confidence=0.9999) == ""
+
+
+def test_many_trials_broken_off_are_told_first_and_most_of_them_are_no_plan():
+    few, many, most = (replace(sailed_promise(), left=0.0, aborted=x, reasons=("in run 7",)) for x in (0.2, 0.27, 0.5))
+    assert few.note == ""
+    assert "about 3 in 10" in many.note
+    assert many.note.endswith("in run 7")
+    sailed, sea = Trials(**dict.fromkeys(Trials.__dataclass_fields__, np.zeros(1))), leg_water(OPEN).area
+    assert broken_promise(many, sailed, (), sea, confidence=0.95) == ""
+    told = broken_promise(most, sailed, (), sea, confidence=0.95)
+    assert "run 7" in told
+    assert "clearance" not in told  # more of it would not help
+
+
+def test_ships_have_come_to_the_goal_only_where_they_are_there():
+    _, track, legs = planned()
+    water = replace(leg_water(OPEN, clearance_m=5.0), environment=Environment(current_std_mps=0.5))
+    whole, ships = np.hstack([track.pose, track.velocity]), 20
+    last = whole[legs[-1].first : legs[-1].last + 1]
+    helm = Helmsman(vessel=water.vessel, environment=water.environment, ship=water.ship)
+    rng = np.random.default_rng(0)
+    truths = draw_truths(water.vessel, water.environment, ships, rng)
+    fleet = Fleet(water.vessel, water.environment, truths, state=last[0], standing=np.zeros(4), rng=rng)
+    pilot = Pilot(
+        helm,
+        water,
+        last,
+        within=tolerances(water),
+        sailing=np.ones(ships, dtype=bool),
+        inputs=np.zeros(4),
+        last=True,
+    )
+    found = pilot.sail(fleet, np.zeros((ships, 3)))
+    off_m = np.hypot(*(found.poses[-1, :, :2] - last[-1, :2]).T)
+    assert 0 < found.begun.sum() < ships  # some currents are faster than the ship
+    assert off_m[found.begun].max() <= ARRIVED * water.vessel.length_m
+    assert off_m[~found.begun].min() > ARRIVED * water.vessel.length_m
 
 
 @cache

@@ -222,6 +222,7 @@ def _promise_entry(promise: Promise | None) -> dict[str, Any] | None:
         "leave_water_upper_95": promise.left_most,
         "aborted_share": promise.aborted,
         "aborted_where": list(promise.reasons),
+        "note_on_broken_off": promise.note or None,
         "extra_time_median_s": _finite(promise.extra_median_s),
         "extra_time_95_s": _finite(promise.extra_most_s),
         "goes_round_at_most": promise.rounds,

@@ -30,6 +30,10 @@ COARSE = 5
 """Samples between the points of a way back that is looked at beforehand."""
 MADE_GOOD = 0.5
 """Share of a leg's time that a ship may need to come back to it."""
+ARRIVED = 1.0
+"""Hull lengths from the goal within which a trial has come to it."""
+STEADY = 2.0
+"""Hull lengths before the start in which ships with a helm steer the heading, not the track: there they drift."""
 HELD = 0.5
 """Share of the tolerances within which a ship that stands still begins; all of them after half of `SPARE`."""
 
@@ -136,7 +140,9 @@ class Pilot:
         shares, at_end = self._within.used(states, self._wanted), self._sample >= self._end
         used = shares.max(axis=1)
         if self._last:
-            return at_end, at_end
+            there = np.hypot(*(states[:, :2] - self._wanted[:2]).T) <= ARRIVED * self._helm.vessel.length_m
+            waits = self._helm.sideways & (self._spent <= self._limit - self._spare / 2)
+            return at_end & (there | ~waits), there
         if not self._moves:
             waited = self._spent > self._limit - self._spare / 2
             return at_end & ((used <= HELD) | ((used <= 1.0) & waited)), used <= 1.0
@@ -217,7 +223,16 @@ class Pilot:
         soon = np.minimum(self._sample + self._helm.answer_s / self._helm.vessel.sample_time_s, self._most)
         now = self._reference.at(self._sample)
         now[:, 3:] = self._reference.at(soon)[:, 3:]  # a ship answers late: her speed is asked for beforehand
+        now[:, :2] = np.where(self._steadies()[:, None], states[:, :2], now[:, :2])
         return np.where(on[:, None], now, wanted)
+
+    def _steadies(self) -> np.ndarray:
+        """(n,) whether a ship that an unknown current sets aside no longer points into it, to begin as planned."""
+        helm = self._helm
+        if self._last or helm.sideways or not self._moves:
+            return np.zeros(len(self._sample), dtype=bool)
+        sample_m = float(np.hypot(*self._wanted[3:5])) * helm.vessel.sample_time_s
+        return np.asarray(self._end - self._sample <= STEADY * helm.vessel.length_m / sample_m)
 
     @property
     def _least_step_m(self) -> float:

@@ -2,7 +2,8 @@
 
 It comes from whole trials (`expdesign.plan.drawn_trials`): runs open loop from the states that ships really have, legs
 and ways back to run-ups steered, the hull against the chart at every step. Trials broken off because a run could not be
-begun are counted apart: they end in allowed water, but they do not end at the goal.
+begun are counted apart: they end in allowed water, but they do not end at the goal. A plan is accepted when its share,
+with the share's standard error on top, is within what is promised, and when most trials come to the goal.
 """
 
 from __future__ import annotations
@@ -21,10 +22,16 @@ from expdesign.plan.values import Leg, LegOutcome, Promise
 from expdesign.signals import Commands, Trajectory
 from expdesign.values import Array
 
-TRIALS = 200
-"""Of a plan that is being made."""
+TRIALS, MOST_TRIALS, SEEN = 500, 2000, 2.0
+"""Of a plan that is being made: at least, at most, and so many that this number may leave allowed water."""
 MOST = 0.95
 """Share of trials that `most` is about, and confidence of the upper limit."""
+HALF = 0.5
+"""Share of trials broken off from which on it is no plan."""
+WHY = tuple(
+    {"time": "not there in time", "no way round": "no way round"}.get(x, f"{x} out of tolerance") for x in MISSED
+)
+"""What kept ships from beginning a run, in words, by number."""
 
 
 def promised(
@@ -49,7 +56,7 @@ def promised(
         left=gone / draws,
         left_most=upper_limit(gone, draws),
         aborted=float(trials.aborted.any(axis=0).mean()),
-        reasons=_reasons(legs, trials),
+        reasons=_reasons(legs, trials, trajectory, water.area),
         extra_median_s=float(np.median(extra)) if len(extra) else float("nan"),
         extra_most_s=float(np.quantile(extra, MOST)) if len(extra) else float("nan"),
         rounds=ROUNDS,
@@ -59,6 +66,11 @@ def promised(
         legs=tuple(_leg_outcome(trials, index, sample_s) for index in range(len(legs))),
     )
     return found, trials
+
+
+def trials_for(confidence: float) -> int:
+    """How many trials tell a share of 1 - confidence from none."""
+    return int(np.clip(np.ceil(SEEN / max(1.0 - confidence, 1e-9)), TRIALS, MOST_TRIALS))
 
 
 def upper_limit(count: int, trials: int, *, confidence: float = MOST) -> float:
@@ -71,17 +83,16 @@ def upper_limit(count: int, trials: int, *, confidence: float = MOST) -> float:
 
 def broken_promise(found: Promise, trials: Trials, legs: Sequence[Leg], area: SeaArea, *, confidence: float) -> str:
     """What is wrong with a plan, with the leg and the place where it is worst; "" when it keeps its promise."""
-    if found.left > 1.0 - confidence + 1e-12:
+    allowed = 1.0 - confidence + 1e-12
+    if found.left > 0.0 and found.left + found.error > allowed:
         worst = worst_leg(trials)
         lat, lon = area.frame.to_degrees(np.nanmedian(trials.place[worst], axis=0))
         return (
-            f"{found.left:.1%} of {found.trials} drawn trials leave allowed water, more than plan.confidence = "
-            f"{confidence:g} allows, most of them ({trials.left[worst].mean():.1%}) {described(legs, worst)} near "
-            f"{lat:.5f}, {lon:.5f}"
+            f"{found.left:.1%} of {found.trials} drawn trials (standard error {found.error:.1%}) leave allowed water, "
+            f"more than plan.confidence = {confidence:g} allows, most of them ({trials.left[worst].mean():.1%}) "
+            f"{described(legs, worst)} near {lat:.5f}, {lon:.5f}; more plan.clearance_m helps"
         )
-    if not trials.completed.any():
-        return f"none of {found.trials} drawn trials comes to the goal: broken off {'; '.join(found.reasons)}"
-    return ""
+    return "" if found.aborted < HALF else f"{found.note}; wider water or a vessel known better helps"
 
 
 def worst_leg(trials: Trials) -> int:
@@ -98,14 +109,16 @@ def described(legs: Sequence[Leg], index: int) -> str:
     return "on the leg to the goal" if index == len(legs) - 1 else f"on the way to run {number + 1}, {leg.name!r},"
 
 
-def _reasons(legs: Sequence[Leg], trials: Trials) -> tuple[str, ...]:
-    """Where trials were broken off, and why."""
+def _reasons(legs: Sequence[Leg], trials: Trials, trajectory: Trajectory, area: SeaArea) -> tuple[str, ...]:
+    """Where trials were broken off, and why; most first."""
     rows = []
-    for index, aborted in enumerate(trials.aborted):
+    for index in np.argsort(-trials.aborted.mean(axis=1), kind="stable").tolist():
+        aborted = trials.aborted[index]
         if aborted.any():
             causes = Counter(trials.missed[index][aborted].tolist())
-            told = ", ".join(f"{MISSED[cause]} {count / len(aborted):.1%}" for cause, count in causes.most_common())
-            rows.append(f"{described(legs, index)} {aborted.mean():.1%} (out of tolerance: {told})")
+            told = ", ".join(f"{WHY[cause]} {count / len(aborted):.1%}" for cause, count in causes.most_common())
+            lat, lon = area.frame.to_degrees(trajectory.pose[legs[index].last, :2])
+            rows.append(f"{described(legs, index)} {aborted.mean():.1%} near {lat:.5f}, {lon:.5f} ({told})")
     return tuple(rows)
 
 

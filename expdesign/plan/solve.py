@@ -19,17 +19,17 @@ from expdesign.plan.drawn_trials import Trials
 from expdesign.plan.field import ClearanceField, clearance_field, narrowest_passage
 from expdesign.plan.footprint import covering_discs, swept_area
 from expdesign.plan.goal_ways import build_goal_ways
-from expdesign.plan.joint_trials import joints_of, settled
+from expdesign.plan.joint_trials import pairs_of, settled
 from expdesign.plan.lattice import LatticePlan, search_lattice
 from expdesign.plan.lattice_moves import build_lattice
 from expdesign.plan.leg_times import leg_times
-from expdesign.plan.leg_values import last_state, leg_speed_mps
+from expdesign.plan.leg_values import last_state
 from expdesign.plan.legs import LegTask, LegWater, find_leg, leg_trajectory
 from expdesign.plan.lower_bound import reposition_bound_s
 from expdesign.plan.placement import is_carried, place_runs
 from expdesign.plan.realised import realised_efficiencies
 from expdesign.plan.recovery import displaced, recover
-from expdesign.plan.safety import broken_promise, promised, worst_leg
+from expdesign.plan.safety import broken_promise, promised, trials_for, worst_leg
 from expdesign.plan.search_space import SearchSpace, Stamp, refusing, stamp
 from expdesign.plan.speed_changes import leg_end
 from expdesign.plan.timeline import Timeline
@@ -50,6 +50,8 @@ JOINT_TRIALS, TRIAL_WIDTH = 4, 100
 LAST_RESORT = 10.0
 """Time budgets by the clock after which the search ends whatever the count."""
 
+SAILED = 1
+"""Sets the chance of drawn trials apart from that of other draws of the same seed."""
 REPLANS, WIDER = 2, 1.4
 """Plans made anew, with so much more room where trials of the last one leave the water, before giving up."""
 
@@ -92,12 +94,12 @@ def plan_trial(problem: PlanProblem, *, progress: Progress = lambda what, share:
         progress("verifying", 0.85)
         verification = _verified(problem, *sailed)
         progress("sailing drawn trials", 0.9)
-        promise, trials = _promised(problem, water, *sailed)
+        promise, trials = _promised(problem, water, *sailed, attempt=replan)
         broken = broken_promise(promise, trials, sailed[2], problem.area, confidence=problem.settings.confidence)
         if not broken:
             return _finished(problem, water, *sailed, verification=verification, promise=promise)
         if replan == REPLANS or not trials.left.any():
-            raise NoPlan(f"the plan found does not keep its promise: {broken}; more plan.clearance_m helps")
+            raise NoPlan(f"the plan found does not keep its promise: {broken}")
         water, space = _wider(problem, water, space, trials, sailed[2], broken)
     raise AssertionError("the last plan is returned or refused")
 
@@ -136,10 +138,18 @@ def _verified(problem: PlanProblem, commands: Commands, trajectory: Trajectory, 
 
 
 def _promised(
-    problem: PlanProblem, water: LegWater, commands: Commands, trajectory: Trajectory, legs: tuple[Leg, ...]
+    problem: PlanProblem,
+    water: LegWater,
+    commands: Commands,
+    trajectory: Trajectory,
+    legs: tuple[Leg, ...],
+    *,
+    attempt: int,
 ) -> tuple[Promise, Trials]:
-    rng = np.random.default_rng(problem.seed)
-    return promised(water, commands=commands, trajectory=trajectory, legs=legs, rng=rng)
+    """What the trial as sailed comes to; no ship is the same that runs keep room for, or that an attempt failed for."""
+    rng = np.random.default_rng((problem.seed, SAILED, attempt))
+    draws = trials_for(problem.settings.confidence)
+    return promised(water, commands=commands, trajectory=trajectory, legs=legs, rng=rng, draws=draws)
 
 
 def _wider(
@@ -166,7 +176,7 @@ def _wider(
         found = _search_space(problem, wide)
     except NoPlan:
         raise NoPlan(f"{broken}; and there is no way to the goal that keeps farther off") from None
-    return wide, replace(found, stamps=space.stamps, settle_s=space.settle_s)
+    return wide, replace(found, stamps=space.stamps, tried=space.tried)
 
 
 def _finished(
@@ -328,11 +338,11 @@ def _with_joints(problem: PlanProblem, water: LegWater, space: SearchSpace, prog
             placements = place_runs(space, counts, start=problem.start, width=TRIAL_WIDTH)
         except NoPlan:  # the search proper keeps more, and says what is impossible
             break
-        tried = joints_of(space, problem.start, "", placements)
-        if all(joint.pair in space.settle_s for joint in tried):
+        pairs = pairs_of(placements)
+        if all(pair in space.tried for pair in pairs):
             break
         carried = is_carried(space, counts, problem.start)
-        space = settled(space, water, runs, tried, carried=carried, seed=problem.seed)
+        space = settled(space, water, runs, pairs, start=problem.start, carried=carried)
     return space
 
 
@@ -410,7 +420,6 @@ def _at_rest(problem: PlanProblem, pose: Array) -> Array:
 
 
 def _reposition_bound_s(problem: PlanProblem, water: LegWater) -> float:
-    ends = tuple(x for item in problem.primitives for x in (item.entry_velocity, item.exit_velocity))
     return reposition_bound_s(
         problem.vessel,
         problem.area,
@@ -419,6 +428,6 @@ def _reposition_bound_s(problem: PlanProblem, water: LegWater) -> float:
         primitives=problem.primitives,
         repeats=_repeats(problem),
         ends=(problem.start, problem.goal),
-        speed_mps=leg_speed_mps(water.ship.transit_speed_mps, ends),
+        transit_mps=water.ship.transit_speed_mps,
         yaw_rate_radps=water.ship.spot_rate_radps + water.ship.yaw_rate_radps,
     )

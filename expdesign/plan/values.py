@@ -11,6 +11,10 @@ from expdesign.signals import Commands, Trajectory
 from expdesign.values import Array, seal
 
 
+MANY = 0.2
+"""Share of drawn trials broken off from which on that is told first."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class PlanSettings:
     """Wishes for the plan.
@@ -101,7 +105,7 @@ class Promise:
         left: share in which the hull left allowed water, on a run or on the way to one.
         left_most: the share is below this with 95 % confidence (Clopper and Pearson 1934).
         aborted: share broken off in allowed water because a run could not be begun within tolerance.
-        reasons: one sentence for each leg on which trials were broken off.
+        reasons: one sentence for each leg on which trials were broken off, most first.
         extra_median_s, extra_most_s: time beyond the plan's, in the middle and in 95 % of the trials that came to the
             goal [s]; nan when none did.
         rounds: most times that a ship goes round for one run.
@@ -127,6 +131,16 @@ class Promise:
         """Standard error of `left` [share of trials]; at least that of half a trial."""
         share = min(max(self.left, 0.5 / self.trials), 1.0 - 0.5 / self.trials)
         return float(np.sqrt(share * (1.0 - share) / self.trials))
+
+    @property
+    def note(self) -> str:
+        """What to hear first of a plan of which many drawn trials are broken off; "" where they are few."""
+        if self.aborted <= MANY:
+            return ""
+        return (
+            f"{self.aborted:.1%} of {self.trials} drawn trials, about {10 * self.aborted:.0f} in 10, had to be broken "
+            f"off because a run could not be begun, most of them {self.reasons[0]}"
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

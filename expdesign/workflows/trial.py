@@ -264,6 +264,7 @@ def _promise_summary(promise: Promise | None) -> dict[str, object]:
     return {
         "drawn_trials": promise.trials,
         "aborted_share": promise.aborted,
+        **({"note_on_broken_off": promise.note} if promise.note else {}),
         "extra_time_median_s": promise.extra_median_s,
         "extra_time_95_s": promise.extra_most_s,
     }

@@ -68,11 +68,12 @@ def _more(seconds: float) -> str:
 
 
 def day_sentence(promise: Promise | None, planned_s: float) -> str:
-    """How long to book; "" where it is not known."""
+    """That the trial may well be broken off, and how long to book; "" where it is not known."""
     if promise is None or math.isnan(promise.extra_median_s):
         return ""
+    warning = f"Mind: {promise.note}. " if promise.note else ""
     whole = words.duration(planned_s + max(promise.extra_most_s, 0.0))
     return (
-        f"Coming back to the starts takes time that the plan does not show: {extra_words(promise)}. Book {whole} from "
+        f"{warning}Coming back to the starts takes time that the plan does not show: {extra_words(promise)}. Book {whole} from "
         "start to goal, besides breaks."
     )
