@@ -14,20 +14,16 @@ from plan_case import at_rest, leg_water
 from test_plan_verification_catches_what_is_wrong import primitive
 
 from expdesign import workflows
-from expdesign.plan.approach import Pilot
 from expdesign.plan.approach import ARRIVED, Pilot
 from expdesign.plan.drawn_trials import Trials, sail_trials
 from expdesign.plan.fleet import Fleet
 from expdesign.plan.hull_watch import HullWatch
-from expdesign.plan.fleet import Fleet
 from expdesign.plan.legs import LegTask, find_leg, leg_trajectory
 from expdesign.plan.run_up import ROUNDS, tolerances
 from expdesign.plan.safety import broken_promise, promised
 from expdesign.plan.steering import Helmsman
-from expdesign.plan.steering import Helmsman
 from expdesign.plan.timeline import Timeline
-from expdesign.plan.uncertainty import draw_truths
-from expdesign.plan.uncertainty import Truths
+from expdesign.plan.uncertainty import Truths, draw_truths
 from expdesign.plan.values import Leg
 from expdesign.scenario import load_scenario
 from expdesign.simulation import CALM, Environment

@@ -10,7 +10,6 @@ from expdesign.plan.area import SeaArea
 from expdesign.signals import Commands, Trajectory
 from expdesign.values import Array, seal
 
-
 MANY = 0.2
 """Share of drawn trials broken off from which on that is told first."""
 

@@ -74,6 +74,6 @@ def day_sentence(promise: Promise | None, planned_s: float) -> str:
     warning = f"Mind: {promise.note}. " if promise.note else ""
     whole = words.duration(planned_s + max(promise.extra_most_s, 0.0))
     return (
-        f"{warning}Coming back to the starts takes time that the plan does not show: {extra_words(promise)}. Book {whole} from "
-        "start to goal, besides breaks."
+        f"{warning}Coming back to the starts takes time that the plan does not show: {extra_words(promise)}. Book "
+        f"{whole} from start to goal, besides breaks."
     )
