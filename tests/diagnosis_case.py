@@ -79,13 +79,14 @@ def hidden_records(
     samples: int = 300,
     step_s: float = 1.0,
     weather: sea.Weather | None = None,
+    sensors: sea.Sensors | None = None,
     manoeuvre: str = "helmsman",
     shoaling: bool = False,
 ) -> list[Record]:
     """A trial for each of what is hidden, otherwise the same.
 
     Args:
-        ship, seed, batches, samples, step_s, weather: as in `hidden_effects`.
+        ship, seed, batches, samples, step_s, weather, sensors: as in `hidden_effects`.
         hidden: what.
         manoeuvre: of `hidden_effects.MANOEUVRES`.
         shoaling: the depth varies along the track and is recorded.
@@ -104,7 +105,7 @@ def hidden_records(
         trials, np.broadcast_to(orders, (*shape, orders.shape[-1])), step_s, weather or sea.Weather(), rng,
         None if depth is None else np.broadcast_to(depth, shape),
     )  # fmt: skip
-    told = sea.measure(true, step_s, sea.Sensors(), rng, [dict(one.faults) for one in hidden])
+    told = sea.measure(true, step_s, sensors or sea.Sensors(), rng, [dict(one.faults) for one in hidden])
 
     def stacked(trial: int, number: int, *names: str) -> np.ndarray:
         return np.column_stack([told[name][trial, number] for name in names])

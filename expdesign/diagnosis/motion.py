@@ -138,21 +138,26 @@ def _rk4(ship: Extended, x: tuple[Array, ...], around: Surroundings, h: float) -
     turn = 0.0 if ship.roll is None else 2 * math.pi * h / ship.roll.period_s
     parts = min(max(1, math.ceil(turn / ROLL_ANGLE)), MOST_PARTS)
     gained: Array | float = 0.0
-    for _ in range(parts):
-        x, more = _rk4_part(ship, x, around, h / parts)
+    for part in range(parts):
+        stages = [around.within((part + share) / parts - 0.5) for share in (0.0, 0.5, 1.0)]
+        x, more = _rk4_part(ship, x, stages, h / parts)
         gained = gained + more
     return x, np.asarray(gained)
 
 
-def _rk4_part(ship: Extended, x: tuple[Array, ...], around: Surroundings, h: float) -> tuple[tuple[Array, ...], Array]:
+def _rk4_part(
+    ship: Extended, x: tuple[Array, ...], around: Sequence[Surroundings], h: float
+) -> tuple[tuple[Array, ...], Array]:
+    """With surroundings at the beginning, in the middle and at the end."""
+    begin, middle, end = around
 
     def ahead(slope: tuple[Array, ...], share: float) -> tuple[Array, ...]:
         return tuple(np.clip(a + share * h * b, -1e3, 1e3) for a, b in zip(x, slope, strict=True))
 
-    k1 = rates(ship, x, around)
-    k2 = rates(ship, x2 := ahead(k1, 0.5), around)
-    k3 = rates(ship, x3 := ahead(k2, 0.5), around)
-    k4 = rates(ship, x4 := ahead(k3, 1.0), around)
+    k1 = rates(ship, x, begin)
+    k2 = rates(ship, x2 := ahead(k1, 0.5), middle)
+    k3 = rates(ship, x3 := ahead(k2, 0.5), middle)
+    k4 = rates(ship, x4 := ahead(k3, 1.0), end)
     onward = tuple(a + h / 6 * (p + 2 * q + 2 * s + t) for a, p, q, s, t in zip(x, k1, k2, k3, k4, strict=True))
     return onward, h / 6 * (x[2] + 2 * x2[2] + 2 * x3[2] + x4[2])
 

@@ -14,17 +14,29 @@ from expdesign.values import Array
 from expdesign.vessel import NUMPY, VesselModel, generalised_force
 from expdesign.vessel.structures import FORCE_SIGNALS, SHOAL
 
+RISE = "rise "
+
 
 class Surroundings(dict[str, Array]):
     """What acts on the ship at the integrator steps (w, k): inputs and forces by signal name, and besides.
 
     `u_c v_c` water and `u_w v_w` air, their velocity in the b-frame [m/s], where they move;
     `h`, draught over depth, and `after`, one after a change of the ship, where the model reads such things.
+    Values are means over each step; signals that move within steps also have a rise, `rise NAME`, from the beginning
+    of each step to its end, by which a force counts when it acts.
     """
 
     def at(self, step: int) -> Surroundings:
         """One integrator step of every window."""
         return Surroundings({name: values[:, step] for name, values in self.items()})
+
+    def within(self, share: float) -> Surroundings:
+        """At a place within the steps, from -0.5 at their beginning to 0.5 at their end."""
+        rises = [name for name in self if name.startswith(RISE)]
+        if not rises:
+            return self
+        moved = {name.removeprefix(RISE): self[name.removeprefix(RISE)] + share * self[name] for name in rises}
+        return Surroundings({**self, **moved})
 
     def before_last(self) -> Surroundings:
         """All steps but the last."""
@@ -35,7 +47,10 @@ def surroundings(ship: Extended, windows: Windows) -> Surroundings:
     """Everything outside the ship, with the inputs as its actuators follow them."""
     model, shape = ship.model, windows.heading.shape
     names = (*dict.fromkeys((*model.inputs, *FORCE_SIGNALS)),)
-    signals = windows.gather(tuple(_acting(model, *rows) for rows in followed_inputs(ship, windows)))
+    followed = followed_inputs(ship, windows)
+    moving = any(finer > 1 for _, finer in followed)
+    signals = windows.gather(tuple(_acting(model, *rows) for rows in followed))
+    names = (*names, *(f"{RISE}{name}" for name in names)) if moving else names
     table = Surroundings({n: np.broadcast_to(signals[..., i], shape) for i, n in enumerate(names)})
     if ship.get("asymmetry"):
         table["tau_psi"] = table["tau_psi"] + ship.get("asymmetry") * ahead_force(table, model)
@@ -54,12 +69,18 @@ def surroundings(ship: Extended, windows: Windows) -> Surroundings:
 
 
 def _acting(model: VesselModel, rows: Array, finer: int) -> Array:
-    """(k, m) inputs and forces, each its mean over the finer steps that it is known at."""
+    """(k, m) inputs and forces, each its mean over the finer steps that it is known at, and (k, m) their rises.
+
+    A straight line of that mean and rise has the mean and the first moment that the signal has within the step.
+    """
     table = dict(zip(model.inputs, rows.T, strict=True))
     forces = generalised_force(model.actuators, table, NUMPY)
     table |= dict(zip(FORCE_SIGNALS, forces, strict=True))
     columns = [np.broadcast_to(np.asarray(values, dtype=float), len(rows)) for values in table.values()]
-    return np.asarray(np.stack(columns, axis=-1).reshape(len(rows) // finer, finer, -1).mean(axis=1))
+    known = np.stack(columns, axis=-1).reshape(len(rows) // finer, finer, -1)
+    place = (np.arange(finer) + 0.5) / finer - 0.5
+    rises = 12.0 * np.einsum("f,kfm->km", place, known) / finer
+    return np.asarray(np.column_stack([known.mean(axis=1), rises]))
 
 
 def _wind(ship: Extended, windows: Windows) -> tuple[Array, Array]:
