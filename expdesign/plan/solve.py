@@ -15,6 +15,7 @@ from expdesign.errors import NoPlan
 from expdesign.plan.area import SeaArea
 from expdesign.plan.capability import capability
 from expdesign.plan.checks import verify_plan
+from expdesign.plan.doors import check_ends
 from expdesign.plan.drawn_trials import Trials
 from expdesign.plan.field import ClearanceField, clearance_field, narrowest_passage
 from expdesign.plan.footprint import covering_discs, swept_area
@@ -85,6 +86,7 @@ def plan_trial(problem: PlanProblem, *, progress: Progress = lambda what, share:
     """
     progress("measuring the water", 0.0)
     water = leg_water(problem)
+    check_ends(problem.start, problem.goal, water)
     space = _with_joints(problem, water, _search_space(problem, water), progress)
     for replan in range(REPLANS + 1):
         line = _sail_all(problem, water, space, progress)

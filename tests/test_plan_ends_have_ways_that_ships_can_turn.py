@@ -1,0 +1,77 @@
+"""Ships that sail arcs get away from where there is room for their turns, and are told where there is none."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+from helm_case import catamaran
+from plan_case import area
+
+from expdesign.errors import NoPlan
+from expdesign.plan import PlanSettings
+from expdesign.plan.capability import capability
+from expdesign.plan.doors import check_ends, gets_away
+from expdesign.plan.field import clearance_field
+from expdesign.plan.legs import LegWater
+from expdesign.simulation import CALM
+
+VESSEL, CLEARANCE = catamaran(), 0.5
+SHIP = capability(VESSEL, PlanSettings(clearance_m=CLEARANCE))
+RADIUS = SHIP.turning_radius_m
+
+
+def water(basin: shapely.Geometry) -> LegWater:
+    sea = area(basin)
+    return LegWater(
+        vessel=VESSEL,
+        environment=CALM,
+        ship=SHIP,
+        area=sea,
+        clearance_m=CLEARANCE,
+        field=clearance_field(sea, resolution_m=0.5),
+    )
+
+
+def slip(half_m: float) -> LegWater:
+    """A slip of a width, closed to the south, that opens to a bay to the north; in turning radii."""
+    bay = shapely.box(-8 * RADIUS, 0, 8 * RADIUS, 8 * RADIUS)
+    return water(bay.union(shapely.box(-half_m, -4 * RADIUS, half_m, 0.1)))
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+def test_out_of_a_slip_there_is_only_the_way_to_its_mouth(backwards):
+    narrow, inside = slip(0.6 * RADIUS), np.array([-2 * RADIUS, 0.0, 0.0])
+    out = inside + (0, 0, np.pi * backwards)  # a way towards a place comes from where its stern points
+    assert gets_away(out, narrow, backwards=backwards)
+    assert not gets_away(out + (0, 0, np.pi), narrow, backwards=backwards)
+
+
+def test_a_slip_wider_than_a_turn_of_half_a_circle_lets_ships_turn():
+    least = RADIUS + np.hypot(RADIUS + VESSEL.beam_m / 2, VESSEL.length_m / 2) - RADIUS + CLEARANCE
+    into = np.array([-2.5 * RADIUS, 0.0, np.pi])
+    assert not gets_away(into, slip(0.9 * RADIUS))
+    assert gets_away(into + (0, -RADIUS, 0), slip(least + 0.3 * RADIUS))
+
+
+def test_answers_do_not_depend_on_where_north_is():
+    bay = slip(0.6 * RADIUS)
+    for turn in np.linspace(0.3, 6.0, 5):
+        turned = water(shapely.affinity.rotate(bay.area.water, -np.degrees(turn), origin=(0, 0)))
+        place = -2 * RADIUS * np.array([np.cos(turn), np.sin(turn)])
+        assert gets_away(np.r_[place, turn], turned)
+        assert not gets_away(np.r_[place, turn + np.pi], turned)
+
+
+def test_the_message_names_the_end_and_its_place_and_agile_ships_are_not_asked():
+    narrow, out, into = slip(0.6 * RADIUS), np.array([-2 * RADIUS, 0, 0]), np.array([-2 * RADIUS, 0, np.pi])
+    check_ends(out, into, narrow)
+    lat, lon = narrow.area.frame.to_degrees(into[:2])
+    for ends, name in (((into, into), "from the start"), ((out, out), "to the goal")):
+        with pytest.raises(NoPlan, match=name) as caught:
+            check_ends(*ends, narrow)
+        assert f"near {lat:.5f}, {lon:.5f}" in str(caught.value)
+        assert f"{RADIUS:.3g} m radius" in str(caught.value)
+    check_ends(into, out, replace(narrow, ship=replace(SHIP, approach=None)))
