@@ -11,11 +11,15 @@ import shapely
 from plan_case import area, at_rest, leg_water, ship
 from test_plan_verification_catches_what_is_wrong import primitive
 
+from expdesign.plan import PlanSettings
+from expdesign.plan.capability import capability
+from expdesign.plan.carries import Carry, Headway, carry, exit_motion
+from expdesign.plan.leg_values import leg_speed_mps, through_water
 from expdesign.plan.legs import LegTask, find_leg
-from expdesign.plan.lower_bound import Carry, Headway, carry, joint_losses, reposition_bound_s, time_to_sail_s
+from expdesign.plan.lower_bound import _grown, joint_losses, reposition_bound_s, time_to_sail_s
 from expdesign.plan.speed_changes import LegEnd, SpeedChanges, least_loss, leg_end
 from expdesign.signals import Commands
-from expdesign.simulation import CALM, Environment, simulate
+from expdesign.simulation import CALM, Environment, simulate, to_body
 from expdesign.vessel import NUMPY
 
 OPEN = shapely.box(-1000, -1000, 1000, 1000)
@@ -31,7 +35,7 @@ def steady(speed_mps: float, rate_mps2: float, top_mps: float) -> LegEnd:
     changes = SpeedChanges(
         edges_mps=np.linspace(0, top_mps, 8), until_s=np.array([np.inf]), faster_mps2=rates, slower_mps2=rates
     )
-    return LegEnd(speed_mps=speed_mps, inputs=None, changes=changes)
+    return LegEnd(slowest_mps=speed_mps, fastest_mps=speed_mps, inputs=None, changes=changes)
 
 
 def to_sail(water, carries, repeats, ends=ENDS, margin_m=5.0) -> float:
@@ -105,6 +109,82 @@ def test_no_point_of_a_drifting_runs_chord_is_farther_from_its_path_than_told():
             assert shapely.distance(shapely.points(chord), shapely.linestrings(track)).max() <= told
 
 
+def windy(share: float = 1.0):
+    """The ship with superstructure: much of it, so that headings differ in any weather, or a share of that."""
+    model = ship().model
+    wind = {"W_abs_u_u": -0.02 * share, "W_abs_v_v": -0.03 * share, "W_uv": 0.0003 * share}
+    values = [wind.get(name, value) for name, value in zip(model.names, model.parameters.tolist(), strict=True)]
+    return replace(ship(), model=replace(model, parameters=np.array(values)))
+
+
+WEATHERS = {
+    "current alone": Environment(current_to=np.array([0.3, -0.25])),
+    "wind alone": Environment(wind_to=np.array([-1.5, 2.0])),
+    "wind across a current": Environment(current_to=np.array([0.3, 0.0]), wind_to=np.array([0.0, -2.0])),
+}
+
+
+@pytest.mark.parametrize("weather", WEATHERS)
+def test_no_heading_carries_a_run_that_feels_the_air_farther_than_told(weather):
+    vessel, environment = windy(), WEATHERS[weather]
+    run, headway = primitive(vessel), Headway(speed_mps=1.3, current_to=environment.current_to)
+    told = carry(vessel, run, environment, headway)
+    slowest, fastest, turning = exit_motion(vessel, run, environment)
+    chords = []
+    for heading in np.random.default_rng(4).uniform(-np.pi, np.pi, 60):
+        u_c, v_c = to_body(environment.current_to, heading, NUMPY)
+        begin = run.entry_velocity + np.array([u_c, v_c, 0.0])
+        track = simulate(vessel, run.commands, pose=np.array([0, 0, heading]), velocity=begin, environment=environment)
+        places = track.pose[:, :2]
+        chords.append(headway.seconds(places[-1] - places[0]))
+        assert headway.seconds(np.diff(places, axis=0)).sum() <= told.path_s
+        chord = places[0] + np.linspace(0, 1, 100)[:, None] * (places[-1] - places[0])
+        assert shapely.distance(shapely.points(chord), shapely.linestrings(places)).max() <= told.stray_m
+        last = through_water(environment, np.r_[track.pose[-1], track.velocity[-1]])
+        assert slowest <= np.hypot(*last[:2]) <= fastest
+        assert abs(last[2]) <= turning
+    assert max(chords) <= told.chord_s <= 1.05 * max(chords)
+
+
+def test_air_that_moves_with_the_water_is_calm():
+    current, run = np.array([0.3, 0.4]), primitive(windy())
+    drifting, headway = Environment(current_to=current, wind_to=current), Headway(speed_mps=1.3, current_to=current)
+    blind = carry(ship(), run, Environment(current_to=current), headway)
+    told = carry(windy(), run, drifting, headway)
+    assert (told.chord_s, told.path_s, told.stray_m) == (blind.chord_s, blind.path_s, blind.stray_m)
+
+
+@pytest.mark.parametrize("wind", [np.array([4.0, 0.0]), np.array([-3.0, 2.0])])
+def test_a_leg_in_wind_takes_no_less_than_the_bound(wind):
+    sea = Environment(current_to=np.array([0.2, 0.1]), wind_to=wind)
+    water = replace(leg_water(OPEN), vessel=windy(0.1), environment=sea)
+    water = replace(water, ship=capability(water.vessel, PlanSettings()))
+    rest = np.r_[water.environment.current_to, 0.0]  # heading north
+    start, end = np.r_[-100.0, 0.0, 0.0, rest], np.r_[100.0, 0.0, 0.0, rest]
+    bound_s = reposition_bound_s(
+        water.vessel,
+        water.area,
+        water.environment,
+        clearance_m=20.0,
+        primitives=(),
+        repeats={},
+        ends=(start[:3], end[:3]),
+        transit_mps=water.ship.transit_speed_mps,
+        yaw_rate_radps=water.ship.spot_rate_radps + water.ship.yaw_rate_radps,
+    )
+    values = find_leg(LegTask(start=start, end=end, start_inputs=np.zeros(4), end_inputs=np.zeros(4), seed=1), water)
+    assert values is not None
+    assert 0 < bound_s <= len(values) * water.vessel.sample_time_s
+
+
+def test_grown_water_holds_all_that_is_as_near():
+    grown = _grown(shapely.box(-1, -1, 1, 1), 50.0)
+    angle = np.linspace(0, np.pi / 2, 2000)
+    within = np.stack([1 + 50 * np.cos(angle), 1 + 50 * np.sin(angle)], axis=1)
+    assert shapely.contains_properly(grown, shapely.points(within)).all()
+    assert shapely.area(grown) < 1.001 * shapely.area(shapely.buffer(shapely.box(-1, -1, 1, 1), 50.0, quad_segs=500))
+
+
 def wandering(rng: np.random.Generator, begin: np.ndarray, steps: int) -> np.ndarray:
     """A random way (k, 2) from a point on."""
     course = rng.uniform(-np.pi, np.pi) + np.cumsum(rng.normal(0, 0.5, steps))
@@ -157,10 +237,10 @@ def test_with_and_against_a_current_the_bound_is_the_way_by_the_speed_over_groun
         primitives=(),
         repeats={},
         ends=ENDS,
-        speed_mps=1.3,
+        transit_mps=1.3,
         yaw_rate_radps=0.1,
     )
-    truth = 400 / (1.3 + 0.2 * along)
+    truth = 400 / (leg_speed_mps(1.3, ()) + 0.2 * along)
     assert bound_s == pytest.approx(truth, abs=1e-6)
 
 
@@ -244,7 +324,7 @@ def test_legs_found_in_random_water_take_longer_than_the_bound(seed):
         primitives=(),
         repeats={},
         ends=ends,
-        speed_mps=1.001 * water.ship.transit_speed_mps,
+        transit_mps=water.ship.transit_speed_mps,
         yaw_rate_radps=water.ship.spot_rate_radps,
     )
     task = LegTask(

@@ -11,10 +11,11 @@ from helm_case import coaster, open_water
 from plan_case import leg_water
 
 from expdesign.dictionary.build import trim
+from expdesign.plan.carries import Headway
 from expdesign.plan.curves import curved_leg
 from expdesign.plan.leg_values import through_water
 from expdesign.plan.legs import LegTask, LegWater, find_leg
-from expdesign.plan.lower_bound import Headway, reposition_bound_s
+from expdesign.plan.lower_bound import reposition_bound_s
 from expdesign.simulation import Environment, steady_ahead
 
 OPEN = shapely.box(-1500, -1500, 1500, 1500)
@@ -74,7 +75,7 @@ def test_legs_from_rest_to_rest_take_no_less_than_the_bound(way):
         primitives=(),
         repeats={},
         ends=(leg.start[:3], leg.end[:3]),
-        speed_mps=STATED_MPS,
+        transit_mps=water.ship.transit_speed_mps,
         yaw_rate_radps=water.ship.spot_rate_radps + water.ship.yaw_rate_radps,
     )
     values = find_leg(leg, water)

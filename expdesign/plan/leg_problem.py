@@ -6,7 +6,7 @@ import numpy as np
 
 from expdesign.plan._casadi import LegProblem
 from expdesign.plan.footprint import covering_discs
-from expdesign.plan.leg_values import LegTask, LegWater, leg_speed_mps, room_beside, through_water
+from expdesign.plan.leg_values import BEYOND_ENDS, LegTask, LegWater, leg_speed_mps, room_beside, through_water
 from expdesign.values import Array
 
 
@@ -63,7 +63,7 @@ def leg_problem(
         circle=np.r_[path[0, :2], np.inf],
         hull_arm_m=arm_m,
         top_speed_mps=leg_speed_mps(fastest, ends),
-        yaw_rate_radps=max(turning_rate_radps, *(1.02 * abs(motion[2]) for motion in ends)),
+        yaw_rate_radps=max(turning_rate_radps, *(BEYOND_ENDS * abs(motion[2]) for motion in ends)),
         lateral_mps2=max(water.ship.lateral_mps2, *(1.05 * abs(motion[0] * motion[2]) for motion in ends)),
         node_s=node_s,
     )

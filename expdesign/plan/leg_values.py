@@ -28,6 +28,8 @@ ARRIVAL = 1e-3
 """Largest miss of a leg's end state, in hull lengths, and in transit speeds."""
 ROUND = 1.0 / float(np.cos(np.pi / (4 * ARC_SEGMENTS)))
 """Taken off a shore by so much more, no rounded corner is nearer than asked: arcs are drawn inside their circles."""
+BEYOND_ENDS = 1.02
+"""Largest speed and yaw rate of legs whose ends are faster than legs need be, in those of their ends."""
 SPARES = (0.25, 0.1, 0.02)
 """Hull lengths that ways keep from the shore beyond clearance and half the beam: more gives smoother ways, less leads
 through narrower water."""
@@ -238,10 +240,10 @@ def room_beside(water: LegWater, centre: Array, side: Array, margin_m: float) ->
 
 
 def leg_speed_mps(transit_mps: float, ends: Iterable[Array]) -> float:
-    """Largest speed on a leg: transit speed, or 2 % above what its ends (3,) have, where they are faster.
+    """Largest speed on a leg: transit speed, or `BEYOND_ENDS` of what its ends (3,) have, where they are faster.
 
     All through water.
     """
     steady = 1.001 * transit_mps
     fastest = max((float(np.hypot(*velocity[:2])) for velocity in ends), default=0.0)
-    return 1.02 * fastest if fastest > steady else steady
+    return BEYOND_ENDS * fastest if fastest > steady else steady

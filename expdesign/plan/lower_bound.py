@@ -1,7 +1,8 @@
 """A bound on repositioning time that holds for every plan with the same runs.
 
-Class of plans: the hull keeps the clearance everywhere; legs go no faster through water than a stated speed; each run
-is sailed as simulated with the nominal vessel in the forecast's means; the ship starts and ends at rest.
+Class of plans: the hull keeps the clearance everywhere; legs go no faster through water than a stated speed and turn no
+faster than a stated rate, or 2 % beyond those at their ends; each run is sailed as simulated with the nominal vessel in
+the forecast's means; the ship starts and ends at rest.
 
 In a steady current the least time of a leg along a straight line is that of Zermelo's navigation problem. It grows with
 the length and obeys the triangle inequality, so the fastest way round the islands bends at their corners only and a
@@ -14,6 +15,10 @@ Speeds and commands at the ends of legs cost time besides: a leg that begins or 
 distance while it changes speed, and actuators move no faster than their rates. Which leg joins which runs is left to
 the plan; the cheapest order counts.
 
+All of this is proved but for two things, which are looked for and given a margin: the largest accelerations, among
+drawn motions and commands (`expdesign.plan.speed_changes`), and, where wind makes a difference, how far runs go and how
+fast they end, at headings all round (`expdesign.plan.carries`).
+
 Source: E. Zermelo, Über das Navigationsproblem bei ruhender oder veränderlicher Windverteilung, ZAMM 11 (1931),
 114-124.
 """
@@ -21,7 +26,7 @@ Source: E. Zermelo, Über das Navigationsproblem bei ruhender oder veränderlich
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 import shapely
@@ -29,69 +34,17 @@ from scipy.optimize import linear_sum_assignment
 
 from expdesign.dictionary import Primitive
 from expdesign.plan.area import SeaArea
+from expdesign.plan.carries import Carry, Headway, carry, exit_motion
 from expdesign.plan.cheapest_orders import cheapest_orders, place_values
+from expdesign.plan.leg_values import BEYOND_ENDS, leg_speed_mps
 from expdesign.plan.speed_changes import LegEnd, least_loss, leg_end
 from expdesign.plan.ways import build_ways, simplified
-from expdesign.simulation import Environment, simulate_many
-from expdesign.values import Array, seal
+from expdesign.simulation import Environment
+from expdesign.values import Array
 from expdesign.vessel import Vessel
 
-HEADINGS = 72
-"""Headings at which runs are simulated where wind makes a difference."""
-SPARE = 1.02
-"""What headings between these may give more."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Carry:
-    """What a run can contribute to the way, at the heading that suits it best.
-
-    Attributes:
-        chord_s: time that a leg needs from its start to its end [s].
-        path_s: the same along its path [s].
-        stray_m: no point of the chord is farther than this from the path [m].
-    """
-
-    chord_s: float
-    path_s: float
-    stray_m: float
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Headway:
-    """The fastest leg.
-
-    Attributes:
-        speed_mps: through water.
-        current_to: (2,) of the water [m/s], slower than that.
-    """
-
-    speed_mps: float
-    current_to: Array
-
-    def __post_init__(self) -> None:
-        seal(self, current_to="2")
-
-    @property
-    def current_mps(self) -> float:
-        """Speed of the water."""
-        return float(np.hypot(*self.current_to))
-
-    def seconds(self, ground: Array) -> Array:
-        """(...,) least time of straight legs (..., 2) over ground [s]."""
-        along = ground @ self.current_to
-        spare = self.speed_mps**2 - self.current_mps**2
-        return np.asarray((np.sqrt(along**2 + spare * (ground**2).sum(axis=-1)) - along) / spare)
-
-    def most_s(self, water_m: Array, lasting_s: Array | float) -> Array:
-        """(...,) that of what moves by a length through water in a time, at the heading for which it is most [s].
-
-        A leg of time t makes good d when p.d <= t for all slownesses p with V |p| + c.p = 1. Of l through water and
-        c T that is at most |p| l + (1 - V |p|) T, so the ends 1 / (V + c) and 1 / (V - c) of |p| decide.
-        """
-        behind = self.speed_mps * lasting_s - water_m
-        slowness = 1.0 / (self.speed_mps + np.where(behind >= 0, 1.0, -1.0) * self.current_mps)
-        return np.asarray(lasting_s - slowness * behind)
+QUAD_SEGS = 32
+"""Chords to a quarter circle round grown water."""
 
 
 def reposition_bound_s(
@@ -103,7 +56,7 @@ def reposition_bound_s(
     primitives: tuple[Primitive, ...],
     repeats: Mapping[str, int],
     ends: tuple[Array, Array],
-    speed_mps: float,
+    transit_mps: float,
     yaw_rate_radps: float,
 ) -> float:
     """Least repositioning time of any plan of the class that the module describes [s].
@@ -113,14 +66,20 @@ def reposition_bound_s(
         clearance_m: distance of the hull from anything forbidden.
         primitives, repeats: the runs.
         ends: start and goal, (3,) or (2,).
-        speed_mps, yaw_rate_radps: of the fastest leg through water.
+        transit_mps, yaw_rate_radps: of legs through water; those whose ends are faster, by `leg_speed_mps`, or turn
+            faster go a little beyond.
     """
-    headway = Headway(speed_mps=speed_mps, current_to=environment.current_to)
     runs = [item for item in primitives if repeats.get(item.name, 0)]
+    exits = [exit_motion(vessel, item, environment) for item in runs]
+    entries = [item.entry_velocity for item in runs]
+    speed_mps = leg_speed_mps(transit_mps, [*entries, *(np.array([most, 0.0]) for _, most, _ in exits)])
+    turns = [*(abs(float(entry[2])) for entry in entries), *(turn for _, _, turn in exits)]
+    yaw_rate_radps = max([yaw_rate_radps, *(BEYOND_ENDS * turn for turn in turns)])
+    headway = Headway(speed_mps=speed_mps, current_to=environment.current_to)
     carries = {item.name: carry(vessel, item, environment, headway) for item in runs}
     counts = {item.name: repeats[item.name] for item in runs}
     way_s = time_to_sail_s(area, clearance_m + vessel.beam_m / 2, carries, counts, ends, headway, vessel.length_m / 30)
-    firsts, lasts = _leg_ends(vessel, environment, runs, speed_mps, yaw_rate_radps)
+    firsts, lasts = _leg_ends(vessel, environment, runs, exits, speed_mps, yaw_rate_radps)
     losses = np.array([[least_loss(first, last, vessel) for last in lasts] for first in firsts])
     lost_m, least_s = (joint_losses(losses[..., k], list(counts.values())) for k in (0, 1))
     return float(max(0.0, least_s, way_s + lost_m / (speed_mps + headway.current_mps)))
@@ -143,7 +102,7 @@ def time_to_sail_s(
             count * (carries[name].chord_s if carries[name].stray_m <= grown_m else carries[name].path_s)
             for name, count in repeats.items()
         )
-        more = shapely.buffer(water, grown_m + 1e-6, quad_segs=32) if grown_m else water
+        more = _grown(water, grown_m) if grown_m else water
         simple = simplified(more, grow=True, tolerance_m=tolerance_m + 0.002 * grown_m)
         way_s = build_ways(simple).least(start, goal, headway.seconds)
         if not np.isfinite(way_s):  # the ends lie outside the water that a plan needs: there is none to be bounded
@@ -154,80 +113,22 @@ def time_to_sail_s(
     return float(best) if np.isfinite(best) else 0.0
 
 
+def _grown(water: shapely.Geometry, distance_m: float) -> shapely.Geometry:
+    """No less than the water within a distance: arcs are drawn by chords, whose middles are nearer than their ends."""
+    return shapely.buffer(water, distance_m / np.cos(np.pi / (4 * QUAD_SEGS)) + 1e-6, quad_segs=QUAD_SEGS)
+
+
 def _holds_ends(water: shapely.Geometry, ends: tuple[Array, Array]) -> bool:
     return bool(shapely.covers(water, shapely.points([end[1::-1] for end in ends])).all())
 
 
-def carry(vessel: Vessel, primitive: Primitive, environment: Environment, headway: Headway) -> Carry:
-    """How far a run carries the ship at most, and how far it bends."""
-    track = primitive.trajectory.pose[:, :2]
-    if environment.wind_to.any() and _feels_wind(vessel):
-        return _carry_in_weather(_in_weather(vessel, primitive, environment), headway)
-    steps = np.hypot(*np.diff(track, axis=0).T)
-    chord = float(np.hypot(*(track[-1] - track[0])))
-    drift_m, lasting_s = headway.current_mps * primitive.duration_s, primitive.duration_s
-    return Carry(
-        chord_s=float(headway.most_s(np.array(chord), lasting_s)),
-        path_s=float(headway.most_s(steps, lasting_s / len(steps)).sum()),
-        stray_m=min(_stray_m(track) + drift_m, _stray_adrift_m(track, drift_m)) if drift_m else _stray_m(track),
-    )
-
-
-def _carry_in_weather(tracks: list[Array], headway: Headway) -> Carry:
-    """The same from tracks (k, 2) over ground at headings all round."""
-    chords = [float(headway.seconds(track[-1] - track[0])) for track in tracks]
-    paths = [float(headway.seconds(np.diff(track, axis=0)).sum()) for track in tracks]
-    return Carry(
-        chord_s=SPARE * max(chords), path_s=SPARE * max(paths), stray_m=SPARE * max(_stray_m(track) for track in tracks)
-    )
-
-
-def _stray_adrift_m(track: Array, drift_m: float) -> float:
-    """Bound on what a chord's points are away from a track (k, 2) through water that drifts any way by so much.
-
-    The current carries the chord's point at a share of it as far as it carries the ship in that share of the time;
-    between points and samples at other shares lies the drift in the time between.
-    """
-    share, when = np.linspace(0.0, 1.0, 201), np.linspace(0.0, 1.0, len(track))
-    points = track[0] + share[:, None] * (track[-1] - track[0])
-    apart = np.hypot(*np.moveaxis(points[:, None] - track, -1, 0)) + drift_m * np.abs(share[:, None] - when)
-    between = (float(np.hypot(*(track[-1] - track[0]))) + drift_m) / 400
-    return float(apart.min(axis=1).max()) + between
-
-
-def _feels_wind(vessel: Vessel) -> bool:
-    used = zip(vessel.model.expressions, vessel.model.parameters, strict=True)
-    return any(value and {"u_q", "v_q"} & set(expression.signals) for expression, value in used)
-
-
-def _in_weather(vessel: Vessel, primitive: Primitive, environment: Environment) -> list[Array]:
-    """Tracks (k, 2) of the run at headings all round, in the forecast's mean current and wind."""
-    heading = np.arange(HEADINGS) * 2 * np.pi / HEADINGS
-    c, s = np.cos(heading), np.sin(heading)
-    north, east = environment.current_to
-    current_b = np.stack([north * c + east * s, east * c - north * s, 0 * c], axis=1)
-    states = simulate_many(
-        vessel,
-        primitive.commands,
-        pose=np.stack([0 * c, 0 * c, heading], axis=1),
-        velocity=primitive.entry_velocity + current_b,
-        current_to=np.tile(environment.current_to, (HEADINGS, 1)),
-        wind_to=np.tile(environment.wind_to, (HEADINGS, 1)),
-        parameters=np.tile(vessel.model.parameters, (HEADINGS, 1)),
-        standing=primitive.entry_inputs,
-    )
-    return list(np.moveaxis(states[..., :2], 1, 0))
-
-
-def _stray_m(track: Array) -> float:
-    """Largest distance of the chord's points from a track (k, 2)."""
-    points = track[0] + np.linspace(0, 1, 201)[:, None] * (track[-1] - track[0])
-    apart = shapely.distance(shapely.points(points), shapely.linestrings(track))
-    return float(apart.max()) + float(np.hypot(*(track[-1] - track[0]))) / 400
-
-
 def _leg_ends(
-    vessel: Vessel, environment: Environment, runs: list[Primitive], top_mps: float, yaw_rate_radps: float
+    vessel: Vessel,
+    environment: Environment,
+    runs: list[Primitive],
+    exits: list[tuple[float, float, float]],
+    top_mps: float,
+    yaw_rate_radps: float,
 ) -> tuple[list[LegEnd], list[LegEnd]]:
     """Where legs begin, the start first, and where they end, the goal last."""
 
@@ -236,7 +137,10 @@ def _leg_ends(
         return leg_end(vessel, environment, speed, inputs, top_mps=top_mps, yaw_rate_radps=yaw_rate_radps)
 
     rest = end(np.zeros(3), None)
-    firsts = [end(item.exit_velocity, item.commands.values[-1]) for item in runs]
+    firsts = [
+        replace(end(item.exit_velocity, item.commands.values[-1]), slowest_mps=least, fastest_mps=most)
+        for item, (least, most, _) in zip(runs, exits, strict=True)
+    ]
     return [rest, *firsts], [*(end(item.entry_velocity, item.commands.values[0]) for item in runs), rest]
 
 

@@ -24,7 +24,7 @@ from expdesign.plan.joint_trials import joints_of, settled
 from expdesign.plan.lattice import LatticePlan, search_lattice
 from expdesign.plan.lattice_moves import build_lattice
 from expdesign.plan.leg_times import leg_times
-from expdesign.plan.leg_values import last_state, leg_speed_mps
+from expdesign.plan.leg_values import last_state
 from expdesign.plan.legs import LegTask, LegWater, find_leg, leg_trajectory
 from expdesign.plan.lower_bound import reposition_bound_s
 from expdesign.plan.placement import is_carried, place_runs
@@ -413,7 +413,6 @@ def _at_rest(problem: PlanProblem, pose: Array) -> Array:
 
 
 def _reposition_bound_s(problem: PlanProblem, water: LegWater) -> float:
-    ends = tuple(x for item in problem.primitives for x in (item.entry_velocity, item.exit_velocity))
     return reposition_bound_s(
         problem.vessel,
         problem.area,
@@ -422,6 +421,6 @@ def _reposition_bound_s(problem: PlanProblem, water: LegWater) -> float:
         primitives=problem.primitives,
         repeats=_repeats(problem),
         ends=(problem.start, problem.goal),
-        speed_mps=leg_speed_mps(water.ship.transit_speed_mps, ends),
+        transit_mps=water.ship.transit_speed_mps,
         yaw_rate_radps=water.ship.spot_rate_radps + water.ship.yaw_rate_radps,
     )

@@ -81,12 +81,13 @@ class LegEnd:
     """Where a leg begins or ends.
 
     Attributes:
-        speed_mps: through water.
+        slowest_mps, fastest_mps: through water.
         inputs: (m,) commands before it begins, or after it has ended; None for any.
         changes: of speed, in the leg's direction of time.
     """
 
-    speed_mps: float
+    slowest_mps: float
+    fastest_mps: float
     inputs: Array | None
     changes: SpeedChanges
 
@@ -118,7 +119,7 @@ def leg_end(
     least = 1e-3 * max(rate.max() for rate in found)  # a band that nothing passes through costs much, but not all
     faster, slower = (SPARE * np.maximum(rate, least) for rate in found)
     changes = SpeedChanges(edges_mps=edges, until_s=until_s, faster_mps2=faster, slower_mps2=slower)
-    return LegEnd(speed_mps=speed_mps, inputs=inputs, changes=changes)
+    return LegEnd(slowest_mps=speed_mps, fastest_mps=speed_mps, inputs=inputs, changes=changes)
 
 
 def to_work_s(vessel: Vessel) -> float:
@@ -189,8 +190,8 @@ def least_loss(first: LegEnd, last: LegEnd, vessel: Vessel) -> tuple[float, floa
     step_s, back = STEP * to_work_s(vessel), last.changes.reversed()
     moved_s = 0.0 if first.inputs is None or last.inputs is None else _moved_s(vessel, first.inputs, last.inputs)
     time_s: Array = step_s * np.arange(MOST_STEPS, dtype=np.float64)
-    fast, slow = first.changes.most(first.speed_mps, time_s), first.changes.least(first.speed_mps, time_s)
-    shed, kept = back.most(last.speed_mps, time_s), back.least(last.speed_mps, time_s)
+    fast, slow = first.changes.most(first.fastest_mps, time_s), first.changes.least(first.slowest_mps, time_s)
+    shed, kept = back.most(last.fastest_mps, time_s), back.least(last.slowest_mps, time_s)
     count = min(int(moved_s / step_s), MOST_STEPS - 1)
     while count < MOST_STEPS - 1 and not _can_meet(fast, slow, shed, kept, count):
         count += 1

@@ -151,7 +151,8 @@ class Plan:
         commands: (k, m) actuator commands from start to goal.
         trajectory: k + 1 samples.
         legs: in time order, without gaps.
-        reposition_bound_s: no plan with these runs repositions in less time [s].
+        reposition_bound_s: no plan with these runs, and legs no faster through water than transit speed, repositions in
+            less time [s]; proved but for what `expdesign.plan.lower_bound` says it looks for among draws.
         leave_water_probability: chance that the hull leaves allowed water in the trial as it is sailed, by
             `promise`, or None if not computed.
         leave_water_by_leg: the same for each leg, or () if not computed.

@@ -109,7 +109,8 @@ def summary(content: ReportContent) -> list[str]:
     plan, check = content.plan, content.plan.verification
     total, runs = plan.commands.duration_s, len(primitive_runs(plan))
     bound = (
-        f" (at this transit speed no plan with these runs needs less than {words.duration(plan.reposition_bound_s)})"
+        f" (at this transit speed no plan with these runs needs less than {words.duration(plan.reposition_bound_s)}, "
+        "as far as the fastest changes of speed are known)"
     )
     verdict = (
         f"The plan is verified: with its commands simulated again, the hull comes no nearer to forbidden water than "
