@@ -22,7 +22,7 @@ from expdesign.values import Array
 
 LARGEST_SPEED = 60.0
 NUDGE = 1e-5
-INNER, OUTER = {"theta", "term", "gain", "inertia"}, {"lever", "gyro"}
+INNER, OUTER = {"theta", "term", "gain", "inertia", "asymmetry"}, {"lever", "gyro"}
 """Kinds of effects that change neither surroundings nor sensors, and those that change sensors alone."""
 MOST_ROUNDS, LOST, NEAR, SETTLED = 12, 5.0, 3e-3, 1e-8
 """Of a simulation of all steps at once: rounds; growth of the change with which it is given up; change below which the

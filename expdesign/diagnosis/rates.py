@@ -6,6 +6,7 @@ import numpy as np
 
 from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.extended import Extended
+from expdesign.diagnosis.parts import ahead_force
 from expdesign.diagnosis.surroundings import Surroundings
 from expdesign.values import Array
 from expdesign.vessel import NUMPY
@@ -28,6 +29,9 @@ def _accelerations(ship: Extended, u: Array, v: Array, r: Array, around: Surroun
         signals["u"], signals["v"] = u - around["u_c"], v - around["v_c"]
     if "u_w" in around:
         signals["u_q"], signals["v_q"] = u - around["u_w"], v - around["v_w"]
+    lean = ship.get("asymmetry")
+    if lean:
+        signals["tau_psi"] = signals["tau_psi"] + lean * ahead_force(signals, ship.model)
     totals = {name: np.zeros_like(u) for name in OUTPUTS}
     steady = dict(totals)
     for part in ship.parts:
@@ -38,7 +42,7 @@ def _accelerations(ship: Extended, u: Array, v: Array, r: Array, around: Surroun
             value = value * (1 + ship.get("shallow:damping") * around[SHOAL])
         into = steady if part.coriolis else totals
         into[part.equation] = into[part.equation] + value
-    if "lean" in around and not any(part.reads_turn for part in ship.parts):
-        totals["r"] = totals["r"] + around["lean"]
+    if lean and not any(part.reads_turn for part in ship.parts):
+        totals["r"] = totals["r"] + lean * ahead_force(signals, ship.model)
     heavier = 1.0 if SHOAL not in around else 1 + ship.get("shallow:inertia") * around[SHOAL]
     return [totals[n] / ((1 + ship.get(f"inertia:{n}")) * heavier) + steady[n] for n in OUTPUTS]

@@ -8,7 +8,6 @@ import numpy as np
 
 from expdesign.diagnosis.extended import Extended
 from expdesign.diagnosis.followed import followed_inputs
-from expdesign.diagnosis.parts import ahead_force
 from expdesign.diagnosis.windows import Windows
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, VesselModel, generalised_force
@@ -52,9 +51,6 @@ def surroundings(ship: Extended, windows: Windows) -> Surroundings:
     signals = windows.gather(tuple(_acting(model, *rows) for rows in followed))
     names = (*names, *(f"{RISE}{name}" for name in names)) if moving else names
     table = Surroundings({n: np.broadcast_to(signals[..., i], shape) for i, n in enumerate(names)})
-    if ship.get("asymmetry"):
-        table["tau_psi"] = table["tau_psi"] + ship.get("asymmetry") * ahead_force(table, model)
-        table["lean"] = ship.get("asymmetry") * ahead_force(table, model)
     north, east = ship.get("current:north"), ship.get("current:east")
     if north or east:
         table["u_c"], table["v_c"] = to_body(north, east, true_heading(ship, windows))
