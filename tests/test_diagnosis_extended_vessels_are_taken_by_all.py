@@ -77,7 +77,7 @@ def finding(cause: str) -> Finding:
     return Finding(
         cause=cause, estimates=estimates, p_value=1e-6, fit_before=np.zeros(3), fit_after=np.ones(3), falls=(),
         gain=1.0, gain_interval=(0.5, 1.5), not_distinguishable_from=(), would_tell_apart=None, explanation="made up",
-        suspect="time", worth=30.0,
+        worth=30.0, keys=tuple(EFFECTS[cause]),
     )  # fmt: skip
 
 
@@ -175,7 +175,7 @@ def test_the_page_of_a_lost_simulation_shows_no_astronomic_numbers(clean):
     lost = np.full(3, -1e8)
     before = replace(clean.before, fit=lost, rmse=np.full(3, np.inf), bias=np.full(3, -1e292))
     before = replace(before, growth=np.full_like(before.growth, 1e6))
-    found = replace(clean, before=before, findings=(finding("wind"),), errors={"wind": clean.windows.measured})
+    found = replace(clean, before=before, findings=(finding("wind"),), errors=(clean.windows.measured,))
     page = diagnosis_html(found, command="made up", version="0")
     text = re.sub(r"<svg.*?</svg>", "", page, flags=re.DOTALL)
     assert text.count("lost") >= 3

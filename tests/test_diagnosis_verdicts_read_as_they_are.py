@@ -20,7 +20,7 @@ def finding(cause: str, falls=((0.1, 0.0, 0.2), (0.5, 0.42, 0.58), (0.0, -0.1, 0
         cause=cause, estimates=(), p_value=1e-6, fit_before=np.zeros(3), fit_after=np.ones(3),
         falls=tuple(Fall(output=n, share=s, low=a, high=b) for n, (s, a, b) in zip(OUTPUTS, falls, strict=True)),
         gain=1.0, gain_interval=(0.5, 1.5), not_distinguishable_from=tuple(rivals), would_tell_apart=telling,
-        explanation="", suspect="time", worth=30.0,
+        explanation="", worth=30.0, keys=(),
     )  # fmt: skip
 
 

@@ -58,10 +58,8 @@ class Cause:
         name: in the vocabulary of diagnosis.json.
         candidates: the ways in which it may act in a situation; none when the data cannot show it.
         explain: one or two sentences for a person, from the estimates and the model they are of.
-        suspect: signal that the error is drawn against.
     """
 
     name: str
     candidates: Callable[[Situation], tuple[Candidate, ...]]
     explain: Callable[[Values, Extended], str]
-    suspect: str

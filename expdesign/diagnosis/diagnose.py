@@ -16,13 +16,14 @@ from expdesign.diagnosis.joint import Fit
 from expdesign.diagnosis.kept import LEAST_GAIN, kept, only_moves
 from expdesign.diagnosis.motion import linearise, start_responses
 from expdesign.diagnosis.notes import notes_on_data
+from expdesign.diagnosis.residuals import short_residuals
 from expdesign.diagnosis.search import search
 from expdesign.diagnosis.spread import spread
 from expdesign.diagnosis.steps import Search, Step
 from expdesign.diagnosis.support import check_support, still_inputs
 from expdesign.diagnosis.tell_apart import Proposal, most_telling, standard_proposals
 from expdesign.diagnosis.values import Diagnosis, Estimated, Finding
-from expdesign.diagnosis.verdict import error_falls, verdict
+from expdesign.diagnosis.verdict import error_falls, held_apart, verdict
 from expdesign.diagnosis.windows import Windows, cut_windows
 from expdesign.errors import Diverged
 from expdesign.signals import Record
@@ -89,10 +90,11 @@ def diagnose(
         before=before,
         after=after,
         findings=tuple(findings[index] for index in order),
-        verdict=verdict([findings[index] for index in order], before),
+        verdict=verdict([findings[index] for index in order], before, held_apart(windows)),
         simulated_before=motion.shown,
         simulated_after=simulate_from_first(final, windows).shown,
-        errors={step.chosen.candidate.cause: step.before.linear.motion.error for step in found.steps},
+        errors=tuple(found.steps[index].before.linear.motion.error for index in order),
+        residuals=short_residuals(ship, windows),
         notes=(
             *notes_on_data(vessel, record, windows, still_inputs(ship, windows)),
             *_settled_note(found, ship, windows, held[0]),
@@ -184,8 +186,8 @@ def _finding(
         not_distinguishable_from=tuple(rival.candidate.cause for rival in step.rivals),
         would_tell_apart=telling,
         explanation=cause.explain(values, last.ship) + as_stated(values, last.ship),
-        suspect=cause.suspect,
         worth=chosen.gain,
+        keys=tuple(values),
     )
 
 

@@ -71,8 +71,8 @@ class Finding:
         not_distinguishable_from: causes that explain the data as well.
         would_tell_apart: the manoeuvre for which they and this cause disagree most per minute, or None.
         explanation: a sentence or two.
-        suspect: what the error is drawn against.
         worth: twice the log likelihood gained.
+        keys: effects of the extended model that the estimates are of, in their order.
     """
 
     cause: str
@@ -86,8 +86,26 @@ class Finding:
     not_distinguishable_from: tuple[str, ...]
     would_tell_apart: str | None
     explanation: str
-    suspect: str
     worth: float
+    keys: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Residuals:
+    """Stretches, each with what the model lacks there and where that was.
+
+    Attributes:
+        outputs: of the model.
+        stretch_s: length of a stretch [s].
+        lacking: (k, n) measured less simulated acceleration [m/s^2, rad/s^2].
+        variables: (k,) means over the stretch by name: u v r as measured, inputs, `u_q v_q` through the air and `depth`
+            where they are measured, `heading` (0 to 2 pi), `time` since the data began and number of the `run`.
+    """
+
+    outputs: tuple[str, ...]
+    stretch_s: float
+    lacking: Array
+    variables: Mapping[str, Array]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -99,10 +117,11 @@ class Diagnosis:
         record: the data.
         windows: the data as compared.
         before, after: accuracy of both on all batches, in sample.
-        findings: by gain.
+        findings: by gain; that of each is against the model with what was found before it, in the order of the search.
         verdict: one sentence.
         simulated_before, simulated_after: (w, s, 4) channels beside `windows.measured`.
-        errors: per finding, (w, s, 4) remaining error without it, all other findings in the model.
+        errors: per finding, (w, s, 4) error without it, with what was found before it in the model.
+        residuals: of the model in use, within seconds.
         notes: what a reader must know: what was left out, what could not be tested.
         screened: (cause, p) of the last round, the smallest p per cause, corrected.
     """
@@ -117,6 +136,7 @@ class Diagnosis:
     verdict: str
     simulated_before: Array
     simulated_after: Array
-    errors: Mapping[str, Array]
+    errors: tuple[Array, ...]
+    residuals: Residuals
     notes: tuple[str, ...]
     screened: tuple[tuple[str, float], ...]

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from expdesign.diagnosis.gain import DRAWS, HeldOut
+from expdesign.diagnosis.gain import DRAWS, HeldOut, units
 from expdesign.diagnosis.values import Accuracy, Fall, Finding
+from expdesign.diagnosis.windows import Windows
 from expdesign.values import Array
 
 LOST_FIT = -300.0
@@ -97,17 +98,28 @@ def worth(item: Finding) -> str:
     return f"{way} the {WORDS[best.output]} error{by} {interval}"
 
 
-def verdict(findings: Sequence[Finding], before: Accuracy) -> str:
-    """The whole in one sentence."""
+def held_apart(windows: Windows) -> str:
+    """What gains are measured on: runs, or stretches of them where there are too few."""
+    return "runs" if np.array_equal(units(windows), windows.batch) else "stretches"
+
+
+def verdict(findings: Sequence[Finding], before: Accuracy, apart: str = "runs") -> str:
+    """The whole in one sentence.
+
+    Args:
+        findings: by gain.
+        before: of the model in use.
+        apart: what gains are measured on.
+    """
     if not findings:
         return f"Nothing is wrong that this data can show: {fits(before)}."
     what = listed([lacking(item.cause) for item in findings])
     parts = [f"The simulation lacks {what}"]
     if len(findings) == 1:
-        parts.append(f"adding it {worth(findings[0])} on runs it has not seen")
+        parts.append(f"adding it {worth(findings[0])} on {apart} it has not seen")
     else:
         gains = [f"{'adding ' if not i else ''}{lacking(item.cause)} {worth(item)}" for i, item in enumerate(findings)]
-        parts.append(f"on runs it has not seen, {listed(gains)}")
+        parts.append(f"on {apart} it has not seen, {listed(gains)}")
     unseen = [item for item in findings if item.falls and all(not fall.share >= VISIBLE for fall in item.falls)]
     if unseen:
         names = "it" if len(findings) == 1 else listed([lacking(item.cause) for item in unseen])

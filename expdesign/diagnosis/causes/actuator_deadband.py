@@ -46,4 +46,4 @@ def _explain(values: Values, _ship: Extended) -> str:
     return f"The ship does not answer {key.split(':')[1]} commands smaller than {rounded(value, std)}: a dead band."
 
 
-ACTUATOR_DEADBAND = Cause(name="actuator_deadband", candidates=_candidates, explain=_explain, suspect="small input")
+ACTUATOR_DEADBAND = Cause(name="actuator_deadband", candidates=_candidates, explain=_explain)

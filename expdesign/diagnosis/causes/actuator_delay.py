@@ -20,4 +20,4 @@ def _explain(values: Values, _ship: Extended) -> str:
     )
 
 
-ACTUATOR_DELAY = Cause(name="actuator_delay", candidates=_candidates, explain=_explain, suspect="input change")
+ACTUATOR_DELAY = Cause(name="actuator_delay", candidates=_candidates, explain=_explain)

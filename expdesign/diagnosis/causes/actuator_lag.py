@@ -48,4 +48,4 @@ def _explain(values: Values, _ship: Extended) -> str:
     )
 
 
-ACTUATOR_LAG = Cause(name="actuator_lag", candidates=_candidates, explain=_explain, suspect="input change")
+ACTUATOR_LAG = Cause(name="actuator_lag", candidates=_candidates, explain=_explain)

@@ -46,4 +46,4 @@ def _explain(values: Values, _ship: Extended) -> str:
     return f"The model holds until {rounded(time, std)} s of the data and not after: {words}."
 
 
-CHANGE_POINT = Cause(name="change_point", candidates=_candidates, explain=_explain, suspect="time")
+CHANGE_POINT = Cause(name="change_point", candidates=_candidates, explain=_explain)

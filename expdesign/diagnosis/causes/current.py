@@ -25,4 +25,4 @@ def _explain(values: Values, _ship: Extended) -> str:
     )
 
 
-CURRENT = Cause(name="current", candidates=_candidates, explain=_explain, suspect="heading")
+CURRENT = Cause(name="current", candidates=_candidates, explain=_explain)

@@ -22,4 +22,4 @@ def _explain(values: Values, _ship: Extended) -> str:
     )
 
 
-GYRO_SCALE = Cause(name="gyro_scale", candidates=_candidates, explain=_explain, suspect="r")
+GYRO_SCALE = Cause(name="gyro_scale", candidates=_candidates, explain=_explain)

@@ -30,4 +30,4 @@ def _explain(values: Values, ship: Extended) -> str:
     )
 
 
-HEADING_BIAS = Cause(name="heading_bias", candidates=_candidates, explain=_explain, suspect="u")
+HEADING_BIAS = Cause(name="heading_bias", candidates=_candidates, explain=_explain)

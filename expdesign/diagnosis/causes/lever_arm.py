@@ -28,4 +28,4 @@ def _explain(values: Values, ship: Extended) -> str:
     )
 
 
-LEVER_ARM = Cause(name="lever_arm", candidates=_candidates, explain=_explain, suspect="r")
+LEVER_ARM = Cause(name="lever_arm", candidates=_candidates, explain=_explain)

@@ -26,4 +26,4 @@ def _explain(values: Values, _ship: Extended) -> str:
     return f"Damping and thrust are both off by one factor: the inertia differs from the model's, in {parts}."
 
 
-LOAD_CHANGE = Cause(name="load_change", candidates=_candidates, explain=_explain, suspect="input change")
+LOAD_CHANGE = Cause(name="load_change", candidates=_candidates, explain=_explain)

@@ -126,4 +126,4 @@ def _explain(values: Values, _ship: Extended) -> str:
     return f"The error follows a regressor that the model does not have: the term {key[5:]}, {rounded(value, std)}."
 
 
-MISSING_TERM = Cause(name="missing_term", candidates=_candidates, explain=_explain, suspect="term")
+MISSING_TERM = Cause(name="missing_term", candidates=_candidates, explain=_explain)

@@ -25,4 +25,4 @@ def _explain(values: Values, _ship: Extended) -> str:
     return f"The structure fits, its numbers do not: the data want parameters changed ({changes})."
 
 
-PARAMETERS = Cause(name="parameters", candidates=_candidates, explain=_explain, suspect="input")
+PARAMETERS = Cause(name="parameters", candidates=_candidates, explain=_explain)

@@ -38,4 +38,4 @@ def _explain(values: Values, _ship: Extended) -> str:
     )
 
 
-ROLL_COUPLING = Cause(name="roll_coupling", candidates=_candidates, explain=_explain, suspect="time")
+ROLL_COUPLING = Cause(name="roll_coupling", candidates=_candidates, explain=_explain)

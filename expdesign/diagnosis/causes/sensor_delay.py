@@ -38,4 +38,4 @@ def _explain(values: Values, _ship: Extended) -> str:
     return f"One signal trails the others: {parts}."
 
 
-SENSOR_DELAY = Cause(name="sensor_delay", candidates=_candidates, explain=_explain, suspect="rate of change")
+SENSOR_DELAY = Cause(name="sensor_delay", candidates=_candidates, explain=_explain)

@@ -50,7 +50,7 @@ def _explain(values: Values, _ship: Extended) -> str:
     return f"The ship moves otherwise where the water is shallow: where it is twice as deep as the draught, {half}."
 
 
-SHALLOW_WATER = Cause(name="shallow_water", candidates=_candidates, explain=_explain, suspect="depth")
+SHALLOW_WATER = Cause(name="shallow_water", candidates=_candidates, explain=_explain)
 
 
 def in_shallow_water(

@@ -23,4 +23,4 @@ def _explain(values: Values, _ship: Extended) -> str:
     return f"The thrust error {way} with surge speed times thrust: {key.split(':')[1]} is off by {rounded(value, std)}."
 
 
-THRUST_ADVANCE_LOSS = Cause(name="thrust_advance_loss", candidates=_candidates, explain=_explain, suspect="advance")
+THRUST_ADVANCE_LOSS = Cause(name="thrust_advance_loss", candidates=_candidates, explain=_explain)

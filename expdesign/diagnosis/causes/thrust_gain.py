@@ -28,4 +28,4 @@ def _explain(values: Values, _ship: Extended) -> str:
     )
 
 
-THRUST_GAIN = Cause(name="thrust_gain", candidates=_candidates, explain=_explain, suspect="input")
+THRUST_GAIN = Cause(name="thrust_gain", candidates=_candidates, explain=_explain)

@@ -41,4 +41,4 @@ def _explain(values: Values, ship: Extended) -> str:
     )
 
 
-THRUSTER_ASYMMETRY = Cause(name="thruster_asymmetry", candidates=_candidates, explain=_explain, suspect="thrust")
+THRUSTER_ASYMMETRY = Cause(name="thruster_asymmetry", candidates=_candidates, explain=_explain)

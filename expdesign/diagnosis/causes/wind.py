@@ -81,4 +81,4 @@ def _explain(values: Values, _ship: Extended) -> str:
     )
 
 
-WIND = Cause(name="wind", candidates=_candidates, explain=_explain, suspect="wind")
+WIND = Cause(name="wind", candidates=_candidates, explain=_explain)

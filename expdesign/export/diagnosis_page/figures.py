@@ -6,15 +6,29 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from expdesign.conventions import OUTPUTS
-from expdesign.diagnosis import Diagnosis, Finding
+from expdesign.diagnosis import Diagnosis
+from expdesign.diagnosis.residuals import Dependence, dependence
+from expdesign.export.diagnosis_page.suspects import DEGREES, has_sign, suspected
 from expdesign.export.estimate_page.figures import AXES, thinned
-from expdesign.export.report.figures.style import BLUE, GREY, VERMILION, light_grid, new_figure, plain, svg
+from expdesign.export.report.figures.style import BLUE, GREY, VERMILION, light_grid, new_figure, short, svg
 from expdesign.values import Array
+from expdesign.vessel import column_name
 
 BINS = 16
 MOST_SPREADS = 3.0
 """Errors beyond so many standard deviations of what is measured are not drawn: the simulation is lost."""
-DEGREES = float(np.degrees(1.0))
+VISIBLE = 0.01
+"""Chance of colouring any panel where nothing depends on anything."""
+LACKING = {
+    "u": ("u [mm/s\N{SUPERSCRIPT TWO}]", 1000.0),
+    "v": ("v [mm/s\N{SUPERSCRIPT TWO}]", 1000.0),
+    "r": ("r [\N{DEGREE SIGN}/min\N{SUPERSCRIPT TWO}]", 3600 * DEGREES),
+}
+VARIABLES = {
+    "u": "u [m/s]", "v": "v [m/s]", "r": "r [\N{DEGREE SIGN}/s]", "u_q": "u through the air [m/s]",
+    "v_q": "v through the air [m/s]", "depth": "depth [m]", "heading": "heading [\N{DEGREE SIGN}]",
+    "time": "time [min]", "run": "run",
+}  # fmt: skip
 
 
 def window_figure(found: Diagnosis, index: int) -> str:
@@ -71,24 +85,23 @@ def growth_figure(found: Diagnosis) -> str:
     return svg(figure, key="growth", label="Root mean square error of the simulation against its horizon")
 
 
-def suspect_figure(found: Diagnosis, item: Finding, key: str) -> str:
-    """The error without a cause, against the variable that it should depend on."""
-    outputs = found.before.outputs
-    error = found.errors[item.cause]
-    values, label = suspected(found, item.suspect)
+def suspect_figure(found: Diagnosis, index: int, key: str) -> str:
+    """The error without a finding, against the variable that it should depend on."""
+    outputs, error, item = found.before.outputs, found.errors[index], found.findings[index]
+    values, label = suspected(found, item)
     figure = new_figure(9.0, 2.5)
     columns = np.atleast_1d(figure.subplots(1, len(outputs)))
     for axes, output in zip(columns, outputs, strict=True):
         name, factor = AXES[output]
-        _scatter(axes, values, factor * error[..., OUTPUTS.index(output)])
+        _scatter(axes, values, factor * error[..., OUTPUTS.index(output)], signed=has_sign(item))
         axes.set_title(f"error of {name}")
-        axes.set_xlabel(plain(label))
+        axes.set_xlabel(short(label))
         light_grid(axes)
     return svg(figure, key=key, label=f"Error of the simulation against {label}")
 
 
-def _scatter(axes: Axes, x: Array, y: Array) -> None:
-    """Every sample in grey, means of equal numbers of samples with their spread over windows in colour."""
+def _scatter(axes: Axes, x: Array, y: Array, *, signed: bool) -> None:
+    """Every sample in grey, means or root mean squares of equal numbers of samples in colour."""
     seen = np.isfinite(x) & np.isfinite(y)
     a, b = x[seen], y[seen]
     if len(a) == 0:
@@ -97,50 +110,60 @@ def _scatter(axes: Axes, x: Array, y: Array) -> None:
     axes.plot(a[::step], b[::step], ".", color="#c8c8c8", markersize=2, rasterized=False)
     edges = np.unique(np.quantile(a, np.linspace(0, 1, BINS + 1)))
     place = np.clip(np.searchsorted(edges, a, side="right") - 1, 0, max(len(edges) - 2, 0))
-    middles = [float(np.mean(a[place == number])) for number in range(len(edges) - 1) if (place == number).any()]
-    means = [float(np.mean(b[place == number])) for number in range(len(edges) - 1) if (place == number).any()]
-    axes.plot(middles, means, "o-", color=VERMILION, markersize=4, linewidth=1.2)
+    groups = [place == number for number in range(len(edges) - 1) if (place == number).any()]
+    middles = [float(np.mean(a[group])) for group in groups]
+    sizes = [float(np.mean(b[group]) if signed else np.sqrt(np.mean(b[group] ** 2))) for group in groups]
+    axes.plot(middles, sizes, "o-", color=VERMILION, markersize=4, linewidth=1.2)
     axes.axhline(0.0, color=GREY, linewidth=0.8)
     low, high = np.quantile(b, [0.005, 0.995])
     axes.set_ylim(low - 0.1 * (high - low + 1e-12), high + 0.1 * (high - low + 1e-12))
 
 
-def suspected(found: Diagnosis, name: str) -> tuple[Array, str]:
-    """(w, s) values of a suspected variable at the compared samples, and its label."""
-    windows = found.windows
-    every = slice(None, None, windows.steps_per_sample)
-    u, v, r = np.moveaxis(windows.measured[..., :3], -1, 0)
-    inputs = windows.gather(windows.batch_inputs)[:, every]
-    scale = np.maximum(np.std(inputs.reshape(-1, inputs.shape[-1]), axis=0), 1e-12)
-    push = inputs[..., 0]
-    change = np.zeros_like(push)
-    change[:, 1:] = np.abs(np.diff(inputs, axis=1) / scale).sum(axis=2)
-    wind = windows.wind[:, every]
-    table: dict[str, tuple[Array, str]] = {
-        "heading": (DEGREES * (windows.heading[:, every] % (2 * np.pi)), "heading [\N{DEGREE SIGN}]"),
-        "wind": (np.hypot(u - wind[..., 0], v - wind[..., 1]), "wind over deck [m/s]"),
-        "input": (push, "first input"),
-        "thrust": (push, "first input"),
-        "small input": (push, "first input"),
-        "input change": (_since((change > 0.2).astype(float)) * windows.sample_s, "time since an input changed [s]"),
-        "advance": (push * u, "first input times surge speed"),
-        "u": (u, "u [m/s]"),
-        "r": (DEGREES * r, "r [\N{DEGREE SIGN}/s]"),
-        "rate of change": (np.gradient(v, windows.sample_s, axis=1), "rate of change of v [m/s\N{SUPERSCRIPT TWO}]"),
-        "term": (u * r, "u r [m/s\N{SUPERSCRIPT TWO}]"),
-        "depth": (windows.depth_m[:, every], "water depth [m]"),
-        "time": (windows.time_s[:, every] / 60, "time [min]"),
+def residual_figures(found: Diagnosis) -> list[tuple[bool, str]]:
+    """Pictures of what the model lacks against every variable, clearest first, and whether it surely depends on it."""
+    residuals = found.residuals
+    tests = {
+        name: [dependence(residuals, output, name) for output in residuals.outputs] for name in residuals.variables
     }
-    return table[name]
+    clear = VISIBLE / sum(len(items) for items in tests.values())
+    limits = [1.15 * max(float(np.abs(items[i].mean).max() + items[i].std.max()) for items in tests.values())
+              for i in range(len(residuals.outputs))]  # fmt: skip
+    ranked = sorted(tests, key=lambda name: min(item.p_value for item in tests[name]))
+    return [
+        (
+            any(item.p_value < clear for item in tests[name]),
+            _residual_figure(name, residuals.outputs, tests[name], limits, clear),
+        )
+        for name in ranked
+    ]
 
 
-def _since(events: Array) -> Array:
-    """(w, s) samples since the last event."""
-    result = np.full(events.shape, np.nan)
-    for row, happened in zip(result, events, strict=True):
-        last = None
-        for index, now in enumerate(happened):
-            last = index if now else last
-            if last is not None:
-                row[index] = index - last
-    return result
+def _residual_figure(
+    name: str, outputs: tuple[str, ...], items: list[Dependence], limits: list[float], clear: float
+) -> str:
+    """One variable: means of the residual with two standard errors, an output above the other."""
+    figure = new_figure(2.6, 0.55 + 0.95 * len(outputs))
+    rows = np.atleast_1d(figure.subplots(len(outputs), 1, sharex=True))
+    factor = DEGREES if name == "heading" else 1 / 60 if name == "time" else DEGREES if name == "r" else 1.0
+    for axes, output, item, limit in zip(rows, outputs, items, limits, strict=True):
+        label, scale = LACKING[output]
+        colour = VERMILION if item.p_value < clear else BLUE
+        axes.axhline(0.0, color=GREY, linewidth=0.8)
+        axes.errorbar(factor * item.middle + (name == "run"), scale * item.mean, 2 * scale * item.std, fmt="o-",
+                      color=colour, markersize=3, linewidth=1.0, elinewidth=1.0)  # fmt: skip
+        axes.set_ylim(-scale * limit, scale * limit)
+        axes.set_ylabel(label, fontsize=8)
+        axes.tick_params(labelsize=8)
+        axes.locator_params(axis="y", nbins=4)
+        light_grid(axes)
+    rows[-1].set_xlabel(variable_label(name), fontsize=9)
+    figure.align_ylabels()
+    return svg(
+        figure, key=f"residual-{name}", label=f"Acceleration that the model lacks against {variable_label(name)}"
+    )
+
+
+def variable_label(name: str) -> str:
+    """A variable of the residuals with its unit."""
+    unit = column_name(name).removeprefix(name).strip("_")
+    return VARIABLES.get(name, f"{name} [{unit}]" if unit else name)

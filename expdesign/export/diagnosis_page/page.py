@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from expdesign.diagnosis import Diagnosis, Finding
+from expdesign.diagnosis.search import ALARM
 from expdesign.diagnosis.values import Fall
-from expdesign.diagnosis.verdict import LOST_FIT, fits, lacking, lost, manoeuvre, worth
-from expdesign.export.diagnosis_page.figures import growth_figure, suspect_figure, window_figure
+from expdesign.diagnosis.verdict import LOST_FIT, fits, held_apart, lacking, lost, manoeuvre, worth
+from expdesign.export.diagnosis_page.figures import growth_figure, residual_figures, suspect_figure, window_figure
+from expdesign.export.diagnosis_page.suspects import has_sign
 from expdesign.export.diagnosis_page.wording import titled, worded
 from expdesign.export.estimates import plus_minus
 from expdesign.export.pages import page_templates
@@ -25,11 +27,14 @@ def diagnosis_html(found: Diagnosis, *, command: str, version: str) -> str:
         figures = {
             "windows": [(_stretch(found, i), window_figure(found, i)) for i in drawn(found)],
             "growth": growth_figure(found),
-            "suspects": [suspect_figure(found, item, f"suspect{i}") for i, item in enumerate(found.findings)],
+            "residuals": residual_figures(found),
+            "suspects": [suspect_figure(found, i, f"suspect{i}") for i in range(len(found.findings))],
         }
     page = page_templates("diagnosis_page").get_template("diagnosis.html")
     return page.render(
         found=found,
+        alarm=f"{ALARM:g}",
+        apart=held_apart(found.windows),
         findings=[_finding(item, found) for item in found.findings],
         before=fits(found.before),
         astray=lost(found.before) or lost(found.after),
@@ -94,6 +99,7 @@ def _finding(item: Finding, found: Diagnosis) -> dict[str, object]:
         "gain": words.number(item.gain, 1),
         "interval": f"{words.number(low, 1)} to {words.number(high, 1)}",
         "fits": rows,
+        "signed": has_sign(item),
         "worth": worth(item),
         "falls": [_fall(fall) for fall in item.falls if np.isfinite(fall.share)],
         "rivals": [lacking(name) for name in item.not_distinguishable_from],

@@ -1,0 +1,136 @@
+"""What is drawn of a simulation's error: what the model lacks, and findings against what they depend on."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnosis_case import hidden_record, vessel_of
+
+from expdesign.diagnosis import Estimated, Finding, diagnose
+from expdesign.diagnosis.extension import as_extended, public_name
+from expdesign.diagnosis.residuals import _slopes, dependence, short_residuals
+from expdesign.diagnosis.values import Residuals
+from expdesign.diagnosis.windows import cut_windows
+from expdesign.export.diagnosis_page import diagnosis_html
+from expdesign.export.diagnosis_page.suspects import has_sign, suspected
+
+ALONE = ("u", "v", "r", "n1", "a1", "n2", "a2", "u_q", "v_q", "heading", "time", "run")
+
+
+@pytest.fixture(scope="module")
+def clean():
+    return diagnose(vessel_of("tug"), hidden_record("tug", seed=3, batches=3, samples=120))
+
+
+def finding(keys: tuple[str, ...], cause: str = "parameters", estimates: tuple[Estimated, ...] = ()) -> Finding:
+    return Finding(
+        cause=cause, estimates=estimates, p_value=1e-6, fit_before=np.zeros(3), fit_after=np.ones(3), falls=(),
+        gain=1.0, gain_interval=(0.5, 1.5), not_distinguishable_from=(), would_tell_apart=None, explanation="made up",
+        worth=30.0, keys=keys,
+    )  # fmt: skip
+
+
+def test_slopes_of_straight_errors_are_exact_whatever_is_missing():
+    error = 3.0 + 0.5 * 0.2 * np.arange(10)[None, :, None] * np.ones((2, 10, 3))
+    error[0, [0, 4, 9], 1] = np.nan
+    slopes, count = _slopes(error, 0.2)
+    np.testing.assert_allclose(slopes, 0.5)
+    assert count.tolist() == [[10, 7, 10], [10, 10, 10]]
+
+
+@pytest.mark.parametrize(
+    ("alike", "by", "most"), [(0.0, "u", 0.05), (0.0, "time", 0.05), (0.5, "u", 0.05), (0.5, "time", 0.1)]
+)
+def test_chance_alone_colours_no_more_than_it_should(alike, by, most):
+    """Of 400 series that depend on nothing, white or alike by a half; these look like drifts twice as often at most."""
+    rng = np.random.default_rng(0)
+    p_values = []
+    for _ in range(400):
+        lacking, run = rng.standard_normal((160, 1)), np.repeat(np.arange(4.0), 40)
+        for k in range(1, 160):
+            lacking[k] += alike * lacking[k - 1]
+        variables = {"u": rng.standard_normal(160), "time": np.arange(160.0), "run": run}
+        found = Residuals(outputs=("u",), stretch_s=10.0, lacking=lacking, variables=variables)
+        p_values.append(dependence(found, "u", by).p_value)
+    assert np.mean(np.array(p_values) < 0.05) < most + 4 * np.sqrt(0.05 * 0.95 / 400)
+
+
+def test_a_current_shows_by_heading_before_any_cause_is_named():
+    record = hidden_record("tug", seed=3, batches=6, samples=200, current=(0.2, 0.1))
+    ship = as_extended(vessel_of("tug"), record)
+    residuals = short_residuals(ship, cut_windows(ship.model, record))
+    assert tuple(residuals.variables) == ALONE
+    for output in ("u", "v"):
+        by = {name: dependence(residuals, output, name).p_value for name in residuals.variables}
+        assert min(by, key=by.__getitem__) == "heading"
+        assert by["heading"] < 1e-6
+
+
+def test_a_stretch_tells_the_acceleration_that_is_missing():
+    """Yaw acceleration g tau_x too much: after t the rate is off by g tau_x (1 - exp(-d t)) / d, with the damping d.
+
+    What sway does to yaw beside it, and orders that change in a stretch, leave the comparison good to a seventh.
+    """
+    record = hidden_record("barge", seed=3, batches=4, samples=200)
+    ship = as_extended(vessel_of("barge"), record)
+    windows = cut_windows(ship.model, record)
+    right, wrong = (short_residuals(one, windows) for one in (ship, ship.having({"asymmetry": 0.6})))
+    slope = np.polyfit(right.variables["tau_x"], wrong.lacking[:, 2] - right.lacking[:, 2], 1)[0]
+    time = np.arange(10.0)
+    expected = -0.6 * 0.0004 * np.polyfit(time, (1 - np.exp(-0.12 * time)) / 0.12, 1)[0]
+    assert slope == pytest.approx(expected, rel=1 / 7)
+
+
+SHOWN = {
+    "term:Y_abs_r_r": "Y_abs_r_r", "theta:X_u": "X_u: u", "deadband:a": "a1 [rad]", "offset:n2": "n2 [rps]",
+    "lag:n": "time since", "delay:all": "time since", "gain": "ahead force, tau_x", "asymmetry": "ahead force",
+    "inertia:v": "rate of change of v", "late:r": "rate of change of r", "late:psi": "r [", "gyro": "r [",
+    "lever:forward": "r [", "heading_bias": "u [", "current:north": "heading", "shallow:damping": "water depth",
+    "roll:sway": "time [min]", "change:time": "time [min]",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("key", SHOWN)
+def test_a_finding_is_drawn_against_what_it_depends_on(key, clean):
+    name = public_name(key, as_extended(clean.vessel, clean.record))[0]
+    item = finding((key,), estimates=(Estimated(name=name, value=1.0, std=0.1, unit=""),))
+    values, label = suspected(clean, replace(item, cause="parameters" if key.startswith("theta") else "any"))
+    assert SHOWN[key] in label
+    assert values.shape == clean.windows.measured.shape[:2]
+
+
+def test_regressors_and_times_since_changes_are_those_of_the_data(clean):
+    r = clean.windows.measured[..., 2]
+    values, _ = suspected(clean, finding(("term:Y_abs_r_r",), "missing_term:Y_abs_r_r"))
+    np.testing.assert_allclose(values, np.abs(r) * r)
+    late, _ = suspected(clean, finding(("lag:n",), "actuator_lag"))
+    orders = clean.windows.gather(clean.windows.batch_inputs)[..., [0, 2]]
+    changed = np.zeros(late.shape, dtype=bool)
+    changed[:, 1:] = np.abs(np.diff(orders, axis=1)).sum(axis=2) > 1.0
+    assert changed.any()
+    assert (late[changed] == 0).all()
+    assert set(late[:, 1:][changed[:, :-1]].tolist()) <= {0.0, clean.windows.sample_s}
+    assert not has_sign(finding(("lag:n",)))
+
+
+def test_of_several_parameters_the_clearest_is_drawn(clean):
+    model = clean.vessel.model
+    names = ("X_u", "Y_v")
+    estimates = tuple(
+        Estimated(name=name, value=float(model.parameters[model.names.index(name)]) + moved, std=0.01, unit="")
+        for name, moved in zip(names, (0.01, -0.2), strict=True)
+    )
+    _, label = suspected(clean, finding(("theta:X_u", "theta:Y_v"), estimates=estimates))
+    assert label == "Y_v: v"
+
+
+def test_two_findings_of_one_cause_have_a_picture_each(clean):
+    items = tuple(
+        finding((f"theta:{name}",), estimates=(Estimated(name=name, value=0.1, std=0.01, unit=""),))
+        for name in ("X_u", "Y_v")
+    )
+    found = replace(clean, findings=items, errors=(clean.windows.measured, clean.windows.measured))
+    page = diagnosis_html(found, command="made up", version="0")
+    assert "X_u: u" in page
+    assert "Y_v: v" in page
+    assert page.index("What the model lacks") < page.index('id="finding1"')
