@@ -3,7 +3,7 @@ import pytest
 import shapely
 from plan_case import leg_water
 
-from expdesign.plan.field import goal_field
+from expdesign.plan.goal_ways import build_goal_ways
 from expdesign.plan.lattice import search_lattice
 from expdesign.plan.lattice_moves import build_lattice
 from expdesign.plan.search_space import SearchSpace, Stamp
@@ -33,7 +33,7 @@ def space(water: shapely.Geometry, goal, *stamps: Stamp) -> SearchSpace:
         stamps=stamps,
         frame=legs.area.frame,
         field=legs.field,
-        goal_way=goal_field(legs.field, np.array(goal[:2]), clearance_m=margin),
+        goal_way=build_goal_ways(legs.narrowest_ways, legs.field, np.array(goal[:2])),
         goal=np.array(goal, dtype=float),
         ship=legs.ship,
         hull_m=30.0,
@@ -78,9 +78,17 @@ def test_every_way_is_as_long_as_the_distance_or_longer_and_turns_have_the_ships
     carried = 3 * np.hypot(100, 130)
     assert plan.cost >= (np.hypot(*(case.goal - start)[:2]) - carried) / case.ship.transit_speed_mps
     problem = build_lattice(case, (3,), start, spacing_m=10.0)
-    assert problem.moves.data[: problem.moves.nnz // 2].min() > 0
     side = case.ship.turning_radius_m  # a lattice finer than the turning radius could not be sailed
-    assert problem.moves.shape[0] < 4 * (2500 / side + 3) ** 2
+    rows, columns = (int((size - 1) * case.field.cell_m / side) + 1 for size in case.field.clearance_m.shape)
+    assert problem.start == 4 * rows * columns
+    between = problem.moves[: problem.start, : problem.start].tocoo()
+    cells = np.stack([np.divmod(pose // 4, columns) for pose in between.coords]).astype(float)
+    apart_m = side * np.hypot(*(cells[1] - cells[0]))
+    turns = between.coords[0] % 4 != between.coords[1] % 4
+    sailed_m = between.data * case.ship.transit_speed_mps
+    np.testing.assert_allclose(apart_m[turns], side * np.sqrt(2))
+    np.testing.assert_allclose(sailed_m[turns], side * np.pi / 2)
+    np.testing.assert_allclose(sailed_m[~turns], apart_m[~turns])
 
 
 def test_runs_begin_only_where_their_discs_have_room():

@@ -93,7 +93,7 @@ def test_the_mirrored_leg_takes_as_long():
     left, right = (find_leg(task(start * flip, end * flip), water) for flip in (np.ones(6), mirror))
     assert left is not None
     assert right is not None
-    assert abs(len(left) - len(right)) <= 2
+    assert abs(len(left) - len(right)) <= 1  # times that differ by the tolerance may round to two samples
 
 
 def test_a_leg_is_not_faster_than_top_speed_and_not_slower_than_twice_the_estimate():
