@@ -8,9 +8,10 @@ from plan_case import VESSELS, area, at_rest, leg_water
 from expdesign.plan import PlanSettings
 from expdesign.plan._ompl import dubins_curve
 from expdesign.plan.capability import capability
+from expdesign.plan.curves import find_path
 from expdesign.plan.field import clearance_field
 from expdesign.plan.footprint import swept_area
-from expdesign.plan.legs import LegTask, LegWater, find_leg, find_path, leg_trajectory
+from expdesign.plan.legs import LegTask, LegWater, find_leg, leg_trajectory
 from expdesign.scenario import load_vessel
 from expdesign.simulation import CALM
 

@@ -1,4 +1,4 @@
-"""Grids over the allowed water: distance to danger, and distance to the goal round the islands."""
+"""The grid over the allowed water: distance to danger, and the widest way through."""
 
 from __future__ import annotations
 
@@ -15,8 +15,6 @@ from expdesign.values import Array
 
 FINEST_CELLS = 3_000_000
 ROUTING_CELLS = 400_000
-OCTILE_EXCESS = float(1.0 / np.cos(np.pi / 8))
-"""Largest ratio of an eight-neighbour grid path to the straight line: 1.0824."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -85,80 +83,6 @@ def clearance_field(area: SeaArea, *, resolution_m: float) -> ClearanceField:
     return ClearanceField(origin=np.array([norths[0], easts[0]]), cell_m=cell, clearance_m=distance.clip(0.0))
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class GoalField:
-    """Shortest ways to the goal through water with a given clearance.
-
-    Attributes:
-        field: the grid.
-        distance_m: (cells,) length of the shortest eight-neighbour way to the goal, infinite where there is none.
-        following: (cells,) next cell on that way, the cell itself at the goal and where there is none.
-    """
-
-    field: ClearanceField
-    distance_m: Array
-    following: np.ndarray
-
-    def flat(self, points: Array) -> np.ndarray:
-        """Flat cell numbers of (..., 2) points."""
-        rows, columns = self.field.index(points)
-        return np.asarray(rows * self.field.clearance_m.shape[1] + columns)
-
-    def to_goal(self, points: Array) -> Array:
-        """(...,) distance to the goal in between the grid's over-estimate and a sure under-estimate [m]."""
-        return np.asarray(self.distance_m[self.flat(points)]) / float(np.sqrt(OCTILE_EXCESS))
-
-    def lower_bound(self, point: Array) -> float:
-        """A length that no way from the point to the goal falls below [m]."""
-        return max(0.0, float(self.distance_m[self.flat(point)]) / OCTILE_EXCESS - 2 * self.field.error_m)
-
-    def way(self, point: Array) -> Array:
-        """(k, 2) cell centres from the point's cell to the goal's; one row where there is no way."""
-        cells = [int(self.flat(point))]
-        while (after := int(self.following[cells[-1]])) != cells[-1]:
-            cells.append(after)
-        return self.field.centre(np.array(cells))
-
-
-def goal_field(
-    fine: ClearanceField, goal: Array, *, clearance_m: float, berths: Array | None = None, berth_m: float = 0.0
-) -> GoalField:
-    """Distances to a goal (2,) over cells with at least `clearance_m`; the goal's own cell always counts.
-
-    Near `berths` (b, 2), within `berth_m`, no more is asked than the berth itself has.
-    """
-    field = fine.thinned(ROUTING_CELLS)
-    rows, columns = field.clearance_m.shape
-    free = field.clearance_m >= clearance_m
-    for berth in np.zeros((0, 2)) if berths is None else berths:
-        away = np.hypot(*np.moveaxis(field.centre(np.arange(rows * columns)) - berth, -1, 0)).reshape(rows, columns)
-        free |= (away <= berth_m) & (field.clearance_m >= float(fine.at(berth)) - field.cell_m)
-    goal_row, goal_column = field.index(goal)
-    free[goal_row, goal_column] = True
-    numbers = np.arange(rows * columns).reshape(rows, columns)
-    tails, heads, lengths = [], [], []
-    for step_row, step_column in ((0, 1), (1, 0), (1, 1), (1, -1)):
-        a, b = _neighbours(numbers, step_row, step_column)
-        both = free.ravel()[a] & free.ravel()[b]
-        tails.append(a[both])
-        heads.append(b[both])
-        lengths.append(np.full(int(both.sum()), field.cell_m * np.hypot(step_row, step_column)))
-    tail, head, length = np.concatenate(tails), np.concatenate(heads), np.concatenate(lengths)
-    graph = coo_matrix((length, (tail, head)), shape=(numbers.size, numbers.size)).tocsr()
-    goal_cell = int(numbers[goal_row, goal_column])
-    distance, before = dijkstra(graph, directed=False, indices=goal_cell, return_predecessors=True)
-    following = np.where(before < 0, np.arange(numbers.size), before)
-    return GoalField(field=field, distance_m=distance, following=following)
-
-
-def _neighbours(numbers: np.ndarray, step_row: int, step_column: int) -> tuple[np.ndarray, np.ndarray]:
-    rows, columns = numbers.shape
-    low, high = max(0, -step_column), columns - max(0, step_column)
-    a = numbers[: rows - step_row, low:high]
-    b = numbers[step_row:, low + step_column : high + step_column]
-    return a.ravel(), b.ravel()
-
-
 def narrowest_passage(field: ClearanceField, start: Array, goal: Array) -> tuple[float, Array]:
     """The largest clearance with which start (2,) and goal (2,) are connected, and where the way is that narrow.
 
@@ -174,5 +98,35 @@ def narrowest_passage(field: ClearanceField, start: Array, goal: Array) -> tuple
         low, high = (middle, high) if regions[a] == regions[b] else (low, middle)
     regions, _ = label(field.clearance_m >= high, structure=eight)
     apart = sum(distance_transform_edt(regions != regions[end]) if regions[end] else 0.0 * regions for end in (a, b))
-    way = goal_field(field, goal, clearance_m=low - field.cell_m).way(start)
+    way = _way(field, start, goal, low - field.cell_m)
     return low, way[int(np.argmin(apart[field.index(way)]))]
+
+
+def _way(fine: ClearanceField, start: Array, goal: Array, clearance_m: float) -> Array:
+    """(k, 2) centres of a shortest eight-neighbour way through cells with a clearance; one row where there is none."""
+    field = fine.thinned(ROUTING_CELLS)
+    free = field.clearance_m >= clearance_m
+    free[field.index(goal)] = True
+    numbers = np.arange(free.size).reshape(free.shape)
+    tails, heads, lengths = [], [], []
+    for step_row, step_column in ((0, 1), (1, 0), (1, 1), (1, -1)):
+        a, b = _neighbours(numbers, step_row, step_column)
+        both = free.ravel()[a] & free.ravel()[b]
+        tails.append(a[both])
+        heads.append(b[both])
+        lengths.append(np.full(int(both.sum()), np.hypot(step_row, step_column)))
+    ends = np.concatenate(tails), np.concatenate(heads)
+    graph = coo_matrix((np.concatenate(lengths), ends), shape=(numbers.size, numbers.size)).tocsr()
+    before = dijkstra(graph, directed=False, indices=int(numbers[field.index(goal)]), return_predecessors=True)[1]
+    cells = [int(numbers[field.index(start)])]
+    while (after := int(before[cells[-1]])) >= 0:
+        cells.append(after)
+    return field.centre(np.array(cells))
+
+
+def _neighbours(numbers: np.ndarray, step_row: int, step_column: int) -> tuple[np.ndarray, np.ndarray]:
+    rows, columns = numbers.shape
+    low, high = max(0, -step_column), columns - max(0, step_column)
+    a = numbers[: rows - step_row, low:high]
+    b = numbers[step_row:, low + step_column : high + step_column]
+    return a.ravel(), b.ravel()

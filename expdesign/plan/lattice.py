@@ -276,15 +276,13 @@ class _Layers:
             if before == n and not any(counters):
                 return tuple(reversed(steps))
             if before == n:
-                pose, q, counters = self._run_before(done, counters, pose, float(layer.values[row]))
+                pose, q, counters = self._run_before(done, counters, pose)
                 steps.append((pose, q))
             else:
                 pose = before
                 steps.append((pose, -1))
 
-    def _run_before(
-        self, done: dict[Counters, _Layer], counters: Counters, pose: int, value: float
-    ) -> tuple[int, int, Counters]:
+    def _run_before(self, done: dict[Counters, _Layer], counters: Counters, pose: int) -> tuple[int, int, Counters]:
         """The run by which a layer was entered at a pose: where it began, which it was, and the counters before."""
         left = sum(self.problem.counts) - sum(counters)
         found: tuple[float, int, int, Counters] = (np.inf, -1, -1, ())

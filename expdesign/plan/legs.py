@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from expdesign.plan.curves import curved_leg, find_path
+from expdesign.plan.curves import curved_leg
 from expdesign.plan.helmed_legs import helmed_leg
 from expdesign.plan.leg_values import LegTask, LegWater, leg_trajectory
 from expdesign.plan.manoeuvres import agile_leg
 from expdesign.values import Array
 
-__all__ = ["LegTask", "LegWater", "find_leg", "find_path", "leg_trajectory"]
+__all__ = ["LegTask", "LegWater", "find_leg", "leg_trajectory"]
 
 
 def find_leg(task: LegTask, water: LegWater) -> Array | None:

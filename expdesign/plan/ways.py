@@ -86,11 +86,6 @@ class Ways:
         least, before = dijkstra(graph, indices=n, return_predecessors=True)
         return nodes, least, before
 
-    def length_m(self, start: Array, end: Array) -> float:
-        """Length of the taut string [m], infinite when there is none."""
-        way = self.shortest(start, end)
-        return float("inf") if way is None else polyline_length(way)
-
     def nearest(self, point: Array) -> Array:
         """The point itself (2,), or the nearest one in the water."""
         here = shapely.Point(point[1], point[0])
