@@ -44,16 +44,16 @@ def slip(half_m: float) -> LegWater:
 @pytest.mark.parametrize("backwards", [False, True])
 def test_out_of_a_slip_there_is_only_the_way_to_its_mouth(backwards):
     narrow, inside = slip(0.6 * RADIUS), np.array([-2 * RADIUS, 0.0, 0.0])
-    out = inside + (0, 0, np.pi * backwards)  # a way towards a place comes from where its stern points
+    out = np.add(inside, (0, 0, np.pi * backwards))  # a way towards a place comes from where its stern points
     assert gets_away(out, narrow, backwards=backwards)
-    assert not gets_away(out + (0, 0, np.pi), narrow, backwards=backwards)
+    assert not gets_away(np.add(out, (0, 0, np.pi)), narrow, backwards=backwards)
 
 
 def test_a_slip_wider_than_a_turn_of_half_a_circle_lets_ships_turn():
     least = RADIUS + np.hypot(RADIUS + VESSEL.beam_m / 2, VESSEL.length_m / 2) - RADIUS + CLEARANCE
     into = np.array([-2.5 * RADIUS, 0.0, np.pi])
     assert not gets_away(into, slip(0.9 * RADIUS))
-    assert gets_away(into + (0, -RADIUS, 0), slip(least + 0.3 * RADIUS))
+    assert gets_away(np.add(into, (0, -RADIUS, 0)), slip(least + 0.3 * RADIUS))
 
 
 def test_answers_do_not_depend_on_where_north_is():

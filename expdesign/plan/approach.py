@@ -10,9 +10,9 @@ from functools import cached_property
 
 import numpy as np
 
-from expdesign.plan._ompl import dubins_curve
 from expdesign.plan.fleet import Fleet
 from expdesign.plan.leg_values import LegWater
+from expdesign.plan.rounds import Rounds
 from expdesign.plan.run_up import AFTER, MISSED, ROUNDS, Tolerances, planned_stretch, run_up, under_way
 from expdesign.plan.steering import CATCH_UP, LEAD, Helmsman, Reference
 from expdesign.plan.ways_back import Convoy, WaysTo, build_ways_to
@@ -128,7 +128,7 @@ class Pilot:
         on = self.doing == ON_STRETCH
         passed, good = self._at_start(states)
         self.doing[on & passed & good] = BEGUN
-        worst = self._within.used(states, self._wanted).argmax(axis=1)
+        worst = 0 if self._last else self._within.used(states, self._wanted).argmax(axis=1)
         self._missed = np.where(on & passed, worst, np.where(late, MISSED.index("time"), self._missed))
         self.doing[(self.doing == ON_WAY) & late] = ABORTED
         self._run_up((self.doing == ON_WAY) & self._convoy.arrived(states))
@@ -156,7 +156,7 @@ class Pilot:
         self._limit[ships] = self._allowed(self._arrival - self._first)
 
     def _rejoin(self, states: Array) -> None:
-        """Ships go round at once that are farther off than the leg's time makes good, or would pass by danger coming back to it."""
+        """Ships go round at once that are farther off than the leg's time makes good, or see no clear way back."""
         first, helm = self._reference.states[0, :2], self._helm
         off_m = np.hypot(*(states[:, :2] - first).T)
         leg_s = self._end[0] * helm.vessel.sample_time_s
@@ -184,7 +184,8 @@ class Pilot:
         if not len(some):
             return
         self.rounds[some] += 1
-        ways = self._tree.find(states[some, :2]) if self._helm.sideways else [self._curve(x) for x in states[some]]
+        sideways = self._helm.sideways
+        ways = self._tree.find(states[some, :2]) if sideways else [self._arcs.find(x) for x in states[some, :3]]
         for ship, way in zip(some.tolist(), ways, strict=True):
             if way is None:
                 self._missed[ship] = MISSED.index("no way round")
@@ -195,11 +196,15 @@ class Pilot:
         self._spent[some] = 0
         self._limit[some] = self._allowed(self._convoy.length_m[some] / sample_m)
 
-    def _curve(self, state: Array) -> Array | None:
-        """(k, 2) the way of a ship that is steered by a helm from a state (6,), on turns that it can sail, or None."""
-        radius, goal, length = self._helm.ship.turning_radius_m, self._convoy.goal, self._helm.vessel.length_m
-        curve = dubins_curve(state[:3], goal[:3], radius_m=radius, spacing_m=length)[:, :2]
-        return curve if self._tree.holds(curve) else None
+    @cached_property
+    def _arcs(self) -> Rounds:
+        helm = self._helm
+        return Rounds(
+            goal=self._convoy.goal[:3],
+            radius_m=helm.ship.turning_radius_m,
+            spacing_m=helm.vessel.length_m,
+            holds=self._tree.holds,
+        )
 
     @cached_property
     def _tree(self) -> WaysTo:

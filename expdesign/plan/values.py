@@ -138,7 +138,7 @@ class Promise:
             return ""
         return (
             f"{self.aborted:.1%} of {self.trials} drawn trials, about {10 * self.aborted:.0f} in 10, had to be broken "
-            f"off because a run could not be begun, most of them {self.reasons[0]}"
+            f"off as a run could not be begun or the goal not come to, most of them {self.reasons[0]}"
         )
 
 

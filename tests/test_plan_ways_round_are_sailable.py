@@ -1,0 +1,75 @@
+"""Ways round of ships that sail arcs: shortest where there is room, never tighter than the ship turns, never ashore."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+
+from expdesign.plan._ompl import dubins_curve
+from expdesign.plan.rounds import Rounds
+from expdesign.plan.ways import polyline_length
+
+RADIUS, SPACING = 40.0, 5.0
+GOAL = np.array([0.0, 0.0, 0.7])
+ISLES = [shapely.Point(120 * np.cos(k), 120 * np.sin(k)).buffer(35) for k in (0.2, 1.7, 3.1, 4.9)]
+SEA = shapely.box(-500, -500, 500, 500).difference(shapely.union_all(ISLES))
+
+
+def rounds(water: shapely.Geometry, goal: np.ndarray = GOAL) -> Rounds:
+    return Rounds(
+        goal=goal,
+        radius_m=RADIUS,
+        spacing_m=SPACING,
+        holds=lambda way: bool(shapely.covers(water, shapely.LineString(way[:, ::-1]))),
+    )
+
+
+def poses(count: int) -> np.ndarray:
+    rng = np.random.default_rng(3)
+    found = rng.uniform([-450, -450, -np.pi], [450, 450, np.pi], (4 * count, 3))
+    clear = shapely.contains_xy(shapely.buffer(SEA, -10), found[:, 1], found[:, 0])
+    return found[clear][:count]
+
+
+def test_in_open_water_the_way_is_the_shortest_curve():
+    sea = rounds(shapely.box(-2000, -2000, 2000, 2000))
+    for pose in poses(20):
+        shortest = dubins_curve(pose, GOAL, radius_m=RADIUS, spacing_m=SPACING)
+        np.testing.assert_allclose(sea.find(pose), shortest[:, :2])
+
+
+def test_among_isles_ways_stay_in_the_water_join_the_ends_and_turn_no_tighter_than_the_ship():
+    direct, around, straits = 0, 0, rounds(SEA)
+    for pose in poses(60):
+        way = straits.find(pose)
+        shortest = dubins_curve(pose, GOAL, radius_m=RADIUS, spacing_m=SPACING)[:, :2]
+        if way is None:
+            continue
+        assert straits.holds(way)
+        np.testing.assert_allclose(way[[0, -1]], [pose[:2], GOAL[:2]], atol=1e-6)
+        steps = np.diff(way, axis=0)
+        turns = np.abs(np.angle(np.exp(1j * np.diff(np.arctan2(*steps.T[::-1])))))
+        lengths = np.hypot(*steps.T)
+        assert (turns <= 1.01 * (lengths[1:] + lengths[:-1]) / 2 / RADIUS + 1e-6).all()
+        assert polyline_length(way) >= polyline_length(shortest) - 1e-6
+        direct, around = direct + straits.holds(shortest), around + (not straits.holds(shortest))
+    assert direct + around >= 0.9 * 60
+    assert around >= 10
+
+
+def test_ways_turn_with_the_water():
+    turn = 1.1
+    c, s = np.cos(turn), np.sin(turn)
+    turned = rounds(shapely.affinity.rotate(SEA, -np.degrees(turn), origin=(0, 0)), np.add(GOAL, (0, 0, turn)))
+    straits = rounds(SEA)
+    for pose in poses(12):
+        way, other = straits.find(pose), turned.find(np.r_[np.array([[c, -s], [s, c]]) @ pose[:2], pose[2] + turn])
+        assert (way is None) == (other is None)
+        if way is not None:
+            assert polyline_length(other) == pytest.approx(polyline_length(way), rel=1e-6)
+
+
+def test_out_of_a_closed_pool_there_is_no_way():
+    pool = SEA.union(shapely.box(-900, -900, -700, -700))
+    assert rounds(pool).find(np.array([-800.0, -800.0, 0.0])) is None
