@@ -13,6 +13,7 @@ import numpy as np
 
 from expdesign.diagnosis.extended import Extended
 from expdesign.diagnosis.motion import Linear, Push, linearise, push_of, responses, simulate_windows, start_responses
+from expdesign.diagnosis.moves import moved
 from expdesign.diagnosis.noise import Noise, fit_colour, hats, wander_covariance, whitened
 from expdesign.diagnosis.spread import spread
 from expdesign.diagnosis.windows import Windows
@@ -243,12 +244,15 @@ def fit(
     precision[[key in flat for key in keys]] = 0.0
     starts = _fitting_starts(starts, ship.states)
     best: Fit | None = None
+    move, turn, share = np.zeros(len(keys)), np.zeros_like(starts), 1.0
     for step in range(steps + 1):
+        if best is not None:
+            ship, starts = best.ship.having(moved(best.ship, keys, share * move)), best.starts + share * turn
         motion = simulate_windows(ship, windows, starts, near=near)
         if motion.diverged:
             if best is None:
                 raise FloatingPointError
-            ship, starts = _halfway(best, ship, starts)
+            share /= 2
             continue
         linear = near = linearise(motion)
         pushes = [push_of(linear, ship.having({k: ship.get(k) + d}), d) for k in keys for d in [step_of(ship, k)]]
@@ -259,7 +263,7 @@ def fit(
         found = marginal(grams(columns, noise), columns, noise)
         cost = found.quadratic + float(precision @ now**2)
         if best is not None and cost > best.cost + 1.0:
-            ship, starts = _halfway(best, ship, starts)
+            share /= 2
             continue
         pull = found.s - precision * now
         close = (
@@ -282,8 +286,7 @@ def fit(
         )  # fmt: skip
         if last:
             break
-        ship = ship.having(limited(ship, dict(zip(keys, (now + move).tolist(), strict=True))))
-        starts = starts + _fitting_starts(_start_moves(columns, noise, move), ship.states)
+        turn, share = _fitting_starts(_start_moves(columns, noise, move), ship.states), 1.0
     assert best is not None
     return best
 
@@ -301,25 +304,6 @@ def _fitting_starts(starts: Array, n: int) -> Array:
     if starts.shape[1] < n:
         return np.column_stack([starts, np.zeros((len(starts), n - starts.shape[1]))])
     return starts[:, :n]
-
-
-def _halfway(best: Fit, ship: Extended, starts: Array) -> tuple[Extended, Array]:
-    middle = {key: (best.ship.get(key) + ship.get(key)) / 2 for key in best.keys}
-    return ship.having(middle), (best.starts + starts) / 2
-
-
-def limited(ship: Extended, effects: dict[str, float]) -> dict[str, float]:
-    """Times and widths stay positive, shares above minus nine tenths."""
-    result = {}
-    for key, value in effects.items():
-        kind = key.split(":")[0]
-        if kind in ("lag", "delay", "deadband") or key in ("roll:period", "roll:damping"):
-            before = ship.get(key)
-            value = min(max(value, before / 3, 1e-6), before * 3 + 1e-6)
-        elif kind in ("inertia", "gain", "gyro"):
-            value = max(value, -0.8)
-        result[key] = value
-    return result
 
 
 def step_of(ship: Extended, key: str) -> float:

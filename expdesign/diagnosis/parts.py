@@ -74,6 +74,17 @@ def own_parts(model: VesselModel, effects: Effects) -> list[Part]:
     return parts
 
 
+def scales(model: VesselModel, effects: Effects) -> dict[str, float]:
+    """What gains and inertia multiply every parameter of the model by, all the time."""
+    result = {}
+    for kind in _kinds(model):
+        result[kind.name] = 1.0 if kind.coriolis else 1.0 / (1 + effects.get(f"inertia:{kind.equation}", 0.0))
+        if kind.thrust:
+            result[kind.name] *= 1 + effects.get("gain", 0.0)
+            result[kind.name] *= 1.0 if kind.rudder else 1 + effects.get("gain:propeller", 0.0)
+    return result
+
+
 def added_parts(model: VesselModel, library: Mapping[str, Term], effects: Effects) -> list[Part]:
     """Library terms that were added."""
     known = (*MOTION_SIGNALS, *dict.fromkeys((*FORCE_SIGNALS, *model.inputs)))
