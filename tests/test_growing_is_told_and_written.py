@@ -69,6 +69,17 @@ def test_recorded_additions_lie_beside_the_dictionary(grown):
     assert {f"dictionary-grown-{spec.name}.csv" for spec in recorded} <= files
 
 
+def test_trials_are_rehearsed_with_the_design_that_a_run_makes(grown):
+    """Additions and seed included: as many runs of every manoeuvre as in durations.json."""
+    folder, _ = grown
+    tried = workflows.validate_design(
+        folder.parent / "scenario.toml", folder.parent / "tried", trials=2, integrator="euler", jobs=1, seed=3
+    )
+    runs = json.loads(tried.files[0].read_text("utf-8"))["designs"]["optimised"]["runs"]
+    rows = json.loads((folder / "durations.json").read_text())["primitives"]
+    assert runs == {row["name"]: row["repeats"] for row in rows if row["repeats"]}
+
+
 @pytest.mark.parametrize(
     ("grow", "says"),
     [

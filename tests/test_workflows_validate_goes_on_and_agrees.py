@@ -1,12 +1,17 @@
 import json
+from dataclasses import replace
 from pathlib import Path
 
+import joblib
 import numpy as np
 import pytest
 
 from expdesign import workflows
 from expdesign.cli import main
+from expdesign.durations.validation import Rehearsal
 from expdesign.errors import InputError
+from expdesign.scenario import load_scenario
+from expdesign.workflows.validated import _identity
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 MODEL_SHIP, TRUE = SCENARIOS / "model-ship.toml", SCENARIOS / "vessels" / "model-ship-true.toml"
@@ -67,3 +72,24 @@ def test_wrong_wishes_are_one_line_and_leave_nothing(tmp_path, capsys, options, 
 def test_another_method_is_named_at_once():
     with pytest.raises(InputError):
         workflows.validate_design(MODEL_SHIP, None, method="magic", trials=2, jobs=1)
+
+
+def test_chunks_of_another_ship_are_not_taken_over():
+    """Whatever of a ship differs, be it one expression, the kept chunks are others."""
+    case = load_scenario(MODEL_SHIP)
+    vessel, model = case.vessel, case.vessel.model
+    turned = replace(model.terms[0], expression=f"2*({model.terms[0].expression})")
+    first, *others = model.actuators
+    ships = (
+        vessel,
+        replace(vessel, model=replace(model, terms=(turned, *model.terms[1:]))),
+        replace(vessel, model=replace(model, actuators=(replace(first, forward_m=first.forward_m + 0.1), *others))),
+    )
+    rehearsals = (
+        Rehearsal(
+            truth=ship, nominal=vessel, primitives=(), designs={}, total_s=60.0, environment=case.environment,
+            parameters=model.names, method="iv", mean_subtraction="none", integrator="euler", trials=2, seed=0,
+        )
+        for ship in ships
+    )  # fmt: skip
+    assert len({joblib.hash(_identity(one)) for one in rehearsals}) == len(ships)

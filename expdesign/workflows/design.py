@@ -19,16 +19,15 @@ from expdesign.durations import (
     solve_durations,
 )
 from expdesign.errors import InputError
-from expdesign.estimation.tables import with_depth
 from expdesign.information import MEAN_SUBTRACTIONS, PrimitiveInformation, estimated_parameters
 from expdesign.information.augmented import score_augmented
 from expdesign.information.outcome_gradients import outcome_gradients
 from expdesign.information.prior import equation_noise, score_prior, stated_information
 from expdesign.information.recorded import pooled, recorded_information
-from expdesign.records import load_records
 from expdesign.scenario import Scenario
 from expdesign.scenario.values import BudgetWish
 from expdesign.values import Array
+from expdesign.workflows.after import measured
 from expdesign.workflows.outcome import Progress, TextTable, silent, within
 
 
@@ -206,8 +205,7 @@ def _prior(case: Scenario, parameters: tuple[str, ...], stated: Mapping[str, flo
         known[index], noise[index] = [std[name] for name in own], equation_noise(case.vessel, own)
         prior += stated_information(known, noise, dimension=dimension, samples=samples)
     if wish.prior_data:
-        record = load_records(wish.prior_data, vessel_inputs=model.inputs, outputs=model.outputs)
-        record = with_depth(record, case.vessel.draught_m) if model.reads_depth else record
+        record = measured(wish.prior_data, case.vessel)
         batches = recorded_information(
             record,
             model,

@@ -68,8 +68,9 @@ def updated(
 
 
 def _fit_note(item: Assessed) -> str:
-    fits = np.mean([run.fit_percent for run in item.runs], axis=0)
-    told = ", ".join(f"{name} {fit:.0f} %" for name, fit in zip(item.runs[0].outputs, fits, strict=True))
+    rows = np.array([run.fit_percent for run in item.runs])
+    fits = [(name, column[np.isfinite(column)]) for name, column in zip(item.runs[0].outputs, rows.T, strict=True)]
+    told = ", ".join(f"{name} {fit.mean():.0f} %" if len(fit) else f"{name} steady" for name, fit in fits)
     return f"With it the simulation fits the data so far with {told}; expdesign diagnose names what a model lacks."
 
 

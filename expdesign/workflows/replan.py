@@ -17,18 +17,18 @@ from expdesign.dictionary import build_primitive
 from expdesign.dictionary.spec import PrimitiveSpec
 from expdesign.durations import DurationDesign, efficiencies
 from expdesign.errors import Diverged, FileError, InputError, NoAnswer, UnknownName, Unreachable
-from expdesign.estimation.tables import with_depth
 from expdesign.export import vessel_toml, write_files
 from expdesign.export.known import Known, replan_json
 from expdesign.information import estimated_parameters
 from expdesign.plan.values import Plan
-from expdesign.records import Fix, last_fix, load_records
+from expdesign.records import Fix, last_fix
 from expdesign.scenario import Scenario, load_scenario, load_vessel
 from expdesign.scenario.berth import berth_problem
 from expdesign.signals import Record
 from expdesign.simulation import Environment
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
+from expdesign.workflows.after import measured
 from expdesign.workflows.design import design_summary, designed
 from expdesign.workflows.grown import growth_summary
 from expdesign.workflows.known import data_parts, expected_std, in_recorded_depth, plan_part, purchases, updated
@@ -93,7 +93,7 @@ def replan(
     }  # fmt: skip
     written = write_files(out or Path("runs") / case.name, files)
     progress("done", 1.0)
-    facts = {**growth_summary(growth), **design_summary(design), **plan_summary(plan)}
+    facts = {**growth_summary(growth, case), **design_summary(design), **plan_summary(plan)}
     summary = {"scenario": case.name, **_summary(known), **facts}
     return Outcome(files=written, summary=summary, tables=(_table(known),))
 
@@ -147,14 +147,7 @@ def present_state(
         raise InputError("no data files are given, expected one or more CSV files after --data")
     first = load_scenario(scenario)
     ship = first.vessel if vessel is None else _same_ship(load_vessel(vessel), first, vessel)
-    record = load_records(
-        list(data),
-        vessel_inputs=ship.model.inputs,
-        sample_time_s=ship.sample_time_s if ship.model.form == "discrete" else None,
-        heading_std_rad=ship.sensors.heading_rad or None,
-        outputs=ship.model.outputs,
-    )
-    record = with_depth(record, ship.draught_m) if ship.model.reads_depth else record
+    record = measured(data, ship)
     pose = present_pose(last_fix(data[-1]), ship, first)
     sailed_s = float(sum(len(batch) * batch.sample_time_s for batch in record.batches))
     left_s = _left(first, sailed_s, remaining_s)

@@ -14,14 +14,14 @@ import numpy as np
 from expdesign import __version__
 from expdesign.durations.validation import RANDOM, Rehearsal, equal_runs, validate
 from expdesign.errors import InputError
-from expdesign.export import write_files
+from expdesign.export import vessel_toml, write_files
 from expdesign.export.validation_page import ValidationContent, judgements, validation_html, validation_json
 from expdesign.information import estimated_parameters
 from expdesign.scenario import load_scenario, load_vessel
 from expdesign.values import Array
 from expdesign.workflows.design import designed
 from expdesign.workflows.outcome import Outcome, Progress, TextTable, silent, within
-from expdesign.workflows.trial import scored
+from expdesign.workflows.trial import ready
 
 OPTIMISED, EQUAL = "optimised", "equal shares"
 INTEGRATORS = ("rk4", "euler")
@@ -51,8 +51,8 @@ def validate_design(
             f"vessel {case.vessel.name!r} has a roll mode, [model.roll], which {method} does not estimate beside; "
             "expected it in the vessel of --truth only"
         )
-    information = scored(case, progress=within(progress, 0.0, 0.05))
-    design = designed(case, information)
+    information, _ = ready(case, seed=seed, progress=within(progress, 0.0, 0.05))
+    design = designed(case, information, seed=seed)
     primitives = tuple(item.primitive for item in information)
     rehearsal = Rehearsal(
         truth=case.vessel if truth is None else load_vessel(truth),
@@ -96,10 +96,7 @@ def validate_design(
 def _identity(rehearsal: Rehearsal) -> tuple[object, ...]:
     """Everything that the trials depend on."""
     arrays = [(item.name, item.commands.values, item.entry_velocity) for item in rehearsal.primitives]
-    ships = [
-        (ship.model.names, ship.model.parameters, ship.sensors, ship.responses, ship.model.roll)
-        for ship in (rehearsal.truth, rehearsal.nominal)
-    ]
+    ships = [vessel_toml(ship) for ship in (rehearsal.truth, rehearsal.nominal)]
     weather = rehearsal.environment
     return (
         __version__,
