@@ -8,6 +8,7 @@ import shapely
 from expdesign import workflows
 from expdesign.plan.solve import PlanProblem, plan_trial
 from expdesign.scenario import load_scenario
+from expdesign.workflows.trial import plan_problem
 
 MODEL_SHIP = Path(__file__).parents[1] / "scenarios" / "model-ship.toml"
 FLIP = np.array([1.0, -1.0, -1.0])
@@ -20,16 +21,7 @@ TURNED = 0.10
 def problem() -> PlanProblem:
     case = load_scenario(MODEL_SHIP)
     information = workflows.scored(case)
-    return PlanProblem(
-        vessel=case.vessel,
-        area=case.area,
-        environment=case.environment,
-        settings=case.plan,
-        primitives=tuple(item.primitive for item in information),
-        design=workflows.designed(case, information),
-        start=case.start,
-        goal=case.goal,
-    )
+    return plan_problem(case, information, workflows.designed(case, information))
 
 
 @pytest.fixture(scope="module")

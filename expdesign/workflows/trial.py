@@ -144,8 +144,19 @@ def planned(
     progress: Progress = silent,
 ) -> Plan:
     """The verified trial of a scenario."""
+    return plan_trial(plan_problem(case, information, design, seed=seed), progress=progress)
+
+
+def plan_problem(
+    case: Scenario, information: Sequence[PrimitiveInformation], design: DurationDesign, *, seed: int = 0
+) -> PlanProblem:
+    """What a scenario asks the planner for, with a dictionary and its durations.
+
+    Raises:
+        InputError: plans cannot be made for the vessel.
+    """
     check_plannable(case)
-    problem = PlanProblem(
+    return PlanProblem(
         vessel=case.vessel,
         area=case.area,
         environment=case.environment,
@@ -156,7 +167,6 @@ def planned(
         goal=case.goal,
         seed=seed,
     )
-    return plan_trial(problem, progress=progress)
 
 
 def check_plannable(case: Scenario) -> None:

@@ -17,25 +17,24 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
-import joblib
 import numpy as np
 
 from expdesign import workflows
 from expdesign.plan import Plan, run_up
 from expdesign.plan.leg_values import LegWater
 from expdesign.plan.safety import promised, upper_limit
-from expdesign.plan.solve import PlanProblem, leg_water
+from expdesign.plan.solve import leg_water
 from expdesign.plan.values import Promise
 from expdesign.scenario import load_scenario
 from expdesign.scenario.values import Scenario
 from expdesign.simulation import Environment, Variation
+from expdesign.workflows.trial import plan_problem
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
-NAMES = ("helsinki", "model-ship", "narrows", "story")
 WANDERING = 1.0, 300.0
 """How much current and wind wander, in the standard deviations with which their means are known, and how slowly [s]."""
 AT_ALL = 1e6
-"""Factor on all tolerances that makes every ship begin at once."""
+"""What all tolerances are set to so that every ship begins at once, in the units of each."""
 
 
 def wandering(forecast: Environment) -> Environment:
@@ -76,17 +75,7 @@ def sailed(water: LegWater, plan: Plan, *, draws: int, breaks: bool, rng: np.ran
 def water_of(case: Scenario, plan: Plan) -> LegWater:
     """Who sails the plan, in what, where."""
     information = workflows.scored(case)
-    problem = PlanProblem(
-        vessel=case.vessel,
-        area=case.area,
-        environment=case.environment,
-        settings=case.plan,
-        primitives=tuple(item.primitive for item in information),
-        design=workflows.designed(case, information),
-        start=case.start,
-        goal=case.goal,
-    )
-    return leg_water(problem)
+    return leg_water(plan_problem(case, information, workflows.designed(case, information)))
 
 
 def row(name: str, kind: str, found: Promise, planned_s: float) -> str:
@@ -106,12 +95,9 @@ def report(path: str, draws: int) -> list[str]:
     calm = water_of(case, plan)
     wanders = replace(calm, environment=wandering(case.environment))
     kinds = {"as forecast": (calm, True), "wandering": (wanders, True), "without a break": (calm, False)}
-    tasks = [
-        joblib.delayed(sailed)(water, plan, draws=draws, breaks=breaks, rng=np.random.default_rng(seed))
-        for seed, (water, breaks) in enumerate(kinds.values(), start=7)
-    ]
     rows = []
-    for kind, found in zip(kinds, joblib.Parallel(n_jobs=1)(tasks), strict=True):
+    for seed, (kind, (water, breaks)) in enumerate(kinds.items(), start=7):
+        found = sailed(water, plan, draws=draws, breaks=breaks, rng=np.random.default_rng(seed))
         rows.append(row(case.name, kind, found, plan.commands.duration_s))
         print(rows[-1], *found.reasons, sep="\n  ", flush=True)
         for leg, sails in zip(plan.legs, found.legs, strict=True):
@@ -126,9 +112,7 @@ def report(path: str, draws: int) -> list[str]:
 if __name__ == "__main__":
     number = int(sys.argv[1]) if len(sys.argv) > 1 else 500
     lines = [
-        line
-        for path in sys.argv[2:] or [str(SCENARIOS / f"{name}.toml") for name in NAMES]
-        for line in report(path, number)
+        line for path in sys.argv[2:] or sorted(map(str, SCENARIOS.glob("*.toml"))) for line in report(path, number)
     ]
     print("\n| scenario | weather | left water (95 %) | broken off | plan | more: middle | more: 95 % |")
     print("|---|---|---|---|---|---|---|", *lines, sep="\n")
