@@ -55,13 +55,13 @@ class Contender:
         return min(1.0, self.tests * float(chi2.sf(max(self.gain, 0.0), max(1, len(self.keys)))))
 
 
-def seen_closely(base: Fit, windows: Windows, long_s: float = COARSE_S) -> Fit | None:
+def seen_closely(base: Fit, windows: Windows) -> Fit | None:
     """The same model in short windows with white noise: a poor judge of small effects and a good guide to large ones.
 
     Over long windows a simulation that is far off says little of why, and the colour of what it leaves hides much of
     it. None where windows are short anyhow, or the model cannot be fitted so.
     """
-    samples = max(COARSE_SAMPLES, round(long_s / windows.sample_s))
+    samples = max(COARSE_SAMPLES, round(COARSE_S / windows.sample_s))
     if 2 * samples > windows.measured.shape[1]:
         return None
     short = replace(windows.shortened(samples), has_heading=False)

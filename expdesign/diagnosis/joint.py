@@ -14,7 +14,7 @@ import numpy as np
 from expdesign.diagnosis.extended import Extended
 from expdesign.diagnosis.motion import Linear, Push, linearise, push_of, responses, simulate_windows, start_responses
 from expdesign.diagnosis.moves import moved
-from expdesign.diagnosis.noise import Noise, fit_colour, hats, wander_covariance, whitened
+from expdesign.diagnosis.noise import Noise, fit_colour, hats, wander_covariance, white_noise, whitened
 from expdesign.diagnosis.spread import spread
 from expdesign.diagnosis.windows import Windows
 from expdesign.values import Array
@@ -33,15 +33,11 @@ class Grams:
 
     Attributes:
         XX: (w, c, c); Xe: (w, c); ee: (w,).
-        rows: whitened rows that count.
-        log_det_starts: of the projected initial states' Gram matrices.
     """
 
     XX: Array
     Xe: Array
     ee: Array
-    rows: int
-    log_det_starts: float
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -96,13 +92,7 @@ def grams(columns: Columns, noise: Noise) -> Grams:
         XX.append(A @ A.T - AB @ half[:, :-1])
         Xe.append(A @ b - AB @ half[:, -1])
         ee.append(b @ b - (B.T @ b) @ half[:, -1])
-    return Grams(
-        XX=np.array(XX),
-        Xe=np.array(Xe),
-        ee=np.array(ee),
-        rows=int(seen.sum()),
-        log_det_starts=float(np.linalg.slogdet(SS)[1].sum()),
-    )
+    return Grams(XX=np.array(XX), Xe=np.array(Xe), ee=np.array(ee))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -221,7 +211,6 @@ def fit(
     noise: Noise | None = None,
     steps: int = 8,
     colour_order: int | None = None,
-    flat: tuple[str, ...] = (),
     near: Linear | None = None,
 ) -> Fit:
     """Gauss-Newton with the colour found anew in every step.
@@ -234,14 +223,12 @@ def fit(
         noise: first guess of the colour.
         steps: Gauss-Newton steps.
         colour_order: of the autoregressions, or None to choose.
-        flat: uncertain parameters whose prior is dropped.
         near: linearised motion of a ship alike over the same windows, for speed.
     """
     uncertain = tuple(key for key in uncertain_keys(ship) if key not in free)
     keys = (*free, *uncertain)
     precision = prior_precision(ship, keys)
     precision[: len(free)] = 0.0
-    precision[[key in flat for key in keys]] = 0.0
     starts = _fitting_starts(starts, ship.states)
     best: Fit | None = None
     move, turn, share = np.zeros(len(keys)), np.zeros_like(starts), 1.0
@@ -343,7 +330,7 @@ def _colours(
     """Colour of what is left after the best linear answer, twice."""
     if noise is None:
         size = spread(columns.error)
-        noise = Noise(filters=np.ones((4, 1)), std=np.where(size > 0, size, np.inf))
+        noise = white_noise(np.where(size > 0, size, np.inf))
         passes = 3
     else:
         passes = 1
@@ -361,7 +348,8 @@ def remainder(columns: Columns, g: Grams, noise: Noise, precision: Array, now: A
     """(w, s, 4) error less the best linear answer of numbers and initial states, and a likely wandering current.
 
     The likeliest current would take noise along with it and leave too little; one drawn from its posterior does not
-    (stochastic EM: G. Celeux and J. Diebolt, Computational Statistics Quarterly 2 (1985), 73-82).
+    (stochastic EM: G. Celeux and J. Diebolt, Computational Statistics Quarterly 2 (1985), 73-82). What is drawn with is
+    always the same, so that fits of candidates differ by what they explain and not by chance.
     """
     m = marginal(g, columns, noise)
     c = columns.numbers

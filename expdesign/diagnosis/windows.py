@@ -23,8 +23,6 @@ from expdesign.signals import Batch, Record
 from expdesign.values import Array
 from expdesign.vessel import VesselModel
 
-CHANNELS = (*OUTPUTS, "psi_rate")
-"""What is compared: u, v, r as measured, and the rate of the measured heading where r is a measurement of its own."""
 COARSEST_S, SHARE_OF_TIME_CONSTANT = 1.0, 0.4
 LONGEST = 700
 """Samples per window, at most."""
@@ -44,7 +42,8 @@ class Windows:
         batch: (w,) batch number of each window.
         batch_inputs: one (k_b, m) array per batch, held inputs at integrator steps.
         first: (w,) first integrator step of each window in its batch.
-        measured: (w, s, 4) channels; nan where not measured.
+        measured: (w, s, 4) channels u, v, r, and the rate of the measured heading where r is a measurement of its own;
+            nan where not measured.
         heading: (w, k) measured heading in the middle of integrator steps, continuous; zero where there is none.
         wind: (w, k, 2) likewise the wind in the b-frame from measured relative wind, the last one seen where a sample
             lacks it, nan in batches without.

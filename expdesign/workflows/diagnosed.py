@@ -110,7 +110,7 @@ def _summary(found: Diagnosis) -> dict[str, object]:
     return {
         "verdict": found.verdict,
         "baseline": accuracy_entry(found.before),
-        "findings": {item.cause: finding_entry(item, found.before.outputs) for item in found.findings},
+        "findings": [finding_entry(item, found.before.outputs) for item in found.findings],
     }
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
-from expdesign.diagnosis.causes.words import first, rounded
+from expdesign.diagnosis.causes.words import rounded
 from expdesign.diagnosis.extended import Extended
 
 NAMES = {
@@ -34,7 +34,6 @@ def _explain(values: Values, _ship: Extended) -> str:
         f"{NAMES.get(key[5:], key[5:])} is recorded {rounded(value, std)} s late"
         for key, (value, std) in values.items()
     )
-    _ = first(values)
     return f"One signal trails the others: {parts}."
 
 

@@ -19,17 +19,12 @@ def rounded(value: float, std: float) -> str:
     return f"{value:.{decimals}f} {PLUS_MINUS} {std:.{decimals}f}"
 
 
-def listed(values: Values, unit: str = "", factor: float = 1.0) -> str:
+def listed(values: Values, unit: str = "") -> str:
     """Every estimate with the last part of its key."""
-    return ", ".join(
-        f"{key.split(':')[-1]} {rounded(factor * value, factor * std)}{unit}" for key, (value, std) in values.items()
-    )
+    return ", ".join(f"{key.split(':')[-1]} {rounded(value, std)}{unit}" for key, (value, std) in values.items())
 
 
-def first(values: Values, prefix: str = "") -> tuple[str, float, float]:
-    """Key, value and standard error of the first estimate with a prefix."""
-    for key, (value, std) in values.items():
-        if key.startswith(prefix):
-            return key, value, std
+def first(values: Values) -> tuple[str, float, float]:
+    """Key, value and standard error of the first estimate."""
     key, (value, std) = next(iter(values.items()))
     return key, value, std
