@@ -11,7 +11,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from expdesign.plan.area import SeaArea
-from expdesign.values import Array
+from expdesign.values import Array, seal
 
 FINEST_CELLS = 3_000_000
 ROUTING_CELLS = 400_000
@@ -30,6 +30,9 @@ class ClearanceField:
     origin: Array
     cell_m: float
     clearance_m: Array
+
+    def __post_init__(self) -> None:
+        seal(self, origin="2", clearance_m="r c")
 
     @property
     def error_m(self) -> float:

@@ -43,7 +43,10 @@ def covering_discs(length_m: float, beam_m: float, *, count: int = 3) -> tuple[A
 
 
 def thinned_poses(pose: Array, *, reach_m: float, spacing_m: float) -> np.ndarray:
-    """Indices of poses (k, 3) between which no point within `reach_m` of the origin moves more than `spacing_m`."""
+    """Indices of poses (k, 3), the last one included: the first after each from which a point may have moved so far.
+
+    Between two of them no point within `reach_m` of the origin moves farther than `spacing_m` and one step more.
+    """
     kept = [0]
     for index in range(1, len(pose)):
         moved = np.hypot(*(pose[index, :2] - pose[kept[-1], :2]))

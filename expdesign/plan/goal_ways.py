@@ -30,7 +30,8 @@ class GoalWays:
 
     Attributes:
         field: the grid of the table.
-        distance_m: (rows, columns) length of the way to the goal, infinite where there is none.
+        distance_m: (rows, columns) length of the way to the goal; where there is none, that of the nearest
+            cell with one, and the distance to it.
         turn: (rows, columns) node where the way from a cell bends first.
         nodes: (n, 2) corners, the goal last.
         following: (n,) next node of each node's way; the goal's own is itself.

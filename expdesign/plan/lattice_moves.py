@@ -79,7 +79,11 @@ def build_lattice(space: SearchSpace, counts: Sequence[int], start: Array, *, sp
     poses = grid.clear.size * 4
     runs = [_run_ends(grid, space, stamp) for stamp in space.stamps]
     entries = np.concatenate(
-        [_moves(grid, space), _doors(grid, space, start, poses), _doors(grid, space, space.goal, poses + 1)[[1, 0, 2]]],
+        [
+            _moves(grid, space),
+            _doors(grid, space, start, poses),
+            _doors(grid, space, space.goal, poses + 1, arriving=True),
+        ],
         axis=1,
     )
     return LatticeProblem(
@@ -163,8 +167,8 @@ def _snap(grid: _Grid, space: SearchSpace, displacement: Array) -> tuple[tuple[i
     return (*options[best], curves[best])
 
 
-def _doors(grid: _Grid, space: SearchSpace, pose: Array, number: int) -> Array:
-    """(3, k) number, lattice pose and seconds of the Dubins curves between a pose and clear lattice poses near it.
+def _doors(grid: _Grid, space: SearchSpace, pose: Array, number: int, *, arriving: bool = False) -> Array:
+    """(3, k) from, to and seconds of the Dubins curves from a pose to clear lattice poses near it, or to it from them.
 
     Near its ends a way needs no more clearance than the ends have, so that a berth can be left and reached.
     """
@@ -177,13 +181,14 @@ def _doors(grid: _Grid, space: SearchSpace, pose: Array, number: int) -> Array:
     for row, column in zip(rows[fits], columns[fits], strict=True):
         for heading in range(4):
             there = np.array([*(grid.origin + grid.spacing_m * np.array([row, column])), HEADINGS[heading]])
-            ends = (there, pose) if pose is space.goal else (pose, there)
+            ends = (there, pose) if arriving else (pose, there)
             curve = dubins_curve(*ends, radius_m=space.ship.turning_radius_m, spacing_m=grid.spacing_m / 4)
             berth = min(grid.margin_m, float(grid.field.at(pose[:2])))
             if (grid.field.at(curve[:, :2]) >= berth).all():
                 entries.append((number, int(grid.number(row, column, heading)), _length(curve)))
     found = np.array(entries).reshape(-1, 3).T
-    return np.asarray(found / np.array([[1.0], [1.0], [space.ship.transit_speed_mps]]))
+    found = found / np.array([[1.0], [1.0], [space.ship.transit_speed_mps]])
+    return np.asarray(found[[1, 0, 2]] if arriving else found)
 
 
 def _length(curve: Array) -> float:

@@ -56,6 +56,8 @@ class LegTask:
 
     def __post_init__(self) -> None:
         seal(self, start="6", end="6", start_inputs="m", end_inputs="m")
+        if self.before is not None:
+            seal(self, start_inputs="m", before="h m")
 
     @property
     def past(self) -> Array:

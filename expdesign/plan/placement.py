@@ -1,9 +1,10 @@
 """Order and placement of the runs: a beam search over continuous poses.
 
-A partial plan is a pose with the runs still to do. It is continued by a leg (an arc and a straight, or a stretch of
-the shortest way to the goal) and one more run. Plans with equally many runs compete on repositioning time so far plus
-a bound on what is left: the way to the goal less the farthest that the remaining runs can carry the ship, at transit
-speed. Clearances are looked up on a grid here; every leg and run is checked exactly later.
+A partial plan is a pose with the runs still to do. It is continued by a leg (an arc and a straight, a stretch of the
+shortest way to the goal, or, for agile vessels, a joint: a short leg to any side with any turn) and one more run. Plans
+with equally many runs compete on repositioning time so far plus a bound on what is left: the way to the goal less the
+farthest that the remaining runs can carry the ship, at transit speed. Clearances are looked up on a grid here; every
+leg and run is checked exactly later.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ from expdesign.plan.footprint import covering_discs, disc_points, thinned_poses
 from expdesign.plan.goal_ways import GoalWays
 from expdesign.plan.leg_times import LegTimes
 from expdesign.plan.values import Placement
-from expdesign.values import Array
+from expdesign.values import Array, seal
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -78,6 +78,11 @@ class SearchSpace:
     settle_s: Mapping[tuple[str, str], float] = dataclasses.field(default_factory=dict)
     run_up: Mapping[tuple[str, str], float] = dataclasses.field(default_factory=dict)
     refused: Array = dataclasses.field(default_factory=lambda: np.zeros((0, 3)))
+
+    def __post_init__(self) -> None:
+        seal(self, goal="3", current_to="2", refused="b 3")
+        if self.recoveries is not None:
+            seal(self, recoveries="q 4")
 
     def joint_times(self, times: LegTimes, before: str, after: str) -> LegTimes:
         """The rule for joints between two runs."""

@@ -38,7 +38,7 @@ from expdesign.plan.uncertainty import stray_m
 from expdesign.plan.values import Leg, Placement, Plan, PlanSettings, Promise, Verification
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import CALM, Environment, to_body
-from expdesign.values import Array
+from expdesign.values import Array, seal
 from expdesign.vessel import NUMPY, Vessel
 
 Progress = Callable[[str, float], None]
@@ -76,6 +76,9 @@ class PlanProblem:
     start: Array
     goal: Array
     seed: int = 0
+
+    def __post_init__(self) -> None:
+        seal(self, start="3", goal="3")
 
 
 def plan_trial(problem: PlanProblem, *, progress: Progress = lambda what, share: None) -> Plan:
