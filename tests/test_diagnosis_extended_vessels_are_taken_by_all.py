@@ -9,9 +9,10 @@ from diagnosis_case import hidden_record, vessel_of
 
 from expdesign.diagnosis import CAUSES, Estimated, Finding
 from expdesign.diagnosis import diagnose as diagnose_record
-from expdesign.diagnosis.accuracy import accuracy
+from expdesign.diagnosis.accuracy import accuracy, first_states
 from expdesign.diagnosis.causes.shallow_water import in_shallow_water
 from expdesign.diagnosis.extension import as_extended, extend
+from expdesign.diagnosis.motion import simulate_windows
 from expdesign.diagnosis.rates import rates
 from expdesign.diagnosis.surroundings import Surroundings
 from expdesign.dictionary import PrimitiveSpec, build_dictionary
@@ -37,7 +38,7 @@ EFFECTS = {
     "thruster_asymmetry": {"offset:a": 0.05},
     "actuator_lag": {"lag:all": 3.0},
     "actuator_delay": {"delay:n": 2.0},
-    "actuator_deadband": {"deadband:n": 1.0},
+    "actuator_deadband": {"deadband:n": 6.0},
     "load_change": {"inertia:u": 0.2, "inertia:v": 0.1},
     "heading_bias": {"heading_bias": 0.03},
     "lever_arm": {"lever:forward": 4.0},
@@ -93,8 +94,8 @@ def test_every_cause_of_the_catalogue_is_tried():
 
 
 @pytest.mark.parametrize("cause", EFFECTS)
-def test_the_file_with_a_cause_is_read_and_scored(cause, clean, tmp_path):
-    found, _ = as_found(clean, cause)
+def test_the_file_with_a_cause_is_read_simulates_it_and_is_scored(cause, clean, tmp_path):
+    found, final = as_found(clean, cause)
     path = tmp_path / "vessel-extended.toml"
     path.write_text(extended_vessel(found, command="made up"), encoding="utf-8")
     ship = load_vessel(path)
@@ -103,6 +104,16 @@ def test_the_file_with_a_cause_is_read_and_scored(cause, clean, tmp_path):
     assert np.isfinite(scored[0].X).all()
     assert vessel_toml(ship) != vessel_toml(TUG)
     assert not [note for note in found.notes if "not in the vessel file" in note]
+    if "change:time" in final.effects:
+        final = final.having({"change:time": -1.0})  # the file describes the ship after it
+    start = first_states(clean.windows, final.states)
+    shown, wanted = (
+        simulate_windows(one, clean.windows, start).shown for one in (as_extended(ship, clean.record), final)
+    )
+    before = simulate_windows(as_extended(TUG, clean.record), clean.windows, start[:, :3]).shown
+    rough = 1e-3 if cause == "shallow_water" else 1e-9  # its factors are polynomials
+    assert np.abs(shown - wanted).max() <= rough * max(np.abs(wanted - before).max(), 1.0)
+    assert np.abs(wanted - before).max() > 1e-3 or cause == "wind"  # which is measured in these data
 
 
 def test_the_written_dependence_on_depth_is_the_one_found(clean):

@@ -32,8 +32,9 @@ def check(case, *, seed, relative_std=0.0):
     record = hidden_record(ship, seed=seed, effects=effects, faults=faults, relative_std=relative_std)
     found = diagnose(vessel_of(ship, relative_std=relative_std), record, seed=0)
     assert found.findings, f"{cause} was not found"
-    first = max(found.findings, key=lambda item: item.worth)
+    first = found.findings[0]
     assert cause == first.cause or cause in first.not_distinguishable_from
+    assert not first.not_distinguishable_from or first.would_tell_apart is not None
     for finding in found.findings:  # what is reported gains on runs that were held out, plainly or surely
         assert finding.gain > 1.0 or finding.gain_interval[0] > 0
         assert finding.gain_interval[0] <= finding.gain <= finding.gain_interval[1]
@@ -69,7 +70,10 @@ def test_clean_data_are_called_clean():
 
 
 def test_the_generator_and_the_package_agree_on_calm_water():
-    """Without weather, noise and effect the model in use explains all but the integration error."""
+    """Without weather and effect all that is left is noise: of the sensors, and of the first state until it dies out.
+
+    The first state comes from a straight line through five samples, so that its error is 0.77 of one sample's noise.
+    """
     from expdesign.diagnosis.accuracy import accuracy
     from expdesign.diagnosis.extension import as_extended
 
@@ -77,5 +81,6 @@ def test_the_generator_and_the_package_agree_on_calm_water():
     for ship in sea.SHIPS:
         record = hidden_record(ship, seed=1, batches=2, samples=150, weather=calm)
         found = accuracy(as_extended(vessel_of(ship), record), record)
-        assert (found.rmse[:2] < 1.2 * 0.014 + 0.01).all(), ship  # sensor noise, and that of the first state
-        assert np.all(np.abs(found.bias[:2]) < 0.01)
+        noise = np.array([0.014, 0.014, 0.003])
+        assert (found.rmse < 1.2 * np.hypot(1.0, 0.77) * noise).all(), ship
+        assert (np.abs(found.bias) < 0.77 * noise).all(), ship

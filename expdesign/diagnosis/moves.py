@@ -33,7 +33,7 @@ def moved(ship: Extended, keys: Sequence[str], move: Array) -> dict[str, float]:
 
 
 def limited(ship: Extended, effects: dict[str, float]) -> dict[str, float]:
-    """Times and widths stay positive, shares above minus nine tenths."""
+    """Times and widths stay positive and change threefold at most; factors of inertia, thrust, gyro stay above 0.2."""
     result = {}
     for key, value in effects.items():
         kind = key.split(":")[0]
