@@ -24,8 +24,8 @@ from expdesign.diagnosis.contenders import (
 from expdesign.diagnosis.extended import Extended
 from expdesign.diagnosis.joint import Fit, fit
 from expdesign.diagnosis.profile import middle, sharpened
-from expdesign.diagnosis.screening import Scored, screen
-from expdesign.diagnosis.steps import Search, Step, superfluous, without
+from expdesign.diagnosis.screening import LEVEL, Scored, screen
+from expdesign.diagnosis.steps import Search, Step, superfluous, wald, without
 from expdesign.diagnosis.windows import Windows
 from expdesign.values import Array
 
@@ -205,9 +205,7 @@ def _step(base: Fit, windows: Windows, found: tuple[Scored, ...], progress: Prog
         contender = contend(base, windows, first, far=far, steps=FIRST_STEPS)
         if contender is not None:
             contenders.append(contender)
-    contenders = judged(base, contenders)
-    least = LEADING * max((item.gain for item in contenders), default=0.0) - MARGIN
-    contenders = judged(base, [finished(base, windows, item) for item in contenders if item.gain > least])
+    contenders = _standing(base, windows, judged(base, contenders))
     chosen = next((item for item in contenders if item.p_value <= ALARM), None)
     if chosen is None:
         return None
@@ -222,6 +220,18 @@ def _step(base: Fit, windows: Windows, found: tuple[Scored, ...], progress: Prog
         before=base,
         screening=found,
     )
+
+
+def _standing(base: Fit, windows: Windows, rough: list[Contender]) -> list[Contender]:
+    """The best, fitted to the end; those that end at nothing, because the data pull beyond it, make way for others."""
+    while rough:
+        least = LEADING * max(item.gain for item in rough) - MARGIN
+        ended = [finished(base, windows, item) for item in rough if item.gain > least]
+        standing = [item for item in ended if wald(item, item.fit) <= LEVEL]
+        if standing:
+            return judged(base, standing)
+        rough = [item for item in rough if item.gain <= least]
+    return []
 
 
 def _openings(base: Fit, windows: Windows, found: tuple[Scored, ...]) -> tuple[list[Opening], bool]:
