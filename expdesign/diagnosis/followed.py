@@ -10,16 +10,17 @@ from scipy.signal import lfilter
 from expdesign.diagnosis.extended import Extended
 from expdesign.diagnosis.windows import Windows
 from expdesign.values import Array
+from expdesign.vessel import stem
 
 
 def members(group: str, inputs: tuple[str, ...]) -> list[int]:
     """Columns of the inputs that belong to a group."""
-    return [index for index, name in enumerate(inputs) if group in ("all", name) or name.rstrip("0123456789") == group]
+    return [index for index, name in enumerate(inputs) if group in ("all", name) or stem(name) == group]
 
 
 def input_groups(inputs: tuple[str, ...]) -> list[str]:
     """All inputs, those of one stem, single ones; of groups with the same members the first."""
-    stems = sorted({name.rstrip("0123456789") for name in inputs})
+    stems = sorted({stem(name) for name in inputs})
     groups = ["all", *(stems if len(stems) > 1 else []), *inputs]
     taken: dict[tuple[int, ...], str] = {}
     for group in groups:

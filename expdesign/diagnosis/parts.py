@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from expdesign.values import Array
-from expdesign.vessel import Term, VesselModel
+from expdesign.vessel import Term, VesselModel, stem
 from expdesign.vessel.expressions import Evaluate, Expression, parse_expression
 from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS
 
@@ -147,7 +147,7 @@ def ahead_force(signals: Mapping[str, Array], model: VesselModel) -> Array:
     """tau_x, of rudder ships n |n| of their propellers."""
     if any(set(e.signals) & set(FORCE_SIGNALS) for e in model.expressions):
         return signals["tau_x"]
-    speeds = [signals[name] for name in model.inputs if name.rstrip("0123456789") == "n"]
+    speeds = [signals[name] for name in model.inputs if stem(name) == "n"]
     return sum((np.abs(n) * n for n in speeds), np.zeros(1))
 
 
@@ -155,7 +155,7 @@ def ahead_force_text(model: VesselModel) -> str:
     """The same as an expression."""
     if any(set(e.signals) & set(FORCE_SIGNALS) for e in model.expressions):
         return "tau_x"
-    return " + ".join(f"abs({name})*{name}" for name in model.inputs if name.rstrip("0123456789") == "n")
+    return " + ".join(f"abs({name})*{name}" for name in model.inputs if stem(name) == "n")
 
 
 def own_lean_terms(model: VesselModel) -> list[str]:

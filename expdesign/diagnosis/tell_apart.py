@@ -12,6 +12,7 @@ from expdesign.diagnosis.motion import Motion, simulate_windows
 from expdesign.diagnosis.surroundings import to_body
 from expdesign.diagnosis.windows import Windows
 from expdesign.values import Array
+from expdesign.vessel import stem
 
 HEADINGS = (0.0, np.pi / 2, np.pi, 3 * np.pi / 2)
 ROUNDS = 2
@@ -124,7 +125,7 @@ def standard_proposals(like: Windows, inputs: tuple[str, ...], sample_time_s: fl
     velocity = np.array([velocity[0], 0.0, 0.0])
     count = max(40, round(PROPOSED * like.sample_s / sample_time_s))
     time = np.arange(count) / count
-    steering = [i for i, n in enumerate(inputs) if n.rstrip("0123456789") in ("a", "rudder", "tau_psi", "tau_y")]
+    steering = [i for i, n in enumerate(inputs) if stem(n) in ("a", "rudder", "tau_psi", "tau_y")]
     driving = [i for i in range(len(inputs)) if i not in steering]
     rng = np.random.default_rng(0)
     shapes: Mapping[str, tuple[list[int], Array]] = {

@@ -10,6 +10,7 @@ from expdesign.vessel.actuators import (
     generalised_force,
     limit_keys,
     response_keys,
+    stem,
 )
 from expdesign.vessel.environment import CALM, STEADY, Environment, Variation
 from expdesign.vessel.expressions import NUMPY, SCALAR, Operators
@@ -51,6 +52,7 @@ __all__ = [
     "limit_keys",
     "required_force",
     "response_keys",
+    "stem",
     "structure_terms",
     "within_limits",
 ]

@@ -159,9 +159,14 @@ class Actuator:
         return 0.0, 0.0, 0.0
 
 
+def stem(signal: str) -> str:
+    """What a signal is, without the number of its actuator: n of n1, rudder of rudder2, tau_x of tau_x."""
+    return signal.rstrip("0123456789")
+
+
 def column_name(signal: str) -> str:
     """File column of an actuator signal: n1 -> n1_rps, a1 -> a1_rad, tau_x -> tau_x."""
-    unit = UNITS.get(signal.rstrip("0123456789"))
+    unit = UNITS.get(stem(signal))
     return f"{signal}_{unit}" if unit else signal
 
 

@@ -10,6 +10,7 @@ from expdesign.diagnosis.causes.words import first, rounded
 from expdesign.diagnosis.extended import Extended
 from expdesign.diagnosis.followed import members
 from expdesign.values import Array
+from expdesign.vessel import stem
 
 QUANTILES = (0.1, 0.2, 0.35, 0.5)
 SHARE, COUNT = 0.75, 40
@@ -26,7 +27,7 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     found = []
     for group in open_groups(situation, "deadband"):
         columns = members(group, inputs)
-        if len({inputs[c].rstrip("0123456789") for c in columns}) > 1:
+        if len({stem(inputs[c]) for c in columns}) > 1:
             continue  # inputs of different units share no width
         sizes = np.concatenate([np.abs(rows[:, columns]).ravel() for rows in situation.windows.batch_inputs])
         levels = np.unique(sizes[sizes > 0])

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.words import first, rounded
 from expdesign.diagnosis.extended import Extended
-
-DEGREES = 57.29578
 
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
@@ -17,7 +17,7 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
 
 def _explain(values: Values, ship: Extended) -> str:
     _, value, std = first(values)
-    size, less = rounded(DEGREES * abs(value), DEGREES * std), value > 0
+    size, less = rounded(math.degrees(abs(value)), math.degrees(std)), value > 0
     leak = "Measured sway contains surge speed, v_measured = v + u sin(bias)"
     if "u" in ship.derived:
         return f"{leak}: velocities come from positions and heading, and the compass shows {size} degrees too " + (

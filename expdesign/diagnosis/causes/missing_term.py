@@ -10,7 +10,7 @@ from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.words import rounded
 from expdesign.diagnosis.extended import Extended
 from expdesign.diagnosis.parts import AIR_SIGNALS
-from expdesign.vessel import NUMPY, TERMS, Term, VesselModel
+from expdesign.vessel import NUMPY, TERMS, Term, VesselModel, stem
 from expdesign.vessel.expressions import parse_expression
 from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS
 
@@ -62,7 +62,7 @@ def _advance(model: VesselModel) -> tuple[Term, ...]:
     """
     read = {name for term, e in zip(model.terms, model.expressions, strict=True) if term.equation == "u"
             for name in e.signals}  # fmt: skip
-    speeds = [name for name in model.inputs if name.rstrip("0123456789") == "n" and name in read]
+    speeds = [name for name in model.inputs if stem(name) == "n" and name in read]
     if not speeds:
         return ()
     return (

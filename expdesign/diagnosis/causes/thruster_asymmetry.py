@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from expdesign.diagnosis.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.actuator_lag import open_groups
 from expdesign.diagnosis.causes.words import first, rounded
@@ -35,10 +37,8 @@ def _explain(values: Values, ship: Extended) -> str:
             f"A yaw moment in proportion to the ahead thrust: {rounded(value, std)} per unit of thrust, as if the "
             f"thrust acted that far to {side}. The ship turns at zero angle."
         )
-    return (
-        f"The angle of {key.split(':')[1]} is off by {rounded(57.29578 * value, 57.29578 * std)} degrees: the ship "
-        f"turns when it is commanded straight."
-    )
+    size = rounded(math.degrees(value), math.degrees(std))
+    return f"The angle of {key.split(':')[1]} is off by {size} degrees: the ship turns when it is commanded straight."
 
 
 THRUSTER_ASYMMETRY = Cause(name="thruster_asymmetry", candidates=_candidates, explain=_explain)

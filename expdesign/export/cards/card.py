@@ -16,7 +16,7 @@ from expdesign.export.report.content import ReportContent, Run, relative_informa
 from expdesign.export.report.tables import settings_sentence
 from expdesign.plan.values import Leg, Plan
 from expdesign.values import Array
-from expdesign.vessel import column_name
+from expdesign.vessel import column_name, stem
 
 STEADY_HEADING_RAD = math.radians(3.0)
 STEADY_SPEED_SHARE, STEADY_SPEED_MPS = 0.1, 0.1
@@ -94,7 +94,7 @@ def run_orders(content: ReportContent, run: Run) -> Array:
     leg, commands = content.plan.legs[run.leg], content.plan.commands
     values = np.array(commands.values[leg.first : leg.last])
     for column, name in enumerate(commands.names):
-        if name.rstrip("0123456789") == "a":
+        if stem(name) == "a":
             values[:, column] -= TURN * np.round(values[0, column] / TURN)
     return values
 
@@ -142,7 +142,7 @@ def _columns(rows: list[tuple[str, ...]]) -> list[list[tuple[str, ...]]]:
 def _orders_notes(content: ReportContent, leg: Leg, rows: list[tuple[str, ...]], missed: float) -> list[str]:
     step = content.plan.commands.sample_time_s
     every = (leg.last - leg.first) * step / len(rows)
-    signs = [meaning for stem, meaning in SIGNS.items() if any(_stem(n) == stem for n in content.vessel.model.inputs)]
+    signs = [meaning for what, meaning in SIGNS.items() if any(stem(n) == what for n in content.vessel.model.inputs)]
     notes = [
         f"Between the rows all orders change evenly; they differ from the full commands, every {step:g} s in "
         f"commands.csv, by {100 * missed:.0f} % of each order's span at most. {' '.join(signs)}".rstrip()
@@ -161,10 +161,6 @@ SIGNS = {
     "rudder": "rudder: 0 amidships; the sign is the vessel file's.",
 }
 """Stem of a signal -> what its sign means."""
-
-
-def _stem(name: str) -> str:
-    return name.rstrip("0123456789")
 
 
 def _purpose(content: ReportContent, index: int) -> str:

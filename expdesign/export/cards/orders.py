@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from expdesign.values import Array
-from expdesign.vessel import Vessel
+from expdesign.vessel import Vessel, stem
 
 TOLERANCE = 0.02
 """Of each signal's span over the run: what the condensed orders may miss at most, unless rows run out."""
@@ -43,8 +43,7 @@ def _worst(values: Array, kept: list[int]) -> tuple[float, int]:
 
 def order_columns(vessel: Vessel) -> list[tuple[str, str, float]]:
     """(signal, unit shown, factor to it) in command order: rpm and degrees; forces in the model's own unit."""
-    stems = [(name, name.rstrip("0123456789")) for name in vessel.model.inputs]
-    return [(name, *UNITS.get(stem, ("", 1.0))) for name, stem in stems]
+    return [(name, *UNITS.get(stem(name), ("", 1.0))) for name in vessel.model.inputs]
 
 
 def order_rows(vessel: Vessel, values: Array, step_s: float) -> tuple[list[tuple[str, ...]], float]:

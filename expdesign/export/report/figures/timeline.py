@@ -12,6 +12,7 @@ from expdesign.export.report.content import primitive_runs
 from expdesign.export.report.figures.style import LINES, PRIMITIVE, light_grid, new_figure, plain, short, svg
 from expdesign.plan.values import Plan
 from expdesign.values import Array
+from expdesign.vessel import stem
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,7 @@ def _motion_panels(plan: Plan) -> tuple[_Panel, ...]:
 def _command_panels(plan: Plan) -> tuple[_Panel, ...]:
     grouped: dict[str, list[tuple[str, Array]]] = {}
     for name in plan.commands.names:
-        title, factor = GROUPS.get(name.rstrip("0123456789"), (plain(name), 1.0))
+        title, factor = GROUPS.get(stem(name), (plain(name), 1.0))
         grouped.setdefault(title, []).append((name, plan.commands.column(name) * factor))
     grouped = {
         title: [(name, _within_a_turn(values)) for name, values in signals] if title == GROUPS["a"][0] else signals
