@@ -29,6 +29,11 @@ def wrap_angle(angle_rad: Array | float) -> Array:
     return np.asarray((np.asarray(angle_rad) + np.pi) % (2.0 * np.pi) - np.pi)
 
 
+def whole_turns(angle_rad: Array | float) -> Array:
+    """The multiples of 2 pi nearest to angles."""
+    return np.asarray(2.0 * np.pi * np.round(np.asarray(angle_rad) / (2.0 * np.pi)))
+
+
 def rotation(heading_rad: float) -> Array:
     """R_nb of shape (2, 2): turns b-frame (forward, starboard) into n-frame (north, east)."""
     c, s = np.cos(heading_rad), np.sin(heading_rad)

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
@@ -11,6 +13,7 @@ from expdesign.plan.capability import capability
 from expdesign.plan.curves import find_path
 from expdesign.plan.field import clearance_field
 from expdesign.plan.footprint import swept_area
+from expdesign.plan.leg_values import nearest_turns
 from expdesign.plan.legs import LegTask, LegWater, find_leg, leg_trajectory
 from expdesign.scenario import load_vessel
 from expdesign.simulation import CALM
@@ -95,6 +98,18 @@ def test_the_mirrored_leg_takes_as_long():
     assert left is not None
     assert right is not None
     assert abs(len(left) - len(right)) <= 1  # times that differ by the tolerance may round to two samples
+
+
+def test_whole_turns_are_added_to_azimuths_without_limits_alone():
+    vessel = leg_water(OPEN).vessel
+    assert vessel.turns_freely.tolist() == [False, True, False, True]
+    inputs, near = np.array([7.0, 0.3, -1.0, -3.0]), np.array([0.0, 6.5, 7.0, 3.2])
+    np.testing.assert_allclose(nearest_turns(vessel, inputs, near), [7.0, 0.3 + 2 * np.pi, -1.0, -3.0 + 2 * np.pi])
+    stops = tuple(
+        replace(item, limits=(item.limits[0], replace(item.limits[1], low=-9.0, high=9.0))) for item in vessel.actuators
+    )
+    limited = replace(vessel, model=replace(vessel.model, actuators=stops))
+    np.testing.assert_array_equal(nearest_turns(limited, inputs, near), inputs)
 
 
 def test_a_leg_is_not_faster_than_top_speed_and_not_slower_than_twice_the_estimate():

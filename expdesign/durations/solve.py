@@ -112,11 +112,16 @@ def _stack(information: Sequence[PrimitiveInformation], mean_subtraction: str) -
 
 def bordered(item: PrimitiveInformation, mean_subtraction: str) -> Array:
     """B_q of one primitive, linear in time fractions: see `DurationProblem`."""
+    return bordered_moments(item.X, item.Y, item.Z, item.YZ, mean_subtraction)
+
+
+def bordered_moments(X: Array, Y: Array, Z: Array, YZ: Array, mean_subtraction: str) -> Array:
+    """The same of moments X (p, p), means Y and Z (p, outputs) and the means' products YZ (p, p)."""
     if mean_subtraction == "none":
-        return item.X
+        return X
     if mean_subtraction == "batch":
-        return item.X - item.YZ
-    return np.block([[item.X, item.Y], [item.Z.T, np.eye(item.Y.shape[1])]])
+        return X - YZ
+    return np.block([[X, Y], [Z.T, np.eye(Y.shape[1])]])
 
 
 def solve_durations(problem: DurationProblem) -> DurationDesign:

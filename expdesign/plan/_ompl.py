@@ -12,6 +12,7 @@ from ompl import base as ob
 from ompl import geometric as og
 from ompl import util as ou
 
+from expdesign.conventions import whole_turns
 from expdesign.values import Array
 
 ou.setLogLevel(ou.LogLevel.LOG_NONE)
@@ -108,5 +109,5 @@ def _continuous(rows: list[tuple[float, float, float]], heading_rad: float) -> A
     """Poses with a heading that does not jump and begins at the given turn of the circle."""
     poses = np.array(rows)
     poses[:, 2] = np.unwrap(poses[:, 2])
-    poses[:, 2] += 2 * np.pi * np.round((heading_rad - poses[0, 2]) / (2 * np.pi))
+    poses[:, 2] += whole_turns(heading_rad - poses[0, 2])
     return poses

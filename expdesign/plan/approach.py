@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from expdesign.plan.fleet import Fleet
-from expdesign.plan.leg_values import LegWater
+from expdesign.plan.leg_values import LegWater, nearest_turns
 from expdesign.plan.rounds import Rounds
 from expdesign.plan.run_up import AFTER, MISSED, ROUNDS, Tolerances, planned_stretch, run_up, under_way
 from expdesign.plan.steering import CATCH_UP, LEAD, Helmsman, Reference
@@ -92,7 +92,6 @@ class Pilot:
         length_m = float(np.hypot(*(runs_up.states[0] - track[-1])[:2]))
         reach_m = np.clip(length_m / 5, self._within.position_m / 2, helm.vessel.length_m)
         self._convoy = Convoy(helm, runs_up.states[0], n, reach_m=float(reach_m))
-        self._turning = _turns_freely(helm)
         self.doing = np.where(sailing, ON_STRETCH, OUT)
         self._sample, self._end, self._most = np.zeros(n), np.full(n, planned.arrival), np.full(n, self._first - 1)
         self.rounds, self.samples = np.zeros(n, dtype=int), np.zeros(n, dtype=int)
@@ -212,7 +211,7 @@ class Pilot:
 
     def _near(self, given: Array) -> Array:
         """(n, m) commands to whose angles azimuths keep: those of the run for ships that come to it under way."""
-        ready = self._inputs + whole_turns(given - self._inputs, self._turning)
+        ready = nearest_turns(self._helm.vessel, self._inputs, given)
         return np.where((self._moves & (self.doing == ON_STRETCH))[:, None], ready, given)
 
     def _next(self, states: Array) -> Array:
@@ -251,21 +250,10 @@ class Pilot:
         return PATIENCE * samples + self._spare
 
 
-def _turns_freely(helm: Helmsman) -> np.ndarray:
-    """(m,) which commands are angles of azimuths without limits."""
-    names = zip(helm.vessel.model.inputs, helm.vessel.limits, strict=True)
-    return np.array([name.startswith("a") and not np.isfinite([x.low, x.high]).any() for name, x in names])
-
-
-def whole_turns(difference: Array, turning: np.ndarray) -> Array:
-    """(n, m) whole turns nearest to differences of angles; nothing for other commands."""
-    return np.asarray(np.where(turning, 2 * np.pi * np.round(difference / (2 * np.pi)), 0.0))
-
-
 def open_loop(helm: Helmsman, fleet: Fleet, values: Array, sailing: np.ndarray) -> Array:
     """(k + 1, n, 3) poses of ships that are given commands (k, m), from those standing on, within the rates."""
     poses = [fleet.states[:, :3]]
-    told = values + whole_turns(fleet.given - values[0], _turns_freely(helm))[:, None]
+    told = values + (nearest_turns(helm.vessel, values[0], fleet.given) - values[0])[:, None]
     reach = np.array([limit.rate for limit in helm.vessel.limits]) * helm.vessel.sample_time_s
     for row in told.swapaxes(0, 1):
         fleet.advance(np.clip(row, fleet.given - reach, fleet.given + reach), sailing)

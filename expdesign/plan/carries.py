@@ -12,7 +12,8 @@ import shapely
 
 from expdesign.dictionary import Primitive
 from expdesign.plan.steering import over_ground
-from expdesign.simulation import Environment, simulate_many
+from expdesign.plan.uncertainty import run_at_headings
+from expdesign.simulation import Environment
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
 
@@ -131,19 +132,14 @@ def _differs_by_heading(vessel: Vessel, environment: Environment) -> bool:
 
 def _in_weather(vessel: Vessel, primitive: Primitive, environment: Environment) -> Array:
     """(k, headings, 6) states over ground of the run at headings all round, in the forecast's mean current and wind."""
-    heading = np.arange(HEADINGS) * 2 * np.pi / HEADINGS
-    c, s = np.cos(heading), np.sin(heading)
-    north, east = environment.current_to
-    current_b = np.stack([north * c + east * s, east * c - north * s, 0 * c], axis=1)
-    return simulate_many(
+    return run_at_headings(
         vessel,
-        primitive.commands,
-        pose=np.stack([0 * c, 0 * c, heading], axis=1),
-        velocity=primitive.entry_velocity + current_b,
+        primitive,
+        np.arange(HEADINGS) * 2 * np.pi / HEADINGS,
+        entering=environment.current_to,
         current_to=np.tile(environment.current_to, (HEADINGS, 1)),
         wind_to=np.tile(environment.wind_to, (HEADINGS, 1)),
         parameters=np.tile(vessel.model.parameters, (HEADINGS, 1)),
-        standing=primitive.entry_inputs,
     )
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from expdesign.conventions import whole_turns
 from expdesign.plan._casadi import LegProblem, solve_leg
 from expdesign.plan._ompl import dubins_curve
 from expdesign.plan.capability import RUN_UP, SETTLE, Capability
@@ -159,7 +160,7 @@ def _straight(pose: Array, length_m: float, hull_m: float) -> Array:
 def _problem(task: LegTask, water: LegWater, check: Recovery, path: Array) -> LegProblem:
     ship = water.ship
     states, inputs, places, duration_s = _guess(task, water, check, path)
-    turned = 2 * np.pi * np.round((states[-1, 2] - task.end[2]) / (2 * np.pi))
+    turned = whole_turns(states[-1, 2] - task.end[2])
     inputs[0], inputs[-1] = task.start_inputs, nearest_turns(water.vessel, task.end_inputs, inputs[-1])
     return leg_problem(
         task,

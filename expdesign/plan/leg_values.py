@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 import shapely
 
+from expdesign.conventions import whole_turns
 from expdesign.plan.area import ARC_SEGMENTS, SeaArea
 from expdesign.plan.capability import Capability
 from expdesign.plan.field import ClearanceField
@@ -224,12 +225,8 @@ def acceptable(start: Array, end: Array, water: LegWater, values: Array, before:
 
 
 def nearest_turns(vessel: Vessel, inputs: Array, near: Array) -> Array:
-    """The same commands with unlimited azimuth angles shifted by whole turns towards `near`."""
-    shifted = inputs.copy()
-    for index, (name, limit) in enumerate(zip(vessel.model.inputs, vessel.limits, strict=True)):
-        if name.startswith("a") and not np.isfinite([limit.low, limit.high]).any():
-            shifted[index] += 2 * np.pi * np.round((near[index] - inputs[index]) / (2 * np.pi))
-    return shifted
+    """The same commands (..., m) with unlimited azimuth angles shifted by whole turns towards `near` (..., m)."""
+    return np.asarray(inputs + np.where(vessel.turns_freely, whole_turns(near - inputs), 0.0))
 
 
 def room_beside(water: LegWater, centre: Array, side: Array, margin_m: float) -> Array:

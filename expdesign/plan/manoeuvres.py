@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from expdesign.conventions import wrap_angle
+from expdesign.conventions import whole_turns, wrap_angle
 from expdesign.plan._casadi import LegProblem, solve_leg
 from expdesign.plan.capability import Capability, joint_m, speed_loss_s, turn_loss_s
 from expdesign.plan.leg_problem import hull_discs, leg_problem
@@ -133,7 +133,7 @@ def _in_parts(task: LegTask, water: LegWater, line: Line, first_m: float, last_m
         return None
     values = np.concatenate([first, middle, last])
     turned = last_state(water.sail(task.start, values, task.past))[2]
-    whole = 2 * np.pi * np.round((turned - task.end[2]) / (2 * np.pi))
+    whole = whole_turns(turned - task.end[2])
     end = np.r_[task.end[:2], task.end[2] + whole, task.end[3:]]
     return values if acceptable(task.start, end, water, values, task.past) else None
 
@@ -161,7 +161,7 @@ def _steady(water: LegWater, line: Line, first_m: float, last_m: float, heading:
     ground = np.interp(samples, time_s, over_ground)[:, None] * np.stack([np.cos(place[:, 2]), np.sin(place[:, 2])], 1)
     through = ground - current
     pointing = np.unwrap(np.arctan2(through[:, 1], through[:, 0]))  # bow into the stream
-    pointing += 2 * np.pi * np.round((heading - pointing[0]) / (2 * np.pi))
+    pointing += whole_turns(heading - pointing[0])
     c, s = np.cos(pointing), np.sin(pointing)
     yaw_rate = np.gradient(pointing, vessel.sample_time_s)
     states = np.column_stack(

@@ -9,6 +9,7 @@ import numpy as np
 
 from expdesign.durations import DurationDesign
 from expdesign.durations.collected import Collected
+from expdesign.durations.solve import bordered_moments
 from expdesign.information import moments, regressor_rows
 from expdesign.plan.values import Leg
 from expdesign.signals import Commands, Trajectory
@@ -51,8 +52,4 @@ def realised_efficiencies(
 
 def _bordered(vessel: Vessel, rows: Array, parameters: Sequence[str], mean_subtraction: str) -> Array:
     X, Y = moments(vessel.model, rows, parameters)
-    if mean_subtraction == "none":
-        return X
-    if mean_subtraction == "batch":
-        return X - Y @ Y.T
-    return np.block([[X, Y], [Y.T, np.eye(Y.shape[1])]])
+    return bordered_moments(X, Y, Y, Y @ Y.T, mean_subtraction)

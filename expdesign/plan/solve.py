@@ -24,7 +24,7 @@ from expdesign.plan.joint_trials import joints_of, settled
 from expdesign.plan.lattice import LatticePlan, search_lattice
 from expdesign.plan.lattice_moves import build_lattice
 from expdesign.plan.leg_times import leg_times
-from expdesign.plan.leg_values import last_state
+from expdesign.plan.leg_values import last_state, nearest_turns
 from expdesign.plan.legs import LegTask, LegWater, find_leg, leg_trajectory
 from expdesign.plan.lower_bound import reposition_bound_s
 from expdesign.plan.placement import is_carried, place_runs
@@ -365,7 +365,8 @@ def _sail_run(problem: PlanProblem, water: LegWater, line: Timeline, placement: 
         return f"no leg leads to {where}"
     track = leg_trajectory(water, line.state, leg, line.given)
     arrived = np.r_[track.pose[-1], track.velocity[-1]]
-    values = primitive.commands.values + _whole_turns(leg[-1] - primitive.entry_inputs)
+    turned = nearest_turns(problem.vessel, primitive.entry_inputs, leg[-1]) - primitive.entry_inputs
+    values = primitive.commands.values + turned
     run = leg_trajectory(water, arrived, values, water.remembered(np.concatenate([line.given, leg])))
     if not shapely.contains_properly(water.safe, swept_area(run.pose, problem.vessel.hull_b)):
         return f"the run {where} leaves safe water"
@@ -398,11 +399,6 @@ def _leg(problem: PlanProblem, water: LegWater, line: Timeline, end: Array, end_
     )
     leg = find_leg(task, water)
     return leg if leg is None or line.stretches or water.prompt else np.concatenate([wait, leg])
-
-
-def _whole_turns(difference: Array) -> Array:
-    """The whole turns by which a leg left an azimuth away from the primitive's own angles."""
-    return np.asarray(2 * np.pi * np.round(difference / (2 * np.pi)))
 
 
 def _through_water(problem: PlanProblem, pose: Array, velocity: Array) -> Array:

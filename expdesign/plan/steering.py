@@ -51,11 +51,7 @@ class Reference:
 
     def pace(self, sample: Array, states: Array, reach_m: float) -> Array:
         """(n,) samples to move on by: one, less where a ship (n, 6) has fallen behind by some of `reach_m`."""
-        wanted = self.at(sample)
-        along = over_ground(wanted)
-        speed = np.hypot(*along.T) + 1e-9
-        behind = ((wanted[:, :2] - states[:, :2]) * along).sum(axis=1) / speed
-        return np.asarray(np.clip(1.5 - behind / reach_m, 0.0, 1.0))
+        return np.asarray(np.clip(1.5 - self._behind_m(sample, states) / reach_m, 0.0, 1.0))
 
     def abreast(self, sample: Array, states: Array, *, step_m: float) -> Array:
         """(n,) samples to move on by so that the reference stays abeam of each ship (n, 6), and does not stand still.
@@ -65,13 +61,16 @@ class Reference:
             states: where ships are.
             step_m: least distance that counts as one sample's, for references that hardly move.
         """
+        row = np.clip(sample.astype(int), 0, len(self.states) - 2)
+        step = np.maximum(np.hypot(*(self.states[row + 1, :2] - self.states[row, :2]).T), step_m)
+        return np.asarray(np.clip(-self._behind_m(sample, states) / step, SLOWEST, FASTEST))
+
+    def _behind_m(self, sample: Array, states: Array) -> Array:
+        """(n,) how far ships (n, 6) are behind the reference at samples (n,), along its course [m]."""
         wanted = self.at(sample)
         along = over_ground(wanted)
         speed = np.hypot(*along.T) + 1e-9
-        behind = ((wanted[:, :2] - states[:, :2]) * along).sum(axis=1) / speed
-        row = np.clip(sample.astype(int), 0, len(self.states) - 2)
-        step = np.maximum(np.hypot(*(self.states[row + 1, :2] - self.states[row, :2]).T), step_m)
-        return np.asarray(np.clip(-behind / step, SLOWEST, FASTEST))
+        return np.asarray(((wanted[:, :2] - states[:, :2]) * along).sum(axis=1) / speed)
 
 
 def over_ground(states: Array) -> Array:

@@ -64,27 +64,56 @@ def stray_m(
         )
     truths, samples = draw_truths(vessel, environment, draws, rng), len(primitive.commands)
     heading = rng.uniform(-np.pi, np.pi, draws)
-    c, s = np.cos(heading), np.sin(heading)
-    drift = environment.current_to
-    along = np.stack([drift[0] * c + drift[1] * s, drift[1] * c - drift[0] * s, 0 * c], axis=1)
-    states = simulate_many(
+    states = run_at_headings(
         vessel,
-        primitive.commands,
-        pose=np.stack([0 * c, 0 * c, heading], axis=1),
-        velocity=primitive.entry_velocity + along,
+        primitive,
+        heading,
+        entering=environment.current_to,
         current_to=truths.current_to + _varying(vessel, environment.current_variation, (samples, draws, 2), rng),
         wind_to=truths.wind_to + _varying(vessel, environment.wind_variation, (samples, draws, 2), rng),
         parameters=truths.parameters,
-        standing=primitive.entry_inputs,
     )
-    time_s = primitive.trajectory.time_s[:, None, None]
-    moved = states[..., :2] - drift * time_s
+    c, s = np.cos(heading), np.sin(heading)
+    moved = states[..., :2] - environment.current_to * primitive.trajectory.time_s[:, None, None]
     back = np.stack([moved[..., 0] * c + moved[..., 1] * s, moved[..., 1] * c - moved[..., 0] * s], axis=-1)
     pose_b = np.concatenate([back, states[..., 2:3] - heading[:, None]], axis=-1)  # (k + 1, n, 3)
     nominal = disc_points(primitive.trajectory.pose, centres_m)
     drawn = disc_points(pose_b.reshape(-1, 3), centres_m).reshape(*pose_b.shape[:2], -1, 2)
     apart = np.hypot(*np.moveaxis(drawn - nominal[:, None], -1, 0)).max(axis=-1)  # (k + 1, n)
     return _radius(apart, confidence, primitive.name)
+
+
+def run_at_headings(
+    vessel: Vessel,
+    primitive: Primitive,
+    heading: Array,
+    *,
+    entering: Array,
+    current_to: Array,
+    wind_to: Array,
+    parameters: Array,
+) -> Array:
+    """(k + 1, n, 6) states over ground of a run that begins at the origin at headings (n,).
+
+    Args:
+        vessel, primitive: who sails what.
+        heading: of each ship [rad].
+        entering: (2,) current through which all begin with the entry velocity [m/s].
+        current_to, wind_to: (n, 2) or (k, n, 2) in which they sail on [m/s].
+        parameters: (n, p) of each ship.
+    """
+    c, s = np.cos(heading), np.sin(heading)
+    north, east = entering
+    return simulate_many(
+        vessel,
+        primitive.commands,
+        pose=np.stack([0 * c, 0 * c, heading], axis=1),
+        velocity=primitive.entry_velocity + np.stack([north * c + east * s, east * c - north * s, 0 * c], axis=1),
+        current_to=current_to,
+        wind_to=wind_to,
+        parameters=parameters,
+        standing=primitive.entry_inputs,
+    )
 
 
 def _varying(

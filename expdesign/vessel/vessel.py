@@ -58,6 +58,12 @@ class Vessel:
         return tuple(response for actuator in self.actuators for response in actuator.responses)
 
     @property
+    def turns_freely(self) -> np.ndarray:
+        """(m,) which commands are angles of azimuths without limits, so that whole turns make no difference."""
+        names = zip(self.model.inputs, self.limits, strict=True)
+        return np.array([name.startswith("a") and not np.isfinite([x.low, x.high]).any() for name, x in names])
+
+    @property
     def hull_b(self) -> Array:
         """(4, 2) corners of the rectangle length x beam, forward/starboard [m]: contains every real waterline."""
         half_length, half_beam = self.length_m / 2, self.beam_m / 2
