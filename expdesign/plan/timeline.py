@@ -12,7 +12,7 @@ from expdesign.values import Array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Stretch:
+class SailedStretch:
     """A leg with its commands (k, m) and states (k + 1, 6)."""
 
     kind: str
@@ -33,7 +33,7 @@ class Timeline:
 
     begin: Array
     begin_inputs: Array
-    stretches: list[Stretch] = field(default_factory=list)
+    stretches: list[SailedStretch] = field(default_factory=list)
 
     @property
     def state(self) -> Array:
@@ -58,7 +58,7 @@ class Timeline:
     def sail(self, kind: str, name: str, commands: Array, track: Trajectory) -> None:
         """Add a stretch."""
         states = np.hstack([track.pose, track.velocity])
-        self.stretches.append(Stretch(kind=kind, name=name, commands=commands, states=states))
+        self.stretches.append(SailedStretch(kind=kind, name=name, commands=commands, states=states))
 
     def undo_run(self) -> Placement:
         """Forget the last run and the leg to it; where the run began."""

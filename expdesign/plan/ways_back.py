@@ -143,8 +143,8 @@ class Convoy:
         brake = BRAKING * helm.ship.acceleration_mps2
         speed = np.sqrt(self._bend[everyone, self._next] ** 2 + 2 * brake * np.maximum(ahead - REACH * length, 0.0))
         near = left < NEAR * length
-        sideways = np.cos(np.arctan2(offset[:, 1], offset[:, 0]) - self.goal[2])
-        slow = np.minimum(fastest * np.maximum(sideways, CRAB), left / (LEAD * helm.answer_s))
+        lengthways = np.cos(np.arctan2(offset[:, 1], offset[:, 0]) - self.goal[2])
+        slow = np.minimum(fastest * np.maximum(lengthways, CRAB), left / (LEAD * helm.answer_s))
         speed = np.minimum(np.minimum(speed, fastest), np.where(near & helm.sideways, slow, np.inf))
         leg = there - before
         leg = leg / np.maximum(np.hypot(*leg.T), 1e-9)[:, None]
