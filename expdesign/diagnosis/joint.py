@@ -7,6 +7,7 @@ Gram matrices per window, small enough for anything that is asked of them.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,6 +24,7 @@ WANDER_MPS = (0.0, 0.005, 0.01, 0.02, 0.035, 0.06, 0.1, 0.2)
 WANDER_TIMES_S = (60.0, 150.0, 400.0, 1000.0)
 SPACING_S = 20.0
 MOST_HATS = 24
+LARGEST_ANSWER = 1e30
 CLOSE = 0.05
 """A fit has converged when the next step would lower twice the negative log likelihood by less than this."""
 
@@ -55,6 +57,12 @@ class Columns:
     numbers: int
     spacing_s: float
 
+    @property
+    def lost(self) -> bool:
+        """Answers grow beyond all bounds: the model is unstable on the way."""
+        sizes = (float(np.abs(item).max(initial=0.0)) for item in (self.values, self.starts))
+        return not all(size < LARGEST_ANSWER for size in sizes)
+
 
 def build_columns(linear: Linear, pushes: list[Push], *, wander: bool) -> Columns:
     """All answers along one simulation."""
@@ -71,6 +79,13 @@ def build_columns(linear: Linear, pushes: list[Push], *, wander: bool) -> Column
     return Columns(
         values=values, starts=start_responses(linear), error=motion.error, numbers=len(pushes), spacing_s=spacing
     )
+
+
+def answers(linear: Linear, keys: Sequence[str]) -> Columns:
+    """Columns of the numbers of a fit."""
+    ship = linear.motion.ship
+    pushes = [push_of(linear, ship.having({k: ship.get(k) + d}), d) for k in keys for d in [step_of(ship, k)]]
+    return build_columns(linear, pushes, wander=linear.motion.windows.has_heading)
 
 
 def grams(columns: Columns, noise: Noise) -> Grams:
@@ -236,14 +251,14 @@ def fit(
         if best is not None:
             ship, starts = best.ship.having(moved(best.ship, keys, share * move)), best.starts + share * turn
         motion = simulate_windows(ship, windows, starts, near=near)
-        if motion.diverged:
+        linear = None if motion.diverged else linearise(motion)
+        columns = None if linear is None else answers(linear, keys)
+        if linear is None or columns is None or columns.lost:
             if best is None:
                 raise FloatingPointError
             share /= 2
             continue
-        linear = near = linearise(motion)
-        pushes = [push_of(linear, ship.having({k: ship.get(k) + d}), d) for k in keys for d in [step_of(ship, k)]]
-        columns = build_columns(linear, pushes, wander=windows.has_heading)
+        near = linear
         if noise is None or step == 0:
             noise = _colours(columns, noise, precision, ship, keys, colour_order)
         now = np.array([ship.get(key) for key in keys])

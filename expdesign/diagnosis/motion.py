@@ -264,7 +264,10 @@ def _differing(one: Extended, other: Extended) -> set[str]:
 
 
 def responses(linear: Linear, pushes: Sequence[Push]) -> Array:
-    """(c, w, s, 4) how the shown channels answer each push, from undisturbed initial states."""
+    """(c, w, s, 4) how the shown channels answer each push, from undisturbed initial states.
+
+    Answers of an unstable motion may grow beyond what numbers hold.
+    """
     motion = linear.motion
     n = motion.ship.states
     w, k = motion.states.shape[:2]
@@ -275,11 +278,13 @@ def responses(linear: Linear, pushes: Sequence[Push]) -> Array:
         kicks = np.stack([np.einsum("wkij,wkj->wki", linear.driven, force) for force in forces.values()], axis=-1)
         x = np.zeros((w, n, len(driven)))
         path = np.zeros((k, w, n, len(driven)))
-        for step in range(k - 1):
-            x = linear.onward[:, step] @ x + kicks[:, step]
-            path[step + 1] = x
+        with np.errstate(over="ignore", invalid="ignore"):
+            for step in range(k - 1):
+                x = linear.onward[:, step] @ x + kicks[:, step]
+                path[step + 1] = x
         moved[driven] = np.moveaxis(path, (3, 1, 0, 2), (0, 1, 2, 3))
-    result = _shown(linear, moved)
+    with np.errstate(over="ignore", invalid="ignore"):
+        result = _shown(linear, moved)
     for index, push in enumerate(pushes):
         if push.sensor is not None:
             result[index] += push.sensor
@@ -293,10 +298,11 @@ def start_responses(linear: Linear) -> Array:
     x = np.broadcast_to(np.eye(n)[:, :3], (w, n, 3)).copy()
     path = np.empty((k, w, n, 3))
     path[0] = x
-    for step in range(k - 1):
-        x = linear.onward[:, step] @ x
-        path[step + 1] = x
-    return _shown(linear, np.moveaxis(path, (3, 1, 0, 2), (0, 1, 2, 3)))
+    with np.errstate(over="ignore", invalid="ignore"):
+        for step in range(k - 1):
+            x = linear.onward[:, step] @ x
+            path[step + 1] = x
+        return _shown(linear, np.moveaxis(path, (3, 1, 0, 2), (0, 1, 2, 3)))
 
 
 def _shown(linear: Linear, moved: Array) -> Array:
@@ -310,6 +316,5 @@ def _shown(linear: Linear, moved: Array) -> Array:
         return np.stack([*seen, averaged(values[..., 2])], axis=-1)
     size = 1e-4
     still = observed(motion.ship, motion.states, motion.windows)
-    return np.stack(
-        [(observed(motion.ship, motion.states + size * part, motion.windows) - still) / size for part in moved]
-    )
+    changes = [(observed(motion.ship, motion.states + size * part, motion.windows) - still) / size for part in moved]
+    return np.array(changes).reshape(len(moved), *still.shape)

@@ -14,8 +14,8 @@ from dataclasses import replace
 import numpy as np
 
 from expdesign.diagnosis.contenders import Contender, gain_over
-from expdesign.diagnosis.joint import Fit, build_columns, fit, profile_cost, step_of
-from expdesign.diagnosis.motion import linearise, push_of, simulate_windows
+from expdesign.diagnosis.joint import Fit, answers, fit, profile_cost
+from expdesign.diagnosis.motion import linearise, simulate_windows
 
 POINTS, ROUNDS = 9, 7
 ALIKE = 1.0
@@ -80,6 +80,7 @@ def _cost(found: Fit, key: str, value: float) -> float:
     if motion.diverged:
         return np.inf
     linear = linearise(motion)
-    pushes = [push_of(linear, ship.having({k: ship.get(k) + d}), d) for k in found.keys for d in [step_of(ship, k)]]
-    columns = build_columns(linear, pushes, wander=windows.has_heading)
+    columns = answers(linear, found.keys)
+    if columns.lost:
+        return np.inf
     return profile_cost(replace(found, ship=ship, linear=linear, columns=columns), found.noise)
