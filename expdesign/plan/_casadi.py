@@ -58,6 +58,8 @@ class LegProblem:
         top_speed_mps, yaw_rate_radps: bounds on speed through water, in any direction, and yaw rate at the nodes.
         lateral_mps2: bound on surge speed through water times yaw rate.
         node_s: least time between nodes; 0 for the sample time.
+        wish: (2,) seconds that a metre made good north and east is worth to legs that may end anywhere, and if it is
+            zero with any heading; None for those that have to end at `end`.
     """
 
     vessel: Vessel
@@ -81,6 +83,7 @@ class LegProblem:
     yaw_rate_radps: float
     lateral_mps2: float
     node_s: float = 0.0
+    wish: Array | None = None
 
     def __post_init__(self) -> None:
         seal(self, start="6", end="6", start_inputs="m", end_inputs="m", states="j 6", inputs="j m")
@@ -88,23 +91,52 @@ class LegProblem:
         seal(self, path="j 3", room_port_m="j", room_starboard_m="j", circle="3")
 
 
+def solve_joint(problem: LegProblem) -> tuple[float, Array] | None:
+    """Time of the leg that gains most by its `wish`, on whole samples, and its end pose (3,); None if none is found."""
+    sample_s, duration_s = problem.vessel.sample_time_s, problem.duration_s
+    nodes, block = _size(problem, duration_s)
+    fastest = _program(problem.vessel, problem.environment, nodes, block, True)
+    for guess in (problem, _even(problem)):
+        found = fastest.solve(_respaced(guess, nodes), duration_s / (nodes * block))
+        if found is None:
+            continue
+        count = max(2, int(np.ceil(nodes * found[1] / sample_s - 1e-6)))
+        smooth = _program(problem.vessel, problem.environment, count, block, False)
+        exact = smooth.solve(_respaced(found[0], count), sample_s)
+        if exact is not None:
+            return count * block * sample_s, exact[0].states[-1, :3]
+    return None
+
+
+def _even(problem: LegProblem) -> LegProblem:
+    """The same leg with commands that change evenly as a first guess."""
+    return replace(problem, inputs=np.linspace(problem.inputs[0], problem.inputs[-1], len(problem.inputs)))
+
+
+def _size(problem: LegProblem, duration_s: float) -> tuple[int, int]:
+    """Number of nodes for a leg of some time, and samples between two of them."""
+    sample_s = problem.vessel.sample_time_s
+    nodes = next((n for n in NODES if n >= duration_s / max(sample_s, problem.node_s)), NODES[-1])
+    return nodes, max(1, round(duration_s / (nodes * sample_s)))
+
+
 def solve_leg(problem: LegProblem) -> Array | None:
     """Commands (k, m) at the vessel's sample time, or None when IPOPT finds none.
 
     First the fastest motion is sought with the sample time free, then the smoothest one on whole samples in that
-    time. The answer is for the caller to check by simulation.
+    time. Where commands that would give the guessed motion lead nowhere, evenly changing ones often do. The answer is
+    for the caller to check by simulation.
     """
     sample_s = problem.vessel.sample_time_s
-    for stretch in (1.0, 1.6, 3.0):
+    for guess, stretch in ((problem, 1.0), (_even(problem), 1.0), (problem, 1.6), (problem, 3.0)):
         guess_s = stretch * problem.duration_s
-        nodes = next((n for n in NODES if n >= guess_s / max(sample_s, problem.node_s)), NODES[-1])
-        block = max(1, round(guess_s / (nodes * sample_s)))
+        nodes, block = _size(problem, guess_s)
         fastest = _program(problem.vessel, problem.environment, nodes, block, True)
-        found = fastest.solve(_respaced(problem, nodes), guess_s / (nodes * block))
+        found = fastest.solve(_respaced(guess, nodes), guess_s / (nodes * block))
         if found is None:
             continue
         time_s = nodes * block * found[1]
-        least = max(2, int(np.ceil(time_s / (block * sample_s) - 1e-6)))
+        least = max(2, int(np.ceil(time_s / (block * sample_s) - 0.1)))
         for count in (least, least + 1, least + 3, least + 8, least + 16):
             smooth = _program(problem.vessel, problem.environment, count, block, False)
             exact = smooth.solve(_respaced(found[0], count), sample_s)
@@ -155,7 +187,7 @@ class _Program:
     def _build(self) -> None:
         j, m = self.nodes, len(self.limits)
         x, u, h = ca.MX.sym("x", 6, j + 1), ca.MX.sym("u", m, j + 1), ca.MX.sym("h")
-        path, circle = ca.MX.sym("path", 3, j - 1), ca.MX.sym("circle", 2)
+        path, circle, wish = ca.MX.sym("path", 3, j - 1), ca.MX.sym("circle", 2), ca.MX.sym("wish", 2)
         unit_s, arm = ca.MX.sym("unit_s"), ca.MX.sym("arm")
         past, d = ca.MX.sym("past", m, self.memory), ca.MX.sym("d", len(self.lagging), j + 1)
         inputs = ca.DM(self.input_scale) * u
@@ -172,14 +204,14 @@ class _Program:
         through = x[3:5, 1:-1] - self._current_b(x[2, 1:-1])
         rows += [ca.sum1(through**2).T, (through[0, :] * x[5, 1:-1]).T]
         steps = ca.diff(u, 1, 1)
-        cost = SMOOTHNESS * ca.sumsqr(steps) + SMALLNESS * ca.sumsqr(u) / j
+        cost = SMOOTHNESS * ca.sumsqr(steps) + SMALLNESS * ca.sumsqr(u) / j - ca.dot(wish, states[:2, -1]) / unit_s
         if self.free:
             cost = cost + h * j * self.block / unit_s
         options: dict[str, Any] = {"print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}
-        options |= {"ipopt.max_iter": 150, "ipopt.constr_viol_tol": 1e-9, "ipopt.acceptable_iter": 0}
+        options |= {"ipopt.max_iter": 100, "ipopt.constr_viol_tol": 1e-9, "ipopt.acceptable_iter": 0}
         options |= {"ipopt.tol": 1e-5 if self.free else 1e-7}
         nlp: Any = {"x": ca.vertcat(ca.vec(x), ca.vec(u), ca.vec(d), h), "f": cost, "g": ca.vertcat(*rows)}
-        nlp["p"] = ca.vertcat(ca.vec(path), circle, unit_s, arm, ca.vec(past))
+        nlp["p"] = ca.vertcat(ca.vec(path), circle, wish, unit_s, arm, ca.vec(past))
         self.solver = ca.nlpsol("leg", "ipopt", nlp, options)
 
     @property
@@ -268,6 +300,8 @@ class _Program:
         low = -high
         low[0] = high[0] = (problem.start - origin) / self.state_scale
         low[-1] = high[-1] = (problem.end - origin) / self.state_scale
+        if problem.wish is not None:
+            low[-1, : 2 if problem.wish.any() else 3], high[-1, : 2 if problem.wish.any() else 3] = -np.inf, np.inf
         first, last = (np.tile([getattr(x, name) for x in self.limits], (j + 1, 1)) for name in ("low", "high"))
         first[0] = last[0] = problem.start_inputs
         for index, response in enumerate(self.vessel.responses):  # nothing may still be on its way at the end
@@ -306,6 +340,7 @@ class _Program:
             p=np.r_[
                 path.ravel(),
                 problem.circle[:2] - origin[:2],
+                np.zeros(2) if problem.wish is None else problem.wish,
                 problem.time_scale_s,
                 problem.hull_arm_m,
                 past.ravel(),

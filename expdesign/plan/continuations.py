@@ -21,9 +21,9 @@ STRAIGHTS = np.array([0.0, 2.0, 6.0])
 """Straight after a turn, beyond the run-up, in hull lengths."""
 WAYS = np.array([5.0, 12.0, 25.0, 50.0, 100.0])
 """Stretches of the shortest way to the goal, in hull lengths; the whole way is always tried too."""
-AGILE_WAYS = np.array([1.0, 1.5, 2.5, 4.0, 7.0, 12.0, 25.0, 50.0, 100.0])
+AGILE_WAYS = np.array([1.5, 2.5, 4.0, 7.0, 12.0, 25.0, 50.0, 100.0])
 """The same for agile vessels."""
-AGILE_STRAIGHTS = np.array([1.0, 2.5, 6.0])
+AGILE_STRAIGHTS = np.array([1.5, 2.5, 6.0])
 """Straight legs of agile vessels besides the best joints, beyond the run-up, in hull lengths."""
 COURSES = np.arange(6) * np.pi / 3
 """Courses of straight legs of agile vessels, from the heading that the run before ends with."""
@@ -122,12 +122,14 @@ def _joints(
     parents, steps, seconds = [np.zeros(0, dtype=int)], [np.zeros((0, 3))], [np.zeros(0)]
     entry = np.array(space.stamps[q].entry_mps)
     for (last, exit_mps), where in _alike(beam, able).items():
-        rule = space.joint_times(times, space.stamps[last].name if last >= 0 else "", space.stamps[q].name)
-        found, longer = joints(rule, exit_mps, float(entry)), float(more_m[where[0]])
-        step, leg_s = found.step, found.seconds
+        tried = space.tried.get((space.stamps[last].name if last >= 0 else "", space.stamps[q].name))
+        found, longer = joints(times, exit_mps, float(entry), short=tried is None), float(more_m[where[0]])
+        step, leg_s = found.step, found.seconds + space.more_s(last, q)
+        if tried is not None:
+            step, leg_s = np.vstack([step, tried.step]), np.r_[leg_s, tried.seconds]
         if longer:  # straight before the run
             step = step + longer * np.column_stack([np.cos(step[:, 2]), np.sin(step[:, 2]), 0 * leg_s])
-            leg_s = rule.step_s(step, np.array(exit_mps), entry)
+            leg_s = times.step_s(step, np.array(exit_mps), entry) + space.more_s(last, q)
         parents.append(np.repeat(able[where], len(leg_s)))
         steps.append(np.tile(step, (len(where), 1)))
         seconds.append(np.tile(leg_s, len(where)))
@@ -158,6 +160,7 @@ def _straights(
     length = np.tile(length, len(able)) + np.repeat(more_m, len(parent) // max(len(able), 1))
     step = np.column_stack([length * np.cos(course), length * np.sin(course), heading])
     leg_s = times.step_s(step, beam.exit_mps[parent], np.array(space.stamps[q].entry_mps))
+    leg_s += np.array([space.more_s(int(last), q) for last in beam.last])[parent]
     return _stepped(space, beam, q, parent, step, leg_s)
 
 
@@ -183,7 +186,7 @@ def _ways(space: SearchSpace, times: LegTimes, beam: PartialPlans, able: np.ndar
             heading - pose[2],
             beam.exit_mps[index],
             entry,
-        )
+        ) + space.more_s(int(beam.last[index]), q)
         placed = np.repeat(points[:, :2], len(HEADINGS), axis=0)
         starts.append(np.column_stack([placed, heading.ravel()]))
         seconds.append(leg_s.ravel())
@@ -251,19 +254,35 @@ def run_ends(space: SearchSpace, primitive: np.ndarray, start: Array) -> Array:
 
 
 def clear_options(space: SearchSpace, plans: PartialPlans, options: Options) -> np.ndarray:
-    """(n,) whether arcs, runs and their ends keep their margins on the grid."""
-    start, turn, primitive = options.start, options.turn, options.primitive
-    clear = space.field.at(start[:, :2]) >= space.leg_margin_m
-    for bad in space.refused:
-        near = np.hypot(*(start[:, :2] - bad[:2]).T) < space.hull_m / 2
-        clear &= ~(near & (np.abs(wrap_angle(start[:, 2] - bad[2])) < 0.2))
-    clear &= space.field.at(run_ends(space, primitive, start)[:, :2]) >= space.leg_margin_m
+    """(n,) whether legs, runs and their ends keep their margins on the grid."""
+    start, turn = options.start, options.turn
+    clear = _ends_clear(space, options.primitive, start)
     arcs = np.flatnonzero(clear & ~np.isnan(turn))
     clear[arcs] = _arcs_clear(space, _departures(space, plans)[0][options.parent[arcs]], turn[arcs], start[arcs])
     lines = np.flatnonzero(clear & options.straight)
     clear[lines] = _lines_clear(space, plans.pose[options.parent[lines]], start[lines])
-    for q in np.unique(primitive[clear]):
-        some = np.flatnonzero(clear & (primitive == q))
+    left = np.flatnonzero(clear)
+    clear[left] = _hulls_clear(space, options.primitive[left], start[left])
+    return clear
+
+
+def runs_clear(space: SearchSpace, primitive: np.ndarray, start: Array) -> np.ndarray:
+    """(n,) whether runs (n,) from poses (n, 3) and their ends keep their margins on the grid."""
+    return _ends_clear(space, primitive, start) & _hulls_clear(space, primitive, start)
+
+
+def _ends_clear(space: SearchSpace, primitive: np.ndarray, start: Array) -> np.ndarray:
+    clear = space.field.at(start[:, :2]) >= space.leg_margin_m
+    for bad in space.refused:
+        near = np.hypot(*(start[:, :2] - bad[:2]).T) < space.hull_m / 2
+        clear &= ~(near & (np.abs(wrap_angle(start[:, 2] - bad[2])) < 0.2))
+    return np.asarray(clear & (space.field.at(run_ends(space, primitive, start)[:, :2]) >= space.leg_margin_m))
+
+
+def _hulls_clear(space: SearchSpace, primitive: np.ndarray, start: Array) -> np.ndarray:
+    clear = np.ones(len(start), dtype=bool)
+    for q in np.unique(primitive):
+        some = np.flatnonzero(primitive == q)
         item = space.stamps[q]
         c, s = np.cos(start[some, 2])[:, None], np.sin(start[some, 2])[:, None]
         north = start[some, :1] + c * item.discs[:, 0] - s * item.discs[:, 1] + space.current_to[0] * item.times_s

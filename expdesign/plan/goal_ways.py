@@ -29,6 +29,7 @@ class GoalWays:
     """Ways to the goal.
 
     Attributes:
+        ways: of the water.
         field: the grid of the table.
         distance_m: (rows, columns) length of the way to the goal; where there is none, that of the nearest
             cell with one, and the distance to it.
@@ -37,6 +38,7 @@ class GoalWays:
         following: (n,) next node of each node's way; the goal's own is itself.
     """
 
+    ways: Ways
     field: ClearanceField
     distance_m: Array
     turn: np.ndarray
@@ -82,7 +84,7 @@ def build_goal_ways(ways: Ways, field: ClearanceField, goal: Array) -> GoalWays 
     if not np.isfinite(table).any():
         return None
     filled, first = _filled(table.reshape(shape), first.reshape(shape), grid.cell_m)
-    return GoalWays(field=grid, distance_m=filled, turn=first, nodes=nodes, following=following)
+    return GoalWays(ways=ways, field=grid, distance_m=filled, turn=first, nodes=nodes, following=following)
 
 
 def ways_to(ways: Ways, goal: Array) -> tuple[Array, Array, np.ndarray]:

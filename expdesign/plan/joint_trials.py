@@ -1,14 +1,15 @@
-"""Joints between runs tried with optimised legs, so that the search knows how long they take to settle.
+"""Joints between runs tried with optimised legs, so that the search knows where they lead and how long they take.
 
-A joint that is a little too short makes a ship slow down, or circle, to arrive as the run asks; how short that is
-depends on how actuators stand and how the ship moves as the run before ends. Each pair of runs is tried once, in open
-calm water, as the search would join them.
+How short a leg may be without making the ship slow down, or circle, to arrive as the run asks depends on how actuators
+stand and how the ship moves as the run before ends, which no rule tells. Each pair of runs is tried once, in open calm
+water: the leg may end anywhere, and way made good counts as much as it would at full speed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import shapely
@@ -17,123 +18,105 @@ from expdesign.conventions import wrap_angle
 from expdesign.dictionary import Primitive
 from expdesign.plan.area import as_multipolygon
 from expdesign.plan.field import clearance_field
-from expdesign.plan.leg_times import LegTimes, joints
+from expdesign.plan.leg_times import NEAR
 from expdesign.plan.leg_values import LegTask, LegWater
-from expdesign.plan.legs import find_leg
-from expdesign.plan.search_space import SearchSpace
+from expdesign.plan.manoeuvres import joint
+from expdesign.plan.search_space import SearchSpace, Stamp, TriedJoint
 from expdesign.plan.values import Placement
 from expdesign.simulation import CALM
 from expdesign.values import Array
 
-LONGER = (1.0, 1.6, 2.6, 4.2)
-"""Times to settle that are tried, in those of the rule."""
-GOOD = 1.15
-"""A leg that takes so much of the rule's time is as good as the rule."""
-NEAR = 3.0
-"""Hull lengths up to which a leg is a joint."""
+GUESS = 0.5
+"""Length of the leg that the optimiser begins with, in hull lengths."""
 ROOM = 25.0
 """Hull lengths of open water to every side."""
 
 Pair = tuple[str, str]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Joint:
-    """A joint of a plan.
-
-    Attributes:
-        pair: names of the run before, "" for the start, and after.
-        step: (3,) forward m, starboard m and turn from the pose where the one ends to that where the other begins.
-    """
-
-    pair: Pair
-    step: Array
-
-
-def joints_of(space: SearchSpace, start: Array, last: str, placements: Sequence[Placement]) -> list[Joint]:
-    """Joints of placements after a run that ended at a pose (3,), the first of each pair."""
-    found: dict[Pair, Joint] = {}
-    stamps = {item.name: item for item in space.stamps}
-    for placement in placements:
-        step = _from(start, placement.pose)
-        pair = (last, placement.primitive)
-        if np.hypot(*step[:2]) <= NEAR * space.hull_m and pair not in found:
-            found[pair] = Joint(pair=pair, step=step)
-        run = stamps[placement.primitive]
-        last, start = run.name, _to(placement.pose, run.displacement)
-        start[:2] += space.current_to * run.duration_s
-    return list(found.values())
+def pairs_of(placements: Sequence[Placement], last: str = "") -> list[Pair]:
+    """Names of the runs before and after each joint, "" for start and goal, once each."""
+    return list(dict.fromkeys(pairwise([last, *(item.primitive for item in placements), ""])))
 
 
 def settled(
     space: SearchSpace,
     water: LegWater,
     primitives: Mapping[str, Primitive],
-    tried: Sequence[Joint],
+    pairs: Iterable[Pair],
     *,
+    start: Array,
     carried: bool,
-    seed: int,
 ) -> SearchSpace:
-    """The same space with the time to settle of joints that had none, from legs.
+    """The same space with joints of pairs that had none.
 
     Args:
         space, water: as of the plan.
         primitives: the runs.
-        tried: joints of a plan.
+        pairs: of which runs.
+        start: (3,) pose of the plan.
         carried: whether it matters how far joints lead.
-        seed: of the path search.
     """
+    open_water, tried = _open(water), dict(space.tried)
+    for pair in pairs:
+        if pair not in tried:
+            tried[pair] = _tried(space, open_water, primitives, pair, start, carried=carried)
+    return replace(space, tried=tried)
+
+
+def _tried(
+    space: SearchSpace, water: LegWater, primitives: Mapping[str, Primitive], pair: Pair, start: Array, *, carried: bool
+) -> TriedJoint | None:
+    """The joint of a pair that loses least."""
     assert space.times is not None
-    open_water, known = _open(water), dict(space.settle_s)
-    for joint in tried:
-        if joint.pair not in known:
-            leg_s = _legs(joint.pair, primitives, open_water, seed)
-            known[joint.pair] = _settle_s(space, space.times, joint, leg_s, carried=carried)
-    return replace(space, settle_s=known)
+    course, turn = _wished(space, pair, start)
+    wish = carried * np.array([np.cos(course), np.sin(course)]) / space.times.speed_mps
+    found = joint(_task(pair, primitives, water, course, turn), water, wish)
+    if found is None:
+        return None
+    seconds, step = found
+    return TriedJoint(step=step, seconds=seconds, more_s=_more_s(space, pair, step, seconds))
 
 
-def _settle_s(
-    space: SearchSpace, times: LegTimes, joint: Joint, leg_s: Callable[[Array], float], *, carried: bool
-) -> float:
-    """The time to settle with which the joint that the rule then asks for loses least."""
-    before, after = ({item.name: item for item in space.stamps}.get(name) for name in joint.pair)
-    assert after is not None
-    best = (np.inf, times.settle_s)
-    for longer in LONGER:
-        rule = replace(times, settle_s=longer * times.settle_s)
-        found = joints(rule, before.exit_mps if before else 0.0, after.entry_mps)
-        course = joint.step[:2] / max(float(np.hypot(*joint.step[:2])), 1e-9)
-        ahead_s = found.step[:, :2] @ course / times.speed_mps
-        astray = np.abs(wrap_angle(found.step[:, 2] - joint.step[2]))
-        alike = np.flatnonzero(astray <= astray.min() + 1e-6)
-        row = alike[int(np.argmin(found.seconds[alike] - ahead_s[alike]))]
-        spent_s = leg_s(found.step[row])
-        best = min(best, (spent_s - carried * float(ahead_s[row]), rule.settle_s))
-        if spent_s <= GOOD * found.seconds[row]:
-            break
-    return best[1]
+def _more_s(space: SearchSpace, pair: Pair, step: Array, seconds: float) -> float:
+    assert space.times is not None
+    if np.hypot(*step[:2]) < NEAR * space.hull_m:
+        return 0.0
+    before, after = _stamps(space, pair)
+    speeds = before.exit_mps if before else 0.0, after.entry_mps if after else 0.0
+    return max(0.0, seconds - float(space.times.step_s(step, *np.array(speeds))))
 
 
-def _legs(pair: Pair, primitives: Mapping[str, Primitive], water: LegWater, seed: int) -> Callable[[Array], float]:
-    """Time of the optimised leg between two runs, by its step; infinite where there is none."""
+def _stamps(space: SearchSpace, pair: Pair) -> tuple[Stamp | None, Stamp | None]:
+    stamps = {item.name: item for item in space.stamps}
+    return stamps.get(pair[0]), stamps.get(pair[1])
+
+
+def _wished(space: SearchSpace, pair: Pair, start: Array) -> tuple[float, float]:
+    """Course of the way that both runs carry the ship, and the turn between them, from the heading before."""
+    before, after = _stamps(space, pair)
+    way = np.diff(space.goal_way.way(start[:2]), axis=0)
+    begins, ends = (float(np.arctan2(step[1], step[0])) for step in (way[0], way[-1]))
+    course = before.way_ahead_rad if before else begins - float(start[2])
+    turn = course - after.course_rad if after else course + float(space.goal[2]) - ends
+    return float(wrap_angle(course)), float(wrap_angle(turn))
+
+
+def _task(pair: Pair, primitives: Mapping[str, Primitive], water: LegWater, course: float, turn: float) -> LegTask:
     rest = np.zeros(len(water.vessel.limits))
-    before, after = primitives.get(pair[0]), primitives[pair[1]]
-    velocity = np.zeros(3) if before is None else before.exit_velocity
+    before, after = primitives.get(pair[0]), primitives.get(pair[1])
     given = rest[None] if before is None else before.commands.values
-
-    def leg_s(step: Array) -> float:
-        task = LegTask(
-            start=np.r_[0.0, 0.0, 0.0, velocity],
-            end=np.r_[step, after.entry_velocity],
-            start_inputs=given[-1],
-            end_inputs=after.entry_inputs,
-            seed=seed,
-            before=water.remembered(given),
-        )
-        values = find_leg(task, water)
-        return np.inf if values is None else len(values) * water.vessel.sample_time_s
-
-    return leg_s
+    away = GUESS * water.vessel.length_m
+    return LegTask(
+        start=np.r_[np.zeros(3), np.zeros(3) if before is None else before.exit_velocity],
+        end=np.r_[
+            away * np.cos(course), away * np.sin(course), turn, np.zeros(3) if after is None else after.entry_velocity
+        ],
+        start_inputs=given[-1],
+        end_inputs=rest if after is None else after.entry_inputs,
+        seed=0,
+        before=water.remembered(given),
+    )
 
 
 def _open(water: LegWater) -> LegWater:
@@ -143,16 +126,3 @@ def _open(water: LegWater) -> LegWater:
     area = replace(water.area, water=as_multipolygon(box), land=shapely.MultiPolygon())
     field = clearance_field(area, resolution_m=length / 4)
     return replace(water, area=area, environment=CALM, field=field, clearance_m=0.0)
-
-
-def _from(pose: Array, other: Array) -> Array:
-    """(3,) step from a pose to another."""
-    c, s = np.cos(pose[2]), np.sin(pose[2])
-    north, east = other[:2] - pose[:2]
-    return np.array([c * north + s * east, c * east - s * north, float(wrap_angle(other[2] - pose[2]))])
-
-
-def _to(pose: Array, step: Array) -> Array:
-    """(3,) pose a step away."""
-    c, s = np.cos(pose[2]), np.sin(pose[2])
-    return np.array([pose[0] + c * step[0] - s * step[1], pose[1] + s * step[0] + c * step[1], pose[2] + step[2]])

@@ -24,6 +24,8 @@ PUSH, SWING, POWER, SETTLE = 1.1, 0.7, 2.0, 1.2
 of both times, and time to settle in those of the actuators from nothing to full. Fitted to 540 optimised legs of three
 vessels, 20 m, 30 m and a model, between random places, headings and speeds: half of the ships' legs are met within
 three seconds, half of the model's within 0.4 s."""
+NEAR = 1.5
+"""Hull lengths that a leg needs to suit any place, heading and speed at its ends; shorter ones have to be tried."""
 LENGTHS = np.array([0.0, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9, 1.2, 1.5, 2.0, 2.7, 3.5, 5.0])
 """Lengths of joints between runs, in hull lengths."""
 GOING_ON = np.array([1.0, 1.1, 1.25])
@@ -119,9 +121,12 @@ class Joints:
 
 
 @lru_cache(maxsize=512)
-def joints(times: LegTimes, exit_mps: float, entry_mps: float) -> Joints:
-    """The best legs between two speeds: for every turn and every direction to go, the one that loses least time."""
-    course, length, turn, seconds = _all_joints(times, exit_mps, entry_mps)
+def joints(times: LegTimes, exit_mps: float, entry_mps: float, *, short: bool = True) -> Joints:
+    """The best legs between two speeds: for every turn and every direction to go, the one that loses least time.
+
+    Unless they may be `short` they are `NEAR` hull lengths long.
+    """
+    course, length, turn, seconds = _all_joints(times, exit_mps, entry_mps, short)
     along = np.cos(course - WISHES[:, None, None, None]) * length / times.speed_mps
     lost = np.concatenate([seconds - along, seconds[None]]).reshape(len(WISHES) + 1, len(TURNS), -1)
     length_of, course_of = np.divmod(lost.argmin(axis=-1), len(COURSES))
@@ -135,9 +140,10 @@ def joints(times: LegTimes, exit_mps: float, entry_mps: float) -> Joints:
     return Joints(step=np.stack([length * np.cos(course), length * np.sin(course), turn], axis=1), seconds=seconds)
 
 
-def _all_joints(times: LegTimes, exit_mps: float, entry_mps: float) -> tuple[Array, Array, Array, Array]:
+def _all_joints(times: LegTimes, exit_mps: float, entry_mps: float, short: bool) -> tuple[Array, Array, Array, Array]:
     going_on_m = times.settle_s * (exit_mps + entry_mps) / 2
     lengths = np.r_[times.hull_m * LENGTHS, going_on_m * GOING_ON]
+    lengths = lengths[short | (lengths >= NEAR * times.hull_m)]
     turn, length, course = np.meshgrid(TURNS, lengths, COURSES, indexing="ij")
     step = np.stack([length * np.cos(course), length * np.sin(course), turn], axis=-1)
     seconds = times.step_s(step, np.array(exit_mps), np.array(entry_mps))
@@ -145,8 +151,8 @@ def _all_joints(times: LegTimes, exit_mps: float, entry_mps: float) -> tuple[Arr
 
 
 @lru_cache(maxsize=512)
-def joint_lost_s(times: LegTimes, exit_mps: float, entry_mps: float) -> Array:
+def joint_lost_s(times: LegTimes, exit_mps: float, entry_mps: float, *, short: bool = True) -> Array:
     """(turns, wishes) least time that joints lose against going straight on at full speed in a wished direction [s]."""
-    course, length, _, seconds = _all_joints(times, exit_mps, entry_mps)
+    course, length, _, seconds = _all_joints(times, exit_mps, entry_mps, short)
     along = np.cos(course - WISHES[:, None, None, None]) * length / times.speed_mps
     return np.asarray((seconds - along).reshape(len(WISHES), len(TURNS), -1).min(axis=-1).T)

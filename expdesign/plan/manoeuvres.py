@@ -1,6 +1,7 @@
 """Legs of agile vessels: turn and gather speed, follow the way, turn and slow down.
 
-Short legs and both ends of long ones are optimised; the middle of a long leg, steady but for bends, is steered.
+Short legs, straight ones of some length, and both ends of long ones are optimised; the middle of a long leg, steady but
+for bends, is steered.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from expdesign.conventions import whole_turns, wrap_angle
-from expdesign.plan._casadi import LegProblem, solve_leg
+from expdesign.plan._casadi import LegProblem, solve_joint, solve_leg
 from expdesign.plan.capability import Capability, joint_m, speed_loss_s, turn_loss_s
 from expdesign.plan.leg_problem import hull_discs, leg_problem
 from expdesign.plan.leg_values import (
@@ -27,6 +28,10 @@ from expdesign.values import Array
 from expdesign.vessel import allocate, required_force
 
 GUESS_NODES = 40
+MOST_NODES = 24
+"""Nodes of joints that are tried."""
+WHOLE = 100.0
+"""Samples up to which straight legs are optimised as a whole."""
 MOST_REMEMBERED = 5000
 """Commands looked back at while steering."""
 BENDS = (1.5, 0.8, 0.4)
@@ -68,7 +73,11 @@ def agile_leg(task: LegTask, water: LegWater) -> Array | None:
         line = _line(water, way)
         first_m, last_m = _joint_lengths(task, water, line)
         short = line.length_m < first_m + last_m + 2 * water.vessel.length_m
-        values = _optimised(task, water, line) if short else _in_parts(task, water, line, first_m, last_m)
+        brief_m = WHOLE * water.vessel.sample_time_s * water.ship.transit_speed_mps
+        whole = short or (len(way) == 2 and line.length_m < brief_m)  # loses less, where it is not too much to ask
+        values = _optimised(task, water, line) if whole else None
+        if values is None and not short:
+            values = _in_parts(task, water, line, first_m, last_m)
         if values is not None:
             return values
     return None
@@ -201,6 +210,22 @@ def _problems(task: LegTask, water: LegWater, line: Line) -> Iterator[LegProblem
     ways = [turn] if abs(turn) < np.pi / 2 else [turn, turn - np.copysign(2 * np.pi, turn)]
     for way in ways:
         yield _problem(task, water, line, way)
+
+
+def joint(task: LegTask, water: LegWater, wish: Array) -> tuple[float, Array] | None:
+    """Time and end pose (3,) of the leg that gains most from a state, in open water, or None.
+
+    Args:
+        task: its end tells heading, motion and commands; its place is only a first guess.
+        water: open water.
+        wish: (2,) seconds that a metre made good north and east is worth; zero when any end will do.
+    """
+    line = _line(water, np.stack([task.start[:2], task.end[:2]]))
+    problems = (
+        replace(problem, wish=wish, node_s=problem.duration_s / MOST_NODES) for problem in _problems(task, water, line)
+    )
+    found = [answer for problem in problems if (answer := solve_joint(problem)) is not None]
+    return min(found, key=lambda answer: answer[0] - float(wish @ answer[1][:2]), default=None)
 
 
 def _problem(task: LegTask, water: LegWater, line: Line, turn: float) -> LegProblem:

@@ -14,7 +14,7 @@ import numpy as np
 from expdesign.conventions import wrap_angle
 from expdesign.plan.cheapest_orders import cheapest_orders, place_values
 from expdesign.plan.leg_times import TURNS, WISHES, LegTimes, joint_lost_s
-from expdesign.plan.search_space import SearchSpace, Stamp
+from expdesign.plan.search_space import SearchSpace, Stamp, TriedJoint
 from expdesign.values import Array
 
 
@@ -41,38 +41,33 @@ def orders_ahead(space: SearchSpace, times: LegTimes, repeats: Sequence[int], *,
     """The table for runs and their counts; `carried` when the way is longer than what they can carry the ship."""
     stamps = space.stamps
     pairs = np.array(
-        [[_joint_s(a, b, space.joint_times(times, a.name, b.name), carried=carried) for b in stamps] for a in stamps]
+        [[_joint_s(a, b, times, space.tried.get((a.name, b.name)), carried=carried) for b in stamps] for a in stamps]
     )
-    home = np.array([_home_s(a, times) for a in stamps])
+    home = np.array([_home_s(a, times) + space.more_s(k, -1) for k, a in enumerate(stamps)])
     table = cheapest_orders(pairs, home, repeats)
     if table is None:
         return OrdersAhead(base=np.ones(len(repeats), dtype=int), lost_s=pairs.min(axis=0)[:, None])
     return OrdersAhead(base=place_values(repeats), lost_s=table)
 
 
-def _joint_s(before: Stamp, after: Stamp, times: LegTimes, *, carried: bool) -> float:
+def _joint_s(before: Stamp, after: Stamp, times: LegTimes, tried: TriedJoint | None, *, carried: bool) -> float:
     """Least time lost between two runs that carry the ship one way."""
-    lost = joint_lost_s(times, before.exit_mps, after.entry_mps)
+    lost = joint_lost_s(times, before.exit_mps, after.entry_mps, short=tried is None)
     if not carried:
-        return float(lost.min())
-    astray = wrap_angle(TURNS - _way_ahead(before) + _course(after))
+        return min(float(lost.min()), np.inf if tried is None else tried.seconds)
+    astray = wrap_angle(TURNS - before.way_ahead_rad + after.course_rad)
     carry_s = float(np.hypot(*after.displacement[:2])) / times.speed_mps
-    return float((lost[:, _nearest(before)] + carry_s * (1 - np.cos(astray))).min())
+    least_s = float((lost[:, _nearest(before)] + carry_s * (1 - np.cos(astray))).min())
+    if tried is None:
+        return least_s
+    least_s += tried.more_s
+    way = np.array([np.cos(before.way_ahead_rad), np.sin(before.way_ahead_rad)])
+    return min(least_s, tried.seconds - float(tried.step[:2] @ way) / times.speed_mps)
 
 
 def _home_s(last: Stamp, times: LegTimes) -> float:
     return float(joint_lost_s(times, last.exit_mps, 0.0)[:, _nearest(last)].min())
 
 
-def _course(run: Stamp) -> float:
-    """Course that a run makes good, from its heading at the beginning."""
-    return float(np.arctan2(run.displacement[1], run.displacement[0]))
-
-
-def _way_ahead(run: Stamp) -> float:
-    """The same, from its heading at the end."""
-    return _course(run) - float(run.displacement[2])
-
-
 def _nearest(run: Stamp) -> int:
-    return int(np.abs(wrap_angle(WISHES - _way_ahead(run))).argmin())
+    return int(np.abs(wrap_angle(WISHES - run.way_ahead_rad)).argmin())

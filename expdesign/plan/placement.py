@@ -16,7 +16,9 @@ import numpy as np
 from expdesign.conventions import wrap_angle
 from expdesign.errors import NoPlan
 from expdesign.plan.continuations import Options, clear_options, continuations, joined, run_ends
+from expdesign.plan.leg_times import NEAR
 from expdesign.plan.orders_ahead import OrdersAhead, orders_ahead
+from expdesign.plan.polish import polished
 from expdesign.plan.search_space import PartialPlans, SearchSpace
 from expdesign.plan.values import Placement
 from expdesign.values import Array
@@ -57,7 +59,11 @@ def place_runs(
     best = int(np.argmin(final_s))
     if not np.isfinite(final_s[best]):
         raise NoPlan("no way to the goal from where the last run ends")
-    return tuple(Placement(primitive=names[q], pose=pose) for q, pose in beam.history[best])
+    runs = [q for q, _ in beam.history[best]]
+    poses = np.array([pose for _, pose in beam.history[best]]).reshape(-1, 3)
+    if space.times is not None:
+        poses = polished(space, runs, poses, start=start, exit_mps=exit_mps, last=names.index(last) if last else -1)
+    return tuple(Placement(primitive=names[q], pose=pose) for q, pose in zip(runs, poses, strict=True))
 
 
 def _orders(space: SearchSpace, repeats: Sequence[int], start: Array) -> OrdersAhead | None:
@@ -142,7 +148,9 @@ def _leg_to_goal_s(space: SearchSpace, beam: PartialPlans) -> Array:
     if space.times is not None:
         helped_m = away @ space.current_to / space.times.speed_mps
         way_m, turn = np.maximum(distance - helped_m, 0.0), space.goal[2] - pose[:, 2]
-        return space.times.seconds(way_m, first, last, turn, beam.exit_mps, np.zeros(1))
+        more_s = np.where(way_m < NEAR * space.hull_m, space.times.settle_s / 2, 0.0)  # may turn out to be too near
+        more_s += np.array([space.more_s(int(last), -1) for last in beam.last])
+        return space.times.seconds(way_m, first, last, turn, beam.exit_mps, np.zeros(1)) + more_s
     turns = np.abs(wrap_angle(first)) + np.abs(wrap_angle(last))
     return np.asarray((distance + space.ship.turning_radius_m * turns) / space.ship.transit_speed_mps)
 

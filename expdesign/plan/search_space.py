@@ -42,6 +42,31 @@ class Stamp:
     entry_mps: float
     exit_mps: float
 
+    @property
+    def course_rad(self) -> float:
+        """Course that it makes good, from its heading at the beginning."""
+        return float(np.arctan2(self.displacement[1], self.displacement[0]))
+
+    @property
+    def way_ahead_rad(self) -> float:
+        """The same, from its heading at the end."""
+        return self.course_rad - float(self.displacement[2])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TriedJoint:
+    """A short leg between two runs as it was sailed in open water.
+
+    Attributes:
+        step: (3,) forward m, starboard m and turn rad through water.
+        seconds: its time.
+        more_s: how much longer that is than the rule for legs says, where the rule can be trusted.
+    """
+
+    step: Array
+    seconds: float
+    more_s: float
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SearchSpace:
@@ -57,7 +82,7 @@ class SearchSpace:
         leg_margin_m: clearance that leg centre lines need on the grid [m].
         current_to: (2,) mean current [m/s].
         times: how long legs take, for agile vessels; None for others.
-        settle_s: time to settle of joints that were tried, by (name before, name); others take that of `times`.
+        tried: joints that were tried, by (name before, name after), "" for start and goal; None where no leg was found.
         run_up: extra straight before a run, by (name before, name) in hull lengths; grows where a leg failed.
         recoveries: (q, 4) what each run is followed by before the ship goes straight: way ahead m, to starboard m,
             course from the heading at the run's end rad, time s; None where ships need nothing of the kind.
@@ -75,7 +100,7 @@ class SearchSpace:
     current_to: Array
     recoveries: Array | None = None
     times: LegTimes | None = None
-    settle_s: Mapping[tuple[str, str], float] = dataclasses.field(default_factory=dict)
+    tried: Mapping[tuple[str, str], TriedJoint | None] = dataclasses.field(default_factory=dict)
     run_up: Mapping[tuple[str, str], float] = dataclasses.field(default_factory=dict)
     refused: Array = dataclasses.field(default_factory=lambda: np.zeros((0, 3)))
 
@@ -84,9 +109,11 @@ class SearchSpace:
         if self.recoveries is not None:
             seal(self, recoveries="q 4")
 
-    def joint_times(self, times: LegTimes, before: str, after: str) -> LegTimes:
-        """The rule for joints between two runs."""
-        return replace(times, settle_s=self.settle_s.get((before, after), times.settle_s))
+    def more_s(self, before: int, after: int) -> float:
+        """How much longer legs from one run to another take than the rule says; -1 for start and goal."""
+        names = [self.stamps[index].name if index >= 0 else "" for index in (before, after)]
+        joint = self.tried.get((names[0], names[1]))
+        return 0.0 if joint is None else joint.more_s
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -20,7 +20,7 @@ from expdesign.plan.drawn_trials import Trials
 from expdesign.plan.field import ClearanceField, clearance_field, narrowest_passage
 from expdesign.plan.footprint import covering_discs, swept_area
 from expdesign.plan.goal_ways import build_goal_ways
-from expdesign.plan.joint_trials import joints_of, settled
+from expdesign.plan.joint_trials import pairs_of, settled
 from expdesign.plan.lattice import LatticePlan, search_lattice
 from expdesign.plan.lattice_moves import build_lattice
 from expdesign.plan.leg_times import leg_times
@@ -51,6 +51,8 @@ JOINT_TRIALS, TRIAL_WIDTH = 4, 100
 LAST_RESORT = 10.0
 """Time budgets by the clock after which the search ends whatever the count."""
 
+SAILED = 1
+"""Sets the chance of drawn trials apart from that of other draws of the same seed."""
 REPLANS, WIDER = 2, 1.4
 """Plans made anew, with so much more room where trials of the last one leave the water, before giving up."""
 
@@ -97,7 +99,7 @@ def plan_trial(problem: PlanProblem, *, progress: Progress = lambda what, share:
         progress("verifying", 0.85)
         verification = _verified(problem, *sailed)
         progress("sailing drawn trials", 0.9)
-        promise, trials = _promised(problem, water, *sailed)
+        promise, trials = _promised(problem, water, *sailed, attempt=replan)
         broken = broken_promise(promise, trials, sailed[2], problem.area, confidence=problem.settings.confidence)
         if not broken:
             return _finished(problem, water, *sailed, verification=verification, promise=promise)
@@ -141,9 +143,16 @@ def _verified(problem: PlanProblem, commands: Commands, trajectory: Trajectory, 
 
 
 def _promised(
-    problem: PlanProblem, water: LegWater, commands: Commands, trajectory: Trajectory, legs: tuple[Leg, ...]
+    problem: PlanProblem,
+    water: LegWater,
+    commands: Commands,
+    trajectory: Trajectory,
+    legs: tuple[Leg, ...],
+    *,
+    attempt: int,
 ) -> tuple[Promise, Trials]:
-    rng = np.random.default_rng(problem.seed)
+    """What the trial as sailed comes to; no ship is the same that runs keep room for, or that an attempt failed for."""
+    rng = np.random.default_rng((problem.seed, SAILED, attempt))
     draws = trials_for(problem.settings.confidence)
     return promised(water, commands=commands, trajectory=trajectory, legs=legs, rng=rng, draws=draws)
 
@@ -172,7 +181,7 @@ def _wider(
         found = _search_space(problem, wide)
     except NoPlan:
         raise NoPlan(f"{broken}; and there is no way to the goal that keeps farther off") from None
-    return wide, replace(found, stamps=space.stamps, settle_s=space.settle_s)
+    return wide, replace(found, stamps=space.stamps, tried=space.tried)
 
 
 def _finished(
@@ -334,11 +343,11 @@ def _with_joints(problem: PlanProblem, water: LegWater, space: SearchSpace, prog
             placements = place_runs(space, counts, start=problem.start, width=TRIAL_WIDTH)
         except NoPlan:  # the search proper keeps more, and says what is impossible
             break
-        tried = joints_of(space, problem.start, "", placements)
-        if all(joint.pair in space.settle_s for joint in tried):
+        pairs = pairs_of(placements)
+        if all(pair in space.tried for pair in pairs):
             break
         carried = is_carried(space, counts, problem.start)
-        space = settled(space, water, runs, tried, carried=carried, seed=problem.seed)
+        space = settled(space, water, runs, pairs, start=problem.start, carried=carried)
     return space
 
 
