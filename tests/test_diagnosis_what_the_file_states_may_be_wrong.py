@@ -56,6 +56,23 @@ def test_whatever_is_stated_may_be_corrected():
     assert not {"lag:all", "lag:n1", "offset:a1"} & free  # would act besides what is stated, and say so of no one value
 
 
+def test_a_lag_stated_of_every_actuator_may_be_wrong_of_some():
+    vessel = vessel_of("tug")
+    slow = tuple(replace(one, responses=(Response(lag_s=2.0),) * 2) for one in vessel.model.actuators)
+    record = hidden_record("tug", seed=1, batches=2, samples=120)
+    ship = as_extended(replace(vessel, model=replace(vessel.model, actuators=slow)), record)
+    assert ship.stated == {"lag:n": 2.0, "lag:a": 2.0}
+    free = {key for candidate in candidates(ship, record) for key in candidate.free}
+    assert {key for key in free if key.startswith("lag:")} == {"lag:n", "lag:a"}
+
+
+def test_a_ship_whose_sensors_are_known_can_be_fitted_with_nothing_free():
+    record = hidden_record("tug", seed=1, batches=2, samples=120)
+    ship = as_extended(stating_everything(), record)
+    windows = replace(cut_windows(ship.model, record), has_heading=False)
+    assert fit(ship, windows, (), starts=first_states(windows), colour_order=0).keys == ()
+
+
 def test_what_was_found_is_not_sought_again_in_another_way():
     record = hidden_record("tug", seed=1, batches=2, samples=120)
     ship = as_extended(stating_everything(), record).having({"lag:n": 3.0, "late:r": 2.0, "lever:forward": 4.0})

@@ -29,9 +29,10 @@ def input_groups(inputs: tuple[str, ...]) -> list[str]:
 
 
 def grouped(values: Mapping[str, float], inputs: tuple[str, ...]) -> dict[str, float]:
-    """Values of single inputs, zero where left out, said of the largest groups that share one; zeros are not said."""
+    """Values of single inputs, zero where left out, said of stems where these share one; zeros are not said."""
     left, found = list(inputs), dict[str, float]()
-    for group in input_groups(inputs):
+    several = len({stem(name) for name in inputs}) > 1
+    for group in input_groups(inputs)[several:]:
         names = [inputs[column] for column in members(group, inputs)]
         shared = {values.get(name, 0.0) for name in names}
         if set(names) <= set(left) and len(shared) == 1:
