@@ -62,6 +62,18 @@ def test_legs_between_moving_ends_keep_the_stated_speed_and_zermelos_time(way, m
     assert least_s <= seconds <= 1.03 * least_s + 2.0
 
 
+def test_a_leg_that_turns_across_a_current_round_a_wall_keeps_the_stated_speed():
+    current = np.array([0.1, 0.2])
+    sea = shapely.box(-700, -700, 700, 700).difference(shapely.box(-20, -700, 20, 200))
+    water = replace(leg_water(sea), environment=Environment(current_to=current))
+    start, end = state(-300.0, np.zeros(3), current), state(-300.0, np.zeros(3), current)
+    start[1], end[1] = -200.0, 200.0
+    leg = LegTask(start=start, end=end, start_inputs=np.zeros(4), end_inputs=np.zeros(4), seed=1)
+    values = find_leg(leg, water)
+    assert values is not None
+    assert fastest_mps(water, leg, values) <= 1.001 * STATED_MPS
+
+
 @pytest.mark.parametrize("way", CURRENTS)
 def test_legs_from_rest_to_rest_take_no_less_than_the_bound(way):
     current = CURRENTS[way]

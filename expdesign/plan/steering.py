@@ -117,7 +117,7 @@ class Helmsman:
         """
         through = self._velocity_through_water(wanted, states)
         moving = self._in_body(states)
-        felt = np.zeros((len(states), 3)) if felt is None else felt
+        felt = (0.0 if felt is None else felt) - self._turning_current(states)
         if not self.sideways:
             turn = self._pointing(wanted, through) - states[:, 2]
             wish = np.column_stack([np.hypot(*through.T), turn, wanted[:, 5]])
@@ -144,6 +144,7 @@ class Helmsman:
         moving = tuple(((old + new) / 2).T)
         told = self.vessel.model.accelerations(moving, moving[:2], tuple(delivered.T))
         known = np.column_stack([np.broadcast_to(part, len(felt)) for part in told])
+        known -= self._turning_current((before + states) / 2)
         share = min(1.0, self.vessel.sample_time_s / (LEARN * self.answer_s))
         return np.asarray(felt + share * ((new - old) / self.vessel.sample_time_s - known - felt))
 
@@ -162,6 +163,14 @@ class Helmsman:
         """(n,) headings of ships that go where they point; those that hardly move keep the wanted one."""
         moves = np.hypot(*through.T) > 0.05 * self.ship.transit_speed_mps
         return np.where(moves, np.arctan2(through[:, 1], through[:, 0]), wanted[:, 2])
+
+    def _turning_current(self, states: Array) -> Array:
+        """(n, 3) rate at which the mean current changes in the b-frames of turning ships (n, 6) [m/s2].
+
+        The model gives the rate of the velocity over ground: that through water has the opposite of this more.
+        """
+        u_c, v_c, _ = (states[:, 3:] - self._in_body(states)).T
+        return np.column_stack([states[:, 5] * v_c, -states[:, 5] * u_c, 0.0 * u_c])
 
     @cached_property
     def _orders(self) -> HelmOrders:
