@@ -14,7 +14,7 @@ from expdesign.plan.steady_turns import SteadyTurn, side_by_side, steady_turns
 from expdesign.plan.values import PlanSettings
 from expdesign.simulation import Approach, Conduct, simulate_many, steady_ahead, stopping
 from expdesign.values import Array
-from expdesign.vessel import Vessel, direct_terms, force_matrix
+from expdesign.vessel import Limit, Vessel, direct_terms, force_matrix
 
 USABLE = 0.9
 """Share of the largest steady speed, and of the largest steady yaw rate, that repositioning counts on."""
@@ -36,6 +36,9 @@ SETTLE = 2.0
 
 GATHERING = 200.0
 """Hull lengths at transit speed in whose time a ship that gathers way is watched."""
+
+SETTLING = 0.25
+"""Share of the time in which a vessel gathers way, or its actuators run up, that a change of motion takes besides."""
 
 OVERSHOOT = 1.3
 """Largest yaw rate on the way into a turn, in those of the steady one: a thumb rule that bounds the search."""
@@ -60,6 +63,8 @@ class Capability:
         turns: its steady turns with the engines at that order.
         stopping_m: distance in which it stops from there with the engines full astern.
         run_up_m: straight before each run: room to settle, and a steady approach.
+        working_s: in which the slowest actuator goes from nothing to full, or turns a quarter of a circle.
+        late_s: until what an actuator delivers has come by most of the way to what it is told.
     """
 
     top_speed_mps: float
@@ -74,6 +79,8 @@ class Capability:
     turns: tuple[SteadyTurn, ...] = ()
     stopping_m: float = 0.0
     run_up_m: float = 0.0
+    working_s: float = 0.0
+    late_s: float = 0.0
 
     @property
     def swing_radps(self) -> float:
@@ -83,7 +90,7 @@ class Capability:
     @property
     def settle_s(self) -> float:
         """Time that a change of motion takes beyond what speeds and accelerations explain: a thumb rule."""
-        return 0.25 * self.transit_speed_mps / self.acceleration_mps2
+        return SETTLING * max(self.transit_speed_mps / self.acceleration_mps2, self.working_s) + self.late_s
 
 
 def capability(vessel: Vessel, settings: PlanSettings, *, current_mps: float = 0.0) -> Capability:
@@ -126,7 +133,15 @@ def capability(vessel: Vessel, settings: PlanSettings, *, current_mps: float = 0
         spot_rate_radps=USABLE * spot,
         agile=agile,
         lateral_mps2=max(LATERAL_MPS2, 1.01 * transit * min(USABLE * yaw, 2.0 * transit / radius)),
+        working_s=max(_reach(limit) / limit.rate for limit in vessel.limits),
+        late_s=max(response.lag_s + response.delay_s for response in vessel.responses),
     )
+
+
+def _reach(limit: Limit) -> float:
+    """Largest size of a command; a quarter turn of angles without limits."""
+    far = max(abs(limit.low), abs(limit.high))
+    return far if np.isfinite(far) else np.pi / 2
 
 
 def needs_helm(vessel: Vessel) -> bool:
@@ -145,9 +160,13 @@ def _transit_speed(vessel: Vessel, settings: PlanSettings, top: float, current_m
 
 def _helmed_capability(vessel: Vessel, settings: PlanSettings, current_mps: float) -> Capability:
     """Capability of a ship that is steered by a helm, by simulating it."""
-    top = _largest(lambda speed: _goes_ahead(vessel, speed), start=1e-3 * vessel.length_m)
+    slowest = 1e-3 * vessel.length_m
+    top = _largest(lambda speed: not _why_not_ahead(vessel, speed), start=slowest)
     if top is None:
-        raise NoPlan(f"vessel {vessel.name!r} cannot hold any speed ahead on a straight course with its actuators")
+        raise NoPlan(
+            f"vessel {vessel.name!r} cannot hold any speed ahead on a straight course with its actuators: "
+            f"{_why_not_ahead(vessel, slowest)}"
+        )
     transit = _transit_speed(vessel, settings, top, current_mps)
     approach = steady_ahead(vessel, transit)
     turns = steady_turns(approach)
@@ -173,12 +192,13 @@ def _helmed_capability(vessel: Vessel, settings: PlanSettings, current_mps: floa
     )
 
 
-def _goes_ahead(vessel: Vessel, speed: float) -> bool:
+def _why_not_ahead(vessel: Vessel, speed: float) -> str:
+    """What keeps a vessel from going straight ahead at a speed; "" for nothing."""
     try:
         steady_ahead(vessel, speed)
-    except InputError:
-        return False
-    return True
+    except InputError as error:
+        return str(error)
+    return ""
 
 
 def _slower(approach: Approach) -> Approach:
@@ -239,15 +259,17 @@ def _stopping_m(vessel: Vessel, speed: float) -> float:
     Raises:
         NoPlan: the ship does not stop, so it cannot come to rest at a goal.
     """
+    reason = ""
     for astern in (1.0, 0.0):
         try:
             _, track = stopping(vessel, astern=astern, conduct=Conduct(speed_mps=speed))
-        except InputError:  # the engines do not go astern
+        except InputError as error:  # the engines do not go astern
+            reason = str(error)
             continue
         except NoAnswer as error:
             raise NoPlan(f"vessel {vessel.name!r} cannot be stopped at the goal: {error}") from None
         return float(np.hypot(*np.diff(track.pose[:, :2], axis=0).T).sum())
-    raise NoPlan(f"vessel {vessel.name!r} cannot be stopped at the goal")
+    raise NoPlan(f"vessel {vessel.name!r} cannot be stopped at the goal: {reason}")
 
 
 def turn_loss_s(ship: Capability, first_rad: Array, second_rad: Array) -> Array:

@@ -90,7 +90,7 @@ def broken_promise(found: Promise, trials: Trials, legs: Sequence[Leg], area: Se
         return (
             f"{found.left:.1%} of {found.trials} drawn trials (standard error {found.error:.1%}) leave allowed water, "
             f"more than plan.confidence = {confidence:g} allows, most of them ({trials.left[worst].mean():.1%}) "
-            f"{described(legs, worst)} near {lat:.5f}, {lon:.5f}; more plan.clearance_m helps"
+            f"{described(legs, worst)} near {lat:.5f}, {lon:.5f}"
         )
     return "" if found.aborted < HALF else f"{found.note}; wider water or a vessel known better helps"
 

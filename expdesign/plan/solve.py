@@ -104,7 +104,8 @@ def plan_trial(problem: PlanProblem, *, progress: Progress = lambda what, share:
         if not broken:
             return _finished(problem, water, *sailed, verification=verification, promise=promise)
         if replan == REPLANS or not trials.left.any():
-            raise NoPlan(f"the plan found does not keep its promise: {broken}")
+            more = "; more plan.clearance_m helps" if trials.left.any() else ""
+            raise NoPlan(f"the plan found does not keep its promise: {broken}{more}")
         water, space = _wider(problem, water, space, trials, sailed[2], broken)
     raise AssertionError("the last plan is returned or refused")
 

@@ -1,0 +1,90 @@
+"""A plan whose drawn trials leave the water is made anew with more room, or refused with the place where they leave.
+
+The strait is as wide as the ship needs where she points along it. In a current that she does not know she has to point
+aside to go straight, and her bow comes nearer to the rocks than a plan can tell.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import shapely
+from plan_case import area, ship
+from test_plan_says_what_is_impossible import acceleration, place_in
+
+from expdesign.errors import NoPlan
+from expdesign.plan import PlanSettings, solve
+from expdesign.plan.solve import PlanProblem, plan_trial
+from expdesign.simulation import Environment
+
+STRAIT_M, GAP_M, ASIDE_M = 250.0, 9.0, 160.0
+"""How far north the strait is, half its width, and how far east of it a wide one is."""
+UNKNOWN = Environment(current_std_mps=0.25)
+
+
+def problem(*gaps: tuple[float, float]) -> PlanProblem:
+    """A run and a passage north through a wall with gaps, each (east, half its width) [m]."""
+    wall = shapely.box(-200, STRAIT_M - 5, 400, STRAIT_M + 5)
+    for east, half in gaps:
+        wall = wall.difference(shapely.box(east - half, STRAIT_M - 10, east + half, STRAIT_M + 10))
+    vessel = ship()
+    return PlanProblem(
+        vessel=vessel,
+        area=area(shapely.box(-200, -150, 400, 420).difference(wall)),
+        environment=UNKNOWN,
+        settings=PlanSettings(clearance_m=1.0),
+        primitives=(acceleration(vessel),),
+        design=SimpleNamespace(problem=SimpleNamespace(names=("go",)), repeats=(1,)),
+        start=np.array([0.0, 0.0, 0.0]),
+        goal=np.array([340.0, 0.0, 0.0]),
+    )
+
+
+@pytest.fixture
+def attempts(monkeypatch):
+    """What drawn trials came to, attempt after attempt; a plan is told by its track."""
+    found = []
+
+    def noted(promise, *others, **known):
+        found.append(promise)
+        return kept(promise, *others, **known)
+
+    kept = solve.broken_promise
+    monkeypatch.setattr(solve, "broken_promise", noted)
+    monkeypatch.setattr(solve, "_finished", lambda problem, water, commands, trajectory, legs, **rest: trajectory)
+    return found
+
+
+def crossing_m(track) -> float:
+    """How far east a track goes through the wall."""
+    return float(np.interp(STRAIT_M, track.pose[:, 0], track.pose[:, 1]))
+
+
+def test_a_wider_way_is_taken_where_too_many_trials_leave_the_direct_one(attempts):
+    track = plan_trial(problem((0.0, GAP_M), (ASIDE_M, 45.0)))
+    first, *_, last = attempts
+    assert first.left > 0.05
+    assert first.legs[-1].left == max(leg.left for leg in first.legs)
+    assert last.left + last.error <= 0.05
+    assert abs(crossing_m(track) - ASIDE_M) < 45.0
+
+
+def test_with_known_weather_the_direct_way_keeps_its_promise(attempts):
+    calm = problem((0.0, GAP_M), (ASIDE_M, 45.0))
+    certain = replace(calm.vessel.model, parameter_std=np.zeros(len(calm.vessel.model.names)))
+    track = plan_trial(replace(calm, environment=Environment(), vessel=replace(calm.vessel, model=certain)))
+    assert [found.left for found in attempts] == [0.0]
+    assert abs(crossing_m(track)) < GAP_M
+
+
+def test_without_one_the_refusal_names_the_share_the_leg_and_the_place(attempts):
+    with pytest.raises(NoPlan) as caught:
+        plan_trial(problem((0.0, GAP_M)))
+    text = str(caught.value)
+    assert text.startswith(f"{attempts[0].left:.1%} of {attempts[0].trials} drawn trials")
+    assert "on the leg to the goal" in text
+    np.testing.assert_allclose(place_in(text), [STRAIT_M, 0.0], atol=30.0)
+    assert text.endswith("there is no way to the goal that keeps farther off")
