@@ -186,7 +186,9 @@ def test_the_page_of_a_lost_simulation_shows_no_astronomic_numbers(clean):
     lost = np.full(3, -1e8)
     before = replace(clean.before, fit=lost, rmse=np.full(3, np.inf), bias=np.full(3, -1e292))
     before = replace(before, growth=np.full_like(before.growth, 1e6))
-    found = replace(clean, before=before, findings=(finding("wind"),), errors=(clean.windows.measured,))
+    found = replace(
+        clean, before=before, findings=(finding("wind"),), errors=(clean.windows.measured,), lacking=(clean.residuals,)
+    )
     page = diagnosis_html(found, command="made up", version="0")
     text = re.sub(r"<svg.*?</svg>", "", page, flags=re.DOTALL)
     assert text.count("lost") >= 3

@@ -8,11 +8,11 @@ from diagnosis_case import hidden_record, vessel_of
 
 from expdesign.diagnosis import Estimated, Finding, diagnose
 from expdesign.diagnosis.extension import as_extended, public_name
-from expdesign.diagnosis.residuals import _slopes, dependence, short_residuals
+from expdesign.diagnosis.residuals import _slopes, dependence, on_the_whole, short_residuals
 from expdesign.diagnosis.values import Residuals
 from expdesign.diagnosis.windows import cut_windows
 from expdesign.export.diagnosis_page import diagnosis_html
-from expdesign.export.diagnosis_page.suspects import has_sign, suspected
+from expdesign.export.diagnosis_page.suspects import has_sign, is_force, suspected, suspected_force
 
 ALONE = ("u", "v", "r", "n1", "a1", "n2", "a2", "u_q", "v_q", "heading", "time", "run")
 
@@ -55,6 +55,19 @@ def test_chance_alone_colours_no_more_than_it_should(alike, by, most):
     assert np.mean(np.array(p_values) < 0.05) < most + 4 * np.sqrt(0.05 * 0.95 / 400)
 
 
+def test_the_mean_on_the_whole_is_as_uncertain_as_it_varies():
+    """Of 300 white series of 100 stretches, the squared ratio to the standard error is chi-squared, 300 in all."""
+    rng, ratios = np.random.default_rng(3), []
+    for _ in range(300):
+        found = Residuals(
+            outputs=("u",), stretch_s=10.0, lacking=2.0 + rng.standard_normal((100, 1)),
+            variables={"run": np.repeat(np.arange(4.0), 25)},
+        )  # fmt: skip
+        mean, std = on_the_whole(found, "u")
+        ratios.append((mean - 2.0) / std)
+    assert abs(np.sum(np.square(ratios)) - 300) < 4 * np.sqrt(600)
+
+
 def test_a_current_shows_by_heading_before_any_cause_is_named():
     record = hidden_record("tug", seed=3, batches=6, samples=200, current=(0.2, 0.1))
     ship = as_extended(vessel_of("tug"), record)
@@ -81,28 +94,39 @@ def test_a_stretch_tells_the_acceleration_that_is_missing():
     assert slope == pytest.approx(expected, rel=1 / 7)
 
 
-SHOWN = {
+BY_FORCE = {
     "term:Y_abs_r_r": "Y_abs_r_r", "theta:X_u": "X_u: u", "deadband:a": "a1 [rad]", "offset:n2": "n2 [rps]",
-    "lag:n": "time since", "delay:all": "time since", "gain": "ahead force, tau_x", "asymmetry": "ahead force",
-    "inertia:v": "rate of change of v", "late:r": "rate of change of r", "late:psi": "r [", "gyro": "r [",
-    "lever:forward": "r [", "heading_bias": "u [", "current:north": "heading", "shallow:damping": "water depth",
-    "roll:sway": "time [min]", "change:time": "time [min]",
+    "gain": "ahead force, tau_x", "asymmetry": "ahead force", "shallow:damping": "water depth",
+}  # fmt: skip
+BY_ERROR = {
+    "lag:n": "time since", "delay:all": "time since", "inertia:v": "rate of change of v", "late:psi": "r [",
+    "late:r": "rate of change of r", "gyro": "r [", "lever:forward": "r [", "heading_bias": "u [",
+    "current:north": "heading", "roll:sway": "time [min]", "change:time": "time [min]",
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("key", SHOWN)
+@pytest.mark.parametrize("key", [*BY_FORCE, *BY_ERROR])
 def test_a_finding_is_drawn_against_what_it_depends_on(key, clean):
     name = public_name(key, as_extended(clean.vessel, clean.record))[0]
     item = finding((key,), estimates=(Estimated(name=name, value=1.0, std=0.1, unit=""),))
-    values, label = suspected(clean, replace(item, cause="parameters" if key.startswith("theta") else "any"))
-    assert SHOWN[key] in label
-    assert values.shape == clean.windows.measured.shape[:2]
+    item = replace(item, cause="parameters" if key.startswith("theta") else "any")
+    assert is_force(clean, item) == (key in BY_FORCE)
+    if key in BY_FORCE:
+        at = {**clean.residuals.variables, "depth": np.full(len(clean.residuals.lacking), 8.0)}
+        values, label = suspected_force(clean, item, at)
+        assert values.shape == clean.residuals.lacking[:, 0].shape
+    else:
+        values, label = suspected(clean, item)
+        assert values.shape == clean.windows.measured.shape[:2]
+    assert (BY_FORCE | BY_ERROR)[key] in label
 
 
 def test_regressors_and_times_since_changes_are_those_of_the_data(clean):
-    r = clean.windows.measured[..., 2]
-    values, _ = suspected(clean, finding(("term:Y_abs_r_r",), "missing_term:Y_abs_r_r"))
-    np.testing.assert_allclose(values, np.abs(r) * r)
+    at = clean.residuals.variables
+    values, _ = suspected_force(clean, finding(("term:Y_abs_r_r",), "missing_term:Y_abs_r_r"), at)
+    np.testing.assert_allclose(values, np.abs(at["r"]) * at["r"])
+    force, _ = suspected_force(clean, finding(("gain",), "thrust_gain"), at)
+    np.testing.assert_allclose(force, at["n1"] * np.cos(at["a1"]) + at["n2"] * np.cos(at["a2"]))
     late, _ = suspected(clean, finding(("lag:n",), "actuator_lag"))
     orders = clean.windows.gather(clean.windows.batch_inputs)[..., [0, 2]]
     changed = np.zeros(late.shape, dtype=bool)
@@ -120,8 +144,8 @@ def test_of_several_parameters_the_clearest_is_drawn(clean):
         Estimated(name=name, value=float(model.parameters[model.names.index(name)]) + moved, std=0.01, unit="")
         for name, moved in zip(names, (0.01, -0.2), strict=True)
     )
-    _, label = suspected(clean, finding(("theta:X_u", "theta:Y_v"), estimates=estimates))
-    assert label == "Y_v: v"
+    item = finding(("theta:X_u", "theta:Y_v"), estimates=estimates)
+    assert suspected_force(clean, item, clean.residuals.variables)[1] == "Y_v: v"
 
 
 def test_two_findings_of_one_cause_have_a_picture_each(clean):
@@ -129,7 +153,7 @@ def test_two_findings_of_one_cause_have_a_picture_each(clean):
         finding((f"theta:{name}",), estimates=(Estimated(name=name, value=0.1, std=0.01, unit=""),))
         for name in ("X_u", "Y_v")
     )
-    found = replace(clean, findings=items, errors=(clean.windows.measured, clean.windows.measured))
+    found = replace(clean, findings=items, errors=(clean.windows.measured,) * 2, lacking=(clean.residuals,) * 2)
     page = diagnosis_html(found, command="made up", version="0")
     assert "X_u: u" in page
     assert "Y_v: v" in page

@@ -95,6 +95,7 @@ def diagnose(
         simulated_after=simulate_from_first(final, windows).shown,
         errors=tuple(found.steps[index].before.linear.motion.error for index in order),
         residuals=short_residuals(ship, windows),
+        lacking=tuple(short_residuals(found.steps[index].before.ship, windows) for index in order),
         notes=(
             *notes_on_data(vessel, record, windows, still_inputs(ship, windows)),
             *_settled_note(found, ship, windows, held[0]),

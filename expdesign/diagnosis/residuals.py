@@ -111,6 +111,14 @@ def dependence(found: Residuals, output: str, name: str) -> Dependence:
     )  # fmt: skip
 
 
+def on_the_whole(found: Residuals, output: str) -> tuple[float, float]:
+    """Mean residual of an output, and its standard error."""
+    y = found.lacking[:, found.outputs.index(output)]
+    share = np.full((len(y), 1), 1 / len(y))
+    covariance, _ = _covariance(y - y.mean(), share, found.variables["run"])
+    return float(y.mean()), float(np.sqrt(covariance[0, 0]))
+
+
 def _covariance(rest: Array, share: Array, run: Array) -> tuple[Array, float]:
     """(b, b) of the groups' means, and how many independent stretches theirs are worth.
 

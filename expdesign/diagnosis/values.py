@@ -121,7 +121,7 @@ class Diagnosis:
         verdict: one sentence.
         simulated_before, simulated_after: (w, s, 4) channels beside `windows.measured`.
         errors: per finding, (w, s, 4) error without it, with what was found before it in the model.
-        residuals: of the model in use, within seconds.
+        residuals: of the model in use, within seconds; lacking: per finding likewise, of the same model as in `errors`.
         notes: what a reader must know: what was left out, what could not be tested.
         screened: (cause, p) of the last round, the smallest p per cause, corrected.
     """
@@ -138,5 +138,6 @@ class Diagnosis:
     simulated_after: Array
     errors: tuple[Array, ...]
     residuals: Residuals
+    lacking: tuple[Residuals, ...]
     notes: tuple[str, ...]
     screened: tuple[tuple[str, float], ...]

@@ -8,13 +8,14 @@ from matplotlib.axes import Axes
 from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis import Diagnosis
 from expdesign.diagnosis.residuals import Dependence, dependence
-from expdesign.export.diagnosis_page.suspects import DEGREES, has_sign, suspected
+from expdesign.export.diagnosis_page.suspects import DEGREES, has_sign, is_force, suspected, suspected_force
 from expdesign.export.estimate_page.figures import AXES, thinned
 from expdesign.export.report.figures.style import BLUE, GREY, VERMILION, light_grid, new_figure, short, svg
 from expdesign.values import Array
 from expdesign.vessel import column_name
 
-BINS = 16
+BINS, FEWEST = 16, 15
+"""Groups of samples, at most, and samples of each, at least."""
 MOST_SPREADS = 3.0
 """Errors beyond so many standard deviations of what is measured are not drawn: the simulation is lost."""
 VISIBLE = 0.01
@@ -86,15 +87,21 @@ def growth_figure(found: Diagnosis) -> str:
 
 
 def suspect_figure(found: Diagnosis, index: int, key: str) -> str:
-    """The error without a finding, against the variable that it should depend on."""
-    outputs, error, item = found.before.outputs, found.errors[index], found.findings[index]
-    values, label = suspected(found, item)
+    """The error without a finding, or what the model then lacks, against the variable that it should depend on."""
+    outputs, item = found.before.outputs, found.findings[index]
+    if is_force(found, item):
+        values, label = suspected_force(found, item, found.lacking[index].variables)
+        what, axis, rows = "lacking", LACKING, np.moveaxis(found.lacking[index].lacking, 1, 0)
+    else:
+        values, label = suspected(found, item)
+        what, axis = "error of", AXES
+        rows = np.stack([found.errors[index][..., OUTPUTS.index(output)] for output in outputs])
     figure = new_figure(9.0, 2.5)
     columns = np.atleast_1d(figure.subplots(1, len(outputs)))
-    for axes, output in zip(columns, outputs, strict=True):
-        name, factor = AXES[output]
-        _scatter(axes, values, factor * error[..., OUTPUTS.index(output)], signed=has_sign(item))
-        axes.set_title(f"error of {name}")
+    for axes, output, row in zip(columns, outputs, rows, strict=True):
+        name, factor = axis[output]
+        _scatter(axes, values, factor * row, signed=has_sign(item))
+        axes.set_title(f"{what} {name}")
         axes.set_xlabel(short(label))
         light_grid(axes)
     return svg(figure, key=key, label=f"Error of the simulation against {label}")
@@ -108,7 +115,7 @@ def _scatter(axes: Axes, x: Array, y: Array, *, signed: bool) -> None:
         return
     step = max(1, len(a) // 1500)
     axes.plot(a[::step], b[::step], ".", color="#c8c8c8", markersize=2, rasterized=False)
-    edges = np.unique(np.quantile(a, np.linspace(0, 1, BINS + 1)))
+    edges = np.unique(np.quantile(a, np.linspace(0, 1, min(BINS, max(len(a) // FEWEST, 2)) + 1)))
     place = np.clip(np.searchsorted(edges, a, side="right") - 1, 0, max(len(edges) - 2, 0))
     groups = [place == number for number in range(len(edges) - 1) if (place == number).any()]
     middles = [float(np.mean(a[group])) for group in groups]
@@ -123,7 +130,9 @@ def residual_figures(found: Diagnosis) -> list[tuple[bool, str]]:
     """Pictures of what the model lacks against every variable, clearest first, and whether it surely depends on it."""
     residuals = found.residuals
     tests = {
-        name: [dependence(residuals, output, name) for output in residuals.outputs] for name in residuals.variables
+        name: [dependence(residuals, output, name) for output in residuals.outputs]
+        for name, values in residuals.variables.items()
+        if np.ptp(values) > 0
     }
     clear = VISIBLE / sum(len(items) for items in tests.values())
     limits = [1.15 * max(float(np.abs(items[i].mean).max() + items[i].std.max()) for items in tests.values())

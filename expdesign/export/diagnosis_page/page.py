@@ -5,11 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from expdesign.diagnosis import Diagnosis, Finding
+from expdesign.diagnosis.residuals import on_the_whole
 from expdesign.diagnosis.search import ALARM
 from expdesign.diagnosis.values import Fall
 from expdesign.diagnosis.verdict import LOST_FIT, fits, held_apart, lacking, lost, manoeuvre, worth
-from expdesign.export.diagnosis_page.figures import growth_figure, residual_figures, suspect_figure, window_figure
-from expdesign.export.diagnosis_page.suspects import has_sign
+from expdesign.export.diagnosis_page.figures import (
+    LACKING,
+    growth_figure,
+    residual_figures,
+    suspect_figure,
+    window_figure,
+)
+from expdesign.export.diagnosis_page.suspects import has_sign, is_force
 from expdesign.export.diagnosis_page.wording import titled, worded
 from expdesign.export.estimates import plus_minus
 from expdesign.export.pages import page_templates
@@ -39,6 +46,7 @@ def diagnosis_html(found: Diagnosis, *, command: str, version: str) -> str:
         before=fits(found.before),
         astray=lost(found.before) or lost(found.after),
         outputs=", ".join(found.before.outputs),
+        whole=_on_the_whole(found),
         tested=[(titled(cause), p_value) for cause, p_value in found.screened],
         accuracy=_accuracy(found),
         data=_data(found),
@@ -46,6 +54,17 @@ def diagnosis_html(found: Diagnosis, *, command: str, version: str) -> str:
         command=command,
         version=version,
     )
+
+
+def _on_the_whole(found: Diagnosis) -> list[str]:
+    """Mean of what the model lacks, e.g. "u 10.2 +- 0.7 mm/s2"."""
+    told = []
+    for output in found.residuals.outputs:
+        label, factor = LACKING[output]
+        name, _, unit = label.partition(" ")
+        mean, std = on_the_whole(found.residuals, output)
+        told.append(f"{name} {plus_minus(factor * mean, factor * std)} {unit.strip('[]')}".replace("-", words.MINUS))
+    return told
 
 
 def drawn(found: Diagnosis) -> list[int]:
@@ -100,6 +119,7 @@ def _finding(item: Finding, found: Diagnosis) -> dict[str, object]:
         "interval": f"{words.number(low, 1)} to {words.number(high, 1)}",
         "fits": rows,
         "signed": has_sign(item),
+        "force": is_force(found, item),
         "worth": worth(item),
         "falls": [_fall(fall) for fall in item.falls if np.isfinite(fall.share)],
         "rivals": [lacking(name) for name in item.not_distinguishable_from],

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from expdesign.diagnosis import Accuracy, Diagnosis, Finding
+from expdesign.diagnosis.residuals import dependence
+from expdesign.diagnosis.values import Residuals
 from expdesign.export.estimates import plus_minus
 from expdesign.export.results import strict_json
 from expdesign.export.vessel_file import vessel_toml
@@ -23,8 +25,20 @@ def diagnosis_json(found: Diagnosis) -> str:
             "verdict": found.verdict,
             "tested": [{"cause": cause, "p_value": _finite(p_value)} for cause, p_value in found.screened],
             "notes": [*found.notes, *found.record.notes],
+            "residuals": _residuals(found.residuals),
         }
     )
+
+
+def _residuals(found: Residuals) -> dict[str, Any]:
+    """Per output the chance that what the model lacks within seconds depends as much on a variable by chance."""
+    return {
+        "stretch_s": found.stretch_s,
+        "p_values": {
+            output: {name: _finite(dependence(found, output, name).p_value) for name in found.variables}
+            for output in found.outputs
+        },
+    }
 
 
 def accuracy_entry(item: Accuracy) -> dict[str, Any]:

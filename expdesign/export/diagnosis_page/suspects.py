@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,9 +13,9 @@ from expdesign.diagnosis.extension import as_extended
 from expdesign.diagnosis.followed import members
 from expdesign.diagnosis.parts import ahead_force, ahead_force_text
 from expdesign.values import Array
-from expdesign.vessel import NUMPY, Term, column_name, generalised_force
+from expdesign.vessel import NUMPY, column_name, generalised_force
 from expdesign.vessel.expressions import parse_expression
-from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS
+from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS, SHOAL
 
 DEGREES = float(np.degrees(1.0))
 CHANGED = 0.2
@@ -25,8 +27,16 @@ RATES = {
     "v": (f"rate of change of v [m/s{SQUARED}]", 1.0),
     "r": (f"rate of change of r [\N{DEGREE SIGN}/s{SQUARED}]", DEGREES),
 }
+FORCES = ("term", "theta", "gain", "asymmetry", "deadband", "offset", "shallow")
+"""Kinds of effects that are forces."""
 SHOWN_BY = {"late:psi": "r", "late:position": "u", "heading_bias": "u", "gyro": "r", "lever": "r"}
 """Effect, or kind of effect, of a sensor -> the velocity by which it shows."""
+
+
+def is_force(found: Diagnosis, item: Finding) -> bool:
+    """It accelerates the ship by what acts at the moment, so that it shows in what the model lacks within seconds."""
+    kind = item.keys[0].partition(":")[0]
+    return kind in FORCES and (item.cause != "wind" or found.windows.has_wind)
 
 
 def has_sign(item: Finding) -> bool:
@@ -34,43 +44,54 @@ def has_sign(item: Finding) -> bool:
     return not item.keys[0].startswith(("lag:", "delay:", "roll:", "change:"))
 
 
-def suspected(found: Diagnosis, item: Finding) -> tuple[Array, str]:
-    """(w, s) values at the compared samples of what a finding depends on, and their label."""
+def suspected_force(found: Diagnosis, item: Finding, at: Mapping[str, Array]) -> tuple[Array, str]:
+    """What a force should depend on, and its label.
+
+    Args:
+        found: the diagnosis.
+        item: one of its findings.
+        at: (k,) variables of `Residuals` by name.
+    """
     ship = as_extended(found.vessel, found.record)
-    key = _telling(found, item)
-    kind, _, rest = key.partition(":")
+    kind, _, rest = _telling(found, item).partition(":")
     if item.cause == "wind":
-        return _wind(found) if found.windows.has_wind else _heading(found)
-    if kind in ("term", "theta"):
-        return _regressor(found, ship, _term(ship, rest))
+        return np.hypot(at["u_q"], at["v_q"]), "wind over deck [m/s]"
+    if kind == "shallow":
+        return at["depth"], "water depth [m]"
     if kind in ("deadband", "offset"):
         name = ship.model.inputs[members(rest, ship.model.inputs)[0]]
-        return signals(found, ship)[name], f"{name} [{column_name(name).removeprefix(name).strip('_') or 'force'}]"
-    if kind in ("lag", "delay"):
-        return _since_change(found, members(rest, ship.model.inputs))
+        return at[name], f"{name} [{column_name(name).removeprefix(name).strip('_') or 'force'}]"
+    table = signals(ship, at)
     if kind in ("gain", "asymmetry"):
-        return ahead_force(signals(found, ship), ship.model), f"ahead force, {ahead_force_text(ship.model)}"
+        return ahead_force(table, ship.model), f"ahead force, {ahead_force_text(ship.model)}"
+    term = {one.name: one for one in ship.model.terms}.get(rest) or ship.library[rest]
+    names = (*MOTION_SIGNALS, *dict.fromkeys((*FORCE_SIGNALS, *ship.model.inputs)))
+    values = parse_expression(term.expression, signals=names).evaluate(table, NUMPY)
+    return np.broadcast_to(values, at["time"].shape), f"{term.name}: {term.expression}"
+
+
+def signals(ship: Extended, at: Mapping[str, Array]) -> dict[str, Array]:
+    """(k,) signals that terms read; of what is not measured nothing is known."""
+    nothing = np.full(at["time"].shape, np.nan)
+    forces = generalised_force(ship.model.actuators, at, NUMPY)
+    shoal = ship.draught_m / at["depth"] if "depth" in at else np.zeros_like(nothing)
+    motion = {name: at.get(name, nothing) for name in MOTION_SIGNALS} | {SHOAL: shoal}
+    table = {name: np.broadcast_to(force, nothing.shape) for name, force in zip(FORCE_SIGNALS, forces, strict=True)}
+    return table | {name: at[name] for name in ship.model.inputs} | motion
+
+
+def suspected(found: Diagnosis, item: Finding) -> tuple[Array, str]:
+    """(w, s) values at the compared samples of what an error should depend on, and their label."""
+    key = item.keys[0]
+    kind, _, rest = key.partition(":")
+    if kind in ("lag", "delay"):
+        inputs = as_extended(found.vessel, found.record).model.inputs
+        return _since_change(found, members(rest, inputs))
     if kind == "inertia" or key in ("late:u", "late:v", "late:r"):
         return _rate(found, rest)
     if key in SHOWN_BY or kind in SHOWN_BY:
         return _speed(found, SHOWN_BY.get(key, SHOWN_BY.get(kind, "u")))
-    if kind == "current":
-        return _heading(found)
-    return _depth(found) if kind == "shallow" else _time(found)
-
-
-def signals(found: Diagnosis, ship: Extended) -> dict[str, Array]:
-    """(w, s) measured signals that terms read, nan where one is not measured."""
-    windows = found.windows
-    every = slice(None, None, windows.steps_per_sample)
-    u, v, r = np.moveaxis(windows.measured[..., :3], -1, 0)
-    wind = windows.wind[:, every]
-    inputs = windows.gather(windows.batch_inputs)[:, every]
-    table = dict(zip(ship.model.inputs, np.moveaxis(inputs, -1, 0), strict=True))
-    forces = [np.broadcast_to(force, u.shape) for force in generalised_force(ship.model.actuators, table, NUMPY)]
-    shoal = ship.draught_m / windows.depth_m[:, every]
-    motion = dict(zip(MOTION_SIGNALS, (u, v, r, u - wind[..., 0], v - wind[..., 1], shoal), strict=True))
-    return dict(zip(FORCE_SIGNALS, forces, strict=True)) | table | motion
+    return _heading(found) if kind == "current" or item.cause == "wind" else _time(found)
 
 
 def _telling(found: Diagnosis, item: Finding) -> str:
@@ -81,17 +102,6 @@ def _telling(found: Diagnosis, item: Finding) -> str:
     if item.cause == "parameters" and sizes:
         return item.keys[int(np.argmax(sizes))]
     return item.keys[0]
-
-
-def _term(ship: Extended, name: str) -> Term:
-    own = {term.name: term for term in ship.model.terms}
-    return own[name] if name in own else ship.library[name]
-
-
-def _regressor(found: Diagnosis, ship: Extended, term: Term) -> tuple[Array, str]:
-    names = (*MOTION_SIGNALS, *dict.fromkeys((*FORCE_SIGNALS, *ship.model.inputs)))
-    values = parse_expression(term.expression, signals=names).evaluate(signals(found, ship), NUMPY)
-    return np.broadcast_to(values, found.windows.measured.shape[:2]), f"{term.name}: {term.expression}"
 
 
 def _since_change(found: Diagnosis, columns: list[int]) -> tuple[Array, str]:
@@ -129,16 +139,6 @@ def _speed(found: Diagnosis, output: str) -> tuple[Array, str]:
 def _heading(found: Diagnosis) -> tuple[Array, str]:
     heading = found.windows.heading[:, :: found.windows.steps_per_sample]
     return np.asarray(DEGREES * (heading % (2 * np.pi))), "heading [\N{DEGREE SIGN}]"
-
-
-def _wind(found: Diagnosis) -> tuple[Array, str]:
-    windows = found.windows
-    relative = windows.measured[..., :2] - windows.wind[:, :: windows.steps_per_sample]
-    return np.hypot(relative[..., 0], relative[..., 1]), "wind over deck [m/s]"
-
-
-def _depth(found: Diagnosis) -> tuple[Array, str]:
-    return found.windows.depth_m[:, :: found.windows.steps_per_sample], "water depth [m]"
 
 
 def _time(found: Diagnosis) -> tuple[Array, str]:
