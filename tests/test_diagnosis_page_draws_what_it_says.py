@@ -1,5 +1,6 @@
 """What is drawn of a simulation's error: what the model lacks, and findings against what they depend on."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,7 @@ from expdesign.diagnosis.extension import as_extended, public_name
 from expdesign.diagnosis.residuals import _slopes, dependence, on_the_whole, short_residuals
 from expdesign.diagnosis.values import Residuals
 from expdesign.diagnosis.windows import cut_windows
-from expdesign.export.diagnosis_page import diagnosis_html
+from expdesign.export.diagnosis_page import diagnosis_html, diagnosis_json
 from expdesign.export.diagnosis_page.suspects import has_sign, is_force, suspected, suspected_force
 
 ALONE = ("u", "v", "r", "n1", "a1", "n2", "a2", "u_q", "v_q", "heading", "time", "run")
@@ -158,3 +159,14 @@ def test_two_findings_of_one_cause_have_a_picture_each(clean):
     assert "X_u: u" in page
     assert "Y_v: v" in page
     assert page.index("What the model lacks") < page.index('id="finding1"')
+
+
+def test_data_too_short_for_the_residuals_are_told_so(clean):
+    short = replace(
+        clean.residuals,
+        lacking=clean.residuals.lacking[:5],
+        variables={name: values[:5] for name, values in clean.residuals.variables.items()},
+    )
+    found = replace(clean, residuals=short)
+    assert "too short for that" in diagnosis_html(found, command="made up", version="0")
+    assert json.loads(diagnosis_json(found))["residuals"]["p_values"]["u"]["heading"] is None

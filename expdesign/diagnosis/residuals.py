@@ -22,6 +22,8 @@ from expdesign.values import Array
 SAMPLES, FEWEST = 10, 5
 """Samples of a stretch, and how many must be measured for it to count."""
 BINS = 8
+ENOUGH = 2 * BINS
+"""Stretches, at least."""
 MOST_ALIKE, LEAST_ALIKE = 0.9, 0.01
 """Largest correlation of successive residuals that is counted with, and the smallest."""
 TINY = 1e-300
@@ -95,8 +97,12 @@ def dependence(found: Residuals, output: str, name: str) -> Dependence:
     """How the residual of an output goes with a variable: runs one by one, others in groups of equal numbers.
 
     Residuals count as an autoregression of first order within each run, so that what lasts does not pass for a drift.
+    Too few of them tell nothing: no groups, and nan.
     """
     x, y = found.variables[name], found.lacking[:, found.outputs.index(output)]
+    if len(y) < ENOUGH:
+        nothing = np.zeros(0)
+        return Dependence(middle=nothing, mean=nothing, std=nothing, p_value=float("nan"))
     place = _places(x, by_value=name == "run")
     share = np.eye(int(place.max()) + 1)[place]
     share = share / share.sum(axis=0)  # (k, b) weights of stretches in the mean of their group
@@ -112,8 +118,10 @@ def dependence(found: Residuals, output: str, name: str) -> Dependence:
 
 
 def on_the_whole(found: Residuals, output: str) -> tuple[float, float]:
-    """Mean residual of an output, and its standard error."""
+    """Mean residual of an output, and its standard error; nan of too few."""
     y = found.lacking[:, found.outputs.index(output)]
+    if len(y) < ENOUGH:
+        return float("nan"), float("nan")
     share = np.full((len(y), 1), 1 / len(y))
     covariance, _ = _covariance(y - y.mean(), share, found.variables["run"])
     return float(y.mean()), float(np.sqrt(covariance[0, 0]))

@@ -9,6 +9,7 @@ import numpy as np
 from expdesign.diagnosis.extended import Extended
 from expdesign.diagnosis.followed import followed_inputs
 from expdesign.diagnosis.windows import Windows
+from expdesign.simulation.motion import to_body
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, VesselModel, generalised_force
 from expdesign.vessel.structures import FORCE_SIGNALS, SHOAL
@@ -53,7 +54,7 @@ def surroundings(ship: Extended, windows: Windows) -> Surroundings:
     table = Surroundings({n: np.broadcast_to(signals[..., i], shape) for i, n in enumerate(names)})
     north, east = ship.get("current:north"), ship.get("current:east")
     if north or east:
-        table["u_c"], table["v_c"] = to_body(north, east, true_heading(ship, windows))
+        table["u_c"], table["v_c"] = to_body((north, east), true_heading(ship, windows), NUMPY)
     if any(part.reads_air for part in ship.parts):
         table["u_w"], table["v_w"] = _wind(ship, windows)
     if model.reads_depth or any(key.startswith("shallow:") for key in ship.effects):
@@ -83,7 +84,8 @@ def _wind(ship: Extended, windows: Windows) -> tuple[Array, Array]:
     """Measured where it is, else the mean wind of the model."""
     if windows.has_wind:
         return windows.wind[..., 0], windows.wind[..., 1]
-    return to_body(*mean_wind(ship), true_heading(ship, windows))
+    u_w, v_w = to_body(mean_wind(ship), true_heading(ship, windows), NUMPY)
+    return u_w, v_w
 
 
 def mean_wind(ship: Extended) -> tuple[float, float]:
@@ -95,9 +97,3 @@ def mean_wind(ship: Extended) -> tuple[float, float]:
 def true_heading(ship: Extended, windows: Windows) -> Array:
     """(w, k) heading, that of a wrong compass put right: where velocities come from the pose, the compass is wrong."""
     return windows.heading + ship.get("heading_bias") if "u" in ship.derived else windows.heading
-
-
-def to_body(north: Array | float, east: Array | float, heading: Array) -> tuple[Array, Array]:
-    """An n-frame vector in the b-frame."""
-    c, s = np.cos(heading), np.sin(heading)
-    return north * c + east * s, east * c - north * s

@@ -9,10 +9,10 @@ import numpy as np
 
 from expdesign.diagnosis.extended import Extended
 from expdesign.diagnosis.motion import Motion, simulate_windows
-from expdesign.diagnosis.surroundings import to_body
 from expdesign.diagnosis.windows import Windows
+from expdesign.simulation.motion import to_body
 from expdesign.values import Array
-from expdesign.vessel import stem
+from expdesign.vessel import NUMPY, stem
 
 HEADINGS = (0.0, np.pi / 2, np.pi, 3 * np.pi / 2)
 ROUNDS = 2
@@ -89,7 +89,7 @@ def _turning(ship: Extended, windows: Windows, proposal: Proposal, wind: Array |
 
 def _air(wind: Array | None, heading: Array) -> Array:
     """(w, k, 2) a steady wind in the b-frame; none where it is not measured."""
-    return np.zeros((*heading.shape, 2)) if wind is None else np.stack(to_body(wind[0], wind[1], heading), axis=-1)
+    return np.zeros((*heading.shape, 2)) if wind is None else np.stack(to_body(wind, heading, NUMPY), axis=-1)
 
 
 def _windows(proposal: Proposal, like: Windows, wind: Array | None) -> Windows:

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 
 from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis import Diagnosis
-from expdesign.diagnosis.residuals import Dependence, dependence
+from expdesign.diagnosis.residuals import ENOUGH, Dependence, dependence
 from expdesign.export.diagnosis_page.suspects import DEGREES, has_sign, is_force, suspected, suspected_force
 from expdesign.export.estimate_page.figures import AXES, thinned
 from expdesign.export.report.figures.style import BLUE, GREY, VERMILION, light_grid, new_figure, short, svg
@@ -129,6 +129,8 @@ def _scatter(axes: Axes, x: Array, y: Array, *, signed: bool) -> None:
 def residual_figures(found: Diagnosis) -> list[tuple[bool, str]]:
     """Pictures of what the model lacks against every variable, clearest first, and whether it surely depends on it."""
     residuals = found.residuals
+    if len(residuals.lacking) < ENOUGH:
+        return []
     tests = {
         name: [dependence(residuals, output, name) for output in residuals.outputs]
         for name, values in residuals.variables.items()
