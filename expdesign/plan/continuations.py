@@ -268,7 +268,7 @@ def clear_options(space: SearchSpace, plans: PartialPlans, options: Options) -> 
 
 def runs_clear(space: SearchSpace, primitive: np.ndarray, start: Array) -> np.ndarray:
     """(n,) whether runs (n,) from poses (n, 3) and their ends keep their margins on the grid."""
-    return _ends_clear(space, primitive, start) & _hulls_clear(space, primitive, start)
+    return np.asarray(_ends_clear(space, primitive, start) & _hulls_clear(space, primitive, start))
 
 
 def _ends_clear(space: SearchSpace, primitive: np.ndarray, start: Array) -> np.ndarray:

@@ -9,7 +9,7 @@ leg and run is checked exactly later.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -18,11 +18,13 @@ from expdesign.errors import NoPlan
 from expdesign.plan.continuations import Options, clear_options, continuations, joined, run_ends
 from expdesign.plan.leg_times import NEAR
 from expdesign.plan.orders_ahead import OrdersAhead, orders_ahead
-from expdesign.plan.polish import polished
+from expdesign.plan.polish import measured_s, polished
 from expdesign.plan.search_space import PartialPlans, SearchSpace
 from expdesign.plan.values import Placement
 from expdesign.values import Array
 
+POLISHED = 6
+"""Orders of runs of which the best plan is polished; the best one then counts."""
 CHUNK = 4096
 """Options checked for clearance at a time."""
 
@@ -59,11 +61,33 @@ def place_runs(
     best = int(np.argmin(final_s))
     if not np.isfinite(final_s[best]):
         raise NoPlan("no way to the goal from where the last run ends")
-    runs = [q for q, _ in beam.history[best]]
-    poses = np.array([pose for _, pose in beam.history[best]]).reshape(-1, 3)
-    if space.times is not None:
-        poses = polished(space, runs, poses, start=start, exit_mps=exit_mps, last=names.index(last) if last else -1)
+    if space.times is None:
+        runs, poses = _chain(beam, best)
+    else:
+        ends = {"start": start, "exit_mps": exit_mps, "last": names.index(last) if last else -1}
+        runs, poses = min(
+            ((runs, polished(space, runs, poses, **ends)) for runs, poses in _different(beam, final_s)),
+            key=lambda chain: measured_s(space, *chain, **ends),
+        )
     return tuple(Placement(primitive=names[q], pose=pose) for q, pose in zip(runs, poses, strict=True))
+
+
+def _different(beam: PartialPlans, final_s: Array) -> Iterator[tuple[list[int], Array]]:
+    """The best plans, each with another order of runs."""
+    seen: set[tuple[int, ...]] = set()
+    for index in np.argsort(final_s, kind="stable"):
+        runs, poses = _chain(beam, int(index))
+        if not np.isfinite(final_s[index]) or len(seen) == POLISHED:
+            break
+        if tuple(runs) not in seen:
+            seen.add(tuple(runs))
+            yield runs, poses
+
+
+def _chain(beam: PartialPlans, index: int) -> tuple[list[int], Array]:
+    """(n,) runs and (n, 3) poses of a plan."""
+    history = beam.history[index]
+    return [q for q, _ in history], np.array([pose for _, pose in history]).reshape(-1, 3)
 
 
 def _orders(space: SearchSpace, repeats: Sequence[int], start: Array) -> OrdersAhead | None:
