@@ -17,7 +17,8 @@ from test_plan_says_what_is_impossible import acceleration, place_in
 
 from expdesign.errors import NoPlan
 from expdesign.plan import PlanSettings, solve
-from expdesign.plan.solve import PlanProblem, plan_trial
+from expdesign.plan.problem import PlanProblem
+from expdesign.plan.solve import plan_trial
 from expdesign.simulation import Environment
 
 STRAIT_M, GAP_M, ASIDE_M = 250.0, 9.0, 160.0

@@ -6,7 +6,8 @@ import pytest
 import shapely
 
 from expdesign import workflows
-from expdesign.plan.solve import PlanProblem, plan_trial
+from expdesign.plan.problem import PlanProblem
+from expdesign.plan.solve import plan_trial
 from expdesign.scenario import load_scenario
 from expdesign.workflows.trial import plan_problem
 

@@ -13,7 +13,8 @@ from plan_case import area, ship
 from expdesign.dictionary import PrimitiveSpec, build_primitive, complete_settings, family
 from expdesign.errors import NoPlan, Unreachable
 from expdesign.plan import LocalFrame, PlanSettings
-from expdesign.plan.solve import PlanProblem, plan_trial
+from expdesign.plan.problem import PlanProblem
+from expdesign.plan.solve import plan_trial
 from expdesign.simulation import CALM, Environment
 
 WIDE = shapely.box(-1000, -1000, 1000, 1000)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,8 @@ from expdesign.plan.area import SeaArea
 from expdesign.signals import Commands, Trajectory
 from expdesign.values import Array, seal
 
+Progress = Callable[[str, float], None]
+"""Told what is done, and the share of the work that is."""
 MANY = 0.2
 """Share of drawn trials broken off from which on that is told first."""
 
@@ -22,7 +25,8 @@ class PlanSettings:
         clearance_m: least distance from the hull to anything forbidden [m].
         confidence: share of drawn trials that must stay in allowed water from start to goal, between 0 and 1.
         time_budget_s: buys tries of other places when a leg or a run fails, one for every two seconds, so that a slow
-            machine finds the same plan as a fast one; by the clock the search ends after ten times as long [s].
+            machine finds the same plan as a fast one; by the clock the search ends after ten times as long [s]. A plan
+            made anew because drawn trials left the water has it again.
         transit_speed_mps: speed of repositioning legs, or None for nine tenths of what the actuators allow.
         turning_radius_m: of repositioning legs, or None for what the vessel model allows.
     """

@@ -28,7 +28,8 @@ from expdesign.export import (
 from expdesign.export.cards import cards_html
 from expdesign.export.report import ReportContent, report_html
 from expdesign.information import PrimitiveInformation, estimated_parameters, score_primitives
-from expdesign.plan.solve import PlanProblem, plan_trial
+from expdesign.plan.problem import PlanProblem
+from expdesign.plan.solve import plan_trial
 from expdesign.plan.values import Plan, Promise
 from expdesign.scenario import Scenario, load_repeats, load_scenario
 from expdesign.workflows.design import design_summary, design_tables, designed

@@ -22,8 +22,8 @@ import numpy as np
 from expdesign import workflows
 from expdesign.plan import Plan, run_up
 from expdesign.plan.leg_values import LegWater
+from expdesign.plan.preparation import leg_water
 from expdesign.plan.safety import promised, upper_limit
-from expdesign.plan.solve import leg_water
 from expdesign.plan.values import Promise
 from expdesign.scenario import load_scenario
 from expdesign.scenario.values import Scenario

@@ -1,0 +1,60 @@
+"""The problem that the planner solves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from expdesign.dictionary import Primitive
+from expdesign.durations import DurationDesign
+from expdesign.plan.area import SeaArea
+from expdesign.plan.values import PlanSettings
+from expdesign.simulation import Environment, to_body
+from expdesign.values import Array, seal
+from expdesign.vessel import NUMPY, Vessel
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PlanProblem:
+    """A trial to be planned.
+
+    Attributes:
+        vessel, area, environment, settings: who, where, in what, and with which wishes.
+        primitives: of the dictionary, in the design's order.
+        design: gives the number of runs of each.
+        start, goal: (3,) poses; the ship starts and ends at rest through the water.
+        seed: of everything drawn.
+    """
+
+    vessel: Vessel
+    area: SeaArea
+    environment: Environment
+    settings: PlanSettings
+    primitives: tuple[Primitive, ...]
+    design: DurationDesign
+    start: Array
+    goal: Array
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        seal(self, start="3", goal="3")
+
+    @property
+    def repeats(self) -> dict[str, int]:
+        """How often each primitive is run."""
+        return dict(zip(self.design.problem.names, self.design.repeats, strict=True))
+
+    @property
+    def used(self) -> tuple[Primitive, ...]:
+        """Primitives that are run."""
+        return tuple(item for item in self.primitives if self.repeats[item.name])
+
+    def under_way(self, pose: Array, velocity: Array) -> Array:
+        """(6,) state at a pose with a velocity (3,) through the forecast's mean current."""
+        u_c, v_c = to_body(self.environment.current_to, pose[2], NUMPY)
+        return np.asarray(np.r_[pose, velocity + np.array([u_c, v_c, 0.0])])
+
+    def at_rest(self, pose: Array) -> Array:
+        """(6,) state at a pose, at rest through the water."""
+        return self.under_way(pose, np.zeros(3))
