@@ -19,7 +19,7 @@ from expdesign.signals import Batch, Commands, Record
 from expdesign.simulation import Environment, Variation, simulate
 from expdesign.vessel import Mounting
 from expdesign.workflows.known import combined, expected_std, purchases
-from expdesign.workflows.replan import present_state, rest_of, weather_for_rest
+from expdesign.workflows.present import present_state, rest_of, weather_for_rest
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 STORY = SCENARIOS / "story.toml"

@@ -1,0 +1,221 @@
+"""Where a trial stands: the ship's place, the time left, and what the data so far have told of her."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from expdesign.conventions import to_n_frame
+from expdesign.dictionary import build_primitive
+from expdesign.dictionary.spec import PrimitiveSpec
+from expdesign.errors import Diverged, FileError, InputError, NoAnswer, UnknownName, Unreachable
+from expdesign.information import estimated_parameters
+from expdesign.records import Fix, last_fix
+from expdesign.scenario import Scenario, load_scenario, load_vessel
+from expdesign.scenario.berth import berth_problem
+from expdesign.signals import Record
+from expdesign.simulation import Environment
+from expdesign.values import Array, seal
+from expdesign.vessel import Vessel
+from expdesign.workflows.after import measured
+from expdesign.workflows.known import updated
+from expdesign.workflows.outcome import Progress, silent
+
+PARTICULARS = ("length_m", "beam_m", "draught_m", "sample_time_s")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PresentState:
+    """Where a trial stands.
+
+    Attributes:
+        first: the scenario of the whole trial.
+        data: files so far.
+        record: what they hold.
+        pose: (3,) of the ship in the area's frame.
+        sailed_s: time in the data.
+        left_s: informative time left.
+        left_stated: whether that was said rather than counted.
+        ship: what the rest is planned with.
+        origin: where its model comes from.
+        notes: what a reader must hear.
+    """
+
+    first: Scenario
+    data: tuple[Path, ...]
+    record: Record
+    pose: Array
+    sailed_s: float
+    left_s: float
+    left_stated: bool
+    ship: Vessel
+    origin: str
+    notes: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        seal(self, pose="3")
+
+
+def present_state(
+    scenario: Path,
+    data: Sequence[Path],
+    *,
+    vessel: Path | None = None,
+    remaining_s: float | None = None,
+    progress: Progress = silent,
+) -> PresentState:
+    """Where a trial stands; arguments as of `replan`.
+
+    Raises:
+        InputError: something in the files is wrong, the ship is not in safe water, or no time is left.
+    """
+    if not data:
+        raise InputError("no data files are given, expected one or more CSV files after --data")
+    first = load_scenario(scenario)
+    ship = first.vessel if vessel is None else _same_ship(load_vessel(vessel), first, vessel)
+    record = measured(data, ship)
+    pose = present_pose(last_fix(data[-1]), ship, first)
+    sailed_s = float(sum(len(batch) * batch.sample_time_s for batch in record.batches))
+    left_s = _left(first, sailed_s, remaining_s)
+    origin = f"that of {vessel}"
+    notes: tuple[str, ...] = ()
+    if vessel is None:
+        fixed, prior_counts = first.design.fixed_parameters, first.design.prior == "parameter_std"
+        ship, origin, notes = updated(ship, record, fixed=fixed, prior_counts=prior_counts, progress=progress)
+    return PresentState(
+        first=first,
+        data=tuple(data),
+        record=record,
+        pose=pose,
+        sailed_s=sailed_s,
+        left_s=left_s,
+        left_stated=remaining_s is not None,
+        ship=ship,
+        origin=origin,
+        notes=notes,
+    )
+
+
+def _same_ship(ship: Vessel, first: Scenario, path: Path) -> Vessel:
+    """The vessel, which must be the scenario's but for its model, sensors and weather."""
+    for name in PARTICULARS:
+        found, wanted = getattr(ship, name), getattr(first.vessel, name)
+        if found != wanted:
+            raise FileError(path, f"vessel.{name}", f"is {found:g}, expected {wanted:g} as in {first.path}")
+    if ship.model.inputs != first.vessel.model.inputs:
+        found_inputs, wanted_inputs = ", ".join(ship.model.inputs), ", ".join(first.vessel.model.inputs)
+        raise FileError(path, "actuators", f"take {found_inputs}, expected {wanted_inputs} as in {first.path}")
+    return ship
+
+
+def present_pose(fix: Fix, ship: Vessel, first: Scenario) -> Array:
+    """(3,) the ship's pose in the area's frame, from a fix by its sensors where they are mounted.
+
+    Raises:
+        FileError: the ship has not its clearance there.
+    """
+    area, sensors = first.area, ship.sensors
+    north_east = area.frame.to_metres(fix.position) if fix.degrees else fix.position
+    antenna = np.array([*north_east, fix.heading_rad - sensors.heading_bias_rad])
+    mounted = np.array([sensors.position.forward_m, sensors.position.starboard_m])
+    pose = np.array([*to_n_frame(-mounted, antenna), antenna[2]])
+    problem = berth_problem(pose, ship, area, first.plan.clearance_m, degrees=fix.degrees)
+    if problem:
+        lat, lon = area.frame.to_degrees(pose[:2])
+        place = f"{pose[0]:.1f} m north, {pose[1]:.1f} m east"
+        where = f"{lat:.6f}, {lon:.6f}" if np.isfinite([lat, lon]).all() else place
+        raise FileError(fix.path, f"row {fix.row}", f"the ship's last position ({where}) {problem}")
+    return pose
+
+
+def _left(first: Scenario, sailed_s: float, stated_s: float | None) -> float:
+    """Informative time left."""
+    if stated_s is not None:
+        if not 0 < stated_s < np.inf:
+            raise InputError(f"--remaining is {stated_s:g}, expected more than 0 seconds")
+        return stated_s
+    left_s = first.design.total_s - sailed_s
+    if not left_s > 0:
+        raise InputError(
+            f"the data last {sailed_s:g} s and design.total_s of {first.path} is {first.design.total_s:g}: no time is "
+            "left; expected --remaining S, the informative time that is left, where the data hold repositioning too"
+        )
+    return left_s
+
+
+def weather_for_rest(scenario: Environment, vessel: Environment) -> tuple[Environment, str]:
+    """The scenario's current and wind; where it has no mean one and the vessel file has, the vessel file's.
+
+    Uncertainty is the larger of both, and so is variation. Returns the forecast and where it comes from.
+    """
+    chosen, words = scenario, []
+    for name in ("current", "wind"):
+        to, std, variation = f"{name}_to", f"{name}_std_mps", f"{name}_variation"
+        if getattr(scenario, to).any() or not getattr(vessel, to).any():
+            words.append(f"{name} from the scenario")
+            continue
+        rows = (getattr(vessel, variation), getattr(scenario, variation))
+        changes = {
+            to: getattr(vessel, to),
+            std: max(getattr(vessel, std), getattr(scenario, std)),
+            variation: max(rows, key=lambda item: item.std_mps),
+        }
+        chosen = replace(chosen, **changes)
+        words.append(f"{name} from the vessel file, as the scenario has none")
+    return chosen, ", ".join(words)
+
+
+def rest_of(state: PresentState, *, interest: Sequence[str] = ()) -> tuple[Scenario, tuple[str, ...]]:
+    """The scenario of the rest, without manoeuvres that the ship as known now cannot do, and notes.
+
+    Args:
+        state: where the trial stands.
+        interest: parameters that the rest is to be best for, by criterion D_s; the scenario's criterion when empty.
+
+    Raises:
+        UnknownName: no such parameter to be estimated.
+        NoAnswer: it can do none.
+        InputError: it cannot do one that is required.
+    """
+    first, wish = state.first, state.first.design
+    weather, _ = weather_for_rest(first.environment, state.ship.environment)
+    if interest:
+        known = estimated_parameters(state.ship.model, wish.fixed_parameters)
+        for name in interest:
+            if name not in known:
+                raise UnknownName("parameter after --interest", name, known=known)
+        wish = replace(wish, criterion="D_s", interest=tuple(dict.fromkeys(interest)))
+    kept, notes = _possible(state.ship, first.dictionary, needed={*wish.required, *wish.least_s})
+    names = {spec.name for spec in kept}
+    if wish.least_s or wish.most_s or wish.required or wish.budgets:
+        notes = (*notes, "Limits of the scenario's [design] on times, runs and budgets are taken to be about the rest.")
+    design = replace(
+        wish,
+        total_s=state.left_s,
+        prior_data=(*wish.prior_data, *state.data),
+        most_s={name: value for name, value in wish.most_s.items() if name in names},
+        excluded=tuple(name for name in wish.excluded if name in names),
+    )
+    case = replace(first, vessel=state.ship, dictionary=kept, design=design, start=state.pose, environment=weather)
+    return case, notes
+
+
+def _possible(
+    ship: Vessel, dictionary: Sequence[PrimitiveSpec], *, needed: set[str]
+) -> tuple[tuple[PrimitiveSpec, ...], tuple[str, ...]]:
+    kept, notes, why = [], [], ""
+    for spec in dictionary:
+        try:
+            build_primitive(ship, spec)
+            kept.append(spec)
+        except (InputError, Diverged, Unreachable) as error:
+            if spec.name in needed:
+                raise
+            why = str(error)
+            notes.append(f"Left out of the dictionary, as the ship is known now: {why}.")
+    if not kept:
+        raise NoAnswer(f"the ship as known now can do none of the dictionary's manoeuvres; the last: {why}")
+    return tuple(kept), tuple(notes)
