@@ -13,7 +13,7 @@ from test_plan_verification_catches_what_is_wrong import primitive
 from expdesign.plan.continuations import run_ends, runs_clear
 from expdesign.plan.goal_ways import build_goal_ways
 from expdesign.plan.leg_times import leg_times
-from expdesign.plan.polish import measured_s, polished
+from expdesign.plan.polish import ChainEnds, measured_s, polished
 from expdesign.plan.search_space import SearchSpace, TriedJoint, stamp
 from expdesign.plan.speed_changes import leg_end
 from expdesign.plan.ways import polyline_length
@@ -49,23 +49,23 @@ def space():
 
 
 def test_legs_take_less_time_and_runs_and_ways_stay_in_the_water(space):
-    ends = {"start": START, "exit_mps": 0.0, "last": -1}
-    found = polished(space, [0, 0, 0], POSES, **ends)
-    assert measured_s(space, [0, 0, 0], found, **ends) < measured_s(space, [0, 0, 0], POSES, **ends) - 5.0
+    ends = ChainEnds(start=START, exit_mps=0.0, last=-1)
+    found = polished(space, [0, 0, 0], POSES, ends)
+    assert measured_s(space, [0, 0, 0], found, ends) < measured_s(space, [0, 0, 0], POSES, ends) - 5.0
     assert runs_clear(space, np.zeros(3, dtype=int), found).all()
-    again = polished(space, [0, 0, 0], found, **ends)
-    assert measured_s(space, [0, 0, 0], again, **ends) == pytest.approx(
-        measured_s(space, [0, 0, 0], found, **ends), abs=0.5
+    again = polished(space, [0, 0, 0], found, ends)
+    assert measured_s(space, [0, 0, 0], again, ends) == pytest.approx(
+        measured_s(space, [0, 0, 0], found, ends), abs=0.5
     )
 
 
 def test_no_plan_takes_less_than_its_way_at_full_speed(space):
-    ends = {"start": START, "exit_mps": 0.0, "last": -1}
-    found = polished(space, [0, 0, 0], POSES, **ends)
+    ends = ChainEnds(start=START, exit_mps=0.0, last=-1)
+    found = polished(space, [0, 0, 0], POSES, ends)
     froms, tos = np.vstack([START, run_ends(space, np.zeros(3, dtype=int), found)]), np.vstack([found, space.goal])
     ways = [space.goal_way.ways.shortest(a[:2], b[:2]) for a, b in zip(froms, tos, strict=True)]
     way_m = sum(polyline_length(way) for way in ways)
-    assert measured_s(space, [0, 0, 0], found, **ends) >= way_m / space.times.speed_mps
+    assert measured_s(space, [0, 0, 0], found, ends) >= way_m / space.times.speed_mps
 
 
 def test_a_mirrored_plan_in_mirrored_water_takes_as_long():
@@ -76,8 +76,8 @@ def test_a_mirrored_plan_in_mirrored_water_takes_as_long():
     totals = []
     for water, sign in zip(waters, (np.ones(3), MIRROR), strict=True):
         space = space_of(water, np.array([0.0, 400.0, 0.0]) * sign)
-        ends = {"start": START * sign, "exit_mps": 0.0, "last": -1}
-        totals.append(measured_s(space, [0, 0, 0], polished(space, [0, 0, 0], POSES * sign, **ends), **ends))
+        ends = ChainEnds(start=START * sign, exit_mps=0.0, last=-1)
+        totals.append(measured_s(space, [0, 0, 0], polished(space, [0, 0, 0], POSES * sign, ends), ends))
     assert totals[0] == pytest.approx(totals[1], rel=0.01)
 
 
@@ -87,6 +87,6 @@ def test_a_joint_that_was_tried_takes_what_it_took(space):
     joint = TriedJoint(step=np.array([7.0, 2.0, 0.3]), seconds=3.0, more_s=0.0)
     known = replace(space, tried={("go", "go"): joint})
     after = end + joint.step  # the run is straight: its end still points north
-    ends = {"start": START, "exit_mps": 0.0, "last": -1}
-    apart = [measured_s(one, [0, 0], np.stack([pose, after]), **ends) for one in (known, space)]
+    ends = ChainEnds(start=START, exit_mps=0.0, last=-1)
+    apart = [measured_s(one, [0, 0], np.stack([pose, after]), ends) for one in (known, space)]
     assert apart[0] < apart[1] - 1.0

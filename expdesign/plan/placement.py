@@ -18,7 +18,7 @@ from expdesign.errors import NoPlan
 from expdesign.plan.continuations import Options, clear_options, continuations, joined, run_ends
 from expdesign.plan.leg_times import NEAR
 from expdesign.plan.orders_ahead import OrdersAhead, orders_ahead
-from expdesign.plan.polish import measured_s, polished
+from expdesign.plan.polish import ChainEnds, measured_s, polished
 from expdesign.plan.search_space import PartialPlans, SearchSpace
 from expdesign.plan.values import Placement
 from expdesign.values import Array
@@ -61,14 +61,11 @@ def place_runs(
     best = int(np.argmin(final_s))
     if not np.isfinite(final_s[best]):
         raise NoPlan("no way to the goal from where the last run ends")
-    if space.times is None:
-        runs, poses = _chain(beam, best)
-    else:
-        ends = {"start": start, "exit_mps": exit_mps, "last": names.index(last) if last else -1}
-        runs, poses = min(
-            ((runs, polished(space, runs, poses, **ends)) for runs, poses in _different(beam, final_s)),
-            key=lambda chain: measured_s(space, *chain, **ends),
-        )
+    runs, poses = _chain(beam, best)
+    if space.times is not None:
+        ends = ChainEnds(start=start, exit_mps=exit_mps, last=names.index(last) if last else -1)
+        chains = [(runs, polished(space, runs, poses, ends)) for runs, poses in _different(beam, final_s)]
+        runs, poses = min(chains, key=lambda chain: measured_s(space, chain[0], chain[1], ends))
     return tuple(Placement(primitive=names[q], pose=pose) for q, pose in zip(runs, poses, strict=True))
 
 

@@ -37,6 +37,21 @@ DRIFTS = 3
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class ChainEnds:
+    """Where a chain of runs begins; it ends at the space's goal.
+
+    Attributes:
+        start: (3,) pose before the first leg.
+        exit_mps: surge speed there.
+        last: primitive that ends there, or -1.
+    """
+
+    start: Array
+    exit_mps: float
+    last: int
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Chain:
     """Runs in order, where they are, and what the legs between them take.
 
@@ -53,18 +68,16 @@ class Chain:
     legs_s: Array
 
 
-def polished(
-    space: SearchSpace, runs: Sequence[int], poses: Array, *, start: Array, exit_mps: float, last: int
-) -> Array:
+def polished(space: SearchSpace, runs: Sequence[int], poses: Array, ends: ChainEnds) -> Array:
     """(n, 3) better poses for the same runs in the same order.
 
     Args:
         space: the primitives and the water; with a rule for the time of legs.
         runs: (n,) indices of primitives.
         poses: (n, 3) where they begin.
-        start: (3,) pose before the first leg; exit_mps: surge speed there; last: primitive that ends there or -1.
+        ends: of the chain.
     """
-    legs = _Legs(space=space, start=start, exit_mps=exit_mps, last=last)
+    legs = _Legs(space=space, ends=ends)
     chain = legs.measured(np.asarray(runs), poses)
     blocks = [(i, j) for i in range(len(runs)) for j in range(i, len(runs))]
     for _ in range(SWEEPS):
@@ -77,12 +90,9 @@ def polished(
     return chain.poses
 
 
-def measured_s(
-    space: SearchSpace, runs: Sequence[int], poses: Array, *, start: Array, exit_mps: float, last: int
-) -> float:
+def measured_s(space: SearchSpace, runs: Sequence[int], poses: Array, ends: ChainEnds) -> float:
     """Time of all legs between runs at poses (n, 3), the last one leading to the goal, by the rule [s]."""
-    legs = _Legs(space=space, start=start, exit_mps=exit_mps, last=last)
-    return float(legs.measured(np.asarray(runs), poses).legs_s.sum())
+    return float(_Legs(space=space, ends=ends).measured(np.asarray(runs), poses).legs_s.sum())
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -90,9 +100,7 @@ class _Legs:
     """Legs of chains that begin and end at the same places."""
 
     space: SearchSpace
-    start: Array
-    exit_mps: float
-    last: int
+    ends: ChainEnds
 
     def measured(self, runs: np.ndarray, poses: Array) -> Chain:
         """A chain with the shortest ways for its legs."""
@@ -152,7 +160,7 @@ class _Legs:
     def _name(self, runs: np.ndarray, k: int) -> str:
         if k == len(runs):
             return ""
-        index = runs[k] if k >= 0 else self.last
+        index = runs[k] if k >= 0 else self.ends.last
         return self.space.stamps[index].name if index >= 0 else ""
 
     def _clear(self, runs: np.ndarray, poses: Array, before: Array, after: Array) -> bool:
@@ -178,16 +186,16 @@ class _Legs:
 
     def _ends(self, runs: np.ndarray, poses: Array) -> tuple[Array, Array]:
         """(n + 1, 3) where legs begin, and where they end."""
-        return np.vstack([self.start, run_ends(self.space, runs, poses)]), np.vstack([poses, self.space.goal])
+        return np.vstack([self.ends.start, run_ends(self.space, runs, poses)]), np.vstack([poses, self.space.goal])
 
     def _leg_s(self, runs: np.ndarray, k: int, froms: Array, tos: Array, bends: Array) -> Array:
         """(m,) time of leg k from poses (m, 3) to poses (m, 3) along a way's bends (b, 2)."""
         space = self.space
         rule = space.times
         assert rule is not None
-        exit_mps = space.stamps[runs[k - 1]].exit_mps if k else self.exit_mps
+        exit_mps = space.stamps[runs[k - 1]].exit_mps if k else self.ends.exit_mps
         entry_mps = space.stamps[runs[k]].entry_mps if k < len(runs) else 0.0
-        more_s = space.more_s(int(runs[k - 1]) if k else self.last, int(runs[k]) if k < len(runs) else -1)
+        more_s = space.more_s(int(runs[k - 1]) if k else self.ends.last, int(runs[k]) if k < len(runs) else -1)
         speeds = np.array(exit_mps), np.array(entry_mps)
         away, turn = tos[..., :2] - froms[..., :2], tos[..., 2] - froms[..., 2]
         if len(bends):
