@@ -225,12 +225,13 @@ def _step(base: Fit, windows: Windows, found: tuple[Scored, ...], progress: Prog
 def _standing(base: Fit, windows: Windows, rough: list[Contender]) -> list[Contender]:
     """The best, fitted to the end; those that end at nothing, because the data pull beyond it, make way for others."""
     while rough:
-        least = LEADING * max(item.gain for item in rough) - MARGIN
-        ended = [finished(base, windows, item) for item in rough if item.gain > least]
+        most = max(item.gain for item in rough)
+        ending = [item for item in rough if item.gain > LEADING * most - MARGIN]
+        ended = [finished(base, windows, item) for item in ending]
         standing = [item for item in ended if wald(item, item.fit) <= LEVEL]
-        if standing:
+        if standing or not ending:  # nothing gains anything
             return judged(base, standing)
-        rough = [item for item in rough if item.gain <= least]
+        rough = [item for item in rough if item not in ending]
     return []
 
 
