@@ -126,3 +126,22 @@ def test_a_block_of_parameters_gives_way_to_the_one_number_behind_it(monkeypatch
     found = search(extended, windows, start, np.random.default_rng(0), lambda what, share: None)
     assert {step.chosen.candidate.cause for step in found.steps} == {"change_point", "load_change"}
     assert abs(found.last.value("inertia:r") - 0.35) < 3 * found.last.std("inertia:r") + 0.01
+
+
+def test_what_ends_at_nothing_makes_way_and_a_round_without_gain_ends(monkeypatch):
+    """Gains of three contenders, and which of them end at nothing: the best of the others stand, or none."""
+    parts = search.__globals__
+    monkeypatch.setitem(parts, "finished", lambda base, windows, item: item)
+    monkeypatch.setitem(parts, "judged", lambda base, items: items)
+    monkeypatch.setitem(parts, "wald", lambda item, fitted: 1.0 if item.idle else 0.0)
+
+    def standing(gains: tuple[float, ...], idle: tuple[int, ...] = ()) -> list[float]:
+        rough = [SimpleNamespace(gain=gain, fit=None, idle=number in idle) for number, gain in enumerate(gains)]
+        return [item.gain for item in parts["_standing"](None, None, rough)]
+
+    assert standing((155.0, 57.0, 2.0)) == [155.0]
+    assert standing((155.0, 57.0, 2.0), idle=(0,)) == [57.0]
+    assert standing((155.0, 57.0, 20.0), idle=(0, 1, 2)) == []
+    assert standing((-200.0, -300.0, float("-inf"))) == []
+    assert standing((float("nan"), -300.0, -400.0)) == []
+    assert standing(()) == []
