@@ -12,7 +12,7 @@ from expdesign.diagnosis.contenders import contend, opening
 from expdesign.diagnosis.extension import as_extended
 from expdesign.diagnosis.gain import HeldOut
 from expdesign.diagnosis.joint import fit
-from expdesign.diagnosis.kept import MOST_HARM, worthwhile
+from expdesign.diagnosis.kept import MOST_HARM, mending, worthwhile
 from expdesign.diagnosis.screening import LEVEL, Scored
 from expdesign.diagnosis.search import search
 from expdesign.diagnosis.steps import Search, Step, like_nothing, wald, without
@@ -35,7 +35,7 @@ def steps_of(*keys: str) -> Search:
 def kept_count(*fits: np.ndarray | float) -> int:
     """How many of the causes are kept whose models have these fits on unseen runs, the model in use first."""
     found = steps_of(*(f"effect {number}" for number in range(len(fits) - 1)))
-    return len(worthwhile(found, [errors(value) for value in fits], np.random.default_rng(0)).steps)
+    return len(worthwhile(found, mending(found, [errors(value) for value in fits], np.random.default_rng(0))).steps)
 
 
 def test_a_first_cause_that_may_cost_half_a_point_is_not_told():

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_case import hidden_record, vessel_of
+from diagnosis_case import from_pose, hidden_record, vessel_of
 from scipy.stats import chi2
 
 from expdesign.diagnosis import diagnose
@@ -122,6 +122,19 @@ def test_a_stated_current_is_left_out_where_no_heading_is_measured():
     np.testing.assert_array_equal(one.fit, other.fit)
     again, _ = extend(vessel, as_extended(vessel, blind), {})
     np.testing.assert_array_equal(again.environment.current_to, [0.3, 0.2])
+
+
+def test_what_mends_little_by_itself_is_judged_again_beside_what_is_found_after_it():
+    """A compass and an antenna that are both not as stated: turned alone, the simulation hardly gains."""
+    faults = {"heading_bias": 0.05, "lever_m": 3.0}
+    batches = hidden_record("barge", seed=6, batches=4, samples=200, faults=faults).batches
+    record = Record(batches=tuple(from_pose(batch) for batch in batches))
+    barge = vessel_of("barge")
+    stated = replace(barge.sensors, heading_bias_rad=0.03, position=Mounting(forward_m=-1.0))
+    found = diagnose(replace(barge, sensors=stated), record)
+    assert {item.cause for item in found.findings} == {"lever_arm", "heading_bias"}
+    for one in (item.estimates[0] for item in found.findings):
+        assert abs(one.value - {"forward_m": 3.0, "heading_bias_rad": 0.05}[one.name]) < 4 * one.std
 
 
 @pytest.mark.slow

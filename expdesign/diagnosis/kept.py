@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from expdesign.diagnosis.candidate import Candidate
 from expdesign.diagnosis.clusters import widened
 from expdesign.diagnosis.gain import HeldOut, gained
 from expdesign.diagnosis.steps import Search, Step, like_nothing, without
@@ -34,9 +35,15 @@ def kept(
     Returns:
         The search with its last fit's standard errors as they are reported, and the errors that belong to it.
     """
+    judged_late: list[Candidate] = []
     while True:
         held = measured(found)
-        found = worthwhile(found, held, rng)
+        good = mending(found, held, rng)
+        later = _put_last(found, good, windows, judged_late)
+        if later is not None:
+            found = later
+            continue
+        found = worthwhile(found, good)
         last = widened(found.last, windows.batch)
         idle = like_nothing(found.steps, last)
         rest = None if idle is None else without(list(found.steps), idle, windows)
@@ -50,8 +57,31 @@ def only_moves(step: Step, found: Search) -> bool:
     return set(step.chosen.keys) <= set(found.first.keys)
 
 
-def worthwhile(found: Search, held: Sequence[HeldOut], rng: np.random.Generator) -> Search:
-    """Up to the first cause that mends nothing where it was not fitted, or so little that it may be nothing.
+def _put_last(found: Search, good: Sequence[bool], windows: Windows, judged_late: list[Candidate]) -> Search | None:
+    """A cause that mends too little before others are known, put after them, once each; None where there is no such.
+
+    A misaligned sensor may seem to mend nothing as long as its distance from amidships is not known either.
+    """
+    steps = list(found.steps)
+    for index, step in enumerate(steps):
+        candidate = step.chosen.candidate
+        if good[index] or not any(good[index + 1 :]) or any(candidate is other for other in judged_late):
+            continue
+        judged_late.append(candidate)
+        rest = without(steps, index, windows)
+        if rest is not None:
+            last = replace(step, chosen=replace(step.chosen, fit=found.last), before=rest[-1].chosen.fit)
+            return found.with_steps((*rest, last))
+    return None
+
+
+def worthwhile(found: Search, good: Sequence[bool]) -> Search:
+    """Up to the first cause that mends nothing."""
+    return found.with_steps(found.steps[: int(np.argmin([*good, False]))])
+
+
+def mending(found: Search, held: Sequence[HeldOut], rng: np.random.Generator) -> list[bool]:
+    """Which causes mend something where they were not fitted, and not so little that it may be nothing.
 
     The first cause is sure by its test, which sees more than a simulation shows, unless it makes things worse, or may
     by more than a little: where no model is right, as with real ships, something is always significant. For others
@@ -59,11 +89,10 @@ def worthwhile(found: Search, held: Sequence[HeldOut], rng: np.random.Generator)
     any model and a ship. Little gains count when their interval leaves zero out.
     """
     results = [gained(one, other, rng) for one, other in pairwise(held)]
-    good = [
+    return [
         only_moves(step, found) or _mends(index == 0, gain, low, high)
         for index, (step, (gain, (low, high))) in enumerate(zip(found.steps, results, strict=True))
     ]
-    return found.with_steps(found.steps[: int(np.argmin([*good, False]))])
 
 
 def _mends(first: bool, gain: float, low: float, high: float) -> bool:
