@@ -13,6 +13,7 @@ from expdesign.diagnosis.extension import as_extended
 from expdesign.diagnosis.gain import HeldOut
 from expdesign.diagnosis.joint import fit
 from expdesign.diagnosis.kept import MOST_HARM, mending, worthwhile
+from expdesign.diagnosis.notes import notes_on_dropped
 from expdesign.diagnosis.screening import LEVEL, Scored
 from expdesign.diagnosis.search import search
 from expdesign.diagnosis.steps import Search, Step, like_nothing, wald, without
@@ -28,7 +29,13 @@ def errors(fit_percent: np.ndarray | float) -> HeldOut:
 
 def steps_of(*keys: str) -> Search:
     """A search that found one cause for every key."""
-    steps = [SimpleNamespace(chosen=SimpleNamespace(keys=(key,), fit=key)) for key in keys]
+    steps = [
+        SimpleNamespace(
+            chosen=SimpleNamespace(keys=(key,), fit=key, candidate=Candidate(cause="current", free={key: 0.0})),
+            screening=(key,), p_value=1e-4,
+        )
+        for key in keys
+    ]  # fmt: skip
     return Search(steps=tuple(steps), first=SimpleNamespace(keys=()), last=None, final_screening=())  # type: ignore[arg-type]
 
 
@@ -53,6 +60,18 @@ def test_later_causes_gain_plainly_or_surely():
     runs = np.array([[-1.0], [-1.0], [-1.0], [1.0], [1.0], [1.0]])
     assert kept_count(50.0, 60.0, 60.2 + 3.0 * runs) == 1  # a little, and perhaps nothing
     assert kept_count(50.0, 60.0, 62.0 + 6.0 * runs) == 2  # plainly
+
+
+def test_what_is_not_told_is_said_with_the_tests_that_saw_it():
+    """The table of tests is that of the round in which it stood out, and a note names it."""
+    found = steps_of("one", "two", "three")
+    told = found.with_steps(found.steps[:1])
+    assert told.final_screening == ("two",)
+    assert found.with_steps(found.steps).final_screening == ()
+    assert found.with_steps(()).final_screening == ("one",)
+    notes = notes_on_dropped(found, told, "runs")
+    assert len(notes) == 2
+    assert all("a sign of a current (chance 0.0001). It was left out: runs" in note for note in notes)
 
 
 @pytest.fixture(scope="module")

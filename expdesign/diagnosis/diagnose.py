@@ -15,7 +15,7 @@ from expdesign.diagnosis.gain import HeldOut, gained, held_out
 from expdesign.diagnosis.joint import Fit
 from expdesign.diagnosis.kept import LEAST_GAIN, kept, only_moves
 from expdesign.diagnosis.motion import linearise, start_responses
-from expdesign.diagnosis.notes import notes_on_data
+from expdesign.diagnosis.notes import notes_on_data, notes_on_dropped
 from expdesign.diagnosis.residuals import short_residuals
 from expdesign.diagnosis.search import search
 from expdesign.diagnosis.spread import spread
@@ -70,7 +70,8 @@ def diagnose(
     def measured(found: Search) -> list[HeldOut]:
         return _held_out(found, ship, windows, lambda share: progress("measuring the gain on held-out runs", share))
 
-    found, held = kept(found, windows, measured, rng)
+    searched = found
+    found, held = kept(searched, windows, measured, rng)
     progress("looking for manoeuvres that tell causes apart", 0.92)
     proposed = proposals or standard_proposals(windows, ship.model.inputs, windows.sample_s)
     findings = tuple(
@@ -98,6 +99,7 @@ def diagnose(
         lacking=tuple(short_residuals(found.steps[index].before.ship, windows) for index in order),
         notes=(
             *notes_on_data(vessel, record, windows, still_inputs(ship, windows)),
+            *notes_on_dropped(searched, found, held_apart(windows)),
             *_settled_note(found, ship, windows, held[0]),
             *missing,
         ),

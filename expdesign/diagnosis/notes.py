@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from expdesign.diagnosis.steps import Search
+from expdesign.diagnosis.verdict import lacking
 from expdesign.diagnosis.windows import Windows, unseen_wind
 from expdesign.signals import Record
 from expdesign.vessel import Vessel
@@ -29,6 +31,8 @@ def notes_on_data(vessel: Vessel, record: Record, windows: Windows, still: Seque
     unseen = unseen_wind(record)
     if windows.has_wind and unseen > FEW:
         notes.append(f"No wind is measured in {100 * unseen:.0f} % of the samples: there the last one seen was used.")
+    if not windows.has_wind and any(batch.wind is not None for batch in record.batches):
+        notes.append("Wind is not measured in every run: what was measured of it was not used.")
     if not windows.has_depth:
         notes.append("No depth is measured: shallow water was not tested.")
     if "r" in windows.derived:
@@ -39,3 +43,20 @@ def notes_on_data(vessel: Vessel, record: Record, windows: Windows, still: Seque
     if not (vessel.model.parameter_std > 0).any():
         notes.append("The vessel file states no parameter_std: its parameters count as known.")
     return tuple(notes)
+
+
+def notes_on_dropped(found: Search, told: Search, apart: str) -> tuple[str, ...]:
+    """What stood out in a test and is not told, one sentence each.
+
+    Args:
+        found: the search.
+        told: what is left of it.
+        apart: what gains are measured on.
+    """
+    kept = {id(step.chosen.candidate) for step in told.steps}
+    return tuple(
+        f"The data show a sign of {lacking(step.chosen.candidate.cause)} (chance {step.p_value:.1g}). It was left out: "
+        f"{apart} that took no part in estimating it are not surely simulated better with it, or its size may be zero."
+        for step in found.steps
+        if id(step.chosen.candidate) not in kept
+    )

@@ -45,8 +45,11 @@ class Search:
     final_screening: tuple[Scored, ...]
 
     def with_steps(self, steps: tuple[Step, ...]) -> Search:
-        """The same, had it found these only."""
-        return replace(self, steps=steps, last=steps[-1].chosen.fit if steps else self.first)
+        """The same, had it found these only: where they are the first ones, the next round's tests are its last."""
+        last = steps[-1].chosen.fit if steps else self.first
+        cut = len(steps) < len(self.steps) and steps == self.steps[: len(steps)]
+        screening = self.steps[len(steps)].screening if cut else self.final_screening
+        return replace(self, steps=steps, last=last, final_screening=screening)
 
 
 def superfluous(steps: list[Step], windows: Windows) -> int | None:
