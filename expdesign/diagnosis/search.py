@@ -46,6 +46,8 @@ STRONG = 0.15
 """Share of the remainder from which on an effect is large, and looked at in short windows, too."""
 CERTAIN = 2
 """Candidates that are fitted in long windows whatever short ones say of them."""
+LARGE_WANDER_MPS = 0.1
+"""Standard deviation of a wandering current from which on it may be a steady one rather, and that is fitted, too."""
 MOST_FINDINGS = 6
 SETTLING = 12
 """Gauss-Newton steps, at most, before anything is tested."""
@@ -237,14 +239,17 @@ def _standing(base: Fit, windows: Windows, rough: list[Contender]) -> list[Conte
 
 def _openings(base: Fit, windows: Windows, found: tuple[Scored, ...]) -> tuple[list[Opening], bool]:
     """What to fit, and whether it is far from the model as it stands: then short windows tell where to begin."""
-    shortlist = _shortlist(found)
+    shortlist = [*_shortlist(found), *_hidden_by_wander(base, found)]
     closely = seen_closely(base, windows)
     near = None if closely is None else screen(closely, [item.candidate for item in found])
     if closely is None or near is None or _share(near, closely) < STRONG:
         return [opening(base, scored) for scored in shortlist], False
     certain = shortlist[:CERTAIN]
     seen = {id(item.candidate) for item in certain}
-    others = [item for item in _shortlist(near) if id(item.candidate) not in seen]
+    tests = {id(item.candidate): item.tests for item in found}
+    others = [
+        replace(item, tests=tests[id(item.candidate)]) for item in _shortlist(near) if id(item.candidate) not in seen
+    ]
     return opened_closely(closely, [*certain, *others], len(certain)), True
 
 
@@ -252,6 +257,14 @@ def _share(found: tuple[Scored, ...], base: Fit) -> float:
     """Share of the remainder that the best candidate explains."""
     rows = int(np.isfinite(base.columns.error).sum())
     return max((item.statistic for item in found), default=0.0) / rows
+
+
+def _hidden_by_wander(base: Fit, found: tuple[Scored, ...]) -> list[Scored]:
+    """A steady current that the wandering one has taken up: in few runs a large one tells nothing against it."""
+    if base.noise.wander_mps < LARGE_WANDER_MPS:
+        return []
+    listed = {id(item.candidate) for item in _shortlist(found)}
+    return [item for item in found if item.candidate.cause == "current" and id(item.candidate) not in listed]
 
 
 def _shortlist(found: tuple[Scored, ...]) -> list[Scored]:
