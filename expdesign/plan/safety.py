@@ -83,8 +83,7 @@ def upper_limit(count: int, trials: int, *, confidence: float = MOST) -> float:
 
 def broken_promise(found: Promise, trials: Trials, legs: Sequence[Leg], area: SeaArea, *, confidence: float) -> str:
     """What is wrong with a plan, with the leg and the place where it is worst; "" when it keeps its promise."""
-    allowed = 1.0 - confidence + 1e-12
-    if found.left > 0.0 and found.left + found.error > allowed:
+    if leaves_too_often(found, confidence):
         worst = worst_leg(trials)
         lat, lon = area.frame.to_degrees(np.nanmedian(trials.place[worst], axis=0))
         return (
@@ -93,6 +92,11 @@ def broken_promise(found: Promise, trials: Trials, legs: Sequence[Leg], area: Se
             f"{described(legs, worst)} near {lat:.5f}, {lon:.5f}"
         )
     return "" if found.aborted < HALF else f"{found.note}; wider water or a vessel known better helps"
+
+
+def leaves_too_often(found: Promise, confidence: float) -> bool:
+    """Whether more trials leave allowed water than a confidence allows, or so many that they may well do."""
+    return found.left > 0.0 and found.left + found.error > 1.0 - confidence + 1e-12
 
 
 def worst_leg(trials: Trials) -> int:

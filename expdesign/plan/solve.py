@@ -17,7 +17,7 @@ from expdesign.plan.lower_bound import reposition_bound_s
 from expdesign.plan.preparation import leg_water, search_space, with_joints
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.realised import realised_efficiencies
-from expdesign.plan.safety import broken_promise, promised, trials_for, worst_leg
+from expdesign.plan.safety import broken_promise, leaves_too_often, promised, trials_for, worst_leg
 from expdesign.plan.sailing import sail_all
 from expdesign.plan.search_space import SearchSpace
 from expdesign.plan.values import Leg, Plan, Progress, Promise, Verification
@@ -50,8 +50,9 @@ def plan_trial(problem: PlanProblem, *, progress: Progress = lambda what, share:
         broken = broken_promise(promise, trials, sailed[2], problem.area, confidence=problem.settings.confidence)
         if not broken:
             return _finished(problem, stated, *sailed, verification=verification, promise=promise)
-        if replan == REPLANS or not trials.left.any():
-            more = "; more plan.clearance_m helps" if trials.left.any() else ""
+        leaving = leaves_too_often(promise, problem.settings.confidence)
+        if replan == REPLANS or not leaving:
+            more = "; more plan.clearance_m helps" if leaving else ""
             raise NoPlan(f"the plan found does not keep its promise: {broken}{more}")
         water, space = _wider(problem, water, space, trials, sailed[2], broken)
         told = _not_back(progress)
