@@ -7,15 +7,16 @@ import pytest
 from diagnosis_case import hidden_record, vessel_of
 
 from expdesign.diagnosis.accuracy import first_states
-from expdesign.diagnosis.candidate import Candidate
+from expdesign.diagnosis.candidate import Candidate, Situation
+from expdesign.diagnosis.causes import CAUSES
 from expdesign.diagnosis.contenders import contend, opening
 from expdesign.diagnosis.extension import as_extended
 from expdesign.diagnosis.gain import HeldOut
 from expdesign.diagnosis.joint import fit
 from expdesign.diagnosis.kept import MOST_HARM, mending, worthwhile
 from expdesign.diagnosis.notes import notes_on_dropped
-from expdesign.diagnosis.screening import LEVEL, Scored
-from expdesign.diagnosis.search import search
+from expdesign.diagnosis.screening import LEVEL, Scored, screen
+from expdesign.diagnosis.search import _openings, search, settled
 from expdesign.diagnosis.steps import Search, Step, like_nothing, wald, without
 from expdesign.diagnosis.windows import cut_windows
 
@@ -164,3 +165,16 @@ def test_what_ends_at_nothing_makes_way_and_a_round_without_gain_ends(monkeypatc
     assert standing((-200.0, -300.0, float("-inf"))) == []
     assert standing((float("nan"), -300.0, -400.0)) == []
     assert standing(()) == []
+
+
+def test_a_large_effect_is_judged_by_all_that_was_tried():
+    """Short windows tell where fits of large effects begin; p-values count the tests of the whole round all the same."""
+    record = hidden_record("barge", seed=3, batches=4, samples=200, effects={"gain": -0.35})
+    ship = as_extended(vessel_of("barge"), record)
+    windows = cut_windows(ship.model, record)
+    base = settled(ship, windows, first_states(windows))
+    situation = Situation(ship=base.ship, windows=windows)
+    candidates = [item for cause in CAUSES for item in cause.candidates(situation)]
+    openings, far = _openings(base, windows, screen(base, candidates, np.random.default_rng(0)))
+    assert far
+    assert all(one.scored.tests > 5.0 for one in openings)
