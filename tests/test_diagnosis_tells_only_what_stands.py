@@ -168,7 +168,7 @@ def test_what_ends_at_nothing_makes_way_and_a_round_without_gain_ends(monkeypatc
 
 
 def test_a_large_effect_is_judged_by_all_that_was_tried():
-    """Short windows tell where fits of large effects begin; p-values count the tests of the whole round all the same."""
+    """Short windows tell where fits of large effects begin; p-values count all tests of the round all the same."""
     record = hidden_record("barge", seed=3, batches=4, samples=200, effects={"gain": -0.35})
     ship = as_extended(vessel_of("barge"), record)
     windows = cut_windows(ship.model, record)
