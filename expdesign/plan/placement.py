@@ -30,7 +30,14 @@ CHUNK = 4096
 
 
 def place_runs(
-    space: SearchSpace, repeats: Sequence[int], *, start: Array, exit_mps: float = 0.0, last: str = "", width: int = 400
+    space: SearchSpace,
+    repeats: Sequence[int],
+    *,
+    start: Array,
+    exit_mps: float = 0.0,
+    last: str = "",
+    width: int = 400,
+    orders: int = POLISHED,
 ) -> tuple[Placement, ...]:
     """Start poses of all runs in the order in which they are to be done.
 
@@ -41,6 +48,7 @@ def place_runs(
         exit_mps: surge speed there.
         last: name of the primitive that ends there, if any.
         width: partial plans kept.
+        orders: of runs, of which the best plan is polished; 0 for none.
 
     Raises:
         NoPlan: some run does not fit anywhere the search can reach; the message names it and the place.
@@ -62,19 +70,19 @@ def place_runs(
     if not np.isfinite(final_s[best]):
         raise NoPlan("no way to the goal from where the last run ends")
     runs, poses = _chain(beam, best)
-    if space.times is not None:
+    if space.times is not None and orders:
         ends = ChainEnds(start=start, exit_mps=exit_mps, last=names.index(last) if last else -1)
-        chains = [(runs, polished(space, runs, poses, ends)) for runs, poses in _different(beam, final_s)]
+        chains = [(runs, polished(space, runs, poses, ends)) for runs, poses in _different(beam, final_s, orders)]
         runs, poses = min(chains, key=lambda chain: measured_s(space, chain[0], chain[1], ends))
     return tuple(Placement(primitive=names[q], pose=pose) for q, pose in zip(runs, poses, strict=True))
 
 
-def _different(beam: PartialPlans, final_s: Array) -> Iterator[tuple[list[int], Array]]:
+def _different(beam: PartialPlans, final_s: Array, count: int) -> Iterator[tuple[list[int], Array]]:
     """The best plans, each with another order of runs."""
     seen: set[tuple[int, ...]] = set()
     for index in np.argsort(final_s, kind="stable"):
         runs, poses = _chain(beam, int(index))
-        if not np.isfinite(final_s[index]) or len(seen) == POLISHED:
+        if not np.isfinite(final_s[index]) or len(seen) == count:
             break
         if tuple(runs) not in seen:
             seen.add(tuple(runs))

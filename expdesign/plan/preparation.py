@@ -81,7 +81,7 @@ def with_joints(problem: PlanProblem, water: LegWater, space: SearchSpace, progr
     for number in range(JOINT_TRIALS if space.times is not None else 0):
         progress("trying joints between runs", 0.01 * (number + 1))
         try:
-            placements = place_runs(space, counts, start=problem.start, width=TRIAL_WIDTH)
+            placements = place_runs(space, counts, start=problem.start, width=TRIAL_WIDTH, orders=0)
         except NoPlan:  # the search proper keeps more, and says what is impossible
             break
         pairs = pairs_of(placements)
