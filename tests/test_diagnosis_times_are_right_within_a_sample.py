@@ -11,7 +11,7 @@ from expdesign.diagnosis.contenders import contend, opening
 from expdesign.diagnosis.extension import as_extended
 from expdesign.diagnosis.joint import fit
 from expdesign.diagnosis.motion import simulate_windows
-from expdesign.diagnosis.profile import sharpened
+from expdesign.diagnosis.profile import middle, sharpened
 from expdesign.diagnosis.screening import Scored
 from expdesign.diagnosis.windows import cut_windows
 
@@ -82,3 +82,17 @@ def test_a_number_found_by_trying_lies_within_three_standard_errors(ship, hidden
     assert abs(found.fit.value(key) - truth) < 3 * std
     assert std < 0.1 * truth
     assert found.gain >= rough.gain - 1.0
+
+
+def test_a_width_is_as_unsure_as_the_commands_leave_it():
+    """Steering in square waves has a few sizes only; any dead band between two of them is as good as another."""
+    hidden = {"deadband": 34.0, "dead_on": 0b100}
+    record = hidden_record("barge", seed=7, batches=6, samples=160, effects=hidden, manoeuvre="zigzag")
+    sizes = np.unique(np.concatenate([np.abs(batch.inputs[:, 2]).round(6) for batch in record.batches]))
+    low, high = sizes[sizes < 34.0].max(), sizes[sizes > 34.0].min()
+    extended = as_extended(vessel_of("barge"), record)
+    windows = cut_windows(extended.model, record)
+    base = fit(extended.having({"deadband:tau_psi": low + 0.1}), windows, (), starts=first_states(windows))
+    found, std = middle(base, "deadband:tau_psi", 0.01)
+    assert found.value("deadband:tau_psi") == pytest.approx((low + high) / 2, abs=0.2 * (high - low))
+    assert std == pytest.approx((high - low) / 2, rel=0.5)

@@ -17,7 +17,7 @@ from expdesign.diagnosis.contenders import Contender, gain_over
 from expdesign.diagnosis.joint import Fit, answers, fit, profile_cost
 from expdesign.diagnosis.motion import linearise, simulate_windows
 
-POINTS, ROUNDS = 9, 7
+POINTS, ROUNDS = 9, 9
 ALIKE = 1.0
 """Twice the log likelihood that values may lack to count as alike: within one standard error of a Gaussian one."""
 WITHIN = 3
@@ -61,10 +61,12 @@ def middle(found: Fit, key: str, std: float) -> tuple[Fit, float]:
         spacing = 2.0 * span / (POINTS - 1)
         if best in (values[0], values[-1]):
             centre = best
+        elif low <= values[0] or high >= values[-1]:  # a plateau that goes on beyond
+            centre, span = (low + high) / 2, 2.5 * span
         elif sum(low <= value <= high for value in values) >= WITHIN:
             break
         else:
-            centre, span = best, 1.5 * spacing
+            centre, span = (low + high) / 2, (high - low) / 2 + spacing
     settled = fit(
         found.ship.having({key: (low + high) / 2}), found.linear.motion.windows, found.keys[: found.free],
         starts=found.starts, noise=found.noise, colour_order=found.noise.order, near=found.linear,
