@@ -1,5 +1,6 @@
 """What is told of a search: nothing that may harm on unseen runs, nothing that its own estimate calls nothing."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,7 +12,7 @@ from expdesign.diagnosis.candidate import Candidate, Situation
 from expdesign.diagnosis.causes import CAUSES
 from expdesign.diagnosis.contenders import contend, opening
 from expdesign.diagnosis.extension import as_extended
-from expdesign.diagnosis.gain import HeldOut
+from expdesign.diagnosis.gain import HeldOut, _fitted, gained
 from expdesign.diagnosis.joint import fit
 from expdesign.diagnosis.kept import MOST_HARM, mending, worthwhile
 from expdesign.diagnosis.notes import notes_on_dropped
@@ -43,7 +44,7 @@ def steps_of(*keys: str) -> Search:
 def kept_count(*fits: np.ndarray | float) -> int:
     """How many of the causes are kept whose models have these fits on unseen runs, the model in use first."""
     found = steps_of(*(f"effect {number}" for number in range(len(fits) - 1)))
-    return len(worthwhile(found, mending(found, [errors(value) for value in fits], np.random.default_rng(0))).steps)
+    return len(worthwhile(found, mending(found, [errors(value) for value in fits], 0)).steps)
 
 
 def test_a_first_cause_that_may_cost_half_a_point_is_not_told():
@@ -107,6 +108,32 @@ def test_an_estimate_of_nothing_goes_and_the_rest_is_estimated_as_without_it(bar
         assert rest.before is before
         assert rest.chosen.fit.value("gain") == pytest.approx(alone.chosen.fit.value("gain"), abs=1e-3)
         assert like_nothing((rest,), rest.chosen.fit) is None
+
+
+def test_runs_held_out_have_no_say_in_the_sizes_they_are_judged_by(barge):
+    """One run is spoilt so that the fit to all runs is many standard errors off; the fit to the others is not."""
+    extended, windows = barge
+    some = windows.batch < np.unique(windows.batch)[-1]
+    start = first_states(windows)
+    alone = fit(extended, windows.picked(some), ("gain",), starts=start[some])
+    measured = windows.measured.copy()
+    measured[~some] *= 1.3
+    spoilt = replace(windows, measured=measured)
+    whole = fit(extended, spoilt, ("gain",), starts=first_states(spoilt))
+    apart = _fitted(whole, spoilt, some)
+    assert apart is not None
+    assert abs(whole.value("gain") - alone.value("gain")) > 10 * alone.std("gain")
+    assert abs(apart.get("gain") - alone.value("gain")) < alone.std("gain")
+
+
+def test_folds_that_cannot_be_fitted_count_for_neither_model():
+    before, after = errors(50.0), errors(60.0)
+    lost, spread = after.lost.copy(), after.spread.copy()
+    lost[:2], spread[:2] = np.nan, np.nan
+    gap = HeldOut(lost=lost, spread=spread)
+    assert gained(before, gap, 0) == (pytest.approx(10.0), (pytest.approx(10.0), pytest.approx(10.0)))
+    assert np.isnan(gained(before, HeldOut(lost=np.nan * lost, spread=spread), 0)[0])
+    assert kept_count(50.0, np.full((6, 1), np.nan)) == 0
 
 
 def test_several_numbers_are_tested_together():

@@ -59,6 +59,6 @@ def test_every_cause_of_the_catalogue_has_words():
 def test_the_fall_of_an_error_is_that_of_its_root_mean_square():
     before = HeldOut(lost=np.array([[4.0, 1.0], [12.0, 1.0]]), spread=np.ones((2, 2)))
     after = HeldOut(lost=np.array([[1.0, 1.0], [3.0, 1.0]]), spread=np.ones((2, 2)))
-    falls = error_falls(("u", "v"), before, after, np.random.default_rng(0))
+    falls = error_falls(("u", "v"), before, after, 0)
     assert [fall.share for fall in falls] == pytest.approx([0.5, 0.0])
     assert [(fall.low, fall.high) for fall in falls] == [pytest.approx((0.5, 0.5)), pytest.approx((0.0, 0.0))]

@@ -71,11 +71,11 @@ def diagnose(
         return _held_out(found, ship, windows, lambda share: progress("measuring the gain on held-out runs", share))
 
     searched = found
-    found, held = kept(searched, windows, measured, rng)
+    found, held = kept(searched, windows, measured, seed)
     progress("looking for manoeuvres that tell causes apart", 0.92)
     proposed = proposals or standard_proposals(windows, ship.model.inputs, windows.sample_s)
     findings = tuple(
-        _finding(step, found.last, held[index], held[index + 1], windows, proposed, rng)
+        _finding(step, found.last, held[index], held[index + 1], windows, proposed, seed)
         for index, step in enumerate(found.steps)
     )
     last = found.last if found.steps else found.first
@@ -160,11 +160,11 @@ def cause_of(name: str) -> Cause:
 
 def _finding(
     step: Step, last: Fit, before: HeldOut, after: HeldOut, windows: Windows, proposals: Sequence[Proposal],
-    rng: np.random.Generator,
+    seed: int,
 ) -> Finding:  # fmt: skip
     """A step of the search in words; its numbers are estimated together with those of all other steps."""
     chosen = step.chosen
-    gain, interval = gained(before, after, rng)
+    gain, interval = gained(before, after, seed)
     values: dict[str, tuple[float, float]] = {
         key: (last.value(key), last.std(key)) if key in last.keys else (last.value(key), chosen.fit.std(key))
         for key in chosen.keys
@@ -183,7 +183,7 @@ def _finding(
         p_value=step.p_value,
         fit_before=before.fit,
         fit_after=after.fit,
-        falls=error_falls(chosen.fit.ship.model.outputs, before, after, rng),
+        falls=error_falls(chosen.fit.ship.model.outputs, before, after, seed),
         gain=gain,
         gain_interval=interval,
         not_distinguishable_from=tuple(rival.candidate.cause for rival in step.rivals),

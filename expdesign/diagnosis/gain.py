@@ -1,4 +1,8 @@
-"""What mending gains where it was not fitted: cross-validation over batches, and a bootstrap over batches."""
+"""What mending gains where it was not fitted: cross-validation over batches, and a bootstrap over batches.
+
+Sizes are fitted without the batches that they are judged on. Which causes, and what is searched on a grid (the width of
+a dead band, the time of a change, where the wind blows), were chosen with all of them.
+"""
 
 from __future__ import annotations
 
@@ -17,6 +21,8 @@ from expdesign.values import Array
 
 FOLDS = 3
 DRAWS = 1000
+STEPS = 3
+"""Gauss-Newton steps from the fit to all batches to that of a fold."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -24,7 +30,8 @@ class HeldOut:
     """Errors of one model on batches that it was not fitted to.
 
     Attributes:
-        lost, spread: (b, n) squared error and squared deviation from the mean, per batch and output.
+        lost, spread: (b, n) squared error and squared deviation from the mean, per batch and output; nan for batches
+            whose fold could not be fitted.
     """
 
     lost: Array
@@ -32,8 +39,8 @@ class HeldOut:
 
     @property
     def fit(self) -> Array:
-        """(n,) [%] over all batches."""
-        return _fit(self.lost.sum(axis=0), self.spread.sum(axis=0))
+        """(n,) [%] over all batches that count."""
+        return _fit(np.nansum(self.lost, axis=0), np.nansum(self.spread, axis=0))
 
 
 def _fit(lost: Array, spread: Array) -> Array:
@@ -65,6 +72,9 @@ def held_out(found: Fit | None, ship: Extended, windows: Windows, tell: Callable
         tell(number / len(folds))
         test = np.isin(unit, fold)
         model = ship if found is None or test.all() else _fitted(found, windows, ~test)
+        if model is None:
+            lost[np.isin(names, fold)], spread[np.isin(names, fold)] = np.nan, np.nan
+            continue
         part = windows.picked(test)
         motion = simulate_from_first(model, part, None if found is None else found.linear.picked(test))
         some = sums(motion.error[..., columns], part.measured[..., columns])
@@ -73,21 +83,36 @@ def held_out(found: Fit | None, ship: Extended, windows: Windows, tell: Callable
     return HeldOut(lost=lost, spread=spread)
 
 
-def _fitted(found: Fit, windows: Windows, train: NDArray[np.bool_]) -> Extended:
+def _fitted(found: Fit, windows: Windows, train: NDArray[np.bool_]) -> Extended | None:
+    """The model with its numbers fitted to some windows, or None where no step from the fit to all of them helps."""
     free = tuple(key for key in found.keys[: found.free])
     try:
-        return fit(
-            found.ship, windows.picked(train), free, starts=found.starts[train], noise=found.noise, steps=1,
+        ship = fit(
+            found.ship, windows.picked(train), free, starts=found.starts[train], noise=found.noise, steps=STEPS,
             colour_order=found.noise.order, near=found.linear.picked(train),
         ).ship  # fmt: skip
     except (FloatingPointError, np.linalg.LinAlgError):
-        return found.ship
+        return None
+    return None if ship is found.ship else ship
 
 
-def gained(before: HeldOut, after: HeldOut, rng: np.random.Generator) -> tuple[float, tuple[float, float]]:
-    """Mean gain of fit over outputs [points], and its 95 % interval from drawing batches with replacement."""
+def on_same(before: HeldOut, after: HeldOut) -> tuple[HeldOut, HeldOut]:
+    """Two models on the batches that count for both."""
+    both = np.isfinite(before.lost).all(axis=1) & np.isfinite(after.lost).all(axis=1)
+    first, second = (HeldOut(lost=item.lost[both], spread=item.spread[both]) for item in (before, after))
+    return first, second
+
+
+def gained(before: HeldOut, after: HeldOut, seed: int) -> tuple[float, tuple[float, float]]:
+    """Mean gain of fit over outputs [points], and its 95 % interval from drawing batches with replacement.
+
+    The same seed gives the same interval, to decide by and to report. Nan where no batch counts for both.
+    """
+    before, after = on_same(before, after)
     count = len(before.lost)
-    drawn = rng.integers(0, count, (DRAWS, count))
+    if not count:
+        return np.nan, (np.nan, np.nan)
+    drawn = np.random.default_rng(seed).integers(0, count, (DRAWS, count))
     fits = [_fit(item.lost[drawn].sum(axis=1), item.spread[drawn].sum(axis=1)) for item in (before, after)]
     gains = np.nanmean(fits[1] - fits[0], axis=1)
     low, high = np.nanquantile(gains, [0.025, 0.975])

@@ -22,7 +22,7 @@ MOST_HARM = 0.5
 
 
 def kept(
-    found: Search, windows: Windows, measured: Callable[[Search], list[HeldOut]], rng: np.random.Generator
+    found: Search, windows: Windows, measured: Callable[[Search], list[HeldOut]], seed: int
 ) -> tuple[Search, list[HeldOut]]:
     """What is told of a search: causes that are worth while, none of which might as well be nothing beside the others.
 
@@ -30,7 +30,7 @@ def kept(
         found: the search.
         windows: data.
         measured: errors on held-out runs of the model before any cause, then after every step.
-        rng: of the gains' intervals.
+        seed: of the gains' intervals.
 
     Returns:
         The search with its last fit's standard errors as they are reported, and the errors that belong to it.
@@ -38,7 +38,7 @@ def kept(
     judged_late: list[Candidate] = []
     while True:
         held = measured(found)
-        good = mending(found, held, rng)
+        good = mending(found, held, seed)
         later = _put_last(found, good, windows, judged_late)
         if later is not None:
             found = later
@@ -80,22 +80,23 @@ def worthwhile(found: Search, good: Sequence[bool]) -> Search:
     return found.with_steps(found.steps[: int(np.argmin([*good, False]))])
 
 
-def mending(found: Search, held: Sequence[HeldOut], rng: np.random.Generator) -> list[bool]:
+def mending(found: Search, held: Sequence[HeldOut], seed: int) -> list[bool]:
     """Which causes mend something where they were not fitted, and not so little that it may be nothing.
 
     The first cause is sure by its test, which sees more than a simulation shows, unless it makes things worse, or may
     by more than a little: where no model is right, as with real ships, something is always significant. For others
     significance alone is not enough: once a large error is mended, what is left shows every small difference between
-    any model and a ship. Little gains count when their interval leaves zero out.
+    any model and a ship. Little gains count when their interval leaves zero out. Parameters that are free to move
+    anyhow gain nothing by being named, and must not cost.
     """
-    results = [gained(one, other, rng) for one, other in pairwise(held)]
+    results = [gained(one, other, seed) for one, other in pairwise(held)]
     return [
-        only_moves(step, found) or _mends(index == 0, gain, low, high)
+        _mends(index == 0 or only_moves(step, found), gain, low, high)
         for index, (step, (gain, (low, high))) in enumerate(zip(found.steps, results, strict=True))
     ]
 
 
-def _mends(first: bool, gain: float, low: float, high: float) -> bool:
-    if first and high >= 0.0 and low > -MOST_HARM:
+def _mends(sure: bool, gain: float, low: float, high: float) -> bool:
+    if sure and high >= 0.0 and low > -MOST_HARM:
         return True
     return gain > LEAST_GAIN and (gain > PLAIN_GAIN or low > 0.0)

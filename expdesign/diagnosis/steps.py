@@ -119,4 +119,6 @@ def wald(chosen: Contender, last: Fit) -> float:
         key, error = chosen.searched
         moved = last.value(key) - stated.get(key, 0.0)
         statistic, freedom = statistic + (moved / error) ** 2, freedom + 1
+    if not np.isfinite(statistic):  # an error that could not be told: the estimate says nothing
+        return 1.0
     return float(chi2.sf(statistic, freedom)) if freedom else 0.0

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from expdesign.diagnosis.gain import DRAWS, HeldOut, units
+from expdesign.diagnosis.gain import DRAWS, HeldOut, on_same, units
 from expdesign.diagnosis.values import Accuracy, Fall, Finding
 from expdesign.diagnosis.windows import Windows
 from expdesign.values import Array
@@ -55,9 +55,10 @@ def manoeuvre(name: str) -> str:
     return MANOEUVRES.get(name, f"the manoeuvre {name}")
 
 
-def error_falls(outputs: Sequence[str], before: HeldOut, after: HeldOut, rng: np.random.Generator) -> tuple[Fall, ...]:
+def error_falls(outputs: Sequence[str], before: HeldOut, after: HeldOut, seed: int) -> tuple[Fall, ...]:
     """Shares by which the simulated error of held-out runs falls, with 95 % intervals from drawing runs anew."""
-    drawn = rng.integers(0, len(before.lost), (DRAWS, len(before.lost)))
+    before, after = on_same(before, after)
+    drawn = np.random.default_rng(seed).integers(0, len(before.lost), (DRAWS, len(before.lost)))
 
     def fall(lost_before: Array, lost_after: Array) -> Array:
         with np.errstate(divide="ignore", invalid="ignore"):
