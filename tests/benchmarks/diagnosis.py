@@ -236,8 +236,11 @@ class Case:
         return vessel_of(self.ship, relative_std=relative_std, without=hidden.without, sample_time_s=self.step_s)
 
     def truths(self, hidden: Hidden, std: float) -> dict[str, float]:
-        """What estimates ought to be: drag in a wind that nobody measured is for a speed that is taken, and runs that lose
-        samples at their ends, laid end to end, have another time of change."""
+        """What estimates ought to be.
+
+        Drag in a wind that nobody measured is for a speed that is taken; runs that lose samples at their ends, laid end
+        to end, have another time of change.
+        """
         unknown = () if self.wind else AIR
         unknown += ("time_s",) if self.recorded == "derived" else ()
         true = hidden.truths(self.ship, self.seed, std)
