@@ -20,8 +20,8 @@ GOAL = "goal"
 TRY_S = 2.0
 """Seconds of the time budget that count as one try of another place: effort is counted, so that a slow machine finds
 the same plan as a fast one."""
-LAST_RESORT = 10.0
-"""Time budgets by the clock after which the search ends whatever the count."""
+LAST_RESORT = 5.0
+"""Time budgets by the clock after which a search that is stuck ends whatever the count."""
 
 
 def sail_all(
