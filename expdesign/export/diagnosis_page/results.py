@@ -14,6 +14,9 @@ from expdesign.export.results import strict_json
 from expdesign.export.vessel_file import vessel_toml
 from expdesign.values import Array
 
+SMALL = 1e-99
+"""Chances below are told as such: floating point has no smaller ones to tell apart."""
+
 
 def diagnosis_json(found: Diagnosis) -> str:
     """The whole diagnosis; what is not a number is null."""
@@ -81,7 +84,7 @@ def diagnosis_tables(found: Diagnosis) -> tuple[tuple[str, ...], list[tuple[str,
         (
             item.cause,
             ", ".join(f"{one.name} {plus_minus(one.value, one.std)}" for one in item.estimates),
-            f"{item.p_value:.1e}",
+            f"{item.p_value:.1e}" if item.p_value > SMALL else f"< {SMALL:.0e}",
             f"{item.gain:.1f} ({item.gain_interval[0]:.1f} to {item.gain_interval[1]:.1f})",
             ", ".join(item.not_distinguishable_from) or "-",
         )
