@@ -1,5 +1,6 @@
 """A roll mode is one oscillator beside the model's terms; every simulation follows it, or says that it does not."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,7 @@ from scipy.linalg import expm
 
 from expdesign import workflows
 from expdesign.diagnosis.extension import as_extended, extend
-from expdesign.diagnosis.motion import simulate_windows
+from expdesign.diagnosis.motion import ROLL_ANGLE, simulate_windows
 from expdesign.diagnosis.windows import cut_windows
 from expdesign.dictionary.trim import drift
 from expdesign.errors import InputError
@@ -87,7 +88,8 @@ def test_the_diagnosis_moves_as_the_file_that_it_writes(tmp_path):
     states = simulate_windows(again, windows, start).states
     for index, inputs in enumerate(windows.batch_inputs):
         commands = Commands(sample_time_s=windows.step_s, names=SHIP.model.inputs, values=inputs)
-        sailed = simulate(extended, commands, velocity=STATE[1], substeps=1)
+        parts = math.ceil(2 * math.pi / ROLL.period_s * windows.step_s / ROLL_ANGLE)
+        sailed = simulate(extended, commands, velocity=STATE[1], substeps=parts)
         np.testing.assert_allclose(states[index, :, :3], sailed.velocity[:-1], atol=1e-9)
 
 
