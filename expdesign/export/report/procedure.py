@@ -16,8 +16,8 @@ def procedure_sentences(plan: Plan) -> list[str]:
     within = _tolerances(promise, [leg.kind == "primitive" for leg in plan.legs])
     return [
         "Run: give the orders of the card open loop, from the state the ship really has.",
-        "After it: come back to the planned leg from wherever the run has ended, and follow it, steered. Where the leg "
-        "is not in sight over safe water, or too short to make the distance good, go round at once.",
+        "After it: come back to the planned leg from wherever the run has ended, and follow it, steered. Where that "
+        "way does not lie in safe water, or the leg is too short to make the distance good, go round at once.",
         f"Start: begin the next run if {within}.",
         "Otherwise go round: the shortest way in safe water to a place behind the start, then steady on the planned "
         f"heading at the planned speed up to the start once more; {words.counted(promise.rounds, 'time')} at most, "
