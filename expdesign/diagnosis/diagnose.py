@@ -100,7 +100,7 @@ def diagnose(
         notes=(
             *notes_on_data(vessel, record, windows, still_inputs(ship, windows)),
             *notes_on_dropped(searched, found, held_apart(windows)),
-            *_settled_note(found, ship, windows, held[0]),
+            *_settled_note(found, ship, windows, held[0], seed),
             *missing,
         ),
         screened=_screened(found),
@@ -206,12 +206,12 @@ def _stds(found: Fit) -> dict[str, float]:
     return {key: found.std(key) for key in found.keys}
 
 
-def _settled_note(found: Search, ship: Extended, windows: Windows, settled: HeldOut) -> tuple[str, ...]:
+def _settled_note(found: Search, ship: Extended, windows: Windows, settled: HeldOut, seed: int) -> tuple[str, ...]:
     """What uncertain parameters gain by themselves: no cause is credited with it."""
     if not found.first.keys:
         return ()
-    gain = float(np.nanmean(settled.fit - held_out(None, ship, windows, lambda share: None).fit))
-    if abs(gain) < LEAST_GAIN:
+    gain, _ = gained(held_out(None, ship, windows, lambda share: None), settled, seed)
+    if not abs(gain) >= LEAST_GAIN:
         return ()
     return (
         f"Moving the parameters within their stated standard deviations changes the fit on held-out runs by "

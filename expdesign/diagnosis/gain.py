@@ -21,7 +21,7 @@ from expdesign.values import Array
 
 FOLDS = 3
 DRAWS = 1000
-STEPS = 3
+STEPS = 6
 """Gauss-Newton steps from the fit to all batches to that of a fold."""
 
 
@@ -84,16 +84,18 @@ def held_out(found: Fit | None, ship: Extended, windows: Windows, tell: Callable
 
 
 def _fitted(found: Fit, windows: Windows, train: NDArray[np.bool_]) -> Extended | None:
-    """The model with its numbers fitted to some windows, or None where no step from the fit to all of them helps."""
+    """The model with its numbers fitted to some windows, or None where they cannot be.
+
+    Where no step from the fit to all windows costs less on these, that fit is theirs, too.
+    """
     free = tuple(key for key in found.keys[: found.free])
     try:
-        ship = fit(
+        return fit(
             found.ship, windows.picked(train), free, starts=found.starts[train], noise=found.noise, steps=STEPS,
             colour_order=found.noise.order, near=found.linear.picked(train),
         ).ship  # fmt: skip
     except (FloatingPointError, np.linalg.LinAlgError):
         return None
-    return None if ship is found.ship else ship
 
 
 def on_same(before: HeldOut, after: HeldOut) -> tuple[HeldOut, HeldOut]:
