@@ -1,6 +1,7 @@
 """What mending gains where it was not fitted: cross-validation over batches, and a bootstrap over batches.
 
-Sizes are fitted without the batches that they are judged on. Which causes, and what is searched on a grid (the width of
+Sizes are fitted without the batches that they are judged on, unless no step of such a fit from that to all batches
+costs less: then the sizes stay as they are, and have seen all batches. Which causes, and what is searched on a grid (the width of
 a dead band, the time of a change, where the wind blows), were chosen with all of them.
 """
 
@@ -86,7 +87,7 @@ def held_out(found: Fit | None, ship: Extended, windows: Windows, tell: Callable
 def _fitted(found: Fit, windows: Windows, train: NDArray[np.bool_]) -> Extended | None:
     """The model with its numbers fitted to some windows, or None where they cannot be.
 
-    Where no step from the fit to all windows costs less on these, that fit is theirs, too.
+    Where no step from the fit to all windows costs less on these, its numbers stay, converged or not.
     """
     free = tuple(key for key in found.keys[: found.free])
     try:
