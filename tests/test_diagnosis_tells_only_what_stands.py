@@ -11,6 +11,7 @@ from expdesign.diagnosis.accuracy import first_states
 from expdesign.diagnosis.candidate import Candidate, Situation
 from expdesign.diagnosis.causes import CAUSES
 from expdesign.diagnosis.contenders import contend, opening
+from expdesign.diagnosis.diagnose import _stuck_note
 from expdesign.diagnosis.extension import as_extended
 from expdesign.diagnosis.gain import HeldOut, _fitted, gained
 from expdesign.diagnosis.joint import fit
@@ -134,6 +135,12 @@ def test_folds_that_cannot_be_fitted_count_for_neither_model():
     assert gained(before, gap, 0) == (pytest.approx(10.0), (pytest.approx(10.0), pytest.approx(10.0)))
     assert np.isnan(gained(before, HeldOut(lost=np.nan * lost, spread=spread), 0)[0])
     assert kept_count(50.0, np.full((6, 1), np.nan)) == 0
+
+
+def test_gains_of_sizes_that_have_seen_the_runs_are_told():
+    assert _stuck_note([errors(50.0), errors(60.0)]) == ()
+    (note,) = _stuck_note([errors(50.0), replace(errors(60.0), stuck=2), replace(errors(61.0), stuck=1)])
+    assert "3 got nowhere" in note
 
 
 def test_several_numbers_are_tested_together():

@@ -101,6 +101,7 @@ def diagnose(
             *notes_on_data(vessel, record, windows, still_inputs(ship, windows)),
             *notes_on_dropped(searched, found, held_apart(windows)),
             *_settled_note(found, ship, windows, held[0], seed),
+            *_stuck_note(held),
             *missing,
         ),
         screened=_screened(found),
@@ -216,6 +217,17 @@ def _settled_note(found: Search, ship: Extended, windows: Windows, settled: Held
     return (
         f"Moving the parameters within their stated standard deviations changes the fit on held-out runs by "
         f"{gain:+.1f} points; the gains of causes come on top of that.",
+    )
+
+
+def _stuck_note(held: Sequence[HeldOut]) -> tuple[str, ...]:
+    """Gains that are not wholly measured on runs that the sizes have not seen."""
+    folds = sum(item.stuck for item in held)
+    if not folds:
+        return ()
+    return (
+        f"Of the fits without the runs held out, {folds} got nowhere from the fit to all runs and kept its sizes: "
+        "gains there are of sizes that have seen the runs.",
     )
 
 

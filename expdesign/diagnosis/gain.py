@@ -1,8 +1,8 @@
 """What mending gains where it was not fitted: cross-validation over batches, and a bootstrap over batches.
 
 Sizes are fitted without the batches that they are judged on, unless no step of such a fit from that to all batches
-costs less: then the sizes stay as they are, and have seen all batches. Which causes, and what is searched on a grid (the width of
-a dead band, the time of a change, where the wind blows), were chosen with all of them.
+costs less: then the sizes stay as they are, and have seen all batches. Which causes, and what is searched on a grid
+(the width of a dead band, the time of a change, where the wind blows), were chosen with all of them.
 """
 
 from __future__ import annotations
@@ -33,10 +33,12 @@ class HeldOut:
     Attributes:
         lost, spread: (b, n) squared error and squared deviation from the mean, per batch and output; nan for batches
             whose fold could not be fitted.
+        stuck: folds whose numbers have seen all batches, as no step of their own fit cost less.
     """
 
     lost: Array
     spread: Array
+    stuck: int = 0
 
     @property
     def fit(self) -> Array:
@@ -68,7 +70,7 @@ def held_out(found: Fit | None, ship: Extended, windows: Windows, tell: Callable
     folds = [names[index::FOLDS] for index in range(min(FOLDS, len(names)))]
     columns = [OUTPUTS.index(name) for name in ship.model.outputs]
     lost = np.zeros((len(names), len(columns)))
-    spread = np.zeros_like(lost)
+    spread, stuck = np.zeros_like(lost), 0
     for number, fold in enumerate(folds):
         tell(number / len(folds))
         test = np.isin(unit, fold)
@@ -76,12 +78,13 @@ def held_out(found: Fit | None, ship: Extended, windows: Windows, tell: Callable
         if model is None:
             lost[np.isin(names, fold)], spread[np.isin(names, fold)] = np.nan, np.nan
             continue
+        stuck += found is not None and model is found.ship
         part = windows.picked(test)
         motion = simulate_from_first(model, part, None if found is None else found.linear.picked(test))
         some = sums(motion.error[..., columns], part.measured[..., columns])
         for which, rows in zip((lost, spread), some, strict=True):
             np.add.at(which, np.searchsorted(names, unit[test]), rows)
-    return HeldOut(lost=lost, spread=spread)
+    return HeldOut(lost=lost, spread=spread, stuck=stuck)
 
 
 def _fitted(found: Fit, windows: Windows, train: NDArray[np.bool_]) -> Extended | None:
