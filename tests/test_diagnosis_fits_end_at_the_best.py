@@ -6,7 +6,7 @@ from diagnosis_case import hidden_record, vessel_of
 
 from expdesign.diagnosis.accuracy import first_states
 from expdesign.diagnosis.extension import as_extended
-from expdesign.diagnosis.joint import fit
+from expdesign.diagnosis.fitting import fit
 from expdesign.diagnosis.moves import moved
 from expdesign.diagnosis.parts import scales
 from expdesign.diagnosis.search import settled

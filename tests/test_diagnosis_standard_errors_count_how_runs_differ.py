@@ -5,7 +5,8 @@ import pytest
 from scipy.stats import chi2
 
 from expdesign.diagnosis.clusters import FEWEST_RUNS, clustered, widened
-from expdesign.diagnosis.joint import Columns, Fit, grams, marginal
+from expdesign.diagnosis.fitting import Fit
+from expdesign.diagnosis.joint import Columns, grams, marginal
 from expdesign.diagnosis.noise import Noise
 
 RUNS, SAMPLES, APART, NOISE = 14, 60, 0.3, 1.0
@@ -23,7 +24,7 @@ def mean_of_runs(rng: np.random.Generator, *, runs: int = RUNS, apart: float = A
     m = marginal(grams(columns, noise), columns, noise)
     return Fit(
         ship=None, keys=("mean",), free=1, covariance=np.linalg.inv(m.A), starts=np.zeros((runs, 3)), noise=noise,
-        cost=0.0, linear=None, columns=columns, precision=np.zeros(1), converged=True,
+        cost=0.0, linear=None, columns=columns, precision=np.zeros(1), move=np.zeros(1), converged=True,
     )  # type: ignore[arg-type]  # fmt: skip
 
 

@@ -13,8 +13,8 @@ from expdesign.diagnosis.causes import CAUSES
 from expdesign.diagnosis.contenders import contend, opening
 from expdesign.diagnosis.diagnose import _stuck_note
 from expdesign.diagnosis.extension import as_extended
+from expdesign.diagnosis.fitting import fit
 from expdesign.diagnosis.gain import HeldOut, _fitted, gained
-from expdesign.diagnosis.joint import fit
 from expdesign.diagnosis.kept import MOST_HARM, mending, worthwhile
 from expdesign.diagnosis.notes import notes_on_dropped
 from expdesign.diagnosis.screening import LEVEL, Scored, screen

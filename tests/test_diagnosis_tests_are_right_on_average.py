@@ -12,7 +12,7 @@ from expdesign.diagnosis.accuracy import first_states
 from expdesign.diagnosis.candidate import Candidate
 from expdesign.diagnosis.contenders import contend, opening
 from expdesign.diagnosis.extension import as_extended, extend
-from expdesign.diagnosis.joint import fit
+from expdesign.diagnosis.fitting import fit
 from expdesign.diagnosis.motion import linearise, push_of, responses, simulate_windows
 from expdesign.diagnosis.noise import FLOOR, Noise, fit_colour, hats, whitened
 from expdesign.diagnosis.screening import Scored, _effective_tests, screen

@@ -9,7 +9,7 @@ from expdesign.diagnosis.accuracy import first_states
 from expdesign.diagnosis.candidate import Candidate
 from expdesign.diagnosis.contenders import contend, opening
 from expdesign.diagnosis.extension import as_extended
-from expdesign.diagnosis.joint import fit
+from expdesign.diagnosis.fitting import fit
 from expdesign.diagnosis.motion import simulate_windows
 from expdesign.diagnosis.profile import middle, sharpened
 from expdesign.diagnosis.screening import Scored

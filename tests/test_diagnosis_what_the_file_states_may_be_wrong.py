@@ -13,7 +13,7 @@ from expdesign.diagnosis.candidate import Candidate, Situation
 from expdesign.diagnosis.causes import CAUSES
 from expdesign.diagnosis.extended import Extended
 from expdesign.diagnosis.extension import as_extended, extend
-from expdesign.diagnosis.joint import fit
+from expdesign.diagnosis.fitting import fit
 from expdesign.diagnosis.screening import screen
 from expdesign.diagnosis.windows import cut_windows
 from expdesign.signals import Record

@@ -15,7 +15,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from expdesign.diagnosis.joint import Fit, grams, marginal
+from expdesign.diagnosis.fitting import Fit
+from expdesign.diagnosis.joint import grams, marginal
 from expdesign.values import Array
 
 FEWEST_RUNS = 10

@@ -11,7 +11,7 @@ from scipy.stats import chi2
 from expdesign.diagnosis.accuracy import first_states
 from expdesign.diagnosis.candidate import Candidate
 from expdesign.diagnosis.extended import Extended
-from expdesign.diagnosis.joint import Fit, fit, profile_cost
+from expdesign.diagnosis.fitting import Fit, fit, profile_cost
 from expdesign.diagnosis.motion import simulate_windows
 from expdesign.diagnosis.screening import LEVEL, Scored, screen
 from expdesign.diagnosis.spread import spread

@@ -11,8 +11,8 @@ from expdesign.diagnosis.candidate import Cause, Values
 from expdesign.diagnosis.causes import CAUSES
 from expdesign.diagnosis.extended import Extended
 from expdesign.diagnosis.extension import as_extended, as_stated, extend, public_name
+from expdesign.diagnosis.fitting import Fit
 from expdesign.diagnosis.gain import HeldOut, gained, held_out
-from expdesign.diagnosis.joint import Fit
 from expdesign.diagnosis.kept import LEAST_GAIN, kept, only_moves
 from expdesign.diagnosis.motion import linearise, start_responses
 from expdesign.diagnosis.notes import notes_on_data, notes_on_dropped

@@ -1,7 +1,7 @@
 """What mending gains where it was not fitted: cross-validation over batches, and a bootstrap over batches.
 
-Sizes are fitted without the batches that they are judged on, unless no step of such a fit from that to all batches
-costs less: then the sizes stay as they are, and have seen all batches. Which causes, and what is searched on a grid
+Sizes are fitted without the batches that they are judged on; where such a fit gets nowhere from that to all batches,
+they stay as they are, have seen all batches, and are told of. Which causes, and what is searched on a grid
 (the width of a dead band, the time of a change, where the wind blows), were chosen with all of them.
 """
 
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.accuracy import simulate_from_first, sums
 from expdesign.diagnosis.extended import Extended
-from expdesign.diagnosis.joint import Fit, fit
+from expdesign.diagnosis.fitting import Fit, fit
 from expdesign.diagnosis.windows import Windows
 from expdesign.values import Array
 
@@ -33,7 +33,7 @@ class HeldOut:
     Attributes:
         lost, spread: (b, n) squared error and squared deviation from the mean, per batch and output; nan for batches
             whose fold could not be fitted.
-        stuck: folds whose numbers have seen all batches, as no step of their own fit cost less.
+        stuck: folds whose numbers have seen all batches, as their own fit got nowhere.
     """
 
     lost: Array
@@ -96,7 +96,7 @@ def _fitted(found: Fit, windows: Windows, train: NDArray[np.bool_]) -> Extended 
     try:
         return fit(
             found.ship, windows.picked(train), free, starts=found.starts[train], noise=found.noise, steps=STEPS,
-            colour_order=found.noise.order, near=found.linear.picked(train),
+            colour_order=found.noise.order, near=found.linear.picked(train), given_weights=True,
         ).ship  # fmt: skip
     except (FloatingPointError, np.linalg.LinAlgError):
         return None

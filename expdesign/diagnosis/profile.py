@@ -14,7 +14,8 @@ from dataclasses import replace
 import numpy as np
 
 from expdesign.diagnosis.contenders import Contender, gain_over
-from expdesign.diagnosis.joint import Fit, answers, fit, profile_cost
+from expdesign.diagnosis.fitting import Fit, fit, profile_cost
+from expdesign.diagnosis.joint import answers
 from expdesign.diagnosis.motion import linearise, simulate_windows
 
 POINTS, ROUNDS = 9, 9

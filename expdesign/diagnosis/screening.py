@@ -20,7 +20,8 @@ from scipy.stats import chi2
 
 from expdesign.diagnosis.candidate import Candidate
 from expdesign.diagnosis.extended import Extended
-from expdesign.diagnosis.joint import Fit, build_columns, grams, marginal, step_of
+from expdesign.diagnosis.fitting import Fit
+from expdesign.diagnosis.joint import build_columns, grams, marginal, step_of
 from expdesign.diagnosis.motion import Linear, Push, push_of
 from expdesign.values import Array
 

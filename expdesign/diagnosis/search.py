@@ -22,7 +22,7 @@ from expdesign.diagnosis.contenders import (
     seen_closely,
 )
 from expdesign.diagnosis.extended import Extended
-from expdesign.diagnosis.joint import Fit, fit
+from expdesign.diagnosis.fitting import Fit, fit
 from expdesign.diagnosis.profile import middle, sharpened
 from expdesign.diagnosis.screening import LEVEL, Scored, screen
 from expdesign.diagnosis.steps import Search, Step, superfluous, wald, without

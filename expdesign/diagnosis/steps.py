@@ -8,7 +8,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from expdesign.diagnosis.contenders import PRICE, Contender, gain_over
-from expdesign.diagnosis.joint import Fit, fit
+from expdesign.diagnosis.fitting import Fit, fit
 from expdesign.diagnosis.screening import LEVEL, Scored
 from expdesign.diagnosis.windows import Windows
 
