@@ -1,23 +1,24 @@
 """How a partial plan can go on, and whether that is clear.
 
 Agile vessels turn where they are and go straight, or along the way to the goal, to a run with any heading. Others sail
-an arc and a straight, or a stretch of the way to the goal.
+an arc and a straight, or a stretch of the way to the goal; those with a helm take the time that their speeds need.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from expdesign.conventions import wrap_angle
+from expdesign.plan.helm_times import HelmTimes, moved
 from expdesign.plan.leg_times import LegTimes, joints
 from expdesign.plan.search_space import PartialPlans, SearchSpace
 from expdesign.values import Array
 
 TURNS = np.deg2rad([0, 15, -15, 30, -30, 50, -50, 75, -75, 105, -105, 140, -140, 180, -180])
-STRAIGHTS = np.array([0.0, 2.0, 6.0])
+STRAIGHTS = np.array([0.0, 1.0, 2.0, 3.0, 4.5, 6.0])
 """Straight after a turn, beyond the run-up, in hull lengths."""
 WAYS = np.array([5.0, 12.0, 25.0, 50.0, 100.0])
 """Stretches of the shortest way to the goal, in hull lengths; the whole way is always tried too."""
@@ -72,8 +73,26 @@ def continuations(space: SearchSpace, beam: PartialPlans, q: int) -> list[Option
             _straights(space, times, beam, able, q, more_m),
             _ways(space, times, beam, able, q),
         ]
+    if space.helm_times is not None:
+        return [_helmed(space, space.helm_times, beam, able, q, runup)]
     change_s = np.abs(beam.exit_mps[able] - space.stamps[q].entry_mps) / space.ship.acceleration_mps2
     return [_arcs(space, beam, able, q, runup, change_s), _transits(space, beam, able, q, change_s)]
+
+
+def _helmed(
+    space: SearchSpace, times: HelmTimes, beam: PartialPlans, able: np.ndarray, q: int, runup: Array
+) -> Options:
+    """Arcs and stretches of the way of ships with a helm, in the time that changes of speed and turns take."""
+    no_s, entry_mps = np.zeros(len(able)), space.stamps[q].entry_mps
+    found = joined([_arcs(space, beam, able, q, runup, no_s), _transits(space, beam, able, q, no_s)])
+    ways_m, leg_s = found.leg_s * times.speed_mps, np.zeros(len(found.leg_s))
+    for (last, exit_mps), where in _alike(beam, found.parent).items():
+        froms, tos = beam.pose[found.parent[where]], found.start[where]
+        leg_s[where] = np.maximum(
+            times.between_s(froms, tos, space.off(last), exit_mps, entry_mps, current_to=space.current_to),
+            np.where(np.isnan(found.turn[where]), times.seconds(ways_m[where], exit_mps, entry_mps), 0.0),
+        )
+    return replace(found, leg_s=leg_s)
 
 
 def _run_up(space: SearchSpace, last: int, q: int) -> float:
@@ -87,10 +106,8 @@ def _departures(space: SearchSpace, beam: PartialPlans) -> tuple[Array, Array]:
     """(b, 3) places from which ships go on, with courses for headings, and (b,) how long it takes to come to that."""
     if space.recoveries is None:
         return beam.pose, np.zeros(len(beam.pose))
-    steps = np.vstack([space.recoveries, [space.hull_m, 0.0, 0.0, space.hull_m / space.ship.transit_speed_mps]])[
-        beam.last
-    ]
-    return _moved(beam.pose, steps[:, :3]), steps[:, 3]
+    steps = np.array([space.off(int(last)) for last in beam.last])
+    return moved(beam.pose, steps[:, :3]), steps[:, 3]
 
 
 def _arcs(space: SearchSpace, beam: PartialPlans, able: np.ndarray, q: int, runup: Array, change_s: Array) -> Options:
@@ -144,7 +161,7 @@ def _alike(beam: PartialPlans, able: np.ndarray) -> dict[tuple[int, float], np.n
 
 def _stepped(space: SearchSpace, beam: PartialPlans, q: int, parent: np.ndarray, step: Array, leg_s: Array) -> Options:
     """Options at steps through water (n, 3) from where partial plans end."""
-    start = _moved(beam.pose[parent], step)
+    start = moved(beam.pose[parent], step)
     start[:, :2] += leg_s[:, None] * space.current_to
     return _options(q, parent, start, leg_s, straight=True)
 
@@ -198,14 +215,7 @@ def _arc_end(pose: Array, turn: Array, straight: Array, radius: float) -> Array:
     """Poses after an arc and a straight; the b-frame end of an arc is R (sin |turn|, +-(1 - cos turn))."""
     forward = radius * np.sin(np.abs(turn)) + straight * np.cos(turn)
     starboard = np.sign(turn) * radius * (1 - np.cos(turn)) + straight * np.sin(turn)
-    return _moved(pose, np.stack([forward, starboard, turn], axis=1))
-
-
-def _moved(pose: Array, step: Array) -> Array:
-    c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
-    north = pose[:, 0] + c * step[:, 0] - s * step[:, 1]
-    east = pose[:, 1] + s * step[:, 0] + c * step[:, 1]
-    return np.stack([north, east, pose[:, 2] + step[:, 2]], axis=1)
+    return moved(pose, np.stack([forward, starboard, turn], axis=1))
 
 
 def _transits(space: SearchSpace, beam: PartialPlans, able: np.ndarray, q: int, change_s: Array) -> Options:
@@ -218,7 +228,8 @@ def _transits(space: SearchSpace, beam: PartialPlans, able: np.ndarray, q: int, 
         heading = np.arctan2(points[:, 3], points[:, 2])
         first = np.abs(wrap_angle(heading[:1] - departures[index, 2]))
         for offset in WAY_OFFSETS:
-            length = along + space.ship.turning_radius_m * (abs(offset) + first)
+            turned = 0.0 if space.helm_times is not None else abs(offset) + first  # theirs are told by their curves
+            length = along + space.ship.turning_radius_m * turned
             starts.append(np.column_stack([points[:, :2], heading + offset]))
             times.append(length / space.ship.transit_speed_mps + wait)
             parents.append(np.full(len(points), index))
@@ -248,7 +259,7 @@ def _way_points(space: SearchSpace, pose: Array, stretches: Array) -> tuple[Arra
 def run_ends(space: SearchSpace, primitive: np.ndarray, start: Array) -> Array:
     """(n, 3) poses at the ends of runs (n,) of the space's primitives that begin at poses (n, 3)."""
     steps = np.array([item.displacement for item in space.stamps])[primitive]
-    end = _moved(start, steps)
+    end = moved(start, steps)
     end[:, :2] += space.current_to * np.array([item.duration_s for item in space.stamps])[primitive][:, None]
     return end
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from expdesign.conventions import wrap_angle
 from expdesign.plan.cheapest_orders import cheapest_orders, place_values
+from expdesign.plan.helm_times import HelmTimes
 from expdesign.plan.leg_times import TURNS, WISHES, LegTimes, joint_lost_s
 from expdesign.plan.search_space import SearchSpace, Stamp, TriedJoint
 from expdesign.values import Array
@@ -44,6 +45,19 @@ def orders_ahead(space: SearchSpace, times: LegTimes, repeats: Sequence[int], *,
         [[_joint_s(a, b, times, space.tried.get((a.name, b.name)), carried=carried) for b in stamps] for a in stamps]
     )
     home = np.array([_home_s(a, times) + space.more_s(k, -1) for k, a in enumerate(stamps)])
+    return _tabled(pairs, home, repeats)
+
+
+def helmed_orders_ahead(space: SearchSpace, times: HelmTimes, repeats: Sequence[int], *, carried: bool) -> OrdersAhead:
+    """The same for ships with a helm: what changes of speed lose."""
+    stamps = space.stamps
+    pairs = np.array([[times.lost_s(a.exit_mps, b.entry_mps, carried=carried) for b in stamps] for a in stamps])
+    home = np.array([times.lost_s(a.exit_mps, 0.0, carried=carried) for a in stamps])
+    return _tabled(pairs, home, repeats)
+
+
+def _tabled(pairs: Array, home: Array, repeats: Sequence[int]) -> OrdersAhead:
+    """Least sums over the best orders from pairs (q, q), the run before in rows, and ways home (q,)."""
     table = cheapest_orders(pairs, home, repeats)
     if table is None:
         return OrdersAhead(base=np.ones(len(repeats), dtype=int), lost_s=pairs.min(axis=0)[:, None])

@@ -16,8 +16,9 @@ import numpy as np
 from expdesign.conventions import wrap_angle
 from expdesign.errors import NoPlan
 from expdesign.plan.continuations import Options, clear_options, continuations, joined, run_ends
+from expdesign.plan.helm_times import HelmTimes
 from expdesign.plan.leg_times import NEAR
-from expdesign.plan.orders_ahead import OrdersAhead, orders_ahead
+from expdesign.plan.orders_ahead import OrdersAhead, helmed_orders_ahead, orders_ahead
 from expdesign.plan.polish import ChainEnds, measured_s, polished
 from expdesign.plan.search_space import PartialPlans, SearchSpace
 from expdesign.plan.values import Placement
@@ -70,7 +71,7 @@ def place_runs(
     if not np.isfinite(final_s[best]):
         raise NoPlan("no way to the goal from where the last run ends")
     runs, poses = _chain(beam, best)
-    if space.times is not None and orders:
+    if orders and (space.times is not None or space.helm_times is not None):
         ends = ChainEnds(start=start, exit_mps=exit_mps, last=names.index(last) if last else -1)
         chains = [(runs, polished(space, runs, poses, ends)) for runs, poses in _different(beam, final_s, orders)]
         runs, poses = min(chains, key=lambda chain: measured_s(space, chain[0], chain[1], ends))
@@ -97,9 +98,10 @@ def _chain(beam: PartialPlans, index: int) -> tuple[list[int], Array]:
 
 def _orders(space: SearchSpace, repeats: Sequence[int], start: Array) -> OrdersAhead | None:
     """What orders lose, for vessels for which that is known."""
-    if space.times is None:
-        return None
-    return orders_ahead(space, space.times, repeats, carried=is_carried(space, repeats, start))
+    carried = is_carried(space, repeats, start)
+    if space.helm_times is not None:
+        return helmed_orders_ahead(space, space.helm_times, repeats, carried=carried)
+    return None if space.times is None else orders_ahead(space, space.times, repeats, carried=carried)
 
 
 def is_carried(space: SearchSpace, repeats: Sequence[int], start: Array) -> bool:
@@ -171,6 +173,8 @@ def _leg_to_goal_s(space: SearchSpace, beam: PartialPlans) -> Array:
     """Estimated time of the last leg from where plans end to the goal [s]."""
     pose = beam.pose
     distance = space.goal_way.to_goal(pose[:, :2])
+    if space.helm_times is not None:
+        return _helmed_to_goal_s(space, space.helm_times, beam, distance)
     away = space.goal[:2] - pose[:, :2]
     direct = np.arctan2(away[:, 1], away[:, 0])
     first, last = pose[:, 2] - direct, space.goal[2] - direct
@@ -182,6 +186,16 @@ def _leg_to_goal_s(space: SearchSpace, beam: PartialPlans) -> Array:
         return space.times.seconds(way_m, first, last, turn, beam.exit_mps, np.zeros(1)) + more_s
     turns = np.abs(wrap_angle(first)) + np.abs(wrap_angle(last))
     return np.asarray((distance + space.ship.turning_radius_m * turns) / space.ship.transit_speed_mps)
+
+
+def _helmed_to_goal_s(space: SearchSpace, times: HelmTimes, beam: PartialPlans, distance: Array) -> Array:
+    """The same for ships with a helm."""
+    found = np.zeros(len(beam.pose))
+    for index, (last, exit_mps) in enumerate(zip(beam.last.tolist(), beam.exit_mps.tolist(), strict=True)):
+        ends = beam.pose[index : index + 1], space.goal[None]
+        open_s = times.between_s(*ends, space.off(last), exit_mps, 0.0, current_to=space.current_to)
+        found[index] = max(float(open_s[0]), float(times.seconds(distance[index], exit_mps, 0.0)))
+    return found
 
 
 def _what_blocks(space: SearchSpace, beam: PartialPlans) -> str:

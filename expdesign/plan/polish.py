@@ -16,6 +16,7 @@ import shapely
 
 from expdesign.conventions import wrap_angle
 from expdesign.plan.continuations import run_ends, runs_clear
+from expdesign.plan.helm_times import HelmTimes
 from expdesign.plan.leg_times import NEAR
 from expdesign.plan.search_space import SearchSpace
 from expdesign.plan.ways import polyline_length, sight_lines
@@ -138,6 +139,8 @@ class _Legs:
 
     def _least_m(self, runs: np.ndarray, k: int) -> float:
         """Length from which on leg k takes as long as the rule says."""
+        if self.space.helm_times is not None:
+            return 0.0
         joint = self.space.tried.get((self._name(runs, k - 1), self._name(runs, k)))
         tried_m = 0.0 if joint is None else float(np.hypot(*joint.step[:2]))
         return self.space.hull_m * float(np.clip(tried_m / self.space.hull_m, NEAR, FAR))
@@ -191,11 +194,14 @@ class _Legs:
     def _leg_s(self, runs: np.ndarray, k: int, froms: Array, tos: Array, bends: Array) -> Array:
         """(m,) time of leg k from poses (m, 3) to poses (m, 3) along a way's bends (b, 2)."""
         space = self.space
-        rule = space.times
-        assert rule is not None
         exit_mps = space.stamps[runs[k - 1]].exit_mps if k else self.ends.exit_mps
         entry_mps = space.stamps[runs[k]].entry_mps if k < len(runs) else 0.0
-        more_s = space.more_s(int(runs[k - 1]) if k else self.ends.last, int(runs[k]) if k < len(runs) else -1)
+        last = int(runs[k - 1]) if k else self.ends.last
+        if space.helm_times is not None:
+            return self._helmed_s(space.helm_times, last, (exit_mps, entry_mps), froms, tos, bends)
+        rule = space.times
+        assert rule is not None
+        more_s = space.more_s(last, int(runs[k]) if k < len(runs) else -1)
         speeds = np.array(exit_mps), np.array(entry_mps)
         away, turn = tos[..., :2] - froms[..., :2], tos[..., 2] - froms[..., 2]
         if len(bends):
@@ -212,6 +218,18 @@ class _Legs:
                 rule.seconds(np.hypot(*step.T), froms[..., 2] - course, tos[..., 2] - course, turn, *speeds) + more_s
             )
         return leg_s
+
+    def _helmed_s(
+        self, times: HelmTimes, last: int, speeds: tuple[float, float], froms: Array, tos: Array, bends: Array
+    ) -> Array:
+        """(m,) time of legs of ships with a helm."""
+        froms, tos = (np.broadcast_to(ends, (max(len(froms), len(tos)), 3)) for ends in (froms, tos))
+        leg_s = times.between_s(froms, tos, self.space.off(last), *speeds, current_to=self.space.current_to)
+        if not len(bends):
+            return leg_s
+        ahead, behind = bends[0] - froms[:, :2], tos[:, :2] - bends[-1]
+        length_m = np.hypot(*ahead.T) + polyline_length(bends) + np.hypot(*behind.T)
+        return np.maximum(leg_s, times.seconds(length_m, *speeds))
 
 
 @lru_cache(maxsize=16)

@@ -14,6 +14,7 @@ from expdesign.plan.capability import Capability
 from expdesign.plan.field import ClearanceField
 from expdesign.plan.footprint import covering_discs, disc_points, thinned_poses
 from expdesign.plan.goal_ways import GoalWays
+from expdesign.plan.helm_times import HelmTimes, helm_times
 from expdesign.plan.leg_times import LegTimes
 from expdesign.plan.values import Placement
 from expdesign.values import Array, seal
@@ -108,6 +109,17 @@ class SearchSpace:
         seal(self, goal="3", current_to="2", refused="b 3")
         if self.recoveries is not None:
             seal(self, recoveries="q 4")
+
+    @property
+    def helm_times(self) -> HelmTimes | None:
+        """How long legs of ships with a helm take; None for others."""
+        return None if self.ship.approach is None else helm_times(self.ship)
+
+    def off(self, last: int) -> Array:
+        """(4,) what a ship with a helm does after a run, -1 for the start, before she turns; as in `recoveries`."""
+        if last >= 0 and self.recoveries is not None:
+            return np.asarray(self.recoveries[last])
+        return np.array([self.hull_m, 0.0, 0.0, self.hull_m / self.ship.transit_speed_mps])
 
     def more_s(self, before: int, after: int) -> float:
         """How much longer legs from one run to another take than the rule says; -1 for start and goal."""
