@@ -105,7 +105,8 @@ class Pilot:
         while (moving := self._looked(fleet)).any():
             before, wanted = fleet.states, self._next(fleet.states)
             near = self._near(fleet.given)
-            fleet.advance(self._helm.commands(wanted, before, fleet.given, felt=felt, near=near), moving)
+            told = self._helm.commands(wanted, before, fleet.given, felt=felt, near=near, delivered=fleet.delivered)
+            fleet.advance(told, moving)
             learnt = self._helm.unexplained(felt, before, fleet.states, fleet.delivered)
             felt = np.where(moving[:, None], learnt, felt)
             self.samples += moving

@@ -11,7 +11,7 @@ from expdesign.conventions import wrap_angle
 from expdesign.plan.capability import Capability
 from expdesign.simulation import Approach
 from expdesign.values import Array
-from expdesign.vessel import Vessel, within_limits
+from expdesign.vessel import Vessel
 
 QUICK = 1.2
 """Natural frequency wished for in courses, in that of a hull length at transit speed."""
@@ -37,19 +37,16 @@ class HelmOrders:
     vessel: Vessel
     ship: Capability
 
-    def commands(self, wish: Array, moving: Array, before: Array, felt: Array) -> Array:
-        """(n, m) commands within limits and rates.
+    def commands(self, wish: Array, moving: Array, felt: Array) -> Array:
+        """(n, m) commands, whatever stands before them.
 
         Args:
             wish: (n, 3) surge speed through water, change of heading, yaw rate.
             moving: (n, 3) velocity through water.
-            before: (n, m) commands standing.
             felt: (n, 3) acceleration that the model does not explain.
         """
         angle = self._helm(wish, moving, felt)
-        rows = self._approach.helm.rows(self._drive(wish[:, 0], moving, angle, felt[:, 0]), angle)
-        actuators, sample_s = self.vessel.actuators, self.vessel.sample_time_s
-        return within_limits(actuators, rows[:, None], sample_time_s=sample_s, before=before)[:, 0]
+        return np.asarray(self._approach.helm.rows(self._drive(wish[:, 0], moving, angle, felt[:, 0]), angle))
 
     @property
     def pace_s(self) -> float:

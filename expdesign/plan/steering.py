@@ -18,7 +18,7 @@ from expdesign.plan.capability import Capability
 from expdesign.plan.helm_orders import HelmOrders
 from expdesign.simulation import Environment
 from expdesign.values import Array, seal
-from expdesign.vessel import Vessel, allocate, required_force
+from expdesign.vessel import Vessel, allocate, required_force, within_limits
 
 CATCH_UP = 0.3
 """Largest speed towards the reference, in transit speeds."""
@@ -26,6 +26,8 @@ LEAD = 4.0
 """Time constant of the way back to the reference, in those of the velocities."""
 SLOWEST, FASTEST = 0.2, 3.0
 """Pace of a reference that stays abeam of a ship, in samples."""
+SOONER = 0.2
+"""Share of their lag in which lagging actuators are brought to what is wanted of them, by telling them more."""
 LEARN = 3.0
 """Time constant in which an unexplained force is believed, in those of the velocities."""
 
@@ -96,8 +98,10 @@ class Helmsman:
     @property
     def answer_s(self) -> float:
         """Time constant wished for velocities [s]; of ships with a helm the time of a hull length at transit speed."""
-        own = self.ship.settle_s if self.sideways else self.vessel.length_m / self.ship.transit_speed_mps
-        return max(own, 3.0 * self.vessel.sample_time_s)
+        if not self.sideways:
+            return max(self.vessel.length_m / self.ship.transit_speed_mps, 3.0 * self.vessel.sample_time_s)
+        late_s = max(response.delay_s + SOONER * response.lag_s for response in self.vessel.responses)
+        return max(self.ship.settle_s - self.ship.late_s + late_s, 3.0 * self.vessel.sample_time_s)
 
     @property
     def sideways(self) -> bool:
@@ -105,7 +109,14 @@ class Helmsman:
         return self.ship.approach is None
 
     def commands(
-        self, wanted: Array, states: Array, before: Array, *, felt: Array | None = None, near: Array | None = None
+        self,
+        wanted: Array,
+        states: Array,
+        before: Array,
+        *,
+        felt: Array | None = None,
+        near: Array | None = None,
+        delivered: Array | None = None,
     ) -> Array:
         """(n, m) commands that bring states (n, 6) towards wanted ones (n, 6).
 
@@ -114,14 +125,15 @@ class Helmsman:
             before: (n, m) commands standing, from which rates count.
             felt: (n, 3) acceleration that the model does not explain, by `unexplained`; None for none.
             near: (n, m) commands to whose angles azimuths keep; None for those standing.
+            delivered: (n, m) what the actuators give; None where they give what they are told.
         """
         through = self._velocity_through_water(wanted, states)
         moving = self._in_body(states)
         felt = (0.0 if felt is None else felt) - self._turning_current(states)
         if not self.sideways:
-            turn = self._pointing(wanted, through) - states[:, 2]
-            wish = np.column_stack([np.hypot(*through.T), turn, wanted[:, 5]])
-            return self._orders.commands(wish, moving, before, felt)
+            speed, pointing = self._pointed(wanted, through)
+            wish = np.column_stack([speed, pointing - states[:, 2], wanted[:, 5]])
+            return self._told(self._orders.commands(wish, moving, felt), before, delivered)
         c, s = np.cos(states[:, 2]), np.sin(states[:, 2])
         ahead, abeam = through[:, 0] * c + through[:, 1] * s, through[:, 1] * c - through[:, 0] * s
         turn = wrap_angle(wanted[:, 2] - states[:, 2]) / (2.0 * self.answer_s)
@@ -129,8 +141,28 @@ class Helmsman:
         wish = np.column_stack([ahead, abeam, np.clip(wanted[:, 5] + turn, -fastest, fastest)])
         force = required_force(self.vessel.model, moving, (wish - moving) / self.answer_s - felt)
         actuators, sample_s = self.vessel.actuators, self.vessel.sample_time_s
-        told = allocate(actuators, force[:, None], sample_time_s=sample_s, before=before, near=near)
-        return np.asarray(told[:, 0])
+        rows = allocate(actuators, force[:, None], sample_time_s=sample_s, near=before if near is None else near)
+        return self._told(rows[:, 0], before, delivered)
+
+    def _told(self, rows: Array, before: Array, delivered: Array | None) -> Array:
+        """(n, m) commands within limits and rates for wished actuators (n, m): lagging ones are told more than that."""
+        if delivered is not None:
+            delay_s, lag_s, offset, gain = self._lead
+            stay = np.exp(-delay_s / np.maximum(lag_s, 1e-9))
+            due = before + (delivered - offset - before) * stay  # when what is told now begins to count
+            rows = np.where(lag_s > 0, due + gain * (rows - due), rows)
+        actuators, sample_s = self.vessel.actuators, self.vessel.sample_time_s
+        return np.asarray(within_limits(actuators, rows[:, None], sample_time_s=sample_s, before=before)[:, 0])
+
+    @cached_property
+    def _lead(self) -> tuple[Array, Array, Array, Array]:
+        """(m,) delays, lags, offsets, and how much more than wanted is told, to be there in a share of the lag."""
+        given = self.vessel.responses
+        delay_s, lag_s, offset = (
+            np.array([getattr(x, name) for x in given]) for name in ("delay_s", "lag_s", "offset")
+        )
+        soon = np.maximum(SOONER, self.vessel.sample_time_s / np.maximum(lag_s, 1e-9))
+        return delay_s, lag_s, offset, 1.0 / -np.expm1(-soon)
 
     def unexplained(self, felt: Array, before: Array, states: Array, delivered: Array) -> Array:
         """(n, 3) acceleration beyond what the nominal model says of the actuators, believed little by little.
@@ -159,16 +191,25 @@ class Helmsman:
         through = steady + back
         return np.asarray(through * np.minimum(1.0, limit / np.maximum(np.hypot(*through.T), 1e-12))[:, None])
 
-    def _pointing(self, wanted: Array, through: Array) -> Array:
-        """(n,) headings of ships that go where they point; those that hardly move keep the wanted one."""
-        moves = np.hypot(*through.T) > 0.05 * self.ship.transit_speed_mps
-        return np.where(moves, np.arctan2(through[:, 1], through[:, 0]), wanted[:, 2])
+    def _pointed(self, wanted: Array, through: Array) -> tuple[Array, Array]:
+        """(n,) surge speeds and headings of ships that go where they point; those that hardly move keep the wanted one.
+
+        So do those that are wanted to go astern, as after a crash stop: their helm does not lead them anywhere.
+        """
+        speed = np.hypot(*through.T)
+        moves = speed > 0.05 * self.ship.transit_speed_mps
+        ahead = np.cos(wanted[:, 2]) * through[:, 0] + np.sin(wanted[:, 2]) * through[:, 1]
+        astern = moves & (self._in_body(wanted)[:, 0] < 0.0)
+        pointing = np.where(moves & ~astern, np.arctan2(through[:, 1], through[:, 0]), wanted[:, 2])
+        return np.where(astern, np.minimum(ahead, 0.0), speed), pointing
 
     def _turning_current(self, states: Array) -> Array:
         """(n, 3) rate at which the mean current changes in the b-frames of turning ships (n, 6) [m/s2].
 
         The model gives the rate of the velocity over ground: that through water has the opposite of this more.
         """
+        if not self.environment.current_to.any():
+            return np.zeros((len(states), 3))
         u_c, v_c, _ = (states[:, 3:] - self._in_body(states)).T
         return np.column_stack([states[:, 5] * v_c, -states[:, 5] * u_c, 0.0 * u_c])
 
@@ -179,5 +220,7 @@ class Helmsman:
     def _in_body(self, states: Array) -> Array:
         """(n, 3) velocities through water from those over ground."""
         north, east = self.environment.current_to
+        if not (north or east):
+            return states[:, 3:]
         c, s = np.cos(states[:, 2]), np.sin(states[:, 2])
         return np.asarray(states[:, 3:] - np.column_stack([north * c + east * s, east * c - north * s, 0.0 * c]))
