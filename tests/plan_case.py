@@ -7,10 +7,15 @@ from pathlib import Path
 import numpy as np
 import shapely
 
+from expdesign.dictionary import Primitive
 from expdesign.plan import LocalFrame, PlanSettings, SeaArea, as_multipolygon
 from expdesign.plan.capability import capability
 from expdesign.plan.field import clearance_field
+from expdesign.plan.goal_ways import build_goal_ways
+from expdesign.plan.leg_times import leg_times
 from expdesign.plan.legs import LegWater
+from expdesign.plan.search_space import SearchSpace, stamp
+from expdesign.plan.speed_changes import leg_end
 from expdesign.scenario import load_vessel
 from expdesign.simulation import CALM
 
@@ -43,6 +48,25 @@ def leg_water(water: shapely.Geometry, *, clearance_m: float = 20.0) -> LegWater
         area=sea,
         clearance_m=clearance_m,
         field=clearance_field(sea, resolution_m=vessel.length_m / 8),
+    )
+
+
+def space_of(sea: LegWater, run: Primitive, goal: np.ndarray) -> SearchSpace:
+    """What a search that places one kind of run on its way to a goal (3,) works on, in calm water."""
+    vessel, ship = sea.vessel, sea.ship
+    changes = leg_end(vessel, CALM, 0.0, None, top_mps=ship.transit_speed_mps, yaw_rate_radps=0.3).changes
+    room = np.full(len(run.trajectory), 25.0)
+    return SearchSpace(
+        stamps=(stamp(run, room, length_m=vessel.length_m, beam_m=vessel.beam_m),),
+        frame=sea.area.frame,
+        field=sea.field,
+        goal_way=build_goal_ways(sea.narrowest_ways, sea.field, goal[:2]),
+        goal=goal,
+        ship=ship,
+        times=leg_times(vessel, ship, changes),
+        hull_m=vessel.length_m,
+        leg_margin_m=25.0,
+        current_to=np.zeros(2),
     )
 
 

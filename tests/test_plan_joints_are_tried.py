@@ -5,17 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapely
-from plan_case import leg_water
+from plan_case import leg_water, space_of
 from test_plan_verification_catches_what_is_wrong import primitive
 
-from expdesign.plan.goal_ways import build_goal_ways
 from expdesign.plan.joint_trials import pairs_of, settled
-from expdesign.plan.leg_times import leg_times
 from expdesign.plan.legs import LegTask, find_leg
-from expdesign.plan.search_space import SearchSpace, stamp
-from expdesign.plan.speed_changes import leg_end
 from expdesign.plan.values import Placement
-from expdesign.simulation import CALM
 
 
 @pytest.fixture(scope="module")
@@ -26,21 +21,7 @@ def water():
 @pytest.fixture(scope="module")
 def space(water):
     """The search space of accelerations from rest."""
-    go = primitive(water.vessel)
-    still = leg_end(water.vessel, CALM, 0.0, None, top_mps=water.ship.transit_speed_mps, yaw_rate_radps=0.3).changes
-    goal = np.array([0.0, 500.0, 0.0])
-    return SearchSpace(
-        stamps=(stamp(go, np.full(len(go.trajectory), 25.0), length_m=30.0, beam_m=9.0),),
-        frame=water.area.frame,
-        field=water.field,
-        goal_way=build_goal_ways(water.narrowest_ways, water.field, goal[:2]),
-        goal=goal,
-        ship=water.ship,
-        times=leg_times(water.vessel, water.ship, still),
-        hull_m=30.0,
-        leg_margin_m=25.0,
-        current_to=np.zeros(2),
-    )
+    return space_of(water, primitive(water.vessel), np.array([0.0, 500.0, 0.0]))
 
 
 def test_each_pair_of_runs_counts_once_and_so_do_both_ends():

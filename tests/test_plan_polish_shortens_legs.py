@@ -7,17 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from plan_case import leg_water
+from plan_case import leg_water, space_of
 from test_plan_verification_catches_what_is_wrong import primitive
 
 from expdesign.plan.continuations import run_ends, runs_clear
-from expdesign.plan.goal_ways import build_goal_ways
-from expdesign.plan.leg_times import leg_times
 from expdesign.plan.polish import ChainEnds, measured_s, polished
-from expdesign.plan.search_space import SearchSpace, TriedJoint, stamp
-from expdesign.plan.speed_changes import leg_end
+from expdesign.plan.search_space import SearchSpace, TriedJoint
 from expdesign.plan.ways import polyline_length
-from expdesign.simulation import CALM
 
 ISLAND = shapely.box(-60, -200, 60, 40)
 START = np.array([0.0, -400.0, 0.0])
@@ -25,27 +21,14 @@ POSES = np.array([[30.0, -330.0, 1.2], [120.0, -150.0, 1.0], [170.0, 120.0, 2.0]
 MIRROR = np.array([-1.0, 1.0, -1.0])
 
 
-def space_of(water: shapely.Geometry, goal: np.ndarray) -> SearchSpace:
+def placed_in(water: shapely.Geometry, goal: np.ndarray) -> SearchSpace:
     sea = leg_water(water)
-    go, transit = primitive(sea.vessel), sea.ship.transit_speed_mps
-    still = leg_end(sea.vessel, CALM, 0.0, None, top_mps=transit, yaw_rate_radps=0.3).changes
-    return SearchSpace(
-        stamps=(stamp(go, np.full(len(go.trajectory), 25.0), length_m=30.0, beam_m=9.0),),
-        frame=sea.area.frame,
-        field=sea.field,
-        goal_way=build_goal_ways(sea.narrowest_ways, sea.field, goal[:2]),
-        goal=goal,
-        ship=sea.ship,
-        times=leg_times(sea.vessel, sea.ship, still),
-        hull_m=30.0,
-        leg_margin_m=25.0,
-        current_to=np.zeros(2),
-    )
+    return space_of(sea, primitive(sea.vessel), goal)
 
 
 @pytest.fixture(scope="module")
 def space():
-    return space_of(shapely.box(-600, -600, 600, 600).difference(ISLAND), np.array([0.0, 400.0, 0.0]))
+    return placed_in(shapely.box(-600, -600, 600, 600).difference(ISLAND), np.array([0.0, 400.0, 0.0]))
 
 
 def test_legs_take_less_time_and_runs_and_ways_stay_in_the_water(space):
@@ -75,7 +58,7 @@ def test_a_mirrored_plan_in_mirrored_water_takes_as_long():
     ]
     totals = []
     for water, sign in zip(waters, (np.ones(3), MIRROR), strict=True):
-        space = space_of(water, np.array([0.0, 400.0, 0.0]) * sign)
+        space = placed_in(water, np.array([0.0, 400.0, 0.0]) * sign)
         ends = ChainEnds(start=START * sign, exit_mps=0.0, last=-1)
         totals.append(measured_s(space, [0, 0, 0], polished(space, [0, 0, 0], POSES * sign, ends), ends))
     assert totals[0] == pytest.approx(totals[1], rel=0.01)

@@ -11,7 +11,7 @@ IFAC Proc. 17 (1984), 1603-1608.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import pairwise
 from typing import Any
@@ -19,6 +19,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from expdesign.plan.effort import Effort
 from expdesign.simulation import Environment, motion_rates, rk4_step, sample_map
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array, seal
@@ -60,6 +61,7 @@ class LegProblem:
         node_s: least time between nodes; 0 for the sample time.
         wish: (2,) seconds that a metre made good north and east is worth to legs that may end anywhere, and if it is
             zero with any heading; None for those that have to end at `end`.
+        effort: that may be spent, and that is; without any left, nothing is found.
     """
 
     vessel: Vessel
@@ -84,6 +86,7 @@ class LegProblem:
     lateral_mps2: float
     node_s: float = 0.0
     wish: Array | None = None
+    effort: Effort = field(default_factory=Effort)
 
     def __post_init__(self) -> None:
         seal(self, start="6", end="6", start_inputs="m", end_inputs="m", states="j 6", inputs="j m")
@@ -322,6 +325,8 @@ class _Program:
 
     def solve(self, problem: LegProblem, step_s: float) -> tuple[LegProblem, float] | None:
         """The problem with states and inputs replaced by the answer, and the sample time found; or None."""
+        if problem.effort.exhausted:
+            return None
         j, m = self.nodes, len(self.limits)
         origin = np.array([*problem.start[:2], 0, 0, 0, 0])
         path = problem.path[1:j] - origin[:3]
@@ -351,6 +356,7 @@ class _Program:
             ubg=most,
         )
         outcome = self.solver.stats()
+        problem.effort.optimised(outcome["iter_count"], j * self.block)
         if outcome["return_status"] == "NonIpopt_Exception_Thrown":
             raise KeyboardInterrupt  # the only exception there can be, as nothing in the program calls back to Python
         if not outcome["success"]:

@@ -17,6 +17,7 @@ import shapely
 from expdesign.conventions import wrap_angle
 from expdesign.dictionary import Primitive
 from expdesign.plan.area import as_multipolygon
+from expdesign.plan.effort import Effort
 from expdesign.plan.field import clearance_field
 from expdesign.plan.leg_times import NEAR
 from expdesign.plan.leg_values import LegTask, LegWater
@@ -47,6 +48,7 @@ def settled(
     *,
     start: Array,
     carried: bool,
+    effort: Effort | None = None,
 ) -> SearchSpace:
     """The same space with joints of pairs that had none.
 
@@ -56,22 +58,24 @@ def settled(
         pairs: of which runs.
         start: (3,) pose of the plan.
         carried: whether it matters how far joints lead.
+        effort: that may be spent; joints that are not tried when it is are left to the rule.
     """
     open_water, tried = _open(water), dict(space.tried)
     for pair in pairs:
+        if effort is not None and effort.exhausted:
+            break
         if pair not in tried:
-            tried[pair] = _tried(space, open_water, primitives, pair, start, carried=carried)
+            course, turn = _wished(space, pair, start)
+            task = replace(_task(pair, primitives, open_water, course, turn), effort=effort or Effort())
+            wish = carried * np.array([np.cos(course), np.sin(course)])
+            tried[pair] = _tried(space, open_water, pair, task, wish)
     return replace(space, tried=tried)
 
 
-def _tried(
-    space: SearchSpace, water: LegWater, primitives: Mapping[str, Primitive], pair: Pair, start: Array, *, carried: bool
-) -> TriedJoint | None:
-    """The joint of a pair that loses least."""
+def _tried(space: SearchSpace, water: LegWater, pair: Pair, task: LegTask, wish: Array) -> TriedJoint | None:
+    """The joint of a pair that loses least, way made good along `wish` (2,) counting as at full speed."""
     assert space.times is not None
-    course, turn = _wished(space, pair, start)
-    wish = carried * np.array([np.cos(course), np.sin(course)]) / space.times.speed_mps
-    found = joint(_task(pair, primitives, water, course, turn), water, wish)
+    found = joint(task, water, wish / space.times.speed_mps)
     if found is None:
         return None
     seconds, step = found

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,6 +12,7 @@ import shapely
 from expdesign.conventions import whole_turns
 from expdesign.plan.area import ARC_SEGMENTS, SeaArea
 from expdesign.plan.capability import Capability
+from expdesign.plan.effort import Effort
 from expdesign.plan.field import ClearanceField
 from expdesign.plan.footprint import swept_area
 from expdesign.plan.ways import Ways, build_ways, polyline_length, simplified
@@ -46,6 +47,7 @@ class LegTask:
         seed: of the path search.
         before: (h, m) commands given before the leg, the standing one last; None when it has stood for long. Only
             lagging and late actuators remember them.
+        effort: that may be spent on it, and that is.
     """
 
     start: Array
@@ -54,6 +56,7 @@ class LegTask:
     end_inputs: Array
     seed: int
     before: Array | None = None
+    effort: Effort = field(default_factory=Effort)
 
     def __post_init__(self) -> None:
         seal(self, start="6", end="6", start_inputs="m", end_inputs="m")

@@ -9,6 +9,7 @@ import shapely
 
 from expdesign.errors import NoPlan
 from expdesign.plan.capability import capability
+from expdesign.plan.effort import Effort
 from expdesign.plan.field import ClearanceField, clearance_field, narrowest_passage
 from expdesign.plan.footprint import covering_discs
 from expdesign.plan.goal_ways import build_goal_ways
@@ -27,6 +28,8 @@ from expdesign.values import Array
 
 JOINT_TRIALS, TRIAL_WIDTH = 4, 100
 """Plans whose joints are tried before the search proper, and partial plans kept for them."""
+JOINTS_S = 30.0
+"""Effort spent on trying joints, after which the rule for the time of legs has to do."""
 
 
 def leg_water(problem: PlanProblem) -> LegWater:
@@ -77,7 +80,7 @@ def search_space(problem: PlanProblem, water: LegWater) -> SearchSpace:
 def with_joints(problem: PlanProblem, water: LegWater, space: SearchSpace, progress: Progress) -> SearchSpace:
     """The space with the joints tried that plans would use, for vessels whose joints are the search's own."""
     counts = [problem.repeats[item.name] for item in space.stamps]
-    runs = {item.name: item for item in problem.used}
+    runs, effort = {item.name: item for item in problem.used}, Effort(most_s=JOINTS_S)
     for number in range(JOINT_TRIALS if space.times is not None else 0):
         progress("trying joints between runs", 0.01 * (number + 1))
         try:
@@ -88,7 +91,9 @@ def with_joints(problem: PlanProblem, water: LegWater, space: SearchSpace, progr
         if all(pair in space.tried for pair in pairs):
             break
         carried = is_carried(space, counts, problem.start)
-        space = settled(space, water, runs, pairs, start=problem.start, carried=carried)
+        space = settled(space, water, runs, pairs, start=problem.start, carried=carried, effort=effort)
+        if effort.exhausted:
+            break
     return space
 
 

@@ -10,6 +10,7 @@ from expdesign.errors import NoPlan
 from expdesign.plan.checks import verify_plan
 from expdesign.plan.doors import check_ends
 from expdesign.plan.drawn_trials import Trials
+from expdesign.plan.effort import Effort
 from expdesign.plan.lattice import LatticePlan, search_lattice
 from expdesign.plan.lattice_moves import build_lattice
 from expdesign.plan.legs import LegWater
@@ -27,6 +28,8 @@ SAILED = 1
 """Sets the chance of drawn trials apart from that of other draws of the same seed."""
 REPLANS, WIDER = 2, 1.4
 """Plans made anew, with so much more room where trials of the last one leave the water, before giving up."""
+ALL = 2.0
+"""Time budgets of counted work within which a plan made anew must be expected to end."""
 
 
 def plan_trial(problem: PlanProblem, *, progress: Progress = lambda what, share: None) -> Plan:
@@ -39,9 +42,10 @@ def plan_trial(problem: PlanProblem, *, progress: Progress = lambda what, share:
     stated = water = leg_water(problem)
     check_ends(problem.start, problem.goal, water)
     space = with_joints(problem, water, search_space(problem, water), progress)
-    told = progress
+    told, effort = progress, Effort(most_s=ALL * problem.settings.time_budget_s)
     for replan in range(REPLANS + 1):
-        line = sail_all(problem, water, space, told, stated=stated)
+        before_s = effort.spent_s
+        line = sail_all(problem, water, space, told, stated=stated, effort=effort)
         sailed = line.joined(sample_time_s=problem.vessel.sample_time_s, names=problem.vessel.model.inputs)
         told("verifying", 0.85)
         verification = _verified(problem, *sailed)
@@ -51,7 +55,9 @@ def plan_trial(problem: PlanProblem, *, progress: Progress = lambda what, share:
         if not broken:
             return _finished(problem, stated, *sailed, verification=verification, promise=promise)
         leaving = leaves_too_often(promise, problem.settings.confidence)
-        if replan == REPLANS or not leaving:
+        effort.sailed(int(trials.samples.max(axis=1).sum()))
+        again_s = effort.spent_s - before_s
+        if replan == REPLANS or not leaving or effort.spent_s + again_s > effort.most_s:
             more = "; more plan.clearance_m helps" if leaving else ""
             raise NoPlan(f"the plan found does not keep its promise: {broken}{more}")
         water, space = _wider(problem, water, space, trials, sailed[2], broken)

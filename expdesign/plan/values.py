@@ -24,9 +24,10 @@ class PlanSettings:
     Attributes:
         clearance_m: least distance from the hull to anything forbidden [m].
         confidence: share of drawn trials that must stay in allowed water from start to goal, between 0 and 1.
-        time_budget_s: buys tries of other places when a leg or a run fails, one for every two seconds, so that a slow
-            machine finds the same plan as a fast one; by the clock a search that is stuck ends after five times as long
-            [s]. A plan made anew because drawn trials left the water has it again.
+        time_budget_s: buys tries of other places when a leg or a run fails, one for every two seconds, fewer where legs
+            cost more, by work that is counted, so that a slow machine finds the same plan as a fast one; by the clock a
+            search that is stuck ends after five times as long [s]. A plan made anew because drawn trials left the water
+            has it again, if the work counted so far lets expect that it ends within twice the budget.
         transit_speed_mps: speed of repositioning legs, or None for nine tenths of what the actuators allow.
         turning_radius_m: of repositioning legs, or None for what the vessel model allows.
     """

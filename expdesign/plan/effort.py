@@ -1,0 +1,36 @@
+"""Work counted instead of timed, so that a search gives up at the same point on every machine."""
+
+from __future__ import annotations
+
+import math
+
+SAMPLE_S = 2e-4
+"""What one iteration of the optimiser costs for each sample of a leg, on a machine of 2020 [s]."""
+STEP_S = 2.5e-3
+"""What one sample of some hundred drawn ships costs there [s]."""
+
+
+class Effort:
+    """Work that a search has cost, in seconds of one machine that stands for all.
+
+    Attributes:
+        spent_s: so far.
+        most_s: that there is; what is spent is never refused, only what comes after.
+    """
+
+    def __init__(self, most_s: float = math.inf) -> None:
+        """Nothing is spent yet."""
+        self.spent_s, self.most_s = 0.0, most_s
+
+    @property
+    def exhausted(self) -> bool:
+        """Whether there is none left."""
+        return self.spent_s > self.most_s
+
+    def optimised(self, iterations: int, samples: int) -> None:
+        """Count iterations of the optimiser on a leg of some samples."""
+        self.spent_s += SAMPLE_S * iterations * samples
+
+    def sailed(self, samples: int) -> None:
+        """Count samples of drawn trials."""
+        self.spent_s += STEP_S * samples

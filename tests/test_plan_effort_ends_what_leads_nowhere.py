@@ -1,0 +1,52 @@
+"""Work is counted, the same on every machine: a leg and joints that would cost more than there is are given up."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+from plan_case import at_rest, leg_water, space_of
+from test_plan_verification_catches_what_is_wrong import primitive
+
+from expdesign.plan.effort import Effort
+from expdesign.plan.joint_trials import settled
+from expdesign.plan.legs import LegTask, find_leg
+
+
+@pytest.fixture(scope="module")
+def water():
+    return leg_water(shapely.box(-400, -400, 400, 400))
+
+
+def task(end: np.ndarray) -> LegTask:
+    return LegTask(start=at_rest(0, 0, 0.0), end=end, start_inputs=np.zeros(4), end_inputs=np.zeros(4), seed=1)
+
+
+def test_the_same_leg_costs_the_same_each_time(water):
+    spent = []
+    for _ in range(2):
+        asked = replace(task(at_rest(30, 60, 2.0)), effort=Effort())
+        assert find_leg(asked, water) is not None
+        spent.append(asked.effort.spent_s)
+    assert spent[0] == spent[1] > 0.0
+
+
+def test_a_leg_that_cannot_be_sailed_costs_no_more_than_it_may(water):
+    ends = at_rest(60, 0, 0.0) + np.array([0.0, 0.0, 0.0, -1.2, 1.2, 0.0])  # faster sideways than the ship can go
+    without = task(ends)
+    assert find_leg(without, water) is None
+    few = replace(without, effort=Effort(most_s=without.effort.spent_s / 10))
+    assert find_leg(few, water) is None
+    assert few.effort.exhausted
+    assert few.effort.spent_s < without.effort.spent_s / 2
+
+
+def test_joints_are_left_to_the_rule_when_there_is_nothing_left_to_spend(water):
+    go = primitive(water.vessel)
+    space, spent = space_of(water, go, np.array([0.0, 300.0, 0.0])), Effort(most_s=1.0)
+    spent.optimised(iterations=100, samples=100)
+    assert spent.exhausted
+    found = settled(space, water, {"go": go}, [("go", "go")], start=np.zeros(3), carried=True, effort=spent)
+    assert found.tried == space.tried
