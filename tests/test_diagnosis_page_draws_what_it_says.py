@@ -129,7 +129,7 @@ def test_regressors_and_times_since_changes_are_those_of_the_data(clean):
     force, _ = suspected_force(clean, finding(("gain",), "thrust_gain"), at)
     np.testing.assert_allclose(force, at["n1"] * np.cos(at["a1"]) + at["n2"] * np.cos(at["a2"]))
     late, _ = suspected(clean, finding(("lag:n",), "actuator_lag"))
-    orders = clean.windows.gather(clean.windows.batch_inputs)[..., [0, 2]]
+    orders = clean.windows.step_inputs[..., [0, 2]]
     changed = np.zeros(late.shape, dtype=bool)
     changed[:, 1:] = np.abs(np.diff(orders, axis=1)).sum(axis=2) > 1.0
     assert changed.any()

@@ -49,8 +49,9 @@ def followed_inputs(ship: Extended, windows: Windows) -> tuple[tuple[Array, int]
     """Per batch, the inputs after dead band, dead time, lag and offset, and how many rows an integrator step has."""
     inputs = ship.model.inputs
     moving = any(key.startswith(("delay:", "lag:")) and value for key, value in ship.effects.items())
-    finer = FINER if moving else 1
-    acting = tuple(np.repeat(rows, finer, axis=0) for rows in windows.batch_inputs)
+    parts = -(-FINER // windows.rows_per_step) if moving else 1
+    acting = tuple(np.repeat(rows, parts, axis=0) for rows in windows.batch_inputs)
+    finer = parts * windows.rows_per_step
     for kind, change in (("deadband", _dead_band), ("delay", _delayed), ("lag", _lagged), ("offset", _offset)):
         for key, value in ship.effects.items():
             if key.startswith(kind + ":") and value != 0.0:

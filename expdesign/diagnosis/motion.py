@@ -309,11 +309,11 @@ def _shown(linear: Linear, moved: Array) -> Array:
     """Changes of the channels for changes of the states (c, w, k, n); sensors are nearly linear in the states."""
     motion = linear.motion
     if not any(key.startswith(("heading", "lever", "gyro", "late")) for key in motion.ship.effects):
-        values = moved[:, :, :: motion.windows.steps_per_sample, :3]
-        seen = [
-            averaged(values[..., i]) if n in motion.windows.derived else values[..., i] for i, n in enumerate("uvr")
-        ]
-        return np.stack([*seen, averaged(values[..., 2])], axis=-1)
+        windows = motion.windows
+        values = moved[:, :, :: windows.steps_per_sample, :3]
+        means = averaged(np.moveaxis(values, -1, 0), windows.rows_per_step)
+        seen = [means[i] if n in windows.derived else values[..., i] for i, n in enumerate("uvr")]
+        return np.stack([*seen, means[2]], axis=-1)
     size = 1e-4
     still = observed(motion.ship, motion.states, motion.windows)
     changes = [(observed(motion.ship, motion.states + size * part, motion.windows) - still) / size for part in moved]

@@ -19,16 +19,20 @@ def observed(ship: Extended, states: Array, windows: Windows, turned: Array | No
         turned: (w, k) heading since the start; integrated from the yaw rate when None.
     """
     u, v, r = np.moveaxis(states[:, :: windows.steps_per_sample, :3], -1, 0)
+    finer = windows.rows_per_step
     u, v = u - ship.get("lever:starboard") * r, v + ship.get("lever:forward") * r
     headings = None if turned is None else turned[:, :: windows.steps_per_sample]
     from_position = {"u", "v"} & set(windows.derived)
     if from_position:
-        u, v = (averaged(u), averaged(v)) if headings is None else averaged_on_course(u, v, headings)
+        if headings is None:
+            u, v = averaged(u, finer), averaged(v, finer)
+        else:
+            u, v = averaged_on_course(u, v, headings, finer)
     u, v = _turned(u, v, ship.get("heading_bias"))
     if from_position and ship.get("late:psi"):
         u, v = _turned(u, v, r * ship.get("late:psi"))
-    channels = {"u": u, "v": v, "r": (1 + ship.get("gyro")) * r, "psi_rate": averaged(r)}
-    if headings is not None:
+    channels = {"u": u, "v": v, "r": (1 + ship.get("gyro")) * r, "psi_rate": averaged(r, finer)}
+    if headings is not None and finer == 1:
         channels["psi_rate"] = differenced(headings, channels["psi_rate"], windows)
     if "r" in windows.derived:
         channels["r"] = channels["psi_rate"]
@@ -67,20 +71,26 @@ def differenced(turned: Array, otherwise: Array, windows: Windows) -> Array:
     return result
 
 
-def averaged(values: Array) -> Array:
-    """What central differences see of a velocity (..., w, s): its mean over two samples, by Simpson's rule."""
+def averaged(values: Array, finer: int = 1) -> Array:
+    """What central differences see of a velocity (..., w, s): its mean over two samples, by Simpson's rule.
+
+    Args:
+        values: at instants of comparison.
+        finer: samples that differences were taken of from one of these instants to the next.
+    """
     result = values.copy()
-    result[..., 1:-1] = (values[..., :-2] + 4 * values[..., 1:-1] + values[..., 2:]) / 6
+    bend = values[..., :-2] - 2 * values[..., 1:-1] + values[..., 2:]
+    result[..., 1:-1] += bend / (6 * finer**2)
     return result
 
 
-def averaged_on_course(u: Array, v: Array, heading: Array) -> tuple[Array, Array]:
+def averaged_on_course(u: Array, v: Array, heading: Array, finer: int = 1) -> tuple[Array, Array]:
     """What central differences of positions see: the mean velocity over two samples, along the axes of the middle one.
 
     The ship turns meanwhile, so that the mean of u and v along their own axes would be another one.
     """
     c, s = np.cos(heading), np.sin(heading)
-    north, east = averaged(u * c - v * s), averaged(u * s + v * c)
+    north, east = averaged(u * c - v * s, finer), averaged(u * s + v * c, finer)
     return north * c + east * s, east * c - north * s
 
 

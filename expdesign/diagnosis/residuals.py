@@ -80,7 +80,7 @@ def _variables(ship: Extended, short: Windows) -> dict[str, Array]:
     measured = short.measured[..., :3]
     count = np.maximum(np.isfinite(measured).sum(axis=1), 1)
     states = np.nansum(measured, axis=1) / count
-    inputs = short.gather(short.batch_inputs).mean(axis=1)
+    inputs = short.step_inputs.mean(axis=1)
     found = {name: states[:, i] for i, name in enumerate(OUTPUTS) if name in ship.model.outputs}
     found |= {name: inputs[:, i] for i, name in enumerate(ship.model.inputs)}
     if short.has_wind:

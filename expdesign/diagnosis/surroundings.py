@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from scipy.ndimage import convolve1d
 
 from expdesign.diagnosis.extended import Extended
 from expdesign.diagnosis.followed import followed_inputs
-from expdesign.diagnosis.windows import Windows
+from expdesign.diagnosis.windows import Windows, half_width
 from expdesign.simulation.motion import to_body
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, VesselModel, generalised_force
@@ -49,7 +50,7 @@ def surroundings(ship: Extended, windows: Windows) -> Surroundings:
     names = (*dict.fromkeys((*model.inputs, *FORCE_SIGNALS)),)
     followed = followed_inputs(ship, windows)
     moving = any(finer > 1 for _, finer in followed)
-    signals = windows.gather(tuple(_acting(model, *rows) for rows in followed))
+    signals = windows.gather(tuple(_acting(model, *rows, windows.rows_per_step) for rows in followed))
     names = (*names, *(f"{RISE}{name}" for name in names)) if moving else names
     table = Surroundings({n: np.broadcast_to(signals[..., i], shape) for i, n in enumerate(names)})
     north, east = ship.get("current:north"), ship.get("current:east")
@@ -65,19 +66,30 @@ def surroundings(ship: Extended, windows: Windows) -> Surroundings:
     return table
 
 
-def _acting(model: VesselModel, rows: Array, finer: int) -> Array:
+def _acting(model: VesselModel, rows: Array, finer: int, rows_per_step: int) -> Array:
     """(k, m) inputs and forces, each its mean over the finer steps that it is known at, and (k, m) their rises.
 
-    A straight line of that mean and rise has the mean and the first moment that the signal has within the step.
+    A straight line of that mean and rise has the mean and the first moment that the signal has within the step. Where
+    what is measured is averaged over samples, so is the signal: the motion that it drives is then the mean motion.
     """
     table = dict(zip(model.inputs, rows.T, strict=True))
     forces = generalised_force(model.actuators, table, NUMPY)
     table |= dict(zip(FORCE_SIGNALS, forces, strict=True))
     columns = [np.broadcast_to(np.asarray(values, dtype=float), len(rows)) for values in table.values()]
-    known = np.stack(columns, axis=-1).reshape(len(rows) // finer, finer, -1)
+    known = _averaged(np.stack(columns, axis=-1), finer, rows_per_step).reshape(len(rows) // finer, finer, -1)
     place = (np.arange(finer) + 0.5) / finer - 0.5
     rises = 12.0 * np.einsum("f,kfm->km", place, known) / finer
     return np.asarray(np.column_stack([known.mean(axis=1), rises]))
+
+
+def _averaged(values: Array, finer: int, rows_per_step: int) -> Array:
+    """Means over the samples that are averaged around every instant."""
+    half, apart = half_width(rows_per_step), finer // rows_per_step
+    if not half:
+        return values
+    taps = np.zeros(2 * half * apart + 1)
+    taps[::apart] = 1.0 / (2 * half + 1)
+    return np.asarray(convolve1d(values, taps, axis=0, mode="nearest"))
 
 
 def _wind(ship: Extended, windows: Windows) -> tuple[Array, Array]:

@@ -1,8 +1,9 @@
 """Measured batches cut into windows that are simulated side by side, each from a free initial state.
 
-Data sampled much faster than the ship moves are averaged over several samples first; data sampled too coarsely for an
-integrator get steps in between, with inputs held. Windows are as long as a batch unless the model is unstable, so that
-slow disturbances show as what they are.
+Data sampled much faster than the ship moves are averaged over several samples first, and so are the forces that drive
+the simulation beside them: the mean of a linear motion is the motion that the mean force makes. Data sampled too
+coarsely for an integrator get steps in between, with inputs held. Windows are as long as a batch unless the model is
+unstable, so that slow disturbances show as what they are.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ class Windows:
         step_s: integrator step [s].
         steps_per_sample: integrator steps from one compared sample to the next.
         batch: (w,) batch number of each window.
-        batch_inputs: one (k_b, m) array per batch, held inputs at integrator steps.
+        batch_inputs: one (k_b rows_per_step, m) array per batch, held inputs, as many rows in every integrator step.
         first: (w,) first integrator step of each window in its batch.
         measured: (w, s, 4) channels u, v, r, and the rate of the measured heading where r is a measurement of its own;
             nan where not measured.
@@ -52,6 +53,7 @@ class Windows:
         has_heading, has_wind, has_depth: whether these are measured.
         derived: those of u, v, r that come from the pose.
         names: of the batches.
+        rows_per_step: samples of the data in an integrator step, where several are averaged.
     """
 
     step_s: float
@@ -69,6 +71,7 @@ class Windows:
     has_depth: bool
     derived: tuple[str, ...]
     names: tuple[str, ...]
+    rows_per_step: int = 1
 
     @property
     def sample_s(self) -> float:
@@ -88,8 +91,14 @@ class Windows:
     @cached_property
     def places(self) -> NDArray[np.int64]:
         """(w, k) integrator steps of each window in its batch, the last one repeated where the window is filled up."""
-        ends = np.array([len(rows) for rows in self.batch_inputs])[self.batch.astype(int)]
+        ends = np.array([len(rows) // self.rows_per_step for rows in self.batch_inputs])[self.batch.astype(int)]
         return np.asarray(np.minimum(self.first[:, None] + np.arange(self.steps), ends[:, None] - 1).astype(int))
+
+    @property
+    def step_inputs(self) -> Array:
+        """(w, k, m) held inputs, their mean over each step."""
+        n = self.rows_per_step
+        return self.gather(tuple(rows.reshape(len(rows) // n, n, -1).mean(axis=1) for rows in self.batch_inputs))
 
     def gather(self, batches: tuple[Array, ...]) -> Array:
         """(w, k, ...) rows of per-batch arrays at the steps of every window."""
@@ -119,6 +128,11 @@ class Windows:
 
 
 ROWS = ("batch", "first", "measured", "heading", "wind", "depth_m", "time_s")
+
+
+def half_width(rows_per_step: int) -> int:
+    """How many samples on either side of an instant of comparison are averaged with it."""
+    return rows_per_step // 2
 
 
 def fastest_rate(model: VesselModel, record: Record) -> float:
@@ -173,6 +187,7 @@ def cut_windows(model: VesselModel, record: Record, *, longest_s: float | None =
         has_depth=all(_has_depth(batch) for batch in record.batches),
         derived=derived,
         names=tuple(batch.name for batch in record.batches),
+        rows_per_step=merged,
         **{name: np.stack(values) for name, values in rows.items()},
     )
 
@@ -205,7 +220,7 @@ class _Part:
         self.samples = (len(batch) - 1) // merged + 1
         self.step_s = batch.sample_time_s * merged / between
         raw = inputs_of(model, batch)
-        self.inputs = np.repeat(self._blocks(raw), between, axis=0)
+        self.inputs = np.repeat(self._whole(raw), between, axis=0)
         heading = np.zeros(len(batch)) if batch.pose is None else batch.pose[:, 2]
         if not np.isfinite(heading).all():
             heading = np.cumsum(np.nan_to_num(batch.velocity[:, 2])) * batch.sample_time_s
@@ -232,21 +247,19 @@ class _Part:
             rate[1:-1] = np.nan if "r" in derived else rates[:, 2]
         channels = self._centred(np.column_stack([velocity, rate]))
         middle = self.merged * np.arange(len(channels))
-        channels[(middle < self.merged // 2) | (middle >= len(self.batch) - self.merged // 2)] = np.nan
+        half = half_width(self.merged)
+        channels[(middle < half) | (middle >= len(self.batch) - half)] = np.nan
         return channels
 
-    def _blocks(self, values: Array) -> Array:
-        """Held inputs averaged over the samples that one step of comparison takes."""
-        if self.merged == 1:
-            return values
-        padded = np.concatenate([values, np.repeat(values[-1:], self.samples * self.merged - len(values), axis=0)])
-        return np.asarray(padded.reshape(self.samples, self.merged, -1).mean(axis=1))
+    def _whole(self, values: Array) -> Array:
+        """Held inputs to the end of the last step of comparison."""
+        return np.concatenate([values, np.repeat(values[-1:], self.samples * self.merged - len(values), axis=0)])
 
     def _centred(self, values: Array) -> Array:
         """Values at the instants of comparison, averaged over the samples around them."""
         if self.merged == 1:
             return np.asarray(values, dtype=float)
-        half = self.merged // 2
+        half = half_width(self.merged)
         padded = np.concatenate([np.repeat(values[:1], half, axis=0), values, np.repeat(values[-1:], half, axis=0)])
         total = np.cumsum(np.concatenate([np.zeros_like(padded[:1]), np.nan_to_num(padded, posinf=1e6)]), axis=0)
         width = 2 * half + 1

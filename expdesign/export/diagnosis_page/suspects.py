@@ -106,7 +106,7 @@ def _telling(found: Diagnosis, item: Finding) -> str:
 
 def _since_change(found: Diagnosis, columns: list[int]) -> tuple[Array, str]:
     windows = found.windows
-    inputs = windows.gather(windows.batch_inputs)[:, :: windows.steps_per_sample, columns]
+    inputs = windows.step_inputs[:, :: windows.steps_per_sample, columns]
     scale = np.maximum(np.std(inputs.reshape(-1, inputs.shape[-1]), axis=0), 1e-12)
     change = np.zeros(inputs.shape[:2])
     change[:, 1:] = np.abs(np.diff(inputs, axis=1) / scale).sum(axis=2)

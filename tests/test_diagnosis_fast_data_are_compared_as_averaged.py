@@ -1,0 +1,66 @@
+"""Data faster than the ship moves are averaged before they are compared: a model that is right must then look right."""
+
+from dataclasses import replace
+
+import hidden_effects as sea
+import numpy as np
+import pytest
+from diagnosis_case import from_pose, hidden_record, vessel_of
+
+from expdesign.diagnosis.accuracy import simulate_from_first
+from expdesign.diagnosis.extension import as_extended
+from expdesign.diagnosis.followed import followed_inputs
+from expdesign.diagnosis.windows import cut_windows
+from expdesign.signals import Record
+
+CALM = sea.Weather(current_std=0.0, wind_std=0.0)
+IDEAL = sea.Sensors(position=0.0, heading=0.0, velocity=0.0, yaw_rate=0.0, wind=0.0)
+START = 60
+"""Compared samples that it takes to forget a first state read from a straight line."""
+
+
+def quiet(step_s: float, *, pose: bool) -> Record:
+    """Four minutes of zig-zags twice, without any noise, from an integrator of its own."""
+    record = hidden_record(
+        "barge", seed=4, batches=2, samples=round(240 / step_s), step_s=step_s, weather=CALM, sensors=IDEAL,
+        manoeuvre="zigzag",
+    )  # fmt: skip
+    return Record(batches=tuple(from_pose(batch) for batch in record.batches)) if pose else record
+
+
+@pytest.mark.parametrize("pose", [False, True])
+@pytest.mark.parametrize("step_s", [0.5, 0.2, 0.05])
+def test_nothing_is_left_over_where_the_model_is_right(step_s, pose):
+    """A quarter of a per cent of what is measured: what the curvature of drag makes of a mean over a second."""
+    record = quiet(step_s, pose=pose)
+    ship = as_extended(vessel_of("barge", sample_time_s=step_s), record)
+    windows = cut_windows(ship.model, record)
+    assert windows.rows_per_step == round(1.0 / step_s)
+    motion = simulate_from_first(ship, windows)
+    known = np.isfinite(windows.measured[:, START:]).any(axis=(0, 1))
+    left = np.sqrt(np.nanmean(motion.error[:, START:, known] ** 2, axis=(0, 1)))
+    assert (left < 0.0025 * np.nanstd(windows.measured[:, START:, known], axis=(0, 1))).all()
+
+
+def test_commands_are_followed_as_recorded_not_as_averaged():
+    """Means over a second of a command that changes its sign pass through a dead band that no command was in."""
+    step_s = 0.05
+    record = quiet(step_s, pose=False)
+    ship = as_extended(vessel_of("barge", sample_time_s=step_s), record)
+    windows = cut_windows(ship.model, record)
+    place = ship.model.inputs.index("tau_psi")
+    orders = np.concatenate([batch.inputs[:, place] for batch in record.batches])
+    width = 0.99 * np.abs(orders).min()
+    (acting, _), *_ = followed_inputs(ship.having({"deadband:tau_psi": width}), windows)
+    assert np.abs(acting[:, place]).min() > width
+
+
+def test_inputs_of_a_step_are_the_mean_of_its_samples():
+    record = quiet(0.2, pose=False)
+    record = Record(batches=(replace(record.batches[0], name="one"),))
+    ship = as_extended(vessel_of("barge", sample_time_s=0.2), record)
+    windows = cut_windows(ship.model, record)
+    rows = record.batches[0].inputs
+    expected = rows[: len(rows) // 5 * 5].reshape(-1, 5, rows.shape[1]).mean(axis=1)
+    first = int(windows.first[1]) if len(windows.first) > 1 else len(expected)
+    np.testing.assert_allclose(windows.step_inputs[0, :first], expected[:first], rtol=1e-12)
