@@ -43,6 +43,7 @@ def sound():
             Leg(kind="reposition", name="goal", first=60, last=160),
         ),
         "clearance_m": CLEARANCE_M,
+        "transit_mps": 1.3,
         "primitives": {"go": run},
         "repeats": {"go": 1},
         "start": np.zeros(3),
@@ -179,3 +180,22 @@ def test_clearance_to_an_island_is_exact():
     track = Trajectory(sample_time_s=1.0, pose=np.zeros((1, 3)), velocity=np.zeros((1, 3)))
     sea = area(shapely.box(-500, -500, 500, 500).difference(shapely.box(34.5, -5, 60, 5)))
     assert hull_clearance(sea, track, vessel.hull_b)[0] == pytest.approx(30.0)
+
+
+@pytest.mark.parametrize("current", [(0.0, 0.0), (0.6, 0.0), (-0.6, 0.3)])
+def test_legs_go_no_faster_through_water_than_stated_whatever_the_current(current):
+    plan = sound()
+    environment = replace(CALM, current_to=np.array(current))
+    track = simulate(plan["vessel"], plan["commands"], velocity=(*current, 0.0), environment=environment)
+    whole = Leg(kind="reposition", name="goal", first=0, last=160)  # from rest to 1 m/s and back, as a leg
+    plan |= {"environment": environment, "trajectory": track, "legs": (whole,), "repeats": {}}
+    fastest = np.hypot(*(track.velocity[:, :2] - current).T).max()  # headed north all the time
+    slow, fast = (check({**plan, "transit_mps": share * fastest}) for share in (0.95, 0.99))
+    named = [problem for problem in slow.problems if "through the water at" in problem]
+    assert [problem.startswith("the leg to 'goal' goes") for problem in named] == [True, False]
+    assert not any("through the water at" in problem and "goes" in problem for problem in fast.problems)
+
+
+def test_runs_and_legs_from_faster_runs_may_be_faster_than_stated():
+    plan = sound()
+    assert check({**plan, "transit_mps": 0.5}).verified

@@ -26,6 +26,8 @@ FINE_SUBSTEPS = 10 * SUBSTEPS
 """Integrator steps per sample of the re-simulation: a tenth of those that plans are made with."""
 ENTRY_TOLERANCE = 0.02
 """Largest deviation of a run's entry velocity, relative to the vessel's speed in the plan."""
+SPEED_TOLERANCE = 0.03
+"""By how much legs may pass the speed stated for them, or that of their faster end: plans keep it at some samples."""
 
 
 def verify_plan(
@@ -37,12 +39,13 @@ def verify_plan(
     trajectory: Trajectory,
     legs: Sequence[Leg],
     clearance_m: float,
+    transit_mps: float,
     primitives: Mapping[str, Primitive],
     repeats: Mapping[str, int],
     start: Array,
     goal: Array,
 ) -> Verification:
-    """Re-simulate the commands ten times finer and check motion, hull, limits, runs, entry states, start and goal.
+    """Re-simulate the commands ten times finer and check motion, hull, limits, speeds, runs, entries and ends.
 
     The hull is checked on the track and on the re-simulated motion.
 
@@ -51,6 +54,7 @@ def verify_plan(
         area: allowed water.
         commands, trajectory, legs: the plan.
         clearance_m: promised distance from hull to forbidden water.
+        transit_mps: stated speed of legs through water.
         primitives: the dictionary by name.
         repeats: how often each is to be run.
         start, goal: (3,) poses where the ship is to begin and end at rest through the water.
@@ -78,6 +82,8 @@ def verify_plan(
         ),
         *_if(excess > 1e-6, f"{excess_signal} by {excess:.2g} of its range"),
         *_repeat_problems(legs, repeats),
+        *(() if misfit else _speed_problems(environment, trajectory, legs, transit_mps)),
+        *(() if misfit else _speed_problems(environment, again, legs, transit_mps, "re-simulated ")),
         *(misfit or _run_problems(vessel, commands, legs, primitives)),
         *(() if misfit else _entry_problems(environment, trajectory, legs, primitives)),
     ]
@@ -232,6 +238,27 @@ def _entry_problems(
             if (np.abs(off) > ENTRY_TOLERANCE * scale).any():
                 share = np.abs(off / scale).max()
                 problems.append(f"{leg.name!r} at sample {leg.first} begins {share:.1%} off its entry")
+    return problems
+
+
+def _speed_problems(
+    environment: Environment, trajectory: Trajectory, legs: Sequence[Leg], transit_mps: float, which: str = ""
+) -> list[str]:
+    """Legs faster through water than stated; those that begin or end faster may be as fast as that."""
+    north, east = environment.current_to
+    heading, (u, v, _) = trajectory.pose[:, 2], trajectory.velocity.T
+    c, s = np.cos(heading), np.sin(heading)
+    speed = np.hypot(u * c - v * s - north, u * s + v * c - east)
+    problems = []
+    for leg in legs:
+        sailed = speed[leg.first : leg.last + 1]
+        allowed = max(transit_mps, sailed[0], sailed[-1])
+        if leg.kind != "primitive" and sailed.max() > (1.0 + SPEED_TOLERANCE) * allowed:
+            at_s = (leg.first + int(sailed.argmax())) * trajectory.sample_time_s
+            problems.append(
+                f"the {which}leg to {leg.name!r} goes {sailed.max():.3g} m/s through the water at {at_s:.0f} s, "
+                f"stated {allowed:.3g} m/s"
+            )
     return problems
 
 

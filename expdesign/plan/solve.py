@@ -48,7 +48,7 @@ def plan_trial(problem: PlanProblem, *, progress: Progress = lambda what, share:
         line = sail_all(problem, water, space, told, stated=stated, effort=effort)
         sailed = line.joined(sample_time_s=problem.vessel.sample_time_s, names=problem.vessel.model.inputs)
         told("verifying", 0.85)
-        verification = _verified(problem, *sailed)
+        verification = _verified(problem, stated.ship.transit_speed_mps, *sailed)
         told("sailing drawn trials", 0.9)
         promise, trials = _promised(problem, stated, *sailed, attempt=replan)
         broken = broken_promise(promise, trials, sailed[2], problem.area, confidence=problem.settings.confidence)
@@ -84,7 +84,9 @@ def lattice_reference(problem: PlanProblem, *, spacing_m: float, suboptimality: 
     return search_lattice(lattice, suboptimality=suboptimality)
 
 
-def _verified(problem: PlanProblem, commands: Commands, trajectory: Trajectory, legs: tuple[Leg, ...]) -> Verification:
+def _verified(
+    problem: PlanProblem, transit_mps: float, commands: Commands, trajectory: Trajectory, legs: tuple[Leg, ...]
+) -> Verification:
     verification = verify_plan(
         problem.vessel,
         problem.area,
@@ -93,6 +95,7 @@ def _verified(problem: PlanProblem, commands: Commands, trajectory: Trajectory, 
         trajectory=trajectory,
         legs=legs,
         clearance_m=problem.settings.clearance_m,
+        transit_mps=transit_mps,
         primitives={item.name: item for item in problem.primitives},
         repeats=problem.repeats,
         start=problem.start,
