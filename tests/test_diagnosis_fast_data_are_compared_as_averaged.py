@@ -10,7 +10,7 @@ from diagnosis_case import from_pose, hidden_record, vessel_of
 from expdesign.diagnosis.accuracy import simulate_from_first
 from expdesign.diagnosis.extension import as_extended
 from expdesign.diagnosis.followed import followed_inputs
-from expdesign.diagnosis.windows import cut_windows
+from expdesign.diagnosis.windows import cut_windows, fastest_rate
 from expdesign.signals import Record
 
 CALM = sea.Weather(current_std=0.0, wind_std=0.0)
@@ -64,3 +64,15 @@ def test_inputs_of_a_step_are_the_mean_of_its_samples():
     expected = rows[: len(rows) // 5 * 5].reshape(-1, 5, rows.shape[1]).mean(axis=1)
     first = int(windows.first[1]) if len(windows.first) > 1 else len(expected)
     np.testing.assert_allclose(windows.step_inputs[0, :first], expected[:first], rtol=1e-12)
+
+
+def test_noise_of_differences_is_no_speed():
+    """Positions good to 0.4 m, twenty times a second, differ by 5 m/s from one to the next: drag is not that quick."""
+    rates = []
+    for position in (0.0, 0.4):
+        record = hidden_record(
+            "tug", seed=4, batches=2, samples=1200, step_s=0.05, sensors=sea.Sensors(position=position)
+        )
+        data = Record(batches=tuple(from_pose(batch) for batch in record.batches))
+        rates.append(fastest_rate(as_extended(vessel_of("tug", sample_time_s=0.05), data).model, data))
+    assert rates[1] < 1.5 * rates[0]

@@ -136,8 +136,11 @@ def half_width(rows_per_step: int) -> int:
 
 
 def fastest_rate(model: VesselModel, record: Record) -> float:
-    """Largest linear damping rate of the model at the measured speeds [1/s]."""
-    speeds = np.abs(np.concatenate([batch.velocity for batch in record.batches]))
+    """Largest linear damping rate of the model at the measured speeds [1/s].
+
+    Speeds are means over `COARSEST_S`: differences of positions taken many times a second are noise, of any size.
+    """
+    speeds = np.abs(np.concatenate([_slowly(batch) for batch in record.batches]))
     seen = np.isfinite(speeds)
     base = np.where(seen, speeds, 0.0).sum(axis=0) / np.maximum(seen.sum(axis=0), 1)
     inputs = np.concatenate([inputs_of(model, batch) for batch in record.batches]).mean(axis=0)
@@ -149,6 +152,15 @@ def fastest_rate(model: VesselModel, record: Record) -> float:
         push = [np.array(model.accelerations(x, (x[0], x[1]), inputs), dtype=float) for x in (high, low)]
         rates.append(abs(float(push[0][axis] - push[1][axis])) / 2e-4)
     return max(*rates, 1e-6)
+
+
+def _slowly(batch: Batch) -> Array:
+    """(k, 3) velocities averaged over the samples of `COARSEST_S`; the batch as it is where it has no more."""
+    count = int(COARSEST_S / batch.sample_time_s + 1e-9)
+    whole = len(batch) // max(count, 1) * count
+    if count <= 1 or not whole:
+        return batch.velocity
+    return np.asarray(batch.velocity[:whole].reshape(-1, count, 3).mean(axis=1))
 
 
 def cut_windows(model: VesselModel, record: Record, *, longest_s: float | None = None) -> Windows:
