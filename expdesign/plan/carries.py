@@ -78,7 +78,7 @@ class Headway:
 def carry(vessel: Vessel, primitive: Primitive, environment: Environment, headway: Headway) -> Carry:
     """How far a run carries the ship at most, and how far it bends."""
     track = primitive.trajectory.pose[:, :2]
-    if _differs_by_heading(vessel, environment):
+    if differs_by_heading(vessel, environment):
         tracks = np.moveaxis(_in_weather(vessel, primitive, environment)[..., :2], 1, 0)
         return _carry_in_weather(list(tracks), headway)
     steps = np.hypot(*np.diff(track, axis=0).T)
@@ -93,7 +93,7 @@ def carry(vessel: Vessel, primitive: Primitive, environment: Environment, headwa
 
 def exit_motion(vessel: Vessel, primitive: Primitive, environment: Environment) -> tuple[float, float, float]:
     """Least and largest speed through water [m/s] and largest yaw rate [rad/s] at the end of a run."""
-    if not _differs_by_heading(vessel, environment):
+    if not differs_by_heading(vessel, environment):
         speed = float(np.hypot(*primitive.exit_velocity[:2]))
         return speed, speed, abs(float(primitive.exit_velocity[2]))
     last = _in_weather(vessel, primitive, environment)[-1]
@@ -123,7 +123,7 @@ def _stray_adrift_m(track: Array, drift_m: float) -> float:
     return float(apart.min(axis=1).max()) + between
 
 
-def _differs_by_heading(vessel: Vessel, environment: Environment) -> bool:
+def differs_by_heading(vessel: Vessel, environment: Environment) -> bool:
     """Whether air moves over the water, and the model feels it: runs of the dictionary are made where it does not."""
     used = zip(vessel.model.expressions, vessel.model.parameters, strict=True)
     feels = any(value and {"u_q", "v_q"} & set(expression.signals) for expression, value in used)

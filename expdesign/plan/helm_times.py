@@ -19,6 +19,8 @@ from expdesign.values import Array, seal
 
 TOO_SHORT = 12.0
 """What a metre costs that a leg is too short by, in metres at transit speed: it is fetched by going back, slowly."""
+AT_REST = 5.0
+"""Hull lengths that legs to a stop have at least: a ship that is off her track has to come back to it before."""
 SPARE = 0.8
 """Hull lengths by which legs to runs are longer than speeds change in: the helm takes some."""
 DRIFTS = 3
@@ -36,6 +38,7 @@ class HelmTimes:
     Attributes:
         speed_mps, radius_m: of long legs, and of their turns.
         run_up_m, steady_m: straight before each run, and the last of that, steady.
+        at_rest_m: of legs to a stop at least.
         spare_m: before a run besides the way in which speeds change.
         answer_s: until a new engine order is worth what it says.
         gathered: (k, 3) speed m/s, way m and time s from rest with the engines full ahead.
@@ -46,6 +49,7 @@ class HelmTimes:
     radius_m: float
     run_up_m: float
     steady_m: float
+    at_rest_m: float
     spare_m: float
     answer_s: float
     gathered: Array
@@ -57,10 +61,11 @@ class HelmTimes:
     def seconds(self, length_m: Array, exit_mps: float, entry_mps: float) -> Array:
         """(...,) time of legs of such lengths through water from one speed to another [s]."""
         way_m, time_s = self._table(exit_mps, entry_mps)
+        least_m = way_m[0] if entry_mps > STOPPED * self.speed_mps else max(way_m[0], self.at_rest_m)
         return np.asarray(
             np.interp(length_m, way_m, time_s)
             + np.maximum(length_m - way_m[-1], 0.0) / self.speed_mps
-            + TOO_SHORT * np.maximum(way_m[0] - length_m, 0.0) / self.speed_mps
+            + TOO_SHORT * np.maximum(least_m - length_m, 0.0) / self.speed_mps
         )
 
     def lost_s(self, exit_mps: float, entry_mps: float, *, carried: bool) -> float:
@@ -121,6 +126,7 @@ def helm_times(ship: Capability) -> HelmTimes:
         radius_m=ship.turning_radius_m,
         run_up_m=ship.run_up_m,
         steady_m=RUN_UP * approach.helm.vessel.length_m,
+        at_rest_m=AT_REST * approach.helm.vessel.length_m,
         spare_m=SPARE * approach.helm.vessel.length_m,
         answer_s=0.5 / approach.helm.drive_rate,
         gathered=_gathered(ship),

@@ -11,6 +11,10 @@ inside W grown by d, so the legs together with the chords of such runs, and with
 start to goal through that water: the time of the fastest way is no more than that of the legs, and what legs would
 need for those chords and paths at the headings that suit them best. This is so whatever d is; the best d counts.
 
+On small charts what each run can save of the way is looked for in all places where its hull has room, too
+(`expdesign.plan.headlands`): the least time to the goal falls by no more than that in a run, and in a leg by no more
+than it takes.
+
 Speeds and commands at the ends of legs cost time besides: a leg that begins or ends slower than the fastest leg loses
 distance while it changes speed, and actuators move no faster than their rates. Which leg joins which runs is left to
 the plan; the cheapest order counts.
@@ -34,8 +38,9 @@ from scipy.optimize import linear_sum_assignment
 
 from expdesign.dictionary import Primitive
 from expdesign.plan.area import SeaArea
-from expdesign.plan.carries import Carry, Headway, carry, exit_motion
+from expdesign.plan.carries import Carry, Headway, carry, differs_by_heading, exit_motion
 from expdesign.plan.cheapest_orders import cheapest_orders, place_values
+from expdesign.plan.headlands import time_saved_s
 from expdesign.plan.leg_values import BEYOND_ENDS, leg_speed_mps
 from expdesign.plan.speed_changes import LegEnd, least_loss, leg_end
 from expdesign.plan.ways import build_ways, simplified
@@ -79,6 +84,11 @@ def reposition_bound_s(
     carries = {item.name: carry(vessel, item, environment, headway) for item in runs}
     counts = {item.name: repeats[item.name] for item in runs}
     way_s = time_to_sail_s(area, clearance_m + vessel.beam_m / 2, carries, counts, ends, headway, vessel.length_m / 30)
+    if not differs_by_heading(vessel, environment):
+        water = area.safe_water(clearance_m + vessel.beam_m / 2)
+        found = time_saved_s(runs, carries, counts, water, ends, headway, vessel, known_s=way_s)
+        if found is not None:
+            way_s = max(way_s, found[0] - sum(counts[name] * most_s for name, most_s in found[1].items()))
     firsts, lasts = _leg_ends(vessel, environment, runs, exits, speed_mps, yaw_rate_radps)
     losses = np.array([[least_loss(first, last, vessel) for last in lasts] for first in firsts])
     lost_m, least_s = (joint_losses(losses[..., k], list(counts.values())) for k in (0, 1))

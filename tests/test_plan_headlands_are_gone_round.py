@@ -1,0 +1,148 @@
+"""What runs save of the way at most: closed forms, placements drawn at random, and plans planted in random charts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+from test_plan_bound_holds import primitive, ship, wandering
+
+from expdesign.plan.carries import Headway, carry
+from expdesign.plan.headlands import GoalTimes, goal_times, grown_times, time_saved_s, track_of
+from expdesign.plan.ways import build_ways
+from expdesign.simulation import Environment
+
+SPEED = 1.2
+STILL = Headway(speed_mps=SPEED, current_to=np.zeros(2))
+
+
+def bent_run(name: str, turn_rad: np.ndarray, step_m: float):
+    """A run whose heading is its course, in as many steps as there are headings."""
+    straight = primitive(ship())
+    away = np.cumsum(step_m * np.stack([np.cos(turn_rad), np.sin(turn_rad)], axis=1), axis=0)
+    pose = np.column_stack([away - away[0], turn_rad])
+    time = straight.trajectory.time_s
+    fit = np.stack([np.interp(np.linspace(0, 1, len(time)), np.linspace(0, 1, len(pose)), x) for x in pose.T], axis=1)
+    return replace(straight, name=name, trajectory=replace(straight.trajectory, pose=fit))
+
+
+def half_turn(name: str = "half turn"):
+    """Half a circle of 25 m radius."""
+    turn = np.linspace(0, np.pi, 121)
+    return bent_run(name, turn, 25 * np.pi / 120)
+
+
+def carries(runs, headway):
+    sea = Environment(current_to=headway.current_to)
+    return {run.name: carry(ship(), run, sea, headway) for run in runs}
+
+
+def looked_for(runs, water, ends, headway=STILL):
+    counts = {run.name: 1 for run in runs}
+    return time_saved_s(runs, carries(runs, headway), counts, water, ends, headway, ship())
+
+
+def test_times_to_the_goal_are_those_of_the_fastest_ways():
+    rng = np.random.default_rng(0)
+    rocks = shapely.union_all(shapely.buffer(shapely.points(rng.uniform(-150, 150, (6, 2))), 30.0, quad_segs=3))
+    water = shapely.box(-200, -200, 200, 200).difference(rocks)
+    ways, goal = build_ways(water), np.array([-190.0, 190.0])
+    for current in (np.zeros(2), np.array([0.3, -0.4])):
+        headway = Headway(speed_mps=SPEED, current_to=current)
+        times: GoalTimes = goal_times(ways, goal, headway)
+        points = rng.uniform(-195, 195, (40, 2))
+        points = points[shapely.contains_xy(water, points[:, 1], points[:, 0])]
+        expected = [ways.least(point, goal, headway.seconds) for point in points]
+        np.testing.assert_allclose(times.at(points), expected, atol=1e-6)
+    assert np.isinf(times.at(np.array([[1000.0, 0.0]]))).all()
+
+
+def test_in_open_water_a_run_saves_what_its_chord_takes():
+    run = half_turn()
+    whole_s, saved = looked_for([run], shapely.box(-300, -300, 300, 300), (np.array([-250.0, 0]), np.array([250.0, 0])))
+    chord_s = 50.0 / SPEED
+    assert whole_s == pytest.approx(500 / SPEED)
+    assert chord_s <= saved["half turn"] <= chord_s + 5.0
+
+
+def test_a_pier_in_the_middle_of_a_half_circle_saves_its_two_sides():
+    """From one side of a thin pier to the other round its head, which the run may pass as near as it likes."""
+    pier = shapely.box(-300, -0.01, 0, 0.01)  # from the west
+    water = shapely.box(-300, -200, 300, 200).difference(pier)
+    ends = np.array([-150.0, -250.0]), np.array([150.0, -250.0])
+    run = half_turn()
+    hull = (ship().length_m - ship().beam_m) / 2
+    _, saved = looked_for([run], water, ends)
+    # amidships alone, the string from end to end over the top of the half circle would take 2 sqrt(2) radii
+    top_s, chord_s = 2 * np.sqrt(2) * 25 / SPEED, 50 / SPEED
+    assert saved["half turn"] <= top_s + 5.0
+    if hull < 10:
+        assert saved["half turn"] > chord_s + 5.0
+
+
+@pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (0, 2, 3, 4))])
+def test_no_placement_drawn_saves_more_than_told(seed):
+    rng = np.random.default_rng(seed)
+    headway = Headway(speed_mps=SPEED, current_to=rng.uniform(-0.3, 0.3, 2) * (seed > 0))
+    rocks = shapely.union_all(shapely.buffer(shapely.points(rng.uniform(-250, 250, (8, 2))), 40.0, quad_segs=2))
+    water = shapely.box(-300, -300, 300, 300).difference(rocks)
+    water = max(shapely.get_parts(water), key=shapely.area)
+    run = bent_run("bent", np.linspace(0, rng.uniform(1.5, 4.0), 121), rng.uniform(0.5, 0.9))
+    start, goal = (
+        shapely.get_coordinates(
+            shapely.point_on_surface(water.intersection(shapely.box(low, low, low + 150, low + 150)))
+        )[0, ::-1]
+        for low in (-300, 150)
+    )
+    whole_s, told = looked_for([run], water, (start, goal), headway)
+    assert whole_s <= build_ways(water).least(start, goal, headway.seconds)
+    times = grown_times([track_of(run, ship(), headway.current_to)], water, goal, headway, ship())
+    pose, when = run.trajectory.pose, run.trajectory.time_s
+    arm = (ship().length_m - ship().beam_m) / 2
+    places, headings = rng.uniform(-320, 320, (20_000, 2)), rng.uniform(-np.pi, np.pi, 20_000)
+    tracks = []
+    for k in np.linspace(0, len(pose) - 1, 25).astype(int):
+        for ahead in (0.0, arm, -arm):
+            x, y = pose[k, :2] + ahead * np.array([np.cos(pose[k, 2]), np.sin(pose[k, 2])])
+            c, s = np.cos(headings), np.sin(headings)
+            at = places + np.stack([c * x - s * y, s * x + c * y], axis=1) + headway.current_to * when[k]
+            tracks.append(at)
+            kept = shapely.contains_xy(water, at[:, 1], at[:, 0])
+            places, headings = places[kept], headings[kept]
+            tracks = [track[kept] for track in tracks]
+    most = times.at(tracks[0]) - times.at(tracks[-3])
+    assert len(most) > 1000
+    assert most.max() <= told["bent"]
+    assert most.max() > told["bent"] - 8.0  # and little less
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_planted_plan_costs_no_less_than_the_way_less_what_its_runs_save(seed):
+    """Water is laid round a plan: legs that wander at full speed, runs at random headings, in a random current."""
+    rng = np.random.default_rng(seed)
+    headway = Headway(speed_mps=SPEED, current_to=rng.uniform(-0.4, 0.4, 2) * (seed % 3 > 0))
+    runs = [bent_run(name, rng.uniform(-4, 4) * np.linspace(0, 1, 121), rng.uniform(0.3, 0.9)) for name in ("a", "b")]
+    arm = (ship().length_m - ship().beam_m) / 2
+    here, spent, lines, counts = np.zeros(2), 0.0, [], {"a": 0, "b": 0}
+    for which in [*rng.integers(0, 2, 3), None]:
+        leg = wandering(rng, here, int(rng.integers(1, 6)))
+        spent, here = spent + headway.seconds(np.diff(leg, axis=0)).sum(), leg[-1]
+        lines.append(leg)
+        if which is None:
+            break
+        run = runs[which]
+        counts[run.name] += 1
+        heading, pose = rng.uniform(-np.pi, np.pi), run.trajectory.pose
+        c, s = np.cos(heading), np.sin(heading)
+        for ahead in (arm, -arm, 0.0):
+            body = pose[:, :2] + ahead * np.stack([np.cos(pose[:, 2]), np.sin(pose[:, 2])], axis=1)
+            track = here + body @ np.array([[c, s], [-s, c]]) + headway.current_to * run.trajectory.time_s[:, None]
+            lines.append(track)
+        here = track[-1]
+    water = shapely.union_all([shapely.buffer(shapely.LineString(line[:, ::-1]), 3.0) for line in lines])
+    used = [run for run in runs if counts[run.name]]
+    found = time_saved_s(used, carries(used, headway), counts, water, (np.zeros(2), here), headway, ship())
+    assert found is not None
+    assert found[0] - sum(counts[name] * most_s for name, most_s in found[1].items()) <= spent + 1e-6
