@@ -132,8 +132,9 @@ def _radius(apart: Array, confidence: float, name: str) -> Array:
     factor = float(np.quantile(ratio, confidence, method="higher"))
     if not np.isfinite(factor):
         raise NoPlan(
-            f"{name!r} is unstable for {np.mean(~stable):.0%} of the vessels drawn from model.parameter_std, more than "
-            f"plan.confidence = {confidence:g} allows; parameters known better help (more data, or earlier knowledge "
-            'by design.prior = "parameter_std"), or to leave it out by design.excluded'
+            f"{name!r} is unstable for {np.mean(~stable):.1%} of the vessels drawn from model.parameter_std, while "
+            f"plan.confidence, shared out over the runs, allows each {1.0 - confidence:.2%}; parameters known better "
+            'help (more data, or earlier knowledge by design.prior = "parameter_std"), or to leave it out by '
+            "design.excluded"
         )
     return np.asarray(factor * shape)
