@@ -14,7 +14,8 @@ from scipy.optimize import fsolve
 
 from expdesign.errors import NoPlan
 from expdesign.plan import PlanSettings
-from expdesign.plan.capability import LATERAL_MPS2, capability, needs_helm
+from expdesign.plan.capability import capability, needs_helm
+from expdesign.plan.helmed_trials import LATERAL_MPS2
 from expdesign.plan.steady_turns import steady_turns
 from expdesign.scenario import load_vessel
 from expdesign.signals import Commands

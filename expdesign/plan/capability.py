@@ -9,33 +9,28 @@ import numpy as np
 
 from expdesign.conventions import wrap_angle
 from expdesign.dictionary.build import drift, trim
-from expdesign.errors import InputError, NoAnswer, NoPlan
+from expdesign.errors import NoPlan
+from expdesign.plan.helmed_trials import (
+    LATERAL_MPS2,
+    leg_radius_m,
+    simulated_acceleration,
+    stopping_way_m,
+    why_not_ahead,
+)
 from expdesign.plan.steady_turns import SteadyTurn, side_by_side, steady_turns
 from expdesign.plan.values import PlanSettings
-from expdesign.simulation import Approach, Conduct, simulate_many, steady_ahead, stopping
+from expdesign.simulation import Approach, steady_ahead
 from expdesign.values import Array
 from expdesign.vessel import Limit, Vessel, direct_terms, force_matrix
 
 USABLE = 0.9
 """Share of the largest steady speed, and of the largest steady yaw rate, that repositioning counts on."""
 
-LATERAL_MPS2 = 0.03 * 9.81
-"""Lateral acceleration of turns on legs: small enough not to heel the ship."""
-
-HELM_SHARE = 0.65
-"""Share of the hardest helm at which ships turn on legs: the rest is for getting into turns and out of them."""
-
-SLOW_SHARE = 0.5
-"""The slowest speed, in transit speeds, at which a ship with a helm must still turn as tightly as legs ask."""
-
 RUN_UP = 1.0
 """Hull lengths that a ship with a helm goes straight and steady, helm as it holds the course, before each run."""
 
 SETTLE = 2.0
 """Hull lengths before that in which what is left of a turn dies out under the helmsman's hand."""
-
-GATHERING = 200.0
-"""Hull lengths at transit speed in whose time a ship that gathers way is watched."""
 
 SETTLING = 0.25
 """Share of the time in which a vessel gathers way, or its actuators run up, that a change of motion takes besides."""
@@ -161,11 +156,11 @@ def _transit_speed(vessel: Vessel, settings: PlanSettings, top: float, current_m
 def _helmed_capability(vessel: Vessel, settings: PlanSettings, current_mps: float) -> Capability:
     """Capability of a ship that is steered by a helm, by simulating it."""
     slowest = 1e-3 * vessel.length_m
-    top = _largest(lambda speed: not _why_not_ahead(vessel, speed), start=slowest)
+    top = _largest(lambda speed: not why_not_ahead(vessel, speed), start=slowest)
     if top is None:
         raise NoPlan(
             f"vessel {vessel.name!r} cannot hold any speed ahead on a straight course with its actuators: "
-            f"{_why_not_ahead(vessel, slowest)}"
+            f"{why_not_ahead(vessel, slowest)}"
         )
     transit = _transit_speed(vessel, settings, top, current_mps)
     approach = steady_ahead(vessel, transit)
@@ -176,100 +171,20 @@ def _helmed_capability(vessel: Vessel, settings: PlanSettings, current_mps: floa
             f"vessel {vessel.name!r} has no steady turn to both sides at {transit:.3g} m/s: its helm is "
             f"{approach.helm.description}"
         )
-    radius = _leg_radius_m(vessel, settings, (pairs, side_by_side(steady_turns(_slower(approach)))), transit)
+    radius = leg_radius_m(approach, settings, pairs)
     fastest = max(abs(turn.yaw_rate_radps) for turn in turns)
     return Capability(
         top_speed_mps=top,
         transit_speed_mps=transit,
         turning_radius_m=radius,
         yaw_rate_radps=OVERSHOOT * max(fastest, transit / radius),
-        acceleration_mps2=_simulated_acceleration(approach),
+        acceleration_mps2=simulated_acceleration(approach),
         lateral_mps2=max(LATERAL_MPS2, OVERSHOOT * transit**2 / radius),
         approach=approach,
         turns=turns,
-        stopping_m=_stopping_m(vessel, transit),
+        stopping_m=stopping_way_m(vessel, transit),
         run_up_m=(SETTLE + RUN_UP) * vessel.length_m,
     )
-
-
-def _why_not_ahead(vessel: Vessel, speed: float) -> str:
-    """What keeps a vessel from going straight ahead at a speed; "" for nothing."""
-    try:
-        steady_ahead(vessel, speed)
-    except InputError as error:
-        return str(error)
-    return ""
-
-
-def _slower(approach: Approach) -> Approach:
-    return steady_ahead(approach.helm.vessel, SLOW_SHARE * approach.speed_mps)
-
-
-def _leg_radius_m(
-    vessel: Vessel,
-    settings: PlanSettings,
-    at_speeds: tuple[list[tuple[SteadyTurn, SteadyTurn]], ...],
-    transit: float,
-) -> float:
-    """The wished radius, or what the ship turns on to both sides, at transit speed and slower, with helm to spare."""
-    tightest = max(max(turn.radius_m for turn in pairs[-1]) for pairs in at_speeds if pairs)
-    wish = settings.turning_radius_m
-    if wish is not None and wish < tightest:
-        raise NoPlan(
-            f"plan.turning_radius_m is {wish:g}, at {transit:.3g} m/s vessel {vessel.name!r} needs {tightest:.3g} m or "
-            "more with its helm hard over"
-        )
-    found = [tightest, 1.5 * vessel.length_m]
-    for pairs in at_speeds:
-        most = max((pair[1].helm_rad for pair in pairs), default=0.0)
-        eased = [pair for pair in pairs if pair[1].helm_rad <= HELM_SHARE * most and _gentle(pair)]
-        found.append(max(turn.radius_m for turn in eased[-1]) if eased else transit**2 / LATERAL_MPS2)
-    return wish or max(found)
-
-
-def _gentle(pair: tuple[SteadyTurn, SteadyTurn]) -> bool:
-    return all(abs(turn.surge_mps * turn.yaw_rate_radps) <= LATERAL_MPS2 for turn in pair)
-
-
-def _simulated_acceleration(approach: Approach) -> float:
-    """The constant acceleration that loses as much time as full ahead from rest to the approach's speed [m/s2]."""
-    helm, speed, vessel = approach.helm, approach.speed_mps, approach.helm.vessel
-    step_s = vessel.sample_time_s
-    count = int(np.ceil(GATHERING * vessel.length_m / speed / step_s))
-    orders = np.minimum(1.0, np.arange(1, count + 1) * step_s * helm.drive_rate)
-    rows = np.array([helm.inputs(order, approach.angle_rad) for order in orders.tolist()])
-    surge = simulate_many(
-        vessel,
-        rows[None],
-        pose=np.zeros((1, 3)),
-        velocity=np.zeros((1, 3)),
-        current_to=np.zeros((1, 2)),
-        wind_to=np.zeros((1, 2)),
-        parameters=vessel.model.parameters[None],
-        standing=np.array([helm.inputs(0.0, approach.angle_rad)]),
-    )[:, 0, 3]
-    there = int(np.argmax(surge >= 0.98 * speed)) or count
-    lost_s = there * step_s - float(np.abs(surge[:there]).sum()) * step_s / speed
-    return speed / (2 * max(lost_s, step_s))
-
-
-def _stopping_m(vessel: Vessel, speed: float) -> float:
-    """Way of a stop from a steady speed [m].
-
-    Raises:
-        NoPlan: the ship does not stop, so it cannot come to rest at a goal.
-    """
-    reason = ""
-    for astern in (1.0, 0.0):
-        try:
-            _, track = stopping(vessel, astern=astern, conduct=Conduct(speed_mps=speed))
-        except InputError as error:  # the engines do not go astern
-            reason = str(error)
-            continue
-        except NoAnswer as error:
-            raise NoPlan(f"vessel {vessel.name!r} cannot be stopped at the goal: {error}") from None
-        return float(np.hypot(*np.diff(track.pose[:, :2], axis=0).T).sum())
-    raise NoPlan(f"vessel {vessel.name!r} cannot be stopped at the goal: {reason}")
 
 
 def turn_loss_s(ship: Capability, first_rad: Array, second_rad: Array) -> Array:

@@ -12,8 +12,9 @@ from functools import lru_cache
 import numpy as np
 
 from expdesign.errors import InputError
-from expdesign.plan.capability import GATHERING, RUN_UP, Capability
+from expdesign.plan.capability import RUN_UP, Capability
 from expdesign.plan.dubins import dubins_m
+from expdesign.plan.helmed_trials import GATHERING
 from expdesign.simulation import Conduct, simulate_many, stopping
 from expdesign.values import Array, seal
 
