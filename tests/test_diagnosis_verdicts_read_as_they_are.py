@@ -5,6 +5,7 @@ import pytest
 
 from expdesign.diagnosis import CAUSES
 from expdesign.diagnosis.gain import HeldOut
+from expdesign.diagnosis.search import _onward
 from expdesign.diagnosis.values import Accuracy, Fall, Finding
 from expdesign.diagnosis.verdict import LACKS, error_falls, verdict
 
@@ -62,3 +63,12 @@ def test_the_fall_of_an_error_is_that_of_its_root_mean_square():
     falls = error_falls(("u", "v"), before, after, 0)
     assert [fall.share for fall in falls] == pytest.approx([0.5, 0.0])
     assert [(fall.low, fall.high) for fall in falls] == [pytest.approx((0.5, 0.5)), pytest.approx((0.0, 0.0))]
+
+
+def test_progress_never_goes_back():
+    """A round that looks at something again begins at its own share."""
+    shares: list[float] = []
+    tell = _onward(lambda what, share: shares.append(share))
+    for share in (0.1, 0.46, 0.43, 0.5):
+        tell("testing", share)
+    assert shares == [0.1, 0.46, 0.46, 0.5]

@@ -65,6 +65,7 @@ def search(ship: Extended, windows: Windows, starts: Array, rng: np.random.Gener
     anything: before they are added, fewer numbers are given the chance to explain as much one after the other.
     When nothing more is found, whatever was chosen before others were known has to hold its place beside them.
     """
+    progress = _onward(progress)
     base = first = settled(ship, windows, starts)
     steps: list[Step] = []
     refused: list[Candidate] = []
@@ -182,6 +183,18 @@ def settled(ship: Extended, windows: Windows, starts: Array) -> Fit:
 def _same_as_any(candidate: Candidate, others: list[Candidate]) -> bool:
     """The same effects, whatever their first guess."""
     return any(candidate.cause == other.cause and set(candidate.free) == set(other.free) for other in others)
+
+
+def _onward(progress: Progress) -> Progress:
+    """Never less than was told before: rounds that look at something again begin anew."""
+    most = 0.0
+
+    def tell(what: str, share: float) -> None:
+        nonlocal most
+        most = max(most, share)
+        progress(what, most)
+
+    return tell
 
 
 def _within(progress: Progress, share: float) -> Progress:
