@@ -44,7 +44,7 @@ def test_lengths_do_not_change_when_poses_are_moved_turned_mirrored_or_sailed_ba
 def test_a_longer_leg_takes_longer_and_never_less_than_its_way_at_transit_speed():
     times = rule()
     for exit_mps, entry_mps in ((0.0, 5.0), (4.8, 5.0), (1.4, 0.0), (2.4, 5.0)):
-        shortest_m = times._table(exit_mps, entry_mps)[0][0]
+        shortest_m = max(times._table(exit_mps, entry_mps)[0][0], 0.0 if entry_mps else times.at_rest_m)
         length_m = shortest_m + np.linspace(0.0, 4000.0, 200)
         seconds = times.seconds(length_m, exit_mps, entry_mps)
         assert (np.diff(seconds) > 0).all()
@@ -73,7 +73,7 @@ def moving(vessel, speed):
 
 @pytest.mark.parametrize(
     ("exit_mps", "entry_mps", "hulls"),
-    [(0.0, 5.0, 7.0), pytest.param(4.8, 5.0, 8.0, marks=pytest.mark.slow), (2.4, 0.0, 4.0)],
+    [(0.0, 5.0, 7.0), pytest.param(4.8, 5.0, 8.0, marks=pytest.mark.slow), (2.4, 0.0, 6.0)],
 )
 def test_optimised_legs_take_as_long_as_the_rule_says(exit_mps, entry_mps, hulls):
     water = open_water(coaster())
