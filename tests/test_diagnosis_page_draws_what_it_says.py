@@ -170,3 +170,9 @@ def test_data_too_short_for_the_residuals_are_told_so(clean):
     found = replace(clean, residuals=short)
     assert "too short for that" in diagnosis_html(found, command="made up", version="0")
     assert json.loads(diagnosis_json(found))["residuals"]["p_values"]["u"]["heading"] is None
+
+
+@pytest.mark.parametrize(("names", "words"), [(("heading",), "This variable"), (("heading", "time"), "2 variables")])
+def test_one_variable_is_not_called_several(clean, names, words):
+    some = replace(clean.residuals, variables={name: clean.residuals.variables[name] for name in names})
+    assert f"{words}</summary>" in diagnosis_html(replace(clean, residuals=some), command="", version="")
