@@ -172,7 +172,7 @@ def test_data_too_short_for_the_residuals_are_told_so(clean):
     assert json.loads(diagnosis_json(found))["residuals"]["p_values"]["u"]["heading"] is None
 
 
-@pytest.mark.parametrize(("names", "words"), [(("heading",), "This variable"), (("heading", "time"), "2 variables")])
+@pytest.mark.parametrize(("names", "words"), [(("run",), "This variable"), (("run", "heading"), "These 2 variables")])
 def test_one_variable_is_not_called_several(clean, names, words):
     some = replace(clean.residuals, variables={name: clean.residuals.variables[name] for name in names})
     assert f"{words}</summary>" in diagnosis_html(replace(clean, residuals=some), command="", version="")
