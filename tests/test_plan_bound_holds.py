@@ -310,6 +310,29 @@ def test_simulated_ships_whose_commands_move_at_their_rates_stay_between_the_spe
             assert (sailed[known] >= least[::10][known] - 1e-6).all()
 
 
+def test_ships_with_stopped_engines_gather_way_no_faster_than_told_whatever_the_angles_they_stand_at():
+    vessel, rng = ship(), np.random.default_rng(3)
+    rates = np.array([limit.rate for limit in vessel.limits])
+    stopped = np.array([0.0, np.nan, 0.0, np.nan])
+    told = leg_end(vessel, CALM, 0.0, stopped, top_mps=1.36, yaw_rate_radps=0.4).changes
+    free = leg_end(vessel, CALM, 0.0, None, top_mps=1.36, yaw_rate_radps=0.4).changes
+    time_s = 0.1 * np.arange(201)
+    most = told.most(0.0, time_s)
+    assert (most[1:30] < free.most(0.0, time_s)[1:30]).all()
+    fastest: np.ndarray = np.zeros(21)
+    for k in range(40):
+        angle = 0.0 if k == 0 else rng.uniform(-np.pi, np.pi)
+        steps = np.tile(rates * [1, 0, 1, 0], (20, 1))
+        steps *= 1.0 if k < 10 else rng.uniform(-0.5, 1.0, (20, 1))
+        values = np.array([0.0, angle, 0.0, angle]) + np.cumsum(steps, axis=0)
+        values[:, ::2] = values[:, ::2].clip(-15.0, 15.0)
+        track = simulate(vessel, Commands(sample_time_s=1.0, names=vessel.model.inputs, values=values))
+        sailed = np.hypot(*track.velocity[:, :2].T)
+        fastest = np.maximum(fastest, sailed)
+    within = np.cumprod(fastest <= 1.36).astype(bool)
+    assert (fastest[within] <= most[::10][within] + 1e-6).all()
+
+
 @pytest.mark.parametrize("seed", range(2))
 def test_legs_found_in_random_water_take_longer_than_the_bound(seed):
     rng = np.random.default_rng(seed)

@@ -28,8 +28,9 @@ CELL, HEADINGS = 16 / 15, 32
 """First cells: in hull lengths, and to a full turn."""
 LEVELS, FINER = 3, 3
 """Times that cells are halved, and those that hold the most besides."""
-MOST_CELLS, MOST_LOOKS = 300_000, 400_000
-"""Cells of any level for a run, and those whose ways are looked up for all runs together: no more is worth the time."""
+MOST_CELLS, MOST_PAIRS, MOST_LOOKS = 300_000, 20_000_000, 400_000
+"""Cells of any level for a run, pairs of these and corners, and cells whose ways are looked up for all runs together:
+no more is worth the time."""
 WORTH = 0.005
 """Share of the way that may be gained on a bound for which runs are looked at."""
 ENOUGH = 0.3
@@ -173,7 +174,7 @@ class Saving:
         told_s = chord_s + spare_s
         for level in range(LEVELS + FINER + 1):
             spread_m, slack_s = self._spread_m(track.ends_m, level), 0.0
-            if len(cells) > MOST_CELLS:
+            if len(cells) > MOST_CELLS or len(cells) * len(self.times.nodes) > MOST_PAIRS:
                 return np.inf, looks
             cells = self._possible(cells, level)
             saved, looked = self._saved(cells, level)

@@ -2,7 +2,7 @@
 
 Class of plans: the hull keeps the clearance everywhere; legs go no faster through water than a stated speed and turn no
 faster than a stated rate, or 2 % beyond those at their ends; each run is sailed as simulated with the nominal vessel in
-the forecast's means; the ship starts and ends at rest.
+the forecast's means; the ship starts and ends at rest with its engines stopped, rudders and thrusters at any angle.
 
 In a steady current the least time of a leg along a straight line is that of Zermelo's navigation problem. It grows with
 the length and obeys the triangle inequality, so the fastest way round the islands bends at their corners only and a
@@ -146,7 +146,8 @@ def _leg_ends(
         speed = float(np.hypot(*velocity[:2]))
         return leg_end(vessel, environment, speed, inputs, top_mps=top_mps, yaw_rate_radps=yaw_rate_radps)
 
-    rest = end(np.zeros(3), None)
+    angles = [name.startswith(("a", "rudder")) for name in vessel.model.inputs]
+    rest = end(np.zeros(3), np.where(angles, np.nan, 0.0))
     firsts = [
         replace(end(item.exit_velocity, item.commands.values[-1]), slowest_mps=least, fastest_mps=most)
         for item, (least, most, _) in zip(runs, exits, strict=True)

@@ -82,7 +82,7 @@ class LegEnd:
 
     Attributes:
         slowest_mps, fastest_mps: through water.
-        inputs: (m,) commands before it begins, or after it has ended; None for any.
+        inputs: (m,) commands before it begins, or after it has ended, nan for any; None for any at all.
         changes: of speed, in the leg's direction of time.
     """
 
@@ -108,7 +108,7 @@ def leg_end(
 
     Args:
         vessel, environment: who, in what air.
-        speed_mps, inputs: at the end.
+        speed_mps, inputs: at the end; nan where a command may be anything.
         top_mps: speed of the fastest leg.
         yaw_rate_radps: no turn is faster.
     """
@@ -144,8 +144,9 @@ def _boxes(vessel: Vessel, inputs: Array | None) -> tuple[Array, Array]:
     rates = np.array([limit.rate for limit in vessel.limits])
     # a command may move before the first sample of a leg is over
     reach = np.minimum(rates * (until_s[:, None] + vessel.sample_time_s), np.where(limited, np.inf, np.pi))
-    lows = np.where(limited, np.maximum(inputs - reach, low), inputs - reach)
-    highs = np.where(limited, np.minimum(inputs + reach, high), inputs + reach)
+    # fmax and fmin take the limit where a command may be anything
+    lows = np.where(limited | np.isnan(inputs), np.fmax(inputs - reach, low), inputs - reach)
+    highs = np.where(limited | np.isnan(inputs), np.fmin(inputs + reach, high), inputs + reach)
     return np.r_[until_s, np.inf], np.concatenate([np.stack([lows, highs], axis=1), np.stack([low, high])[None]])
 
 
@@ -208,7 +209,7 @@ def _can_meet(fast: Array, slow: Array, shed: Array, kept: Array, count: int) ->
 
 def _moved_s(vessel: Vessel, first: Array, last: Array) -> float:
     """Time in which commands (m,) become others at their rates, less the two samples in which they may stand."""
-    turned = np.abs(first - last)
+    turned = np.nan_to_num(np.abs(first - last), nan=0.0)
     turns = ~np.isfinite([limit.high - limit.low for limit in vessel.limits])
     turned[turns] = np.abs(wrap_angle(turned[turns]))
     rates = np.array([limit.rate for limit in vessel.limits])
