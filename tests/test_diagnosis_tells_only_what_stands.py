@@ -54,7 +54,10 @@ def test_a_first_cause_that_may_cost_half_a_point_is_not_told():
     assert kept_count(50.0, 50.0) == 1  # its test alone sees it
     runs = np.array([[-1.0], [-1.0], [-1.0], [1.0], [1.0], [1.0]])
     assert kept_count(50.0, 50.0 + 0.2 * MOST_HARM * runs) == 1  # may cost, but never half a point
-    assert kept_count(50.0, 50.0 + 4.0 * MOST_HARM * runs) == 0  # as good on average, and may cost more
+    assert kept_count(50.0, 50.0 - 0.1 * MOST_HARM + 4.0 * MOST_HARM * runs) == 0  # no better on average
+    apart = 50.0 + MOST_HARM + 4.0 * MOST_HARM * runs  # may cost more, but is better on average
+    assert kept_count(50.0, apart * np.ones(3)) == 1
+    assert kept_count(50.0, apart + MOST_HARM * np.array([1.0, 1.0, -2.0])) == 0  # and worse in one output
 
 
 def test_later_causes_gain_plainly_or_surely():

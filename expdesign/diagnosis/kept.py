@@ -10,7 +10,7 @@ import numpy as np
 
 from expdesign.diagnosis.candidate import Candidate
 from expdesign.diagnosis.clusters import widened
-from expdesign.diagnosis.gain import HeldOut, gained
+from expdesign.diagnosis.gain import HeldOut, gained, on_same
 from expdesign.diagnosis.steps import Search, Step, like_nothing, without
 from expdesign.diagnosis.windows import Windows
 
@@ -18,7 +18,7 @@ LEAST_GAIN, PLAIN_GAIN = 0.1, 1.0
 """Points of simulated fit on held-out runs, mean over outputs: what causes beside the first must gain at least, and
 what suffices even when its interval, of few runs perhaps, reaches zero."""
 MOST_HARM = 0.5
-"""Points that the first may cost at the lower end of its interval."""
+"""Points that the first may cost at the lower end of its interval, if it costs anything in any output."""
 
 
 def kept(
@@ -84,19 +84,26 @@ def mending(found: Search, held: Sequence[HeldOut], seed: int) -> list[bool]:
     """Which causes mend something where they were not fitted, and not so little that it may be nothing.
 
     The first cause is sure by its test, which sees more than a simulation shows, unless it makes things worse, or may
-    by more than a little: where no model is right, as with real ships, something is always significant. For others
+    by more than a little and makes some output worse on average: where no model is right, as with real ships, something
+    is always significant. Currents that vary make intervals of few runs wide, whatever the cause. For others
     significance alone is not enough: once a large error is mended, what is left shows every small difference between
     any model and a ship. Little gains count when their interval leaves zero out. Parameters that are free to move
     anyhow gain nothing by being named, and must not cost.
     """
     results = [gained(one, other, seed) for one, other in pairwise(held)]
     return [
-        _mends(index == 0 or only_moves(step, found), gain, low, high)
+        _mends(index == 0 or only_moves(step, found), _harmless(*held[index : index + 2]), gain, low, high)
         for index, (step, (gain, (low, high))) in enumerate(zip(found.steps, results, strict=True))
     ]
 
 
-def _mends(sure: bool, gain: float, low: float, high: float) -> bool:
-    if sure and high >= 0.0 and low > -MOST_HARM:
+def _harmless(before: HeldOut, after: HeldOut) -> bool:
+    """No output is simulated worse on average."""
+    before, after = on_same(before, after)
+    return bool(len(before.lost) and (np.nan_to_num(after.fit - before.fit) >= 0.0).all())
+
+
+def _mends(sure: bool, harmless: bool, gain: float, low: float, high: float) -> bool:
+    if sure and high >= 0.0 and (low > -MOST_HARM or harmless):
         return True
     return gain > LEAST_GAIN and (gain > PLAIN_GAIN or low > 0.0)
