@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import shapely
-from plan_case import at_rest, leg_water, space_of
+from plan_case import area, at_rest, leg_water, ship, space_of
+from test_plan_says_what_is_impossible import acceleration
 from test_plan_verification_catches_what_is_wrong import primitive
 
+from expdesign.errors import NoPlan
+from expdesign.plan import PlanSettings, sailing
 from expdesign.plan.effort import Effort
 from expdesign.plan.joint_trials import settled
 from expdesign.plan.legs import LegTask, find_leg
+from expdesign.plan.problem import PlanProblem
+from expdesign.plan.solve import plan_trial
+from expdesign.simulation import CALM
 
 
 @pytest.fixture(scope="module")
@@ -50,3 +57,25 @@ def test_joints_are_left_to_the_rule_when_there_is_nothing_left_to_spend(water):
     assert spent.exhausted
     found = settled(space, water, {"go": go}, [("go", "go")], start=np.zeros(3), carried=True, effort=spent)
     assert found.tried == space.tried
+
+
+@pytest.mark.parametrize(("leg_s", "tries"), [(0.0, 11), (8.0, 3)])  # 2 s each at least: 11 x 2, or 3 x 8, pass 20
+def test_a_search_that_is_stuck_ends_when_its_budget_is_worked_off_not_when_a_clock_says_so(monkeypatch, leg_s, tries):
+    def nowhere(asked: LegTask, water) -> None:
+        asked.effort.spent_s += leg_s
+
+    monkeypatch.setattr(sailing, "find_leg", nowhere)
+    vessel = ship()
+    go = acceleration(vessel)
+    problem = PlanProblem(
+        vessel=vessel,
+        area=area(shapely.box(-300, -300, 300, 300)),
+        environment=CALM,
+        settings=PlanSettings(clearance_m=1.0, time_budget_s=20.0),
+        primitives=(go,),
+        design=SimpleNamespace(problem=SimpleNamespace(names=(go.name,)), repeats=(1,)),
+        start=np.zeros(3),
+        goal=np.array([200.0, 0.0, 0.0]),
+    )
+    with pytest.raises(NoPlan, match=f"time_budget_s = 20, {tries} places were tried: no leg leads to 'go' near 60"):
+        plan_trial(problem)
