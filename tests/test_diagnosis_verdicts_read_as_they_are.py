@@ -2,12 +2,16 @@
 
 import numpy as np
 import pytest
+from diagnosis_case import from_pose, hidden_record, vessel_of
 
 from expdesign.diagnosis import CAUSES
+from expdesign.diagnosis.extension import as_extended, extend
 from expdesign.diagnosis.gain import HeldOut
+from expdesign.diagnosis.notes import note_on_weather
 from expdesign.diagnosis.search import _onward
 from expdesign.diagnosis.values import Accuracy, Fall, Finding
 from expdesign.diagnosis.verdict import LACKS, error_falls, verdict
+from expdesign.signals import Record
 
 OUTPUTS = ("u", "v", "r")
 BEFORE = Accuracy(
@@ -72,3 +76,22 @@ def test_progress_never_goes_back():
     for share in (0.1, 0.46, 0.43, 0.5):
         tell("testing", share)
     assert shares == [0.1, 0.46, 0.46, 0.5]
+
+
+@pytest.mark.parametrize(("delay_s", "word", "left_out"), [(2.0, "late", False), (-2.0, "early", True)])
+def test_a_signal_before_its_time_is_called_early_and_the_file_says_that_it_lacks_it(delay_s, word, left_out):
+    """A vessel file knows sensors that are late; a position before its time means that the heading is late, say."""
+    record = hidden_record("barge", seed=1, batches=1, samples=120)
+    ship = as_extended(vessel_of("barge"), Record(batches=tuple(from_pose(batch) for batch in record.batches)))
+    vessel, missing = extend(vessel_of("barge"), ship.having({"late:position": delay_s}), {})
+    assert vessel.sensors.position.delay_s == max(delay_s, 0.0)
+    assert any("below zero" in text for text in missing) == left_out
+    (cause,) = (cause for cause in CAUSES if cause.name == "sensor_delay")
+    assert f"2.000 ± 0.050 s {word}" in cause.explain({"late:position": (delay_s, 0.05)}, ship)
+
+
+def test_a_current_that_varies_much_is_told():
+    assert note_on_weather(0.03, 300.0) == ()
+    (text,) = note_on_weather(0.25, 400.0)
+    assert "0.25 m/s" in text
+    assert "400 s" in text

@@ -15,7 +15,7 @@ from expdesign.diagnosis.fitting import Fit
 from expdesign.diagnosis.gain import HeldOut, gained, held_out
 from expdesign.diagnosis.kept import LEAST_GAIN, kept, only_moves
 from expdesign.diagnosis.motion import linearise, start_responses
-from expdesign.diagnosis.notes import notes_on_data, notes_on_dropped
+from expdesign.diagnosis.notes import note_on_weather, notes_on_data, notes_on_dropped
 from expdesign.diagnosis.residuals import short_residuals
 from expdesign.diagnosis.search import search
 from expdesign.diagnosis.spread import spread
@@ -102,6 +102,7 @@ def diagnose(
             *notes_on_dropped(searched, found, held_apart(windows)),
             *_settled_note(found, ship, windows, held[0], seed),
             *_stuck_note(held),
+            *note_on_weather(found.last.noise.wander_mps, found.last.noise.wander_time_s),
             *missing,
         ),
         screened=_screened(found),

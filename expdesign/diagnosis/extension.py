@@ -115,6 +115,11 @@ def extend(vessel: Vessel, ship: Extended, std: Mapping[str, float]) -> tuple[Ve
     actuators, more = _actuators(model.actuators, ship)
     if "u" not in ship.derived and ship.get("late:u") != ship.get("late:v"):
         more = (*more, "The delay of u or v alone is written as one of the whole velocity sensor.")
+    if any(key.startswith("late:") and value < 0 for key, value in ship.effects.items()):
+        more = (
+            *more,
+            "The vessel file leaves out a delay below zero, and its simulation gains nothing by that finding.",
+        )
     weather = vessel.environment
     if _has(ship, "current:"):
         weather = replace(weather, current_to=np.array([ship.get("current:north"), ship.get("current:east")]))

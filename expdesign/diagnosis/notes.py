@@ -10,6 +10,8 @@ from expdesign.diagnosis.windows import Windows, unseen_wind
 from expdesign.signals import Record
 from expdesign.vessel import Vessel
 
+LARGE_WANDER_MPS = 0.1
+"""Standard deviation of a varying current that is worth a word [m/s]."""
 FEW = 0.002
 """Share of missing samples not worth a word."""
 
@@ -43,6 +45,21 @@ def notes_on_data(vessel: Vessel, record: Record, windows: Windows, still: Seque
     if not (vessel.model.parameter_std > 0).any():
         notes.append("The vessel file states no parameter_std: its parameters count as known.")
     return tuple(notes)
+
+
+def note_on_weather(wander_mps: float, time_s: float) -> tuple[str, ...]:
+    """A varying current that took part of the error upon itself; the catalogue has no such cause.
+
+    Args:
+        wander_mps: standard deviation of the current that the tests allow for.
+        time_s: its correlation time.
+    """
+    if wander_mps < LARGE_WANDER_MPS:
+        return ()
+    return (
+        f"Some error is taken for a current that varies by {wander_mps:.2g} m/s with a memory of {time_s:.0f} s: "
+        "the catalogue has no such cause, and the vessel file nothing of it.",
+    )
 
 
 def notes_on_dropped(found: Search, told: Search, apart: str) -> tuple[str, ...]:

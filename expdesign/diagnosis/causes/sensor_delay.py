@@ -31,9 +31,11 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
 
 def _explain(values: Values, _ship: Extended) -> str:
     parts = " and ".join(
-        f"{NAMES.get(key[5:], key[5:])} is recorded {rounded(value, std)} s late"
+        f"{NAMES.get(key[5:], key[5:])} is recorded {rounded(abs(value), std)} s {'late' if value >= 0 else 'early'}"
         for key, (value, std) in values.items()
     )
+    if any(value < 0 for value, _ in values.values()):
+        return f"Signals are not of one time: {parts}. No sensor is early: what it is set against is late, or filtered."
     return f"One signal trails the others: {parts}."
 
 
