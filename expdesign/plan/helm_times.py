@@ -88,9 +88,14 @@ class HelmTimes:
         straight_m = self._straight_m(entry_mps)
         begins, ends = moved(froms, off[None, :3]), moved(tos, np.array([[-straight_m, 0.0, 0.0]]))
         along_m, leg_s = float(np.hypot(*off[:2])) + straight_m, np.zeros(len(tos))
+        over_ground_m = dubins_m(
+            begins, ends, radius_m=self.radius_m
+        )  # legs are first guessed there: no turn all round
         for _ in range(DRIFTS if current_to.any() else 1):
             through = np.column_stack([ends[:, :2] - leg_s[:, None] * current_to, ends[:, 2]])
-            leg_s = self.seconds(dubins_m(begins, through, radius_m=self.radius_m) + along_m, exit_mps, entry_mps)
+            length_m = dubins_m(begins, through, radius_m=self.radius_m)
+            rounds_m = np.where(over_ground_m > length_m + np.pi * self.radius_m, over_ground_m, length_m)
+            leg_s = self.seconds(rounds_m + along_m, exit_mps, entry_mps)
         return leg_s
 
     def _straight_m(self, entry_mps: float) -> float:
