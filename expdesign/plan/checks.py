@@ -81,6 +81,7 @@ def verify_plan(
             f"at {worst * commands.sample_time_s:.0f} s, {_place(area, trajectory.pose[worst])}",
         ),
         *_if(excess > 1e-6, f"{excess_signal} by {excess:.2g} of its range"),
+        *_engine_problems(vessel, commands),
         *_repeat_problems(legs, repeats),
         *(() if misfit else _speed_problems(environment, trajectory, legs, transit_mps)),
         *(() if misfit else _speed_problems(environment, again, legs, transit_mps, "re-simulated ")),
@@ -185,6 +186,16 @@ def _limit_excess(vessel: Vessel, commands: Commands) -> tuple[float, str]:
             if excess / span > worst:
                 worst, which = excess / span, f"{name} passes its {what}"
     return worst, which
+
+
+def _engine_problems(vessel: Vessel, commands: Commands) -> list[str]:
+    """Engines and forces that are not stopped at the goal; that they are at the start is in their rates."""
+    told = zip(commands.names, vessel.limits, vessel.angles, commands.values[-1], strict=True)
+    return [
+        f"{name} is told {last:.3g} at the goal, where it is to have stopped"
+        for name, limit, turns, last in told
+        if not turns and abs(last) > 1e-6 * max(abs(limit.low), abs(limit.high))
+    ]
 
 
 def _repeat_problems(legs: Sequence[Leg], repeats: Mapping[str, int]) -> list[str]:

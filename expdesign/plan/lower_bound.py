@@ -146,8 +146,7 @@ def _leg_ends(
         speed = float(np.hypot(*velocity[:2]))
         return leg_end(vessel, environment, speed, inputs, top_mps=top_mps, yaw_rate_radps=yaw_rate_radps)
 
-    angles = [name.startswith(("a", "rudder")) for name in vessel.model.inputs]
-    rest = end(np.zeros(3), np.where(angles, np.nan, 0.0))
+    rest = end(np.zeros(3), np.where(vessel.angles, np.nan, 0.0))
     firsts = [
         replace(end(item.exit_velocity, item.commands.values[-1]), slowest_mps=least, fastest_mps=most)
         for item, (least, most, _) in zip(runs, exits, strict=True)

@@ -58,6 +58,11 @@ class Vessel:
         return tuple(response for actuator in self.actuators for response in actuator.responses)
 
     @property
+    def angles(self) -> np.ndarray:
+        """(m,) which commands are angles, of azimuths or rudders; the others drive."""
+        return np.array([name.startswith(("a", "rudder")) for name in self.model.inputs])
+
+    @property
     def turns_freely(self) -> np.ndarray:
         """(m,) which commands are angles of azimuths without limits, so that whole turns make no difference."""
         names = zip(self.model.inputs, self.limits, strict=True)
