@@ -90,7 +90,7 @@ def curves(rows: list[dict]) -> None:
     levels = sorted({row["scale"] for row in rows})
     print(
         f"{'cause':22}"
-        + "".join(f"{100 * level:8.0f} %" for level in levels)
+        + "".join(f"{100 * level:10.0f} %" for level in levels)
         + f"{'oracle - named':>18}{'- at 1/18':>16}"
     )
     groups: dict[str, list[dict]] = {}
@@ -105,7 +105,7 @@ def curves(rows: list[dict]) -> None:
             cells.append(f"{named}/{seen}/{len(here)}")
         print(
             f"{name:22}"
-            + "".join(f"{cell:>10}" for cell in cells)
+            + "".join(f"{cell:>12}" for cell in cells)
             + _missed(some, 0.05, 18)
             + _missed(some, 0.05 / 18, 16)
         )
