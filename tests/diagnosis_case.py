@@ -157,5 +157,5 @@ def from_pose(batch: Batch, *, smoothed: bool = False, wind: bool = True) -> Bat
         found, kept = central_difference(batch.pose, batch.sample_time_s), slice(1, -1)
     return replace(
         batch, velocity=found, pose=batch.pose[kept], inputs=batch.inputs[kept], derived=("u", "v", "r"),
-        wind=batch.wind[kept] if wind else None,
+        wind=batch.wind[kept] if wind else None, depth_m=None if batch.depth_m is None else batch.depth_m[kept],
     )  # fmt: skip
