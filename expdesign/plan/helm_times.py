@@ -11,11 +11,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from expdesign.errors import InputError
 from expdesign.plan.capability import RUN_UP, Capability
 from expdesign.plan.dubins import dubins_m
-from expdesign.plan.helmed_trials import GATHERING
-from expdesign.simulation import Conduct, simulate_many, stopping
+from expdesign.plan.helmed_trials import full_ahead, stopped
 from expdesign.values import Array, seal
 
 TOO_SHORT = 12.0
@@ -150,33 +148,17 @@ def _gathered(ship: Capability) -> Array:
     """(k, 3) from rest to transit speed, full ahead as fast as the engines answer."""
     approach = ship.approach
     assert approach is not None
-    helm, vessel = approach.helm, approach.helm.vessel
-    step_s = vessel.sample_time_s
-    count = int(np.ceil(GATHERING * vessel.length_m / ship.transit_speed_mps / step_s))
-    orders = np.minimum(1.0, np.arange(1, count + 1) * step_s * helm.drive_rate)
-    states = simulate_many(
-        vessel,
-        helm.rows(orders, np.full(count, approach.angle_rad))[None],
-        pose=np.zeros((1, 3)),
-        velocity=np.zeros((1, 3)),
-        current_to=np.zeros((1, 2)),
-        wind_to=np.zeros((1, 2)),
-        parameters=vessel.model.parameters[None],
-        standing=np.array([helm.inputs(0.0, approach.angle_rad)]),
-    )[:, 0]
-    return _table(np.hypot(*states[:, 3:5].T), step_s, ship.transit_speed_mps)
+    speed = np.hypot(*full_ahead(approach)[:, 3:5].T)
+    return _table(speed, approach.helm.vessel.sample_time_s, ship.transit_speed_mps)
 
 
 def _shed(ship: Capability) -> Array:
     """(k, 3) from transit speed to rest, looked at backwards."""
     approach = ship.approach
     assert approach is not None
-    vessel, conduct = approach.helm.vessel, Conduct(speed_mps=ship.transit_speed_mps)
-    try:
-        _, track = stopping(vessel, conduct=conduct)
-    except InputError:  # the engines do not go astern
-        _, track = stopping(vessel, astern=0.0, conduct=conduct)
-    return _table(np.hypot(*track.velocity[::-1, :2].T), vessel.sample_time_s, ship.transit_speed_mps)
+    vessel = approach.helm.vessel
+    speed = np.hypot(*stopped(vessel, ship.transit_speed_mps).velocity[::-1, :2].T)
+    return _table(speed, vessel.sample_time_s, ship.transit_speed_mps)
 
 
 def _table(speed: Array, step_s: float, top_mps: float) -> Array:

@@ -7,7 +7,9 @@ import numpy as np
 from expdesign.errors import InputError, NoAnswer, NoPlan
 from expdesign.plan.steady_turns import SteadyTurn, side_by_side, steady_turns
 from expdesign.plan.values import PlanSettings
+from expdesign.signals import Trajectory
 from expdesign.simulation import Approach, Conduct, simulate_many, steady_ahead, stopping
+from expdesign.values import Array
 from expdesign.vessel import Vessel
 
 LATERAL_MPS2 = 0.03 * 9.81
@@ -68,14 +70,14 @@ def _gentle(pair: tuple[SteadyTurn, SteadyTurn]) -> bool:
     return all(abs(turn.surge_mps * turn.yaw_rate_radps) <= LATERAL_MPS2 for turn in pair)
 
 
-def simulated_acceleration(approach: Approach) -> float:
-    """The constant acceleration that loses as much time as full ahead from rest to the approach's speed [m/s2]."""
-    helm, speed, vessel = approach.helm, approach.speed_mps, approach.helm.vessel
+def full_ahead(approach: Approach) -> Array:
+    """(k, 6) pose and velocity from rest with the engines full ahead, as fast as they answer, at every sample."""
+    helm, vessel = approach.helm, approach.helm.vessel
     step_s = vessel.sample_time_s
-    count = int(np.ceil(GATHERING * vessel.length_m / speed / step_s))
+    count = int(np.ceil(GATHERING * vessel.length_m / approach.speed_mps / step_s))
     orders = np.minimum(1.0, np.arange(1, count + 1) * step_s * helm.drive_rate)
     rows = np.array([helm.inputs(order, approach.angle_rad) for order in orders.tolist()])
-    surge = simulate_many(
+    states = simulate_many(
         vessel,
         rows[None],
         pose=np.zeros((1, 3)),
@@ -84,14 +86,20 @@ def simulated_acceleration(approach: Approach) -> float:
         wind_to=np.zeros((1, 2)),
         parameters=vessel.model.parameters[None],
         standing=np.array([helm.inputs(0.0, approach.angle_rad)]),
-    )[:, 0, 3]
-    there = int(np.argmax(surge >= 0.98 * speed)) or count
+    )
+    return np.asarray(states[:, 0])
+
+
+def simulated_acceleration(approach: Approach) -> float:
+    """The constant acceleration that loses as much time as full ahead from rest to the approach's speed [m/s2]."""
+    speed, step_s, surge = approach.speed_mps, approach.helm.vessel.sample_time_s, full_ahead(approach)[:, 3]
+    there = int(np.argmax(surge >= 0.98 * speed)) or len(surge) - 1
     lost_s = there * step_s - float(np.abs(surge[:there]).sum()) * step_s / speed
     return speed / (2 * max(lost_s, step_s))
 
 
-def stopping_way_m(vessel: Vessel, speed: float) -> float:
-    """Way of a stop from a steady speed [m].
+def stopped(vessel: Vessel, speed: float) -> Trajectory:
+    """A stop from a steady speed, the engines full astern, or stopped where they do not go astern.
 
     Raises:
         NoPlan: the ship does not stop, so it cannot come to rest at a goal.
@@ -99,11 +107,18 @@ def stopping_way_m(vessel: Vessel, speed: float) -> float:
     reason = ""
     for astern in (1.0, 0.0):
         try:
-            _, track = stopping(vessel, astern=astern, conduct=Conduct(speed_mps=speed))
+            return stopping(vessel, astern=astern, conduct=Conduct(speed_mps=speed))[1]
         except InputError as error:  # the engines do not go astern
             reason = str(error)
-            continue
         except NoAnswer as error:
             raise NoPlan(f"vessel {vessel.name!r} cannot be stopped at the goal: {error}") from None
-        return float(np.hypot(*np.diff(track.pose[:, :2], axis=0).T).sum())
     raise NoPlan(f"vessel {vessel.name!r} cannot be stopped at the goal: {reason}")
+
+
+def stopping_way_m(vessel: Vessel, speed: float) -> float:
+    """Way of a stop from a steady speed [m].
+
+    Raises:
+        NoPlan: as `stopped`.
+    """
+    return float(np.hypot(*np.diff(stopped(vessel, speed).pose[:, :2], axis=0).T).sum())
