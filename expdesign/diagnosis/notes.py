@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from expdesign.diagnosis.search import LARGE_WANDER_MPS
 from expdesign.diagnosis.steps import Search
 from expdesign.diagnosis.verdict import lacking
 from expdesign.diagnosis.windows import Windows, unseen_wind
 from expdesign.signals import Record
 from expdesign.vessel import Vessel
 
-LARGE_WANDER_MPS = 0.1
-"""Standard deviation of a varying current that is worth a word [m/s]."""
 FEW = 0.002
 """Share of missing samples not worth a word."""
 
