@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-import hidden_effects as sea
 import numpy as np
 
+import hidden_effects as sea
 from expdesign.records import central_difference, smoothed_velocity
 from expdesign.signals import Batch, Record
 from expdesign.vessel import STRUCTURES, Actuator, Limit, Term, Vessel, VesselModel

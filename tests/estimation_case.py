@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from expdesign.dictionary import build_dictionary
-from expdesign.durations.validation import Rehearsal, Validated, validate
 from expdesign.errors import NoAnswer
 from expdesign.estimation.methods import estimate
+from expdesign.rehearsal.validation import Rehearsal, Validated, validate
 from expdesign.scenario import load_vessel
-from expdesign.scenario.dictionary_file import load_dictionary
+from expdesign.scenario.dictionaries.dictionary_file import load_dictionary
 from expdesign.signals import Batch, Record
 from expdesign.simulation import Environment, Variation, simulate_ensemble
 from expdesign.vessel import Sensors, Vessel

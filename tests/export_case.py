@@ -18,8 +18,8 @@ from expdesign.durations import DurationDesign, build_durations, solve_durations
 from expdesign.export import PlannedTrack, commands_csv, plan_json, planned_track, track_csv
 from expdesign.export.report import ReportContent
 from expdesign.information import PrimitiveInformation, moments, regressor_rows, score_primitives
-from expdesign.plan.area import LocalFrame, SeaArea, as_multipolygon
 from expdesign.plan.values import Leg, Plan, Verification
+from expdesign.sea_area import LocalFrame, SeaArea, as_multipolygon
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import CALM, Environment, simulate
 from expdesign.vessel import Actuator, Limit, Vessel, VesselModel, allocate, required_force, structure_terms

@@ -6,15 +6,15 @@ from functools import cache
 
 import numpy as np
 import shapely
-from plan_case import VESSELS, area
 
 from expdesign.plan import PlanSettings
-from expdesign.plan.capability import capability
-from expdesign.plan.field import clearance_field
-from expdesign.plan.legs import LegWater
+from expdesign.plan.chart.clearance_grid import clearance_field
+from expdesign.plan.control.capability import capability
+from expdesign.plan.legs.find import LegWater
 from expdesign.scenario import load_vessel
 from expdesign.simulation import CALM
 from expdesign.vessel import Actuator, Limit, Term, Vessel, VesselModel
+from plan_case import VESSELS, area
 
 
 @cache

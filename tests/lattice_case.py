@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.sparse import csr_array
 
-from expdesign.plan.lattice import LatticeProblem
+from expdesign.plan.search.lattice import LatticeProblem
 
 AHEAD = ((1, 0), (0, 1), (-1, 0), (0, -1))
 

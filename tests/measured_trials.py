@@ -4,12 +4,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from record_files import write_trial
 
 from expdesign.scenario import load_vessel
 from expdesign.signals import Commands
 from expdesign.simulation import CALM, Environment, measure, simulate
 from expdesign.vessel import Sensors, Vessel
+from record_files import write_trial
 
 VESSELS = Path(__file__).parents[1] / "scenarios" / "vessels"
 MODEL_SHIP, TUG = VESSELS / "model-ship.toml", VESSELS / "azimuth-30m.toml"

@@ -8,15 +8,16 @@ import numpy as np
 import shapely
 
 from expdesign.dictionary import Primitive
-from expdesign.plan import LocalFrame, PlanSettings, SeaArea, as_multipolygon
-from expdesign.plan.capability import capability
-from expdesign.plan.field import clearance_field
-from expdesign.plan.goal_ways import build_goal_ways
-from expdesign.plan.leg_times import leg_times
-from expdesign.plan.legs import LegWater
-from expdesign.plan.search_space import SearchSpace, stamp
-from expdesign.plan.speed_changes import leg_end
+from expdesign.plan import PlanSettings
+from expdesign.plan.chart.clearance_grid import clearance_field
+from expdesign.plan.chart.goal_distance import build_goal_ways
+from expdesign.plan.control.acceleration_limits import leg_end
+from expdesign.plan.control.capability import capability
+from expdesign.plan.legs.agile_times import leg_times
+from expdesign.plan.legs.find import LegWater
+from expdesign.plan.search.state import SearchSpace, stamp
 from expdesign.scenario import load_vessel
+from expdesign.sea_area import LocalFrame, SeaArea, as_multipolygon
 from expdesign.simulation import CALM
 
 VESSELS = Path(__file__).parents[1] / "scenarios" / "vessels"

@@ -6,7 +6,7 @@ import pytest
 import shapely
 
 from expdesign.errors import NoAnswer, NoPlan
-from expdesign.plan.area import DENSE, LocalFrame, Zones, as_multipolygon, build_sea_area
+from expdesign.sea_area import DENSE, LocalFrame, Zones, as_multipolygon, build_sea_area
 
 EMPTY = shapely.MultiPolygon()
 BOUNDS = shapely.box(-500, -500, 500, 500)

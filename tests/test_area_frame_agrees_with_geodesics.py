@@ -4,7 +4,7 @@ import numpy as np
 import pyproj
 import pytest
 
-from expdesign.plan.area import LocalFrame
+from expdesign.sea_area import LocalFrame
 
 GEOD = pyproj.Geod(ellps="WGS84")
 ORIGINS = [(60.1275, 24.97), (0.0, 0.0), (-33.9, 151.2), (78.2, 15.6), (-17.0, 179.99), (58.45, -179.995)]

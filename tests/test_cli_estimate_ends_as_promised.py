@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from measured_trials import EULER, MODEL_SHIP, MODEL_SHIP_TRUE, model_ship_commands, write_run
 
 from expdesign.cli import main
 from expdesign.estimation.methods import METHODS
 from expdesign.signals import Commands
+from measured_trials import EULER, MODEL_SHIP, MODEL_SHIP_TRUE, model_ship_commands, write_run
 
 
 @pytest.fixture(scope="module")

@@ -6,14 +6,14 @@ import re
 import shlex
 from pathlib import Path
 
-import export_case
 import pytest
-from measured_trials import TUG, TUG_TRUE, quiet, write_run
 
+import export_case
 from expdesign.cli import main
 from expdesign.export import FORMATS
 from expdesign.indices import standard_results
 from expdesign.simulation import Conduct, turning_circle, zigzag
+from measured_trials import TUG, TUG_TRUE, quiet, write_run
 
 README = Path(__file__).parents[1] / "README.md"
 TWENTY = math.radians(20)

@@ -14,7 +14,11 @@ from expdesign.cli import main
 from expdesign.errors import FileError, InputError, NoAnswer, NoPlan
 
 ASLEEP = """
-import signal, sys, time, types, expdesign
+import signal
+import sys
+import time
+import types
+import expdesign
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a test run in the background would ignore it
 from expdesign.cli import main
 def run(scenario, out, *, seed, progress):
@@ -131,7 +135,9 @@ def test_a_signal_interrupts_the_work(number: signal.Signals) -> None:
 def test_ctrl_c_while_the_program_loads_is_one_line(module: str) -> None:
     """Solvers are not broken off while they load: some take that badly."""
     early = f"""
-import builtins, signal, sys
+import builtins
+import signal
+import sys
 from expdesign.cli import main
 real = builtins.__import__
 def pressed(name, *rest):

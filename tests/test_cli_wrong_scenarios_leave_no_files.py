@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 
 import pytest
-from scenario_files import collection, feature, spoil, square, write_scenario
 
 from expdesign.cli import main
+from scenario_files import collection, feature, spoil, square, write_scenario
 
 
 def unknown_key(folder):

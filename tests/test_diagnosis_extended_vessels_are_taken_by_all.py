@@ -5,22 +5,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_case import hidden_record, vessel_of
 
+from diagnosis_case import hidden_record, vessel_of
 from expdesign.diagnosis import CAUSES, Estimated, Finding
 from expdesign.diagnosis import diagnose as diagnose_record
-from expdesign.diagnosis.accuracy import accuracy, first_states
-from expdesign.diagnosis.causes.shallow_water import in_shallow_water
+from expdesign.diagnosis.causes.environment.shallow_water import in_shallow_water
 from expdesign.diagnosis.extension import as_extended, extend
-from expdesign.diagnosis.motion import simulate_windows
-from expdesign.diagnosis.rates import rates
-from expdesign.diagnosis.surroundings import Surroundings
+from expdesign.diagnosis.model.accuracy import accuracy, first_states
+from expdesign.diagnosis.model.motion import simulate_windows
+from expdesign.diagnosis.model.rates import rates
+from expdesign.diagnosis.model.surroundings import Surroundings
 from expdesign.dictionary import PrimitiveSpec, build_dictionary
 from expdesign.dictionary.build import family
 from expdesign.dictionary.spec import complete_settings
 from expdesign.estimation.methods import Settings, estimate
-from expdesign.estimation.replay import Integration, simulate_batch
-from expdesign.estimation.tables import model_for, with_depth
+from expdesign.estimation.regression.tables import model_for, with_depth
+from expdesign.estimation.replay.replay import Integration, simulate_batch
 from expdesign.export import vessel_toml
 from expdesign.export.diagnosis_page import diagnosis_html, extended_vessel
 from expdesign.information import score_primitives

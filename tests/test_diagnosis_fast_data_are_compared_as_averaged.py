@@ -2,15 +2,15 @@
 
 from dataclasses import replace
 
-import hidden_effects as sea
 import numpy as np
 import pytest
-from diagnosis_case import from_pose, hidden_record, vessel_of
 
-from expdesign.diagnosis.accuracy import simulate_from_first
+import hidden_effects as sea
+from diagnosis_case import from_pose, hidden_record, vessel_of
+from expdesign.diagnosis.data.windows import cut_windows, fastest_rate
 from expdesign.diagnosis.extension import as_extended
-from expdesign.diagnosis.followed import followed_inputs
-from expdesign.diagnosis.windows import cut_windows, fastest_rate
+from expdesign.diagnosis.model.accuracy import simulate_from_first
+from expdesign.diagnosis.model.delivered_inputs import followed_inputs
 from expdesign.signals import Record
 
 CALM = sea.Weather(current_std=0.0, wind_std=0.0)

@@ -2,15 +2,15 @@
 
 import numpy as np
 import pytest
-from diagnosis_case import hidden_record, vessel_of
 
-from expdesign.diagnosis.accuracy import first_states
+from diagnosis_case import hidden_record, vessel_of
+from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.extension import as_extended
-from expdesign.diagnosis.fitting import fit
-from expdesign.diagnosis.moves import moved
-from expdesign.diagnosis.parts import scales
-from expdesign.diagnosis.search import settled
-from expdesign.diagnosis.windows import cut_windows
+from expdesign.diagnosis.fit.gauss_newton import fit
+from expdesign.diagnosis.fit.step_limits import moved
+from expdesign.diagnosis.model.accuracy import first_states
+from expdesign.diagnosis.model.terms import scales
+from expdesign.diagnosis.select.forward_search import settled
 
 
 @pytest.mark.parametrize("ship", ["tug", "barge", "coaster"])

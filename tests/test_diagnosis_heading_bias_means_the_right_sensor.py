@@ -8,12 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_case import vessel_of
 
-from expdesign.diagnosis.accuracy import accuracy
+from diagnosis_case import vessel_of
+from expdesign.diagnosis.data.windows import cut_windows, derived_outputs
 from expdesign.diagnosis.extension import as_extended, extend
-from expdesign.diagnosis.observed import observed
-from expdesign.diagnosis.windows import cut_windows, derived_outputs
+from expdesign.diagnosis.model.accuracy import accuracy
+from expdesign.diagnosis.model.sensors import observed
 from expdesign.records import load_records
 from expdesign.signals import Commands
 from expdesign.simulation import CALM, measure, simulate

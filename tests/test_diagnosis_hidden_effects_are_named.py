@@ -1,10 +1,10 @@
 """Effects hidden by an independent simulator are named, estimated and mended; clean data are called clean."""
 
-import hidden_effects as sea
 import numpy as np
 import pytest
-from diagnosis_case import hidden_record, vessel_of
 
+import hidden_effects as sea
+from diagnosis_case import hidden_record, vessel_of
 from expdesign.diagnosis import diagnose
 
 ALL = 0b111
@@ -74,8 +74,8 @@ def test_the_generator_and_the_package_agree_on_calm_water():
 
     The first state comes from a straight line through five samples, so that its error is 0.77 of one sample's noise.
     """
-    from expdesign.diagnosis.accuracy import accuracy
     from expdesign.diagnosis.extension import as_extended
+    from expdesign.diagnosis.model.accuracy import accuracy
 
     calm = sea.Weather(current_std=0.0, wind_std=0.0)
     for ship in sea.SHIPS:

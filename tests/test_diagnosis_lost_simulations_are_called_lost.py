@@ -3,10 +3,10 @@
 from dataclasses import replace
 
 import numpy as np
-from diagnosis_case import hidden_record, vessel_of
 
-from expdesign.diagnosis.accuracy import MOST_SPREADS, accuracy, bounded
+from diagnosis_case import hidden_record, vessel_of
 from expdesign.diagnosis.extension import as_extended
+from expdesign.diagnosis.model.accuracy import MOST_SPREADS, accuracy, bounded
 
 
 def test_a_model_that_runs_away_has_a_bounded_error():

@@ -5,13 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_case import hidden_record, vessel_of
 
+from diagnosis_case import hidden_record, vessel_of
 from expdesign.diagnosis import Estimated, Finding, diagnose
+from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.extension import as_extended, public_name
-from expdesign.diagnosis.residuals import _slopes, dependence, on_the_whole, short_residuals
+from expdesign.diagnosis.model.residuals import _slopes, dependence, on_the_whole, short_residuals
 from expdesign.diagnosis.values import Residuals
-from expdesign.diagnosis.windows import cut_windows
 from expdesign.export.diagnosis_page import diagnosis_html, diagnosis_json
 from expdesign.export.diagnosis_page.suspects import has_sign, is_force, suspected, suspected_force
 

@@ -2,11 +2,18 @@
 
 import numpy as np
 import pytest
-from diagnosis_case import hidden_record, vessel_of
 
+from diagnosis_case import hidden_record, vessel_of
+from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.extension import as_extended
-from expdesign.diagnosis.tell_apart import Proposal, _turning, _windows, most_telling, seen_wind, standard_proposals
-from expdesign.diagnosis.windows import cut_windows
+from expdesign.diagnosis.select.discriminating_manoeuvre import (
+    Proposal,
+    _turning,
+    _windows,
+    most_telling,
+    seen_wind,
+    standard_proposals,
+)
 from expdesign.errors import InputError
 from expdesign.signals import Commands
 from expdesign.workflows.diagnosed import as_inputs

@@ -4,15 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_case import Told, from_pose, hidden_record, hidden_records, vessel_of
 
-from expdesign.diagnosis.accuracy import accuracy, first_states
-from expdesign.diagnosis.candidate import Situation
+from diagnosis_case import Told, from_pose, hidden_record, hidden_records, vessel_of
 from expdesign.diagnosis.causes import CAUSES
+from expdesign.diagnosis.causes.candidate import Situation
+from expdesign.diagnosis.data.windows import cut_windows, held_wind
 from expdesign.diagnosis.extension import as_extended, extend
-from expdesign.diagnosis.motion import simulate_windows
+from expdesign.diagnosis.model.accuracy import accuracy, first_states
+from expdesign.diagnosis.model.motion import simulate_windows
 from expdesign.diagnosis.notes import notes_on_data
-from expdesign.diagnosis.windows import cut_windows, held_wind
 from expdesign.errors import InputError
 from expdesign.signals import Record
 from expdesign.vessel import Term, Vessel

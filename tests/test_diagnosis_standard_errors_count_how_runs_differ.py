@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from expdesign.diagnosis.clusters import FEWEST_RUNS, clustered, widened
-from expdesign.diagnosis.fitting import Fit
-from expdesign.diagnosis.joint import Columns, grams, marginal
-from expdesign.diagnosis.noise import Noise
+from expdesign.diagnosis.data.noise import Noise
+from expdesign.diagnosis.fit.clusters import FEWEST_RUNS, clustered, widened
+from expdesign.diagnosis.fit.gauss_newton import Fit
+from expdesign.diagnosis.fit.linear_model import Columns, grams, marginal
 
 RUNS, SAMPLES, APART, NOISE = 14, 60, 0.3, 1.0
 

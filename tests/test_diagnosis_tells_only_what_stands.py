@@ -5,22 +5,22 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from diagnosis_case import hidden_record, vessel_of
 
-from expdesign.diagnosis.accuracy import first_states
-from expdesign.diagnosis.candidate import Candidate, Situation
+from diagnosis_case import hidden_record, vessel_of
 from expdesign.diagnosis.causes import CAUSES
-from expdesign.diagnosis.contenders import contend, opening
+from expdesign.diagnosis.causes.candidate import Candidate, Situation
+from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.diagnose import _stuck_note
 from expdesign.diagnosis.extension import as_extended
-from expdesign.diagnosis.fitting import fit
-from expdesign.diagnosis.gain import HeldOut, _fitted, gained
-from expdesign.diagnosis.kept import MOST_HARM, mending, worthwhile
+from expdesign.diagnosis.fit.cross_validation import HeldOut, _fitted, gained
+from expdesign.diagnosis.fit.gauss_newton import fit
+from expdesign.diagnosis.fit.score_tests import LEVEL, Scored, screen
+from expdesign.diagnosis.model.accuracy import first_states
 from expdesign.diagnosis.notes import notes_on_dropped
-from expdesign.diagnosis.screening import LEVEL, Scored, screen
-from expdesign.diagnosis.search import _openings, search, settled
-from expdesign.diagnosis.steps import Search, Step, like_nothing, wald, without
-from expdesign.diagnosis.windows import cut_windows
+from expdesign.diagnosis.select.contenders import contend, opening
+from expdesign.diagnosis.select.forward_search import _openings, search, settled
+from expdesign.diagnosis.select.pruning import MOST_HARM, mending, worthwhile
+from expdesign.diagnosis.select.search_state import Search, Step, like_nothing, wald, without
 
 SPREAD = np.ones((6, 3))
 

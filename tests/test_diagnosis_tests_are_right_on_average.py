@@ -2,23 +2,23 @@
 
 from dataclasses import replace
 
-import hidden_effects as sea
 import numpy as np
 import pytest
-from diagnosis_case import hidden_record, vessel_of
 from scipy.stats import chi2
 
-from expdesign.diagnosis.accuracy import first_states
-from expdesign.diagnosis.candidate import Candidate
-from expdesign.diagnosis.contenders import contend, opening
+import hidden_effects as sea
+from diagnosis_case import hidden_record, vessel_of
+from expdesign.diagnosis.causes.candidate import Candidate
+from expdesign.diagnosis.data.noise import FLOOR, Noise, fit_colour, hats, whitened
+from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.extension import as_extended, extend
-from expdesign.diagnosis.fitting import fit
-from expdesign.diagnosis.motion import linearise, push_of, responses, simulate_windows
-from expdesign.diagnosis.noise import FLOOR, Noise, fit_colour, hats, whitened
-from expdesign.diagnosis.screening import Scored, _effective_tests, screen
-from expdesign.diagnosis.search import _candidates, settled
-from expdesign.diagnosis.steps import Step, superfluous
-from expdesign.diagnosis.windows import cut_windows
+from expdesign.diagnosis.fit.gauss_newton import fit
+from expdesign.diagnosis.fit.score_tests import Scored, _effective_tests, screen
+from expdesign.diagnosis.model.accuracy import first_states
+from expdesign.diagnosis.model.motion import linearise, push_of, responses, simulate_windows
+from expdesign.diagnosis.select.contenders import contend, opening
+from expdesign.diagnosis.select.forward_search import _candidates, settled
+from expdesign.diagnosis.select.search_state import Step, superfluous
 
 SMALL = {"theta:X_u": 1e-5, "current:north": 1e-4, "gain": 1e-4, "inertia:v": 1e-4, "heading_bias": 1e-4}
 

@@ -1,19 +1,19 @@
 """What acts in a part of a sample's time is simulated so, and roll that is quick beside it."""
 
-import hidden_effects as sea
 import numpy as np
 import pytest
-from diagnosis_case import hidden_record, vessel_of
 
-from expdesign.diagnosis.accuracy import first_states
-from expdesign.diagnosis.candidate import Candidate
-from expdesign.diagnosis.contenders import contend, opening
+import hidden_effects as sea
+from diagnosis_case import hidden_record, vessel_of
+from expdesign.diagnosis.causes.candidate import Candidate
+from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.extension import as_extended
-from expdesign.diagnosis.fitting import fit
-from expdesign.diagnosis.motion import simulate_windows
-from expdesign.diagnosis.profile import middle, sharpened
-from expdesign.diagnosis.screening import Scored
-from expdesign.diagnosis.windows import cut_windows
+from expdesign.diagnosis.fit.gauss_newton import fit
+from expdesign.diagnosis.fit.score_tests import Scored
+from expdesign.diagnosis.model.accuracy import first_states
+from expdesign.diagnosis.model.motion import simulate_windows
+from expdesign.diagnosis.select.contenders import contend, opening
+from expdesign.diagnosis.select.profile_likelihood import middle, sharpened
 
 CALM = sea.Weather(current_std=0.0, wind_std=0.0)
 PERFECT = sea.Sensors(position=0.0, heading=0.0, velocity=0.0, yaw_rate=0.0, wind=0.0)

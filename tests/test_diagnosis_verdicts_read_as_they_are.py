@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from diagnosis_case import from_pose, hidden_record, vessel_of
 
+from diagnosis_case import from_pose, hidden_record, vessel_of
 from expdesign.diagnosis import CAUSES
 from expdesign.diagnosis.extension import as_extended, extend
-from expdesign.diagnosis.gain import HeldOut
+from expdesign.diagnosis.fit.cross_validation import HeldOut
 from expdesign.diagnosis.notes import note_on_weather
-from expdesign.diagnosis.search import _onward
+from expdesign.diagnosis.select.forward_search import _onward
 from expdesign.diagnosis.values import Accuracy, Fall, Finding
 from expdesign.diagnosis.verdict import LACKS, error_falls, verdict
 from expdesign.signals import Record

@@ -4,18 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_case import from_pose, hidden_record, vessel_of
 from scipy.stats import chi2
 
+from diagnosis_case import from_pose, hidden_record, vessel_of
 from expdesign.diagnosis import diagnose
-from expdesign.diagnosis.accuracy import accuracy, first_states
-from expdesign.diagnosis.candidate import Candidate, Situation
 from expdesign.diagnosis.causes import CAUSES
-from expdesign.diagnosis.extended import Extended
+from expdesign.diagnosis.causes.candidate import Candidate, Situation
+from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.extension import as_extended, extend
-from expdesign.diagnosis.fitting import fit
-from expdesign.diagnosis.screening import screen
-from expdesign.diagnosis.windows import cut_windows
+from expdesign.diagnosis.fit.gauss_newton import fit
+from expdesign.diagnosis.fit.score_tests import screen
+from expdesign.diagnosis.model.accuracy import accuracy, first_states
+from expdesign.diagnosis.model.extended import Extended
 from expdesign.signals import Record
 from expdesign.vessel import Mounting, Response, Vessel
 

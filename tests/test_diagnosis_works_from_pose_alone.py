@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_case import from_pose, hidden_record, vessel_of
 
+from diagnosis_case import from_pose, hidden_record, vessel_of
 from expdesign.diagnosis import diagnose
 from expdesign.signals import Record
 

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from design_case import SCENARIOS, one_line, spec, vessel
 
+from design_case import SCENARIOS, one_line, spec, vessel
 from expdesign.dictionary import FAMILIES, PrimitiveSpec, build_primitive, complete_settings, family
 from expdesign.dictionary.trim import STEADY, lost
 from expdesign.errors import InputError
-from expdesign.export.dictionary_file import dictionary_files
+from expdesign.export.files.dictionary_file import dictionary_files
 from expdesign.information import score_primitives
 from expdesign.scenario import load_dictionary
 from expdesign.simulation import Conduct, simulate, steady_ahead, zigzag

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from design_case import one_line, spec, vessel
 
+from design_case import one_line, spec, vessel
 from expdesign.dictionary import FAMILIES, Family, Setting, build_primitive, complete_settings, family
 from expdesign.errors import InputError, UnknownName
 from expdesign.values import Array

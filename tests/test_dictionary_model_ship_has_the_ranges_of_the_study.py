@@ -1,6 +1,7 @@
 """tau1 to tau11 stay in the ranges of F. Ljungberg, doctoral thesis, Linköping University, 9.1.1."""
 
 import pytest
+
 from design_case import example_dictionary, vessel
 
 PRIMITIVES = {primitive.name[:5]: primitive for primitive in example_dictionary("model-ship")}

@@ -5,8 +5,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from design_case import example_dictionary, force_actuator, resampled, spec, vessel, with_limit
 
+from design_case import example_dictionary, force_actuator, resampled, spec, vessel, with_limit
 from expdesign.dictionary import Primitive, PrimitiveSpec, build_primitive, family
 from expdesign.errors import Unreachable
 from expdesign.simulation import simulate

@@ -6,8 +6,8 @@ import re
 
 import numpy as np
 import pytest
-from design_case import SCENARIOS, spec, vessel
 
+from design_case import SCENARIOS, spec, vessel
 from expdesign.cli import main
 from expdesign.dictionary import build_primitive
 from expdesign.dictionary.trim import drift

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from design_case import SCENARIOS, WIND, example_dictionary, spec, vessel, with_limit
 
+from design_case import SCENARIOS, WIND, example_dictionary, spec, vessel, with_limit
 from expdesign.dictionary import build_dictionary, build_primitive, family
 from expdesign.dictionary.wishes import STRAYED, departure, strayed, wished_motion
-from expdesign.durations.growing_optimum import optimum
+from expdesign.growing.optimum import optimum
 from expdesign.information import score_primitives
 from expdesign.scenario import load_dictionary
 from expdesign.vessel import Limit

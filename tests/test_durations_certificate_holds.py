@@ -3,9 +3,9 @@
 import cvxpy
 import numpy as np
 import pytest
-from design_case import WIND, duration_problem, random_matrices, scored_example, vessel
 from scipy.optimize import minimize
 
+from design_case import WIND, duration_problem, random_matrices, scored_example, vessel
 from expdesign.durations import (
     DurationDesign,
     DurationProblem,

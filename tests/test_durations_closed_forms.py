@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from design_case import duration_problem
 
+from design_case import duration_problem
 from expdesign.durations import solve_durations
 from expdesign.values import Array
 

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from design_case import duration_problem, random_matrices
 from scipy.optimize import minimize
 
+from design_case import duration_problem, random_matrices
 from expdesign.durations import Aim, DurationProblem, efficiencies, optimal_shares, solve_durations
 from expdesign.durations.collected import Collected
 from expdesign.errors import InputError, UnknownName

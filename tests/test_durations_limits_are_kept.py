@@ -5,8 +5,8 @@ from dataclasses import replace
 import cvxpy
 import numpy as np
 import pytest
-from design_case import duration_problem, one_line, random_matrices
 
+from design_case import duration_problem, one_line, random_matrices
 from expdesign.durations import (
     Aim,
     Budget,

@@ -3,9 +3,9 @@
 from pathlib import Path
 
 import pytest
-from scenario_files import spoil, write_scenario
 
 from expdesign.cli import main
+from scenario_files import spoil, write_scenario
 
 TINY = 'most_s = {acceleration = 1e-9, "zz-speed-0.5" = 600.0, "zz-speed-0.4" = 1e-9}'
 ALL_TIME = 'least_s = {acceleration = 360.0, "zz-speed-0.5" = 240.0}'

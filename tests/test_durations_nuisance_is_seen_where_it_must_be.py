@@ -5,8 +5,8 @@ from itertools import product
 
 import numpy as np
 import pytest
-from design_case import duration_problem, one_line, random_matrices
 
+from design_case import duration_problem, one_line, random_matrices
 from expdesign.durations import Aim, DurationProblem, optimal_shares, solve_durations, with_repeats
 from expdesign.durations.collected import Collected
 from expdesign.durations.criteria import LogDet, LogSmallest, LogTrace

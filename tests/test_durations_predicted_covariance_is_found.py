@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 
 from expdesign.dictionary import build_dictionary
-from expdesign.durations.validation import Rehearsal, heading_rad, trial_parts, validate
 from expdesign.errors import NotInformative
 from expdesign.information.expected import TrialPart, expected_covariance
+from expdesign.rehearsal.validation import Rehearsal, heading_rad, trial_parts, validate
 from expdesign.scenario import load_vessel
-from expdesign.scenario.dictionary_file import load_dictionary
+from expdesign.scenario.dictionaries.dictionary_file import load_dictionary
 from expdesign.signals import Commands
 from expdesign.simulation import Environment, Variation
 from expdesign.vessel import Actuator, Limit, Sensors, Term, Vessel, VesselModel

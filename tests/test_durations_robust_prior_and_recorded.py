@@ -5,8 +5,8 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from design_case import duration_problem, example_dictionary, random_matrices, scored_example, vessel
 
+from design_case import duration_problem, example_dictionary, random_matrices, scored_example, vessel
 from expdesign.durations import (
     Aim,
     DurationProblem,

@@ -4,8 +4,8 @@ from itertools import product
 
 import numpy as np
 import pytest
-from design_case import WIND, duration_problem, one_line, random_matrices, scored_example, vessel
 
+from design_case import WIND, duration_problem, one_line, random_matrices, scored_example, vessel
 from expdesign.durations import DurationDesign, DurationProblem, build_durations, solve_durations, with_repeats
 from expdesign.durations.certificate import scaled
 from expdesign.errors import NoAnswer, NotInformative

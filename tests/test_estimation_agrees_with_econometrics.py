@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from expdesign.estimation.regression import single_output
-from expdesign.estimation.solution import Weighting, solve_iv, solve_ls
+from expdesign.estimation.regression.regression import single_output
+from expdesign.estimation.solve.solution import Weighting, solve_iv, solve_ls
 
 linearmodels = pytest.importorskip("linearmodels.iv")
 statsmodels = pytest.importorskip("statsmodels.api")

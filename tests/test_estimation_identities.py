@@ -5,8 +5,8 @@ import pytest
 
 from expdesign.errors import NotInformative
 from expdesign.estimation.fusion import fuse
-from expdesign.estimation.regression import Regression
-from expdesign.estimation.solution import Weighting, solve_iv, solve_ls
+from expdesign.estimation.regression.regression import Regression
+from expdesign.estimation.solve.solution import Weighting, solve_iv, solve_ls
 
 NAMES = ("a", "b", "c", "d")
 

@@ -7,6 +7,7 @@ current that wanders for 100 s. Thresholds are the binomial chance error of as m
 
 import numpy as np
 import pytest
+
 from estimation_case import (
     CALM_CURRENT,
     NOMINAL,
@@ -18,12 +19,11 @@ from estimation_case import (
     many_short_batches,
     measured,
 )
-
 from expdesign.estimation.methods import Settings, estimate
-from expdesign.estimation.regression import single_output
-from expdesign.estimation.solution import Weighting, solve_iv
-from expdesign.estimation.timeline import timeline
-from expdesign.estimation.whitening import Colour, fitted_colour, innovations, white_parts
+from expdesign.estimation.noise.timeline import timeline
+from expdesign.estimation.noise.whitening import Colour, fitted_colour, innovations, white_parts
+from expdesign.estimation.regression.regression import single_output
+from expdesign.estimation.solve.solution import Weighting, solve_iv
 from expdesign.signals import Record
 
 CASES = {

@@ -2,16 +2,16 @@
 
 import numpy as np
 import pytest
-from estimation_case import CALM_CURRENT, NOMINAL, TRUE, commands, measured, record
 
-from expdesign.estimation.components import MISFIT, Components, filtered, fit_components, score_covariance
-from expdesign.estimation.components import _expected as expected_periodogram
-from expdesign.estimation.instruments import apart_from_start
+from estimation_case import CALM_CURRENT, NOMINAL, TRUE, commands, measured, record
 from expdesign.estimation.methods import estimate
-from expdesign.estimation.predictors import build_layout, build_regression
-from expdesign.estimation.regression import single_output
-from expdesign.estimation.solution import Weighting, solve_iv
-from expdesign.estimation.timeline import stretches
+from expdesign.estimation.noise.components import MISFIT, Components, filtered, fit_components, score_covariance
+from expdesign.estimation.noise.components import _expected as expected_periodogram
+from expdesign.estimation.noise.timeline import stretches
+from expdesign.estimation.regression.predictors import build_layout, build_regression
+from expdesign.estimation.regression.regression import single_output
+from expdesign.estimation.replay.instruments import apart_from_start
+from expdesign.estimation.solve.solution import Weighting, solve_iv
 
 MEMORIES = np.array([4.0, 30.0, np.inf])
 

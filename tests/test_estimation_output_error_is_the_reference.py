@@ -4,17 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from estimation_case import NOMINAL, QUIET, TRUE, commands, measured, record
-from measured_trials import MODEL_SHIP_TRUE, model_ship_commands
 from scipy.optimize import least_squares
 
+from estimation_case import NOMINAL, QUIET, TRUE, commands, measured, record
 from expdesign.errors import InputError
-from expdesign.estimation._casadi import Stretches, compiled
 from expdesign.estimation.fit import fit_percent
 from expdesign.estimation.methods import Settings, estimate
-from expdesign.estimation.replay import Integration, build_replay, simulate_batch, start_state
+from expdesign.estimation.replay._casadi import Stretches, compiled
+from expdesign.estimation.replay.replay import Integration, build_replay, simulate_batch, start_state
 from expdesign.signals import Batch, Record
 from expdesign.simulation import Environment, Variation, motion_rates, simulate
+from measured_trials import MODEL_SHIP_TRUE, model_ship_commands
 
 TRUTH = dict(zip(TRUE.model.names, TRUE.model.parameters.tolist(), strict=True))
 MERGED = {"X_abs_u_u": "W_abs_u_u", "Y_abs_v_v": "W_abs_v_v", "N_uv": "W_uv"}

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from estimation_case import CURRENT, NOMINAL, QUIET, TRUE, commands, measured, record
 
+from estimation_case import CURRENT, NOMINAL, QUIET, TRUE, commands, measured, record
 from expdesign.errors import InputError, NotInformative, UnknownName
 from expdesign.estimation.disturbance import mean_current
 from expdesign.estimation.methods import METHODS, Settings, estimate
-from expdesign.estimation.predictors import build_layout, build_regression
-from expdesign.estimation.solution import Weighting
+from expdesign.estimation.regression.predictors import build_layout, build_regression
+from expdesign.estimation.solve.solution import Weighting
 from expdesign.signals import Batch
 from expdesign.simulation import Environment, Variation
 from expdesign.vessel import Term

@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from estimation_case import CURRENT, NOMINAL, QUIET, TRUE, commands, measured, record
 
+from estimation_case import CURRENT, NOMINAL, QUIET, TRUE, commands, measured, record
 from expdesign.errors import Diverged, InputError
 from expdesign.estimation.excitation import WorstCase, check_excitation, worst_case
 from expdesign.estimation.fit import fit_percent
 from expdesign.estimation.methods import Settings, estimate
 from expdesign.estimation.physical import PhysicalModel, from_physical, to_physical
-from expdesign.estimation.replay import Integration, simulate_batch
+from expdesign.estimation.replay.replay import Integration, simulate_batch
 from expdesign.signals import Commands
 from expdesign.simulation import CALM, Environment, Variation, simulate, simulate_ensemble
 

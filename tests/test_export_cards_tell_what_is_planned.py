@@ -4,12 +4,12 @@ import math
 from dataclasses import replace
 from functools import cache
 
-import export_case as case
 import numpy as np
 import pytest
 import shapely
 from lxml import html
 
+import export_case as case
 from expdesign.conventions import to_n_frame
 from expdesign.errors import NoPlan
 from expdesign.export.cards import cards_html

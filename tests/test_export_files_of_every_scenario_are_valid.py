@@ -16,17 +16,18 @@ import numpy as np
 import pytest
 import shapely
 from lxml import etree
-from route_readers import PLAN_SCHEMA, READERS
 
 from expdesign import workflows
 from expdesign.dictionary import build_dictionary
-from expdesign.export import FORMATS, build_route, plan_json, planned_track, read_plan, route_files, track_csv
+from expdesign.export import FORMATS, build_route, plan_json, planned_track, route_files, track_csv
 from expdesign.export.formats.check import check_route_file
 from expdesign.export.formats.mission import NAV_WAYPOINT
+from expdesign.export.routes import read_plan
 from expdesign.plan.values import Leg, Plan, Verification
 from expdesign.scenario import Scenario, load_scenario
 from expdesign.signals import Trajectory
 from expdesign.simulation import simulate
+from route_readers import PLAN_SCHEMA, READERS
 
 SCENARIOS = sorted((Path(__file__).parents[1] / "scenarios").glob("*.toml"))
 SCHEMAS = Path(__file__).parents[2] / "shared" / "data" / "schemas"

@@ -8,13 +8,13 @@ from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
 
-import export_case as case
 import gpxpy
 import numpy as np
 import pytest
 from lxml import etree
 from shapely.geometry import shape
 
+import export_case as case
 from expdesign.conventions import KNOTS_PER_MPS, METRES_PER_NAUTICAL_MILE
 from expdesign.errors import InputError, UnknownName
 from expdesign.export import FORMATS, STANDARD, Route, build_route, find_format, route_files

@@ -7,17 +7,17 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from functools import cache
 
-import export_case as case
 import gpxpy
 import numpy as np
 import pytest
 from lxml import etree
-from route_readers import PLAN_SCHEMA, READERS
 from shapely.geometry import LinearRing, shape
 
+import export_case as case
 from expdesign.export import FORMATS, Route, build_route, find_format
 from expdesign.export.formats.check import check_gpx, check_rtz
 from expdesign.export.formats.mission import DO_CHANGE_SPEED, NAV_WAYPOINT
+from route_readers import PLAN_SCHEMA, READERS
 
 DEPARTURE = datetime(2027, 5, 1, 8, 0, tzinfo=UTC)
 ODD = "Åbo \"sväng\" <b>&amp; 'zig\\zag'</b>; \N{SNOWMAN} 訓練"

@@ -6,16 +6,15 @@ from dataclasses import replace
 from functools import cache
 from html.parser import HTMLParser
 
-import export_case as case
 import numpy as np
 import pytest
 import shapely
 from lxml import etree
 
+import export_case as case
 from expdesign.durations import MEAN_SUBTRACTIONS, build_durations, solve_durations
-from expdesign.durations.growing_values import GrowRound, Growth
-from expdesign.export import build_route
-from expdesign.export.report import report_html, words
+from expdesign.export import build_route, words
+from expdesign.export.report import report_html
 from expdesign.export.report.admission import least_charted_depth
 from expdesign.export.report.content import information_rate, primitive_runs, relative_information
 from expdesign.export.report.figures.footprints import footprints
@@ -24,10 +23,11 @@ from expdesign.export.report.figures.position_axes import nice_step
 from expdesign.export.report.tables import parameter_rows
 from expdesign.export.report.trust import chain
 from expdesign.export.report.uncertainty import expected
+from expdesign.growing.values import GrowRound, Growth
 from expdesign.information.expected import TrialPart, expected_covariance
-from expdesign.plan.footprint import hull_polygons
 from expdesign.simulation import CALM
 from expdesign.vessel import Sensors
+from expdesign.vessel.hull import hull_polygons
 
 ODD = 'x <script>alert(1)</script> & "$\\alpha$" $ \x07 \N{SNOWMAN}'
 

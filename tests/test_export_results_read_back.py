@@ -9,10 +9,10 @@ from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
-import export_case as case
 import numpy as np
 import pytest
 
+import export_case as case
 from expdesign.errors import FileError, NoPlan
 from expdesign.export import (
     commands_csv,
@@ -20,11 +20,11 @@ from expdesign.export import (
     durations_json,
     plan_json,
     planned_track,
-    read_plan,
     track_csv,
     write_files,
 )
-from expdesign.export.results import strict_json
+from expdesign.export.files.results import strict_json
+from expdesign.export.routes import read_plan
 from expdesign.simulation import simulate
 
 

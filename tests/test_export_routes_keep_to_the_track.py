@@ -5,17 +5,18 @@ from datetime import UTC, datetime
 from itertools import pairwise
 from pathlib import Path
 
-import export_case as case
 import numpy as np
 import pyproj
 import pytest
 import shapely
 
+import export_case as case
 from expdesign.errors import InputError, NoPlan
-from expdesign.export import PlannedTrack, Route, build_route, read_plan
-from expdesign.export.fence import build_fence, fence_polygon
-from expdesign.plan.area import LocalFrame
+from expdesign.export import PlannedTrack, Route, build_route
+from expdesign.export.routes import read_plan
+from expdesign.export.routes.fence import build_fence, fence_polygon
 from expdesign.plan.values import Leg
+from expdesign.sea_area import LocalFrame
 from expdesign.signals import Commands, Trajectory
 
 

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from design_case import example_dictionary, vessel
 
-from expdesign.durations.validation import Rehearsal, Validated, validate
+from design_case import example_dictionary, vessel
 from expdesign.export.validation_page import ValidationContent, judgements
+from expdesign.rehearsal.validation import Rehearsal, Validated, validate
 from expdesign.simulation import CALM, Environment
 from expdesign.vessel import Sensors, Vessel
 

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from vessel_files import KVLCC2, write_vessel
 
 from expdesign.errors import FileError, InputError
 from expdesign.export import vessel_toml
 from expdesign.scenario import load_vessel
 from expdesign.vessel import Vessel
+from vessel_files import KVLCC2, write_vessel
 
 FILES = sorted((Path(__file__).parents[1] / "scenarios" / "vessels").glob("*.toml"))
 

@@ -5,21 +5,21 @@ from functools import cache
 
 import numpy as np
 import pytest
-from design_case import WIND, example_dictionary, scored_example, spec, vessel
-from test_dictionary_command_families import rudder_ship
 
+from design_case import WIND, example_dictionary, scored_example, spec, vessel
 from expdesign.dictionary import FAMILIES, build_primitive, family
 from expdesign.dictionary.batch import excite_many
 from expdesign.durations import bordered, build_durations, solve_durations
-from expdesign.durations.growing import grow_dictionary, motion_limits
-from expdesign.durations.growing_optimum import optimum, sensitivity
-from expdesign.durations.growing_search import violation
-from expdesign.durations.growing_space import family_spaces
-from expdesign.durations.growing_values import GrowSettings, Growth
 from expdesign.errors import InputError, UnknownName
+from expdesign.growing.loop import grow_dictionary, motion_limits
+from expdesign.growing.optimum import optimum, sensitivity
+from expdesign.growing.search import violation
+from expdesign.growing.space import family_spaces
+from expdesign.growing.values import GrowSettings, Growth
 from expdesign.information import MEAN_SUBTRACTIONS, score_primitives
 from expdesign.information.many import bordered_runs
 from expdesign.simulation import CALM, Environment
+from test_dictionary_command_families import rudder_ship
 
 SMALL = GrowSettings(rounds=3, pool=32, run_s=12.5, families=("zigzag", "turning_circle", "multisine"))
 

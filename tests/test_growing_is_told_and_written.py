@@ -4,8 +4,8 @@ import json
 from pathlib import Path
 
 import pytest
-from design_case import SCENARIOS, one_line
 
+from design_case import SCENARIOS, one_line
 from expdesign import workflows
 from expdesign.errors import FileError
 from expdesign.scenario import load_dictionary, load_scenario

@@ -3,16 +3,17 @@
 from dataclasses import replace
 from pathlib import Path
 
-import export_case as case
 import pytest
-from scenario_files import spoil, write_scenario
 
+import export_case as case
 from expdesign.errors import FileError, InputError
-from expdesign.export import plan_json, read_plan, write_files
+from expdesign.export import plan_json, write_files
 from expdesign.export.report.admission import conditions
+from expdesign.export.routes import read_plan
 from expdesign.indices import BEAUFORT_MPS, Conditions, admissibility, beaufort
 from expdesign.scenario import load_scenario
 from expdesign.simulation import Environment
+from scenario_files import spoil, write_scenario
 
 KNOWN = Conditions(
     draught_m=5.0,

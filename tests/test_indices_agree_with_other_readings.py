@@ -5,9 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from measured_trials import TUG_TRUE
-from nomoto_ship import nomoto_ship
-from vessel_files import KVLCC2, write_vessel
 
 from expdesign.errors import InputError
 from expdesign.indices import Circle, NotStandard, Stop, ZigZag, measured_trial, standard_results
@@ -16,6 +13,9 @@ from expdesign.scenario import load_vessel
 from expdesign.signals import Batch, Commands, Trajectory
 from expdesign.simulation import Conduct, steady_ahead, stopping, turning_circle, zigzag
 from expdesign.vessel import Vessel
+from measured_trials import TUG_TRUE
+from nomoto_ship import nomoto_ship
+from vessel_files import KVLCC2, write_vessel
 
 DATA = Path(__file__).parents[2] / "shared" / "data" / "kvlcc2-hsva-7m"
 SPEED, TEN = 2.0, math.radians(10)

@@ -5,13 +5,13 @@ from dataclasses import replace
 
 import pytest
 from lxml import html
-from nomoto_ship import nomoto_ship
 
 from expdesign.errors import InputError
 from expdesign.export.indices_form import Held, IndicesContent, indices_html
 from expdesign.export.indices_form.appendix import condition_rows, form_lines, ship_rows
 from expdesign.indices import Circle, criteria, standard_results
 from expdesign.vessel import Vessel
+from nomoto_ship import nomoto_ship
 
 SHIP = replace(nomoto_ship(), length_m=180.0, beam_m=30.0, draught_m=10.0)
 SPEED = 7.0

@@ -9,7 +9,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from nomoto_ship import GAIN, LAG, nomoto_ship
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
@@ -17,6 +16,7 @@ from expdesign.errors import InputError
 from expdesign.indices import OUTCOMES, Circle, Stop, ZigZag, criteria, judge, outcomes, standard_results, watched
 from expdesign.indices.read import read_circle
 from expdesign.simulation import Conduct, turning_circle
+from nomoto_ship import GAIN, LAG, nomoto_ship
 
 SPEED, TEN, TWENTY, FULL = 7.0, math.radians(10), math.radians(20), math.radians(35)
 SHIP = nomoto_ship(helm_rate=math.inf)

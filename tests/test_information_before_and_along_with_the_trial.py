@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from design_case import CALM, Environment, example_dictionary, vessel
 
+from design_case import CALM, Environment, example_dictionary, vessel
 from expdesign.dictionary import Primitive
 from expdesign.durations import DurationProblem, bordered, build_durations, optimal_shares
 from expdesign.errors import InputError

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from design_case import WIND, example_dictionary, one_line, scored_example, spec, vessel
 
+from design_case import WIND, example_dictionary, one_line, scored_example, spec, vessel
 from expdesign.dictionary import Primitive, build_primitive
 from expdesign.durations import build_durations
 from expdesign.errors import NotInformative

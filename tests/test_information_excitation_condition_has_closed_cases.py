@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from design_case import azimuth, force_actuator, structured, vessel
 
+from design_case import azimuth, force_actuator, structured, vessel
 from expdesign.information import excitation_condition
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import CALM, Environment

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from design_case import WIND, example_dictionary, force_actuator, scored_example, spec, vessel
 
+from design_case import WIND, example_dictionary, force_actuator, scored_example, spec, vessel
 from expdesign.conventions import rotation
 from expdesign.dictionary import Primitive, build_primitive
 from expdesign.durations import bordered

@@ -8,19 +8,19 @@ from itertools import pairwise, permutations
 import numpy as np
 import pytest
 import shapely
-from plan_case import area, at_rest, leg_water, ship
-from test_plan_verification_catches_what_is_wrong import primitive
 
 from expdesign.plan import PlanSettings
-from expdesign.plan.capability import capability
-from expdesign.plan.carries import Carry, Headway, carry, exit_motion
-from expdesign.plan.leg_values import leg_speed_mps, through_water
-from expdesign.plan.legs import LegTask, find_leg
-from expdesign.plan.lower_bound import _grown, joint_losses, reposition_bound_s, time_to_sail_s
-from expdesign.plan.speed_changes import LegEnd, SpeedChanges, least_loss, leg_end
+from expdesign.plan.bounds.displacement import Carry, Headway, carry, exit_motion
+from expdesign.plan.bounds.repositioning import _grown, joint_losses, reposition_bound_s, time_to_sail_s
+from expdesign.plan.control.acceleration_limits import LegEnd, SpeedChanges, least_loss, leg_end
+from expdesign.plan.control.capability import capability
+from expdesign.plan.legs.find import LegTask, find_leg
+from expdesign.plan.legs.water import leg_speed_mps, through_water
 from expdesign.signals import Commands
 from expdesign.simulation import CALM, Environment, simulate, to_body
 from expdesign.vessel import NUMPY
+from plan_case import area, at_rest, leg_water, ship
+from test_plan_verification_catches_what_is_wrong import primitive
 
 OPEN = shapely.box(-1000, -1000, 1000, 1000)
 WALL = shapely.box(-10, -1000, 10, 300)

@@ -12,14 +12,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import shapely
-from plan_case import area, ship
-from test_plan_says_what_is_impossible import acceleration, place_in
 
 from expdesign.errors import NoPlan
 from expdesign.plan import PlanSettings, solve
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import plan_trial
 from expdesign.simulation import Environment
+from plan_case import area, ship
+from test_plan_says_what_is_impossible import acceleration, place_in
 
 STRAIT_M, GAP_M, ASIDE_M = 250.0, 9.0, 160.0
 """How far north the strait is, half its width, and how far east of it a wide one is."""

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from plan_case import VESSELS, ship
 
 from expdesign.errors import NoPlan
-from expdesign.plan.capability import capability
+from expdesign.plan.control.capability import capability
 from expdesign.plan.values import PlanSettings
 from expdesign.scenario import load_vessel
 from expdesign.vessel import STRUCTURES
+from plan_case import VESSELS, ship
 
 
 def test_top_speed_is_the_steady_speed_at_full_thrust():

@@ -8,18 +8,18 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import shapely
-from plan_case import area, at_rest, leg_water, ship, space_of
-from test_plan_says_what_is_impossible import acceleration
-from test_plan_verification_catches_what_is_wrong import primitive
 
 from expdesign.errors import NoPlan
 from expdesign.plan import PlanSettings, sailing
-from expdesign.plan.effort import Effort
-from expdesign.plan.joint_trials import settled
-from expdesign.plan.legs import LegTask, find_leg
+from expdesign.plan.legs.find import LegTask, find_leg
 from expdesign.plan.problem import PlanProblem
+from expdesign.plan.search.transitions import settled
 from expdesign.plan.solve import plan_trial
+from expdesign.plan.work_budget import Effort
 from expdesign.simulation import CALM
+from plan_case import area, at_rest, leg_water, ship, space_of
+from test_plan_says_what_is_impossible import acceleration
+from test_plan_verification_catches_what_is_wrong import primitive
 
 
 @pytest.fixture(scope="module")

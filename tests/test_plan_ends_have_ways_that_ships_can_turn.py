@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from helm_case import catamaran
-from plan_case import area
 
 from expdesign.errors import NoPlan
 from expdesign.plan import PlanSettings
-from expdesign.plan.capability import capability
-from expdesign.plan.doors import check_ends, gets_away
-from expdesign.plan.field import clearance_field
-from expdesign.plan.legs import LegWater
+from expdesign.plan.chart.clearance_grid import clearance_field
+from expdesign.plan.control.capability import capability
+from expdesign.plan.legs.escape_check import check_ends, gets_away
+from expdesign.plan.legs.find import LegWater
 from expdesign.simulation import CALM
+from helm_case import catamaran
+from plan_case import area
 
 VESSEL, CLEARANCE = catamaran(), 0.5
 SHIP = capability(VESSEL, PlanSettings(clearance_m=CLEARANCE))

@@ -3,9 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapely
-from plan_case import area
 
-from expdesign.plan.field import clearance_field, narrowest_passage
+from expdesign.plan.chart.clearance_grid import clearance_field, narrowest_passage
+from plan_case import area
 
 
 def test_clearance_of_a_square_is_the_distance_to_its_nearest_side():

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from test_plan_bound_holds import primitive, ship, wandering
 
-from expdesign.plan.carries import Headway, carry
-from expdesign.plan.headlands import GoalTimes, goal_times, grown_times, time_saved_s, track_of
-from expdesign.plan.ways import build_ways
+from expdesign.plan.bounds.branch_and_bound import GoalTimes, goal_times, grown_times, time_saved_s, track_of
+from expdesign.plan.bounds.displacement import Headway, carry
+from expdesign.plan.chart.visibility_graph import build_ways
 from expdesign.simulation import Environment
+from test_plan_bound_holds import primitive, ship, wandering
 
 SPEED = 1.2
 STILL = Headway(speed_mps=SPEED, current_to=np.zeros(2))

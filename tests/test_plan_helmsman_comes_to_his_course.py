@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from helm_case import coaster, open_water
 
 from expdesign.conventions import wrap_angle
-from expdesign.plan.fleet import Fleet, Truths
-from expdesign.plan.run_up import OFF_HEADING_RAD, OFF_YAW_RATE, STRAIGHT
-from expdesign.plan.steering import Helmsman
+from expdesign.plan.control.tracking import Helmsman
+from expdesign.plan.monte_carlo.procedure import OFF_HEADING_RAD, OFF_YAW_RATE, STRAIGHT
+from expdesign.plan.runs.ensemble import Fleet, Truths
 from expdesign.simulation import CALM
+from helm_case import coaster, open_water
 
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])

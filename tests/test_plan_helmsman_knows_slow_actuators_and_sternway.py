@@ -5,15 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from helm_case import coaster, open_water
-from plan_case import ship
 
 from expdesign.plan import PlanSettings
-from expdesign.plan.capability import capability
-from expdesign.plan.fleet import Fleet, Truths
-from expdesign.plan.steering import Helmsman
+from expdesign.plan.control.capability import capability
+from expdesign.plan.control.tracking import Helmsman
+from expdesign.plan.runs.ensemble import Fleet, Truths
 from expdesign.simulation import CALM
 from expdesign.vessel import Response, Vessel
+from helm_case import coaster, open_water
+from plan_case import ship
 
 LATE = Response(lag_s=8.0, delay_s=2.0)
 SAMPLES, NEAR_M = 400, 2.0

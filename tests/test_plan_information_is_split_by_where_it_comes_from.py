@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from export_case import design, plan, tug
 
 from expdesign.plan import Leg
-from expdesign.plan.realised import realised_efficiencies
+from expdesign.plan.verify.efficiency import realised_efficiencies
 from expdesign.signals import Trajectory
 from expdesign.simulation import CALM
+from export_case import design, plan, tug
 
 
 def split(legs: tuple[Leg, ...], trajectory: Trajectory | None = None) -> tuple[float, float]:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapely
+
+from expdesign.plan.legs.find import LegTask, find_leg
+from expdesign.plan.search.transitions import pairs_of, settled
+from expdesign.plan.values import Placement
 from plan_case import leg_water, space_of
 from test_plan_verification_catches_what_is_wrong import primitive
-
-from expdesign.plan.joint_trials import pairs_of, settled
-from expdesign.plan.legs import LegTask, find_leg
-from expdesign.plan.values import Placement
 
 
 @pytest.fixture(scope="module")

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
-from lattice_case import Run, World, as_problem, astar_thesis, cost_of, dijkstra_plain, random_world
 from scipy.sparse import csr_array
 
 from expdesign.errors import InputError, NoPlan
-from expdesign.plan.lattice import LatticeProblem, search_lattice
+from expdesign.plan.search.lattice import LatticeProblem, search_lattice
+from lattice_case import Run, World, as_problem, astar_thesis, cost_of, dijkstra_plain, random_world
 
 RUNS = (Run(3, 0, 0, 1), Run(2, 0, 0, 0), Run(0, 2, 1, 0))
 COSTS = [{"step": 1.0, "turn": 1.0}, {"step": 1.0, "turn": 2.5}, {"step": 0.7310, "turn": 1.1931}]

@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 import shapely
-from plan_case import leg_water
 
-from expdesign.plan.goal_ways import build_goal_ways
-from expdesign.plan.lattice import search_lattice
-from expdesign.plan.lattice_moves import build_lattice
-from expdesign.plan.search_space import SearchSpace, Stamp
+from expdesign.plan.chart.goal_distance import build_goal_ways
+from expdesign.plan.search.lattice import search_lattice
+from expdesign.plan.search.lattice_moves import build_lattice
+from expdesign.plan.search.state import SearchSpace, Stamp
+from plan_case import leg_water
 
 SPACING_M = 60.0
 

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from plan_case import leg_water
 from scipy.stats import binom
 
 from expdesign.dictionary.build import trim
-from expdesign.plan.leg_times import (
+from expdesign.plan.control.acceleration_limits import leg_end, to_work_s
+from expdesign.plan.legs.agile_times import (
     COURSES,
     GOING_ON,
     LENGTHS,
@@ -23,9 +23,9 @@ from expdesign.plan.leg_times import (
     joints,
     leg_times,
 )
-from expdesign.plan.legs import LegTask, find_leg
-from expdesign.plan.speed_changes import leg_end, to_work_s
+from expdesign.plan.legs.find import LegTask, find_leg
 from expdesign.simulation import CALM
+from plan_case import leg_water
 
 RULE = LegTimes(speed_mps=2.0, push_mps2=0.5, swing_radps=0.25, settle_s=4.0, hull_m=20.0)
 REST = np.zeros(1)

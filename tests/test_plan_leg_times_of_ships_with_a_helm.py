@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from helm_case import coaster, open_water
 
-from expdesign.plan._ompl import dubins_curve
-from expdesign.plan.dubins import dubins_m
-from expdesign.plan.helm_times import helm_times
-from expdesign.plan.legs import LegTask, find_leg
-from expdesign.plan.ways import polyline_length
+from expdesign.plan.chart.visibility_graph import polyline_length
+from expdesign.plan.legs._ompl import dubins_curve
+from expdesign.plan.legs.dubins_length import dubins_m
+from expdesign.plan.legs.find import LegTask, find_leg
+from expdesign.plan.legs.helm_times import helm_times
 from expdesign.simulation import steady_ahead
+from helm_case import coaster, open_water
 
 
 def rule():

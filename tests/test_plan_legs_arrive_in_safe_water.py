@@ -5,18 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from plan_case import VESSELS, area, at_rest, leg_water
 
 from expdesign.plan import PlanSettings
-from expdesign.plan._ompl import dubins_curve
-from expdesign.plan.capability import capability
-from expdesign.plan.curves import find_path
-from expdesign.plan.field import clearance_field
-from expdesign.plan.footprint import swept_area
-from expdesign.plan.leg_values import nearest_turns
-from expdesign.plan.legs import LegTask, LegWater, find_leg, leg_trajectory
+from expdesign.plan.chart.clearance_grid import clearance_field
+from expdesign.plan.control.capability import capability
+from expdesign.plan.legs._ompl import dubins_curve
+from expdesign.plan.legs.dubins import find_path
+from expdesign.plan.legs.find import LegTask, LegWater, find_leg, leg_trajectory
+from expdesign.plan.legs.water import nearest_turns
 from expdesign.scenario import load_vessel
 from expdesign.simulation import CALM
+from expdesign.vessel.hull import swept_area
+from plan_case import VESSELS, area, at_rest, leg_water
 
 OPEN = shapely.box(-1500, -1500, 1500, 1500)
 BASIN = shapely.box(-350, -350, 350, 350)

@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from helm_case import coaster, open_water
-from plan_case import leg_water
 
 from expdesign.dictionary.build import trim
-from expdesign.plan.carries import Headway
-from expdesign.plan.curves import curved_leg
-from expdesign.plan.leg_values import through_water
-from expdesign.plan.legs import LegTask, LegWater, find_leg
-from expdesign.plan.lower_bound import reposition_bound_s
+from expdesign.plan.bounds.displacement import Headway
+from expdesign.plan.bounds.repositioning import reposition_bound_s
+from expdesign.plan.legs.dubins import curved_leg
+from expdesign.plan.legs.find import LegTask, LegWater, find_leg
+from expdesign.plan.legs.water import through_water
 from expdesign.simulation import Environment, steady_ahead
+from helm_case import coaster, open_water
+from plan_case import leg_water
 
 OPEN = shapely.box(-1500, -1500, 1500, 1500)
 CURRENTS = {

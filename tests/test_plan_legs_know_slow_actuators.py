@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from plan_case import at_rest, leg_water
 
-from expdesign.plan.legs import LegTask, find_leg, leg_trajectory
+from expdesign.plan.legs.find import LegTask, find_leg, leg_trajectory
 from expdesign.signals import Commands
 from expdesign.simulation import CALM, delivered_at_samples, simulate
 from expdesign.vessel import Response
+from plan_case import at_rest, leg_water
 
 OPEN = shapely.box(-1500, -1500, 1500, 1500)
 CASES = {

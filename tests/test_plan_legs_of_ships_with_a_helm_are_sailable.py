@@ -6,14 +6,14 @@ from functools import cache
 
 import numpy as np
 import pytest
-from helm_case import catamaran, coaster, open_water
 
-from expdesign.plan.capability import RUN_UP
-from expdesign.plan.helmed_legs import _shortest_first
-from expdesign.plan.legs import LegTask, find_leg
-from expdesign.plan.recovery import displaced, recover
+from expdesign.plan.control.capability import RUN_UP
+from expdesign.plan.legs.find import LegTask, find_leg
+from expdesign.plan.legs.helm import _shortest_first
+from expdesign.plan.legs.recovery import displaced, recover
 from expdesign.signals import Commands
 from expdesign.simulation import simulate, steady_ahead
+from helm_case import catamaran, coaster, open_water
 
 SHIPS = {"coaster": coaster, "catamaran": catamaran}
 

@@ -10,23 +10,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
-from plan_case import at_rest, leg_water
-from test_plan_verification_catches_what_is_wrong import primitive
 
 from expdesign import workflows
-from expdesign.plan.approach import ARRIVED, Pilot
-from expdesign.plan.drawn_trials import Trials, sail_trials
-from expdesign.plan.fleet import Fleet
-from expdesign.plan.hull_watch import HullWatch
-from expdesign.plan.legs import LegTask, find_leg, leg_trajectory
-from expdesign.plan.run_up import ROUNDS, tolerances
-from expdesign.plan.safety import broken_promise, promised
-from expdesign.plan.steering import Helmsman
+from expdesign.plan.control.tracking import Helmsman
+from expdesign.plan.legs.find import LegTask, find_leg, leg_trajectory
+from expdesign.plan.monte_carlo.collision import HullWatch
+from expdesign.plan.monte_carlo.guidance import ARRIVED, Pilot
+from expdesign.plan.monte_carlo.procedure import ROUNDS, tolerances
+from expdesign.plan.monte_carlo.risk import broken_promise, promised
+from expdesign.plan.monte_carlo.trials import Trials, sail_trials
+from expdesign.plan.runs.dispersion import Truths, draw_truths
+from expdesign.plan.runs.ensemble import Fleet
 from expdesign.plan.timeline import Timeline
-from expdesign.plan.uncertainty import Truths, draw_truths
 from expdesign.plan.values import Leg
 from expdesign.scenario import load_scenario
 from expdesign.simulation import CALM, Environment
+from plan_case import at_rest, leg_water
+from test_plan_verification_catches_what_is_wrong import primitive
 
 ROOT = Path(__file__).parents[1]
 OPEN = shapely.box(-400, -300, 400, 500)

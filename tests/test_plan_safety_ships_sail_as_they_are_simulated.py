@@ -7,22 +7,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from nomoto_ship import nomoto_ship
-from plan_case import area, leg_water, ship
 
-from expdesign.plan.capability import capability
-from expdesign.plan.checks import hull_clearance
-from expdesign.plan.fleet import Fleet, Truths
-from expdesign.plan.hull_watch import HullWatch
-from expdesign.plan.run_up import steady_states
-from expdesign.plan.safety import upper_limit
-from expdesign.plan.steering import Helmsman
+from expdesign.plan.chart.visibility_graph import polyline_length
+from expdesign.plan.control.capability import capability
+from expdesign.plan.control.tracking import Helmsman
+from expdesign.plan.monte_carlo.collision import HullWatch
+from expdesign.plan.monte_carlo.procedure import steady_states
+from expdesign.plan.monte_carlo.return_paths import build_ways_to
+from expdesign.plan.monte_carlo.risk import upper_limit
+from expdesign.plan.runs.ensemble import Fleet, Truths
 from expdesign.plan.values import PlanSettings
-from expdesign.plan.ways import polyline_length
-from expdesign.plan.ways_back import build_ways_to
+from expdesign.plan.verify.checks import hull_clearance
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import CALM, Environment, Variation, simulate
 from expdesign.vessel import IDEAL, Response
+from nomoto_ship import nomoto_ship
+from plan_case import area, leg_water, ship
 
 RESPONSES = {
     "prompt": IDEAL,

@@ -8,14 +8,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import shapely
-from plan_case import area, ship
 
 from expdesign.dictionary import PrimitiveSpec, build_primitive, complete_settings, family
 from expdesign.errors import NoPlan, Unreachable
-from expdesign.plan import LocalFrame, PlanSettings
+from expdesign.plan import PlanSettings
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import plan_trial
+from expdesign.sea_area import LocalFrame
 from expdesign.simulation import CALM, Environment
+from plan_case import area, ship
 
 WIDE = shapely.box(-1000, -1000, 1000, 1000)
 

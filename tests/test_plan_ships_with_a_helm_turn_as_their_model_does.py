@@ -7,19 +7,19 @@ from functools import cache
 
 import numpy as np
 import pytest
-from helm_case import catamaran, coaster
-from plan_case import VESSELS
-from plan_case import ship as tug
 from scipy.optimize import fsolve
 
 from expdesign.errors import NoPlan
 from expdesign.plan import PlanSettings
-from expdesign.plan.capability import capability, needs_helm
-from expdesign.plan.helmed_trials import LATERAL_MPS2
-from expdesign.plan.steady_turns import steady_turns
+from expdesign.plan.control.capability import capability, needs_helm
+from expdesign.plan.control.helm_capability import LATERAL_MPS2
+from expdesign.plan.control.steady_turns import steady_turns
 from expdesign.scenario import load_vessel
 from expdesign.signals import Commands
 from expdesign.simulation import Conduct, simulate, steady_ahead, stopping, turning_circle
+from helm_case import catamaran, coaster
+from plan_case import VESSELS
+from plan_case import ship as tug
 
 # block coefficient, propeller diameter, thrust deduction, wake, interaction: as the vessel file says
 WATER, BLOCK, DIAMETER, DEDUCTION, WAKE = 1025.0, 0.70, 3.0, 0.20, 0.30

@@ -5,19 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from plan_case import area, ship
-from test_plan_verification_catches_what_is_wrong import primitive
 
 from expdesign.errors import NoPlan
-from expdesign.plan.approach import open_loop
-from expdesign.plan.capability import capability
-from expdesign.plan.fleet import Fleet
-from expdesign.plan.footprint import covering_discs
-from expdesign.plan.hull_watch import HullWatch
-from expdesign.plan.steering import Helmsman
-from expdesign.plan.uncertainty import draw_truths, stray_m
+from expdesign.plan.control.capability import capability
+from expdesign.plan.control.tracking import Helmsman
+from expdesign.plan.monte_carlo.collision import HullWatch
+from expdesign.plan.monte_carlo.guidance import open_loop
+from expdesign.plan.runs.dispersion import draw_truths, stray_m
+from expdesign.plan.runs.ensemble import Fleet
 from expdesign.plan.values import PlanSettings
 from expdesign.simulation import CALM, Environment, Variation
+from expdesign.vessel.hull import covering_discs
+from plan_case import area, ship
+from test_plan_verification_catches_what_is_wrong import primitive
 
 CENTRES = covering_discs(30.0, 9.0)[0]
 

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from plan_case import area, ship
 
 from expdesign.dictionary import PrimitiveSpec, build_primitive, complete_settings, family
-from expdesign.plan.checks import hull_clearance, verify_plan
 from expdesign.plan.values import Leg
+from expdesign.plan.verify.checks import hull_clearance, verify_plan
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import CALM, simulate
+from plan_case import area, ship
 
 CLEARANCE_M = 20.0
 

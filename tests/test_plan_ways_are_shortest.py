@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapely
-from plan_case import area, leg_water
 
-from expdesign.plan.field import clearance_field
-from expdesign.plan.goal_ways import build_goal_ways
-from expdesign.plan.ways import build_ways, polyline_length, simplified
+from expdesign.plan.chart.clearance_grid import clearance_field
+from expdesign.plan.chart.goal_distance import build_goal_ways
+from expdesign.plan.chart.visibility_graph import build_ways, polyline_length, simplified
+from plan_case import area, leg_water
 
 OPEN = shapely.box(-500, -500, 500, 500)
 WALL = shapely.box(-10, -500, 10, 300)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import shapely
 
-from expdesign.plan._ompl import dubins_curve
-from expdesign.plan.rounds import Rounds
-from expdesign.plan.ways import polyline_length
+from expdesign.plan.chart.visibility_graph import polyline_length
+from expdesign.plan.legs._ompl import dubins_curve
+from expdesign.plan.monte_carlo.go_around import Rounds
 
 RADIUS, SPACING = 40.0, 5.0
 GOAL = np.array([0.0, 0.0, 0.7])

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from record_files import Columns, csv_text, motion, texts
 
 from expdesign.errors import FileError
 from expdesign.records import VELOCITY_METHODS, load_records
 from expdesign.signals import Record
+from record_files import Columns, csv_text, motion, texts
 
 VESSEL = ("n1", "rudder1")
 DEGREES = 180 / np.pi

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from record_files import SAMPLE_TIME_S, csv_text, motion, texts, write_trial
 
 from expdesign.conventions import OUTPUTS
 from expdesign.records import load_records
 from expdesign.signals import Batch, Record
+from record_files import SAMPLE_TIME_S, csv_text, motion, texts, write_trial
 
 Data = dict[str, np.ndarray]
 KNOT = 1852 / 3600

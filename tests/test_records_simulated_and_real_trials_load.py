@@ -4,13 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from record_files import write_trial
 
 from expdesign.records import load_records
 from expdesign.signals import Commands, Record
 from expdesign.simulation import CALM, Environment, measure, simulate
 from expdesign.values import Array
 from expdesign.vessel import Actuator, Limit, Vessel, VesselModel, structure_terms
+from record_files import write_trial
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 STEP = 1.0

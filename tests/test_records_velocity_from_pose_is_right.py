@@ -4,11 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from record_files import SAMPLE_TIME_S, motion, write_trial
 
 from expdesign.records import central_difference, load_records, smoothed_velocity
-from expdesign.records.smoother import WEIGHT, smooth
-from expdesign.records.smoother import _likeliest_ratio as likeliest_ratio
+from expdesign.records.pose.smoother import WEIGHT, smooth
+from expdesign.records.pose.smoother import _likeliest_ratio as likeliest_ratio
+from record_files import SAMPLE_TIME_S, motion, write_trial
 
 STEP = 0.5
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from record_files import SAMPLE_TIME_S, csv_text, motion, texts, write_trial
 
 from expdesign.errors import FileError, InputError, UnknownName
 from expdesign.records import load_records
+from record_files import SAMPLE_TIME_S, csv_text, motion, texts, write_trial
 
 LAT, LON = 60.15, 24.95
 METRES_PER_DEGREE = 111_412.0

@@ -4,10 +4,10 @@ import math
 import numpy as np
 import pytest
 import shapely
-from scenario_files import collection, feature, spoil, square, square_chart, write_scenario
 
 from expdesign.errors import FileError, NoPlan
 from expdesign.scenario import load_area, load_scenario
+from scenario_files import collection, feature, spoil, square, square_chart, write_scenario
 
 BOW_TIE = [[0.001, 0.001], [0.003, 0.003], [0.003, 0.001], [0.001, 0.003], [0.001, 0.001]]
 TOUCHING = [[0, 0], [0.002, 0], [0.001, 0.001], [0.002, 0.002], [0, 0.002], [0.001, 0.001], [0, 0]]

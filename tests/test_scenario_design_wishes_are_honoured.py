@@ -4,12 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scenario_files import spoil, write_scenario
 
 from expdesign import workflows
 from expdesign.durations import DurationProblem
 from expdesign.errors import FileError
 from expdesign.scenario import load_scenario
+from scenario_files import spoil, write_scenario
 
 NAMES = ("acceleration", "zz-speed-0.5", "zz-speed-0.4")
 

@@ -3,13 +3,13 @@ import re
 
 import numpy as np
 import pytest
-from scenario_files import spoil, write_scenario
 
 from expdesign.dictionary import Family, Setting
 from expdesign.errors import FileError
 from expdesign.plan.values import PlanSettings
 from expdesign.scenario import load_dictionary, load_scenario, load_vessel
 from expdesign.vessel import column_name
+from scenario_files import spoil, write_scenario
 
 
 def test_everything_arrives_in_si_units_and_radians(tmp_path):

@@ -1,10 +1,10 @@
 from pathlib import Path
 
 import pytest
-from scenario_files import spoil, write_scenario
 
 from expdesign.errors import FileError, InputError, NoPlan
 from expdesign.scenario import load_area, load_dictionary, load_scenario, load_vessel
+from scenario_files import spoil, write_scenario
 
 SCENARIO_CASES = [
     ('name = "square"', "name = 3", "scenario.name", "is 3, expected text"),

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from design_case import vessel
 from scipy.integrate import solve_ivp
 
+from design_case import vessel
 from expdesign.errors import InputError
 from expdesign.signals import Commands
 from expdesign.simulation import (

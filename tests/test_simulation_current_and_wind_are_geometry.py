@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from design_case import vessel
 
+from design_case import vessel
 from expdesign.conventions import compose, rotation
 from expdesign.signals import Commands
 from expdesign.simulation import Environment, relative_velocity, simulate

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from helm_case import catamaran, coaster
-from plan_case import VESSELS, ship
 
 from expdesign.scenario import load_vessel
 from expdesign.simulation.helm import Helm
+from helm_case import catamaran, coaster
+from plan_case import VESSELS, ship
 
 SHIPS = {
     "rudder": coaster,

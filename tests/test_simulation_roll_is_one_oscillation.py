@@ -5,17 +5,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_case import hidden_record, vessel_of
 from scipy.linalg import expm
 
+from diagnosis_case import hidden_record, vessel_of
 from expdesign import workflows
+from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.extension import as_extended, extend
-from expdesign.diagnosis.motion import ROLL_ANGLE, simulate_windows
-from expdesign.diagnosis.windows import cut_windows
+from expdesign.diagnosis.model.motion import ROLL_ANGLE, simulate_windows
 from expdesign.dictionary.trim import drift
 from expdesign.errors import InputError
 from expdesign.estimation.methods import estimate
-from expdesign.estimation.replay import Integration, simulate_batch
+from expdesign.estimation.replay.replay import Integration, simulate_batch
 from expdesign.export import vessel_toml
 from expdesign.scenario import load_vessel
 from expdesign.signals import Batch, Commands

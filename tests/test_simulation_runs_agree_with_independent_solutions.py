@@ -5,9 +5,9 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from design_case import one_line, structured, vessel
 from scipy.integrate import solve_ivp
 
+from design_case import one_line, structured, vessel
 from expdesign.errors import Diverged, InputError
 from expdesign.signals import Commands
 from expdesign.simulation import Environment, simulate, simulate_many

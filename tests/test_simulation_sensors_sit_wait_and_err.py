@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from design_case import vessel
 
+from design_case import vessel
 from expdesign.conventions import wrap_angle
 from expdesign.errors import InputError
 from expdesign.signals import Commands, Trajectory

@@ -5,8 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from measured_trials import MODEL_SHIP_TRUE, TUG_TRUE
-from nomoto_ship import GAIN, LAG, nomoto_ship
 
 from expdesign.errors import InputError, NoAnswer
 from expdesign.signals import Commands, Trajectory
@@ -21,6 +19,8 @@ from expdesign.simulation import (
     zigzag,
 )
 from expdesign.vessel import Response
+from measured_trials import MODEL_SHIP_TRUE, TUG_TRUE
+from nomoto_ship import GAIN, LAG, nomoto_ship
 
 TEN, TWENTY = math.radians(10), math.radians(20)
 SHIPS = {"rudder": nomoto_ship(), "azimuth": TUG_TRUE, "force": MODEL_SHIP_TRUE}

@@ -11,12 +11,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from outside_check import columns
 
 from expdesign import workflows
 from expdesign.scenario import load_vessel
 from expdesign.signals import Commands
 from expdesign.simulation import simulate
+from outside_check import columns
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 STORY = SCENARIOS / "story.toml"

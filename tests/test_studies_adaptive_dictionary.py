@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from expdesign.durations.growing_values import GrowSettings
-from expdesign.studies.adaptive import Comparison, compare, comparison_table, growth_table, minutes_for_the_same
-from expdesign.studies.adaptive_monte_carlo import sample_counts, simulate_trials
+from adaptive import Comparison, compare, comparison_table, growth_table, minutes_for_the_same
+from adaptive_monte_carlo import sample_counts, simulate_trials
+from expdesign.growing.values import GrowSettings
 
 
 @pytest.fixture(scope="module")
@@ -52,8 +52,9 @@ def test_samples_are_shared_out_without_loss():
 def test_without_noise_the_estimates_are_the_truth(comparison: Comparison, monkeypatch: pytest.MonkeyPatch):
     from dataclasses import replace
 
+    import adaptive
+    import adaptive_monte_carlo
     from expdesign.scenario import load_vessel
-    from expdesign.studies import adaptive, adaptive_monte_carlo
     from expdesign.vessel import Sensors
 
     monkeypatch.setattr(adaptive_monte_carlo, "VARIANCE", 0.0)

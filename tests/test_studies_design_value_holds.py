@@ -7,11 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from expdesign.errors import InputError
-from expdesign.export.design_value_page import DesignErrors
-from expdesign.studies import adaptive_monte_carlo, design_value
-from expdesign.studies.adaptive_monte_carlo import Segment, drawn, separate_runs, shared_out, voyages
-from expdesign.studies.design_value import (
+import adaptive_monte_carlo
+import design_value
+from adaptive_monte_carlo import Segment, drawn, separate_runs, shared_out, voyages
+from design_value import (
     EQUAL,
     ERROR_LIMIT,
     NORM_LIMIT,
@@ -24,6 +23,8 @@ from expdesign.studies.design_value import (
     simulation_errors,
     try_design,
 )
+from design_value_page import DesignErrors
+from expdesign.errors import InputError
 from expdesign.vessel import Sensors
 
 

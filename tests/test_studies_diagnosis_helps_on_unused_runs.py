@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from diagnosis_real import POND, averaged_over, tried
 from expdesign.signals import Batch
-from expdesign.studies.diagnosis_real import POND, averaged_over, tried
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 

@@ -4,14 +4,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from vessel_files import ESSO_WIND, KVLCC2, write_vessel
 
 from expdesign.errors import InputError, NoAnswer
 from expdesign.records import load_records
 from expdesign.scenario import load_vessel
 from expdesign.signals import Batch, Record
-from expdesign.studies.real_data import explained_accelerations
 from expdesign.vessel import VesselModel
+from real_data import explained_accelerations
+from vessel_files import ESSO_WIND, KVLCC2, write_vessel
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 

@@ -5,18 +5,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from measured_trials import MODEL_SHIP_TRUE, model_ship_commands
 
 from expdesign.assessment import Wish, assess, check_run, sentence, what_limits
 from expdesign.assessment.limits import AHEAD_S, Limits
 from expdesign.assessment.runs import RunCheck
 from expdesign.estimation.methods import estimate
-from expdesign.estimation.replay import Integration
+from expdesign.estimation.replay.replay import Integration
 from expdesign.records import load_records
 from expdesign.signals import Batch, Record
 from expdesign.simulation import simulate
-from expdesign.studies.real_data_cases import POND, TANK, Case, vessel_of
 from expdesign.vessel import Actuator, Limit, Term, VesselModel
+from measured_trials import MODEL_SHIP_TRUE, model_ship_commands
+from real_data_cases import POND, TANK, Case, vessel_of
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 RK4 = Integration("rk4", 2)

@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 
+import fir_example
+import manoeuvring
+import scalar_system
 from expdesign.simulation import simulate_ensemble
-from expdesign.studies import fir_example, manoeuvring, scalar_system
-from expdesign.studies.manoeuvring import ESTIMATORS, MILD, SEVERE
-from expdesign.studies.pulses import Pulses, draw_inputs
-from expdesign.studies.reference import main, published_consistent
 from expdesign.vessel import Environment
+from manoeuvring import ESTIMATORS, MILD, SEVERE
+from pulses import Pulses, draw_inputs
+from reference import main, published_consistent
 
 INPUT_DRAW = 0.4
 """The source may have kept one input for all runs; one draw moves a mean by up to this share of the spread."""

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from design_case import FREE, azimuth, force_actuator, one_line, structured, tunnel, vessel
 
+from design_case import FREE, azimuth, force_actuator, one_line, structured, tunnel, vessel
 from expdesign.errors import InputError, UnknownName
 from expdesign.signals import Commands
 from expdesign.vessel import (

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from design_case import one_line
 
+from design_case import one_line
 from expdesign.errors import InputError
 from expdesign.vessel import NUMPY, SCALAR
 from expdesign.vessel.expressions import parse_expression

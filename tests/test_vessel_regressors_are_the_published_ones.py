@@ -5,8 +5,8 @@ from dataclasses import replace
 import casadi
 import numpy as np
 import pytest
-from design_case import azimuth, force_actuator, structured, vessel
 
+from design_case import azimuth, force_actuator, structured, vessel
 from expdesign.errors import InputError, UnknownName
 from expdesign.signals import Commands
 from expdesign.simulation import Environment, simulate

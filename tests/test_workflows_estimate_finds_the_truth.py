@@ -7,6 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
+from expdesign import workflows
+from expdesign.assessment import Wish, assess, check_run
+from expdesign.assessment.assess import preferred
+from expdesign.assessment.residuals import autocorrelation
+from expdesign.records import load_records
+from expdesign.scenario import load_vessel
+from expdesign.simulation import Environment
+from expdesign.vessel import NUMPY, generalised_force
 from measured_trials import (
     EULER,
     MODEL_SHIP,
@@ -20,15 +29,6 @@ from measured_trials import (
 )
 from record_files import write_trial
 from vessel_files import KVLCC2, write_vessel
-
-from expdesign import workflows
-from expdesign.assessment import Wish, assess, check_run
-from expdesign.assessment.assess import preferred
-from expdesign.assessment.residuals import autocorrelation
-from expdesign.records import load_records
-from expdesign.scenario import load_vessel
-from expdesign.simulation import Environment
-from expdesign.vessel import NUMPY, generalised_force
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 TRUTH = dict(zip(MODEL_SHIP_TRUE.model.names, MODEL_SHIP_TRUE.model.parameters.tolist(), strict=True))

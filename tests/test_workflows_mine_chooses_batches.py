@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from design_case import SCENARIOS, example_dictionary, random_matrices, vessel
 
+from design_case import SCENARIOS, example_dictionary, random_matrices, vessel
 from expdesign.cli import main
 from expdesign.durations import best_subset
 from expdesign.errors import InputError
-from expdesign.export.record_file import record_csv
+from expdesign.export.files.record_file import record_csv
 from expdesign.information.recorded import BatchInformation, recorded_information
 from expdesign.records import load_records
 from expdesign.signals import Batch, Record

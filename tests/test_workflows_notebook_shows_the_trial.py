@@ -4,9 +4,9 @@ import html
 import re
 from pathlib import Path
 
-import export_case as case
 import pytest
 
+import export_case as case
 from expdesign.export import build_route
 from expdesign.workflows import notebook
 from expdesign.workflows.notebook import Trial

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scenario_files import spoil
 
 from expdesign import workflows
 from expdesign.cli import main
@@ -20,6 +19,7 @@ from expdesign.simulation import Environment, Variation, simulate
 from expdesign.vessel import Mounting
 from expdesign.workflows.known import combined, expected_std, purchases
 from expdesign.workflows.present import present_state, rest_of, weather_for_rest
+from scenario_files import spoil
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 STORY = SCENARIOS / "story.toml"

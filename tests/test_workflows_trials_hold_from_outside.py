@@ -10,10 +10,10 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from outside_check import columns, hull_to_land_m, recomputed_gap, replayed, runs_of_plan
-from scenario_files import spoil
 
 from expdesign import workflows
+from outside_check import columns, hull_to_land_m, recomputed_gap, replayed, runs_of_plan
+from scenario_files import spoil
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 CASES = {

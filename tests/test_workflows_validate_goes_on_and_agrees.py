@@ -8,8 +8,8 @@ import pytest
 
 from expdesign import workflows
 from expdesign.cli import main
-from expdesign.durations.validation import Rehearsal
 from expdesign.errors import InputError
+from expdesign.rehearsal.validation import Rehearsal
 from expdesign.scenario import load_scenario
 from expdesign.workflows.validated import _identity
 

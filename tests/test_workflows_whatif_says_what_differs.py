@@ -3,12 +3,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scenario_files import write_scenario
 
 from expdesign import workflows
 from expdesign.cli import main
 from expdesign.errors import FileError, InputError
 from expdesign.scenario import load_scenario, load_variant
+from scenario_files import write_scenario
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 MODEL_SHIP, HELSINKI = SCENARIOS / "model-ship.toml", SCENARIOS / "helsinki.toml"

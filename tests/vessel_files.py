@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from expdesign.studies.real_data_cases import SIDE, TANK
+from real_data_cases import SIDE, TANK
 
 Terms = tuple[tuple[str, str, str], ...]
 

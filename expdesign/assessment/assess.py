@@ -13,12 +13,10 @@ from expdesign.errors import Diverged, InputError, NoAnswer, NotInformative, Unk
 from expdesign.estimation.disturbance import COLUMNS, DAMPING, mean_current
 from expdesign.estimation.excitation import check_excitation, worst_case
 from expdesign.estimation.methods import STARTS, Method, Settings, estimate, method_named
-from expdesign.estimation.predictors import PREDICTORS
+from expdesign.estimation.regression import AIR, MEANS, PREDICTORS
 from expdesign.estimation.replay import Integration
-from expdesign.estimation.solution import Weighting
-from expdesign.estimation.tables import AIR
+from expdesign.estimation.solve import Weighting
 from expdesign.estimation.values import Estimate
-from expdesign.estimation.zero_mean import MEANS
 from expdesign.signals import Record
 from expdesign.vessel import Vessel
 

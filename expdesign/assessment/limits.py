@@ -21,9 +21,8 @@ from scipy.fft import dct, idct
 
 from expdesign.assessment.runs import RunCheck
 from expdesign.conventions import OUTPUTS
-from expdesign.estimation._casadi import Compiled, Stretches, compiled
-from expdesign.estimation.replay import Integration
-from expdesign.estimation.tables import inputs_of, model_for
+from expdesign.estimation.regression import inputs_of, model_for
+from expdesign.estimation.replay import Compiled, Integration, Stretches, compiled
 from expdesign.estimation.values import Estimate
 from expdesign.signals import Batch, Record
 from expdesign.values import Array, seal

@@ -8,9 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.estimation.methods import method_named
-from expdesign.estimation.predictors import build_layout, build_regression
-from expdesign.estimation.regression import Integers
-from expdesign.estimation.tables import model_for
+from expdesign.estimation.regression import Integers, build_layout, build_regression, model_for
 from expdesign.estimation.values import Estimate
 from expdesign.signals import Record
 from expdesign.values import Array, frozen_set, seal

@@ -9,8 +9,7 @@ import numpy as np
 from expdesign.conventions import OUTPUTS
 from expdesign.errors import Diverged
 from expdesign.estimation.fit import fit_percent
-from expdesign.estimation.instruments import instrument_wind
-from expdesign.estimation.replay import Integration, simulate_batch
+from expdesign.estimation.replay import Integration, instrument_wind, simulate_batch
 from expdesign.signals import Batch
 from expdesign.values import Array, seal
 from expdesign.vessel import VesselModel

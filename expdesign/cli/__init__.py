@@ -17,7 +17,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; arguments and exit status as of `expdesign.cli.entry.main`."""
     try:
         with interruptions_wait():
-            from expdesign.cli.entry import main as run_command  # takes a moment, in which Ctrl-C counts, too
+            from expdesign.cli.entry import main as run_command
     except KeyboardInterrupt:
         sys.stderr.write("expdesign: error: interrupted, nothing half-written\n")
         return 130

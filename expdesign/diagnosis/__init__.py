@@ -15,7 +15,7 @@ P. H. Westfall and S. S. Young (1993) for the correction for trying many.
 
 from expdesign.diagnosis.causes import CAUSES
 from expdesign.diagnosis.diagnose import diagnose
-from expdesign.diagnosis.tell_apart import Proposal
+from expdesign.diagnosis.select import Proposal
 from expdesign.diagnosis.values import Accuracy, Diagnosis, Estimated, Finding
 
 __all__ = ["CAUSES", "Accuracy", "Diagnosis", "Estimated", "Finding", "Proposal", "diagnose"]

@@ -6,25 +6,35 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from expdesign.diagnosis.accuracy import accuracy, first_states, simulate_from_first
-from expdesign.diagnosis.candidate import Cause, Values
-from expdesign.diagnosis.causes import CAUSES
-from expdesign.diagnosis.extended import Extended
+from expdesign.diagnosis.causes import CAUSES, Cause, Values
+from expdesign.diagnosis.data import Windows, cut_windows, spread
 from expdesign.diagnosis.extension import as_extended, as_stated, extend, public_name
-from expdesign.diagnosis.fitting import Fit
-from expdesign.diagnosis.gain import HeldOut, gained, held_out
-from expdesign.diagnosis.kept import LEAST_GAIN, kept, only_moves
-from expdesign.diagnosis.motion import linearise, start_responses
+from expdesign.diagnosis.fit import Fit, HeldOut, gained, held_out
+from expdesign.diagnosis.model import (
+    Extended,
+    accuracy,
+    check_support,
+    first_states,
+    linearise,
+    short_residuals,
+    simulate_from_first,
+    start_responses,
+    still_inputs,
+)
 from expdesign.diagnosis.notes import note_on_weather, notes_on_data, notes_on_dropped
-from expdesign.diagnosis.residuals import short_residuals
-from expdesign.diagnosis.search import search
-from expdesign.diagnosis.spread import spread
-from expdesign.diagnosis.steps import Search, Step
-from expdesign.diagnosis.support import check_support, still_inputs
-from expdesign.diagnosis.tell_apart import Proposal, most_telling, standard_proposals
+from expdesign.diagnosis.select import (
+    LEAST_GAIN,
+    Proposal,
+    Search,
+    Step,
+    kept,
+    most_telling,
+    only_moves,
+    search,
+    standard_proposals,
+)
 from expdesign.diagnosis.values import Diagnosis, Estimated, Finding
 from expdesign.diagnosis.verdict import error_falls, held_apart, verdict
-from expdesign.diagnosis.windows import Windows, cut_windows
 from expdesign.errors import Diverged
 from expdesign.signals import Record
 from expdesign.vessel import Vessel

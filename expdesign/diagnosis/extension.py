@@ -7,15 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from expdesign.diagnosis.causes.missing_term import library
-from expdesign.diagnosis.extended import ROLL, Extended
-from expdesign.diagnosis.followed import grouped, members
+from expdesign.diagnosis.causes import library
+from expdesign.diagnosis.data import derived_outputs, has_heading
 from expdesign.diagnosis.found_model import found_model
-from expdesign.diagnosis.parts import ahead_force_text, turns_by_force
-from expdesign.diagnosis.surroundings import mean_wind
-from expdesign.diagnosis.windows import derived_outputs, has_heading
+from expdesign.diagnosis.model import ROLL, Extended, ahead_force_text, grouped, mean_wind, members, turns_by_force
 from expdesign.errors import InputError
-from expdesign.estimation.tables import model_for
+from expdesign.estimation.regression import model_for
 from expdesign.signals import Batch, Record
 from expdesign.vessel import Actuator, Environment, Response, Roll, Sensors, Vessel, VesselModel, column_name
 from expdesign.vessel.structures import SHOAL

@@ -13,9 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from expdesign.diagnosis.causes.shallow_water import in_shallow_water
-from expdesign.diagnosis.extended import Extended
-from expdesign.diagnosis.parts import ahead_force_text, is_coriolis, is_damping, is_thrust, reads_rudder
+from expdesign.diagnosis.causes import in_shallow_water
+from expdesign.diagnosis.model import Extended, ahead_force_text, is_coriolis, is_damping, is_thrust, reads_rudder
 from expdesign.vessel import Term, VesselModel
 from expdesign.vessel.expressions import Expression
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from expdesign.diagnosis.search import LARGE_WANDER_MPS
-from expdesign.diagnosis.steps import Search
+from expdesign.diagnosis.data import Windows, unseen_wind
+from expdesign.diagnosis.select import LARGE_WANDER_MPS, Search
 from expdesign.diagnosis.verdict import lacking
-from expdesign.diagnosis.windows import Windows, unseen_wind
 from expdesign.signals import Record
 from expdesign.vessel import Vessel
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from expdesign.diagnosis.windows import Windows
+from expdesign.diagnosis.data import Windows
 from expdesign.signals import Record
 from expdesign.values import Array
 from expdesign.vessel import Vessel

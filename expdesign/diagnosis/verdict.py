@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from expdesign.diagnosis.gain import DRAWS, HeldOut, on_same, units
+from expdesign.diagnosis.data import Windows
+from expdesign.diagnosis.fit import DRAWS, HeldOut, on_same, units
 from expdesign.diagnosis.values import Accuracy, Fall, Finding
-from expdesign.diagnosis.windows import Windows
 from expdesign.values import Array
 
 LOST_FIT = -300.0

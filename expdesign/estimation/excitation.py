@@ -13,9 +13,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.errors import InputError
-from expdesign.estimation.polynomial import Polynomial, Table, lift, symbol
-from expdesign.estimation.regression import Integers
-from expdesign.estimation.tables import AIR, measured_table, model_for
+from expdesign.estimation.regression import (
+    AIR,
+    Integers,
+    Polynomial,
+    SignalTable,
+    lift,
+    measured_table,
+    model_for,
+    symbol,
+)
 from expdesign.signals import Batch, Record
 from expdesign.values import frozen_set
 from expdesign.vessel import Operators, Sensors, VesselModel
@@ -135,12 +142,12 @@ def _moduli(model: VesselModel, wind_measured: bool) -> list[Modulus]:
     return list(found.values())
 
 
-def _as_polynomial(modulus: Expression, table: Table) -> Polynomial:
+def _as_polynomial(modulus: Expression, table: SignalTable) -> Polynomial:
     opaque = Operators(lambda x: symbol(f"abs({x})"), lambda x: symbol(f"sin({x})"), lambda x: symbol(f"cos({x})"))
     return lift(modulus.evaluate(table, opaque))
 
 
-def _breaches(batch: Batch, table: Table, moduli: list[Modulus], worst: WorstCase) -> list[Breach]:
+def _breaches(batch: Batch, table: SignalTable, moduli: list[Modulus], worst: WorstCase) -> list[Breach]:
     functions = {
         f"{name}({signal})": lambda t, f=f, signal=signal: f(t[signal])
         for name, f in (("abs", np.abs), ("sin", np.sin), ("cos", np.cos))

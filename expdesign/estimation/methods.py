@@ -8,15 +8,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from expdesign.errors import Diverged, InputError, UnknownName
-from expdesign.estimation.instruments import InstrumentModel, apart_from_start
-from expdesign.estimation.null_space import NullSpace
 from expdesign.estimation.output_error import Fitting, minimise_output_error
-from expdesign.estimation.predictors import Layout, Rows, build_layout, build_regression
-from expdesign.estimation.refine import MOST_REFINEMENTS, Refined, refine_iv
-from expdesign.estimation.regression import Regression
-from expdesign.estimation.replay import Integration, build_replay
-from expdesign.estimation.solution import Solution, Weighting, solve_ls
-from expdesign.estimation.tables import model_for
+from expdesign.estimation.regression import Layout, Regression, Rows, build_layout, build_regression, model_for
+from expdesign.estimation.replay import InstrumentModel, Integration, apart_from_start, build_replay
+from expdesign.estimation.solve import MOST_REFINEMENTS, NullSpace, Refined, Solution, Weighting, refine_iv, solve_ls
 from expdesign.estimation.values import Estimate, Residuals
 from expdesign.signals import Record
 from expdesign.values import Array

@@ -25,12 +25,9 @@ import numpy as np
 
 from expdesign.conventions import OUTPUTS
 from expdesign.errors import InputError, NoAnswer
-from expdesign.estimation._casadi import Compiled, Stretches, compiled
-from expdesign.estimation.predictors import Layout
-from expdesign.estimation.regression import Integers, Regression
-from expdesign.estimation.replay import Integration
-from expdesign.estimation.solution import Solution, Weighting, solve_ls
-from expdesign.estimation.tables import inputs_of
+from expdesign.estimation.regression import Integers, Layout, Regression, inputs_of
+from expdesign.estimation.replay import Compiled, Integration, Stretches, compiled
+from expdesign.estimation.solve import Solution, Weighting, solve_ls
 from expdesign.signals import Batch, Record
 from expdesign.values import Array
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from expdesign.errors import UnknownName
-from expdesign.estimation.null_space import NullSpace
+from expdesign.estimation.solve import NullSpace
 from expdesign.values import Array, seal
 from expdesign.vessel import VesselModel
 

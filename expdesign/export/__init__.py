@@ -1,6 +1,9 @@
 """Results leave the package here: JSON and CSV, route files, and the report (in `expdesign.export.report`)."""
 
-from expdesign.export.estimates import (
+from expdesign.export.files import (
+    commands_csv,
+    dictionary_json,
+    durations_json,
     estimate_json,
     estimate_warnings,
     estimated_vessel,
@@ -10,14 +13,13 @@ from expdesign.export.estimates import (
     limit_table,
     parameter_entries,
     parameter_table,
+    plan_json,
+    track_csv,
+    vessel_toml,
 )
 from expdesign.export.folder import write_files
 from expdesign.export.formats import FORMATS, STANDARD, Format, find_format, route_files
-from expdesign.export.planned import PlannedTrack, planned_track
-from expdesign.export.read_plan import read_plan
-from expdesign.export.results import commands_csv, dictionary_json, durations_json, plan_json, track_csv
-from expdesign.export.route import Route, Waypoint, build_route
-from expdesign.export.vessel_file import vessel_toml
+from expdesign.export.routes import PlannedTrack, Route, Waypoint, build_route, planned_track, read_plan
 
 __all__ = [
     "FORMATS",

@@ -7,14 +7,14 @@ from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from expdesign.export.formats.format import xml_text
 
 
-def page_templates(room: str) -> Environment:
-    """Templates of a room of `expdesign.export`, and the report's style sheet.
+def page_templates(package: str) -> Environment:
+    """Templates of a package, and the report's style sheet.
 
     A name that a template uses and nobody gives is an error; text is escaped, and characters that no page may hold are
     replaced.
     """
     return Environment(
-        loader=ChoiceLoader([PackageLoader(f"expdesign.export.{name}") for name in dict.fromkeys((room, "report"))]),
+        loader=ChoiceLoader([PackageLoader(name) for name in dict.fromkeys((package, "expdesign.export.report"))]),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,

@@ -16,9 +16,7 @@ import numpy as np
 
 from expdesign.dictionary import Primitive
 from expdesign.errors import Diverged
-from expdesign.estimation.nuisance import batch_signs
-from expdesign.estimation.predictors import Layout, build_layout
-from expdesign.estimation.tables import measured_table, model_for
+from expdesign.estimation.regression import Layout, batch_signs, build_layout, measured_table, model_for
 from expdesign.information.moments import HEADINGS, log_det_or_none
 from expdesign.information.primitive_information import PrimitiveInformation
 from expdesign.information.scoring import score_primitives

@@ -15,10 +15,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from expdesign.errors import InputError
-from expdesign.estimation.instruments import InstrumentModel
-from expdesign.estimation.predictors import build_layout, build_regression
-from expdesign.estimation.replay import Integration, build_replay
-from expdesign.estimation.tables import inputs_of, model_for
+from expdesign.estimation.regression import build_layout, build_regression, inputs_of, model_for
+from expdesign.estimation.replay import InstrumentModel, Integration, build_replay
 from expdesign.information.moments import MEAN_SUBTRACTIONS
 from expdesign.signals import Record
 from expdesign.simulation import deliver

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from expdesign.dictionary import Primitive
 from expdesign.errors import Diverged, UnknownName
-from expdesign.estimation.tables import AIR
+from expdesign.estimation.regression import AIR
 from expdesign.information.moments import (
     HEADINGS,
     MEAN_SUBTRACTIONS,

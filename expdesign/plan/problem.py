@@ -8,8 +8,8 @@ import numpy as np
 
 from expdesign.dictionary import Primitive
 from expdesign.durations import DurationDesign
-from expdesign.plan.area import SeaArea
 from expdesign.plan.values import PlanSettings
+from expdesign.sea_area import SeaArea
 from expdesign.simulation import Environment, to_body
 from expdesign.values import Array, seal
 from expdesign.vessel import NUMPY, Vessel

@@ -7,14 +7,12 @@ import time
 import numpy as np
 
 from expdesign.errors import NoPlan
-from expdesign.plan.effort import Effort
-from expdesign.plan.leg_values import last_state, nearest_turns
-from expdesign.plan.legs import LegTask, LegWater, find_leg, leg_trajectory
-from expdesign.plan.placement import place_runs
+from expdesign.plan.legs import LegTask, LegWater, find_leg, last_state, leg_trajectory, nearest_turns
 from expdesign.plan.problem import PlanProblem
-from expdesign.plan.search_space import SearchSpace, refusing
+from expdesign.plan.search import SearchSpace, place_runs, refusing
 from expdesign.plan.timeline import Timeline
 from expdesign.plan.values import Placement, Progress
+from expdesign.plan.work_budget import Effort
 from expdesign.values import Array
 
 GOAL = "goal"

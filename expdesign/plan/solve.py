@@ -7,21 +7,16 @@ from dataclasses import replace
 import numpy as np
 
 from expdesign.errors import NoPlan
-from expdesign.plan.checks import verify_plan
-from expdesign.plan.doors import check_ends
-from expdesign.plan.drawn_trials import Trials
-from expdesign.plan.effort import Effort
-from expdesign.plan.lattice import LatticePlan, search_lattice
-from expdesign.plan.lattice_moves import build_lattice
-from expdesign.plan.legs import LegWater
-from expdesign.plan.lower_bound import reposition_bound_s
-from expdesign.plan.preparation import leg_water, search_space, with_joints
+from expdesign.plan.assembly import leg_water, search_space, with_joints
+from expdesign.plan.bounds import reposition_bound_s
+from expdesign.plan.legs import LegWater, check_ends
+from expdesign.plan.monte_carlo import Trials, broken_promise, leaves_too_often, promised, trials_for, worst_leg
 from expdesign.plan.problem import PlanProblem
-from expdesign.plan.realised import realised_efficiencies
-from expdesign.plan.safety import broken_promise, leaves_too_often, promised, trials_for, worst_leg
 from expdesign.plan.sailing import sail_all
-from expdesign.plan.search_space import SearchSpace
+from expdesign.plan.search import LatticePlan, SearchSpace, build_lattice, search_lattice
 from expdesign.plan.values import Leg, Plan, Progress, Promise, Verification
+from expdesign.plan.verify import realised_efficiencies, verify_plan
+from expdesign.plan.work_budget import Effort
 from expdesign.signals import Commands, Trajectory
 
 SAILED = 1

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from expdesign.plan.area import SeaArea
+from expdesign.sea_area import SeaArea
 from expdesign.signals import Commands, Trajectory
 from expdesign.values import Array, seal
 
@@ -102,7 +102,7 @@ class LegOutcome:
 
 @dataclass(frozen=True, kw_only=True)
 class Promise:
-    """What whole trials of drawn ships in drawn weather came to, sailed by the procedure of `expdesign.plan.run_up`.
+    """What whole trials of drawn ships in drawn weather came to, sailed as `plan.monte_carlo.procedure` says.
 
     Attributes:
         trials: how many.
@@ -157,7 +157,7 @@ class Plan:
         trajectory: k + 1 samples.
         legs: in time order, without gaps.
         reposition_bound_s: no plan with these runs, and legs no faster through water than transit speed, repositions in
-            less time [s]; proved but for what `expdesign.plan.lower_bound` says it looks for among draws.
+            less time [s]; proved but for what `expdesign.plan.bounds.repositioning` says it looks for among draws.
         leave_water_probability: chance that the hull leaves allowed water in the trial as it is sailed, by
             `promise`, or None if not computed.
         leave_water_by_leg: the same for each leg, or () if not computed.

@@ -14,8 +14,7 @@ Known quantities in other units (`u_knots`, `n1_rpm`, `wind_angle_deg`) are conv
 nothing here are ignored and noted. Whatever is wrong becomes one `FileError` with the rows it was seen in.
 """
 
-from expdesign.records.fix import Fix, last_fix
 from expdesign.records.load import load_records
-from expdesign.records.velocity import VELOCITY_METHODS, central_difference, smoothed_velocity
+from expdesign.records.pose import VELOCITY_METHODS, Fix, central_difference, last_fix, smoothed_velocity
 
 __all__ = ["VELOCITY_METHODS", "Fix", "central_difference", "last_fix", "load_records", "smoothed_velocity"]

@@ -8,26 +8,25 @@ from pathlib import Path
 
 from expdesign.conventions import OUTPUTS, POSE_COLUMNS
 from expdesign.errors import InputError, UnknownName
-from expdesign.records.agreement import check_agreement
-from expdesign.records.choice import Inputs
-from expdesign.records.clock import Clock, read_clock
-from expdesign.records.motion import (
+from expdesign.records.file import Clock, Inputs, Table, check_ranges, check_wind, read_clock, read_table, relative_wind
+from expdesign.records.pose import (
     MEASURED,
+    VELOCITY_METHODS,
+    LocalMetres,
     Request,
     batch_velocity,
+    check_agreement,
+    check_jumps,
     kept_samples,
     left_out_notes,
     long_enough,
     needed_columns,
     origin_notes,
     velocity_origins,
+    with_continuous_heading,
+    with_metres,
 )
-from expdesign.records.position import LocalMetres, check_jumps, with_continuous_heading, with_metres
-from expdesign.records.ranges import check_ranges
 from expdesign.records.remarks import motion_remarks, table_remarks
-from expdesign.records.table import Table, read_table
-from expdesign.records.velocity import VELOCITY_METHODS
-from expdesign.records.wind import check_wind, relative_wind
 from expdesign.signals import Batch, Record
 from expdesign.vessel import column_name
 

@@ -6,9 +6,8 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from expdesign.records.motion import MEASURED
-from expdesign.records.names import is_input
-from expdesign.records.table import Table
+from expdesign.records.file import Table, is_input
+from expdesign.records.pose import MEASURED
 from expdesign.signals import Batch
 
 HELD = 0.5

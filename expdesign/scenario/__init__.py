@@ -6,13 +6,13 @@ out is in metres and radians. Everything wrong in a file becomes one `FileError`
 a list count from 1, as in ``actuators[2].speed_max_rps``), the value found and what would be right.
 """
 
-from expdesign.scenario.area_file import load_area
-from expdesign.scenario.dictionary_file import load_dictionary
+from expdesign.scenario.charts import load_area
+from expdesign.scenario.dictionaries import load_dictionary
 from expdesign.scenario.durations_file import load_repeats
 from expdesign.scenario.scenario_file import load_scenario
 from expdesign.scenario.values import DesignSettings, Scenario
 from expdesign.scenario.variant_file import Variant, load_variant
-from expdesign.scenario.vessel_file import load_vessel
+from expdesign.scenario.vessels import load_vessel
 
 __all__ = [
     "DesignSettings",

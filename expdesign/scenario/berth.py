@@ -7,7 +7,7 @@ import shapely
 from shapely.ops import nearest_points
 
 from expdesign.conventions import to_n_frame
-from expdesign.plan.area import SeaArea
+from expdesign.sea_area import SeaArea
 from expdesign.values import Array
 from expdesign.vessel import Vessel
 

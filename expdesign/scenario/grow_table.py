@@ -7,7 +7,7 @@ from typing import Annotated
 from pydantic import Field
 
 from expdesign.dictionary import FAMILIES
-from expdesign.durations.growing_values import GrowSettings
+from expdesign.growing import GrowSettings
 from expdesign.scenario.tables import Entry, Number, Positive, Table, Text, shown
 
 Pair = Annotated[list[Number], Field(min_length=2, max_length=2)]

@@ -10,27 +10,15 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from expdesign.plan.area import SeaArea
 from expdesign.plan.values import PlanSettings
-from expdesign.scenario.area_file import load_area
-from expdesign.scenario.area_tables import Latitude, Longitude
 from expdesign.scenario.berth import berth_problem
+from expdesign.scenario.charts import Latitude, Longitude, load_area
 from expdesign.scenario.design_file import DesignTable, design_settings
-from expdesign.scenario.dictionary_file import NAME, NAME_RULE, load_dictionary
-from expdesign.scenario.environment_table import EnvironmentTable, build_environment
-from expdesign.scenario.tables import (
-    Entry,
-    NonNegative,
-    Number,
-    Positive,
-    Table,
-    Text,
-    check_table,
-    read_toml,
-    shown,
-)
+from expdesign.scenario.dictionaries import NAME, NAME_RULE, load_dictionary
+from expdesign.scenario.tables import Entry, NonNegative, Number, Positive, Table, Text, check_table, read_toml, shown
 from expdesign.scenario.values import Scenario
-from expdesign.scenario.vessel_file import load_vessel
+from expdesign.scenario.vessels import EnvironmentTable, build_environment, load_vessel
+from expdesign.sea_area import SeaArea
 from expdesign.values import Array
 
 Degrees = Annotated[float, Field(ge=-360, le=360)]

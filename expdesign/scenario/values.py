@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from expdesign.dictionary.spec import PrimitiveSpec
-from expdesign.durations.growing_values import GrowSettings
-from expdesign.plan.area import SeaArea
+from expdesign.growing import GrowSettings
 from expdesign.plan.values import PlanSettings
+from expdesign.sea_area import SeaArea
 from expdesign.simulation.environment import Environment
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel

@@ -16,7 +16,7 @@ from expdesign import __version__
 from expdesign.assessment import NO_TESTS, Assessment, Wish, assess
 from expdesign.conventions import Array
 from expdesign.errors import FileError, InputError
-from expdesign.estimation.tables import with_depth
+from expdesign.estimation.regression import with_depth
 from expdesign.export import (
     FORMATS,
     build_route,
@@ -30,11 +30,11 @@ from expdesign.export import (
     limit_table,
     parameter_entries,
     parameter_table,
-    read_plan,
     route_files,
     write_files,
 )
 from expdesign.export.estimate_page import EstimateContent, estimate_html
+from expdesign.export.routes import read_plan
 from expdesign.records import load_records
 from expdesign.scenario import load_vessel
 from expdesign.signals import Commands, Record

@@ -13,7 +13,7 @@ from expdesign.diagnosis import Diagnosis, Proposal
 from expdesign.diagnosis import diagnose as diagnose_record
 from expdesign.dictionary import build_dictionary
 from expdesign.errors import InputError
-from expdesign.estimation.tables import model_for
+from expdesign.estimation.regression import model_for
 from expdesign.export import write_files
 from expdesign.export.diagnosis_page import diagnosis_html, diagnosis_json, diagnosis_tables, extended_vessel
 from expdesign.export.diagnosis_page.results import accuracy_entry, finding_entry

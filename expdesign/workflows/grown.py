@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from expdesign.durations.growing import grow_dictionary
-from expdesign.durations.growing_values import GrowSettings, Growth
-from expdesign.export.dictionary_file import dictionary_files, growth_json
+from expdesign.export.files import dictionary_files, growth_json
+from expdesign.growing import GrowSettings, Growth, grow_dictionary
 from expdesign.information import PrimitiveInformation
 from expdesign.scenario import Scenario
 from expdesign.workflows.outcome import Progress, TextTable, silent

@@ -10,9 +10,9 @@ import numpy as np
 from expdesign.assessment import Assessed, Wish, assess
 from expdesign.durations import DurationDesign
 from expdesign.errors import Diverged, NoAnswer, NotInformative
-from expdesign.estimation.tables import in_depth
+from expdesign.estimation.regression import in_depth
 from expdesign.estimation.values import Estimate
-from expdesign.export.known import Purchase
+from expdesign.export.files import Purchase
 from expdesign.information.expected import TrialPart, expected_covariance
 from expdesign.plan.values import Plan
 from expdesign.signals import Commands, Record

@@ -15,7 +15,7 @@ from expdesign import __version__
 from expdesign.durations import MEAN_SUBTRACTIONS, Subset, best_subset
 from expdesign.errors import InputError, NotInformative
 from expdesign.export import write_files
-from expdesign.export.record_file import record_csv
+from expdesign.export.files import record_csv
 from expdesign.information import estimated_parameters
 from expdesign.information.recorded import BatchInformation, recorded_information
 from expdesign.scenario import load_vessel

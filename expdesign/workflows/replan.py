@@ -15,7 +15,7 @@ import numpy as np
 from expdesign.durations import DurationDesign, efficiencies
 from expdesign.errors import NoAnswer
 from expdesign.export import vessel_toml, write_files
-from expdesign.export.known import Known, replan_json
+from expdesign.export.files import Known, replan_json
 from expdesign.information import estimated_parameters
 from expdesign.plan.values import Plan
 from expdesign.scenario import Scenario

@@ -10,7 +10,6 @@ from expdesign import __version__
 from expdesign.dictionary import build_dictionary
 from expdesign.dictionary.wishes import strayed
 from expdesign.durations import DurationDesign, efficiencies, with_repeats
-from expdesign.durations.growing_values import Growth
 from expdesign.errors import InputError
 from expdesign.export import (
     STANDARD,
@@ -27,6 +26,7 @@ from expdesign.export import (
 )
 from expdesign.export.cards import cards_html
 from expdesign.export.report import ReportContent, report_html
+from expdesign.growing import Growth
 from expdesign.information import PrimitiveInformation, estimated_parameters, score_primitives
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import plan_trial

@@ -12,11 +12,11 @@ import joblib
 import numpy as np
 
 from expdesign import __version__
-from expdesign.durations.validation import RANDOM, Rehearsal, equal_runs, validate
 from expdesign.errors import InputError
 from expdesign.export import vessel_toml, write_files
 from expdesign.export.validation_page import ValidationContent, judgements, validation_html, validation_json
 from expdesign.information import estimated_parameters
+from expdesign.rehearsal import RANDOM, Rehearsal, equal_runs, validate
 from expdesign.scenario import load_scenario, load_vessel
 from expdesign.values import Array
 from expdesign.workflows.design import designed

@@ -14,13 +14,13 @@ from joblib import Parallel, delayed, parallel_config
 from expdesign import __version__
 from expdesign.durations import DurationDesign
 from expdesign.durations.efficiency import efficiencies
-from expdesign.durations.validation import trial_parts
 from expdesign.errors import InputError, NoAnswer
 from expdesign.export import write_files
 from expdesign.export.whatif_page import Case, WhatIfContent, explanations, whatif_html, whatif_json
 from expdesign.export.whatif_page.page import table_header, table_row
 from expdesign.information import PrimitiveInformation, estimated_parameters
 from expdesign.information.expected import expected_covariance
+from expdesign.rehearsal import trial_parts
 from expdesign.scenario import Scenario, load_scenario, load_variant
 from expdesign.workflows.design import designed
 from expdesign.workflows.outcome import Outcome, Progress, TextTable, silent

@@ -16,11 +16,10 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1]))
 import hidden_effects as sea
 from diagnosis_case import hidden_record, vessel_of
-
 from expdesign.diagnosis import diagnose
-from expdesign.diagnosis.accuracy import simulate_from_first
+from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.extension import as_extended
-from expdesign.diagnosis.windows import cut_windows
+from expdesign.diagnosis.model.accuracy import simulate_from_first
 
 RUNS, SAMPLES, TIMES = 8, 450, 5
 HIDDEN = {

@@ -15,14 +15,13 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 import hidden_effects as sea
 from diagnosis_case import Told, drawn_parameters, from_pose, hidden_records, vessel_of
-
 from expdesign.diagnosis import CAUSES, diagnose
-from expdesign.diagnosis.accuracy import WHOLE_S, first_states, pooled_fit, simulate_from_first
-from expdesign.diagnosis.candidate import Situation
+from expdesign.diagnosis.causes.candidate import Situation
+from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.extension import as_extended
-from expdesign.diagnosis.screening import screen
-from expdesign.diagnosis.search import settled
-from expdesign.diagnosis.windows import cut_windows
+from expdesign.diagnosis.fit.score_tests import screen
+from expdesign.diagnosis.model.accuracy import WHOLE_S, first_states, pooled_fit, simulate_from_first
+from expdesign.diagnosis.select.forward_search import settled
 from expdesign.signals import Batch, Record
 from expdesign.vessel import Vessel
 

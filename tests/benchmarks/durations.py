@@ -18,9 +18,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import cvxpy
 import numpy as np
-from design_case import CALM, WIND, duration_problem, example_dictionary, random_matrices, vessel
 from scipy.optimize import minimize
 
+from design_case import CALM, WIND, duration_problem, example_dictionary, random_matrices, vessel
 from expdesign.durations import log_det, optimal_shares, sensitivities
 from expdesign.durations.certificate import scaled
 from expdesign.information import score_primitives

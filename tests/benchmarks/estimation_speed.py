@@ -16,7 +16,6 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from estimation_case import NOMINAL, STEADY_CURRENT, TRUE, commands, measured, record
-
 from expdesign.estimation.methods import estimate
 from expdesign.simulation import euler_step, motion_rates
 from expdesign.vessel import SCALAR

@@ -16,9 +16,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from expdesign.plan.search.lattice import search_lattice
 from lattice_case import Run, as_problem, astar_thesis, dijkstra_plain, random_world
-
-from expdesign.plan.lattice import search_lattice
 
 THREE = (Run(5, 0, 0, 1), Run(3, 0, 0, 2), Run(0, 4, 0, 1))
 BEST_OF = 3

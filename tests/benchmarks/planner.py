@@ -18,14 +18,13 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from main_job import SCENARIOS, baseline_s, main_job
-
 from expdesign import workflows
 from expdesign.errors import NoPlan
-from expdesign.plan.capability import capability
+from expdesign.plan.control.capability import capability
 from expdesign.plan.solve import lattice_reference
 from expdesign.scenario import load_scenario
 from expdesign.workflows.trial import plan_problem
+from main_job import SCENARIOS, baseline_s, main_job
 
 CELLS = 1.1
 """Turning radii between cells of the lattice: little more than it needs for a quarter turn."""

@@ -1,8 +1,9 @@
 """Whole trials of drawn ships in drawn weather: how many leave allowed water or are broken off, and what time it costs.
 
 Run with the package installed: ``python tests/benchmarks/safety.py [DRAWS] [SCENARIO.toml ...]``, by default 500 draws
-of all examples. One draw is one trial, sailed by the procedure of `expdesign.plan.run_up`; the hull is looked at
-against the chart at every step, of runs, of legs and of ways round alike. The draws are others than the plan's own.
+of all examples. One draw is one trial, sailed by the procedure of `expdesign.plan.monte_carlo.procedure`; the
+hull is looked at against the chart at every step, of runs, of legs and of ways round alike. The draws are others than
+the plan's own.
 
 Each scenario is sailed three times: in the weather it forecasts; with current and wind that besides wander slowly
 (Gauss-Markov, `WANDERING`), which the plan knew nothing of; and *without a break*: nobody goes round, every run begins
@@ -20,10 +21,11 @@ from pathlib import Path
 import numpy as np
 
 from expdesign import workflows
-from expdesign.plan import Plan, run_up
-from expdesign.plan.leg_values import LegWater
-from expdesign.plan.preparation import leg_water
-from expdesign.plan.safety import promised, upper_limit
+from expdesign.plan import Plan
+from expdesign.plan.assembly import leg_water
+from expdesign.plan.legs.water import LegWater
+from expdesign.plan.monte_carlo import procedure as run_up
+from expdesign.plan.monte_carlo.risk import promised, upper_limit
 from expdesign.plan.values import Promise
 from expdesign.scenario import load_scenario
 from expdesign.scenario.values import Scenario

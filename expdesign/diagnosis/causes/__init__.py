@@ -1,24 +1,17 @@
 """The catalogue of causes: one file each, one signature, one visible tuple."""
 
-from expdesign.diagnosis.candidate import Cause
-from expdesign.diagnosis.causes.actuator_deadband import ACTUATOR_DEADBAND
-from expdesign.diagnosis.causes.actuator_delay import ACTUATOR_DELAY
-from expdesign.diagnosis.causes.actuator_lag import ACTUATOR_LAG
-from expdesign.diagnosis.causes.change_point import CHANGE_POINT
-from expdesign.diagnosis.causes.current import CURRENT
-from expdesign.diagnosis.causes.gyro_scale import GYRO_SCALE
-from expdesign.diagnosis.causes.heading_bias import HEADING_BIAS
-from expdesign.diagnosis.causes.lever_arm import LEVER_ARM
-from expdesign.diagnosis.causes.load_change import LOAD_CHANGE
-from expdesign.diagnosis.causes.missing_term import MISSING_TERM
-from expdesign.diagnosis.causes.parameters import PARAMETERS
-from expdesign.diagnosis.causes.roll_coupling import ROLL_COUPLING
-from expdesign.diagnosis.causes.sensor_delay import SENSOR_DELAY
-from expdesign.diagnosis.causes.shallow_water import SHALLOW_WATER
-from expdesign.diagnosis.causes.thrust_advance_loss import THRUST_ADVANCE_LOSS
-from expdesign.diagnosis.causes.thrust_gain import THRUST_GAIN
-from expdesign.diagnosis.causes.thruster_asymmetry import THRUSTER_ASYMMETRY
-from expdesign.diagnosis.causes.wind import WIND
+from expdesign.diagnosis.causes.actuators import (
+    ACTUATOR_DEADBAND,
+    ACTUATOR_DELAY,
+    ACTUATOR_LAG,
+    THRUST_ADVANCE_LOSS,
+    THRUST_GAIN,
+    THRUSTER_ASYMMETRY,
+)
+from expdesign.diagnosis.causes.candidate import Candidate, Cause, Situation, Values
+from expdesign.diagnosis.causes.environment import CURRENT, SHALLOW_WATER, WIND, in_shallow_water
+from expdesign.diagnosis.causes.hull import CHANGE_POINT, LOAD_CHANGE, MISSING_TERM, PARAMETERS, ROLL_COUPLING, library
+from expdesign.diagnosis.causes.sensors import GYRO_SCALE, HEADING_BIAS, LEVER_ARM, SENSOR_DELAY
 
 CAUSES: tuple[Cause, ...] = (
     PARAMETERS,
@@ -41,4 +34,4 @@ CAUSES: tuple[Cause, ...] = (
     CHANGE_POINT,
 )
 
-__all__ = ["CAUSES"]
+__all__ = ["CAUSES", "Candidate", "Cause", "Situation", "Values", "in_shallow_water", "library"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from expdesign.diagnosis.candidate import Values
+from expdesign.diagnosis.causes.candidate import Values
 
 PLUS_MINUS = "\N{PLUS-MINUS SIGN}"
 

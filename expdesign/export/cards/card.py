@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from expdesign.export import words
 from expdesign.export.cards.chart import run_chart
 from expdesign.export.cards.danger import FARTHEST_M, Danger, look_out
 from expdesign.export.cards.orders import order_columns, order_rows
-from expdesign.export.report import words
 from expdesign.export.report.content import ReportContent, Run, relative_information
 from expdesign.export.report.tables import settings_sentence
 from expdesign.plan.values import Leg, Plan

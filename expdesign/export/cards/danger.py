@@ -8,8 +8,8 @@ import numpy as np
 import shapely
 
 from expdesign.conventions import to_n_frame
-from expdesign.plan.footprint import swept_area
 from expdesign.values import Array
+from expdesign.vessel.hull import swept_area
 
 FARTHEST_M = 5000.0
 DIRECTIONS = {"ahead": 0.0, "starboard": np.pi / 2, "port": -np.pi / 2}

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from expdesign.export import words
 from expdesign.export.cards.card import BLANKS, build_card, card_groups
 from expdesign.export.pages import page_templates
-from expdesign.export.planned import require_verified
-from expdesign.export.report import tables, words
+from expdesign.export.report import tables
 from expdesign.export.report.content import ReportContent, primitive_runs
 from expdesign.export.report.figures.chart import chart
 from expdesign.export.report.figures.style import report_style
 from expdesign.export.report.procedure import day_sentence, procedure_sentences
+from expdesign.export.routes import require_verified
 
 
 def cards_html(content: ReportContent) -> str:
@@ -23,7 +24,7 @@ def cards_html(content: ReportContent) -> str:
     with report_style():
         cards = [build_card(content, group) for group in card_groups(content, runs)]
         overview = chart(content)
-    page = page_templates("cards").get_template("cards.html")
+    page = page_templates("expdesign.export.cards").get_template("cards.html")
     return page.render(
         content=content,
         cards=cards,

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 
 from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis import Diagnosis
-from expdesign.diagnosis.residuals import ENOUGH, Dependence, dependence
+from expdesign.diagnosis.model import ENOUGH, Dependence, dependence
 from expdesign.export.diagnosis_page.suspects import DEGREES, has_sign, is_force, suspected, suspected_force
 from expdesign.export.estimate_page.figures import AXES, thinned
 from expdesign.export.report.figures.style import BLUE, GREY, VERMILION, light_grid, new_figure, short, svg

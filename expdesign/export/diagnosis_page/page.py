@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from expdesign.diagnosis import Diagnosis, Finding
-from expdesign.diagnosis.residuals import on_the_whole
-from expdesign.diagnosis.search import ALARM
+from expdesign.diagnosis.model import on_the_whole
+from expdesign.diagnosis.select import ALARM
 from expdesign.diagnosis.values import Fall
 from expdesign.diagnosis.verdict import LOST_FIT, fits, held_apart, lacking, lost, manoeuvre, worth
+from expdesign.export import words
 from expdesign.export.diagnosis_page.figures import (
     LACKING,
     growth_figure,
@@ -18,9 +19,8 @@ from expdesign.export.diagnosis_page.figures import (
 )
 from expdesign.export.diagnosis_page.suspects import has_sign, is_force
 from expdesign.export.diagnosis_page.wording import titled, worded
-from expdesign.export.estimates import plus_minus
+from expdesign.export.files import plus_minus
 from expdesign.export.pages import page_templates
-from expdesign.export.report import words
 from expdesign.export.report.figures.style import report_style
 
 SHOWN = 4
@@ -37,7 +37,7 @@ def diagnosis_html(found: Diagnosis, *, command: str, version: str) -> str:
             "residuals": residual_figures(found),
             "suspects": [suspect_figure(found, i, f"suspect{i}") for i in range(len(found.findings))],
         }
-    page = page_templates("diagnosis_page").get_template("diagnosis.html")
+    page = page_templates("expdesign.export.diagnosis_page").get_template("diagnosis.html")
     return page.render(
         found=found,
         alarm=f"{ALARM:g}",

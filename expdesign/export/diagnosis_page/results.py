@@ -7,11 +7,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from expdesign.diagnosis import Accuracy, Diagnosis, Finding
-from expdesign.diagnosis.residuals import dependence
+from expdesign.diagnosis.model import dependence
 from expdesign.diagnosis.values import Residuals
-from expdesign.export.estimates import plus_minus
-from expdesign.export.results import strict_json
-from expdesign.export.vessel_file import vessel_toml
+from expdesign.export.files import plus_minus, strict_json, vessel_toml
 from expdesign.values import Array
 
 SMALL = 1e-99

@@ -8,10 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from expdesign.diagnosis import Diagnosis, Finding
-from expdesign.diagnosis.extended import Extended
 from expdesign.diagnosis.extension import as_extended
-from expdesign.diagnosis.followed import members
-from expdesign.diagnosis.parts import ahead_force, ahead_force_text
+from expdesign.diagnosis.model import Extended, ahead_force, ahead_force_text, members
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, column_name, generalised_force
 from expdesign.vessel.expressions import parse_expression

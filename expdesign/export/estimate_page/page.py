@@ -9,11 +9,11 @@ import numpy as np
 
 from expdesign.assessment import Assessed, Assessment, sentence
 from expdesign.assessment.limits import AHEAD_S
+from expdesign.export import words
 from expdesign.export.estimate_page.content import EstimateContent
 from expdesign.export.estimate_page.figures import autocorrelation_figure, interval_figure, residual_figure, run_figure
-from expdesign.export.estimates import breach_sentences, fit_table, motion_words, plus_minus, unstable_warning
+from expdesign.export.files import breach_sentences, fit_table, motion_words, plus_minus, unstable_warning
 from expdesign.export.pages import page_templates
-from expdesign.export.report import words
 from expdesign.export.report.figures.style import report_style
 
 FACTOR = 1.959964
@@ -47,7 +47,7 @@ class MethodNotes:
 def estimate_html(content: EstimateContent) -> str:
     """One HTML page without any outside reference."""
     found = content.found
-    page = page_templates("estimate_page").get_template("estimate.html")
+    page = page_templates("expdesign.export.estimate_page").get_template("estimate.html")
     return page.render(
         content=content,
         found=found,

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from expdesign.errors import UnknownName
 from expdesign.export.formats import ardupilot, geojson, gpx, kml, qgc, route_csv, rtz
 from expdesign.export.formats.format import Format
-from expdesign.export.route import Route
+from expdesign.export.routes import Route
 
 FORMATS: tuple[Format, ...] = (
     route_csv.FORMAT,

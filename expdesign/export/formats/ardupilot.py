@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from expdesign.export.formats.format import Format, degrees, route_file
 from expdesign.export.formats.mission import GLOBAL, NAV_WAYPOINT, MissionItem, mission
-from expdesign.export.route import Route
+from expdesign.export.routes import Route
 
 HEADER = "QGC WPL 110"
 

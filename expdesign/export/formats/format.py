@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from expdesign.export.route import DEGREE_DECIMALS, ROUTE_NAME, Route, Waypoint
+from expdesign.export.routes import DEGREE_DECIMALS, ROUTE_NAME, Route, Waypoint
 
 
 @dataclass(frozen=True, kw_only=True)

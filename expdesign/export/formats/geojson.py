@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from itertools import groupby, pairwise
 from typing import Any
 
+from expdesign.export.files import strict_json
 from expdesign.export.formats.format import Format, route_file
-from expdesign.export.results import strict_json
-from expdesign.export.route import Route, Waypoint
+from expdesign.export.routes import Route, Waypoint
 
 Position = tuple[float, float]
 

@@ -10,7 +10,7 @@ from lxml import etree
 
 from expdesign.conventions import KNOTS_PER_MPS, METRES_PER_NAUTICAL_MILE
 from expdesign.export.formats.format import Format, degrees, leg_sentence, route_file, xml_text
-from expdesign.export.route import Route, Waypoint
+from expdesign.export.routes import Route, Waypoint
 
 GPX = "http://www.topografix.com/GPX/1/1"
 OPENCPN = "http://www.opencpn.org"

@@ -11,7 +11,7 @@ from lxml import etree
 
 from expdesign.export.formats.format import Format, degrees, leg_sentence, route_file, xml_text
 from expdesign.export.formats.geojson import crosses_antimeridian, cut_at_antimeridian
-from expdesign.export.route import Route, Waypoint
+from expdesign.export.routes import Route, Waypoint
 
 KML = "http://www.opengis.net/kml/2.2"
 COLOURS = {"primitive": "ff005ed5", "reposition": "ffb27200"}

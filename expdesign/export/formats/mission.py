@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from expdesign.export.route import Route
+from expdesign.export.routes import Route
 
 NAV_WAYPOINT, DO_CHANGE_SPEED = 16, 178
 GLOBAL, MISSION, GLOBAL_RELATIVE_ALT = 0, 2, 3

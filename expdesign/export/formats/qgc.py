@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from expdesign.export.files import strict_json
 from expdesign.export.formats.format import Format, route_file
 from expdesign.export.formats.mission import MissionItem, mission
-from expdesign.export.results import strict_json
-from expdesign.export.route import Route
+from expdesign.export.routes import Route
 
 ARDUPILOT, SURFACE_BOAT = 3, 11
 FENCE_VERSION, MISSION_VERSION, RALLY_VERSION = 2, 2, 2

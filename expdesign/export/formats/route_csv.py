@@ -6,7 +6,7 @@ import csv
 import io
 
 from expdesign.export.formats.format import Format, degrees, route_file
-from expdesign.export.route import Route
+from expdesign.export.routes import Route
 
 COLUMNS = (
     "waypoint",

@@ -17,7 +17,7 @@ from lxml import etree
 from expdesign.conventions import KNOTS_PER_MPS, METRES_PER_NAUTICAL_MILE
 from expdesign.errors import InputError
 from expdesign.export.formats.format import Format, degrees, leg_sentence, route_file, xml_text
-from expdesign.export.route import Route, Waypoint
+from expdesign.export.routes import Route, Waypoint
 
 SPACE = "http://www.cirm.org/RTZ/{}/{}"
 VERSIONS = ("1.0", "1.1", "1.2")

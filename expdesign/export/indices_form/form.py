@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from expdesign.errors import InputError
-from expdesign.export.results import strict_json
+from expdesign.export.files import strict_json
 from expdesign.indices import Circle, NotStandard, StandardResults, Stop, Verdict, ZigZag, judge
 from expdesign.indices.criteria import LEAST_LENGTH_M
 from expdesign.vessel import Vessel

@@ -14,7 +14,7 @@ def indices_html(content: IndicesContent) -> str:
     """One HTML page without outside references."""
     sources = tuple(dict.fromkeys(source for source, _ in content.trials))
     unmet = sum(verdict.met is False for _, verdict in content.verdicts)
-    page = page_templates("indices_form").get_template("indices.html")
+    page = page_templates("expdesign.export.indices_form").get_template("indices.html")
     return page.render(
         content=content,
         rows=verdict_rows(content),

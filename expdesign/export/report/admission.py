@@ -7,7 +7,7 @@ import shapely
 
 from expdesign.export.report.content import ReportContent
 from expdesign.indices import Condition, Conditions, admissibility
-from expdesign.plan.area import SeaArea
+from expdesign.sea_area import SeaArea
 from expdesign.values import Array
 
 

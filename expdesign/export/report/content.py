@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.durations import Efficiencies
-from expdesign.durations.growing_values import Growth
 from expdesign.durations.values import DurationDesign
-from expdesign.export.known import Known
-from expdesign.export.route import Route
+from expdesign.export.files import Known
+from expdesign.export.routes import Route
+from expdesign.growing import Growth
 from expdesign.information.primitive_information import PrimitiveInformation
 from expdesign.plan.values import Plan
 from expdesign.simulation.environment import Environment

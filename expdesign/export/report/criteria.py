@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from expdesign.durations import CRITERIA, limits_kept
-from expdesign.export.report import words
+from expdesign.export import words
 from expdesign.export.report.content import ReportContent
 
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from expdesign.durations.growing_values import GrowRound, Growth
-from expdesign.export.report import words
+from expdesign.export import words
 from expdesign.export.report.tables import setting
+from expdesign.growing import GrowRound, Growth
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from expdesign.export import words
 from expdesign.export.pages import page_templates
-from expdesign.export.report import criteria, tables, words
+from expdesign.export.report import criteria, tables
 from expdesign.export.report.admission import conditions
 from expdesign.export.report.content import ReportContent, primitive_runs
 from expdesign.export.report.figures.chart import chart
@@ -48,7 +49,7 @@ def report_html(content: ReportContent) -> str:
     """One HTML page without any outside reference: figures inside as SVG, readable on a phone and on paper."""
     after = expected(content)
     rows = tables.parameter_rows(content, after)
-    page = page_templates("report").get_template("report.html")
+    page = page_templates("expdesign.export.report").get_template("report.html")
     return page.render(
         content=content,
         plan=content.plan,

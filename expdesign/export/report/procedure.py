@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from expdesign.export.report import words
+from expdesign.export import words
 from expdesign.plan.values import Plan, Promise
 
 

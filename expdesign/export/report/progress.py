@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from expdesign.export.known import Known, Purchase
-from expdesign.export.report import words
-from expdesign.plan.area import LocalFrame
+from expdesign.export import words
+from expdesign.export.files import Known, Purchase
+from expdesign.sea_area import LocalFrame
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from expdesign.export.report import words
+from expdesign.export import words
 from expdesign.export.report.content import ReportContent, primitive_runs
 from expdesign.export.report.procedure import aborted_words, extra_words, left_words
 from expdesign.export.report.uncertainty import Expected

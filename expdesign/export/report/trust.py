@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from expdesign.export.report import words
+from expdesign.export import words
 from expdesign.export.report.content import ReportContent
-from expdesign.export.route import DEGREE_DECIMALS
+from expdesign.export.routes import DEGREE_DECIMALS
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from expdesign.durations.validation import Rehearsal, Validated
+from expdesign.rehearsal import Rehearsal, Validated
 
 AGREES = 0.10
 """Relative difference of standard deviations that still counts as agreement, chance aside."""

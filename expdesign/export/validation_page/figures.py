@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from expdesign.durations.validation import Validated
 from expdesign.export.report.figures.style import BLUE, GREY, LINES, VERMILION, light_grid, new_figure, plain, svg
 from expdesign.export.validation_page.content import ERROR_LIMIT, chance
+from expdesign.rehearsal import Validated
 
 WIDE = 10.0
 """Ratio of the ends of an axis beyond which its ticks stand farther apart."""

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from expdesign.durations.validation import Validated
 from expdesign.export.pages import page_templates
 from expdesign.export.report.figures.style import report_style
 from expdesign.export.validation_page.content import ERROR_LIMIT, ValidationContent, judgements
 from expdesign.export.validation_page.figures import error_figure, spread_figure
+from expdesign.rehearsal import Validated
 
 
 def validation_html(content: ValidationContent) -> str:
@@ -20,7 +20,7 @@ def validation_html(content: ValidationContent) -> str:
             "spread": None if predicted is None else spread_figure(predicted),
         }
     return (
-        page_templates("validation_page")
+        page_templates("expdesign.export.validation_page")
         .get_template("validation.html")
         .render(
             content=content,

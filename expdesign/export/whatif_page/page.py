@@ -13,7 +13,7 @@ def whatif_html(content: WhatIfContent) -> str:
     with report_style():
         figures = {"times": time_figure(content), "ratios": ratio_figure(content), "runs": runs_figure(content)}
     return (
-        page_templates("whatif_page")
+        page_templates("expdesign.export.whatif_page")
         .get_template("whatif.html")
         .render(
             content=content,

@@ -29,8 +29,8 @@ from expdesign.export.report.figures.style import (
     new_figure,
     svg,
 )
-from expdesign.plan.area import SeaArea, as_multipolygon, eroded
 from expdesign.plan.values import Plan
+from expdesign.sea_area import SeaArea, as_multipolygon, eroded
 from expdesign.values import Array
 
 WIDTH_IN = 8.0

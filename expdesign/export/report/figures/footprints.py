@@ -9,9 +9,9 @@ import shapely
 
 from expdesign.errors import NoPlan
 from expdesign.export.report.content import ReportContent
-from expdesign.plan.footprint import covering_discs, hull_polygons
-from expdesign.plan.uncertainty import stray_m
+from expdesign.plan.runs import stray_m
 from expdesign.values import Array
+from expdesign.vessel.hull import covering_discs, hull_polygons
 
 SEED = 0
 """Of the draws for the picture; the planner's own are others."""

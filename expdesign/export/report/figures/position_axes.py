@@ -7,9 +7,9 @@ import math
 import numpy as np
 from matplotlib.axes import Axes
 
-from expdesign.export.report import words
+from expdesign.export import words
 from expdesign.export.report.figures.style import BLACK
-from expdesign.plan.area import LocalFrame
+from expdesign.sea_area import LocalFrame
 
 STEPS = (1.0, 2.0, 5.0, 10.0)
 

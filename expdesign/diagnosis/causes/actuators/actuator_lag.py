@@ -1,0 +1,50 @@
+"""Actuators that follow their commands with a first-order lag."""
+
+from __future__ import annotations
+
+from expdesign.diagnosis.causes.candidate import Candidate, Cause, Situation, Values
+from expdesign.diagnosis.causes.words import first, rounded
+from expdesign.diagnosis.model import Extended, input_groups, members
+
+SAMPLES = (0.5, 2.0, 6.0)
+SHARES = (0.5, 1.5)
+
+
+def open_groups(situation: Situation, kind: str) -> list[str]:
+    """Groups of inputs of which the vessel file states nothing of a kind, and those of which it states one value.
+
+    None once something of the kind was found: what is then left is another cause's.
+    """
+    ship = situation.ship
+    if ship.found(f"{kind}:"):
+        return []
+    inputs = ship.model.inputs
+    stated = {key.split(":", 1)[1] for key in ship.stated if key.startswith(f"{kind}:")}
+    taken = {column for group in stated for column in members(group, inputs)}
+    return [group for group in input_groups(inputs) if group in stated or not taken & {*members(group, inputs)}]
+
+
+def followers(situation: Situation, kind: str, cause: str) -> tuple[Candidate, ...]:
+    """A time of every group of inputs, tried at a few values; smaller and larger than what the vessel file states."""
+    sample, found = situation.windows.sample_s, []
+    for group in open_groups(situation, kind):
+        key = f"{kind}:{group}"
+        stated = situation.ship.stated.get(key)
+        times = [sample * number for number in SAMPLES] if stated is None else [stated * share for share in SHARES]
+        found += [Candidate(cause=cause, free={key: time}, finite=True) for time in times]
+    return tuple(found)
+
+
+def _candidates(situation: Situation) -> tuple[Candidate, ...]:
+    return followers(situation, "lag", "actuator_lag")
+
+
+def _explain(values: Values, _ship: Extended) -> str:
+    key, value, std = first(values)
+    return (
+        f"The error follows every change of command and dies out: {key.split(':')[1]} inputs lag behind their commands "
+        f"with a time constant of {rounded(value, std)} s."
+    )
+
+
+ACTUATOR_LAG = Cause(name="actuator_lag", candidates=_candidates, explain=_explain)

@@ -1,0 +1,42 @@
+"""A ship that turns at zero angle: thrust off the centre line, or angles that are not what they are said to be."""
+
+from __future__ import annotations
+
+import math
+
+from expdesign.diagnosis.causes.actuators.actuator_lag import open_groups
+from expdesign.diagnosis.causes.candidate import Candidate, Cause, Situation, Values
+from expdesign.diagnosis.causes.words import first, rounded
+from expdesign.diagnosis.model import ANGLE_STEMS, Extended, ahead_force_text, members, turns_by_force
+
+
+def _candidates(situation: Situation) -> tuple[Candidate, ...]:
+    ship = situation.ship
+    if ship.found("offset:") or ship.found("asymmetry") or "r" not in ship.model.outputs:
+        return ()
+    angles = {column for stem in ANGLE_STEMS for column in members(stem, ship.model.inputs)}
+    groups = [group for group in open_groups(situation, "offset") if {*members(group, ship.model.inputs)} <= angles]
+    lean = Candidate(cause="thruster_asymmetry", free={"asymmetry": 0.0})
+    return (lean, *(Candidate(cause="thruster_asymmetry", free={f"offset:{group}": 0.0}) for group in groups))
+
+
+def _explain(values: Values, ship: Extended) -> str:
+    key, value, std = first(values)
+    side = "port" if value > 0 else "starboard"
+    if key == "asymmetry" and not turns_by_force(ship.model):
+        turn = "starboard" if value > 0 else "port"
+        return (
+            f"Thrust turns the ship to {turn} at zero angle: the yaw rate accelerates by {rounded(value, std)} "
+            f"rad/s\N{SUPERSCRIPT TWO} per {ahead_force_text(ship.model)}, as if thrust acted to {side} of the centre "
+            "line."
+        )
+    if key == "asymmetry":
+        return (
+            f"A yaw moment in proportion to the ahead thrust: {rounded(value, std)} per unit of thrust, as if the "
+            f"thrust acted that far to {side}. The ship turns at zero angle."
+        )
+    size = rounded(math.degrees(value), math.degrees(std))
+    return f"The angle of {key.split(':')[1]} is off by {size} degrees: the ship turns when it is commanded straight."
+
+
+THRUSTER_ASYMMETRY = Cause(name="thruster_asymmetry", candidates=_candidates, explain=_explain)

@@ -1,0 +1,65 @@
+"""What a cause of the catalogue is: a name, ways in which it may act, and words for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from expdesign.diagnosis.data import Windows
+from expdesign.diagnosis.model import Extended
+
+
+@dataclass(frozen=True, kw_only=True)
+class Candidate:
+    """One way in which a cause may act.
+
+    Attributes:
+        cause: name in the catalogue.
+        free: effects to estimate, with a first guess each; zero where the effect is smooth around zero.
+        fixed: effects that say which candidate it is, e.g. the roll period.
+        finite: the effect is not smooth at zero; it is tried at the first guess as a whole.
+        grid: effect whose value is found by trying these once the candidate is singled out, as the likelihood has
+            corners in it.
+    """
+
+    cause: str
+    free: Mapping[str, float]
+    fixed: Mapping[str, float] = field(default_factory=dict)
+    finite: bool = False
+    grid: tuple[str, tuple[float, ...]] | None = None
+
+    @property
+    def size(self) -> int:
+        """Numbers that screening tests at once."""
+        return 1 if self.finite else len(self.free)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Situation:
+    """What candidates are made for: the model as it stands, and the data."""
+
+    ship: Extended
+    windows: Windows
+
+    def has(self, key: str) -> bool:
+        """The effect is already in the model."""
+        return key in self.ship.effects
+
+
+Values = Mapping[str, tuple[float, float]]
+"""Effect -> (estimate, standard error)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cause:
+    """An entry of the catalogue.
+
+    Attributes:
+        name: in the vocabulary of diagnosis.json.
+        candidates: the ways in which it may act in a situation; none when the data cannot show it.
+        explain: one or two sentences for a person, from the estimates and the model they are of.
+    """
+
+    name: str
+    candidates: Callable[[Situation], tuple[Candidate, ...]]
+    explain: Callable[[Values, Extended], str]

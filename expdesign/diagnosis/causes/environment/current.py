@@ -1,0 +1,28 @@
+"""A steady current: the ship moves with water that moves."""
+
+from __future__ import annotations
+
+import math
+
+from expdesign.diagnosis.causes.candidate import Candidate, Cause, Situation, Values
+from expdesign.diagnosis.causes.words import rounded
+from expdesign.diagnosis.model import Extended
+
+
+def _candidates(situation: Situation) -> tuple[Candidate, ...]:
+    if not situation.windows.has_heading:
+        return ()
+    return (Candidate(cause="current", free={"current:north": 0.0, "current:east": 0.0}),)
+
+
+def _explain(values: Values, _ship: Extended) -> str:
+    (north, _), (east, _) = values["current:north"], values["current:east"]
+    toward = math.degrees(math.atan2(east, north)) % 360
+    return (
+        f"The error turns with the heading in the earth's frame, as if the water moved: a steady current of "
+        f"{math.hypot(north, east):.2f} m/s towards {toward:.0f} degrees "
+        f"(north {rounded(*values['current:north'])}, east {rounded(*values['current:east'])} m/s)."
+    )
+
+
+CURRENT = Cause(name="current", candidates=_candidates, explain=_explain)

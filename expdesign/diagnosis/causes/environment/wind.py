@@ -1,0 +1,84 @@
+"""Wind: drag of the air on hull and superstructure, with measured wind or with an unknown mean one."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from expdesign.diagnosis.causes.candidate import Candidate, Cause, Situation, Values
+from expdesign.diagnosis.causes.hull import lacking, own_air_terms
+from expdesign.diagnosis.causes.words import listed, rounded
+from expdesign.diagnosis.model import Extended
+
+TAKEN_MPS, WAYS, FINER = 10.0, 8, 7
+"""Of a wind that is not measured: its speed, directions looked in, and steps between them."""
+SPEEDS_MPS = (3.0, 8.0)
+DIRECTIONS = ((1.0, 0.0), (0.7, 0.7), (0.0, 1.0), (-0.7, 0.7), (-1.0, 0.0), (-0.7, -0.7), (0.0, -1.0), (0.7, -0.7))
+
+
+def _candidates(situation: Situation) -> tuple[Candidate, ...]:
+    ship, windows = situation.ship, situation.windows
+    terms, reads_air = lacking(situation, air=True), own_air_terms(ship.model)
+    found: list[Candidate] = []
+    if windows.has_wind:
+        if terms:
+            found.append(Candidate(cause="wind", free={f"term:{name}": 0.0 for name in terms}))
+            found += [Candidate(cause="wind", free={f"term:{name}": 0.0}) for name in terms if len(terms) > 1]
+        if reads_air:
+            found.append(Candidate(cause="wind", free={f"theta:{name}": 0.0 for name in reads_air}))
+            found += [Candidate(cause="wind", free={f"theta:{name}": 0.0}) for name in reads_air if len(reads_air) > 1]
+    elif windows.has_heading and terms and not reads_air:
+        found += _of_unknown_wind(situation, terms)
+    elif windows.has_heading and reads_air:
+        if any(key.startswith("wind:") for key in ship.stated):
+            found.append(Candidate(cause="wind", free={"wind:north": 0.0, "wind:east": 0.0}))
+        found += [
+            Candidate(cause="wind", free={"wind:north": speed * n, "wind:east": speed * e}, finite=True)
+            for speed in SPEEDS_MPS
+            for n, e in DIRECTIONS
+        ]
+    return tuple(found)
+
+
+def _of_unknown_wind(situation: Situation, terms: list[str]) -> list[Candidate]:
+    """Air drag in the mean wind that the vessel's file states, or in one whose direction is looked for.
+
+    Drag goes with the square of the wind, so data without wind tell its direction, and the coefficients only for a
+    speed that is taken.
+    """
+    free = {f"term:{name}": 0.0 for name in terms}
+    if situation.has("wind:north") or situation.has("wind:east"):
+        return [Candidate(cause="wind", free=free)]
+    if situation.has("wind:toward"):
+        return []
+    turns = 2 * math.pi * np.arange(WAYS) / WAYS
+    around = np.linspace(-1, 1, FINER) * math.pi / WAYS
+    return [
+        Candidate(
+            cause="wind",
+            free=free,
+            fixed={"wind:speed": TAKEN_MPS, "wind:toward": float(turn)},
+            grid=("wind:toward", tuple((turn + around).tolist())),
+        )
+        for turn in turns
+    ]
+
+
+def _explain(values: Values, _ship: Extended) -> str:
+    if "wind:toward" in values:
+        toward, std = (math.degrees(number) for number in values["wind:toward"])
+        drag = {key: pair for key, pair in values.items() if key != "wind:toward"}
+        return (
+            f"The error turns with the heading as air drag does in a steady wind towards "
+            f"{rounded(toward % 360, std)} degrees. No wind is measured: its speed is taken to be {TAKEN_MPS:g} m/s, "
+            f"and the drag ({listed(drag)}) is that which such a wind needs."
+        )
+    if "wind:north" in values:
+        return f"Air drag as of a mean wind blowing to {listed(values, ' m/s')} explains the error."
+    return (
+        f"The error grows with the wind over the deck: the hull has air drag that the model lacks ({listed(values)})."
+    )
+
+
+WIND = Cause(name="wind", candidates=_candidates, explain=_explain)

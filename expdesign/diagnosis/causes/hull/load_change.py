@@ -1,0 +1,29 @@
+"""A ship heavier or lighter than the model: slower to react, same steady speeds."""
+
+from __future__ import annotations
+
+from expdesign.diagnosis.causes.candidate import Candidate, Cause, Situation, Values
+from expdesign.diagnosis.causes.words import rounded
+from expdesign.diagnosis.model import Extended
+
+WORDS = {"u": "surge", "v": "sway", "r": "yaw"}
+
+
+def _candidates(situation: Situation) -> tuple[Candidate, ...]:
+    if any(key.startswith("inertia:") for key in situation.ship.effects):
+        return ()
+    outputs = situation.ship.model.outputs
+    groups: list[tuple[str, ...]] = [(name,) for name in outputs]
+    if len(outputs) == 3:
+        groups += [("u", "v"), ("v", "r"), ("u", "v", "r")]
+    return tuple(Candidate(cause="load_change", free={f"inertia:{n}": 0.0 for n in group}) for group in groups)
+
+
+def _explain(values: Values, _ship: Extended) -> str:
+    parts = ", ".join(
+        f"{WORDS[key[-1]]} by {rounded(100 * value, 100 * std)} %" for key, (value, std) in values.items()
+    )
+    return f"Damping and thrust are both off by one factor: the inertia differs from the model's, in {parts}."
+
+
+LOAD_CHANGE = Cause(name="load_change", candidates=_candidates, explain=_explain)

@@ -1,0 +1,41 @@
+"""Roll that shows in sway and yaw: a lightly damped mode driven by the side acceleration."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from expdesign.diagnosis.causes.candidate import Candidate, Cause, Situation, Values
+from expdesign.diagnosis.causes.words import rounded
+from expdesign.diagnosis.model import ROLL, Extended
+
+COUNT = 14
+DAMPING = 0.08
+
+
+def _candidates(situation: Situation) -> tuple[Candidate, ...]:
+    outputs = set(situation.ship.model.outputs)
+    if situation.ship.found("roll:") or not {"v", "r"} <= outputs:
+        return ()
+    if situation.ship.has_roll:  # the vessel file has a mode, which may be another
+        return (Candidate(cause="roll_coupling", free=dict.fromkeys(ROLL, 0.0)),)
+    shortest = 4.0 * situation.windows.sample_s
+    periods = np.geomspace(shortest, max(30.0 * shortest / 4, 2 * shortest), COUNT)
+    return tuple(
+        Candidate(
+            cause="roll_coupling",
+            free={"roll:sway": 0.0, "roll:yaw": 0.0},
+            fixed={"roll:period": float(period), "roll:damping": DAMPING},
+        )
+        for period in periods
+    )
+
+
+def _explain(values: Values, _ship: Extended) -> str:
+    period, std = values["roll:period"]
+    return (
+        f"Sway or yaw oscillate with a period of {rounded(period, std)} s, as a rolling ship makes them. Roll is not "
+        "measured: compare the period with that of the ship, for waves or a steering loop may oscillate alike."
+    )
+
+
+ROLL_COUPLING = Cause(name="roll_coupling", candidates=_candidates, explain=_explain)

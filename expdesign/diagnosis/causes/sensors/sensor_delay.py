@@ -1,0 +1,42 @@
+"""One measured signal late against the others."""
+
+from __future__ import annotations
+
+from expdesign.diagnosis.causes.candidate import Candidate, Cause, Situation, Values
+from expdesign.diagnosis.causes.words import rounded
+from expdesign.diagnosis.model import Extended
+
+NAMES = {
+    "u": "the speed ahead",
+    "v": "the speed to starboard",
+    "r": "the yaw rate",
+    "psi": "the heading",
+    "position": "the position",
+}
+
+
+def _candidates(situation: Situation) -> tuple[Candidate, ...]:
+    if situation.ship.found("late:"):
+        return ()
+    outputs = situation.ship.model.outputs
+    derived = set(situation.windows.derived)
+    signals = [name for name in outputs if name not in derived]
+    signals += ["psi"] if derived else []
+    signals += ["position"] if derived & {"u", "v"} else []
+    found = [Candidate(cause="sensor_delay", free={f"late:{name}": 0.0}) for name in signals]
+    if {"u", "v"} <= set(signals):
+        found.append(Candidate(cause="sensor_delay", free={"late:u": 0.0, "late:v": 0.0}))
+    return tuple(found)
+
+
+def _explain(values: Values, _ship: Extended) -> str:
+    parts = " and ".join(
+        f"{NAMES.get(key[5:], key[5:])} is recorded {rounded(abs(value), std)} s {'late' if value >= 0 else 'early'}"
+        for key, (value, std) in values.items()
+    )
+    if any(value < 0 for value, _ in values.values()):
+        return f"Signals are not of one time: {parts}. No sensor is early: what it is set against is late, or filtered."
+    return f"One signal trails the others: {parts}."
+
+
+SENSOR_DELAY = Cause(name="sensor_delay", candidates=_candidates, explain=_explain)

@@ -1,0 +1,37 @@
+"""Pull-out: a turn, then helm amidships; how the yaw rate dies out tells whether the ship is stable on course.
+
+Source: ITTC Recommended Procedure 7.5-04-02-01 (2017).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from expdesign.dictionary.families.orders.orders import APPROACH, DURATION, helm_family, helm_setting
+from expdesign.dictionary.spec import Family, PrimitiveSpec, Setting
+from expdesign.values import Array
+
+
+def _helm(request: PrimitiveSpec, time_s: Array) -> Array:
+    turning = time_s < request.settings["turn_fraction"] * request.settings["duration_s"]
+    return np.where(turning, request.settings["helm_rad"], 0.0)
+
+
+PULL_OUT = Family(
+    name="pull_out",
+    summary="helm over for a share of the run, then back to where it held the course",
+    settings=(
+        DURATION,
+        APPROACH,
+        helm_setting("helm in the turn, positive to starboard", default=float(np.radians(20.0))),
+        Setting(
+            name="turn_fraction",
+            meaning="share of the run that the helm is over",
+            default=0.5,
+            low=0.05,
+            high=0.95,
+            searched="share",
+        ),
+    ),
+    orders=helm_family(_helm),
+)

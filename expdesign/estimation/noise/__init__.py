@@ -1,0 +1,21 @@
+"""The noise in residuals: its parts, its memory, and what whitens it."""
+
+from expdesign.estimation.noise.components import MISFIT, Components, fit_components, score_covariance
+from expdesign.estimation.noise.long_run import automatic_lags, long_run_covariance, lost_share
+from expdesign.estimation.noise.timeline import Timeline, stretches, timeline
+from expdesign.estimation.noise.whitening import PASSES, white_parts
+
+__all__ = [
+    "MISFIT",
+    "PASSES",
+    "Components",
+    "Timeline",
+    "automatic_lags",
+    "fit_components",
+    "long_run_covariance",
+    "lost_share",
+    "score_covariance",
+    "stretches",
+    "timeline",
+    "white_parts",
+]

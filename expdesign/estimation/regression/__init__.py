@@ -1,0 +1,46 @@
+"""Measured batches as a linear regression."""
+
+from expdesign.estimation.regression.nuisance import batch_signs
+from expdesign.estimation.regression.polynomial import Polynomial, SignalTable, lift, symbol
+from expdesign.estimation.regression.predictors import PREDICTORS, Layout, Rows, build_layout, build_regression
+from expdesign.estimation.regression.regression import Integers, Regression, batch_slices, single_output
+from expdesign.estimation.regression.tables import (
+    AIR,
+    Table,
+    heading_of,
+    in_depth,
+    inputs_of,
+    measured_table,
+    model_for,
+    signal_table,
+    with_depth,
+)
+from expdesign.estimation.regression.zero_mean import MEANS, subtract_mean
+
+__all__ = [
+    "AIR",
+    "MEANS",
+    "PREDICTORS",
+    "Integers",
+    "Layout",
+    "Polynomial",
+    "Regression",
+    "Rows",
+    "SignalTable",
+    "Table",
+    "batch_signs",
+    "batch_slices",
+    "build_layout",
+    "build_regression",
+    "heading_of",
+    "in_depth",
+    "inputs_of",
+    "lift",
+    "measured_table",
+    "model_for",
+    "signal_table",
+    "single_output",
+    "subtract_mean",
+    "symbol",
+    "with_depth",
+]

@@ -1,0 +1,251 @@
+"""Predictors: how measured batches become a regression.
+
+One row per pair of samples: nu(k) - nu(k - 1) is regressed on Phi(k - 1) times sample time over time scale, so that
+parameters come out in the model's own form, discrete or continuous. Phi(k - 1) is by choice that of the sample: the
+parameters are then those of Euler's map, which differ from the motion's in the first order of the sample time (a decay
+of a = 0.35 per sample shows as 1 - exp(-a) = 0.295). Or it is the mean of both ends of the interval under the inputs
+held over it, the trapezoidal rule, which leaves an error of second order (2 tanh(a / 2) = 0.346). Either is of second
+order in the data, so what holds for instruments, moduli and means holds for both. Every parameter belongs to one
+equation. Rows never reach across batches; rows with numbers missing are left out. Parameters held fixed move to the
+left side.
+
+- basic: the model's terms from measured velocities; terms of air velocities fall together with those of water.
+- basic-wind: the same with air velocities from the anemometer.
+- augmented: basic plus nuisance regressors for unknown current and wind, (5.68)-(5.70).
+- wind: basic-wind plus nuisance regressors for unknown current, (5.74)-(5.76).
+
+Source: F. Ljungberg, doctoral thesis, Linköping University, (5.63)-(5.76).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from expdesign.conventions import OUTPUTS
+from expdesign.errors import InputError, NotInformative, UnknownName
+from expdesign.estimation.regression.nuisance import Nuisance, batch_signs, headings, nuisance_regressors, symbolic
+from expdesign.estimation.regression.polynomial import Algebra
+from expdesign.estimation.regression.regression import Integers, Regression
+from expdesign.estimation.regression.tables import AIR, Table, measured_table
+from expdesign.signals import Batch, Record
+from expdesign.values import Array
+from expdesign.vessel import NUMPY, VesselModel
+from expdesign.vessel.structures import MOTION_SIGNALS
+
+
+@dataclass(frozen=True)
+class Predictor:
+    """What goes into the regressors.
+
+    Attributes:
+        name: as users type it.
+        wind: whether measured wind is used.
+        nuisance: whether nuisance regressors are added.
+    """
+
+    name: str
+    wind: bool
+    nuisance: bool
+
+
+PREDICTORS = (
+    Predictor("basic", wind=False, nuisance=False),
+    Predictor("basic-wind", wind=True, nuisance=False),
+    Predictor("augmented", wind=False, nuisance=True),
+    Predictor("wind", wind=True, nuisance=True),
+)
+
+
+QUADRATURES = ("euler", "trapezoid")
+"""Regressors of the sample at which an interval begins, or the mean of both its ends under the inputs held over it."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Layout:
+    """The columns of the regression.
+
+    Attributes:
+        model: driven by the recorded inputs; its parameters give the values of those held.
+        predictor: which signals are used.
+        parameters: names estimated.
+        fixed: names held at the model's values.
+        merged: names left out because no wind is used: their effect is in other terms' parameters, or nowhere.
+        nuisance: further regressors.
+        notes: one sentence for each thing that a reader of the estimate must know.
+        quadrature: one of `QUADRATURES`.
+    """
+
+    model: VesselModel
+    predictor: Predictor
+    parameters: tuple[str, ...]
+    fixed: tuple[str, ...]
+    merged: tuple[str, ...]
+    nuisance: tuple[Nuisance, ...]
+    notes: tuple[str, ...] = field(default=())
+    quadrature: str = "euler"
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Parameters, then nuisance parameters."""
+        return self.parameters + tuple(item.name for item in self.nuisance)
+
+    def rows(self, table: Table, signs: dict[str, float], *, used: Integers | slice, scale: float) -> Array:
+        """(k, n, p) regressors of a table of signals, times a scale, at the samples used."""
+        rows = self._rows(table, signs, used, scale)
+        if self.quadrature == "euler":
+            return rows
+        rows += self._rows(ahead(table), signs, used, scale)
+        rows *= 0.5
+        return rows
+
+    def _rows(self, table: Table, signs: dict[str, float], used: Integers | slice, scale: float) -> Array:
+        places = {name: index for index, name in enumerate(self.model.names)}
+        columns = [(self._term(places[name]), self._values(places[name], table)) for name in self.parameters]
+        turned = {**table, **signs, **headings(table["psi"])} if self.nuisance else {}
+        columns += [(item.equation, item.evaluate(turned)) for item in self.nuisance]
+        count = len(table["psi"][used])
+        rows = np.zeros((len(self.model.outputs), len(columns), count)).transpose(2, 0, 1)  # columns lie in one piece
+        row_of = {name: index for index, name in enumerate(self.model.outputs)}
+        for index, (equation, values) in enumerate(columns):
+            np.multiply(np.broadcast_to(values, table["psi"].shape)[used], scale, out=rows[:, row_of[equation], index])
+        return rows
+
+    def known(self, table: Table) -> Array:
+        """(k, n) what the parameters held fixed explain."""
+        if self.quadrature == "euler":
+            return self._known(table)
+        return np.asarray(0.5 * (self._known(table) + self._known(ahead(table))))
+
+    def _known(self, table: Table) -> Array:
+        outputs = self.model.outputs
+        total = np.zeros((len(table["psi"]), len(outputs)))
+        for name in self.fixed:
+            place = self.model.names.index(name)
+            total[:, outputs.index(self._term(place))] += self.model.parameters[place] * self._values(place, table)
+        return total
+
+    def _term(self, place: int) -> str:
+        return self.model.terms[place].equation
+
+    def _values(self, place: int, table: Table) -> Array:
+        return np.asarray(self.model.expressions[place].evaluate(table, NUMPY))
+
+
+def ahead(table: Table) -> Table:
+    """The table a sample later, with the inputs that were held until then; the last sample stands for itself."""
+    moved = {name: np.concatenate([table[name][1:], table[name][-1:]]) for name in (*MOTION_SIGNALS, "psi")}
+    return {**table, **moved}
+
+
+def build_layout(
+    model: VesselModel, record: Record, *, predictor: str, fixed: Sequence[str] = (), quadrature: str = "euler"
+) -> Layout:
+    """Decide the columns for a record.
+
+    Args:
+        model: from `tables.model_for`.
+        record: the data.
+        predictor: a name in `PREDICTORS`.
+        fixed: parameters held at the model's values.
+        quadrature: one of `QUADRATURES`.
+
+    Raises:
+        UnknownName: no such predictor, parameter or quadrature.
+        InputError: nothing to estimate, or the record lacks wind or heading.
+    """
+    known = {item.name: item for item in PREDICTORS}
+    if predictor not in known:
+        raise UnknownName("predictor", predictor, known=known)
+    for name in fixed:
+        if name not in model.names:
+            raise UnknownName("parameter", name, known=model.names)
+    if quadrature not in QUADRATURES:
+        raise UnknownName("quadrature", quadrature, known=QUADRATURES)
+    chosen = known[predictor]
+    tables = [_checked_table(model, batch, chosen) for batch in record.batches]
+    reads_air = {t.name for t, e in zip(model.terms, model.expressions, strict=True) if set(AIR) & set(e.signals)}
+    merged = () if chosen.wind else tuple(n for n in model.names if n in reads_air and n not in fixed)
+    parameters = tuple(name for name in model.names if name not in merged and name not in fixed)
+    if not parameters:
+        raise InputError("every parameter is held fixed, nothing is left to estimate")
+    nuisance: tuple[Nuisance, ...] = ()
+    if chosen.nuisance:
+        nuisance = nuisance_regressors(model, model.names, tables, wind_measured=chosen.wind)
+    notes = tuple(_merged_note(model, name) for name in merged)
+    return Layout(
+        model=model,
+        predictor=chosen,
+        parameters=parameters,
+        fixed=tuple(fixed),
+        merged=merged,
+        nuisance=nuisance,
+        notes=notes,
+        quadrature=quadrature,
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Rows:
+    """Where the rows of a regression come from.
+
+    Attributes:
+        regression: of all batches.
+        used: per batch, the samples k - 1 whose regressors are used.
+        left_out: number of rows left out because numbers are missing.
+    """
+
+    regression: Regression
+    used: tuple[Integers, ...]
+    left_out: int
+
+
+def build_regression(layout: Layout, record: Record) -> Rows:
+    """The regression of all batches.
+
+    Raises:
+        NotInformative: no row is complete.
+    """
+    parts, used, left_out = [], [], 0
+    columns = [layout.model.outputs.index(name) for name in layout.model.outputs]
+    states = [OUTPUTS.index(layout.model.outputs[index]) for index in columns]
+    for batch in record.batches:
+        table = measured_table(layout.model, batch, wind_measured=layout.predictor.wind)
+        ratio = batch.sample_time_s / layout.model.time_scale_s
+        signs = batch_signs(layout.nuisance, table)
+        Phi = layout.rows(table, signs, used=slice(0, -1), scale=ratio)
+        y = np.diff(batch.velocity[:, states], axis=0) - ratio * layout.known(table)[:-1]
+        whole = np.flatnonzero(np.isfinite(Phi).all(axis=(1, 2)) & np.isfinite(y).all(axis=1))
+        parts.append((Phi, y) if len(whole) == len(y) else (Phi[whole], y[whole]))
+        used.append(whole)
+        left_out += len(y) - len(whole)
+    if not sum(len(rows) for rows in used):
+        raise NotInformative("no pair of successive samples has every signal the predictor needs")
+    regression = Regression(
+        parameters=layout.names,
+        Phi=parts[0][0] if len(parts) == 1 else np.concatenate([Phi for Phi, _ in parts]),
+        y=np.concatenate([y for _, y in parts]),
+        batch=np.repeat(np.arange(len(used)), [len(rows) for rows in used]),
+        step=np.concatenate(used),
+        outputs=layout.model.outputs,
+    )
+    return Rows(regression=regression, used=tuple(used), left_out=left_out)
+
+
+def _checked_table(model: VesselModel, batch: Batch, predictor: Predictor) -> Table:
+    table = measured_table(model, batch, wind_measured=predictor.wind)
+    if predictor.nuisance and not np.isfinite(table["psi"]).any():
+        raise InputError(f"{batch.name} has no measured heading; use a predictor without nuisance regressors")
+    return table
+
+
+def _merged_note(model: VesselModel, name: str) -> str:
+    algebra, index = Algebra(), model.names.index(name)
+    own = symbolic(model.expressions[index], algebra, wind_measured=False)
+    for term, expression in zip(model.terms, model.expressions, strict=True):
+        same = term.equation == model.terms[index].equation and not set(AIR) & set(expression.signals)
+        if same and str(symbolic(expression, algebra, wind_measured=False)) == str(own):
+            return f"No wind is used, so {term.name} stands for {term.name} + {name}, and {name} is set to 0."
+    return f"No wind is used, so {name} is set to 0 and its effect left out."

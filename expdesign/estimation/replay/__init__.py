@@ -1,0 +1,17 @@
+"""Batches simulated again: instruments, and fast simulation for output error."""
+
+from expdesign.estimation.replay._casadi import Compiled, Stretches, compiled
+from expdesign.estimation.replay.instruments import InstrumentModel, apart_from_start, instrument_wind
+from expdesign.estimation.replay.replay import Integration, build_replay, simulate_batch
+
+__all__ = [
+    "Compiled",
+    "InstrumentModel",
+    "Integration",
+    "Stretches",
+    "apart_from_start",
+    "build_replay",
+    "compiled",
+    "instrument_wind",
+    "simulate_batch",
+]

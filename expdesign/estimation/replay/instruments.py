@@ -1,0 +1,164 @@
+"""Instruments: the regressors of a noise-free simulation with the same inputs.
+
+Velocities come from the simulated model in calm water; where wind is used in the wind below, else in calm air. (A ship
+that drifts in the wind more than she sails is not followed by a model in calm air, and what does not follow her is a
+weak instrument.) Heading is the measured one of the sample before, carried on by the simulated yaw rate: a simulated
+heading alone drifts away within minutes, while the measured one of the same sample shares its noise with the
+regressors. Relative wind is, by choice,
+
+- "lagged": the simulated velocity less the n-frame wind measured a sample before, whose noise the regressors do not
+  share. Right for real winds, which last.
+- "mean": the simulated velocity less the mean n-frame wind of the batch. A steady wind lets air terms be seen only
+  where a modulus changes its sign, and their product not at all.
+- "measured": the measured relative wind itself, beside velocities of a model in calm air. What only the wind's
+  variation shows is then biased towards zero, by the anemometer's share of that variation; for winds white from sample
+  to sample there is nothing else.
+
+Simulations start from the first measured velocity, whose noise is in the first residual too. The first row of every
+batch is therefore not used: with it, many short batches are biased by half a standard deviation.
+
+Source: F. Ljungberg, doctoral thesis, Linköping University, (4.37)-(4.39), for velocities.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from expdesign.errors import InputError, NotInformative, UnknownName
+from expdesign.estimation.regression import Integers, Layout, Rows, Table, batch_signs, heading_of, measured_table
+from expdesign.estimation.replay.replay import Replay
+from expdesign.signals import Batch, Record
+from expdesign.simulation import to_body
+from expdesign.values import Array, frozen_set
+from expdesign.vessel import NUMPY
+
+HEADINGS = ("measured", "simulated")
+WINDS = ("lagged", "mean", "measured")
+
+
+@dataclass(frozen=True, eq=False)
+class InstrumentModel:
+    """Everything that stays the same while the instruments are refined.
+
+    Attributes:
+        layout: columns.
+        record: the data.
+        rows: which samples the regression uses.
+        replay: simulates the batches.
+        heading: one of `HEADINGS`.
+        wind: one of `WINDS`.
+        measured: per batch, the table of measured signals and the signs that its moduli have.
+    """
+
+    layout: Layout
+    record: Record
+    rows: Rows
+    replay: Replay
+    heading: str = "measured"
+    wind: str = "lagged"
+    measured: tuple[tuple[Table, dict[str, float]], ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        if self.heading not in HEADINGS:
+            raise UnknownName("heading of instruments", self.heading, known=HEADINGS)
+        if self.wind not in WINDS:
+            raise UnknownName("wind of instruments", self.wind, known=WINDS)
+        model, predictor = self.layout.model, self.layout.predictor
+        tables = [measured_table(model, batch, wind_measured=predictor.wind) for batch in self.record.batches]
+        signed = tuple((table, batch_signs(self.layout.nuisance, table)) for table in tables)
+        frozen_set(self, "measured", signed)
+
+    def instruments(self, parameters: Array) -> Array:
+        """(k, n, p) for a model with all parameters (all,) in model order.
+
+        Raises:
+            Diverged: that model is unstable.
+        """
+        parts = [self._batch(index, parameters) for index in range(len(self.record.batches))]
+        return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+    def _batch(self, index: int, parameters: Array) -> Array:
+        batch, wind = self.record.batches[index], self.layout.predictor.wind
+        blown = wind and self.wind != "measured"
+        air_n = instrument_wind(batch, self.wind) if blown else None
+        states = self.replay.states(batch, parameters, None if air_n is None else air_n.T)
+        psi = states[:, 2] if self.heading == "simulated" else carried_heading(heading_of(batch), states[:, 2])
+        u, v, r = states[:, 3:].T
+        air = u, v
+        if wind and self.wind == "measured":
+            assert batch.wind is not None  # the regression was built from it
+            air = batch.wind.T[0], batch.wind.T[1]
+        elif wind:
+            u_w, v_w = to_body(instrument_wind(batch, self.wind), psi, NUMPY)
+            air = u - u_w, v - v_w
+        moved = {"u": u, "v": v, "r": r, "u_q": air[0], "v_q": air[1], "psi": psi}
+        ratio = batch.sample_time_s / self.layout.model.time_scale_s
+        table, signs = self.measured[index]
+        return self.layout.rows({**table, **moved}, signs, used=_run(self.rows.used[index]), scale=ratio)
+
+
+def apart_from_start(rows: Rows) -> Rows:
+    """The same without the first pair of samples of every batch, whose noise the instruments share.
+
+    Raises:
+        NotInformative: nothing is left.
+    """
+    regression = rows.regression
+    later = np.flatnonzero(regression.step_of > 0)
+    if not len(later):
+        raise NotInformative("instruments need batches of three samples or more")
+    kept = _run(later)
+    shorter = replace(
+        regression,
+        Phi=regression.Phi[kept],
+        y=regression.y[kept],
+        batch=regression.batch_of[kept],
+        step=regression.step_of[kept],
+    )
+    return replace(rows, regression=shorter, used=tuple(places[places > 0] for places in rows.used))
+
+
+def _run(places: Integers) -> Integers | slice:
+    """The same places, as a slice where none is left out between them."""
+    if not len(places):
+        return slice(0, 0)
+    whole = len(places) == places[-1] - places[0] + 1
+    return slice(int(places[0]), int(places[-1]) + 1) if whole else places
+
+
+def carried_heading(measured: Array, simulated: Array) -> Array:
+    """(k,) last heading measured before each sample plus the simulated turn since; nothing measured: as simulated."""
+    if not np.isfinite(measured).any():
+        return simulated
+    before = _last_seen(np.isfinite(measured))
+    return np.asarray(measured[before] + simulated - simulated[before])
+
+
+def instrument_wind(batch: Batch, kind: str) -> Array:
+    """(2, k) wind to north/east [m/s] that instruments are made with, "mean" or "lagged".
+
+    Raises:
+        InputError: no sample has velocity, relative wind and heading.
+    """
+    heading = heading_of(batch)
+    seen = np.isfinite(heading) & np.isfinite(batch.velocity[:, :2]).all(axis=1)
+    if batch.wind is None or not (seen & np.isfinite(batch.wind).all(axis=1)).any():
+        raise InputError(f"{batch.name}: instruments for wind need measured relative wind and heading")
+    seen &= np.isfinite(batch.wind).all(axis=1)
+    u, v = (batch.velocity[:, :2] - batch.wind).T
+    c, s = np.cos(heading), np.sin(heading)
+    wind = np.stack([u * c - v * s, u * s + v * c])
+    if kind == "mean":
+        return np.repeat(wind[:, seen].mean(axis=1, keepdims=True), len(batch), axis=1)
+    return np.asarray(wind[:, _last_seen(seen)])
+
+
+def _last_seen(seen: NDArray[np.bool_]) -> Integers:
+    """(k,) the latest sample before each one at which something was seen; before the first, the first."""
+    count = len(seen)
+    latest = np.maximum.accumulate(np.where(seen, np.arange(count), -1))
+    before = np.concatenate([[-1], latest[:-1]])
+    return np.where(before < 0, int(np.argmax(seen)), before)

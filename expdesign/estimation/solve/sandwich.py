@@ -1,0 +1,189 @@
+"""The covariance of an estimate: what its instruments make of the noise in the residuals.
+
+    P = sum over k, l of W(k) cov(eps(k), eps(l)) W(l)^T,    W = G^-1 Z
+
+Residuals of one-step predictors from noisy data are coloured: noise enters at k and, through Phi, at k - 1, where it
+nearly cancels; disturbances may last. By choice,
+
+- "components", the default: noise is a sum of white, sensor and slow parts, whose variances are estimated, and P is
+  exact for them, for one long batch as for many short ones, see `components`. Both assumptions are tested. Where the
+  variance changes with the instruments (White's test, 1 % for all parameters of an equation together), standard
+  deviations are multiplied by what White's factor says of the whitened residuals. Where the parts do not fit the
+  periodogram (Bartlett's test, 1 %), they are those of "hac" where these are larger, and a warning says so.
+- "hac": robust to changing variance and to any correlation in time that a kernel with few lags sees after the residuals
+  are made white, see `whitening`. Disturbances that last for tens of samples are seen in part.
+- "kernel": robust to both too, by the kernel alone; "hc0" and "hc1" are robust to changing variance only. These three
+  are as in econometric software.
+
+Source: L. P. Hansen, Econometrica 50 (1982), 1029-1054; H. White, Econometrica 48 (1980), 817-838.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import norm
+
+from expdesign.estimation.noise import (
+    MISFIT,
+    PASSES,
+    Components,
+    Timeline,
+    automatic_lags,
+    fit_components,
+    long_run_covariance,
+    lost_share,
+    score_covariance,
+    stretches,
+    timeline,
+    white_parts,
+)
+from expdesign.estimation.regression import Regression, batch_slices
+from expdesign.estimation.solve.systems import Part
+from expdesign.estimation.solve.weighting import Weighting
+from expdesign.values import Array
+
+LEVEL = 0.01
+"""Of White's test."""
+
+
+@dataclass(frozen=True, eq=False)
+class Uncertainty:
+    """How uncertain an estimate is.
+
+    Attributes:
+        covariance: (p, p).
+        lags: last lag that a kernel counts.
+        warnings: one sentence each.
+    """
+
+    covariance: Array
+    lags: int
+    warnings: tuple[str, ...] = ()
+
+
+def covariance_of(regression: Regression, weighting: Weighting, parts: Sequence[Part], residuals: Array) -> Uncertainty:
+    """The covariance that a weighting asks for, of the estimate from parts with residuals (k, n)."""
+    p, kind = len(regression.parameters), weighting.covariance
+    factor = 1.0 if kind == "hc0" else residuals.size / max(1, residuals.size - p)
+    if kind == "components":
+        return _by_components(regression, weighting, parts, residuals, factor)
+    terms = _terms(regression, parts, residuals, passes=PASSES if kind == "hac" else 0)
+    P, lags = _summed(terms, weighting, p, len(regression))
+    return Uncertainty(factor * P, lags)
+
+
+@dataclass(frozen=True, eq=False)
+class _Terms:
+    """Terms whose sum is the error of a part's estimate.
+
+    Attributes:
+        part: the part.
+        when: where its rows stand.
+        zeta, n: (t, n, p) and (t, n) instruments and residuals, made white if wished.
+    """
+
+    part: Part
+    when: Timeline
+    zeta: Array
+    n: Array
+
+    def influences(self) -> Array:
+        """(t, p) what each term adds."""
+        return self._led(np.einsum("knp,kn->kp", self.zeta, self.n))
+
+    def white_factor(self) -> Array:
+        """(p,) by how much changing variance adds to the variance of parameters, where it clearly does; else 1."""
+        even, changing, chance = np.zeros((3, self.zeta.shape[2]))
+        for output in range(self.n.shape[1]):
+            squares = self.n[self.when.place, output] ** 2
+            level = float(squares.mean())
+            shares = self._led(self.zeta[:, output])[self.when.place] ** 2
+            even += level * shares.sum(axis=0)
+            changing += squares @ shares
+            chance += ((squares - level) ** 2).mean() * ((shares - shares.mean(axis=0)) ** 2).sum(axis=0)
+        clear = changing - even > norm.isf(LEVEL / len(even)) * np.sqrt(chance)
+        return np.where(clear, np.divide(changing, even, out=np.ones_like(even), where=even > 0), 1.0)
+
+    def _led(self, scores: Array) -> Array:
+        return by_batch([self.part.A[owner] for owner in self.when.owner], scores, batch_slices(self.when.batch))
+
+
+def _terms(regression: Regression, parts: Sequence[Part], residuals: Array, *, passes: int) -> list[_Terms]:
+    when = timeline(regression.batch_of, regression.step_of)
+    return [
+        _Terms(part, when, *white_parts(part.Z, residuals[:, part.system.outputs], when, passes=passes))
+        for part in parts
+    ]
+
+
+def _summed(terms: Sequence[_Terms], weighting: Weighting, p: int, rows: int) -> tuple[Array, int]:
+    """(p, p) long-run covariance of the terms, and the last lag counted."""
+    when, kind = terms[0].when, weighting.covariance
+    scores = np.zeros((len(when.batch), p))
+    lags = 0 if weighting.lags is None or kind in ("hc0", "hc1") else weighting.lags
+    for item in terms:
+        own = item.influences()
+        scores[:, item.part.system.columns] = own
+        if weighting.lags is None and kind not in ("hc0", "hc1"):
+            lags = max(lags, automatic_lags(own, when.batch, when.step, kernel=weighting.kernel))
+    P = long_run_covariance(scores, when.batch, when.step, lags=lags, kernel=weighting.kernel)
+    if kind in ("hac", "components"):
+        P = P / (1.0 - lost_share(rows, lags=lags, kernel=weighting.kernel))
+    return P, lags
+
+
+def _by_components(
+    regression: Regression, weighting: Weighting, parts: Sequence[Part], residuals: Array, factor: float
+) -> Uncertainty:
+    places = stretches(regression.batch_of, regression.step_of)
+    fitted = fit_components(residuals, places)
+    P = factor * _exact(regression, parts, residuals, fitted)
+    scale, odd = np.ones((2, len(P)))
+    for item in _terms(regression, parts, residuals, passes=1):
+        system = item.part.system
+        scale[system.columns] = np.sqrt(item.white_factor())
+        odd[system.columns] = max(fitted[output].misfit for output in system.outputs)
+    P *= np.outer(scale, scale)
+    if (odd <= MISFIT).all():
+        return Uncertainty(P, 0)
+    robust, lags = _summed(_terms(regression, parts, residuals, passes=PASSES), weighting, len(P), len(regression))
+    own, other = np.diag(P), factor * np.diag(robust)
+    larger = (odd > MISFIT) & (other > own) & (own > 0)
+    scale = np.sqrt(np.divide(other, own, out=np.ones_like(own), where=larger))
+    names = [name for name, item in zip(regression.outputs, fitted, strict=True) if item.misfit > MISFIT]
+    return Uncertainty(P * np.outer(scale, scale), lags, (_misfit_note(names),))
+
+
+def _misfit_note(outputs: Sequence[str]) -> str:
+    return (
+        f"Residuals of {', '.join(outputs)} are coloured otherwise than by sensor noise and lasting disturbances; "
+        "standard deviations are the larger of two kinds and less certain than usual."
+    )
+
+
+def _exact(regression: Regression, parts: Sequence[Part], residuals: Array, fitted: Sequence[Components]) -> Array:
+    """(p, p) covariance of an estimate under noise of these parts."""
+    W, columns = [], []
+    for output in range(residuals.shape[1]):
+        own = next((part for part in parts if output in part.system.outputs), None)
+        if own is None:
+            W.append(np.zeros((len(regression), 0)))
+            columns.append(np.zeros(0, dtype=np.int64))
+            continue
+        place = int(np.flatnonzero(own.system.outputs == output)[0])
+        W.append(by_batch(own.A, own.Z[:, place], own.system.parts))
+        columns.append(own.system.columns)
+    P = np.zeros((len(regression.parameters),) * 2)
+    blocks = score_covariance(W, residuals, fitted, stretches(regression.batch_of, regression.step_of))
+    for row, line in zip(columns, blocks, strict=True):
+        for column, block in zip(columns, line, strict=True):
+            P[np.ix_(row, column)] += block
+    return P
+
+
+def by_batch(A: Sequence[Array], scores: Array, batches: Sequence[slice]) -> Array:
+    """Scores (k, p), as what they add to the estimate, with each batch's own A (p, p)."""
+    return np.concatenate([scores[rows] @ own.T for rows, own in zip(batches, A, strict=True)])

@@ -1,0 +1,177 @@
+"""The equations of instrumental variables, split into parts that share no parameter, and how they are solved.
+
+In ship models every output has parameters of its own, so a regression of three outputs falls into three parts.
+
+Source: F. Ljungberg, doctoral thesis, Linköping University, (2.21), (4.45).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse.csgraph import connected_components
+
+from expdesign.estimation.regression import Integers, Regression, batch_slices, subtract_mean
+from expdesign.estimation.solve.null_space import NullSpace, null_space
+from expdesign.estimation.solve.weighting import Weighting
+from expdesign.values import Array
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """The part of a regression that some parameters and outputs have to themselves.
+
+    Attributes:
+        names: of the parameters.
+        columns, outputs: places in the regression.
+        Phi: (k, n, p) regressors.
+        varying: (k, n, p) the same without the mean that is subtracted from instruments.
+        size: (p,) norm of that; infinite where it is constant to working precision.
+        y: (k, n).
+        batch: (k,) batch numbers.
+        parts: rows of each batch.
+    """
+
+    names: tuple[str, ...]
+    columns: Integers
+    outputs: Integers
+    Phi: Array
+    varying: Array
+    size: Array
+    y: Array
+    batch: Integers
+    parts: list[slice]
+
+    def cut(self, whole: Array) -> Array:
+        """(k, n, p) of this part from (k, all, all)."""
+        return _cut(whole, self.outputs, self.columns)
+
+
+def occupied(rows: Array) -> Array:
+    """(n, p) sum of squares over samples."""
+    flat = rows.reshape(len(rows), -1)
+    return np.asarray(np.einsum("kq,kq->q", flat, flat).reshape(rows.shape[1:]))
+
+
+def split(regression: Regression, uses: Array, mean: str) -> tuple[System, ...]:
+    """Parts that share neither parameters nor outputs; `uses` (n, p) is nonzero where a parameter acts on an output."""
+    held = (uses > 0).astype(int)
+    count, labels = connected_components(held.T @ held, directed=False)
+    columns = [np.flatnonzero(labels == label) for label in range(count)]
+    parts = batch_slices(regression.batch_of)
+    return tuple(
+        _system(regression, places, np.flatnonzero(held[:, places].any(axis=1)), mean, parts) for places in columns
+    )
+
+
+def _system(regression: Regression, columns: Integers, outputs: Integers, mean: str, parts: list[slice]) -> System:
+    Phi = _cut(regression.Phi, outputs, columns)
+    varying = subtract_mean(Phi, regression.batch_of, mean)
+    size = _norm(varying)
+    size[size <= 1e-11 * _norm(Phi)] = np.inf
+    return System(
+        names=tuple(regression.parameters[index] for index in columns),
+        columns=columns,
+        outputs=outputs,
+        Phi=Phi,
+        varying=varying,
+        size=size,
+        y=regression.y[:, outputs],
+        batch=regression.batch_of,
+        parts=parts,
+    )
+
+
+def _cut(whole: Array, outputs: Integers, columns: Integers) -> Array:
+    """(k, n, p), every column in one piece of memory."""
+    return np.asarray(whole.transpose(1, 2, 0)[outputs[:, None], columns].transpose(2, 0, 1))
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A system with its instruments.
+
+    Attributes:
+        system: the part of the regression.
+        Z: (k, n, p) instruments, without mean and weighted.
+        A: (p, p) per batch, with theta = sum over batches of A sum Z y.
+        found: what its data cannot see.
+    """
+
+    system: System
+    Z: Array
+    A: list[Array]
+    found: NullSpace
+
+    def solved(self, mean: str) -> tuple[Array, Array]:
+        """Parameters (p,) and residuals (k, n) without the mean that instruments are without."""
+        system, p = self.system, len(self.system.names)
+        theta = np.zeros(p)
+        for rows, A in zip(system.parts, self.A, strict=True):
+            theta += A @ (self.Z[rows].reshape(-1, p).T @ system.y[rows].ravel())
+        return theta, subtract_mean(system.y - system.Phi @ theta, system.batch, mean)
+
+
+def instruments_of(system: System, instruments: Array, weighting: Weighting) -> Array:
+    """(k, n, p) instruments of a part, without mean and weighted."""
+    Z = subtract_mean(system.cut(instruments), system.batch, weighting.mean)
+    return Z * np.array(weighting.output_weights)[system.outputs, None] if weighting.output_weights else Z
+
+
+def solvers(system: System, Z: Array, weighting: Weighting, *, exogenous: bool) -> tuple[list[Array], NullSpace]:
+    """A (p, p) for each batch, with theta = sum over batches of A sum Z y; none where the report finds no solution.
+
+    Args:
+        system: the part.
+        Z: (k, n, p) its instruments.
+        weighting: how equations are formed.
+        exogenous: the instruments are the regressors themselves.
+    """
+    row = _norm(Z)
+    row[row == 0] = 1.0
+    moments = [_moment(Z[rows], system.varying[rows]) / row[:, None] / system.size for rows in system.parts]
+    weights = weighting.batch_weights or (1.0,) * len(moments)
+    if weighting.blocks == "one":
+        return _one_block(system, Z, row, moments, weights, exogenous=exogenous)
+    halves = [
+        np.sqrt(w) * _whitening(_moment(Z[rows], Z[rows]) / np.outer(row, row))
+        for w, rows in zip(weights, system.parts, strict=True)
+    ]
+    stacked = np.concatenate([half @ H for half, H in zip(halves, moments, strict=True)])
+    found = null_space(stacked, system.names, samples=len(Z), exogenous=exogenous)
+    if found.unseen:
+        return [], found
+    pieces = np.split(np.linalg.pinv(stacked), np.cumsum([len(half) for half in halves])[:-1], axis=1)
+    return [piece @ half / system.size[:, None] / row for piece, half in zip(pieces, halves, strict=True)], found
+
+
+def _one_block(
+    system: System, Z: Array, row: Array, moments: list[Array], weights: tuple[float, ...], *, exogenous: bool
+) -> tuple[list[Array], NullSpace]:
+    total = sum((w * H for w, H in zip(weights, moments, strict=True)), start=np.zeros_like(moments[0]))
+    second = None
+    if not exogenous:
+        size = system.size
+        second = (_moment(Z, Z) / np.outer(row, row), _moment(system.varying, system.varying) / np.outer(size, size))
+    found = null_space(total, system.names, samples=len(Z), exogenous=exogenous, second=second)
+    if found.unseen:
+        return [], found
+    A = np.linalg.inv(total) / system.size[:, None] / row
+    return [w * A for w in weights], found
+
+
+def _norm(rows: Array) -> Array:
+    """(p,) over samples and outputs."""
+    return np.asarray(np.sqrt(np.einsum("knp,knp->p", rows, rows)))
+
+
+def _moment(Z: Array, Phi: Array) -> Array:
+    return np.asarray(Z.reshape(-1, Z.shape[2]).T @ Phi.reshape(-1, Phi.shape[2]))
+
+
+def _whitening(moments: Array) -> Array:
+    """Square root of the inverse second moments, on the directions in which the instruments vary at all."""
+    values, vectors = np.linalg.eigh(moments)
+    kept = values > 1e-12 * values[-1]
+    return np.asarray((vectors[:, kept] / np.sqrt(values[kept])).T)

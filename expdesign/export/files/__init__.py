@@ -1,0 +1,58 @@
+"""Results as JSON, CSV and TOML files."""
+
+from expdesign.export.files.dictionary_file import dictionary_files, growth_json
+from expdesign.export.files.estimates import (
+    breach_sentences,
+    estimate_json,
+    estimate_warnings,
+    estimated_vessel,
+    fit_entries,
+    fit_table,
+    limit_entries,
+    limit_table,
+    motion_words,
+    parameter_entries,
+    parameter_table,
+    plus_minus,
+    unstable_warning,
+)
+from expdesign.export.files.known import Known, Purchase, replan_json
+from expdesign.export.files.record_file import record_csv
+from expdesign.export.files.results import (
+    commands_csv,
+    dictionary_json,
+    durations_json,
+    plan_json,
+    strict_json,
+    track_csv,
+)
+from expdesign.export.files.vessel_file import vessel_toml
+
+__all__ = [
+    "Known",
+    "Purchase",
+    "breach_sentences",
+    "commands_csv",
+    "dictionary_files",
+    "dictionary_json",
+    "durations_json",
+    "estimate_json",
+    "estimate_warnings",
+    "estimated_vessel",
+    "fit_entries",
+    "fit_table",
+    "growth_json",
+    "limit_entries",
+    "limit_table",
+    "motion_words",
+    "parameter_entries",
+    "parameter_table",
+    "plan_json",
+    "plus_minus",
+    "record_csv",
+    "replan_json",
+    "strict_json",
+    "track_csv",
+    "unstable_warning",
+    "vessel_toml",
+]

@@ -1,0 +1,128 @@
+"""What is known when the rest of a trial is planned, and what the rest buys; as replan.json."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from expdesign.conventions import POSE_COLUMNS
+from expdesign.export.files.results import strict_json
+from expdesign.simulation.environment import Environment
+from expdesign.values import Array, seal
+
+
+@dataclass(frozen=True, kw_only=True)
+class Purchase:
+    """The manoeuvre whose runs buy most of a parameter.
+
+    Attributes:
+        primitive: its name; "" where no single manoeuvre matters.
+        runs: of it in the plan.
+        without: how many times larger the parameter's standard deviation would be without them; inf where nothing
+            else tells.
+    """
+
+    primitive: str
+    runs: int
+    without: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Known:
+    """The state of a trial that goes on.
+
+    Attributes:
+        data: files so far.
+        sailed_s: time in them [s].
+        total_s: informative time asked for in the whole trial [s].
+        remaining_s: informative time left [s].
+        remaining_stated: whether that was said rather than counted.
+        pose: (3,) of the ship at the end of the data, in the area's frame.
+        speed_mps: over ground in the last sample.
+        model: where the model that the rest is planned with comes from.
+        environment: current and wind that the rest is planned for.
+        weather: where they come from.
+        notes: what else a reader must hear, one sentence each.
+        parameters: p names.
+        before: (p,) values before the trial, nan for parameters that the model did not have.
+        now: (p,) values now.
+        stated: (p,) standard deviations stated before the trial, 0 where none was.
+        so_far: (p,) of estimates from the data so far, as theory gives them; nan where they do not tell.
+        after: (p,) likewise from these data and the rest together.
+        purchases: (p,) what buys them.
+    """
+
+    data: tuple[str, ...]
+    sailed_s: float
+    total_s: float
+    remaining_s: float
+    remaining_stated: bool
+    pose: Array
+    speed_mps: float
+    model: str
+    environment: Environment
+    weather: str
+    notes: tuple[str, ...]
+    parameters: tuple[str, ...]
+    before: Array
+    now: Array
+    stated: Array
+    so_far: Array
+    after: Array
+    purchases: tuple[Purchase, ...]
+
+    def __post_init__(self) -> None:
+        seal(self, pose="3", before="p", now="p", stated="p", so_far="p", after="p")
+
+    @property
+    def new(self) -> tuple[str, ...]:
+        """Parameters that the model did not have before the trial."""
+        return tuple(name for name, value in zip(self.parameters, self.before, strict=True) if math.isnan(value))
+
+
+def replan_json(known: Known) -> str:
+    """All of it as replan.json; what is not a number is null."""
+    columns = zip(
+        known.parameters,
+        *(column.tolist() for column in (known.before, known.now, known.stated, known.so_far, known.after)),
+        known.purchases,
+        strict=True,
+    )
+    current, wind = known.environment.current_to.tolist(), known.environment.wind_to.tolist()
+    return strict_json(
+        {
+            "data": list(known.data),
+            "sailed_s": known.sailed_s,
+            "total_s": known.total_s,
+            "remaining_s": known.remaining_s,
+            "remaining_stated": known.remaining_stated,
+            "start": dict(zip(POSE_COLUMNS, known.pose.tolist(), strict=True)),
+            "measured_speed_mps": known.speed_mps,
+            "assumed_speed_mps": 0.0,
+            "model": known.model,
+            "environment": {
+                "from": known.weather,
+                "current_to": {"north_mps": current[0], "east_mps": current[1]},
+                "wind_to": {"north_mps": wind[0], "east_mps": wind[1]},
+            },
+            "notes": list(known.notes),
+            "parameters": {name: _entry(*row) for name, *row in columns},
+        }
+    )
+
+
+def _entry(before: float, now: float, stated: float, so_far: float, after: float, purchase: Purchase) -> dict[str, Any]:
+    return {
+        "before": _finite(before),
+        "now": now,
+        "std_before": stated or None,
+        "std_so_far": _finite(so_far),
+        "std_after_rest": _finite(after),
+        "bought_by": purchase.primitive or None,
+        "std_ratio_without_it": _finite(purchase.without),
+    }
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -1,0 +1,19 @@
+"""The plan as a route: chords of the track, corridor, fence."""
+
+from expdesign.export.routes.fence import build_fence
+from expdesign.export.routes.planned import PlannedTrack, planned_track, require_verified
+from expdesign.export.routes.read_plan import read_plan
+from expdesign.export.routes.route import DEGREE_DECIMALS, ROUTE_NAME, Route, Waypoint, build_route
+
+__all__ = [
+    "DEGREE_DECIMALS",
+    "ROUTE_NAME",
+    "PlannedTrack",
+    "Route",
+    "Waypoint",
+    "build_fence",
+    "build_route",
+    "planned_track",
+    "read_plan",
+    "require_verified",
+]

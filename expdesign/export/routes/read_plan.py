@@ -1,0 +1,254 @@
+"""Reading a plan back from plan.json with the track.csv and commands.csv beside it.
+
+Nothing is taken on trust: the three files must tell the same story, and the plan must be verified.
+"""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from expdesign.conventions import POSE_COLUMNS, VELOCITY_COLUMNS
+from expdesign.errors import FileError
+from expdesign.export.routes.fence import Fence
+from expdesign.export.routes.planned import PlannedTrack
+from expdesign.plan.values import Leg
+from expdesign.sea_area import LocalFrame
+from expdesign.signals import Commands, Trajectory
+from expdesign.simulation.environment import Environment
+from expdesign.values import Array
+from expdesign.vessel import Variation, column_name
+
+TRACK_COLUMNS = ("time_s", *POSE_COLUMNS, *VELOCITY_COLUMNS, "leg", "lat_deg", "lon_deg")
+STATE_TOLERANCE = 1e-5
+"""Between plan.json, which has every digit, and track.csv, which has micrometres [m, rad, m/s, rad/s]."""
+DEGREE_TOLERANCE = 1e-7
+TIME_TOLERANCE_S = 1e-6
+
+
+class _Entry(BaseModel):
+    model_config = ConfigDict(frozen=True, allow_inf_nan=False, extra="ignore")
+
+
+class _Vessel(_Entry):
+    name: str
+    length_m: float = Field(gt=0)
+    beam_m: float = Field(gt=0)
+
+
+class _Origin(_Entry):
+    lat_deg: float = Field(ge=-90, le=90)
+    lon_deg: float = Field(ge=-180, le=180)
+
+
+class _Frame(_Entry):
+    projection: str
+    origin: _Origin
+
+
+class _Medium(_Entry):
+    north_mps: float
+    east_mps: float
+    std_mps: float = Field(ge=0)
+    variation_std_mps: float = Field(default=0.0, ge=0)
+    correlation_s: float = Field(default=0.0, ge=0)
+
+
+class _Environment(_Entry):
+    current_to: _Medium
+    wind_to: _Medium
+    sea_state: int | None = Field(default=None, ge=0, le=9)
+
+
+class _State(_Entry):
+    time_s: float
+    north_m: float
+    east_m: float
+    heading_rad: float
+    u_mps: float
+    v_mps: float
+    r_radps: float
+
+    @property
+    def motion(self) -> Array:
+        return np.array([getattr(self, name) for name in (*POSE_COLUMNS, *VELOCITY_COLUMNS)])
+
+
+class _Leg(_Entry):
+    index: int
+    kind: Literal["primitive", "reposition"]
+    name: str
+    start: _State
+    end: _State
+
+
+class _Fence(_Entry):
+    inside: tuple[tuple[float, float], ...] = Field(min_length=3)
+    outside: tuple[tuple[tuple[float, float], ...], ...] = ()
+
+
+class _PlanFile(_Entry):
+    scenario: str
+    vessel: _Vessel
+    sample_time_s: float = Field(gt=0)
+    inputs: list[str] = Field(min_length=1)
+    frame: _Frame
+    environment: _Environment
+    legs: list[_Leg] = Field(min_length=1)
+    clearance_required_m: float = Field(ge=0)
+    fence: _Fence | None = None
+    verified: bool
+
+
+def read_plan(path: Path) -> PlannedTrack:
+    """The plan of plan.json, with track.csv and commands.csv from the same folder.
+
+    Raises:
+        FileError: a file is missing or garbled, the files contradict each other, or the plan is not verified.
+    """
+    file = _parse(path)
+    if not file.verified:
+        raise FileError(path, "verified", "is false: the plan failed its checks, plan again before using it")
+    frame = LocalFrame(file.frame.origin.lat_deg, file.frame.origin.lon_deg)
+    if file.frame.projection != frame.definition:
+        raise FileError(path, "frame.projection", f"is {file.frame.projection!r}, expected {frame.definition!r}")
+    legs = _legs(path, file)
+    track = _read_table(path.with_name("track.csv"), TRACK_COLUMNS)
+    _check_track(path, file, frame, legs, track)
+    command_path = path.with_name("commands.csv")
+    commands = _read_table(command_path, ("time_s", *(column_name(name) for name in file.inputs), "leg"))
+    _check_rows(command_path, commands, file.sample_time_s, legs, expected=legs[-1].last, leg_column=-1)
+    return PlannedTrack(
+        scenario=file.scenario,
+        vessel=file.vessel.name,
+        length_m=file.vessel.length_m,
+        beam_m=file.vessel.beam_m,
+        frame=frame,
+        environment=_environment(file.environment),
+        commands=Commands(sample_time_s=file.sample_time_s, names=tuple(file.inputs), values=commands[:, 1:-1]),
+        trajectory=Trajectory(sample_time_s=file.sample_time_s, pose=track[:, 1:4], velocity=track[:, 4:7]),
+        legs=legs,
+        clearance_m=file.clearance_required_m,
+        fence=None if file.fence is None else Fence(inside=file.fence.inside, outside=file.fence.outside),
+    )
+
+
+def _parse(path: Path) -> _PlanFile:
+    try:
+        return _PlanFile.model_validate_json(_text(path))
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        problem = first["msg"][:1].lower() + first["msg"][1:]
+        found = first.get("input")
+        if isinstance(found, str | int | float | bool) and first["type"] != "json_invalid":
+            problem = f"is {found!r}: {problem}"
+        raise FileError(path, ".".join(str(part) for part in first["loc"]), problem) from None
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise FileError(path, "", "does not exist") from None
+    except UnicodeDecodeError:
+        raise FileError(path, "", "is not UTF-8 text") from None
+    except OSError as error:
+        raise FileError(path, "", f"cannot be read: {error.strerror or error}") from None
+
+
+def _legs(path: Path, file: _PlanFile) -> tuple[Leg, ...]:
+    legs: list[Leg] = []
+    for number, entry in enumerate(file.legs):
+        key = f"legs.{number}"
+        first, last = (_sample(path, file, f"{key}.{end}", getattr(entry, end).time_s) for end in ("start", "end"))
+        expected = legs[-1].last if legs else 0
+        if entry.index != number:
+            raise FileError(path, f"{key}.index", f"is {entry.index}, expected {number}")
+        if first != expected:
+            begins = expected * file.sample_time_s
+            raise FileError(path, f"{key}.start.time_s", f"is {entry.start.time_s:g}, expected {begins:g}")
+        if last <= first:
+            raise FileError(path, f"{key}.end.time_s", f"is {entry.end.time_s:g}, expected a time after the start")
+        legs.append(Leg(kind=entry.kind, name=entry.name, first=first, last=last))
+    return tuple(legs)
+
+
+def _sample(path: Path, file: _PlanFile, key: str, time_s: float) -> int:
+    sample = round(time_s / file.sample_time_s)
+    if abs(sample * file.sample_time_s - time_s) > TIME_TOLERANCE_S:
+        raise FileError(path, f"{key}.time_s", f"is {time_s!r}, expected a multiple of {file.sample_time_s:g} s")
+    return sample
+
+
+def _read_table(path: Path, columns: tuple[str, ...]) -> Array:
+    rows = list(csv.reader(_text(path).splitlines()))
+    if not rows or tuple(rows[0]) != columns:
+        found = ",".join(rows[0]) if rows else "nothing"
+        raise FileError(path, "row 1", f"has the columns {found}, expected {','.join(columns)}")
+    table = np.empty((len(rows) - 1, len(columns)))
+    for number, row in enumerate(rows[1:]):
+        if len(row) != len(columns):
+            raise FileError(path, f"row {number + 2}", f"has {len(row)} cells, expected {len(columns)}")
+        for column, cell in enumerate(row):
+            table[number, column] = _number(path, f"row {number + 2}, {columns[column]}", cell)
+    return table
+
+
+def _number(path: Path, key: str, cell: str) -> float:
+    try:
+        value = float(cell)
+    except ValueError:
+        value = np.nan
+    if not np.isfinite(value):
+        raise FileError(path, key, f"is {cell!r}, expected a number")
+    return value
+
+
+def _check_rows(
+    path: Path, table: Array, sample_time_s: float, legs: tuple[Leg, ...], *, expected: int, leg_column: int
+) -> None:
+    """The rows are as many as the plan has samples, at its times, and belong to its legs."""
+    if len(table) != expected:
+        raise FileError(path, "", f"has {len(table)} rows, but plan.json beside it has {expected} samples")
+    times = np.arange(expected) * sample_time_s
+    leg = np.searchsorted([leg.first for leg in legs], np.arange(expected), side="right") - 1
+    for column, name, right in ((0, "time_s", times), (leg_column, "leg", leg)):
+        wrong = np.flatnonzero(np.abs(table[:, column] - right) > TIME_TOLERANCE_S)
+        if len(wrong):
+            row = wrong[0]
+            raise FileError(path, f"row {row + 2}, {name}", f"is {table[row, column]:g}, expected {right[row]:g}")
+
+
+def _check_track(path: Path, file: _PlanFile, frame: LocalFrame, legs: tuple[Leg, ...], track: Array) -> None:
+    track_path = path.with_name("track.csv")
+    column = TRACK_COLUMNS.index("leg")
+    _check_rows(track_path, track, file.sample_time_s, legs, expected=legs[-1].last + 1, leg_column=column)
+    for number, (leg, entry) in enumerate(zip(legs, file.legs, strict=True)):
+        for sample, end in ((leg.first, "start"), (leg.last, "end")):
+            if np.abs(track[sample, 1:7] - getattr(entry, end).motion).max() > STATE_TOLERANCE:
+                raise FileError(
+                    track_path, f"row {sample + 2}", f"is not the state that plan.json gives as legs.{number}.{end}"
+                )
+    error = (track[:, 8:] - frame.to_degrees(track[:, 1:3]) + 180.0) % 360.0 - 180.0
+    wrong = np.flatnonzero(np.abs(error).max(axis=1) > DEGREE_TOLERANCE)
+    if len(wrong):
+        raise FileError(
+            track_path, f"row {wrong[0] + 2}, lat_deg", "and lon_deg are not where north_m and east_m are in this frame"
+        )
+
+
+def _environment(file: _Environment) -> Environment:
+    current, wind = file.current_to, file.wind_to
+    return Environment(
+        current_to=np.array([current.north_mps, current.east_mps]),
+        wind_to=np.array([wind.north_mps, wind.east_mps]),
+        current_std_mps=current.std_mps,
+        wind_std_mps=wind.std_mps,
+        current_variation=Variation(std_mps=current.variation_std_mps, correlation_s=current.correlation_s),
+        wind_variation=Variation(std_mps=wind.variation_std_mps, correlation_s=wind.correlation_s),
+        sea_state=file.sea_state,
+    )

@@ -1,0 +1,225 @@
+"""Growing the dictionary: search for the manoeuvre whose information the present design lacks most, add it, repeat.
+
+A run with d = trace(B(w)^-1 B_run) above the dimension raises the optimal log det; none above it means that nothing
+is to be gained, by the equivalence theorem over all the runs that were looked at.
+
+Source: V. V. Fedorov, Theory of Optimal Experiments (1972), chapter 2 (adding the point of largest sensitivity);
+J. Kiefer and J. Wolfowitz, Canad. J. Math. 12 (1960), 363-366.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from expdesign.dictionary import FAMILIES, Primitive, PrimitiveSpec, build_primitive, family
+from expdesign.errors import InputError, UnknownName
+from expdesign.growing._casadi import FreeForm, optimise_commands
+from expdesign.growing.optimum import Optimum, optimum, sensitivity
+from expdesign.growing.search import Measure, best_of, pool_of, refined, violation
+from expdesign.growing.space import FamilySpace, family_spaces
+from expdesign.growing.values import GrowRound, GrowSettings, Growth
+from expdesign.information import PrimitiveInformation, check_informative, estimated_parameters, score_primitives
+from expdesign.simulation import CALM, Environment
+from expdesign.values import Array
+from expdesign.vessel import Vessel
+
+Progress = Callable[[str, float], None]
+OUTPUT_KEYS = ("u_mps", "v_mps", "r_radps")
+ROUNDING = 1e-6
+"""Share of a range by which freely optimised commands may pass a limit."""
+SEARCHING = "searching for manoeuvres that add"
+
+
+def grow_dictionary(
+    vessel: Vessel,
+    information: Sequence[PrimitiveInformation],
+    *,
+    settings: GrowSettings,
+    environment: Environment = CALM,
+    fixed_parameters: Sequence[str] = (),
+    mean_subtraction: str = "complete",
+    progress: Progress = lambda what, share: None,
+) -> Growth:
+    """Add the most telling manoeuvres of the families to a scored dictionary, one by one, for the D criterion.
+
+    Args:
+        vessel: nominal.
+        information: the present dictionary, scored with the same environment, fixed parameters and mean subtraction.
+        settings: what to search, and how far.
+        environment, fixed_parameters, mean_subtraction: as in `score_primitives`.
+        progress: told what is being done, and the share done.
+
+    Raises:
+        NotInformative: the present dictionary cannot tell all parameters apart.
+        UnknownName: no such family.
+        InputError: limits or families that leave nothing to search.
+    """
+    case = _Case(
+        vessel=vessel,
+        environment=environment,
+        fixed=tuple(fixed_parameters),
+        mean_subtraction=mean_subtraction,
+        limits=motion_limits(settings, [item.primitive for item in information]),
+    )
+    check_informative(information, case.names, mean_subtraction)
+    progress("simulating candidates", 0.0)
+    spaces, measure = _spaces(case, information, settings), _measure(case)
+    rng = np.random.default_rng(settings.seed or 0)
+    archives = pool_of(spaces, measure, pool=settings.pool, seed=settings.seed or 0)
+    grown, specs, rounds = list(information), list[PrimitiveSpec](), list[GrowRound]()
+    first = best = optimum(grown, mean_subtraction)
+    while True:
+        tell = _within(progress, len(rounds), settings.rounds)
+        archives = refined(archives, best.inverse, measure, rng, partial(tell, SEARCHING))
+        spec, found = best_of(archives, best.inverse)
+        left = found
+        if spec is None or len(rounds) == settings.rounds:
+            break
+        item, spec = _addition(case, best, spec, settings, tell)
+        left = sensitivity(best, item, mean_subtraction)
+        if left <= best.dimension * (1 + settings.tolerance):
+            break
+        name = _unused(len(rounds) + 1, spec.family, grown)
+        spec, item = replace(spec, name=name), replace(item, primitive=replace(item.primitive, name=name))
+        before, best = best, optimum([*grown, item], mean_subtraction)
+        grown.append(item)
+        specs.append(spec)
+        rounds.append(
+            GrowRound(
+                name=name,
+                family=spec.family,
+                settings=spec.settings,
+                sensitivity=left,
+                searched=found,
+                log_det_gain=best.log_det - before.log_det,
+                efficiency=float(np.exp((best.log_det - first.log_det) / len(case.names))),
+                excitation_condition=item.excitation_condition,
+            )
+        )
+    return Growth(
+        specs=tuple(specs),
+        information=tuple(grown),
+        rounds=tuple(rounds),
+        limits=case.limits,
+        evaluated=sum(len(archive.points) for archive in archives),
+        dimension=best.dimension,
+        parameters=len(case.names),
+        best_left=left,
+    )
+
+
+def _addition(
+    case: _Case, best: Optimum, spec: PrimitiveSpec, settings: GrowSettings, tell: Progress
+) -> tuple[PrimitiveInformation, PrimitiveSpec]:
+    """The candidate found, or freely optimised commands that began as its own and are worth more."""
+    item = case.scored(spec)
+    if not settings.free_form:
+        return item, spec
+    tell("optimising its commands", 0.9)
+    free = _free_form(case, best, item)
+    if free is None:
+        return item, spec
+    scored = case.scored(free)
+    over = violation(scored.primitive.trajectory.velocity[None], case.limits)[0]
+    better = sensitivity(best, scored, case.mean_subtraction) > sensitivity(best, item, case.mean_subtraction)
+    return (scored, free) if better and over <= ROUNDING else (item, spec)
+
+
+def _free_form(case: _Case, best: Optimum, item: PrimitiveInformation) -> PrimitiveSpec | None:
+    run = item.primitive
+    values = optimise_commands(
+        FreeForm(
+            vessel=case.vessel,
+            names=case.names,
+            gradient=best.inverse,
+            mean_subtraction=case.mean_subtraction,
+            limits=case.limits,
+            entry_inputs=run.entry_inputs,
+            commands=run.commands.values,
+            velocity=run.trajectory.velocity,
+        )
+    )
+    if values is None:
+        return None
+    speed, sway, yaw = run.entry_velocity.tolist()
+    settings = {"duration_s": run.duration_s, "speed_mps": speed, "sway_mps": sway, "yaw_rate_radps": yaw}
+    commands = replace(run.commands, values=values)
+    return PrimitiveSpec(name=run.name, family="recorded", settings=settings, commands=commands)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Case:
+    """What every candidate is scored with."""
+
+    vessel: Vessel
+    environment: Environment
+    fixed: tuple[str, ...]
+    mean_subtraction: str
+    limits: Array
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return estimated_parameters(self.vessel.model, self.fixed)
+
+    def scored(self, spec: PrimitiveSpec) -> PrimitiveInformation:
+        (item,) = score_primitives(
+            self.vessel,
+            [build_primitive(self.vessel, spec)],
+            environment=self.environment,
+            fixed_parameters=self.fixed,
+            mean_subtraction=self.mean_subtraction,
+        )
+        return item
+
+
+def motion_limits(settings: GrowSettings, primitives: Sequence[Primitive]) -> Array:
+    """(3, 2) low and high of u, v, r: as wished, else what the primitives span in calm water.
+
+    Raises:
+        UnknownName: a wish for something else.
+        InputError: low is not below high.
+    """
+    motion = np.concatenate([primitive.trajectory.velocity for primitive in primitives])
+    limits = np.stack([motion.min(axis=0), motion.max(axis=0)], axis=1)
+    for key, (low, high) in settings.limits.items():
+        if key not in OUTPUT_KEYS:
+            raise UnknownName("velocity in limits", key, known=OUTPUT_KEYS)
+        if not low < high:
+            raise InputError(f"limits.{key} is [{low:g}, {high:g}], expected low below high")
+        limits[OUTPUT_KEYS.index(key)] = low, high
+    return limits
+
+
+def _spaces(
+    case: _Case, information: Sequence[PrimitiveInformation], settings: GrowSettings
+) -> tuple[FamilySpace, ...]:
+    step_s = case.vessel.sample_time_s
+    run_s = settings.run_s or float(np.median([item.primitive.duration_s for item in information]))
+    chosen = tuple(family(name) for name in settings.families) or FAMILIES
+    return family_spaces(case.vessel, chosen, case.limits, max(round(run_s / step_s), 2) * step_s)
+
+
+def _measure(case: _Case) -> Measure:
+    return Measure(
+        vessel=case.vessel,
+        names=case.names,
+        environment=case.environment,
+        mean_subtraction=case.mean_subtraction,
+        limits=case.limits,
+    )
+
+
+def _unused(number: int, kind: str, grown: Sequence[PrimitiveInformation]) -> str:
+    """A name that no primitive has."""
+    name, taken = f"grown-{number}-{kind.replace('_', '-')}", {item.primitive.name for item in grown}
+    while name in taken:
+        name += "-again"
+    return name
+
+
+def _within(progress: Progress, done: int, rounds: int) -> Progress:
+    return lambda what, share: progress(what, (done + share) / (rounds + 1))

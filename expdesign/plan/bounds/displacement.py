@@ -1,0 +1,150 @@
+"""What runs can contribute to the way at most, against the fastest leg: the part of the bound that they take off.
+
+Where wind makes a difference runs are simulated at headings all round, with a margin for those in between.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from expdesign.dictionary import Primitive
+from expdesign.plan.control import over_ground
+from expdesign.plan.runs import run_at_headings
+from expdesign.simulation import Environment
+from expdesign.values import Array, seal
+from expdesign.vessel import Vessel
+
+HEADINGS = 72
+"""Headings at which runs are simulated where wind makes a difference."""
+SPARE = 1.02
+"""What headings between these may give more."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Carry:
+    """What a run can contribute to the way, at the heading that suits it best.
+
+    Attributes:
+        chord_s: time that a leg needs from its start to its end [s].
+        path_s: the same along its path [s].
+        stray_m: no point of the chord is farther than this from the path [m].
+    """
+
+    chord_s: float
+    path_s: float
+    stray_m: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Headway:
+    """The fastest leg.
+
+    Attributes:
+        speed_mps: through water.
+        current_to: (2,) of the water [m/s], slower than that.
+    """
+
+    speed_mps: float
+    current_to: Array
+
+    def __post_init__(self) -> None:
+        seal(self, current_to="2")
+
+    @property
+    def current_mps(self) -> float:
+        """Speed of the water."""
+        return float(np.hypot(*self.current_to))
+
+    def seconds(self, ground: Array) -> Array:
+        """(...,) least time of straight legs (..., 2) over ground [s]."""
+        along = ground @ self.current_to
+        spare = self.speed_mps**2 - self.current_mps**2
+        return np.asarray((np.sqrt(along**2 + spare * (ground**2).sum(axis=-1)) - along) / spare)
+
+    def most_s(self, water_m: Array, lasting_s: Array | float) -> Array:
+        """(...,) that of what moves by a length through water in a time, at the heading for which it is most [s].
+
+        A leg of time t makes good d when p.d <= t for all slownesses p with V |p| + c.p = 1. Of l through water and
+        c T that is at most |p| l + (1 - V |p|) T, so the ends 1 / (V + c) and 1 / (V - c) of |p| decide.
+        """
+        behind = self.speed_mps * lasting_s - water_m
+        slowness = 1.0 / (self.speed_mps + np.where(behind >= 0, 1.0, -1.0) * self.current_mps)
+        return np.asarray(lasting_s - slowness * behind)
+
+
+def carry(vessel: Vessel, primitive: Primitive, environment: Environment, headway: Headway) -> Carry:
+    """How far a run carries the ship at most, and how far it bends."""
+    track = primitive.trajectory.pose[:, :2]
+    if differs_by_heading(vessel, environment):
+        tracks = np.moveaxis(_in_weather(vessel, primitive, environment)[..., :2], 1, 0)
+        return _carry_in_weather(list(tracks), headway)
+    steps = np.hypot(*np.diff(track, axis=0).T)
+    chord = float(np.hypot(*(track[-1] - track[0])))
+    drift_m, lasting_s = headway.current_mps * primitive.duration_s, primitive.duration_s
+    return Carry(
+        chord_s=float(headway.most_s(np.array(chord), lasting_s)),
+        path_s=float(headway.most_s(steps, lasting_s / len(steps)).sum()),
+        stray_m=min(_stray_m(track) + drift_m, _stray_adrift_m(track, drift_m)) if drift_m else _stray_m(track),
+    )
+
+
+def exit_motion(vessel: Vessel, primitive: Primitive, environment: Environment) -> tuple[float, float, float]:
+    """Least and largest speed through water [m/s] and largest yaw rate [rad/s] at the end of a run."""
+    if not differs_by_heading(vessel, environment):
+        speed = float(np.hypot(*primitive.exit_velocity[:2]))
+        return speed, speed, abs(float(primitive.exit_velocity[2]))
+    last = _in_weather(vessel, primitive, environment)[-1]
+    speeds = np.hypot(*(over_ground(last) - environment.current_to).T)
+    return float(speeds.min()) / SPARE, float(speeds.max()) * SPARE, float(np.abs(last[:, 5]).max()) * SPARE
+
+
+def _carry_in_weather(tracks: list[Array], headway: Headway) -> Carry:
+    """The same from tracks (k, 2) over ground at headings all round."""
+    chords = [float(headway.seconds(track[-1] - track[0])) for track in tracks]
+    paths = [float(headway.seconds(np.diff(track, axis=0)).sum()) for track in tracks]
+    return Carry(
+        chord_s=SPARE * max(chords), path_s=SPARE * max(paths), stray_m=SPARE * max(_stray_m(track) for track in tracks)
+    )
+
+
+def _stray_adrift_m(track: Array, drift_m: float) -> float:
+    """Bound on what a chord's points are away from a track (k, 2) through water that drifts any way by so much.
+
+    The current carries the chord's point at a share of it as far as it carries the ship in that share of the time;
+    between points and samples at other shares lies the drift in the time between.
+    """
+    share, when = np.linspace(0.0, 1.0, 201), np.linspace(0.0, 1.0, len(track))
+    points = track[0] + share[:, None] * (track[-1] - track[0])
+    apart = np.hypot(*np.moveaxis(points[:, None] - track, -1, 0)) + drift_m * np.abs(share[:, None] - when)
+    between = (float(np.hypot(*(track[-1] - track[0]))) + drift_m) / 400
+    return float(apart.min(axis=1).max()) + between
+
+
+def differs_by_heading(vessel: Vessel, environment: Environment) -> bool:
+    """Whether air moves over the water, and the model feels it: runs of the dictionary are made where it does not."""
+    used = zip(vessel.model.expressions, vessel.model.parameters, strict=True)
+    feels = any(value and {"u_q", "v_q"} & set(expression.signals) for expression, value in used)
+    return feels and bool((environment.wind_to - environment.current_to).any())
+
+
+def _in_weather(vessel: Vessel, primitive: Primitive, environment: Environment) -> Array:
+    """(k, headings, 6) states over ground of the run at headings all round, in the forecast's mean current and wind."""
+    return run_at_headings(
+        vessel,
+        primitive,
+        np.arange(HEADINGS) * 2 * np.pi / HEADINGS,
+        entering=environment.current_to,
+        current_to=np.tile(environment.current_to, (HEADINGS, 1)),
+        wind_to=np.tile(environment.wind_to, (HEADINGS, 1)),
+        parameters=np.tile(vessel.model.parameters, (HEADINGS, 1)),
+    )
+
+
+def _stray_m(track: Array) -> float:
+    """Largest distance of the chord's points from a track (k, 2)."""
+    points = track[0] + np.linspace(0, 1, 201)[:, None] * (track[-1] - track[0])
+    apart = shapely.distance(shapely.points(points), shapely.linestrings(track))
+    return float(apart.max()) + float(np.hypot(*(track[-1] - track[0]))) / 400

@@ -1,0 +1,172 @@
+"""A bound on repositioning time that holds for every plan with the same runs.
+
+Class of plans: the hull keeps the clearance everywhere; legs go no faster through water than a stated speed and turn no
+faster than a stated rate, or 2 % beyond those at their ends; each run is sailed as simulated with the nominal vessel in
+the forecast's means; the ship starts and ends at rest with its engines stopped, rudders and thrusters at any angle.
+
+In a steady current the least time of a leg along a straight line is that of Zermelo's navigation problem. It grows with
+the length and obeys the triangle inequality, so the fastest way round the islands bends at their corners only and a
+visibility graph finds it. Let W be where amidships may be. A run whose chord stays within d of its path has its chord
+inside W grown by d, so the legs together with the chords of such runs, and with the paths of all others, lead from
+start to goal through that water: the time of the fastest way is no more than that of the legs, and what legs would
+need for those chords and paths at the headings that suit them best. This is so whatever d is; the best d counts.
+
+On small charts what each run can save of the way is looked for in all places where its hull has room, too
+(`expdesign.plan.bounds.branch_and_bound`): the least time to the goal falls by no more than that in a run, and in a leg
+by no more than it takes.
+
+Speeds and commands at the ends of legs cost time besides: a leg that begins or ends slower than the fastest leg loses
+distance while it changes speed, and actuators move no faster than their rates. Which leg joins which runs is left to
+the plan; the cheapest order counts.
+
+All of this is proved but for two things, which are looked for and given a margin: the largest accelerations, among
+drawn motions and commands (`expdesign.plan.control.acceleration_limits`), and, where wind makes a difference, how far
+runs go and how fast they end, at headings all round (`expdesign.plan.bounds.displacement`).
+
+Source: E. Zermelo, Über das Navigationsproblem bei ruhender oder veränderlicher Windverteilung, ZAMM 11 (1931),
+114-124.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+import shapely
+from scipy.optimize import linear_sum_assignment
+
+from expdesign.dictionary import Primitive
+from expdesign.plan.bounds.branch_and_bound import time_saved_s
+from expdesign.plan.bounds.cheapest_orders import cheapest_orders, place_values
+from expdesign.plan.bounds.displacement import Carry, Headway, carry, differs_by_heading, exit_motion
+from expdesign.plan.chart import build_ways, simplified
+from expdesign.plan.control import LegEnd, least_loss, leg_end
+from expdesign.plan.legs import BEYOND_ENDS, leg_speed_mps
+from expdesign.sea_area import SeaArea
+from expdesign.simulation import Environment
+from expdesign.values import Array
+from expdesign.vessel import Vessel
+
+QUAD_SEGS = 32
+"""Chords to a quarter circle round grown water."""
+
+
+def reposition_bound_s(
+    vessel: Vessel,
+    area: SeaArea,
+    environment: Environment,
+    *,
+    clearance_m: float,
+    primitives: tuple[Primitive, ...],
+    repeats: Mapping[str, int],
+    ends: tuple[Array, Array],
+    transit_mps: float,
+    yaw_rate_radps: float,
+) -> float:
+    """Least repositioning time of any plan of the class that the module describes [s].
+
+    Args:
+        vessel, area, environment: who, where, in what.
+        clearance_m: distance of the hull from anything forbidden.
+        primitives, repeats: the runs.
+        ends: start and goal, (3,) or (2,).
+        transit_mps, yaw_rate_radps: of legs through water; those whose ends are faster, by `leg_speed_mps`, or turn
+            faster go a little beyond.
+    """
+    runs = [item for item in primitives if repeats.get(item.name, 0)]
+    exits = [exit_motion(vessel, item, environment) for item in runs]
+    entries = [item.entry_velocity for item in runs]
+    speed_mps = leg_speed_mps(transit_mps, [*entries, *(np.array([most, 0.0]) for _, most, _ in exits)])
+    turns = [*(abs(float(entry[2])) for entry in entries), *(turn for _, _, turn in exits)]
+    yaw_rate_radps = max([yaw_rate_radps, *(BEYOND_ENDS * turn for turn in turns)])
+    headway = Headway(speed_mps=speed_mps, current_to=environment.current_to)
+    carries = {item.name: carry(vessel, item, environment, headway) for item in runs}
+    counts = {item.name: repeats[item.name] for item in runs}
+    way_s = time_to_sail_s(area, clearance_m + vessel.beam_m / 2, carries, counts, ends, headway, vessel.length_m / 30)
+    if not differs_by_heading(vessel, environment):
+        water = area.safe_water(clearance_m + vessel.beam_m / 2)
+        found = time_saved_s(runs, carries, counts, water, ends, headway, vessel, known_s=way_s)
+        if found is not None:
+            way_s = max(way_s, found[0] - sum(counts[name] * most_s for name, most_s in found[1].items()))
+    firsts, lasts = _leg_ends(vessel, environment, runs, exits, speed_mps, yaw_rate_radps)
+    losses = np.array([[least_loss(first, last, vessel) for last in lasts] for first in firsts])
+    lost_m, least_s = (joint_losses(losses[..., k], list(counts.values())) for k in (0, 1))
+    return float(max(0.0, least_s, way_s + lost_m / (speed_mps + headway.current_mps)))
+
+
+def time_to_sail_s(
+    area: SeaArea,
+    margin_m: float,
+    carries: Mapping[str, Carry],
+    repeats: Mapping[str, int],
+    ends: tuple[Array, Array],
+    headway: Headway,
+    tolerance_m: float,
+) -> float:
+    """Time that legs cannot do without [s]; negative where runs can carry the ship farther than it has to go."""
+    water, best = area.safe_water(margin_m), -np.inf
+    start, goal = (end[:2] for end in ends)
+    for grown_m in sorted({0.0, *(item.stray_m for item in carries.values())}):
+        carried = sum(
+            count * (carries[name].chord_s if carries[name].stray_m <= grown_m else carries[name].path_s)
+            for name, count in repeats.items()
+        )
+        more = _grown(water, grown_m) if grown_m else water
+        simple = simplified(more, grow=True, tolerance_m=tolerance_m + 0.002 * grown_m)
+        way_s = build_ways(simple).least(start, goal, headway.seconds)
+        if not np.isfinite(way_s):  # the ends lie outside the water that a plan needs: there is none to be bounded
+            continue
+        # an end outside the water is joined to it by a line that the true way need not follow
+        straight_s = float(headway.seconds(goal - start))
+        best = max(best, (way_s if _holds_ends(simple, ends) else straight_s) - carried)
+    return float(best) if np.isfinite(best) else 0.0
+
+
+def _grown(water: shapely.Geometry, distance_m: float) -> shapely.Geometry:
+    """No less than the water within a distance: arcs are drawn by chords, whose middles are nearer than their ends."""
+    return shapely.buffer(water, distance_m / np.cos(np.pi / (4 * QUAD_SEGS)) + 1e-6, quad_segs=QUAD_SEGS)
+
+
+def _holds_ends(water: shapely.Geometry, ends: tuple[Array, Array]) -> bool:
+    return bool(shapely.covers(water, shapely.points([end[1::-1] for end in ends])).all())
+
+
+def _leg_ends(
+    vessel: Vessel,
+    environment: Environment,
+    runs: list[Primitive],
+    exits: list[tuple[float, float, float]],
+    top_mps: float,
+    yaw_rate_radps: float,
+) -> tuple[list[LegEnd], list[LegEnd]]:
+    """Where legs begin, the start first, and where they end, the goal last."""
+
+    def end(velocity: Array, inputs: Array | None) -> LegEnd:
+        speed = float(np.hypot(*velocity[:2]))
+        return leg_end(vessel, environment, speed, inputs, top_mps=top_mps, yaw_rate_radps=yaw_rate_radps)
+
+    rest = end(np.zeros(3), np.where(vessel.angles, np.nan, 0.0))
+    firsts = [
+        replace(end(item.exit_velocity, item.commands.values[-1]), slowest_mps=least, fastest_mps=most)
+        for item, (least, most, _) in zip(runs, exits, strict=True)
+    ]
+    return [rest, *firsts], [*(end(item.entry_velocity, item.commands.values[0]) for item in runs), rest]
+
+
+def joint_losses(losses: Array, counts: Sequence[int]) -> float:
+    """What legs lose at least together, over all orders of the runs, or over all assignments where those are many.
+
+    Args:
+        losses: (q + 1, q + 1) of a leg; rows by the run before, the start first, columns by the run after, the goal
+            last.
+        counts: (q,) of each run, one at least.
+    """
+    if not len(counts):
+        return float(losses[0, 0])
+    table = cheapest_orders(losses[1:, :-1], losses[1:, -1], counts)
+    if table is None:
+        every = np.repeat(np.repeat(losses, [1, *counts], axis=0), [*counts, 1], axis=1)
+        return float(every[linear_sum_assignment(every)].sum())
+    one_less = len(table) - 1 - place_values(counts)
+    return float((losses[0, :-1] + table[one_less, np.arange(len(counts))]).min())

@@ -1,0 +1,135 @@
+"""The grid over the allowed water: distance to danger, and the widest way through."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from scipy.ndimage import distance_transform_edt, label
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import dijkstra
+
+from expdesign.sea_area import SeaArea
+from expdesign.values import Array, seal
+
+FINEST_CELLS = 3_000_000
+ROUTING_CELLS = 400_000
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ClearanceField:
+    """Distance to forbidden water on a grid.
+
+    Attributes:
+        origin: (2,) north, east of the first cell's centre [m].
+        cell_m: grid spacing [m].
+        clearance_m: (rows north, columns east) distance from the cell's centre to anything forbidden [m].
+    """
+
+    origin: Array
+    cell_m: float
+    clearance_m: Array
+
+    def __post_init__(self) -> None:
+        seal(self, origin="2", clearance_m="r c")
+
+    @property
+    def error_m(self) -> float:
+        """A looked-up clearance differs from the true one by less than this [m]."""
+        return 2.0 * self.cell_m  # half a cell's diagonal at the point and at the shore, and half a cell of rounding
+
+    def index(self, points: Array) -> tuple[np.ndarray, np.ndarray]:
+        """Nearest cell's row and column of (..., 2) north/east points; outside the grid they are clipped."""
+        cells = np.rint((points - self.origin) / self.cell_m).astype(int)
+        rows, columns = self.clearance_m.shape
+        return np.clip(cells[..., 0], 0, rows - 1), np.clip(cells[..., 1], 0, columns - 1)
+
+    def at(self, points: Array) -> Array:
+        """(...,) clearance of (..., 2) points; the grid's rim is forbidden, so points outside have none."""
+        rows, columns = self.index(points)
+        return np.asarray(self.clearance_m[rows, columns])
+
+    def thinned(self, cells: int) -> ClearanceField:
+        """Every n-th cell in both directions, so that at most `cells` are left."""
+        step = max(1, int(np.ceil(np.sqrt(self.clearance_m.size / cells))))
+        return ClearanceField(
+            origin=self.origin, cell_m=self.cell_m * step, clearance_m=self.clearance_m[::step, ::step]
+        )
+
+    def centre(self, flat: np.ndarray) -> Array:
+        """(..., 2) north/east of flat cell numbers."""
+        rows, columns = np.divmod(flat, self.clearance_m.shape[1])
+        return self.origin + self.cell_m * np.stack([rows, columns], axis=-1)
+
+
+def clearance_field(area: SeaArea, *, resolution_m: float) -> ClearanceField:
+    """Rasterise the allowed water and measure how far each cell is from anything forbidden.
+
+    Args:
+        area: allowed water.
+        resolution_m: wished spacing; coarser when the area would need more than `FINEST_CELLS`.
+    """
+    west, south, east, north = area.water.bounds
+    cell = max(resolution_m, float(np.sqrt((east - west) * (north - south) / FINEST_CELLS)))
+    norths = np.arange(south - cell, north + 2 * cell, cell)
+    easts = np.arange(west - cell, east + 2 * cell, cell)
+    shapely.prepare(area.water)
+    free = shapely.contains_xy(area.water, *np.meshgrid(easts, norths))
+    # a pier thinner than a cell hides between the centres: every cell that a shore passes through is forbidden
+    shore = shapely.get_coordinates(shapely.segmentize(shapely.boundary(area.water), cell / 2))
+    free[
+        np.rint((shore[:, 1] - norths[0]) / cell).astype(int), np.rint((shore[:, 0] - easts[0]) / cell).astype(int)
+    ] = False
+    free[[0, -1], :] = free[:, [0, -1]] = False
+    distance = np.asarray(distance_transform_edt(free)) * cell - cell / 2
+    return ClearanceField(origin=np.array([norths[0], easts[0]]), cell_m=cell, clearance_m=distance.clip(0.0))
+
+
+def narrowest_passage(field: ClearanceField, start: Array, goal: Array) -> tuple[float, Array]:
+    """The largest clearance with which start (2,) and goal (2,) are connected, and where the way is that narrow.
+
+    Returns:
+        Clearance [m] (zero when they are not connected at all), and the (2,) north/east place.
+    """
+    a, b = field.index(start), field.index(goal)
+    low, high = 0.0, float(min(field.clearance_m[a], field.clearance_m[b]))
+    eight = np.ones((3, 3))
+    while high - low > field.cell_m / 4:
+        middle = (low + high) / 2
+        regions, _ = label(field.clearance_m >= middle, structure=eight)
+        low, high = (middle, high) if regions[a] == regions[b] else (low, middle)
+    regions, _ = label(field.clearance_m >= high, structure=eight)
+    apart = sum(distance_transform_edt(regions != regions[end]) if regions[end] else 0.0 * regions for end in (a, b))
+    way = _way(field, start, goal, low - field.cell_m)
+    return low, way[int(np.argmin(apart[field.index(way)]))]
+
+
+def _way(fine: ClearanceField, start: Array, goal: Array, clearance_m: float) -> Array:
+    """(k, 2) centres of a shortest eight-neighbour way through cells with a clearance; one row where there is none."""
+    field = fine.thinned(ROUTING_CELLS)
+    free = field.clearance_m >= clearance_m
+    free[field.index(goal)] = True
+    numbers = np.arange(free.size).reshape(free.shape)
+    tails, heads, lengths = [], [], []
+    for step_row, step_column in ((0, 1), (1, 0), (1, 1), (1, -1)):
+        a, b = _neighbours(numbers, step_row, step_column)
+        both = free.ravel()[a] & free.ravel()[b]
+        tails.append(a[both])
+        heads.append(b[both])
+        lengths.append(np.full(int(both.sum()), np.hypot(step_row, step_column)))
+    ends = np.concatenate(tails), np.concatenate(heads)
+    graph = coo_matrix((np.concatenate(lengths), ends), shape=(numbers.size, numbers.size)).tocsr()
+    before = dijkstra(graph, directed=False, indices=int(numbers[field.index(goal)]), return_predecessors=True)[1]
+    cells = [int(numbers[field.index(start)])]
+    while (after := int(before[cells[-1]])) >= 0:
+        cells.append(after)
+    return field.centre(np.array(cells))
+
+
+def _neighbours(numbers: np.ndarray, step_row: int, step_column: int) -> tuple[np.ndarray, np.ndarray]:
+    rows, columns = numbers.shape
+    low, high = max(0, -step_column), columns - max(0, step_column)
+    a = numbers[: rows - step_row, low:high]
+    b = numbers[step_row:, low + step_column : high + step_column]
+    return a.ravel(), b.ravel()

@@ -1,0 +1,171 @@
+"""Shortest ways through polygons: exact, by a visibility graph of the corners that a taut string can bend round.
+
+Independent of any grid, so turning the chart turns the ways with it.
+
+Source: T. Lozano-Perez and M. A. Wesley, An algorithm for planning collision-free paths among polyhedral obstacles,
+Communications of the ACM 22 (1979), 560-570.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from scipy.sparse import coo_matrix, csr_matrix
+from scipy.sparse.csgraph import dijkstra
+
+from expdesign.sea_area import as_multipolygon
+from expdesign.values import Array
+
+MOST_CORNERS = 700
+"""Corners of a simplified water; more would make the graph slow."""
+MOST_AT_ALL, COARSE = 2500, 16.0
+"""Corners accepted once the tolerance is so many times what was asked for."""
+SLIT_M = 1e-3
+"""A string may touch the shore: the water is grown by this before lines of sight are tested."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Ways:
+    """Water, and which of its corners see each other.
+
+    Attributes:
+        water: polygons (east, north), grown by `SLIT_M`.
+        corners: (n, 2) north/east of the corners that stick out into the water.
+        lengths: (n, n) sparse distances between corners that see each other.
+    """
+
+    water: shapely.MultiPolygon
+    corners: Array
+    lengths: csr_matrix
+
+    def shortest(self, start: Array, end: Array) -> Array | None:
+        """(k, 2) the taut string between two points (2,), or None when the water does not join them.
+
+        Points outside the water are joined to its nearest point by a straight line.
+        """
+        nodes, distance, before = self._least(start, end, lambda step: np.hypot(*step.T))
+        n = len(self.corners)
+        if not np.isfinite(distance[n + 1]):
+            return None
+        chain = [n + 1]
+        while chain[-1] != n:
+            chain.append(int(before[chain[-1]]))
+        way = np.array([start, *nodes[chain[::-1]], end])
+        moved = np.r_[True, np.hypot(*np.diff(way, axis=0).T) > 1e-9]
+        return way[moved]
+
+    def least(self, start: Array, end: Array, cost: Callable[[Array], Array]) -> float:
+        """Least cost of the ways between two points (2,), infinite when there is none.
+
+        Exact for costs of straight steps (k, 2) that grow with their length and obey the triangle inequality, in one
+        direction perhaps more than in the other: the best ways then bend at corners only. For points outside the water
+        it is that from its nearest points.
+        """
+        _, least, _ = self._least(start, end, cost)
+        return float(least[len(self.corners) + 1])
+
+    def _least(self, start: Array, end: Array, cost: Callable[[Array], Array]) -> tuple[Array, Array, np.ndarray]:
+        """Corners and the nearest points to both ends, least costs from the start to all, and the node before each."""
+        inside = [self.nearest(point) for point in (start, end)]
+        nodes = np.concatenate([self.corners, inside])
+        n = len(self.corners)
+        rows, columns = self.lengths.nonzero()
+        tails, heads = [rows, columns], [columns, rows]
+        for k, point in enumerate(inside):
+            seen = self.sees(point, nodes)
+            tails += [np.full(len(seen), n + k), seen]
+            heads += [seen, np.full(len(seen), n + k)]
+        tail, head = np.concatenate(tails), np.concatenate(heads)
+        once = np.unique(tail * (n + 2) + head)  # the ends may see each other twice
+        tail, head = once // (n + 2), once % (n + 2)
+        data = cost(nodes[head] - nodes[tail]) + 1e-12
+        graph = coo_matrix((data, (tail, head)), shape=(n + 2, n + 2)).tocsr()
+        least, before = dijkstra(graph, indices=n, return_predecessors=True)
+        return nodes, least, before
+
+    def nearest(self, point: Array) -> Array:
+        """The point itself (2,), or the nearest one in the water."""
+        here = shapely.Point(point[1], point[0])
+        if shapely.covers(self.water, here):
+            return point
+        there = shapely.get_coordinates(shapely.shortest_line(self.water, here))[0]
+        return np.array([there[1], there[0]])
+
+    def sees(self, point: Array, nodes: Array) -> np.ndarray:
+        """Indices of the nodes in a straight line of sight from a point."""
+        lines = sight_lines(np.broadcast_to(point, nodes.shape), nodes)
+        apart = np.hypot(*(nodes - point).T) > 0
+        return np.flatnonzero(shapely.covers(self.water, lines) | ~apart)
+
+
+def build_ways(water: shapely.Geometry) -> Ways:
+    """The visibility graph of a water polygon with at most some hundreds of corners."""
+    corners, before, after = _corners(as_multipolygon(water))
+    grown = as_multipolygon(shapely.buffer(as_multipolygon(water), SLIT_M, join_style="mitre"))
+    shapely.prepare(grown)  # stays prepared for all later lines of sight
+    tail, head = np.triu_indices(len(corners), 1)
+    taut = _tangent(corners[tail], corners[head], before[head], after[head])
+    taut &= _tangent(corners[head], corners[tail], before[tail], after[tail])
+    tail, head = tail[taut], head[taut]
+    seen = shapely.covers(grown, sight_lines(corners[tail], corners[head])) if len(tail) else np.zeros(0, dtype=bool)
+    tail, head = tail[seen], head[seen]
+    away = np.hypot(*(corners[tail] - corners[head]).T)
+    lengths = coo_matrix((away, (tail, head)), shape=(len(corners), len(corners))).tocsr()
+    return Ways(water=grown, corners=corners, lengths=lengths)
+
+
+def simplified(water: shapely.MultiPolygon, *, grow: bool, tolerance_m: float) -> shapely.MultiPolygon:
+    """Water with at most `MOST_CORNERS` corners that contains the given one (`grow`), or lies inside it.
+
+    Water that shrinks loses its narrow ways: from `COARSE` times the first tolerance on, `MOST_AT_ALL` corners will do.
+
+    Args:
+        water: polygons.
+        grow: which.
+        tolerance_m: of the first try; doubled until few enough corners are left.
+    """
+    coarse_m = np.inf if grow else COARSE * tolerance_m
+    while True:
+        moved = shapely.buffer(water, tolerance_m if grow else -tolerance_m)
+        simple = as_multipolygon(shapely.make_valid(shapely.simplify(moved, 0.98 * tolerance_m)))
+        if len(_corners(simple)[0]) <= (MOST_AT_ALL if tolerance_m >= coarse_m else MOST_CORNERS):
+            return simple
+        tolerance_m *= 2.0
+
+
+def polyline_length(points: Array) -> float:
+    """Length of a line through points (k, 2) [m]."""
+    return float(np.hypot(*np.diff(points, axis=0).T).sum())
+
+
+def sight_lines(a: Array, b: Array) -> np.ndarray:
+    """(n,) straight lines between north/east points (n, 2), for shapely."""
+    return np.asarray(shapely.linestrings(np.stack([a[:, ::-1], b[:, ::-1]], axis=1)))
+
+
+def _corners(water: shapely.MultiPolygon) -> tuple[Array, Array, Array]:
+    """Corners where the shore bends away from the water (n, 2) north/east, with their neighbours on the ring."""
+    found: list[Array] = [np.zeros((3, 0, 2))]
+    for polygon in shapely.get_parts(shapely.orient_polygons(water)):
+        for ring in (polygon.exterior, *polygon.interiors):
+            points = shapely.get_coordinates(ring)[:-1, ::-1]
+            before, after = np.roll(points, 1, axis=0), np.roll(points, -1, axis=0)
+            # rings run with the water on their left in (east, north), which is on the right in (north, east)
+            reflex = _cross(points - before, after - points) > 0
+            found.append(np.stack([points[reflex], before[reflex], after[reflex]]))
+    corners, before, after = np.concatenate(found, axis=1)
+    return corners, before, after
+
+
+def _tangent(origin: Array, corner: Array, before: Array, after: Array) -> np.ndarray:
+    """Whether the line from an origin to a corner leaves both of the corner's shores on one side."""
+    ahead = corner - origin
+    sides = _cross(ahead, before - corner) * _cross(ahead, after - corner)
+    return np.asarray(sides >= -1e-9 * np.maximum(np.abs(ahead).max(axis=-1), 1.0) ** 2)
+
+
+def _cross(a: Array, b: Array) -> Array:
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])

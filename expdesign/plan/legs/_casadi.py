@@ -1,0 +1,378 @@
+"""The only door to CasADi and IPOPT: fastest smooth commands between two states, within limits and a region.
+
+Direct multiple shooting on the very map that simulates the trial: commands are linear between nodes, sampled and held,
+and each sample is integrated with the simulation's Runge-Kutta steps. Programs of one size are built once and reused:
+everything that differs from leg to leg is a bound or a parameter.
+
+Source: H. G. Bock and K. J. Plitt, A multiple shooting algorithm for direct solution of optimal control problems,
+IFAC Proc. 17 (1984), 1603-1608.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from itertools import pairwise
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from expdesign.plan.work_budget import Effort
+from expdesign.simulation import Environment, motion_rates, rk4_step, sample_map
+from expdesign.simulation.run import SUBSTEPS
+from expdesign.values import Array, seal
+from expdesign.vessel import Operators, Vessel
+
+CASADI = Operators(ca.fabs, ca.sin, ca.cos)
+SMOOTHNESS = 0.02
+"""Weight of squared command steps against time in units of `LegProblem.time_scale_s`."""
+SMALLNESS = 1e-4
+"""Weight of squared commands: decides between commands that give the same force."""
+NODES = (12, 18, 24, 32, 44, 60, 80, 110, 160)
+"""Numbers of nodes tried while the time is free."""
+SETTLED = 1e-4
+"""How near what lagging actuators deliver must be to the end's commands, relative to the largest."""
+PROGRAMS = 24
+"""Programs kept built."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LegProblem:
+    """A leg to be made into commands.
+
+    Attributes:
+        vessel: model, actuator limits and rates.
+        environment: its means act.
+        start, end: (6,) states; heading continuous along the reference.
+        start_inputs, end_inputs: (m,) commands standing before the leg, and as its last sample.
+        past: (h, m) commands given before the leg, the standing one last.
+        delivered: (m,) what the actuators deliver as the leg begins, misalignment included.
+        states, inputs: (j + 1, 6) and (j + 1, m) first guess at even times.
+        duration_s: first guess.
+        time_scale_s: unit of time in which smoothness is weighed.
+        path: (j + 1, 3) poses that the corridor is measured from.
+        room_port_m, room_starboard_m: (j + 1,) how far the origin may be from the path to either side.
+        circle: (3,) north, east, radius that the hull's discs keep to; the radius may be infinite.
+        hull_arm_m: points this far ahead and astern of the origin must keep to corridor and circle too.
+        top_speed_mps, yaw_rate_radps: bounds on speed through water, in any direction, and yaw rate at the nodes.
+        lateral_mps2: bound on surge speed through water times yaw rate.
+        node_s: least time between nodes; 0 for the sample time.
+        wish: (2,) seconds that a metre made good north and east is worth to legs that may end anywhere, and if it is
+            zero with any heading; None for those that have to end at `end`.
+        effort: that may be spent, and that is; without any left, nothing is found.
+    """
+
+    vessel: Vessel
+    environment: Environment
+    start: Array
+    end: Array
+    start_inputs: Array
+    end_inputs: Array
+    past: Array
+    delivered: Array
+    states: Array
+    inputs: Array
+    duration_s: float
+    time_scale_s: float
+    path: Array
+    room_port_m: Array
+    room_starboard_m: Array
+    circle: Array
+    hull_arm_m: float
+    top_speed_mps: float
+    yaw_rate_radps: float
+    lateral_mps2: float
+    node_s: float = 0.0
+    wish: Array | None = None
+    effort: Effort = field(default_factory=Effort)
+
+    def __post_init__(self) -> None:
+        seal(self, start="6", end="6", start_inputs="m", end_inputs="m", states="j 6", inputs="j m")
+        seal(self, past="h m", delivered="m")
+        seal(self, path="j 3", room_port_m="j", room_starboard_m="j", circle="3")
+
+
+def solve_joint(problem: LegProblem) -> tuple[float, Array] | None:
+    """Time of the leg that gains most by its `wish`, on whole samples, and its end pose (3,); None if none is found."""
+    sample_s, duration_s = problem.vessel.sample_time_s, problem.duration_s
+    nodes, block = _size(problem, duration_s)
+    fastest = _program(problem.vessel, problem.environment, nodes, block, True)
+    for guess in (problem, _even(problem)):
+        found = fastest.solve(_respaced(guess, nodes), duration_s / (nodes * block))
+        if found is None:
+            continue
+        count = max(2, int(np.ceil(nodes * found[1] / sample_s - 1e-6)))
+        smooth = _program(problem.vessel, problem.environment, count, block, False)
+        exact = smooth.solve(_respaced(found[0], count), sample_s)
+        if exact is not None:
+            return count * block * sample_s, exact[0].states[-1, :3]
+    return None
+
+
+def _even(problem: LegProblem) -> LegProblem:
+    """The same leg with commands that change evenly as a first guess."""
+    return replace(problem, inputs=np.linspace(problem.inputs[0], problem.inputs[-1], len(problem.inputs)))
+
+
+def _size(problem: LegProblem, duration_s: float) -> tuple[int, int]:
+    """Number of nodes for a leg of some time, and samples between two of them."""
+    sample_s = problem.vessel.sample_time_s
+    nodes = next((n for n in NODES if n >= duration_s / max(sample_s, problem.node_s)), NODES[-1])
+    return nodes, max(1, round(duration_s / (nodes * sample_s)))
+
+
+def solve_leg(problem: LegProblem) -> Array | None:
+    """Commands (k, m) at the vessel's sample time, or None when IPOPT finds none.
+
+    First the fastest motion is sought with the sample time free, then the smoothest one on whole samples in that
+    time. Where commands that would give the guessed motion lead nowhere, evenly changing ones often do. The answer is
+    for the caller to check by simulation.
+    """
+    sample_s = problem.vessel.sample_time_s
+    for guess, stretch in ((problem, 1.0), (_even(problem), 1.0), (problem, 1.6), (problem, 3.0)):
+        guess_s = stretch * problem.duration_s
+        nodes, block = _size(problem, guess_s)
+        fastest = _program(problem.vessel, problem.environment, nodes, block, True)
+        found = fastest.solve(_respaced(guess, nodes), guess_s / (nodes * block))
+        if found is None:
+            continue
+        time_s = nodes * block * found[1]
+        least = max(2, int(np.ceil(time_s / (block * sample_s) - 0.1)))
+        for count in (least, least + 1, least + 3, least + 8, least + 16):
+            smooth = _program(problem.vessel, problem.environment, count, block, False)
+            exact = smooth.solve(_respaced(found[0], count), sample_s)
+            if exact is not None:
+                return _samples(exact[0].inputs, block)
+    return None
+
+
+def _spread(rows: Array, count: int) -> Array:
+    """Rows (j + 1, ...) linearly resampled to count + 1."""
+    old, new = np.linspace(0, 1, len(rows)), np.linspace(0, 1, count + 1)
+    return np.stack([np.interp(new, old, column) for column in np.atleast_2d(rows.T)], axis=-1).reshape(
+        count + 1, *rows.shape[1:]
+    )
+
+
+def _respaced(problem: LegProblem, count: int) -> LegProblem:
+    """The same leg with another number of nodes."""
+    return replace(
+        problem,
+        states=_spread(problem.states, count),
+        inputs=_spread(problem.inputs, count),
+        path=_spread(problem.path, count),
+        room_port_m=_spread(problem.room_port_m, count),
+        room_starboard_m=_spread(problem.room_starboard_m, count),
+    )
+
+
+def _samples(nodes: Array, block: int) -> Array:
+    """(count x block, m) commands, linear from node to node; the first node is what stands before the leg."""
+    shares = (np.arange(1, block + 1) / block)[:, None]
+    return np.concatenate([a + (b - a) * shares for a, b in pairwise(nodes)])
+
+
+class _Program:
+    """The nonlinear program of legs with a given number of nodes and samples per node."""
+
+    def __init__(self, vessel: Vessel, environment: Environment, nodes: int, block: int, free_time: bool) -> None:
+        self.vessel, self.environment, self.nodes, self.block, self.free = vessel, environment, nodes, block, free_time
+        self.limits = vessel.limits
+        self.state_scale = np.array([vessel.length_m] * 2 + [1.0] * 4)
+        self.input_scale = np.array([max(abs(x.low), abs(x.high)) if np.isfinite(x.high) else 1.0 for x in self.limits])
+        self.maps = [sample_map(x, sample_time_s=vessel.sample_time_s, substeps=SUBSTEPS) for x in vessel.responses]
+        self.lagging = np.flatnonzero([response.lag_s > 0 for response in vessel.responses])
+        self.memory = 1 + max(through.lateness for through in self.maps)
+        self._build()
+
+    def _build(self) -> None:
+        j, m = self.nodes, len(self.limits)
+        x, u, h = ca.MX.sym("x", 6, j + 1), ca.MX.sym("u", m, j + 1), ca.MX.sym("h")
+        path, circle, wish = ca.MX.sym("path", 3, j - 1), ca.MX.sym("circle", 2), ca.MX.sym("wish", 2)
+        unit_s, arm = ca.MX.sym("unit_s"), ca.MX.sym("arm")
+        past, d = ca.MX.sym("past", m, self.memory), ca.MX.sym("d", len(self.lagging), j + 1)
+        inputs = ca.DM(self.input_scale) * u
+        states = ca.DM(self.state_scale) * x
+        lag_scale = ca.DM(self.input_scale[self.lagging])
+        early, late = self._arriving(past, inputs)
+        ends, held = self._block_map().map(j)(states[:, :-1], lag_scale * d[:, :-1], early, late, ca.repmat(h, 1, j))
+        rows = [ca.vec((ends - states[:, 1:]) / ca.DM(self.state_scale)), ca.vec(held / lag_scale - d[:, 1:])]
+        rows += self._region(states[:, 1:-1], path, circle, arm)
+        for index in self._rated:
+            step = (inputs[int(index), 1:] - inputs[int(index), :-1]).T / self.input_scale[index]
+            reach = self.limits[index].rate * self.block * h / self.input_scale[index]
+            rows += [step - reach, -step - reach]
+        through = x[3:5, 1:-1] - self._current_b(x[2, 1:-1])
+        rows += [ca.sum1(through**2).T, (through[0, :] * x[5, 1:-1]).T]
+        steps = ca.diff(u, 1, 1)
+        cost = SMOOTHNESS * ca.sumsqr(steps) + SMALLNESS * ca.sumsqr(u) / j - ca.dot(wish, states[:2, -1]) / unit_s
+        if self.free:
+            cost = cost + h * j * self.block / unit_s
+        options: dict[str, Any] = {"print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}
+        options |= {"ipopt.max_iter": 100, "ipopt.constr_viol_tol": 1e-9, "ipopt.acceptable_iter": 0}
+        options |= {"ipopt.tol": 1e-5 if self.free else 1e-7}
+        nlp: Any = {"x": ca.vertcat(ca.vec(x), ca.vec(u), ca.vec(d), h), "f": cost, "g": ca.vertcat(*rows)}
+        nlp["p"] = ca.vertcat(ca.vec(path), circle, wish, unit_s, arm, ca.vec(past))
+        self.solver = ca.nlpsol("leg", "ipopt", nlp, options)
+
+    @property
+    def _rated(self) -> np.ndarray:
+        """Indices of the signals with a finite rate."""
+        return np.flatnonzero(np.isfinite([limit.rate for limit in self.limits]))
+
+    def _arriving(self, past: ca.MX, inputs: ca.MX) -> tuple[ca.MX, ca.MX]:
+        """(m block, j) commands that arrive at the actuators in each sample: the earlier and the later one."""
+        j, m, block = self.nodes, len(self.limits), self.block
+        shares = np.zeros((j + 1, j * block))
+        for sample in range(j * block):
+            node, share = divmod(sample, block)
+            shares[node, sample], shares[node + 1, sample] = 1 - (share + 1) / block, (share + 1) / block
+        given = ca.horzcat(past, ca.mtimes(inputs, ca.sparsify(ca.DM(shares))))
+        firsts = [self.memory - through.lateness for through in self.maps]
+        late = ca.vertcat(*[given[i, first : first + j * block] for i, first in enumerate(firsts)])
+        early = ca.vertcat(*[given[i, first - 1 : first - 1 + j * block] for i, first in enumerate(firsts)])
+        return ca.reshape(early, m * block, j), ca.reshape(late, m * block, j)
+
+    def _block_map(self) -> ca.Function:
+        """State and delivered values after a block of samples, from the commands that arrive in them.
+
+        Dead bands are left out: commands inside them make the leg miss its end, which the caller finds.
+        """
+        m, count = len(self.limits), len(self.lagging)
+        x, d, h = ca.SX.sym("x", 6), ca.SX.sym("d", count), ca.SX.sym("h")
+        early, late = ca.SX.sym("early", m * self.block), ca.SX.sym("late", m * self.block)
+        state: tuple[Any, ...] = tuple(ca.vertsplit(x))
+        lagged: dict[int, Any] = {int(i): d[k] for k, i in enumerate(self.lagging)}
+        for sample in range(self.block):
+            start, after = early[sample * m : (sample + 1) * m], late[sample * m : (sample + 1) * m]
+            for step in range(SUBSTEPS):
+                given = [
+                    _mixed(through.means[step], lagged.get(i, 0.0), start[i], after[i]) + through.offset
+                    for i, through in enumerate(self.maps)
+                ]
+                state = rk4_step(self._rates(given), state, h / SUBSTEPS)
+            lagged = {i: _mixed(self.maps[i].end, value, start[i], after[i]) for i, value in lagged.items()}
+        delivered = ca.vertcat(*[lagged[int(i)] for i in self.lagging]) if count else ca.SX(0, 1)
+        return ca.Function("block", [x, d, early, late, h], [ca.vertcat(*state), delivered])
+
+    def _rates(self, given: list[Any]) -> Callable[[tuple[Any, ...]], tuple[Any, ...]]:
+        current, wind = self.environment.current_to.tolist(), self.environment.wind_to.tolist()
+        model = self.vessel.model
+        return lambda state: motion_rates(model, state, given, current_to=current, wind_to=wind, ops=CASADI)
+
+    def _current_b(self, heading: ca.MX) -> Any:
+        """(2, j) current ahead and to starboard at headings (1, j); 0 in still water."""
+        north, east = self.environment.current_to.tolist()
+        if not (north or east):
+            return 0
+        c, s = ca.cos(heading), ca.sin(heading)
+        return ca.vertcat(north * c + east * s, east * c - north * s)
+
+    def _region(self, inner: ca.MX, path: ca.MX, circle: ca.MX, arm: ca.MX) -> list[ca.MX]:
+        """Rows for origin, bow point and stern point: offset from the path, and squared distance from the circle."""
+        side = ca.vertcat(-ca.sin(path[2, :]), ca.cos(path[2, :]))
+        ahead = ca.vertcat(ca.cos(inner[2, :]), ca.sin(inner[2, :]))
+        length = self.vessel.length_m
+        points = [inner[:2, :] + share * arm * ahead for share in (0, 1, -1)]
+        offsets = [ca.sum1(side * (point - path[:2, :])).T / length for point in points]
+        return offsets + [ca.sum1((point - circle) ** 2).T / length**2 for point in points]
+
+    def _row_bounds(self, problem: LegProblem) -> tuple[Array, Array]:
+        """Lower and upper bounds of the constraints, in the order of `_build`."""
+        j, inner, length = self.nodes, slice(1, self.nodes), self.vessel.length_m
+        low, high = [np.zeros((6 + len(self.lagging)) * j)], [np.zeros((6 + len(self.lagging)) * j)]
+        low += 3 * [-problem.room_port_m[inner] / length]
+        high += 3 * [problem.room_starboard_m[inner] / length]
+        radius = problem.circle[2]
+        low += [np.full(3 * (j - 1), -np.inf)]
+        high += [np.full(3 * (j - 1), (radius / length) ** 2)]
+        low += [np.full(2 * j * len(self._rated), -np.inf), np.full(j - 1, -np.inf)]
+        high += [np.zeros(2 * j * len(self._rated)), np.full(j - 1, problem.top_speed_mps**2)]
+        low += [np.full(j - 1, -problem.lateral_mps2)]
+        high += [np.full(j - 1, problem.lateral_mps2)]
+        return np.concatenate(low), np.concatenate(high)
+
+    def _variable_bounds(self, problem: LegProblem, origin: Array) -> tuple[Array, Array]:
+        """Lower and upper bounds of states, commands and sample time."""
+        j = self.nodes
+        high = np.full((j + 1, 6), np.inf)
+        over_ground = problem.top_speed_mps + float(np.hypot(*self.environment.current_to))
+        high[:, 3:] = [over_ground, over_ground, problem.yaw_rate_radps]
+        low = -high
+        low[0] = high[0] = (problem.start - origin) / self.state_scale
+        low[-1] = high[-1] = (problem.end - origin) / self.state_scale
+        if problem.wish is not None:
+            low[-1, : 2 if problem.wish.any() else 3], high[-1, : 2 if problem.wish.any() else 3] = -np.inf, np.inf
+        first, last = (np.tile([getattr(x, name) for x in self.limits], (j + 1, 1)) for name in ("low", "high"))
+        first[0] = last[0] = problem.start_inputs
+        for index, response in enumerate(self.vessel.responses):  # nothing may still be on its way at the end
+            after = j - int(np.ceil(response.delay_s / (self.block * self.vessel.sample_time_s) - 1e-9))
+            first[after:, index] = last[after:, index] = problem.end_inputs[index]
+        offset = np.array([response.offset for response in self.vessel.responses])
+        ends = ((problem.delivered - offset)[self.lagging], problem.end_inputs[self.lagging])
+        least, most = (np.full((j + 1, len(self.lagging)), sign * np.inf) for sign in (-1, 1))
+        scale = self.input_scale[self.lagging]
+        least[0] = most[0] = ends[0] / scale
+        least[-1], most[-1] = ends[1] / scale - SETTLED, ends[1] / scale + SETTLED
+        sample_s = self.vessel.sample_time_s
+        times = (0.2 * sample_s, 3.0 * sample_s) if self.free else (sample_s, sample_s)
+        return (
+            np.r_[low.ravel(), (first / self.input_scale).ravel(), least.ravel(), times[0]],
+            np.r_[high.ravel(), (last / self.input_scale).ravel(), most.ravel(), times[1]],
+        )
+
+    def solve(self, problem: LegProblem, step_s: float) -> tuple[LegProblem, float] | None:
+        """The problem with states and inputs replaced by the answer, and the sample time found; or None."""
+        if problem.effort.exhausted:
+            return None
+        j, m = self.nodes, len(self.limits)
+        origin = np.array([*problem.start[:2], 0, 0, 0, 0])
+        path = problem.path[1:j] - origin[:3]
+        inputs = problem.inputs / self.input_scale
+        guess = [
+            ((problem.states - origin) / self.state_scale).ravel(),
+            inputs.ravel(),
+            inputs[:, self.lagging].ravel(),
+        ]
+        rows = len(problem.past) - 1 + np.arange(-self.memory + 1, 1)
+        past = problem.past[np.maximum(rows, 0)]
+        low, high = self._variable_bounds(problem, origin)
+        least, most = self._row_bounds(problem)
+        answer = self.solver(
+            x0=np.clip(np.r_[*guess, step_s], low, high),
+            p=np.r_[
+                path.ravel(),
+                problem.circle[:2] - origin[:2],
+                np.zeros(2) if problem.wish is None else problem.wish,
+                problem.time_scale_s,
+                problem.hull_arm_m,
+                past.ravel(),
+            ],
+            lbx=low,
+            ubx=high,
+            lbg=least,
+            ubg=most,
+        )
+        outcome = self.solver.stats()
+        problem.effort.optimised(outcome["iter_count"], j * self.block)
+        if outcome["return_status"] == "NonIpopt_Exception_Thrown":
+            raise KeyboardInterrupt  # the only exception there can be, as nothing in the program calls back to Python
+        if not outcome["success"]:
+            return None
+        values = np.asarray(answer["x"]).ravel()
+        states = values[: 6 * (j + 1)].reshape(j + 1, 6) * self.state_scale + origin
+        inputs = values[6 * (j + 1) : (6 + m) * (j + 1)].reshape(j + 1, m) * self.input_scale
+        return replace(problem, states=states, inputs=inputs), float(values[-1])
+
+
+def _mixed(weights: Array, start: Any, early: Any, late: Any) -> Any:
+    """What a sample map makes of the value it starts from and of two commands; weights of zero leave no trace."""
+    parts = [weight * value for weight, value in zip(weights.tolist(), (start, early, late), strict=True) if weight]
+    return sum(parts[1:], parts[0]) if parts else 0.0
+
+
+@lru_cache(maxsize=PROGRAMS)
+def _program(vessel: Vessel, environment: Environment, nodes: int, block: int, free_time: bool) -> _Program:
+    return _Program(vessel, environment, nodes, block, free_time)

@@ -1,0 +1,250 @@
+"""What legs are made from: the task, the water all legs share, and whether commands fulfil a task."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+import shapely
+
+from expdesign.conventions import whole_turns
+from expdesign.plan.chart import ClearanceField, Ways, build_ways, polyline_length, simplified
+from expdesign.plan.control import Capability
+from expdesign.plan.work_budget import Effort
+from expdesign.sea_area import ARC_SEGMENTS, SeaArea
+from expdesign.signals import Commands, Trajectory
+from expdesign.simulation import Environment, deliver, delivered_at_samples, simulate, to_body
+from expdesign.simulation.run import SUBSTEPS
+from expdesign.values import Array, seal
+from expdesign.vessel import IDEAL, NUMPY, Vessel
+from expdesign.vessel.hull import swept_area
+
+ROOM_M = 3.0
+"""Hull lengths to either side beyond which a corridor is not widened."""
+MEMORY = 20.0
+"""Time constants after which a lagging actuator has forgotten: two parts in a thousand million are left."""
+ARRIVAL = 1e-3
+"""Largest miss of a leg's end state, in hull lengths, and in transit speeds."""
+ROUND = 1.0 / float(np.cos(np.pi / (4 * ARC_SEGMENTS)))
+"""Taken off a shore by so much more, no rounded corner is nearer than asked: arcs are drawn inside their circles."""
+BEYOND_ENDS = 1.02
+"""Largest speed and yaw rate of legs whose ends are faster than legs need be, in those of their ends."""
+SPARES = (0.25, 0.1, 0.02)
+"""Hull lengths that ways keep from the shore beyond clearance and half the beam: more gives smoother ways, less leads
+through narrower water."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LegTask:
+    """A leg to be found.
+
+    Attributes:
+        start, end: (6,) states, pose in the n-frame and velocity over ground.
+        start_inputs, end_inputs: (m,) commands standing at its ends.
+        seed: of the path search.
+        before: (h, m) commands given before the leg, the standing one last; None when it has stood for long. Only
+            lagging and late actuators remember them.
+        effort: that may be spent on it, and that is.
+    """
+
+    start: Array
+    end: Array
+    start_inputs: Array
+    end_inputs: Array
+    seed: int
+    before: Array | None = None
+    effort: Effort = field(default_factory=Effort)
+
+    def __post_init__(self) -> None:
+        seal(self, start="6", end="6", start_inputs="m", end_inputs="m")
+        if self.before is not None:
+            seal(self, start_inputs="m", before="h m")
+
+    @property
+    def past(self) -> Array:
+        """(h, m) commands before the leg."""
+        return self.start_inputs[None] if self.before is None else self.before
+
+
+@dataclass(frozen=True, kw_only=True)
+class LegWater:
+    """Vessel, weather and water that all legs of a plan share.
+
+    Attributes:
+        vessel, environment, ship: who sails, in what, how fast.
+        area: allowed water.
+        clearance_m: least distance of the hull from anything forbidden.
+        field: the same water on a grid.
+    """
+
+    vessel: Vessel
+    environment: Environment
+    ship: Capability
+    area: SeaArea
+    clearance_m: float
+    field: ClearanceField
+
+    @cached_property
+    def safe(self) -> shapely.MultiPolygon:
+        """Water that the hull may touch where a sample's hull and the next one's do, so that all between keep clear."""
+        turned = 2.0 * self.ship.yaw_rate_radps * self.vessel.sample_time_s  # runs turn faster than legs
+        swing_m = np.hypot(*self.vessel.hull_b.T).max() * (1 - np.cos(min(turned, np.pi) / 2))
+        safe = self.area.safe_water((self.clearance_m + float(swing_m)) * ROUND)
+        shapely.prepare(safe)
+        return safe
+
+    @cached_property
+    def ways(self) -> tuple[Ways, ...]:
+        """Shortest ways for amidships of a hull that points along them, from wide to narrow."""
+        length = self.vessel.length_m
+        margins = [self.straight_margin_m + spare * length for spare in SPARES]
+        if not self.ship.agile:
+            margins = [self.path_margin_m]
+        waters = [self.area.safe_water(margin) for margin in margins]
+        return tuple(build_ways(simplified(water, grow=False, tolerance_m=length / 60)) for water in waters)
+
+    @property
+    def narrowest_ways(self) -> Ways:
+        """Ways in all the water that centre lines may use."""
+        return self.ways[-1]
+
+    @property
+    def straight_margin_m(self) -> float:
+        """Clearance of the centre line of a hull that goes straight."""
+        return self.clearance_m + self.vessel.beam_m / 2
+
+    @property
+    def leg_margin_m(self) -> float:
+        """Clearance that the centre lines of legs need."""
+        return self.straight_margin_m + SPARES[-1] * self.vessel.length_m if self.ship.agile else self.path_margin_m
+
+    @property
+    def path_margin_m(self) -> float:
+        """Clearance of the centre line that keeps the hull clear on an arc of the turning radius."""
+        radius, half_length, half_beam = (
+            self.ship.turning_radius_m,
+            self.vessel.length_m / 2,
+            self.vessel.beam_m / 2,
+        )
+        return self.clearance_m + float(np.hypot(radius + half_beam, half_length)) - radius
+
+    def candidate_ways(self, start: Array, end: Array) -> list[Array]:
+        """Ways (k, 2) between two points, shortest first, of like ones the one farther from the shore.
+
+        A straight one where a hull may go straight; none where there is none.
+        """
+        straight = np.stack([start, end])
+        if shapely.contains_properly(self._open, shapely.LineString(straight[:, ::-1])):
+            return [straight]
+        found = [way for ways in self.ways if (way := ways.shortest(start, end)) is not None]
+        return sorted(found, key=lambda way: np.ceil(polyline_length(way) / (2 * self.vessel.length_m)))
+
+    @cached_property
+    def _open(self) -> shapely.MultiPolygon:
+        water = self.area.safe_water(self.straight_margin_m)
+        shapely.prepare(water)
+        return water
+
+    def parted(self, start: Array, end: Array) -> bool:
+        """Whether forbidden water lies between two positions (2,) on every way of a hull, however small."""
+        ends = shapely.points(np.stack([start[1::-1], end[1::-1]]))
+        return not any(shapely.contains(part, ends).all() for part in self.safe.geoms)
+
+    def holds(self, pose: Array) -> bool:
+        """Whether the hull stays in safe water between consecutive poses (k, 3)."""
+        return bool(shapely.contains_properly(self.safe, swept_area(pose, self.vessel.hull_b)))
+
+    def sail(self, start: Array, values: Array, before: Array | None = None) -> Trajectory:
+        """The motion that commands (k, m) give from a state (6,), after commands `before` (h, m).
+
+        What was given before matters for lagging and late actuators only; the first of them has stood for long.
+        """
+        vessel, names = self.vessel, self.vessel.model.inputs
+        if before is None or self.prompt:
+            commands = Commands(sample_time_s=vessel.sample_time_s, names=names, values=values)
+            return simulate(vessel, commands, pose=start[:3], velocity=start[3:], environment=self.environment)
+        told = np.concatenate([before, values])
+        step_s = vessel.sample_time_s / SUBSTEPS
+        given = deliver(
+            vessel.responses, told, sample_time_s=vessel.sample_time_s, substeps=SUBSTEPS, standing=before[0]
+        )
+        fine = Commands(sample_time_s=step_s, names=names, values=given[len(before) :].reshape(-1, len(names)))
+        track = simulate(
+            self._prompt_vessel, fine, pose=start[:3], velocity=start[3:], environment=self.environment, substeps=1
+        )
+        return Trajectory(
+            sample_time_s=vessel.sample_time_s, pose=track.pose[::SUBSTEPS], velocity=track.velocity[::SUBSTEPS]
+        )
+
+    @property
+    def prompt(self) -> bool:
+        """Whether every actuator delivers its commands at once."""
+        return all(response == IDEAL for response in self.vessel.responses)
+
+    @cached_property
+    def _prompt_vessel(self) -> Vessel:
+        """The same vessel with actuators that deliver at once."""
+        actuators = tuple(
+            replace(actuator, responses=(IDEAL,) * len(actuator.limits)) for actuator in self.vessel.actuators
+        )
+        return replace(self.vessel, model=replace(self.vessel.model, actuators=actuators))
+
+    def remembered(self, commands: Array) -> Array:
+        """The last of given commands (k, m), as many as any actuator still shows."""
+        longest_s = max(MEMORY * response.lag_s + response.delay_s for response in self.vessel.responses)
+        return commands[-int(np.ceil(longest_s / self.vessel.sample_time_s)) - 2 :]
+
+    def delivered(self, before: Array) -> Array:
+        """(m,) what the actuators deliver after commands (h, m) of which the first stood for long."""
+        sample_s = self.vessel.sample_time_s
+        values = delivered_at_samples(self.vessel.responses, before, sample_time_s=sample_s, standing=before[0])
+        return np.asarray(values[-1])
+
+
+def leg_trajectory(water: LegWater, start: Array, values: Array, before: Array | None = None) -> Trajectory:
+    """The motion that commands (k, m) give from a state (6,) after commands `before` (h, m)."""
+    return water.sail(start, values, before)
+
+
+def last_state(track: Trajectory) -> Array:
+    """(6,) the state at a trajectory's end."""
+    return np.asarray(np.r_[track.pose[-1], track.velocity[-1]])
+
+
+def through_water(environment: Environment, state: Array) -> Array:
+    """(3,) velocity through water of a state (6,), whose velocity is over ground."""
+    u_c, v_c = to_body(environment.current_to, state[2], NUMPY)
+    return np.asarray(state[3:] - np.array([u_c, v_c, 0.0]))
+
+
+def acceptable(start: Array, end: Array, water: LegWater, values: Array, before: Array) -> bool:
+    """Whether commands, simulated from a state after others, arrive at another state and stay in safe water."""
+    track = water.sail(start, values, before)
+    scale = np.r_[[water.vessel.length_m] * 2, 1.0, [water.ship.transit_speed_mps] * 2, water.ship.yaw_rate_radps]
+    return bool((np.abs(last_state(track) - end) <= ARRIVAL * scale).all()) and water.holds(track.pose)
+
+
+def nearest_turns(vessel: Vessel, inputs: Array, near: Array) -> Array:
+    """The same commands (..., m) with unlimited azimuth angles shifted by whole turns towards `near` (..., m)."""
+    return np.asarray(inputs + np.where(vessel.turns_freely, whole_turns(near - inputs), 0.0))
+
+
+def room_beside(water: LegWater, centre: Array, side: Array, margin_m: float) -> Array:
+    """(j,) how far each centre may move to one side while its discs keep clear, at most `ROOM_M` hull lengths."""
+    steps = np.arange(0.0, ROOM_M * water.vessel.length_m, water.field.cell_m)
+    points = centre[:, None] + steps[:, None] * side[:, None, :]
+    free = water.field.at(points) >= margin_m
+    free[:, 0] = True
+    return np.asarray(steps[np.cumprod(free, axis=1).sum(axis=1).astype(int) - 1])
+
+
+def leg_speed_mps(transit_mps: float, ends: Iterable[Array]) -> float:
+    """Largest speed on a leg: transit speed, or `BEYOND_ENDS` of what its ends (3,) have, where they are faster.
+
+    All through water.
+    """
+    steady = 1.001 * transit_mps
+    fastest = max((float(np.hypot(*velocity[:2])) for velocity in ends), default=0.0)
+    return BEYOND_ENDS * fastest if fastest > steady else steady

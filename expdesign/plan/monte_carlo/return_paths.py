@@ -1,0 +1,170 @@
+"""Ways of many ships to one place: the shortest in safe water, and how they are followed.
+
+The ways are those of planned legs, taut strings round the corners of the water that centre lines may use. A ship that
+has strayed out of that water goes straight back into it first.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from expdesign.conventions import wrap_angle
+from expdesign.plan.chart import Ways, first_bends, ways_to
+from expdesign.plan.control import LEAD, Helmsman
+from expdesign.values import Array
+
+NEAR = 2.0
+"""Hull lengths from the place within which a ship that can go sideways turns to the heading wanted there."""
+TURNED_OFF = 0.25
+"""Least speed, in transit speeds, at bends and while the bow points elsewhere."""
+BRAKING = 0.5
+"""Share of the mean acceleration between rest and transit speed that is used for slowing down."""
+CRAB = 0.5
+"""Speed sideways and astern, in transit speeds."""
+TURNED_RAD = 0.15
+"""Difference from the heading wanted at the place within which a ship has come to it, if she hardly turns any more."""
+PURSUED = 1.5
+"""Hull lengths ahead on its way at which a ship with a helm aims."""
+REACH = 0.4
+"""Hull lengths from a bend at which a ship has come to it."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class WaysTo:
+    """All shortest ways to a place.
+
+    Attributes:
+        ways: of the water.
+        place: (2,).
+        nodes, distance, following: the tree of ways by `ways_to`.
+    """
+
+    ways: Ways
+    place: Array
+    nodes: Array
+    distance: Array
+    following: np.ndarray
+
+    def find(self, points: Array) -> list[Array | None]:
+        """A way (k, 2) from each point (n, 2), its own place first, or None where there is none."""
+        inside = np.array([self.ways.nearest(point) for point in points]).reshape(-1, 2)
+        reached = np.flatnonzero(np.isfinite(self.distance))
+        length, first = first_bends(self.ways, inside, self.nodes[reached], self.distance[reached])
+        found: list[Array | None] = []
+        for point, start, away, node in zip(points, inside, length, reached[first], strict=True):
+            found.append(self._chain(point, start, int(node)) if np.isfinite(away) else None)
+        return found
+
+    def _chain(self, point: Array, start: Array, node: int) -> Array:
+        chain = [point, start, self.nodes[node]]
+        while (after := int(self.following[node])) != node:
+            node = after
+            chain.append(self.nodes[node])
+        way = np.array([*chain, self.place])
+        return way[np.r_[True, np.hypot(*np.diff(way, axis=0).T) > 1e-6]]
+
+    def holds(self, way: Array) -> bool:
+        """Whether a way (k, 2) stays in the water."""
+        return bool(shapely.covers(self.ways.water, shapely.LineString(way[:, ::-1])))
+
+
+def build_ways_to(ways: Ways, place: Array) -> WaysTo:
+    """The tree of ways to a place (2,)."""
+    nodes, distance, following = ways_to(ways, place)
+    return WaysTo(ways=ways, place=place, nodes=nodes, distance=distance, following=following)
+
+
+class Convoy:
+    """n ships, each with a way of its own to one state.
+
+    Attributes:
+        goal: (6,) where all ways lead.
+        length_m: (n,) of the ways as they were found.
+    """
+
+    def __init__(self, helm: Helmsman, goal: Array, ships: int, *, reach_m: float) -> None:
+        """No ship has a way yet; a ship within `reach_m` of the goal has arrived."""
+        self._helm, self.goal = helm, goal
+        self._way: Array = np.tile(goal[:2], (ships, 2, 1))
+        self._left: Array = np.zeros((ships, 2))
+        self._bend: Array = np.full((ships, 2), helm.ship.transit_speed_mps)
+        self._next = np.ones(ships, dtype=int)
+        self._reach_m = reach_m
+        self.length_m: Array = np.zeros(ships)
+
+    def set_off(self, ship: int, way: Array) -> None:
+        """Give a ship a way (k, 2) that begins where she is."""
+        room = len(way) - self._way.shape[1]
+        if room > 0:
+            self._way = np.concatenate([self._way, np.repeat(self._way[:, -1:], room, axis=1)], axis=1)
+            self._left = np.pad(self._left, ((0, 0), (0, room)))
+            self._bend = np.pad(self._bend, ((0, 0), (0, room)), mode="edge")
+        count, fastest = len(way), self._helm.ship.transit_speed_mps
+        steps = np.diff(way, axis=0)
+        self._way[ship], self._left[ship], self._next[ship] = self.goal[:2], 0.0, min(1, count - 1)
+        self._way[ship, :count] = way
+        length = np.hypot(*steps.T)
+        self._left[ship, :count] = np.r_[np.cumsum(length[::-1])[::-1], 0.0]
+        self._bend[ship] = TURNED_OFF * fastest if self._helm.sideways else fastest
+        if count > 2:
+            turn = np.abs(wrap_angle(np.diff(np.arctan2(steps[:, 1], steps[:, 0]))))
+            self._bend[ship, 1 : count - 1] = fastest * np.maximum(TURNED_OFF, np.cos(np.minimum(turn, np.pi / 2)))
+        self.length_m[ship] = length.sum()
+
+    def arrived(self, states: Array) -> np.ndarray:
+        """(n,) ships that have come to the place and, if they can turn there, point as wanted."""
+        helm = self._helm
+        there = np.hypot(*(states[:, :2] - self.goal[:2]).T) < self._reach_m
+        turned = np.abs(wrap_angle(states[:, 2] - self.goal[2])) < TURNED_RAD
+        turned &= np.abs(states[:, 5]) < TURNED_RAD / (2.0 * helm.answer_s)
+        if helm.sideways:
+            return np.asarray(there & turned)
+        ahead = np.stack([np.cos(self.goal[2]), np.sin(self.goal[2])])
+        on_last = self._left[np.arange(len(states)), self._next] <= 0.0
+        return np.asarray(there | (on_last & ((states[:, :2] - self.goal[:2]) @ ahead > 0.0)))
+
+    def wanted(self, states: Array) -> Array:
+        """(n, 6) where each ship should be and how it should move now: on its way, at a speed that it can lose."""
+        helm, everyone = self._helm, np.arange(len(states))
+        length, fastest = helm.vessel.length_m, helm.ship.transit_speed_mps
+        last = (self._left <= 0.0).argmax(axis=1)
+        ahead = np.hypot(*(self._way[everyone, self._next] - states[:, :2]).T)
+        there, before = self._way[everyone, self._next], self._way[everyone, self._next - 1]
+        passed = ((there - states[:, :2]) * (there - before)).sum(axis=1) <= 0.0
+        self._next = np.where(((ahead < REACH * length) | passed) & (self._next < last), self._next + 1, self._next)
+        there, before = self._way[everyone, self._next], self._way[everyone, self._next - 1]
+        offset = there - states[:, :2]
+        ahead = np.hypot(*offset.T)
+        left = ahead + self._left[everyone, self._next]
+        brake = BRAKING * helm.ship.acceleration_mps2
+        speed = np.sqrt(self._bend[everyone, self._next] ** 2 + 2 * brake * np.maximum(ahead - REACH * length, 0.0))
+        near = left < NEAR * length
+        lengthways = np.cos(np.arctan2(offset[:, 1], offset[:, 0]) - self.goal[2])
+        slow = np.minimum(fastest * np.maximum(lengthways, CRAB), left / (LEAD * helm.answer_s))
+        speed = np.minimum(np.minimum(speed, fastest), np.where(near & helm.sideways, slow, np.inf))
+        leg = there - before
+        leg = leg / np.maximum(np.hypot(*leg.T), 1e-9)[:, None]
+        across = offset - (offset * leg).sum(axis=1)[:, None] * leg
+        look = length if helm.sideways else PURSUED * length
+        pursued = leg * look + across  # a point ahead on the way
+        if helm.sideways:
+            pursued = np.where((near | (ahead < look))[:, None], offset, pursued)
+        course = pursued / np.maximum(np.hypot(*pursued.T), 1e-9)[:, None]
+        through = course * speed[:, None] - helm.environment.current_to
+        pointing = np.arctan2(through[:, 1], through[:, 0])
+        heading = np.where(near & helm.sideways, self.goal[2], pointing)
+        off = np.cos(np.minimum(np.abs(wrap_angle(heading - states[:, 2])), np.pi / 2))
+        ground = course * (speed * np.where(near | (not helm.sideways), 1.0, np.maximum(off, TURNED_OFF)))[:, None]
+        c, s = np.cos(heading), np.sin(heading)
+        return np.column_stack(
+            [
+                states[:, :2],
+                heading,
+                ground[:, 0] * c + ground[:, 1] * s,
+                ground[:, 1] * c - ground[:, 0] * s,
+                np.zeros(len(states)),
+            ]
+        )

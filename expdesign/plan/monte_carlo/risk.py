@@ -1,0 +1,139 @@
+"""The promise of a plan: the chance that the hull leaves allowed water in the trial as it is sailed, and where.
+
+It comes from whole trials (`expdesign.plan.monte_carlo.trials`): runs open loop from the states that ships really have,
+legs and ways back to run-ups steered, the hull against the chart at every step. Trials broken off because a run could
+not be begun are counted apart: they end in allowed water, but not at the goal. A plan is accepted when its share, with
+the share's standard error on top, is within what is promised, and when most trials come to the goal.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.stats import beta
+
+from expdesign.plan.legs import LegWater
+from expdesign.plan.monte_carlo.procedure import MISSED, ROUNDS
+from expdesign.plan.monte_carlo.trials import Trials, sail_trials
+from expdesign.plan.values import Leg, LegOutcome, Promise
+from expdesign.sea_area import SeaArea
+from expdesign.signals import Commands, Trajectory
+from expdesign.values import Array
+
+TRIALS, MOST_TRIALS, SEEN = 500, 2000, 2.0
+"""Of a plan that is being made: at least, at most, and so many that this number may leave allowed water."""
+MOST = 0.95
+"""Share of trials that `most` is about, and confidence of the upper limit."""
+HALF = 0.5
+"""Share of trials broken off from which on it is no plan."""
+WHY = tuple(
+    {"time": "not there in time", "no way round": "no way round"}.get(x, f"{x} out of tolerance") for x in MISSED
+)
+"""What kept ships from beginning a run, in words, by number."""
+
+
+def promised(
+    water: LegWater,
+    *,
+    commands: Commands,
+    trajectory: Trajectory,
+    legs: Sequence[Leg],
+    rng: np.random.Generator,
+    draws: int = TRIALS,
+) -> tuple[Promise, Trials]:
+    """Sail drawn trials of a plan and tell what happened to them.
+
+    The shares' standard errors are sqrt(p (1 - p) / draws).
+    """
+    trials = sail_trials(water, commands=commands, trajectory=trajectory, legs=legs, draws=draws, rng=rng)
+    within, sample_s = trials.within[0], commands.sample_time_s
+    gone, done = int(trials.left.any(axis=0).sum()), trials.completed
+    extra = (trials.samples.sum(axis=0)[done] - len(commands)) * sample_s
+    found = Promise(
+        trials=draws,
+        left=gone / draws,
+        left_most=upper_limit(gone, draws),
+        aborted=float(trials.aborted.any(axis=0).mean()),
+        reasons=_reasons(legs, trials, trajectory, water.area),
+        extra_median_s=float(np.median(extra)) if len(extra) else float("nan"),
+        extra_most_s=float(np.quantile(extra, MOST)) if len(extra) else float("nan"),
+        rounds=ROUNDS,
+        heading_rad=within.heading_rad,
+        speed_mps=within.speed_mps,
+        yaw_rate_radps=within.yaw_rate_radps,
+        legs=tuple(_leg_outcome(trials, index, sample_s) for index in range(len(legs))),
+    )
+    return found, trials
+
+
+def trials_for(confidence: float) -> int:
+    """How many trials tell a share of 1 - confidence from none."""
+    return int(np.clip(np.ceil(SEEN / max(1.0 - confidence, 1e-9)), TRIALS, MOST_TRIALS))
+
+
+def upper_limit(count: int, trials: int, *, confidence: float = MOST) -> float:
+    """The share that would show `count` cases or fewer among trials with a chance of only 1 - confidence.
+
+    Source: C. J. Clopper and E. S. Pearson, Biometrika 26 (1934), 404-413.
+    """
+    return 1.0 if count >= trials else float(beta.ppf(confidence, count + 1, trials - count))
+
+
+def broken_promise(found: Promise, trials: Trials, legs: Sequence[Leg], area: SeaArea, *, confidence: float) -> str:
+    """What is wrong with a plan, with the leg and the place where it is worst; "" when it keeps its promise."""
+    if leaves_too_often(found, confidence):
+        worst = worst_leg(trials)
+        lat, lon = area.frame.to_degrees(np.nanmedian(trials.place[worst], axis=0))
+        return (
+            f"{found.left:.1%} of {found.trials} drawn trials (standard error {found.error:.1%}) leave allowed water, "
+            f"more than plan.confidence = {confidence:g} allows, most of them ({trials.left[worst].mean():.1%}) "
+            f"{described(legs, worst)} near {lat:.5f}, {lon:.5f}"
+        )
+    return "" if found.aborted < HALF else f"{found.note}; wider water or a vessel known better helps"
+
+
+def leaves_too_often(found: Promise, confidence: float) -> bool:
+    """Whether more trials leave allowed water than a confidence allows, or so many that they may well do."""
+    return found.left > 0.0 and found.left + found.error > 1.0 - confidence + 1e-12
+
+
+def worst_leg(trials: Trials) -> int:
+    """Index of the leg on which most trials leave allowed water."""
+    return int(trials.left.mean(axis=1).argmax())
+
+
+def described(legs: Sequence[Leg], index: int) -> str:
+    """In a run or on a leg, which one, counted as on the run cards."""
+    number = sum(leg.kind == "primitive" for leg in legs[: index + 1])
+    leg = legs[index]
+    if leg.kind == "primitive":
+        return f"in run {number}, {leg.name!r},"
+    return "on the leg to the goal" if index == len(legs) - 1 else f"on the way to run {number + 1}, {leg.name!r},"
+
+
+def _reasons(legs: Sequence[Leg], trials: Trials, trajectory: Trajectory, area: SeaArea) -> tuple[str, ...]:
+    """Where trials were broken off, and why; most first."""
+    rows = []
+    for index in np.argsort(-trials.aborted.mean(axis=1), kind="stable").tolist():
+        aborted = trials.aborted[index]
+        if aborted.any():
+            causes = Counter(trials.missed[index][aborted].tolist())
+            told = ", ".join(f"{WHY[cause]} {count / len(aborted):.1%}" for cause, count in causes.most_common())
+            lat, lon = area.frame.to_degrees(trajectory.pose[legs[index].last, :2])
+            rows.append(f"{described(legs, index)} {aborted.mean():.1%} near {lat:.5f}, {lon:.5f} ({told})")
+    return tuple(rows)
+
+
+def _leg_outcome(trials: Trials, index: int, sample_s: float) -> LegOutcome:
+    sailed = trials.samples[index] > 0
+    times: Array = trials.samples[index][sailed] * sample_s if sailed.any() else np.zeros(1)
+    return LegOutcome(
+        position_m=trials.within[index].position_m,
+        left=float(trials.left[index].mean()),
+        aborted=float(trials.aborted[index].mean()),
+        rounds=float(trials.rounds[index][sailed].mean()) if sailed.any() else 0.0,
+        median_s=float(np.median(times)),
+        most_s=float(np.quantile(times, MOST)),
+    )

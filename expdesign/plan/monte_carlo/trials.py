@@ -1,0 +1,119 @@
+"""Whole trials of drawn ships in drawn weather, sailed as the plan says they are sailed.
+
+The procedure is that of `expdesign.plan.monte_carlo.procedure`: legs steered from wherever a run has ended, runs open
+loop from the state the ship really has, a way round to the run-up where she is not in place. One draw is one trial: the
+same parameters, mean current and mean wind throughout; current and wind vary round these as the forecast says.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from expdesign.plan.control import Helmsman
+from expdesign.plan.legs import LegWater
+from expdesign.plan.monte_carlo.collision import HullWatch
+from expdesign.plan.monte_carlo.guidance import Pilot, open_loop
+from expdesign.plan.monte_carlo.procedure import Tolerances, tolerances
+from expdesign.plan.runs import Fleet, draw_truths
+from expdesign.plan.values import Leg
+from expdesign.plan.verify import hull_clearance
+from expdesign.signals import Commands, Trajectory
+from expdesign.values import Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Trials:
+    """What happened to n trials, leg by leg.
+
+    A trial ends where the hull leaves allowed water or where the ship gives up to begin a run.
+
+    Attributes:
+        left: (legs, n) whether the hull left allowed water on a leg.
+        aborted: (legs, n) whether the ship gave up on a leg.
+        rounds: (legs, n) times gone round on a leg.
+        samples: (legs, n) that legs took.
+        used: (legs, n) largest share of a tolerance used up where a run began; nan where none did.
+        missed: (legs, n) number in `MISSED` of what kept ships that gave up from beginning.
+        place: (legs, n, 2) where hulls left allowed water; nan where they did not.
+        within: in place at the beginning of each leg.
+    """
+
+    left: np.ndarray
+    aborted: np.ndarray
+    rounds: np.ndarray
+    samples: np.ndarray
+    used: Array
+    missed: np.ndarray
+    place: Array
+    within: tuple[Tolerances, ...]
+
+    @property
+    def completed(self) -> np.ndarray:
+        """(n,) trials that came to the goal."""
+        return np.asarray(~(self.left | self.aborted).any(axis=0))
+
+
+def sail_trials(
+    water: LegWater,
+    *,
+    commands: Commands,
+    trajectory: Trajectory,
+    legs: Sequence[Leg],
+    draws: int,
+    rng: np.random.Generator,
+) -> Trials:
+    """Sail drawn trials of a plan.
+
+    Args:
+        water: who sails, in which forecast and area, and where ways may lead.
+        commands, trajectory, legs: the plan.
+        draws: number of trials.
+        rng: all chance.
+    """
+    vessel, track = water.vessel, np.hstack([trajectory.pose, trajectory.velocity])
+    helm = Helmsman(vessel=vessel, environment=water.environment, ship=water.ship)
+    truths = draw_truths(vessel, water.environment, draws, rng)
+    fleet = Fleet(vessel, water.environment, truths, state=track[0], standing=np.zeros(len(vessel.limits)), rng=rng)
+    watch, within = HullWatch(area=water.area, vessel=vessel), start_tolerances(water, trajectory, legs)
+    sailing, felt = np.ones(draws, dtype=bool), np.zeros((draws, 3))
+    shape = (len(legs), draws)
+    left, aborted = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
+    rounds, samples, missed = (np.zeros(shape, dtype=int) for _ in range(3))
+    used, place = np.full(shape, np.nan), np.full((*shape, 2), np.nan)
+    for index, leg in enumerate(legs):
+        values = commands.values[leg.first : leg.last]
+        if leg.kind == "primitive":
+            used[index] = np.where(sailing, within[index].used(fleet.states, track[leg.first]).max(axis=1), np.nan)
+            poses, begun = open_loop(helm, fleet, values, sailing), sailing & ~fleet.lost
+            samples[index] = np.where(sailing, len(values), 0)
+        else:
+            pilot = Pilot(
+                helm,
+                water,
+                track[leg.first : leg.last + 1],
+                within=within[min(index + 1, len(legs) - 1)],
+                sailing=sailing,
+                inputs=values[-1],
+                last=index == len(legs) - 1,
+            )
+            found = pilot.sail(fleet, felt)
+            felt, poses, begun = found.felt, found.poses, found.begun
+            rounds[index], samples[index], missed[index] = found.rounds, found.samples, found.missed
+        place[index] = np.where(fleet.lost[:, None] & sailing[:, None], poses[-1, :, :2], watch.leaves(poses))
+        left[index] = sailing & ~np.isnan(place[index, :, 0])
+        aborted[index] = sailing & ~begun & ~left[index]
+        sailing = sailing & begun & ~left[index]
+    return Trials(
+        left=left, aborted=aborted, rounds=rounds, samples=samples, used=used, missed=missed, place=place, within=within
+    )
+
+
+def start_tolerances(water: LegWater, trajectory: Trajectory, legs: Sequence[Leg]) -> tuple[Tolerances, ...]:
+    """Within which each leg begins; for runs by the room that the hull has round all of the planned run."""
+    clearance = hull_clearance(water.area, trajectory, water.vessel.hull_b)
+    spare = [float(clearance[leg.first : leg.last + 1].min()) - water.clearance_m for leg in legs]
+    runs = [leg.kind == "primitive" for leg in legs]
+    return tuple(tolerances(water, room if run else 0.0) for room, run in zip(spare, runs, strict=True))

@@ -1,0 +1,140 @@
+"""How far a run may stray from its footprint when the vessel is not quite the nominal one."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from expdesign.dictionary import Primitive
+from expdesign.errors import NoPlan
+from expdesign.plan.runs.ensemble import Truths
+from expdesign.simulation import Environment, Variation, draw_environment, simulate_many
+from expdesign.simulation.environment import vary
+from expdesign.values import Array
+from expdesign.vessel import Vessel
+from expdesign.vessel.hull import disc_points
+
+FEWEST_DRAWS, MOST_DRAWS = 200, 2000
+
+
+def draw_truths(vessel: Vessel, environment: Environment, draws: int, rng: np.random.Generator) -> Truths:
+    """Parameters, mean currents and mean winds drawn from the prior and the forecast.
+
+    Parameters are normal and independent with the vessel file's standard deviations.
+    """
+    p = len(vessel.model.parameters)
+    parameters = vessel.model.parameters + vessel.model.parameter_std * rng.standard_normal((draws, p))
+    weather = [draw_environment(environment, rng) for _ in range(draws)]
+    return Truths(
+        parameters=parameters,
+        current_to=np.array([x.current_to for x in weather]),
+        wind_to=np.array([x.wind_to for x in weather]),
+    )
+
+
+def stray_m(
+    vessel: Vessel,
+    primitive: Primitive,
+    environment: Environment,
+    *,
+    centres_m: Array,
+    confidence: float,
+    rng: np.random.Generator,
+    draws: int | None = None,
+) -> Array:
+    """(k + 1,) radius round the nominal disc centres that a share `confidence` of drawn runs keeps to all the time.
+
+    Each draw has its own vessel, weather and heading, begins at the entry velocity and runs open loop. The radius
+    grows with time like the draws' root mean square distance, scaled so that the wished share stays inside throughout.
+
+    Args:
+        vessel, primitive, environment: the nominal run and what is uncertain about it.
+        centres_m: (c,) forward positions of the discs that cover the hull.
+        confidence: between 0 and 1.
+        rng: draws.
+        draws: how many; by default two beyond the wished share, within `FEWEST_DRAWS` and `MOST_DRAWS`.
+
+    Raises:
+        NoPlan: so many drawn vessels are unstable that the share cannot be met, or it is too high to be estimated.
+    """
+    draws = draws or int(np.clip(np.ceil(2.0 / (1.0 - confidence)), FEWEST_DRAWS, MOST_DRAWS))
+    if draws * (1.0 - confidence) < 1.0:
+        raise NoPlan(
+            f"plan.confidence is too high to be estimated: each run would have to keep to its room in {confidence:.6g} "
+            f"of all cases, which {draws} drawn vessels cannot tell"
+        )
+    truths, samples = draw_truths(vessel, environment, draws, rng), len(primitive.commands)
+    heading = rng.uniform(-np.pi, np.pi, draws)
+    states = run_at_headings(
+        vessel,
+        primitive,
+        heading,
+        entering=environment.current_to,
+        current_to=truths.current_to + _varying(vessel, environment.current_variation, (samples, draws, 2), rng),
+        wind_to=truths.wind_to + _varying(vessel, environment.wind_variation, (samples, draws, 2), rng),
+        parameters=truths.parameters,
+    )
+    c, s = np.cos(heading), np.sin(heading)
+    moved = states[..., :2] - environment.current_to * primitive.trajectory.time_s[:, None, None]
+    back = np.stack([moved[..., 0] * c + moved[..., 1] * s, moved[..., 1] * c - moved[..., 0] * s], axis=-1)
+    pose_b = np.concatenate([back, states[..., 2:3] - heading[:, None]], axis=-1)  # (k + 1, n, 3)
+    nominal = disc_points(primitive.trajectory.pose, centres_m)
+    drawn = disc_points(pose_b.reshape(-1, 3), centres_m).reshape(*pose_b.shape[:2], -1, 2)
+    apart = np.hypot(*np.moveaxis(drawn - nominal[:, None], -1, 0)).max(axis=-1)  # (k + 1, n)
+    return _radius(apart, confidence, primitive.name)
+
+
+def run_at_headings(
+    vessel: Vessel,
+    primitive: Primitive,
+    heading: Array,
+    *,
+    entering: Array,
+    current_to: Array,
+    wind_to: Array,
+    parameters: Array,
+) -> Array:
+    """(k + 1, n, 6) states over ground of a run that begins at the origin at headings (n,).
+
+    Args:
+        vessel, primitive: who sails what.
+        heading: of each ship [rad].
+        entering: (2,) current through which all begin with the entry velocity [m/s].
+        current_to, wind_to: (n, 2) or (k, n, 2) in which they sail on [m/s].
+        parameters: (n, p) of each ship.
+    """
+    c, s = np.cos(heading), np.sin(heading)
+    north, east = entering
+    return simulate_many(
+        vessel,
+        primitive.commands,
+        pose=np.stack([0 * c, 0 * c, heading], axis=1),
+        velocity=primitive.entry_velocity + np.stack([north * c + east * s, east * c - north * s, 0 * c], axis=1),
+        current_to=current_to,
+        wind_to=wind_to,
+        parameters=parameters,
+        standing=primitive.entry_inputs,
+    )
+
+
+def _varying(
+    vessel: Vessel, variation: Variation, shape: tuple[int, int, int], rng: np.random.Generator
+) -> Array | float:
+    """(k, n, 2) what a current or a wind does round its mean; nothing where it is steady."""
+    if variation.std_mps == 0.0:
+        return 0.0
+    return vary(variation, rng.standard_normal(shape), sample_time_s=vessel.sample_time_s)
+
+
+def _radius(apart: Array, confidence: float, name: str) -> Array:
+    stable = ~np.isnan(apart).any(axis=0)
+    shape = np.sqrt(np.mean(apart[:, stable] ** 2, axis=1)) + 1e-9 if stable.any() else np.ones(len(apart))
+    ratio = np.where(stable, np.nan_to_num(apart / shape[:, None]).max(axis=0), np.inf)
+    factor = float(np.quantile(ratio, confidence, method="higher"))
+    if not np.isfinite(factor):
+        raise NoPlan(
+            f"{name!r} is unstable for {np.mean(~stable):.1%} of the vessels drawn from model.parameter_std, while "
+            f"plan.confidence, shared out over the runs, allows each {1.0 - confidence:.2%}; parameters known better "
+            'help (more data, or earlier knowledge by design.prior = "parameter_std"), or to leave it out by '
+            "design.excluded"
+        )
+    return np.asarray(factor * shape)

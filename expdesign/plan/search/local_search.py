@@ -1,0 +1,239 @@
+"""Placements polished: blocks of runs are moved and turned as one while that shortens the legs at their two ends.
+
+The search places runs at a few distances and headings. Here they may have any, their order kept: a pattern search over
+all blocks of consecutive runs, by the rule for the time of legs. Joints inside a block stay as they are through water.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import product
+
+import numpy as np
+import shapely
+
+from expdesign.conventions import wrap_angle
+from expdesign.plan.chart import polyline_length, sight_lines
+from expdesign.plan.legs import NEAR, HelmTimes
+from expdesign.plan.search.state import SearchSpace
+from expdesign.plan.search.successors import run_ends, runs_clear
+from expdesign.values import Array
+
+SHIFTS = 8.0 * 0.5 ** np.arange(8)
+"""Steps of the pattern, in hull lengths, and with each a turn."""
+TURNS = np.deg2rad([90.0, 60.0, 40.0, 25.0, 15.0, 8.0, 4.0, 2.0])
+SWEEPS = 20
+"""Rounds over all blocks at most."""
+FAR = 4.0
+"""Hull lengths that are enough for any leg."""
+SAME = 1e-3
+"""Hull lengths and radians by which a leg may differ from a joint that was tried."""
+GAIN_S = 0.05
+"""Smallest gain for which a block is moved [s]."""
+DRIFTS = 3
+"""Rounds in which the time of a leg and the drift in that time are made to agree."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ChainEnds:
+    """Where a chain of runs begins; it ends at the space's goal.
+
+    Attributes:
+        start: (3,) pose before the first leg.
+        exit_mps: surge speed there.
+        last: primitive that ends there, or -1.
+    """
+
+    start: Array
+    exit_mps: float
+    last: int
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Chain:
+    """Runs in order, where they are, and what the legs between them take.
+
+    Attributes:
+        runs: (n,) of the space's primitives.
+        poses: (n, 3) where they begin.
+        bends: n + 1 corners (k, 2) of each leg's way, both ends left out; the last leg leads to the goal.
+        legs_s: (n + 1,) time of the legs.
+    """
+
+    runs: np.ndarray
+    poses: Array
+    bends: tuple[Array, ...]
+    legs_s: Array
+
+
+def polished(space: SearchSpace, runs: Sequence[int], poses: Array, ends: ChainEnds) -> Array:
+    """(n, 3) better poses for the same runs in the same order.
+
+    Args:
+        space: the primitives and the water; with a rule for the time of legs.
+        runs: (n,) indices of primitives.
+        poses: (n, 3) where they begin.
+        ends: of the chain.
+    """
+    legs = _Legs(space=space, ends=ends)
+    chain = legs.measured(np.asarray(runs), poses)
+    blocks = [(i, j) for i in range(len(runs)) for j in range(i, len(runs))]
+    for _ in range(SWEEPS):
+        before = chain
+        for i, j in blocks:
+            chain = legs.moved(chain, i, j)
+        if chain is before:
+            break
+        chain = legs.measured(chain.runs, chain.poses)
+    return chain.poses
+
+
+def measured_s(space: SearchSpace, runs: Sequence[int], poses: Array, ends: ChainEnds) -> float:
+    """Time of all legs between runs at poses (n, 3), the last one leading to the goal, by the rule [s]."""
+    return float(_Legs(space=space, ends=ends).measured(np.asarray(runs), poses).legs_s.sum())
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Legs:
+    """Legs of chains that begin and end at the same places."""
+
+    space: SearchSpace
+    ends: ChainEnds
+
+    def measured(self, runs: np.ndarray, poses: Array) -> Chain:
+        """A chain with the shortest ways for its legs."""
+        froms, tos = self._ends(runs, poses)
+        ways = [self.space.goal_way.ways.shortest(a[:2], b[:2]) for a, b in zip(froms, tos, strict=True)]
+        bends = tuple(np.zeros((0, 2)) if way is None else way[1:-1] for way in ways)
+        legs_s = [
+            self._tried_s(runs, k, froms[k], tos[k])
+            or self._leg_s(runs, k, froms[k : k + 1], tos[k : k + 1], bends[k])[0]
+            for k in range(len(froms))
+        ]
+        return Chain(runs=runs, poses=poses, bends=bends, legs_s=np.array(legs_s))
+
+    def moved(self, chain: Chain, i: int, j: int) -> Chain:
+        """The chain with runs i to j moved as suits the legs before and after them best, or the same chain."""
+        bent = any(len(bends) for bends in chain.bends[i + 1 : j + 1])
+        if bent or self._kept(chain.runs, i) or self._kept(chain.runs, j + 1):
+            return chain
+        blocks = self._blocks(chain, i, j)
+        froms, tos = self._ends(chain.runs, chain.poses)
+        leaving = run_ends(self.space, np.full(len(blocks), chain.runs[j]), blocks[:, -1])
+        arrive_s = self._leg_s(chain.runs, i, froms[i : i + 1], blocks[:, 0], chain.bends[i])
+        leave_s = self._leg_s(chain.runs, j + 1, leaving, tos[j + 1 : j + 2], chain.bends[j + 1])
+        legs_m = [np.hypot(*(b - a)[:, :2].T) for a, b in ((froms[i], blocks[:, 0]), (leaving, tos[j + 1]))]
+        gain_s = chain.legs_s[i] + chain.legs_s[j + 1] - arrive_s - leave_s
+        before, after = [*froms[i : i + 1, :2], *chain.bends[i]][-1], [*chain.bends[j + 1], *tos[j + 1 : j + 2, :2]][0]
+        gain_s[(legs_m[0] < self._least_m(chain.runs, i)) | (legs_m[1] < self._least_m(chain.runs, j + 1))] = -np.inf
+        order = np.argsort(-gain_s, kind="stable")
+        for row in order[gain_s[order] > GAIN_S]:
+            if self._clear(chain.runs[i : j + 1], blocks[row], before, after):
+                poses, legs_s = chain.poses.copy(), chain.legs_s.copy()
+                poses[i : j + 1], legs_s[i], legs_s[j + 1] = blocks[row], arrive_s[row], leave_s[row]
+                return replace(chain, poses=poses, legs_s=legs_s)
+        return chain
+
+    def _least_m(self, runs: np.ndarray, k: int) -> float:
+        """Length from which on leg k takes as long as the rule says."""
+        if self.space.helm_times is not None:
+            return 0.0
+        joint = self.space.tried.get((self._name(runs, k - 1), self._name(runs, k)))
+        tried_m = 0.0 if joint is None else float(np.hypot(*joint.step[:2]))
+        return self.space.hull_m * float(np.clip(tried_m / self.space.hull_m, NEAR, FAR))
+
+    def _tried_s(self, runs: np.ndarray, k: int, before: Array, after: Array) -> float:
+        """Time of leg k as tried, or 0 if it is another than that."""
+        joint = self.space.tried.get((self._name(runs, k - 1), self._name(runs, k)))
+        if joint is None:
+            return 0.0
+        c, s = np.cos(before[2]), np.sin(before[2])
+        north, east = after[:2] - before[:2] - joint.seconds * self.space.current_to
+        away = np.hypot(c * north + s * east - joint.step[0], c * east - s * north - joint.step[1])
+        turned = abs(float(wrap_angle(after[2] - before[2] - joint.step[2])))
+        return joint.seconds if away < SAME * self.space.hull_m and turned < SAME else 0.0
+
+    def _kept(self, runs: np.ndarray, k: int) -> bool:
+        """Whether leg k failed elsewhere and was given more room: it is left alone."""
+        return (self._name(runs, k - 1), self._name(runs, k)) in self.space.run_up
+
+    def _name(self, runs: np.ndarray, k: int) -> str:
+        if k == len(runs):
+            return ""
+        index = runs[k] if k >= 0 else self.ends.last
+        return self.space.stamps[index].name if index >= 0 else ""
+
+    def _clear(self, runs: np.ndarray, poses: Array, before: Array, after: Array) -> bool:
+        """Whether runs have room, and straight lines between them and two places (2,) lead through water."""
+        lines = sight_lines(
+            np.vstack([before, run_ends(self.space, runs, poses)[:, :2]]), np.vstack([poses[:, :2], after])
+        )
+        seen = shapely.covers(self.space.goal_way.ways.water, lines).all()
+        return bool(seen and runs_clear(self.space, runs, poses).all())
+
+    def _blocks(self, chain: Chain, i: int, j: int) -> Array:
+        """(moves, j - i + 1, 3) poses of a block moved and turned about its first pose, drifting as before."""
+        moves, origin = _pattern(self.space.hull_m), chain.poses[i]
+        c, s = np.cos(origin[2]), np.sin(origin[2])
+        firsts = origin[:2] + np.stack([c * moves[:, 0] - s * moves[:, 1], s * moves[:, 0] + c * moves[:, 1]], axis=1)
+        lasting_s = np.array([self.space.stamps[q].duration_s for q in chain.runs])[i:j] + chain.legs_s[i + 1 : j + 1]
+        drift = np.r_[0.0, np.cumsum(lasting_s)][:, None] * self.space.current_to
+        apart = chain.poses[i : j + 1, :2] - origin[:2] - drift
+        c, s = np.cos(moves[:, 2])[:, None], np.sin(moves[:, 2])[:, None]
+        turned = np.stack([c * apart[:, 0] - s * apart[:, 1], s * apart[:, 0] + c * apart[:, 1]], axis=-1)
+        headings = chain.poses[i : j + 1, 2] + moves[:, 2:]
+        return np.concatenate([firsts[:, None] + turned + drift, headings[..., None]], axis=-1)
+
+    def _ends(self, runs: np.ndarray, poses: Array) -> tuple[Array, Array]:
+        """(n + 1, 3) where legs begin, and where they end."""
+        return np.vstack([self.ends.start, run_ends(self.space, runs, poses)]), np.vstack([poses, self.space.goal])
+
+    def _leg_s(self, runs: np.ndarray, k: int, froms: Array, tos: Array, bends: Array) -> Array:
+        """(m,) time of leg k from poses (m, 3) to poses (m, 3) along a way's bends (b, 2)."""
+        space = self.space
+        exit_mps = space.stamps[runs[k - 1]].exit_mps if k else self.ends.exit_mps
+        entry_mps = space.stamps[runs[k]].entry_mps if k < len(runs) else 0.0
+        last = int(runs[k - 1]) if k else self.ends.last
+        if space.helm_times is not None:
+            return self._helmed_s(space.helm_times, last, (exit_mps, entry_mps), froms, tos, bends)
+        rule = space.times
+        assert rule is not None
+        more_s = space.more_s(last, int(runs[k]) if k < len(runs) else -1)
+        speeds = np.array(exit_mps), np.array(entry_mps)
+        away, turn = tos[..., :2] - froms[..., :2], tos[..., 2] - froms[..., 2]
+        if len(bends):
+            ahead, behind = bends[0] - froms[..., :2], tos[..., :2] - bends[-1]
+            length_m = np.hypot(*ahead.T) + polyline_length(bends) + np.hypot(*behind.T)
+            through_m = np.maximum(length_m - away @ space.current_to / rule.speed_mps, 0.0)
+            first, last = (np.arctan2(step[..., 1], step[..., 0]) for step in (ahead, behind))
+            return rule.seconds(through_m, froms[..., 2] - first, tos[..., 2] - last, turn, *speeds) + more_s
+        leg_s = np.zeros(len(away))
+        for _ in range(DRIFTS if space.current_to.any() else 1):
+            step = away - leg_s[:, None] * space.current_to
+            course = np.arctan2(step[..., 1], step[..., 0])
+            leg_s = (
+                rule.seconds(np.hypot(*step.T), froms[..., 2] - course, tos[..., 2] - course, turn, *speeds) + more_s
+            )
+        return leg_s
+
+    def _helmed_s(
+        self, times: HelmTimes, last: int, speeds: tuple[float, float], froms: Array, tos: Array, bends: Array
+    ) -> Array:
+        """(m,) time of legs of ships with a helm."""
+        froms, tos = (np.broadcast_to(ends, (max(len(froms), len(tos)), 3)) for ends in (froms, tos))
+        leg_s = times.between_s(froms, tos, self.space.off(last), *speeds, current_to=self.space.current_to)
+        if not len(bends):
+            return leg_s
+        ahead, behind = bends[0] - froms[:, :2], tos[:, :2] - bends[-1]
+        length_m = np.hypot(*ahead.T) + polyline_length(bends) + np.hypot(*behind.T)
+        return np.maximum(leg_s, times.seconds(length_m, *speeds))
+
+
+@lru_cache(maxsize=16)
+def _pattern(hull_m: float) -> Array:
+    """(n, 3) moves forward, to starboard and round, of every size, to all sides alike."""
+    sides = np.array([side for side in product((-1.0, 0.0, 1.0), repeat=3) if any(side)])
+    sizes = np.column_stack([hull_m * SHIFTS, hull_m * SHIFTS, TURNS])
+    return np.concatenate([sides * size for size in sizes])

@@ -1,0 +1,282 @@
+"""Independent verification: from the chart, the vessel, the commands and the track, not from how the plan was made.
+
+It shares the equations of motion and the hull's outline with the planner, but none of its grids, margins or paths.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import shapely
+
+from expdesign.conventions import wrap_angle
+from expdesign.dictionary import Primitive
+from expdesign.plan.values import Leg, Verification
+from expdesign.sea_area import SeaArea
+from expdesign.signals import Commands, Trajectory
+from expdesign.simulation import Environment, simulate, to_body
+from expdesign.simulation.run import SUBSTEPS
+from expdesign.values import Array
+from expdesign.vessel import NUMPY, Vessel
+from expdesign.vessel.hull import hull_polygons
+
+FINE_SUBSTEPS = 10 * SUBSTEPS
+"""Integrator steps per sample of the re-simulation: a tenth of those that plans are made with."""
+ENTRY_TOLERANCE = 0.02
+"""Largest deviation of a run's entry velocity, relative to the vessel's speed in the plan."""
+SPEED_TOLERANCE = 0.03
+"""By how much legs may pass the speed stated for them, or that of their faster end: plans keep it at some samples."""
+
+
+def verify_plan(
+    vessel: Vessel,
+    area: SeaArea,
+    environment: Environment,
+    *,
+    commands: Commands,
+    trajectory: Trajectory,
+    legs: Sequence[Leg],
+    clearance_m: float,
+    transit_mps: float,
+    primitives: Mapping[str, Primitive],
+    repeats: Mapping[str, int],
+    start: Array,
+    goal: Array,
+) -> Verification:
+    """Re-simulate the commands ten times finer and check motion, hull, limits, speeds, runs, entries and ends.
+
+    The hull is checked on the track and on the re-simulated motion.
+
+    Args:
+        vessel, environment: the nominal model and the forecast's means.
+        area: allowed water.
+        commands, trajectory, legs: the plan.
+        clearance_m: promised distance from hull to forbidden water.
+        transit_mps: stated speed of legs through water.
+        primitives: the dictionary by name.
+        repeats: how often each is to be run.
+        start, goal: (3,) poses where the ship is to begin and end at rest through the water.
+    """
+    misfit = _legs_problems(commands, legs, primitives)
+    again = simulate(
+        vessel,
+        commands,
+        pose=trajectory.pose[0],
+        velocity=trajectory.velocity[0],
+        environment=environment,
+        substeps=FINE_SUBSTEPS,
+    )
+    clearance = np.minimum(*(hull_clearance(area, track, vessel.hull_b) for track in (trajectory, again)))
+    worst = int(np.argmin(clearance))
+    excess, excess_signal = _limit_excess(vessel, commands)
+    problems = [
+        *_motion_problems(vessel, trajectory, again),
+        *_end_problems(vessel, environment, trajectory, start, goal),
+        *_end_problems(vessel, environment, again, start, goal, "re-simulated "),
+        *_if(
+            bool(clearance[worst] < clearance_m - 1e-6),
+            f"the hull is {clearance[worst]:.2f} m from forbidden water, promised {clearance_m:g} m, "
+            f"at {worst * commands.sample_time_s:.0f} s, {_place(area, trajectory.pose[worst])}",
+        ),
+        *_if(excess > 1e-6, f"{excess_signal} by {excess:.2g} of its range"),
+        *_engine_problems(vessel, commands),
+        *_repeat_problems(legs, repeats),
+        *(() if misfit else _speed_problems(environment, trajectory, legs, transit_mps)),
+        *(() if misfit else _speed_problems(environment, again, legs, transit_mps, "re-simulated ")),
+        *(misfit or _run_problems(vessel, commands, legs, primitives)),
+        *(() if misfit else _entry_problems(environment, trajectory, legs, primitives)),
+    ]
+    return Verification(
+        clearance_min_m=float(clearance[worst]),
+        clearance_time_s=worst * commands.sample_time_s,
+        reproduction_error_m=float(np.hypot(*(again.pose - trajectory.pose)[:, :2].T).max()),
+        limit_excess=excess,
+        problems=tuple(problems),
+    )
+
+
+def hull_clearance(area: SeaArea, trajectory: Trajectory, hull_b: Array) -> Array:
+    """(k,) distance from the hull to forbidden water [m].
+
+    Each sample's polygon spans the hull at this sample and the next, and what its corners swing out between them is
+    taken off, so nothing is passed between samples. Where the hull lies in forbidden water: minus the side of a square
+    as large as the part that does.
+    """
+    hulls = hull_polygons(trajectory.pose, hull_b)
+    corners = shapely.get_coordinates(hulls).reshape(len(hulls), -1, 2)
+    spans = shapely.convex_hull(shapely.multipoints(np.concatenate([corners[:-1], corners[1:]], axis=1)))
+    spans = np.append(spans, hulls[-1])
+    water = area.water
+    shapely.prepare(water)
+    inside = shapely.contains_properly(water, spans)
+    shore = shapely.get_parts(shapely.boundary(water))
+    pieces = np.concatenate([_pieces(line) for line in shore])
+    tree = shapely.STRtree(pieces)
+    (which, _), distances = tree.query_nearest(spans, return_distance=True, all_matches=False)
+    clearance: Array = np.empty(len(spans))
+    clearance[which] = distances
+    outside = ~inside
+    clearance[outside] = -np.sqrt(shapely.area(shapely.difference(spans[outside], water)))
+    return clearance - _swing(trajectory.pose, hull_b)
+
+
+def _swing(pose: Array, hull_b: Array) -> Array:
+    """(k,) how far at most the arc of a corner leaves its chord between a sample and the next [m]."""
+    turned = np.abs(np.diff(pose[:, 2], append=pose[-1, 2]))
+    return np.asarray(np.hypot(*hull_b.T).max() * (1 - np.cos(np.minimum(turned, np.pi) / 2)))
+
+
+def _pieces(line: shapely.Geometry) -> np.ndarray:
+    """A closed boundary as its segments."""
+    points = shapely.get_coordinates(line)
+    return np.asarray(shapely.linestrings(np.stack([points[:-1], points[1:]], axis=1)))
+
+
+def _motion_problems(vessel: Vessel, trajectory: Trajectory, again: Trajectory) -> list[str]:
+    """Where the track is not the motion that the commands give."""
+    apart, speed = np.abs(again.pose - trajectory.pose), np.abs(again.velocity).max(axis=0) + 1e-9
+    found = (
+        ("m", np.hypot(*apart[:, :2].T), vessel.length_m / 30),
+        ("rad of heading", apart[:, 2], 0.02),
+        ("of the largest speed", (np.abs(again.velocity - trajectory.velocity) / speed).max(axis=1), 0.02),
+    )
+    problems = []
+    for what, off, allowed in found:
+        worst = int(np.argmax(off))
+        if not off[worst] <= allowed:
+            problems.append(
+                f"the re-simulated commands are {off[worst]:.3g} {what} off the track at "
+                f"{worst * trajectory.sample_time_s:.0f} s, allowed {allowed:.3g}"
+            )
+    return problems
+
+
+def _end_problems(
+    vessel: Vessel, environment: Environment, trajectory: Trajectory, start: Array, goal: Array, which: str = ""
+) -> list[str]:
+    """How the plan's ends differ from start and goal, at rest through the water."""
+    problems = []
+    fastest = np.hypot(*trajectory.velocity[:, :2].T).max(), np.abs(trajectory.velocity[:, 2]).max()
+    slow, steady = ENTRY_TOLERANCE * np.array(fastest) + 1e-9
+    for name, pose, index in (("start", start, 0), ("goal", goal, -1)):
+        place, velocity = trajectory.pose[index], trajectory.velocity[index]
+        off_m = float(np.hypot(*(place - pose)[:2]))
+        turned = abs(float(wrap_angle(place[2] - pose[2])))
+        u_c, v_c = to_body(environment.current_to, place[2], NUMPY)
+        moving, turning = float(np.hypot(velocity[0] - u_c, velocity[1] - v_c)), abs(float(velocity[2]))
+        if off_m > vessel.length_m / 30 or turned > ENTRY_TOLERANCE or moving > slow or turning > steady:
+            problems.append(
+                f"the {which}plan is {off_m:.2f} m and {turned:.3f} rad off the {name}, at {moving:.3f} m/s through "
+                f"the water and turning at {turning:.4f} rad/s"
+            )
+    return problems
+
+
+def _limit_excess(vessel: Vessel, commands: Commands) -> tuple[float, str]:
+    """The largest violation of a limit or a rate relative to the signal's range, and which; all begin at zero."""
+    worst, which = 0.0, ""
+    for name, limit, values in zip(commands.names, vessel.limits, commands.values.T, strict=True):
+        span = limit.high - limit.low if np.isfinite(limit.high - limit.low) else 2 * np.pi
+        beyond = max(float((values - limit.high).max()), float((limit.low - values).max()))
+        steps = np.abs(np.diff([np.clip(0.0, limit.low, limit.high), *values]))
+        faster = float(steps.max()) - limit.rate * commands.sample_time_s
+        for excess, what in ((beyond, "limit"), (faster, "rate")):
+            if excess / span > worst:
+                worst, which = excess / span, f"{name} passes its {what}"
+    return worst, which
+
+
+def _engine_problems(vessel: Vessel, commands: Commands) -> list[str]:
+    """Engines and forces that are not stopped at the goal; that they are at the start is in their rates."""
+    told = zip(commands.names, vessel.limits, vessel.angles, commands.values[-1], strict=True)
+    return [
+        f"{name} is told {last:.3g} at the goal, where it is to have stopped"
+        for name, limit, turns, last in told
+        if not turns and abs(last) > 1e-6 * max(abs(limit.low), abs(limit.high))
+    ]
+
+
+def _repeat_problems(legs: Sequence[Leg], repeats: Mapping[str, int]) -> list[str]:
+    done = Counter(leg.name for leg in legs if leg.kind == "primitive")
+    return [
+        f"{name!r} is run {done[name]} times, the durations ask for {repeats.get(name, 0)}"
+        for name in sorted({*done, *repeats})
+        if done[name] != repeats.get(name, 0)
+    ]
+
+
+def _legs_problems(commands: Commands, legs: Sequence[Leg], primitives: Mapping[str, Primitive]) -> list[str]:
+    """Legs that do not make up the plan, or runs that are none of the dictionary's."""
+    problems = []
+    if [0, *(leg.last for leg in legs)] != [*(leg.first for leg in legs), len(commands)]:
+        problems.append("the legs do not follow each other without gaps from the first sample to the last")
+    for leg in legs:
+        if leg.kind == "primitive" and leg.name not in primitives:
+            problems.append(f"the dictionary has no {leg.name!r}")
+        elif leg.kind == "primitive" and leg.last - leg.first != len(primitives[leg.name].commands):
+            lasts, asked = leg.last - leg.first, len(primitives[leg.name].commands)
+            problems.append(f"{leg.name!r} at sample {leg.first} lasts {lasts} samples, the dictionary's {asked}")
+    return problems
+
+
+def _run_problems(
+    vessel: Vessel, commands: Commands, legs: Sequence[Leg], primitives: Mapping[str, Primitive]
+) -> list[str]:
+    """Runs whose commands are not the dictionary's, but for whole turns of angles without limits."""
+    unlimited = [not np.isfinite([limit.low, limit.high]).any() for limit in vessel.limits]
+    turning = [name.startswith("a") and free for name, free in zip(commands.names, unlimited, strict=True)]
+    problems = []
+    for leg in legs:
+        if leg.kind == "primitive":
+            apart = commands.values[leg.first : leg.last] - primitives[leg.name].commands.values
+            turns = 2 * np.pi * np.round(apart[0] / (2 * np.pi)) * turning
+            if np.abs(apart - turns).max() > 1e-9:
+                problems.append(f"the commands of {leg.name!r} at sample {leg.first} are not the dictionary's")
+    return problems
+
+
+def _entry_problems(
+    environment: Environment, trajectory: Trajectory, legs: Sequence[Leg], primitives: Mapping[str, Primitive]
+) -> list[str]:
+    problems = []
+    scale = np.abs(trajectory.velocity).max(axis=0) + 1e-9
+    for leg in legs:
+        if leg.kind == "primitive":
+            u_c, v_c = to_body(environment.current_to, trajectory.pose[leg.first, 2], NUMPY)
+            off = trajectory.velocity[leg.first] - [u_c, v_c, 0.0] - primitives[leg.name].entry_velocity
+            if (np.abs(off) > ENTRY_TOLERANCE * scale).any():
+                share = np.abs(off / scale).max()
+                problems.append(f"{leg.name!r} at sample {leg.first} begins {share:.1%} off its entry")
+    return problems
+
+
+def _speed_problems(
+    environment: Environment, trajectory: Trajectory, legs: Sequence[Leg], transit_mps: float, which: str = ""
+) -> list[str]:
+    """Legs faster through water than stated; those that begin or end faster may be as fast as that."""
+    north, east = environment.current_to
+    heading, (u, v, _) = trajectory.pose[:, 2], trajectory.velocity.T
+    c, s = np.cos(heading), np.sin(heading)
+    speed = np.hypot(u * c - v * s - north, u * s + v * c - east)
+    problems = []
+    for leg in legs:
+        sailed = speed[leg.first : leg.last + 1]
+        allowed = max(transit_mps, sailed[0], sailed[-1])
+        if leg.kind != "primitive" and sailed.max() > (1.0 + SPEED_TOLERANCE) * allowed:
+            at_s = (leg.first + int(sailed.argmax())) * trajectory.sample_time_s
+            problems.append(
+                f"the {which}leg to {leg.name!r} goes {sailed.max():.3g} m/s through the water at {at_s:.0f} s, "
+                f"stated {allowed:.3g} m/s"
+            )
+    return problems
+
+
+def _place(area: SeaArea, pose: Array) -> str:
+    lat, lon = area.frame.to_degrees(pose[:2])
+    return f"near {lat:.5f}, {lon:.5f}"
+
+
+def _if(wrong: bool, sentence: str) -> tuple[str, ...]:
+    return (sentence,) if wrong else ()

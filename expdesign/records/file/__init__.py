@@ -1,0 +1,21 @@
+"""One file of measured data: header, cells, columns, clock, ranges."""
+
+from expdesign.records.file.choice import Inputs, mistyped
+from expdesign.records.file.clock import Clock, read_clock
+from expdesign.records.file.names import is_input
+from expdesign.records.file.ranges import check_ranges
+from expdesign.records.file.table import Table, read_table
+from expdesign.records.file.wind import check_wind, relative_wind
+
+__all__ = [
+    "Clock",
+    "Inputs",
+    "Table",
+    "check_ranges",
+    "check_wind",
+    "is_input",
+    "mistyped",
+    "read_clock",
+    "read_table",
+    "relative_wind",
+]

@@ -1,0 +1,191 @@
+"""The numbers of one file in SI units, with the rows they come from: complete, finite and within reason."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from expdesign.errors import FileError
+from expdesign.records.file.cells import Cells, read_cells, shown
+from expdesign.records.file.choice import Inputs, Sources, choose_columns
+from expdesign.records.file.names import Source, is_input
+from expdesign.values import Array
+
+FIRST_ROW = 2
+MISSING = ("", "na", "n/a", "nan", "-nan", "null", "none")
+OPTIONAL = (("wind_u_mps", "wind_v_mps"), ("wind_speed_mps", "wind_angle_rad"), ("depth_m",))
+LARGEST = 1e15
+"""No measurement is near it; what is larger would only overflow further on."""
+LISTED = 3
+"""Stretches of rows that a message names before it only counts."""
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Table:
+    """Columns of one file.
+
+    Attributes:
+        path: the file.
+        header: names in row 1.
+        columns: contract name -> (k,) in the contract's unit.
+        sources: contract name -> where it stands in the file.
+        first_row: row of the file that sample 0 comes from.
+        notes: what was found and how it was dealt with.
+    """
+
+    path: Path
+    header: tuple[str, ...]
+    columns: Mapping[str, Array]
+    sources: Sources
+    first_row: int = FIRST_ROW
+    notes: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.columns["time_s"])
+
+    def error(self, name: str, problem: str) -> FileError:
+        """The error about a column, under the name the file gives it."""
+        return FileError(self.path, self.sources[name].header, problem)
+
+    def value(self, name: str, index: int) -> str:
+        """A number as it stands in the file."""
+        return f"{self.columns[name][index] / self.sources[name].factor:.10g}"
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Input columns, in file order."""
+        return tuple(name for name in self.columns if is_input(name))
+
+    def stack(self, *names: str) -> Array:
+        """Columns side by side, (k, m); nan where one is not there."""
+        columns = np.full((len(self), len(names)), np.nan)
+        for index, name in enumerate(names):
+            columns[:, index] = self.columns.get(name, np.nan)
+        return columns
+
+    def found(self, name: str, wrong: Mask, also: str) -> str:
+        """The first wrong value with its row, and the other rows where a mask (k,) is set: `is 7 in row 3 (...)`."""
+        first = int(np.argmax(wrong))
+        rest = wrong & (np.arange(len(wrong)) > first)
+        more = f" (and {also} in {self.rows(rest)})" if rest.any() else ""
+        return f"is {self.value(name, first)} in row {first + self.first_row}{more}"
+
+    def rows(self, wrong: Mask) -> str:
+        """The rows of the file where a mask (k,) is set, in words."""
+        return rows_in_words(np.flatnonzero(wrong) + self.first_row)
+
+    def noted(self, *notes: str) -> Table:
+        """The same with more notes."""
+        return replace(self, notes=(*self.notes, *notes))
+
+
+def read_table(path: Path, *, inputs: Inputs | None) -> Table:
+    """Read the columns that are used.
+
+    Raises:
+        FileError: unreadable, columns missing, cells that are no numbers, infinite, or missing inside the data.
+    """
+    cells = read_cells(path)
+    sources, notes = choose_columns(path, cells.header, inputs=inputs)
+    columns = {name: _numbers(cells, source) for name, source in sources.items()}
+    table = Table(path=path, header=cells.header, columns=columns, sources=sources, notes=notes)
+    return _without_missing(_without_empty_columns(table), cells)
+
+
+def rows_in_words(rows: NDArray[np.int_]) -> str:
+    """Row numbers, ascending: `row 12`, `rows 12 to 15, 20`, `rows 2, 4, 6 and 17 more`."""
+    stretches = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
+    words = [f"{part[0]} to {part[-1]}" if len(part) > 2 else ", ".join(map(str, part)) for part in stretches]
+    rest = sum(len(part) for part in stretches[LISTED:])
+    return f"row{'s' if len(rows) > 1 else ''} {', '.join(words[:LISTED])}" + (f" and {rest} more" if rest else "")
+
+
+def _numbers(cells: Cells, source: Source) -> Array:
+    """One column in SI units; missing cells are nan."""
+    texts = cells.columns[source.column]
+    try:
+        values = np.array(list(map(float, texts)))
+    except ValueError:
+        values = np.array([_number(cells, source, row, text) for row, text in enumerate(texts, start=FIRST_ROW)])
+    if "_" in "".join(texts):
+        row, text = next((row, text) for row, text in enumerate(texts, start=FIRST_ROW) if "_" in text)
+        raise _not_a_number(cells, source, row, text)
+    huge = np.abs(values) > LARGEST
+    if huge.any():
+        rows = rows_in_words(np.flatnonzero(huge) + FIRST_ROW)
+        found = "infinite" if np.isinf(values).any() else f"{values[int(np.argmax(huge))]:.6g}"
+        raise FileError(cells.path, source.header, f"is {found} in {rows}, expected finite numbers up to {LARGEST:g}")
+    return values * source.factor if source.factor != 1.0 else values
+
+
+def _number(cells: Cells, source: Source, row: int, text: str) -> float:
+    if text.strip().lower() in MISSING:
+        return np.nan
+    try:
+        return float(text)
+    except ValueError:
+        raise _not_a_number(cells, source, row, text) from None
+
+
+def _not_a_number(cells: Cells, source: Source, row: int, text: str) -> FileError:
+    expected = "a number"
+    if re.fullmatch(r"\s*-?\d+,\d+\s*", text):
+        expected = "a number with a decimal point"
+    elif source.name == "time_s" and ":" in text:
+        expected = "seconds as one number"
+    return FileError(cells.path, source.header, f"is {shown(text)} in row {row}, expected {expected}")
+
+
+def _without_empty_columns(table: Table) -> Table:
+    """Optional columns without any number are not measured; required ones are an error."""
+    empty = [name for name, values in table.columns.items() if np.isnan(values).all()]
+    dropped = {name for group in OPTIONAL for name in group if any(other in empty for other in group)}
+    for name in empty:
+        if name not in dropped:
+            raise table.error(name, "holds no number in any row, expected one in every row")
+    gone = [name for name in table.columns if name in dropped]
+    columns = {name: values for name, values in table.columns.items() if name not in dropped}
+    names = [table.sources[name].header for name in gone if name in empty]
+    return replace(table, columns=columns).noted(*(f"{name} holds no numbers: not measured" for name in names))
+
+
+def _without_missing(table: Table, cells: Cells) -> Table:
+    """Cut the rows at the start and end that lack a number; inside the data a lacking number is an error."""
+    missing = {name: np.isnan(values) for name, values in table.columns.items()}
+    complete = np.flatnonzero(~np.any(list(missing.values()), axis=0))
+    if not len(complete):
+        raise FileError(table.path, "", "has no row with a number in every column that is used, expected such rows")
+    first, last = int(complete[0]), int(complete[-1]) + 1
+    for name in sorted(missing, key=lambda name: -int(missing[name].sum())):
+        _check_inside(table, cells, name, missing[name], slice(first, last))
+    columns = {name: values[first:last] for name, values in table.columns.items()}
+    notes = list(_cuts(table, missing, first, last))
+    return replace(table, columns=columns, first_row=FIRST_ROW + first).noted(*notes)
+
+
+def _check_inside(table: Table, cells: Cells, name: str, missing: Mask, kept: slice) -> None:
+    inside = np.zeros(len(missing), dtype=bool)
+    inside[kept] = missing[kept]
+    if 2 * (kept.stop - kept.start) < len(missing) and missing.any():
+        problem = f"holds no number in {table.rows(missing)}, more than half of the file; expected one in every row"
+        raise table.error(name, problem)
+    if inside.any():
+        text = cells.columns[table.sources[name].column][int(np.argmax(inside))].strip()
+        found = f"is {shown(text)}" if text else "is empty"
+        raise table.error(name, f"{found} in {table.rows(inside)}, expected a number in every row")
+
+
+def _cuts(table: Table, missing: Mapping[str, Mask], first: int, last: int) -> Iterator[str]:
+    count = len(table)
+    for place, part in (("start", slice(0, first)), ("end", slice(last, count))):
+        names = [table.sources[name].header for name, mask in missing.items() if mask[part].any()]
+        if names:
+            rows = rows_in_words(np.arange(count)[part] + FIRST_ROW)
+            yield f"cut {rows} at the {place}, where {', '.join(names)} {'is' if len(names) == 1 else 'are'} missing"

@@ -1,0 +1,39 @@
+"""Pose and velocity: positions, derived velocities, and whether they agree."""
+
+from expdesign.records.pose.agreement import check_agreement
+from expdesign.records.pose.fix import Fix, last_fix
+from expdesign.records.pose.motion import (
+    MEASURED,
+    Request,
+    batch_velocity,
+    kept_samples,
+    left_out_notes,
+    long_enough,
+    needed_columns,
+    origin_notes,
+    velocity_origins,
+)
+from expdesign.records.pose.position import LocalMetres, check_jumps, with_continuous_heading, with_metres
+from expdesign.records.pose.velocity import VELOCITY_METHODS, central_difference, smoothed_velocity
+
+__all__ = [
+    "MEASURED",
+    "VELOCITY_METHODS",
+    "Fix",
+    "LocalMetres",
+    "Request",
+    "batch_velocity",
+    "central_difference",
+    "check_agreement",
+    "check_jumps",
+    "kept_samples",
+    "last_fix",
+    "left_out_notes",
+    "long_enough",
+    "needed_columns",
+    "origin_notes",
+    "smoothed_velocity",
+    "velocity_origins",
+    "with_continuous_heading",
+    "with_metres",
+]

@@ -1,0 +1,122 @@
+"""Where each velocity comes from, and the batches that it gives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from expdesign.conventions import OUTPUTS, POSE_COLUMNS, VELOCITY_COLUMNS
+from expdesign.errors import FileError
+from expdesign.records.file import Table, mistyped
+from expdesign.records.pose.smoother import SHORTEST
+from expdesign.records.pose.velocity import central_difference, smoothed_velocity
+from expdesign.values import Array
+
+MEASURED, DIFFERENCE, SMOOTHED = "measured", "difference", "smoothed"
+COLUMN_OF = dict(zip(OUTPUTS, VELOCITY_COLUMNS, strict=True))
+NEEDS = {"u": POSE_COLUMNS, "v": POSE_COLUMNS, "r": POSE_COLUMNS[2:]}
+SAMPLES = {MEASURED: 2, DIFFERENCE: 4, SMOOTHED: SHORTEST}
+"""Samples that a batch must have."""
+DERIVED = "north_m and east_m (or lat_deg and lon_deg) with heading_rad (or heading_deg)"
+WORDS = {DIFFERENCE: "central differences of the pose", SMOOTHED: "the smoothed pose"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Request:
+    """How velocities are to be had.
+
+    Attributes:
+        method: "auto", "measured", "difference" or "smoothed".
+        heading_std_rad: of the heading's noise, or None.
+        outputs: the velocities that there must be.
+    """
+
+    method: str
+    heading_std_rad: float | None
+    outputs: tuple[str, ...]
+
+
+def velocity_origins(table: Table, request: Request) -> dict[str, str]:
+    """For each of u, v, r that there is: measured, difference or smoothed.
+
+    Raises:
+        FileError: one that must be there can neither be read nor derived.
+    """
+    origins: dict[str, str] = {}
+    for output, column in COLUMN_OF.items():
+        if request.method in ("auto", MEASURED) and column in table.columns:
+            origins[output] = MEASURED
+        elif request.method != MEASURED and set(NEEDS[output]) <= set(table.columns):
+            origins[output] = SMOOTHED if request.method == SMOOTHED else DIFFERENCE
+        elif output in request.outputs:
+            raise _missing(table, output, column, request.method)
+    return origins
+
+
+def needed_columns(origins: Mapping[str, str]) -> set[str]:
+    """The columns that velocities are taken or derived from, and the heading, which everything is turned by."""
+    measured = {column for output, column in COLUMN_OF.items() if origins.get(output) == MEASURED}
+    derived = (NEEDS[output] for output, origin in origins.items() if origin != MEASURED)
+    return measured.union(["heading_rad"], *derived)
+
+
+def long_enough(batches: tuple[slice, ...], origins: Mapping[str, str]) -> tuple[slice, ...]:
+    """The batches that the velocities can be derived in."""
+    least = max((SAMPLES[origin] for origin in origins.values()), default=2)
+    return tuple(part for part in batches if part.stop - part.start >= least)
+
+
+def left_out_notes(table: Table, batches: tuple[slice, ...], kept: tuple[slice, ...]) -> list[str]:
+    """Which batches are too short."""
+    gone = np.zeros(len(table), dtype=bool)
+    for part in [part for part in batches if part not in kept]:
+        gone[part] = True
+    return [f"left out {table.rows(gone)}, batches too short to derive velocities in"] if gone.any() else []
+
+
+def kept_samples(part: slice, origins: Mapping[str, str]) -> slice:
+    """The samples of a batch that have a velocity: differences lack the first and the last."""
+    return slice(part.start + 1, part.stop - 1) if DIFFERENCE in origins.values() else part
+
+
+def batch_velocity(
+    table: Table, part: slice, sample_time_s: float, origins: Mapping[str, str], heading_std_rad: float | None
+) -> Array:
+    """Velocities (k, 3) of the samples that `kept_samples` gives; nan where there is none."""
+    kept = kept_samples(part, origins)
+    pose = table.stack(*POSE_COLUMNS)[part]
+    sources: dict[str, Array] = {MEASURED: table.stack(*VELOCITY_COLUMNS)[kept]}
+    if DIFFERENCE in origins.values():
+        sources[DIFFERENCE] = central_difference(pose, sample_time_s, heading_std_rad=heading_std_rad or 0.0)
+    if SMOOTHED in origins.values():
+        sources[SMOOTHED] = smoothed_velocity(pose, sample_time_s, heading_std_rad=heading_std_rad)
+    columns = [
+        sources[origins[output]][:, index] if output in origins else np.full(kept.stop - kept.start, np.nan)
+        for index, output in enumerate(OUTPUTS)
+    ]
+    return np.stack(columns, axis=-1)
+
+
+def origin_notes(origins: Mapping[str, str]) -> list[str]:
+    """What is derived and what is not known."""
+    notes = []
+    for origin, words in WORDS.items():
+        names = [output for output in OUTPUTS if origins.get(output) == origin]
+        if names:
+            ends = ", which the first and last sample of a batch lack" if origin == DIFFERENCE else ""
+            notes.append(f"{', '.join(names)} {'come' if len(names) > 1 else 'comes'} from {words}{ends}")
+    unknown = [output for output in OUTPUTS if output not in origins]
+    return [*notes, *([f"{', '.join(unknown)} not measured"] if unknown else [])]
+
+
+def _missing(table: Table, output: str, column: str, method: str) -> FileError:
+    pose = [name for name in NEEDS[output] if name not in table.columns]
+    if method == MEASURED:
+        return FileError(table.path, "row 1", f"names no {column}, expected it{mistyped(column, table.header)}")
+    derive = DERIVED if output != "r" else "heading_rad (or heading_deg)"
+    wanted = f"expected {column}, or {derive}" if method == "auto" else f"expected {derive}"
+    hint = mistyped(column, table.header) if method == "auto" else ""
+    hint = hint or next((found for name in pose if (found := mistyped(name, table.header))), "")
+    return FileError(table.path, "row 1", f"gives no {output}: {wanted}{hint}")

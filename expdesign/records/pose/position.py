@@ -1,0 +1,119 @@
+"""Pose from a file's columns: metres north and east, heading continuous, no jumps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pyproj
+
+from expdesign.records.file import Table
+from expdesign.values import Array
+
+JUMP = 10.0
+"""A step this many times the 95th percentile of all changes is out of the ordinary."""
+CHANGES = {
+    "heading_rad": (0.5, 1.0, "rad"),
+    "u_mps": (10.0, 0.0, "m/s"),
+    "v_mps": (10.0, 0.0, "m/s"),
+    "r_radps": (1.0, 0.0, "rad/s"),
+    "north_m": (2.0, 10.0, "m"),
+}
+"""Column -> change that is still possible: at any sample time, and per second of it; north_m stands for position."""
+NOTED = ("heading_rad", "north_m")
+"""Columns whose lesser jumps are told; filtered velocities may change unevenly without any harm."""
+
+
+@dataclass(frozen=True)
+class LocalMetres:
+    """Transverse Mercator metres around an origin, scale 1 there (WGS84).
+
+    Attributes:
+        lat_deg, lon_deg: the origin.
+    """
+
+    lat_deg: float
+    lon_deg: float
+
+    def north_east(self, lat_deg: Array, lon_deg: Array) -> tuple[Array, Array]:
+        """Metres north and east of the origin, (k,) each."""
+        place = f"+proj=tmerc +lat_0={self.lat_deg!r} +lon_0={self.lon_deg!r} +k=1 +ellps=WGS84 +units=m"
+        east, north = pyproj.Proj(place)(lon_deg, lat_deg)
+        return np.asarray(north), np.asarray(east)
+
+
+def with_metres(table: Table, origin: LocalMetres | None) -> tuple[Table, LocalMetres | None]:
+    """Add north_m and east_m to a table that has latitudes and longitudes.
+
+    Args:
+        table: a file.
+        origin: of an earlier file's metres, or None to take this file's first position.
+
+    Returns:
+        The table, and the origin used so far.
+    """
+    if "lat_deg" not in table.columns:
+        return table, origin
+    lat, lon = table.columns["lat_deg"], table.columns["lon_deg"]
+    origin = origin or LocalMetres(float(lat[0]), float(lon[0]))
+    north, east = origin.north_east(lat, lon)
+    sources = {**table.sources, "north_m": table.sources["lat_deg"], "east_m": table.sources["lon_deg"]}
+    note = f"north_m and east_m are metres from lat_deg {origin.lat_deg:.7g}, lon_deg {origin.lon_deg:.7g}"
+    columns = {**table.columns, "north_m": north, "east_m": east}
+    return replace(table, columns=columns, sources=sources).noted(note), origin
+
+
+def with_continuous_heading(table: Table) -> Table:
+    """Take the jumps by a whole turn out of the heading."""
+    heading = table.columns.get("heading_rad")
+    if heading is None:
+        return table
+    continuous = np.unwrap(heading)
+    turns = int(np.sum(np.abs(np.diff(continuous - heading)) > np.pi))
+    if not turns:
+        return table
+    columns = {**table.columns, "heading_rad": continuous}
+    note = (
+        f"{table.sources['heading_rad'].header} is wrapped {turns} time{'s' if turns > 1 else ''} and made continuous"
+    )
+    return replace(table, columns=columns).noted(note)
+
+
+def check_jumps(table: Table, batches: tuple[slice, ...], sample_time_s: float, *, needed: set[str]) -> Table:
+    """Raise where what is needed jumps as no ship can; note other steps of the pose that are out of the ordinary.
+
+    Args:
+        table: a file in metres and radians.
+        batches: stretches without a gap.
+        sample_time_s: time between samples [s].
+        needed: columns that velocities are taken or derived from.
+
+    Raises:
+        FileError: naming the column, the size of the jump and the row it lands in.
+    """
+    notes: list[str] = []
+    for name, (least, fastest, unit) in CHANGES.items():
+        if name not in table.columns:
+            continue
+        step = np.abs(_steps(table.columns[name], batches))
+        if name == "north_m":
+            step = np.hypot(step, _steps(table.columns["east_m"], batches))
+        ordinary = JUMP * float(np.percentile(step[step > 0], 95)) if step.any() else 0.0
+        jump = step > max(least, fastest * sample_time_s, ordinary)
+        if jump.any() and name in needed:
+            what = "position jumps" if name == "north_m" else "jumps"
+            found = f"{what} by {step[int(np.argmax(jump))]:.4g} {unit} in {table.rows(jump)}"
+            raise table.error(name, f"{found}, expected what a ship can do in {sample_time_s:g} s")
+        odd = step > ordinary
+        if odd.any() and name in NOTED:
+            what = "the position" if name == "north_m" else table.sources[name].header
+            notes.append(f"{what} changes by up to {step[odd].max():.3g} {unit} at once in {table.rows(odd)}")
+    return table.noted(*notes)
+
+
+def _steps(values: Array, batches: tuple[slice, ...]) -> Array:
+    """(k,) change into each sample from the one before it in the same batch, else 0."""
+    steps = np.zeros(len(values))
+    for part in batches:
+        steps[part.start + 1 : part.stop] = np.diff(values[part])
+    return steps

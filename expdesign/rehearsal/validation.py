@@ -1,0 +1,332 @@
+"""What a design is worth when it is sailed: estimates of many simulated trials, beside what was predicted.
+
+A trial is a number of whole runs, each simulated with a true ship from its entry velocity, measured with the ship's
+sensors, and estimated as measured data would be, with the scenario's vessel as the nominal model. Designs are compared
+at the same informative time: the optimised one, equal shares, and runs drawn at random, anew for every trial.
+
+Each run of a trial begins at a heading of its own, the same in every trial: a golden angle further than the last, which
+spreads the runs of every manoeuvre evenly over the wind. Predictions are made for these headings.
+
+Work is cut into chunks with random numbers of their own: any number of processes gives the same result, and chunks that
+are done need not be done again.
+
+Source: F. Ljungberg, doctoral thesis, Linköping University, 9.1.2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from joblib import Parallel, delayed
+
+from expdesign.dictionary import Primitive
+from expdesign.errors import InputError, NoAnswer
+from expdesign.estimation.methods import Settings, estimate
+from expdesign.estimation.solve import Weighting
+from expdesign.information.expected import TrialPart, expected_covariance
+from expdesign.information.moments import HEADINGS
+from expdesign.signals import Batch, Record
+from expdesign.simulation import CALM, Environment, simulate_ensemble
+from expdesign.simulation.run import SUBSTEPS
+from expdesign.values import Array, seal
+from expdesign.vessel import Vessel
+
+Progress = Callable[[str, float], None]
+CHUNK = 20
+"""Trials of one chunk."""
+RANDOM = "random"
+GOLDEN_ANGLE_RAD = np.pi * (3.0 - 5.0**0.5)
+"""From the heading of one run to that of the next."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Rehearsal:
+    """What is to be tried.
+
+    Attributes:
+        truth: the ship that sails, with its sensors.
+        nominal: the ship that was designed for, with the same actuators: it simulates the instruments.
+        primitives: the dictionary.
+        designs: name -> whole runs of each primitive; None for runs drawn at random for each trial.
+        total_s: informative time of a random design [s].
+        environment: weather; its mean is drawn for each trial with its standard deviation.
+        parameters: estimated ones; the others are held at the nominal model's values.
+        method, mean_subtraction: of the estimator.
+        integrator: of the true ship, "rk4" or "euler", the map that discrete parameters are defined by.
+        trials: of each design.
+        seed: of everything drawn.
+    """
+
+    truth: Vessel
+    nominal: Vessel
+    primitives: tuple[Primitive, ...]
+    designs: Mapping[str, tuple[int, ...] | None]
+    total_s: float
+    environment: Environment
+    parameters: tuple[str, ...]
+    method: str = "iv"
+    mean_subtraction: str = "complete"
+    integrator: str = "rk4"
+    trials: int = 100
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.truth.model.inputs != self.nominal.model.inputs:
+            raise InputError(
+                f"the true vessel takes {', '.join(self.truth.model.inputs)}, the scenario's vessel "
+                f"{', '.join(self.nominal.model.inputs)}: expected the same actuators"
+            )
+        if self.truth.sample_time_s != self.nominal.sample_time_s:
+            raise InputError(
+                f"the true vessel is sampled every {self.truth.sample_time_s:g} s, expected "
+                f"{self.nominal.sample_time_s:g} s as the scenario's vessel"
+            )
+        if self.trials < 2:
+            raise InputError(f"trials is {self.trials}, expected 2 or more")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Validated:
+    """What came of one design.
+
+    Attributes:
+        design: its name.
+        parameters: estimated ones.
+        truth: (p,) values of the true ship; nan for what its model does not have.
+        estimates, stated: (n, p) estimates and the standard deviations that came with them.
+        forecast: (p,) standard deviations predicted with the nominal model, nan for random designs.
+        theory: (p,) the same with the true ship, which nobody knows before; nan for random designs.
+        failed: trials that gave no estimate.
+    """
+
+    design: str
+    parameters: tuple[str, ...]
+    truth: Array
+    estimates: Array
+    stated: Array
+    forecast: Array
+    theory: Array
+    failed: int
+
+    def __post_init__(self) -> None:
+        seal(self, truth="p", estimates="n p", stated="n p", forecast="p", theory="p")
+
+    @property
+    def found(self) -> Array:
+        """(p,) standard deviation of the estimates."""
+        return np.asarray(self.estimates.std(axis=0, ddof=1))
+
+    @property
+    def bias(self) -> Array:
+        """(p,) mean estimate less the true value."""
+        return np.asarray(self.estimates.mean(axis=0) - self.truth)
+
+    @property
+    def coverage(self) -> Array:
+        """(p,) share of trials whose 95 % interval holds the true value."""
+        return np.asarray((np.abs(self.estimates - self.truth) <= 1.959964 * self.stated).mean(axis=0))
+
+    @property
+    def errors(self) -> Array:
+        """(n,) root mean square over the parameters of (estimate - truth) / |truth|, as in the thesis's figure 9.1."""
+        known = np.abs(self.truth) > 0
+        relative = (self.estimates - self.truth)[:, known] / np.abs(self.truth[known])
+        return np.asarray(np.sqrt((relative**2).mean(axis=1)))
+
+
+def equal_runs(primitives: Sequence[Primitive], total_s: float) -> tuple[int, ...]:
+    """Whole runs of every primitive that come nearest to equal shares of a time, at least one of each."""
+    share = total_s / len(primitives)
+    return tuple(max(1, round(share / primitive.duration_s)) for primitive in primitives)
+
+
+def validate(
+    rehearsal: Rehearsal,
+    *,
+    jobs: int = 1,
+    done: Mapping[str, Array] | None = None,
+    keep: Callable[[str, Array], None] = lambda key, rows: None,
+    progress: Progress = lambda what, share: None,
+) -> tuple[Validated, ...]:
+    """Every design of a rehearsal, tried.
+
+    Args:
+        rehearsal: what to try.
+        jobs: processes; a `joblib.parallel_config` around the call chooses another backend.
+        done: rows of chunks from an earlier, interrupted call with the same rehearsal.
+        keep: told each chunk's rows as soon as they are there.
+        progress: told the share of the trials done.
+
+    Raises:
+        NoAnswer: no trial of a design gives an estimate.
+    """
+    rows = dict(done or {})
+    tasks = [task for task in _tasks(rehearsal) if task[0] not in rows]
+    total = len(tasks) + len(rows)
+    work = Parallel(n_jobs=jobs, return_as="generator_unordered")
+    for key, found in work(delayed(_chunk)(rehearsal, *task) for task in tasks):
+        rows[key] = found
+        keep(key, found)
+        progress("simulating trials", len(rows) / total)
+    return tuple(_validated(rehearsal, name, rows) for name in rehearsal.designs)
+
+
+def _tasks(rehearsal: Rehearsal) -> Iterator[tuple[str, str, int, int]]:
+    """(key, design, chunk number, trials in it)."""
+    for name in rehearsal.designs:
+        for number, first in enumerate(range(0, rehearsal.trials, CHUNK)):
+            yield f"{name}/{number}", name, number, min(CHUNK, rehearsal.trials - first)
+
+
+def _chunk(rehearsal: Rehearsal, key: str, design: str, number: int, trials: int) -> tuple[str, Array]:
+    """Rows (trials, 2 p) of estimates and stated standard deviations, nan where there is none."""
+    order = sorted(rehearsal.designs).index(design)
+    rng = np.random.default_rng([rehearsal.seed, order, number])
+    runs, weather = rehearsal.designs[design], rehearsal.environment
+    steady = not (weather.current_std_mps or weather.wind_std_mps)
+    if runs is not None and steady:
+        return key, np.array([_estimated(rehearsal, item) for item in _sailed(rehearsal, runs, weather, trials, rng)])
+    rows = []
+    for _ in range(trials):
+        counts = _random_runs(rehearsal, rng) if runs is None else runs
+        (record,) = _sailed(rehearsal, counts, _drawn(weather, rng), 1, rng)
+        rows.append(_estimated(rehearsal, record))
+    return key, np.array(rows)
+
+
+def _random_runs(rehearsal: Rehearsal, rng: np.random.Generator) -> tuple[int, ...]:
+    """Runs drawn one after the other until the time is full."""
+    counts, spent = [0] * len(rehearsal.primitives), 0.0
+    while spent < rehearsal.total_s * (1 - 1e-9):
+        index = int(rng.integers(len(counts)))
+        counts[index] += 1
+        spent += rehearsal.primitives[index].duration_s
+    return tuple(counts)
+
+
+def _drawn(weather: Environment, rng: np.random.Generator) -> Environment:
+    """The weather of one trial: its own means, the same variation."""
+    return replace(
+        weather,
+        current_to=weather.current_to + weather.current_std_mps * rng.standard_normal(2),
+        wind_to=weather.wind_to + weather.wind_std_mps * rng.standard_normal(2),
+        current_std_mps=0.0,
+        wind_std_mps=0.0,
+    )
+
+
+def _sailed(
+    rehearsal: Rehearsal, runs: Sequence[int], weather: Environment, trials: int, rng: np.random.Generator
+) -> list[Record]:
+    """What every trial measures, one batch for each whole run."""
+    batches: list[list[Batch]] = []
+    for primitive, count in zip(rehearsal.primitives, runs, strict=True):
+        for repeat in range(count):
+            ensemble = simulate_ensemble(
+                rehearsal.truth,
+                np.concatenate([primitive.commands.values, primitive.commands.values[-1:]]),
+                runs=trials,
+                environment=weather,
+                rng=rng,
+                pose=(0.0, 0.0, heading_rad(len(batches))),
+                velocity=primitive.entry_velocity,
+                standing=primitive.entry_inputs,
+                integrator=rehearsal.integrator,
+                substeps=1 if rehearsal.integrator == "euler" else SUBSTEPS,
+            )
+            name = f"{primitive.name} {repeat + 1}"
+            batches.append([replace(ensemble.batch(trial), name=name) for trial in range(trials)])
+    return [Record(batches=tuple(rows)) for rows in zip(*batches, strict=True)]
+
+
+def heading_rad(number: int) -> float:
+    """Heading [rad] at the beginning of a run, counted from 0 in the order of the trial."""
+    return float(number * GOLDEN_ANGLE_RAD % (2 * np.pi))
+
+
+def _estimated(rehearsal: Rehearsal, record: Record) -> Array:
+    """(2 p,) estimates and stated standard deviations, nan when there is no estimate."""
+    model = rehearsal.nominal.model
+    fixed = tuple(name for name in model.names if name not in rehearsal.parameters)
+    settings = Settings(fixed=fixed, weighting=Weighting(mean=rehearsal.mean_subtraction))
+    try:
+        found = estimate(record, model, method=rehearsal.method, settings=settings)
+    except NoAnswer:
+        return np.full(2 * len(rehearsal.parameters), np.nan)
+    order = [found.names.index(name) for name in rehearsal.parameters]
+    return np.concatenate([found.values[order], found.std[order]])
+
+
+def _validated(rehearsal: Rehearsal, design: str, chunks: Mapping[str, Array]) -> Validated:
+    rows = np.concatenate([chunks[key] for key, name, *_ in _tasks(rehearsal) if name == design])
+    kept = rows[np.isfinite(rows).all(axis=1)]
+    if len(kept) < 2:
+        raise NoAnswer(f"design {design!r}: {len(rows) - len(kept)} of {len(rows)} simulated trials give no estimate")
+    p, known = len(rehearsal.parameters), rehearsal.truth.model
+    values = dict(zip(known.names, known.parameters.tolist(), strict=True))
+    return Validated(
+        design=design,
+        parameters=rehearsal.parameters,
+        truth=np.array([values.get(name, np.nan) for name in rehearsal.parameters]),
+        estimates=kept[:, :p],
+        stated=kept[:, p:],
+        forecast=_predicted(rehearsal, design, rehearsal.nominal),
+        theory=_predicted(rehearsal, design, rehearsal.truth),
+        failed=len(rows) - len(kept),
+    )
+
+
+def _predicted(rehearsal: Rehearsal, design: str, vessel: Vessel) -> Array:
+    """(p,) standard deviations that the design should give with a ship, by that ship's sensors; nan for random runs."""
+    runs = rehearsal.designs[design]
+    if runs is None or not set(rehearsal.parameters) <= set(vessel.model.names):
+        return np.full(len(rehearsal.parameters), np.nan)
+    covariance = expected_covariance(
+        replace(vessel, sensors=rehearsal.truth.sensors),
+        _rehearsed_parts(rehearsal, runs),
+        rehearsal.parameters,
+        environment=rehearsal.environment,
+        mean_subtraction=rehearsal.mean_subtraction,
+        integrator=rehearsal.integrator,
+    )
+    return np.asarray(np.sqrt(np.diag(covariance)))
+
+
+def _rehearsed_parts(rehearsal: Rehearsal, runs: Sequence[int]) -> tuple[TrialPart, ...]:
+    """Every run of a trial at its heading; repeats are counted where headings do not matter."""
+    if rehearsal.environment.isotropic:
+        return trial_parts(rehearsal.primitives, runs)
+    order = [item for item, count in zip(rehearsal.primitives, runs, strict=True) for _ in range(count)]
+    return tuple(
+        TrialPart(
+            commands=primitive.commands,
+            velocity=primitive.entry_velocity,
+            heading_rad=heading_rad(number),
+            standing=primitive.entry_inputs,
+        )
+        for number, primitive in enumerate(order)
+    )
+
+
+def trial_parts(
+    primitives: Sequence[Primitive], runs: Sequence[int], *, environment: Environment = CALM
+) -> tuple[TrialPart, ...]:
+    """The parts of a trial of whole runs, in the dictionary's order.
+
+    Wind and current make information depend on the heading; a trial of unknown headings then counts as spread evenly
+    over `HEADINGS` of them.
+    """
+    count = 1 if environment.isotropic else HEADINGS
+    return tuple(
+        TrialPart(
+            commands=primitive.commands,
+            velocity=primitive.entry_velocity,
+            heading_rad=2 * np.pi * turn / count,
+            standing=primitive.entry_inputs,
+            repeats=number / count,
+        )
+        for primitive, number in zip(primitives, runs, strict=True)
+        for turn in range(count if number else 0)
+    )

@@ -1,0 +1,6 @@
+"""Area files and the charts that they name."""
+
+from expdesign.scenario.charts.area_file import load_area
+from expdesign.scenario.charts.area_tables import Latitude, Longitude
+
+__all__ = ["Latitude", "Longitude", "load_area"]

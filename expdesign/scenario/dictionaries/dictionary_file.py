@@ -1,0 +1,144 @@
+"""Dictionary files: requests for manoeuvre primitives; a list of values makes a grid."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+from pydantic import Field
+
+from expdesign.dictionary import FAMILIES
+from expdesign.dictionary.spec import Family, PrimitiveSpec, complete_settings
+from expdesign.errors import InputError
+from expdesign.scenario.dictionaries.recorded_file import load_recorded
+from expdesign.scenario.tables import Entry, Table, Text, check_table, read_toml, shown
+
+LARGEST_GRID = 10_000
+NAME = re.compile(r"\w([\w .+-]{0,78}[\w+-])?")
+NAME_RULE = "at most 80 letters, digits, spaces and . _ + - that can name a file"
+
+
+class NameTable(Table):
+    """`[dictionary]`."""
+
+    name: Text = Field(description="a name for the dictionary")
+
+
+class DictionaryTable(Table):
+    """The whole file."""
+
+    dictionary: NameTable = Field(description="a table [dictionary] with a name")
+    primitives: list[dict[str, Any]] = Field(min_length=1, description="at least one table [[primitives]]")
+
+
+def load_dictionary(path: Path | str, *, families: tuple[Family, ...] = FAMILIES) -> tuple[PrimitiveSpec, ...]:
+    """Read a dictionary file.
+
+    Each `[[primitives]]` names a family and gives its settings; one with lists of values stands for every combination,
+    in the order of the file, the last list running fastest. Names are given by `name` or else by the family (with -2,
+    -3 ... for further entries of the same family); a grid adds `-setting-value`, without the unit, for every list.
+    `family = "recorded"` takes `file`, the path of a CSV of commands beside this file, instead of a duration.
+
+    Args:
+        path: a TOML file with `[dictionary]` and `[[primitives]]`.
+        families: the manoeuvre families it may ask for.
+
+    Raises:
+        FileError: unreadable, or something in it is wrong, missing or unknown, or a name occurs twice.
+    """
+    entry = Entry(Path(path))
+    file = check_table(DictionaryTable, read_toml(entry.path), entry)
+    by_name = {family.name: family for family in families}
+    specs: dict[str, PrimitiveSpec] = {}
+    unnamed: dict[str, int] = {}
+    for index, row in enumerate(file.primitives, start=1):
+        place = entry.at("primitives").item(index)
+        family = _family(row, by_name, place.at("family"))
+        stem = _stem(row, family, unnamed, place.at("name"))
+        for spec in (
+            _recorded(row, family, stem, place) if family.name == "recorded" else _grid(row, family, stem, place)
+        ):
+            if spec.name in specs:
+                raise place.at("name").error(f"is {spec.name!r}, expected a name not used before")
+            specs[spec.name] = replace(spec, place=f"{place.path}: {place.key}")
+    return tuple(specs.values())
+
+
+def _family(row: Mapping[str, Any], families: Mapping[str, Family], entry: Entry) -> Family:
+    name = row.get("family")
+    if not isinstance(name, str):
+        found = "is missing" if name is None else f"is {shown(name)}"
+        raise entry.error(f"{found}, expected one of {', '.join(families)}")
+    if name not in families:
+        raise entry.unknown(name, families)
+    return families[name]
+
+
+def _stem(row: Mapping[str, Any], family: Family, unnamed: dict[str, int], entry: Entry) -> str:
+    """The given name, or the family's with a number from the second unnamed entry on."""
+    if "name" not in row:
+        unnamed[family.name] = count = unnamed.get(family.name, 0) + 1
+        return family.name if count == 1 else f"{family.name}-{count}"
+    name = row["name"]
+    if not isinstance(name, str) or not NAME.fullmatch(name):
+        raise entry.error(f"is {shown(name)}, expected {NAME_RULE}")
+    return name
+
+
+def _recorded(row: Mapping[str, Any], family: Family, stem: str, entry: Entry) -> Iterator[PrimitiveSpec]:
+    """The one primitive of a command file; its duration is the file's."""
+    named = row.get("file")
+    if not isinstance(named, str) or not named:
+        found = "is missing" if named is None else f"is {shown(named)}"
+        raise entry.at("file").error(f"{found}, expected the path of a CSV of commands")
+    if "duration_s" in row:
+        raise entry.at("duration_s").error("is given, but the file of a recorded primitive tells how long it lasts")
+    commands, begins = load_recorded(entry.at("file").file(named))
+    rest = {name: value for name, value in row.items() if name != "file"}
+    for name in rest:
+        if name not in ("family", "name") and isinstance(rest[name], list):
+            raise entry.at(name).error("is a list, expected a number")
+    whole = {**begins, **rest, "duration_s": commands.duration_s}
+    for spec in _grid(whole, family, stem, entry):
+        yield replace(spec, commands=commands)
+
+
+def _grid(row: Mapping[str, Any], family: Family, stem: str, entry: Entry) -> Iterator[PrimitiveSpec]:
+    given = {name: value for name, value in row.items() if name not in ("family", "name")}
+    axes = {name: _values(value, entry.at(name)) for name, value in given.items()}
+    count = math.prod(len(values) for values in axes.values())
+    if count > LARGEST_GRID:
+        raise entry.error(f"makes {count} primitives, expected at most {LARGEST_GRID}")
+    lists = [name for name, value in given.items() if isinstance(value, list)]
+    for combination in product(*axes.values()):
+        settings = dict(zip(axes, combination, strict=True))
+        try:
+            complete = complete_settings(family, settings)
+        except InputError as error:
+            raise entry.error(str(error)) from None
+        name = "-".join([stem, *(f"{_without_unit(name)}-{settings[name]:.12g}" for name in lists)])
+        yield PrimitiveSpec(name=name, family=family.name, settings=complete)
+
+
+def _without_unit(setting: str) -> str:
+    """The setting's name as it reads in a primitive's: yaw_rate_radps -> yaw-rate."""
+    return re.sub(r"_(s|m|mps|rad|radps)$", "", setting).replace("_", "-")
+
+
+def _values(value: object, entry: Entry) -> list[float]:
+    """One value as a list of one, or a list without repeats."""
+    values: list[Any] = value if isinstance(value, list) else [value]
+    if not values:
+        raise entry.error("is an empty list, expected a number or a list of numbers")
+    for number in values:
+        if type(number) not in (int, float) or not abs(number) < 1e300:
+            raise entry.error(f"is {shown(number)}, expected a finite number or a list of them")
+    repeats = [number for number in values if values.count(number) > 1]
+    if repeats:
+        raise entry.error(f"has {shown(float(repeats[0]))} more than once, expected different values")
+    return [float(number) for number in values]

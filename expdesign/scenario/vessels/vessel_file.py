@@ -1,0 +1,189 @@
+"""Vessel files: particulars, actuators, model and sensors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from expdesign.errors import InputError
+from expdesign.scenario.tables import Entry, check_table, offer, read_toml, shown
+from expdesign.scenario.vessels.environment_table import build_environment
+from expdesign.scenario.vessels.vessel_tables import (
+    ACTUATOR_TABLES,
+    SAME_AS,
+    ActuatorTable,
+    ModelTable,
+    ParticularsTable,
+    SensorsTable,
+    TermTable,
+    VesselTable,
+)
+from expdesign.vessel import (
+    CALM,
+    KINDS,
+    SENSORS,
+    STRUCTURES,
+    Actuator,
+    Limit,
+    Mounting,
+    Response,
+    Roll,
+    Sensors,
+    Term,
+    Vessel,
+    VesselModel,
+    limit_keys,
+    response_keys,
+    structure_terms,
+)
+from expdesign.vessel.expressions import parse_expression
+from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS
+
+MOUNTING_KEYS = tuple(field.name for field in fields(Mounting))
+
+
+def load_vessel(path: Path | str) -> Vessel:
+    """Read a vessel file.
+
+    Args:
+        path: a TOML file with `[vessel]`, `[[actuators]]`, `[model]` and optionally `[sensors]` and `[environment]`.
+
+    Raises:
+        FileError: unreadable, or something in it is wrong, missing or unknown.
+    """
+    entry = Entry(Path(path))
+    file = check_table(VesselTable, read_toml(entry.path), entry)
+    actuators = _actuators(file.actuators, file.vessel, entry.at("actuators"))
+    model = _model(file.model, actuators, file.vessel.sample_time_s, entry.at("model"))
+    return Vessel(
+        **file.vessel.model_dump(),
+        model=model,
+        sensors=_sensors(file.sensors),
+        environment=CALM if file.environment is None else build_environment(file.environment),
+    )
+
+
+def _sensors(table: SensorsTable) -> Sensors:
+    flat: dict[str, Any] = table.model_dump()
+    for sensor in SENSORS:
+        keys = {key: f"{sensor}_{key}" for key in MOUNTING_KEYS if f"{sensor}_{key}" in flat}
+        flat[sensor] = Mounting(**{key: flat.pop(name) for key, name in keys.items()})
+    return Sensors(**flat)
+
+
+def _actuators(rows: list[dict[str, Any]], ship: ParticularsTable, entry: Entry) -> tuple[Actuator, ...]:
+    """Actuators numbered in file order; all kinds with a propeller share one count, so that signal names differ."""
+    actuators: list[Actuator] = []
+    for index, row in enumerate(rows, start=1):
+        table = _actuator_table(row, entry.item(index))
+        _check_place(table, ship, entry.item(index))
+        kind = SAME_AS.get(table.kind, table.kind)
+        number = 1 + sum(KINDS[other.kind][0] == KINDS[kind][0] for other in actuators)
+        limits = tuple(_limit(table, limit_keys(stem), entry.item(index)) for stem in KINDS[kind])
+        actuators.append(
+            Actuator(
+                kind=kind,
+                number=number,
+                forward_m=table.forward_m,
+                starboard_m=table.starboard_m,
+                limits=limits,
+                responses=tuple(_response(table, stem) for stem in KINDS[kind]),
+            )
+        )
+    _check_force_alone([actuator.kind for actuator in actuators], entry)
+    return tuple(actuators)
+
+
+def _actuator_table(row: Mapping[str, Any], entry: Entry) -> ActuatorTable:
+    kind = row.get("kind")
+    if not isinstance(kind, str):
+        found = "is missing" if kind is None else f"is {shown(kind)}"
+        raise entry.at("kind").error(f"{found}, expected one of {', '.join(ACTUATOR_TABLES)}")
+    if kind not in ACTUATOR_TABLES:
+        raise entry.at("kind").unknown(kind, ACTUATOR_TABLES)
+    return check_table(ACTUATOR_TABLES[kind], row, entry)
+
+
+def _check_place(table: ActuatorTable, ship: ParticularsTable, entry: Entry) -> None:
+    for name, reach in (("forward_m", ship.length_m), ("starboard_m", ship.beam_m)):
+        place = getattr(table, name)
+        if abs(place) > reach:
+            allowed = f"{-reach:g} to {reach:g}, counted from amidships"
+            raise entry.at(name).error(f"is {shown(place)}, expected {allowed}")
+
+
+def _check_force_alone(kinds: list[str], entry: Entry) -> None:
+    """Generalised forces are the sum over all thrusters: no thruster can stand beside them."""
+    if "force" in kinds and sum(kind != "rudder" for kind in kinds) > 1:
+        raise entry.item(kinds.index("force") + 1).at("kind").error("is 'force', expected no other thruster beside it")
+
+
+def _limit(table: ActuatorTable, keys: tuple[str, str, str], entry: Entry) -> Limit:
+    low, high, rate = (getattr(table, name) for name in keys)
+    if low is not None and high is not None and not low < high:
+        raise entry.at(keys[1]).error(f"is {shown(high)}, expected more than {keys[0]} = {shown(low)}")
+    return Limit(
+        low=-math.inf if low is None else low,
+        high=math.inf if high is None else high,
+        rate=math.inf if rate is None else rate,
+    )
+
+
+def _response(table: ActuatorTable, stem: str) -> Response:
+    lag, delay, deadband, offset = (getattr(table, key, 0.0) for key in response_keys(stem))
+    return Response(lag_s=lag, delay_s=delay, deadband=deadband, offset=offset)
+
+
+def _model(table: ModelTable, actuators: tuple[Actuator, ...], sample_time_s: float, entry: Entry) -> VesselModel:
+    if table.structure not in (*STRUCTURES, "custom"):
+        raise entry.at("structure").unknown(table.structure, (*STRUCTURES, "custom"))
+    _check_terms(table.terms, actuators, entry.at("terms"))
+    try:
+        terms = structure_terms(table.structure, tuple(Term(t.equation, t.name, t.expression) for t in table.terms))
+    except InputError as error:
+        raise entry.at("terms").error(str(error)) from None
+    names = [term.name for term in terms]
+    _check_names(table.parameters, names, entry.at("parameters"))
+    _check_names(table.parameter_std, names, entry.at("parameter_std"))
+    missing = [name for name in names if name not in table.parameters]
+    if missing:
+        found = f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing"
+        raise entry.at("parameters").error(f"{found}, expected every parameter of structure {table.structure!r}")
+    if table.roll is not None and not {"v", "r"} <= {term.equation for term in terms}:
+        raise entry.at("roll").error("needs terms of v and r, which roll acts on")
+    return VesselModel(
+        terms=terms,
+        parameters=np.array([table.parameters[name] for name in names]),
+        parameter_std=np.array([table.parameter_std.get(name, 0.0) for name in names]),
+        form=table.form,
+        sample_time_s=sample_time_s,
+        actuators=actuators,
+        roll=None if table.roll is None else Roll(**table.roll.model_dump()),
+    )
+
+
+def _check_terms(terms: list[TermTable], actuators: tuple[Actuator, ...], entry: Entry) -> None:
+    inputs = (name for actuator in actuators for name in actuator.signals)
+    signals = tuple(dict.fromkeys((*MOTION_SIGNALS, *FORCE_SIGNALS, *inputs)))
+    seen: dict[str, int] = {}
+    for index, term in enumerate(terms, start=1):
+        if term.name in seen:
+            found = f"is {shown(term.name)}, expected another name than that of term {seen[term.name]}"
+            raise entry.item(index).at("name").error(found)
+        seen[term.name] = index
+        try:
+            parse_expression(term.expression, signals=signals)
+        except InputError as error:
+            raise entry.item(index).at("expression").error(str(error)) from None
+
+
+def _check_names(given: Iterable[str], names: list[str], entry: Entry) -> None:
+    for name in given:
+        if name not in names:
+            problem = f"{shown(name)} is not a parameter of the structure, {offer(name, tuple(names))}"
+            raise entry.error(problem)

@@ -1,1 +1,0 @@
-"""Studies: many simulated cases at once, and published reference numbers beside our own."""
