@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 import shapely
 
-from expdesign.dictionary import Primitive
+from expdesign.dictionary import Primitive, PrimitiveSpec, build_primitive, complete_settings, family
 from expdesign.plan import PlanSettings
 from expdesign.plan.chart.clearance_grid import clearance_field
 from expdesign.plan.chart.goal_distance import build_goal_ways
@@ -19,6 +20,7 @@ from expdesign.plan.search.state import SearchSpace, stamp
 from expdesign.scenario import load_vessel
 from expdesign.sea_area import LocalFrame, SeaArea, as_multipolygon
 from expdesign.simulation import CALM
+from expdesign.vessel import Vessel
 
 VESSELS = Path(__file__).parents[1] / "scenarios" / "vessels"
 
@@ -34,9 +36,36 @@ def area(water: shapely.Geometry) -> SeaArea:
     )
 
 
-def ship():
+def ship() -> Vessel:
     """The nominal 30 m ship."""
     return load_vessel(VESSELS / "azimuth-30m.toml")
+
+
+def acceleration(vessel: Vessel, *, speed_mps: float = 4.0, duration_s: float = 60.0) -> Primitive:
+    """The run 'go': an acceleration from rest."""
+    settings = complete_settings(family("acceleration"), {"duration_s": duration_s, "speed_mps": speed_mps})
+    return build_primitive(vessel, PrimitiveSpec(name="go", family="acceleration", settings=settings))
+
+
+def primitive(vessel: Vessel) -> Primitive:
+    """The run 'go' at 1 m/s: a straight minute."""
+    return acceleration(vessel, speed_mps=1.0)
+
+
+def random_path(rng: np.random.Generator, begin: np.ndarray, steps: int) -> np.ndarray:
+    """A random path (steps + 1, 2) from a point."""
+    course = rng.uniform(-np.pi, np.pi) + np.cumsum(rng.normal(0, 0.5, steps))
+    step = rng.uniform(20, 60, (steps, 1)) * np.stack([np.cos(course), np.sin(course)], axis=1)
+    return np.asarray(begin + np.r_[np.zeros((1, 2)), np.cumsum(step, axis=0)])
+
+
+def place_in(text: str) -> np.ndarray:
+    """North and east [m] of the position that a message names."""
+    found = re.search(r"near (-?[\d.]+), (-?[\d.]+)", text)
+    assert found is not None, text
+    frame = LocalFrame(60.0, 25.0)
+    metres_per_degree = 1.0 / (frame.to_degrees(np.array([1.0, 1.0])) - [60.0, 25.0])
+    return (np.array(found.groups(), dtype=float) - [60.0, 25.0]) * metres_per_degree
 
 
 def leg_water(water: shapely.Geometry, *, clearance_m: float = 20.0) -> LegWater:

@@ -163,6 +163,21 @@ def test_no_room_is_crowded() -> None:
     assert crowded <= set(CROWDED)
 
 
+def test_no_test_imports_from_another_test_file() -> None:
+    tests = sorted(Path(__file__).parent.glob("*.py"))
+    imports = {(path.name, name) for path in tests for name in imported_names(path) if name.startswith("test_")}
+    assert imports == set()
+    assert "expdesign" in imported_names(Path(__file__))
+
+
+def imported_names(path: Path) -> set[str]:
+    """First parts of the names of all modules that a file imports, inside functions too."""
+    nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+    named = [alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names]
+    named += [node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)]
+    return {name.split(".")[0] for name in named}
+
+
 def test_the_scan_sees_the_whole_package() -> None:
     seen = {path.relative_to(ROOT).parts[0].removesuffix(".py") for path in ROOT.rglob("*.py")}
     assert {"errors", "vessel", "plan", "cli", "__main__"} <= seen

@@ -19,7 +19,7 @@ from expdesign.growing.values import GrowSettings, Growth
 from expdesign.information import MEAN_SUBTRACTIONS, score_primitives
 from expdesign.information.many import bordered_runs
 from expdesign.simulation import CALM, Environment
-from test_dictionary_command_families import rudder_ship
+from rudder_ship import rudder_ship
 
 SMALL = GrowSettings(rounds=3, pool=32, run_s=12.5, families=("zigzag", "turning_circle", "multisine"))
 

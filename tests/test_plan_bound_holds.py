@@ -19,8 +19,7 @@ from expdesign.plan.legs.water import leg_speed_mps, through_water
 from expdesign.signals import Commands
 from expdesign.simulation import CALM, Environment, simulate, to_body
 from expdesign.vessel import NUMPY
-from plan_case import area, at_rest, leg_water, ship
-from test_plan_verification_catches_what_is_wrong import primitive
+from plan_case import area, at_rest, leg_water, primitive, random_path, ship
 
 OPEN = shapely.box(-1000, -1000, 1000, 1000)
 WALL = shapely.box(-10, -1000, 10, 300)
@@ -185,13 +184,6 @@ def test_grown_water_holds_all_that_is_as_near():
     assert shapely.area(grown) < 1.001 * shapely.area(shapely.buffer(shapely.box(-1, -1, 1, 1), 50.0, quad_segs=500))
 
 
-def wandering(rng: np.random.Generator, begin: np.ndarray, steps: int) -> np.ndarray:
-    """A random way (k, 2) from a point on."""
-    course = rng.uniform(-np.pi, np.pi) + np.cumsum(rng.normal(0, 0.5, steps))
-    step = rng.uniform(20, 60, (steps, 1)) * np.stack([np.cos(course), np.sin(course)], axis=1)
-    return np.asarray(begin + np.r_[np.zeros((1, 2)), np.cumsum(step, axis=0)])
-
-
 @pytest.mark.parametrize("seed", range(40))
 def test_a_planted_plan_costs_no_less_than_the_bound(seed):
     """Water is laid round a plan: legs that wander at full speed, runs at random headings, in a random current."""
@@ -207,7 +199,7 @@ def test_a_planted_plan_costs_no_less_than_the_bound(seed):
         runs[name] = replace(straight, name=name, trajectory=track)
     here, spent, waters, repeats = np.zeros(2), 0.0, [], {"a": 0, "b": 0}
     for name in [*rng.choice(["a", "b"], 4), ""]:
-        leg = wandering(rng, here, int(rng.integers(1, 8)))
+        leg = random_path(rng, here, int(rng.integers(1, 8)))
         spent, here = spent + headway.seconds(np.diff(leg, axis=0)).sum(), leg[-1]
         waters.append(shapely.LineString(leg[:, ::-1]))
         if name:
@@ -297,7 +289,7 @@ def test_simulated_ships_whose_commands_move_at_their_rates_stay_between_the_spe
         told = leg_end(vessel, CALM, speed, standing, top_mps=1.36, yaw_rate_radps=0.4).changes
         most, least = told.most(speed, 0.1 * np.arange(301)), told.least(speed, 0.1 * np.arange(301))
         for _ in range(40):
-            # mostly hard ahead or astern, the angles wandering
+            # mostly hard ahead or astern, the angles random_path
             steps = np.where(rng.uniform(size=(30, 4)) < 0.7, rng.choice([-1.0, 1.0], 4), rng.uniform(-1, 1, (30, 4)))
             values = standing + np.cumsum(rates * steps, axis=0)
             values[:, ::2] = values[:, ::2].clip(-15.0, 15.0)

@@ -18,8 +18,7 @@ from expdesign.plan import PlanSettings, solve
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import plan_trial
 from expdesign.simulation import Environment
-from plan_case import area, ship
-from test_plan_says_what_is_impossible import acceleration, place_in
+from plan_case import acceleration, area, place_in, ship
 
 STRAIT_M, GAP_M, ASIDE_M = 250.0, 9.0, 160.0
 """How far north the strait is, half its width, and how far east of it a wide one is."""

@@ -17,9 +17,7 @@ from expdesign.plan.search.transitions import settled
 from expdesign.plan.solve import plan_trial
 from expdesign.plan.work_budget import Effort
 from expdesign.simulation import CALM
-from plan_case import area, at_rest, leg_water, ship, space_of
-from test_plan_says_what_is_impossible import acceleration
-from test_plan_verification_catches_what_is_wrong import primitive
+from plan_case import acceleration, area, at_rest, leg_water, primitive, ship, space_of
 
 
 @pytest.fixture(scope="module")

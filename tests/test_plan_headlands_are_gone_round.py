@@ -12,7 +12,7 @@ from expdesign.plan.bounds.branch_and_bound import GoalTimes, goal_times, grown_
 from expdesign.plan.bounds.displacement import Headway, carry
 from expdesign.plan.chart.visibility_graph import build_ways
 from expdesign.simulation import Environment
-from test_plan_bound_holds import primitive, ship, wandering
+from plan_case import primitive, random_path, ship
 
 SPEED = 1.2
 STILL = Headway(speed_mps=SPEED, current_to=np.zeros(2))
@@ -127,7 +127,7 @@ def test_a_planted_plan_costs_no_less_than_the_way_less_what_its_runs_save(seed)
     arm = (ship().length_m - ship().beam_m) / 2
     here, spent, lines, counts = np.zeros(2), 0.0, [], {"a": 0, "b": 0}
     for which in [*rng.integers(0, 2, 3), None]:
-        leg = wandering(rng, here, int(rng.integers(1, 6)))
+        leg = random_path(rng, here, int(rng.integers(1, 6)))
         spent, here = spent + headway.seconds(np.diff(leg, axis=0)).sum(), leg[-1]
         lines.append(leg)
         if which is None:

@@ -9,8 +9,7 @@ import shapely
 from expdesign.plan.legs.find import LegTask, find_leg
 from expdesign.plan.search.transitions import pairs_of, settled
 from expdesign.plan.values import Placement
-from plan_case import leg_water, space_of
-from test_plan_verification_catches_what_is_wrong import primitive
+from plan_case import leg_water, primitive, space_of
 
 
 @pytest.fixture(scope="module")

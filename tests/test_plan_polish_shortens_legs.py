@@ -12,8 +12,7 @@ from expdesign.plan.chart.visibility_graph import polyline_length
 from expdesign.plan.search.local_search import ChainEnds, measured_s, polished
 from expdesign.plan.search.state import SearchSpace, TriedJoint
 from expdesign.plan.search.successors import run_ends, runs_clear
-from plan_case import leg_water, space_of
-from test_plan_verification_catches_what_is_wrong import primitive
+from plan_case import leg_water, primitive, space_of
 
 ISLAND = shapely.box(-60, -200, 60, 40)
 START = np.array([0.0, -400.0, 0.0])

@@ -25,8 +25,7 @@ from expdesign.plan.timeline import Timeline
 from expdesign.plan.values import Leg
 from expdesign.scenario import load_scenario
 from expdesign.simulation import CALM, Environment
-from plan_case import at_rest, leg_water
-from test_plan_verification_catches_what_is_wrong import primitive
+from plan_case import at_rest, leg_water, primitive
 
 ROOT = Path(__file__).parents[1]
 OPEN = shapely.box(-400, -300, 400, 500)

@@ -14,17 +14,10 @@ from expdesign.errors import NoPlan, Unreachable
 from expdesign.plan import PlanSettings
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import plan_trial
-from expdesign.sea_area import LocalFrame
 from expdesign.simulation import CALM, Environment
-from plan_case import area, ship
+from plan_case import acceleration, area, place_in, ship
 
 WIDE = shapely.box(-1000, -1000, 1000, 1000)
-
-
-def acceleration(vessel, **settings: float):
-    kind = family("acceleration")
-    given = complete_settings(kind, {"duration_s": 60.0, "speed_mps": 4.0, **settings})
-    return build_primitive(vessel, PrimitiveSpec(name="go", family="acceleration", settings=given))
 
 
 def refusal(water: shapely.Geometry, *, start=(0.0, -200.0, 0.0), goal=(0.0, 200.0, 0.0), environment=CALM, **wishes):
@@ -42,15 +35,6 @@ def refusal(water: shapely.Geometry, *, start=(0.0, -200.0, 0.0), goal=(0.0, 200
     with pytest.raises(NoPlan) as caught:
         plan_trial(problem)
     return str(caught.value)
-
-
-def place_in(text: str) -> np.ndarray:
-    """North and east [m] of the position a message names."""
-    found = re.search(r"near (-?[\d.]+), (-?[\d.]+)", text)
-    assert found is not None, text
-    frame = LocalFrame(60.0, 25.0)
-    metres_per_degree = 1.0 / (frame.to_degrees(np.array([1.0, 1.0])) - [60.0, 25.0])
-    return (np.array(found.groups(), dtype=float) - [60.0, 25.0]) * metres_per_degree
 
 
 def test_water_too_small_for_a_run_names_the_run_its_length_and_where_the_search_stopped():

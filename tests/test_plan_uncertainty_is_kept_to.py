@@ -16,8 +16,7 @@ from expdesign.plan.runs.ensemble import Fleet
 from expdesign.plan.values import PlanSettings
 from expdesign.simulation import CALM, Environment, Variation
 from expdesign.vessel.hull import covering_discs
-from plan_case import area, ship
-from test_plan_verification_catches_what_is_wrong import primitive
+from plan_case import area, primitive, ship
 
 CENTRES = covering_discs(30.0, 9.0)[0]
 

@@ -8,20 +8,13 @@ import numpy as np
 import pytest
 import shapely
 
-from expdesign.dictionary import PrimitiveSpec, build_primitive, complete_settings, family
 from expdesign.plan.values import Leg
 from expdesign.plan.verify.checks import hull_clearance, verify_plan
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import CALM, simulate
-from plan_case import area, ship
+from plan_case import area, primitive, ship
 
 CLEARANCE_M = 20.0
-
-
-def primitive(vessel):
-    acceleration = family("acceleration")
-    settings = complete_settings(acceleration, {"duration_s": 60.0, "speed_mps": 1.0})
-    return build_primitive(vessel, PrimitiveSpec(name="go", family="acceleration", settings=settings))
 
 
 def sound():

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
+from design_case import SCENARIOS
 from diagnosis_case import hidden_record, vessel_of
 from expdesign import workflows
 from expdesign.diagnosis.data.windows import cut_windows
@@ -114,8 +115,6 @@ def test_what_does_not_follow_roll_says_so(tmp_path):
     with pytest.raises(InputError, match="period_s is -1"):
         replace(ROLL, period_s=-1.0)
     scenario, vessel = tmp_path / "scenario.toml", tmp_path / "vessel.toml"
-    from test_story_goes_on_after_diagnosis import SCENARIOS  # the files of an example
-
     own = load_vessel(SCENARIOS / "vessels/tender-20m.toml")
     vessel.write_text(vessel_toml(replace(own, model=replace(own.model, roll=ROLL))), encoding="utf-8")
     text = (SCENARIOS / "story.toml").read_text(encoding="utf-8")
