@@ -15,9 +15,11 @@ from expdesign.simulation import Conduct, steady_ahead, stopping, turning_circle
 from expdesign.vessel import Vessel
 from measured_trials import TUG_TRUE
 from nomoto_ship import nomoto_ship
+from sample_files import outside
 from vessel_files import KVLCC2, write_vessel
 
-DATA = Path(__file__).parents[2] / "shared" / "data" / "kvlcc2-hsva-7m"
+RUNS = ("10_01", "10_05", "10_10_p", "15_01", "15_05", "20_10_p", "25_05", "30_05")
+"""Helm and heading [deg] of the measured zig-zags."""
 SPEED, TEN = 2.0, math.radians(10)
 FINE = Conduct(speed_mps=SPEED, sample_time_s=0.02)
 
@@ -112,15 +114,17 @@ def test_positions_of_an_antenna_forward_are_brought_amidships() -> None:
     assert two.tactical_diameter_m == pytest.approx(one.tactical_diameter_m)
 
 
-@pytest.mark.skipif(not DATA.exists(), reason="measured trials are not here")
-@pytest.mark.parametrize("path", sorted(DATA.glob("*.csv")), ids=lambda path: path.stem)
-def test_measured_zigzags_show_the_overshoots_that_plain_readings_show(path: Path, tmp_path: Path) -> None:
+@pytest.mark.outside
+@pytest.mark.parametrize("run", RUNS)
+def test_measured_zigzags_show_the_overshoots_that_plain_readings_show(run: str, tmp_path: Path) -> None:
     """They lie between two plain readings, with the order taken early and late in the rudder's movement."""
     vessel = load_vessel(write_vessel(tmp_path / "kvlcc2.toml", KVLCC2))
-    batch = load_records([path], vessel_inputs=vessel.model.inputs, sample_time_s=None).batches[0]
+    batch = load_records(
+        [outside(f"kvlcc2-hsva-7m/zigzag_{run}.csv")], vessel_inputs=vessel.model.inputs, sample_time_s=None
+    ).batches[0]
     found = measured_trial(vessel, batch)
     assert isinstance(found, ZigZag)
-    helm, heading = float(path.stem.split("_")[1]), float(path.stem.split("_")[2])
+    helm, heading = (float(part) for part in run.split("_")[:2])
     assert math.degrees(found.helm_rad) == pytest.approx(helm, abs=0.5)
     assert math.degrees(found.heading_rad) == pytest.approx(heading, abs=1.5)
     rudder, course = batch.inputs[:, 1], batch.pose[:, 2]

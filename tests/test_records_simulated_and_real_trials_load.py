@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from expdesign.records import load_records
-from expdesign.signals import Commands, Record
+from expdesign.signals import Commands
 from expdesign.simulation import CALM, Environment, measure, simulate
 from expdesign.values import Array
 from expdesign.vessel import Actuator, Limit, Vessel, VesselModel, structure_terms
 from record_files import write_trial
+from sample_files import outside, outside_record
 
-DATA = Path(__file__).parents[2] / "shared" / "data"
 STEP = 1.0
 
 PARAMETERS = {
@@ -79,16 +79,9 @@ def test_velocities_from_a_simulated_pose_are_those_of_the_simulation(tmp_path: 
     assert np.abs(smoothed - velocity)[2:-2].max() < 0.02
 
 
-def real(folder: str, velocity: str = "measured") -> Record:
-    files = sorted((DATA / folder).glob("*.csv")) if (DATA / folder).is_dir() else []
-    if not files:
-        pytest.skip(f"{folder} is not here")
-    return load_records(files, vessel_inputs=("n1", "rudder1"), velocity=velocity)
-
-
 def errors(folder: str, method: str) -> Array:
     """Root-mean-square difference of u, v, r from the measured ones per run, (runs, 3)."""
-    pairs = zip(real(folder, method).batches, real(folder).batches, strict=True)
+    pairs = zip(outside_record(folder, velocity=method).batches, outside_record(folder).batches, strict=True)
     return np.array(
         [
             np.sqrt(np.mean((a.velocity - b.velocity[a.first_row - 2 : a.first_row - 2 + len(a)]) ** 2, axis=0))
@@ -100,22 +93,25 @@ def errors(folder: str, method: str) -> Array:
 REAL = [("kvlcc2-hsva-7m", 8, 0.05), ("esso-osaka-3m", 34, 0.1)]
 
 
+@pytest.mark.outside
 @pytest.mark.parametrize(("folder", "runs", "step"), REAL)
 def test_real_files_load_whole(folder: str, runs: int, step: float) -> None:
-    record = real(folder)
+    record = outside_record(folder)
     assert len(record.batches) == runs
     assert {batch.sample_time_s for batch in record.batches} == {step}
     for batch in record.batches:
-        lines = (DATA / folder / batch.name).read_text(encoding="utf-8").count("\n")
+        lines = (outside(folder) / batch.name).read_text(encoding="utf-8").count("\n")
         assert len(batch) == lines - 1
         assert np.abs(np.diff(batch.pose[:, 2])).max() < 0.2
 
 
+@pytest.mark.outside
 @pytest.mark.parametrize("method", ["difference", "smoothed"])
 def test_velocities_of_the_towing_tank_agree_to_a_millimetre_per_second(method: str) -> None:
     assert (errors("kvlcc2-hsva-7m", method) < 0.001).all()
 
 
+@pytest.mark.outside
 def test_velocities_of_the_pond_agree_as_well_as_its_positions_allow() -> None:
     """Positions there jump by centimetres: a smoother halves the error of the difference, at a speed of 0.3 m/s."""
     difference, smoothed = errors("esso-osaka-3m", "difference"), errors("esso-osaka-3m", "smoothed")

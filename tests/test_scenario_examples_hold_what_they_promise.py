@@ -6,10 +6,10 @@ import shapely
 
 from expdesign.errors import NoPlan
 from expdesign.scenario import load_area, load_scenario, load_vessel
+from sample_files import SAMPLES, outside
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENARIOS = ROOT / "scenarios"
-CHARTS = ROOT.parent / "shared" / "data" / "charts"
 
 # F. Ljungberg, doctoral thesis, Linköping University, Table 6.1 (true, nominal) and Table 9.1 (true, nominal).
 TABLE_6_1 = {
@@ -103,13 +103,12 @@ def test_every_scenario_file_loads():
         assert scenario.area.source
 
 
-@pytest.mark.skipif(not CHARTS.is_dir(), reason="charts are not there")
-def test_a_chart_of_a_hundred_thousand_points_with_depths_is_read(tmp_path):
+@pytest.mark.parametrize("points", [10_000, pytest.param(100_000, marks=pytest.mark.outside)])
+def test_a_chart_of_many_points_with_depths_is_read(tmp_path, points):
+    chart = SAMPLES / "kartverket/aalesund-centre.geojson" if points == 10_000 else outside("charts/aalesund.geojson")
     path = tmp_path / "aalesund.toml"
     layers = 'land_layers = ["land", "shore"]\ndepth_layers = {seabed0m = 0, seabed5m = 5, seabed10m = 10}'
-    path.write_text(
-        f'[area]\nname = "Ålesund"\n[chart]\ngeojson = "{CHARTS / "aalesund.geojson"}"\n{layers}\n', "utf-8"
-    )
+    path.write_text(f'[area]\nname = "Ålesund"\n[chart]\ngeojson = "{chart}"\n{layers}\n', "utf-8")
     shallow, deep = load_area(path, draught_m=2.5), load_area(path, draught_m=8.0)
     assert deep.water.area < shallow.water.area
     assert deep.water.difference(shallow.water).area < 1e-3 * deep.water.area

@@ -8,10 +8,9 @@ import shapely
 
 from expdesign.errors import FileError, NoPlan
 from expdesign.scenario import load_area
+from sample_files import SAMPLES
 
-CHARTS = Path(__file__).parents[2] / "shared" / "data" / "charts"
-CELL = CHARTS / "US5WA22M.000"
-needs_cell = pytest.mark.skipif(not CELL.exists(), reason="the S-57 cell is not beside the project")
+CELL = SAMPLES / "noaa-enc" / "US5WA22M.000"
 DRAUGHT_M, NEEDED_M = 2.5, 3.5
 
 
@@ -34,8 +33,6 @@ def in_frame(area, geometries):
 
 @pytest.fixture(scope="module")
 def harbour(tmp_path_factory):
-    if not CELL.exists():
-        pytest.skip("the S-57 cell is not beside the project")
     return load_area(write_area(tmp_path_factory.mktemp("cell"), CELL), draught_m=DRAUGHT_M)
 
 
@@ -75,7 +72,6 @@ def test_edition_updates_and_datum_are_told(harbour):
     assert any("mean lower low water" in note for note in harbour.notes)
 
 
-@needs_cell
 def test_without_update_files_it_says_so_and_with_a_gap_it_stops(tmp_path):
     cell = Path(shutil.copy(CELL, tmp_path))
     area = load_area(write_area(tmp_path, cell), draught_m=DRAUGHT_M)
@@ -85,7 +81,6 @@ def test_without_update_files_it_says_so_and_with_a_gap_it_stops(tmp_path):
         load_area(write_area(tmp_path, cell), draught_m=DRAUGHT_M)
 
 
-@needs_cell
 def test_tide_opens_water_and_draught_closes_it(tmp_path, harbour):
     high = load_area(write_area(tmp_path, CELL, rest="[depth]\ntide_m = 3.0"), draught_m=DRAUGHT_M)
     deep = load_area(write_area(tmp_path, CELL), draught_m=DRAUGHT_M + 3.0)
@@ -94,7 +89,6 @@ def test_tide_opens_water_and_draught_closes_it(tmp_path, harbour):
     assert "- 3 m tide = 0.5 m" in high.depth_rule
 
 
-@needs_cell
 def test_bridges_open_for_ships_that_fit_below(tmp_path, harbour):
     low = load_area(write_area(tmp_path, CELL, "air_draught_m = 6.0"), draught_m=DRAUGHT_M)
     opened = low.water.difference(harbour.water)
@@ -107,7 +101,6 @@ def test_bridges_open_for_ships_that_fit_below(tmp_path, harbour):
     assert opened.difference(crossings.buffer(1.1)).area < 1.0
 
 
-@needs_cell
 def test_nowhere_deep_enough_names_the_deepest(tmp_path):
     with pytest.raises(NoPlan, match=r"no charted depth reaches .* = 41 m, the deepest is 15\.6 m"):
         load_area(write_area(tmp_path, CELL), draught_m=40.0)
@@ -121,7 +114,6 @@ def test_files_that_are_no_cells_are_refused(tmp_path, content):
         load_area(write_area(tmp_path, cell), draught_m=DRAUGHT_M)
 
 
-@needs_cell
 def test_depths_for_drawing_cover_the_water(harbour):
     drawn = shapely.union_all([polygons for _, polygons in harbour.depths])
     assert harbour.water.difference(drawn.buffer(0.01)).area < 1.0

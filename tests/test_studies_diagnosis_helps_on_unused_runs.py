@@ -1,14 +1,11 @@
 """On real trials the diagnosis names what is known to act, and mending it helps on runs that nobody used."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from diagnosis_real import POND, averaged_over, tried
 from expdesign.signals import Batch
-
-DATA = Path(__file__).parents[2] / "shared" / "data"
+from sample_files import outside
 
 
 def test_averages_keep_means_and_are_cut_to_whole_samples() -> None:
@@ -21,12 +18,11 @@ def test_averages_keep_means_and_are_cut_to_whole_samples() -> None:
     np.testing.assert_allclose(found.inputs[0], rows[:5, :1].mean(axis=0))
 
 
+@pytest.mark.outside
 @pytest.mark.slow
 def test_wind_is_named_first_on_the_pond_and_sway_is_predicted_better() -> None:
     """The pond's wind of 1-2 m/s acts on a model that makes 0.05-0.4 m/s: Wakita et al. (2022) measured it for that."""
-    if not (DATA / POND.folder).is_dir():
-        pytest.skip(f"{POND.folder} is not here")
-    result = tried(POND, DATA)
+    result = tried(POND, outside(POND.folder).parent)
     assert result.found.findings[0].cause == "wind"
     sway = [np.mean([rows[name][1] for name in rows]) for rows in (result.before, result.after)]
     assert sway[1] < sway[0]

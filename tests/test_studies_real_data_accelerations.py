@@ -6,25 +6,16 @@ import numpy as np
 import pytest
 
 from expdesign.errors import InputError, NoAnswer
-from expdesign.records import load_records
 from expdesign.scenario import load_vessel
 from expdesign.signals import Batch, Record
 from expdesign.vessel import VesselModel
 from real_data import explained_accelerations
+from sample_files import outside_record
 from vessel_files import ESSO_WIND, KVLCC2, write_vessel
-
-DATA = Path(__file__).parents[2] / "shared" / "data"
 
 
 def tanker(folder: Path, text: str = KVLCC2) -> VesselModel:
     return load_vessel(write_vessel(folder / "tanker.toml", text)).model
-
-
-def real(folder: str) -> Record:
-    files = sorted((DATA / folder).glob("*.csv")) if (DATA / folder).is_dir() else []
-    if not files:
-        pytest.skip(f"{folder} is not here")
-    return load_records(files, vessel_inputs=("n1", "rudder1"))
 
 
 def swinging(noise: float = 0.0) -> Record:
@@ -67,15 +58,17 @@ def test_wrong_windows_are_refused(tmp_path: Path) -> None:
         explained_accelerations(model, swinging(), window_s=2.0, wind=True)
 
 
+@pytest.mark.outside
 def test_the_towing_tank_is_nearly_all_explained(tmp_path: Path) -> None:
     """An independent fit of the same data reached 0.98, 1.00 and 0.98."""
-    found = explained_accelerations(tanker(tmp_path), real("kvlcc2-hsva-7m"), window_s=4.0)
+    found = explained_accelerations(tanker(tmp_path), outside_record("kvlcc2-hsva-7m"), window_s=4.0)
     assert list(found.values()) == pytest.approx([0.98, 1.00, 0.98], abs=0.03)
 
 
+@pytest.mark.outside
 def test_on_the_pond_wind_explains_a_good_part(tmp_path: Path) -> None:
     """An independent fit reached 0.70, 0.74, 0.66 with wind and 0.62, 0.46, 0.53 without."""
-    model, record = tanker(tmp_path, ESSO_WIND), real("esso-osaka-3m")
+    model, record = tanker(tmp_path, ESSO_WIND), outside_record("esso-osaka-3m")
     windy = explained_accelerations(model, record, window_s=8.0, wind=True)
     still = explained_accelerations(model, record, window_s=8.0)
     assert list(windy.values()) == pytest.approx([0.70, 0.74, 0.66], abs=0.06)

@@ -1,7 +1,6 @@
 """What limits a fit is found: constants, noise, instability and uncertain parameters where nothing else acts."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,14 +10,13 @@ from expdesign.assessment.limits import AHEAD_S, Limits
 from expdesign.assessment.runs import RunCheck
 from expdesign.estimation.methods import estimate
 from expdesign.estimation.replay.replay import Integration
-from expdesign.records import load_records
 from expdesign.signals import Batch, Record
 from expdesign.simulation import simulate
 from expdesign.vessel import Actuator, Limit, Term, VesselModel
 from measured_trials import MODEL_SHIP_TRUE, model_ship_commands
-from real_data_cases import POND, TANK, Case, vessel_of
+from real_data_cases import POND, TANK, vessel_of
+from sample_files import outside_record
 
-DATA = Path(__file__).parents[2] / "shared" / "data"
 RK4 = Integration("rk4", 2)
 MODEL = MODEL_SHIP_TRUE.model
 
@@ -125,17 +123,10 @@ def test_without_misfit_prediction_ahead_is_exact() -> None:
     assert AHEAD_S > 0
 
 
-def runs_of(case: Case, beginnings: tuple[str, ...]) -> Record:
-    folder = DATA / case.folder
-    files = [path for path in sorted(folder.glob("*.csv")) if path.stem.startswith(beginnings)]
-    if not files:
-        pytest.skip(f"{case.folder} is not here")
-    return load_records(files, vessel_inputs=("n1", "rudder1"))
-
-
+@pytest.mark.outside
 def test_a_tanker_is_unstable_on_her_course_and_stable_in_large_turns() -> None:
     """KVLCC2 is known not to keep her course: about it, in 10/1 zig-zags, errors grow, far from it they die away."""
-    used, tests = runs_of(TANK, TANK.used), runs_of(TANK, ("zigzag_10_01", "zigzag_30_05"))
+    used, tests = outside_record(TANK.folder, TANK.used), outside_record(TANK.folder, ("zigzag_10_01", "zigzag_30_05"))
     found = assess(vessel_of(TANK), used, Wish(methods=("ls",)), tests=tests)
     limits = {run.batch.name: item for item, run in zip(found.limits, found.best.runs, strict=True)}
     assert limits["zigzag_10_01.csv"].unstable
@@ -148,10 +139,11 @@ def test_a_tanker_is_unstable_on_her_course_and_stable_in_large_turns() -> None:
             assert item.constant + item.slow + item.quick == pytest.approx(np.ones(3), abs=0.02), name
 
 
+@pytest.mark.outside
 @pytest.mark.slow
 def test_on_the_pond_instruments_in_the_measured_wind_give_a_stable_model() -> None:
     """Simulated in calm air instruments do not follow a ship that drifts in the wind, and every run diverged."""
-    used, tests = runs_of(POND, POND.used), runs_of(POND, POND.tests)
+    used, tests = outside_record(POND.folder, POND.used), outside_record(POND.folder, POND.tests)
     found = assess(vessel_of(POND), used, Wish(methods=("iv-air", "ls-air")), tests=tests)
     instruments, squares = found.methods
     assert instruments.stable

@@ -28,9 +28,9 @@ from measured_trials import (
     write_run,
 )
 from record_files import write_trial
+from sample_files import outside
 from vessel_files import KVLCC2, write_vessel
 
-DATA = Path(__file__).parents[2] / "shared" / "data"
 TRUTH = dict(zip(MODEL_SHIP_TRUE.model.names, MODEL_SHIP_TRUE.model.parameters.tolist(), strict=True))
 SENSORS = load_vessel(MODEL_SHIP).sensors
 
@@ -201,10 +201,9 @@ def test_autocorrelation_is_the_mean_product_of_pairs_that_exist() -> None:
         assert found[lag] == pytest.approx(np.mean(pairs, axis=0) / (values**2).mean(axis=0))
 
 
+@pytest.mark.outside
 def test_free_running_tests_of_a_tanker_predict_runs_kept_apart(tmp_path: Path) -> None:
-    folder = DATA / "kvlcc2-hsva-7m"
-    if not folder.is_dir():
-        pytest.skip("the towing-tank data are not here")
+    folder = outside("kvlcc2-hsva-7m")
     used = [folder / f"zigzag_{name}.csv" for name in ("10_05", "15_05", "25_05")]
     vessel = write_vessel(tmp_path / "tanker.toml", KVLCC2)
     outcome = workflows.estimate(
