@@ -11,6 +11,7 @@ from expdesign.errors import InputError
 from expdesign.signals import Commands
 from expdesign.simulation import (
     CALM,
+    ActuatorState,
     Environment,
     deliver,
     delivered,
@@ -178,6 +179,28 @@ def test_truths_and_commands_of_their_own_are_delivered_alike():
         alone = simulate(ship, commands, velocity=(1.0, 0.0, 0.0), standing=STANDING, environment=CALM)
         np.testing.assert_allclose(own[:, index, :3], alone.pose, rtol=1e-10, atol=1e-10)
     np.testing.assert_allclose(shared[:, 0], own[:, 1], rtol=1e-10, atol=1e-10)
+
+
+@pytest.mark.parametrize("responses", [(SPEED, ANGLE), (IDEAL, ANGLE), (IDEAL, IDEAL)])
+def test_stepping_sample_by_sample_delivers_what_is_delivered_to_commands_known_beforehand(
+    responses: tuple[Response, ...],
+):
+    commands = np.random.default_rng(3).normal(size=(40, 2, 5))
+    standing, step = np.ones((2, 5)), {"sample_time_s": 0.5, "substeps": 2}
+    known = deliver(responses, commands, standing=standing, **step)
+    actuators = ActuatorState.standing(responses, standing, **step)
+    for command, expected in zip(commands, known, strict=True):
+        np.testing.assert_allclose(actuators.mean(command), expected, rtol=1e-12, atol=1e-12)
+        actuators = actuators.after(command)
+
+
+def test_actuators_of_ships_that_wait_stay_as_they_are():
+    commands, moving = np.random.default_rng(4).normal(size=(2, 2)), np.array([True, False])
+    before = ActuatorState.standing((SPEED, ANGLE), np.ones((2, 2)), sample_time_s=0.5, substeps=2)
+    after, all_moved = before.after(commands, moving), before.after(commands)
+    np.testing.assert_array_equal(after.values, np.where(moving, all_moved.values, before.values))
+    for now, moved, then in zip(after.past, all_moved.past, before.past, strict=True):
+        np.testing.assert_array_equal(now, np.where(moving, moved, then))
 
 
 def test_what_is_delivered_can_be_asked_for():

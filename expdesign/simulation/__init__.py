@@ -1,6 +1,7 @@
 """Simulation: equations of motion, integrators, environment and sensors."""
 
 from expdesign.simulation.actuation import (
+    ActuatorState,
     SampleMap,
     deliver,
     delivered,
@@ -28,6 +29,7 @@ from expdesign.simulation.standard_trials import initial_turn, pull_out, stoppin
 __all__ = [
     "CALM",
     "STEADY",
+    "ActuatorState",
     "Approach",
     "Conduct",
     "Ensemble",

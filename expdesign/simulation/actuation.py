@@ -1,7 +1,9 @@
-"""What actuators deliver of their commands: dead time, dead band, first-order lag and misalignment.
+"""What actuators deliver of their commands: dead band, dead time, first-order lag and misalignment, in this order.
 
-Commands are held between samples, so the lag answers in closed form. Equations of motion see the mean of what is
-delivered over each integrator step. A signal whose response is ideal passes through untouched, to the last bit.
+Commands are held between samples, so the lag has a closed form: `sample_map` states it once, linear in what is
+delivered and in the commands, for arrays and for symbols. `deliver` applies it to commands that are known beforehand,
+`ActuatorState` sample by sample to commands that follow the motion. Equations of motion see the mean of what is
+delivered over each integrator step. A signal with the ideal response passes through unchanged, to the last bit.
 
 Before the first sample `standing` commands have stood for long; without them the first ones have.
 """
@@ -14,6 +16,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.signal import lfilter
 
 from expdesign.signals import Commands
 from expdesign.values import Array, seal
@@ -147,7 +150,71 @@ def _signals(through: SampleMap, command: Array, before: Any) -> tuple[Array, Ar
     history = np.concatenate([np.repeat(first[None], min(through.lateness, count) + 1, axis=0), effective])
     early, late = history[:count], history[1 : count + 1]
     keep, of_early, of_late = through.end.tolist()
-    values = [first]
-    for driven in of_early * early + of_late * late:
-        values.append(keep * values[-1] + driven)
-    return np.array(values), early, late
+    driven = of_early * early + of_late * late
+    ends = lfilter([1.0], [1.0, -keep], driven, axis=0, zi=keep * first[None])[0]
+    return np.concatenate([first[None], ends]), early, late
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ActuatorState:
+    """Where the actuators of n ships stand as a sample begins: `deliver` for commands that are not known beforehand.
+
+    Attributes:
+        maps: (m) how each signal goes through a sample; None where its response is ideal.
+        substeps: integrator steps per sample.
+        values: (m, n) what is delivered, less the misalignment.
+        past: for each signal (lateness + 1, n) commands past the dead band that have not come through, oldest first.
+    """
+
+    maps: tuple[SampleMap | None, ...]
+    substeps: int
+    values: Array
+    past: tuple[Array, ...]
+
+    @classmethod
+    def standing(
+        cls, responses: Sequence[Response], commands: Array, *, sample_time_s: float, substeps: int
+    ) -> ActuatorState:
+        """After commands (m, n) that have stood for long."""
+        maps = tuple(
+            None if response == IDEAL else sample_map(response, sample_time_s=sample_time_s, substeps=substeps)
+            for response in responses
+        )
+        values = np.array([_effective(through, row) for through, row in zip(maps, commands, strict=True)])
+        counts = [through.lateness + 1 if through else 0 for through in maps]
+        past = tuple(np.tile(row, (count, 1)) for row, count in zip(values, counts, strict=True))
+        return cls(maps=maps, substeps=substeps, values=values, past=past)
+
+    def mean(self, commands: Array) -> Array:
+        """(substeps, m, n) mean over each integrator step of a sample with these commands (m, n).
+
+        Where every response is ideal (1, m, n), the commands themselves.
+        """
+        if not any(self.maps):
+            return commands[None]
+        result = np.repeat(commands[None], self.substeps, axis=0)
+        for row, through in enumerate(self.maps):
+            if through is not None:
+                result[:, row] = through.means @ self._driving(row, commands[row]) + through.offset
+        return result
+
+    def after(self, commands: Array, moving: np.ndarray | bool = True) -> ActuatorState:
+        """One sample later, for the ships that move (n,); the others stay as they are."""
+        values, pasts = np.where(moving, commands, self.values), list(self.past)
+        for row, through in enumerate(self.maps):
+            if through is not None:
+                driving = self._driving(row, commands[row])
+                values[row] = np.where(moving, through.end @ driving, self.values[row])
+                later = np.concatenate([self.past[row][1:], _effective(through, commands[row])[None]])
+                pasts[row] = np.where(moving, later, self.past[row])
+        return ActuatorState(maps=self.maps, substeps=self.substeps, values=values, past=tuple(pasts))
+
+    def _driving(self, row: int, command: Array) -> Array:
+        """(3, n) what a signal starts from, and the commands that act early and late in the sample."""
+        on_their_way = np.concatenate([self.past[row], _effective(self.maps[row], command)[None]])
+        return np.concatenate([self.values[row][None], on_their_way[:2]])
+
+
+def _effective(through: SampleMap | None, command: Array) -> Array:
+    """Commands past the dead band, as floats."""
+    return np.asarray(command if through is None else past_deadband(command, through.deadband), dtype=float)

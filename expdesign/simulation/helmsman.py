@@ -15,12 +15,12 @@ from scipy.optimize import brentq
 
 from expdesign.errors import Diverged, NoAnswer
 from expdesign.signals import Commands, Trajectory
-from expdesign.simulation.actuation import SampleMap, past_deadband, sample_map
+from expdesign.simulation.actuation import ActuatorState
 from expdesign.simulation.helm import Approach, Helm
 from expdesign.simulation.motion import State, begun, motion_rates, rk4_step
 from expdesign.simulation.run import LARGEST_SPEED, SUBSTEPS
 from expdesign.values import Array
-from expdesign.vessel import IDEAL, SCALAR, Vessel
+from expdesign.vessel import SCALAR, Vessel
 
 Trial = tuple[Commands, Trajectory]
 LONGEST = 300.0
@@ -106,18 +106,19 @@ def sail(approach: Approach, stages: Iterable[Stage], conduct: Conduct, what: st
     state: State = begun(vessel.model, (0.0, 0.0, 0.0, *approach.velocity.tolist()))
     rows: list[list[float]] = []
     states, began_s, finished = [state], 0.0, False
-    engine_room = _Delivery.standing(vessel, approach.inputs.tolist(), step_s)
+    standing = approach.inputs[:, None]
+    actuators = ActuatorState.standing(vessel.responses, standing, sample_time_s=step_s, substeps=SUBSTEPS)
     while not finished and len(rows) < round(end_s / step_s):
         stage, since_s = waiting[0], len(rows) * step_s - began_s
         row, moved = orders.toward(stage, stage, 1.0)
-        share = _share_left(vessel, engine_room.given(row), state, stage, since_s, step_s)
+        share = _share_left(vessel, _delivered(actuators, row), state, stage, since_s, step_s)
         if share is not None and len(waiting) > 1:
             waiting, began_s = waiting[1:], len(rows) * step_s + share * step_s
             row, moved = orders.toward(stage, waiting[0], share)
         elif share is not None:
             finished = conduct.duration_s is None
-        orders, state = moved, _stepped(vessel, engine_room.given(row), state, step_s, step_s)
-        engine_room = engine_room.after(row)
+        orders, state = moved, _stepped(vessel, _delivered(actuators, row), state, step_s, step_s)
+        actuators = actuators.after(np.array(row)[:, None])
         rows.append(row)
         states.append(state)
     if conduct.duration_s is None and not finished:
@@ -125,6 +126,12 @@ def sail(approach: Approach, stages: Iterable[Stage], conduct: Conduct, what: st
     table: Array = np.array(states)
     commands = Commands(sample_time_s=step_s, names=vessel.model.inputs, values=np.array(rows))
     return commands, Trajectory(sample_time_s=step_s, pose=table[:, :3], velocity=table[:, 3:6])
+
+
+def _delivered(actuators: ActuatorState, row: list[float]) -> list[list[float]]:
+    """(substeps, m) what the actuators give over the steps of a sample with these commands."""
+    given = actuators.mean(np.array(row)[:, None])[..., 0]
+    return np.broadcast_to(given, (SUBSTEPS, len(row))).tolist()  # type: ignore[no-any-return]
 
 
 def _share_left(
@@ -155,62 +162,3 @@ def _stepped(vessel: Vessel, given: list[list[float]], state: State, step_s: flo
     if not all(abs(speed) < LARGEST_SPEED for speed in state[3:]):
         raise Diverged(f"vessel {vessel.name!r}: the model is unstable: a speed passes {LARGEST_SPEED:g} m/s or rad/s")
     return state
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Delivery:
-    """What the actuators make of commands, sample by sample: `deliver` for commands that are not known beforehand.
-
-    Attributes:
-        maps: how each signal goes through a sample, or None where its response is ideal.
-        values: delivered by each signal as the sample begins, less its misalignment.
-        past: commands past the dead band that have not come through, for each signal the oldest first.
-    """
-
-    maps: tuple[SampleMap | None, ...]
-    values: tuple[float, ...]
-    past: tuple[tuple[float, ...], ...]
-
-    @classmethod
-    def standing(cls, vessel: Vessel, row: list[float], step_s: float) -> _Delivery:
-        """After commands that have stood for long."""
-        maps = tuple(
-            None if response == IDEAL else sample_map(response, sample_time_s=step_s, substeps=SUBSTEPS)
-            for response in vessel.responses
-        )
-        felt = tuple(_felt(through, command) for through, command in zip(maps, row, strict=True))
-        lateness = [through.lateness if through else 0 for through in maps]
-        return cls(
-            maps=maps,
-            values=felt,
-            past=tuple((value,) * (late + 1) for value, late in zip(felt, lateness, strict=True)),
-        )
-
-    def given(self, row: list[float]) -> list[list[float]]:
-        """(substeps, m) means over the steps of a sample with these commands."""
-        columns = []
-        for through, value, past, command in zip(self.maps, self.values, self.past, row, strict=True):
-            if through is None:
-                columns.append([command] * SUBSTEPS)
-                continue
-            driven = (value, *_arriving(past, _felt(through, command)))
-            columns.append([float(means @ driven) + through.offset for means in through.means])
-        return [list(step) for step in zip(*columns, strict=True)]
-
-    def after(self, row: list[float]) -> _Delivery:
-        """One sample later."""
-        values, pasts = [], []
-        for through, value, past, command in zip(self.maps, self.values, self.past, row, strict=True):
-            felt = _felt(through, command)
-            values.append(float(through.end @ (value, *_arriving(past, felt))) if through else felt)
-            pasts.append((*past[1:], felt))
-        return _Delivery(maps=self.maps, values=tuple(values), past=tuple(pasts))
-
-
-def _felt(through: SampleMap | None, command: float) -> float:
-    return command if through is None else float(past_deadband(command, through.deadband))
-
-
-def _arriving(past: tuple[float, ...], felt: float) -> tuple[float, float]:
-    """The commands that act early and late in a sample, of those on their way and the new one."""
-    return past[0], (*past, felt)[1]

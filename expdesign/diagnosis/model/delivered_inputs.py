@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.signal import lfilter
 
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.model.extended import Extended
+from expdesign.simulation import deliver
 from expdesign.values import Array
-from expdesign.vessel import stem
+from expdesign.vessel import Response, stem
 
 
 def members(group: str, inputs: tuple[str, ...]) -> list[int]:
@@ -41,6 +41,8 @@ def grouped(values: Mapping[str, float], inputs: tuple[str, ...]) -> dict[str, f
     return {group: value for group, value in found.items() if value}
 
 
+RESPONSES = (("deadband", "deadband"), ("delay", "delay_s"), ("lag", "lag_s"), ("offset", "offset"))
+"""Kinds of effects, in the order in which they act, and the field of a response that each is."""
 FINER = 4
 """Steps within an integrator step in which moving actuators are followed: forces are not linear in angles."""
 
@@ -52,42 +54,22 @@ def followed_inputs(ship: Extended, windows: Windows) -> tuple[tuple[Array, int]
     parts = -(-FINER // windows.rows_per_step) if moving else 1
     acting = tuple(np.repeat(rows, parts, axis=0) for rows in windows.batch_inputs)
     finer = parts * windows.rows_per_step
-    for kind, change in (("deadband", _dead_band), ("delay", _delayed), ("lag", _lagged), ("offset", _offset)):
+    for kind, field in RESPONSES:
         for key, value in ship.effects.items():
             if key.startswith(kind + ":") and value != 0.0:
-                columns = members(key.split(":", 1)[1], inputs)
-                acting = tuple(_changed(rows, columns, change, value, windows.step_s / finer) for rows in acting)
+                columns, response = members(key.split(":", 1)[1], inputs), _response(field, value)
+                acting = tuple(_answered(rows, columns, response, windows.step_s / finer) for rows in acting)
     return tuple((rows, finer) for rows in acting)
 
 
-def _changed(rows: Array, columns: list[int], change, value: float, step_s: float) -> Array:  # type: ignore[no-untyped-def]
+def _response(field: str, value: float) -> Response:
+    """A response with one effect; fits may try times and dead bands below zero, which are none."""
+    return Response(**{field: value if field == "offset" else max(value, 0.0)})
+
+
+def _answered(rows: Array, columns: list[int], response: Response, step_s: float) -> Array:
+    """Inputs (k, m) of which some columns go through actuators with this response."""
     result = np.array(rows)
-    result[:, columns] = change(result[:, columns], value, step_s)
+    responses = (response,) * len(columns)
+    result[:, columns] = deliver(responses, result[:, columns], sample_time_s=step_s)[:, 0]
     return result
-
-
-def _dead_band(rows: Array, width: float, step_s: float) -> Array:
-    return np.where(np.abs(rows) < width, 0.0, rows)
-
-
-def _offset(rows: Array, value: float, step_s: float) -> Array:
-    return rows + value
-
-
-def _delayed(rows: Array, delay_s: float, step_s: float) -> Array:
-    """Held inputs late by any time: the mean over each step of what then acts."""
-    whole, share = divmod(max(delay_s, 0.0) / step_s, 1.0)
-    index = np.arange(len(rows)) - int(whole)
-    near, far = rows[np.maximum(index, 0)], rows[np.maximum(index - 1, 0)]
-    return (1 - share) * near + share * far
-
-
-def _lagged(rows: Array, lag_s: float, step_s: float) -> Array:
-    """First-order lag, the mean over each step."""
-    if lag_s <= 1e-9:
-        return rows
-    fade = np.exp(-step_s / lag_s)
-    mean_share = lag_s / step_s * (1 - fade)
-    ends = lfilter([1 - fade], [1.0, -fade], rows, axis=0, zi=fade * rows[:1])[0]
-    begins = np.concatenate([rows[:1], ends[:-1]])
-    return np.asarray(rows + (begins - rows) * mean_share)

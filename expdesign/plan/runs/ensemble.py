@@ -11,13 +11,12 @@ from functools import partial
 
 import numpy as np
 
-from expdesign.simulation import Environment, rk4_step, sample_map
-from expdesign.simulation.actuation import SampleMap, past_deadband
+from expdesign.simulation import ActuatorState, Environment, rk4_step
 from expdesign.simulation.environment import vary
 from expdesign.simulation.program import RatesProgram
 from expdesign.simulation.run import LARGEST_SPEED, SUBSTEPS
 from expdesign.values import Array, seal
-from expdesign.vessel import IDEAL, Vessel
+from expdesign.vessel import Vessel
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -72,9 +71,10 @@ class Fleet:
         self.states: Array = np.tile(state, (runs, 1))
         self.given: Array = np.tile(standing, (runs, 1))
         self.lost = np.zeros(runs, dtype=bool)
-        self._actuators = [_Signal(vessel, column, self.given[:, column]) for column in range(self.given.shape[1])]
+        self._actuators = ActuatorState.standing(
+            vessel.responses, self.given.T, sample_time_s=vessel.sample_time_s, substeps=SUBSTEPS
+        )
         self.delivered = self.given.copy()
-        self._prompt = all(response == IDEAL for response in vessel.responses)
         self._variations = (environment.current_variation, environment.wind_variation)
         self._means = (truths.current_to, truths.wind_to)
         self._varied: list[Array | None] = [None, None]
@@ -84,7 +84,8 @@ class Fleet:
         """One sample with commands (n, m) for the ships that move (n,); the others wait."""
         moving = moving & ~self.lost
         held = np.where(moving[:, None], commands, self.given)
-        given = held.T[None] if self._prompt else self._delivered(held, moving)  # (substeps or 1, m, n)
+        given = self._actuators.mean(held.T)  # (substeps or 1, m, n)
+        self._actuators = self._actuators.after(held.T, moving)
         self._program.sea[...] = self._weather()
         self._program.hold(given)
         state = self.states.T
@@ -101,10 +102,6 @@ class Fleet:
         self.given = np.where(moved[:, None], held, self.given)
         self.delivered = np.where(moved[:, None], given.mean(axis=0).T, self.delivered)
 
-    def _delivered(self, held: Array, moving: np.ndarray) -> Array:
-        rows = [signal.deliver(column, moving) for signal, column in zip(self._actuators, held.T, strict=True)]
-        return np.stack(rows, axis=1)
-
     def _rates(self, state: tuple[Array, ...]) -> tuple[Array, ...]:
         return (self._program.rates(state)[0].copy(),)
 
@@ -120,25 +117,3 @@ class Fleet:
             self._varied[index] = now = draw(variation, normal, before=self._varied[index])[0]
             rows.append((mean + now).T)
         return np.concatenate(rows)
-
-
-class _Signal:
-    """One actuator signal of n ships: what it delivers in each integrator step, sample after sample."""
-
-    def __init__(self, vessel: Vessel, column: int, standing: Array) -> None:
-        response = vessel.responses[column]
-        self._ideal = response == IDEAL
-        self._map: SampleMap = sample_map(response, sample_time_s=vessel.sample_time_s, substeps=SUBSTEPS)
-        self._value = past_deadband(standing, response.deadband)
-        self._told = np.tile(self._value, (self._map.lateness + 1, 1))
-        """(lateness + 1, n) commands past the dead band, the latest last."""
-
-    def deliver(self, command: Array, moving: np.ndarray) -> Array:
-        """(substeps, n) means of what the ships that move get of commands (n,)."""
-        if self._ideal:
-            return np.broadcast_to(command, (SUBSTEPS, len(command)))
-        history = np.concatenate([self._told, past_deadband(command, self._map.deadband)[None]])
-        seen = np.stack([self._value, history[0], history[1]])
-        self._told = np.where(moving, history[1:], self._told)
-        self._value = np.where(moving, self._map.end @ seen, self._value)
-        return np.asarray(self._map.means @ seen + self._map.offset)
