@@ -50,12 +50,20 @@ def test_a_hidden_effect_is_named_estimated_and_mended(case):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("relative_std", [0.0, 0.1])
 @pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case[0]}-{case[1]}")
-def test_every_hidden_effect_is_named(case, relative_std):
-    if relative_std and case[1] in ("thrust_gain", "load_change"):
-        pytest.skip("parameters uncertain by a tenth each leave one common factor of that size undecided")
-    check(case, seed=12, relative_std=relative_std)
+def test_every_hidden_effect_is_named(case):
+    check(case, seed=12)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "case",
+    [case for case in CASES if case[1] not in ("thrust_gain", "load_change")],
+    ids=lambda case: f"{case[0]}-{case[1]}",
+)
+def test_every_hidden_effect_is_named_by_uncertain_parameters(case):
+    """Of two effects not: parameters uncertain by a tenth each leave one common factor of that size undecided."""
+    check(case, seed=12, relative_std=0.1)
 
 
 @pytest.mark.slow

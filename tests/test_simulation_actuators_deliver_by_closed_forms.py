@@ -151,10 +151,8 @@ def test_a_run_is_that_of_the_ship_with_its_lags_as_states():
 
 @pytest.mark.parametrize(("integrator", "substeps"), [("rk4", 2), ("rk4", 1), ("euler", 1), ("euler", 3)])
 @pytest.mark.parametrize("responses", [(IDEAL,) * 4, (SPEED, ANGLE, IDEAL, ANGLE)])
-@pytest.mark.parametrize("engine", ["numpy", "numba"])
+@pytest.mark.parametrize("engine", ["numpy", pytest.param("numba", marks=pytest.mark.optional)])
 def test_one_run_and_many_runs_agree(integrator: str, substeps: int, responses: tuple[Response, ...], engine: str):
-    if engine == "numba":
-        pytest.importorskip("numba")
     ship = sluggish(*responses)
     runs = [random_commands(70, seed) for seed in range(3)]
     how = {"standing": STANDING, "substeps": substeps}
