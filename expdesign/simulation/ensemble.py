@@ -1,7 +1,7 @@
 """Many simulated trials at once, with everything that disturbs a real one: for Monte Carlo studies.
 
 Every run has its own current and wind, varying around a mean of its own in the n-frame, its own sensor noise, and, if
-wished, its own commands and parameters. Arrays are (samples, runs, ...). Noise is drawn a stretch of samples at a time,
+required, its own commands and parameters. Arrays are (samples, runs, ...). Noise is drawn a stretch of samples at a time,
 so memory is that of the result.
 
 Source: F. Ljungberg, doctoral thesis, Linköping University, (3.18), (5.3), (5.61), (6.1)-(6.2).
@@ -148,9 +148,9 @@ def _sailed(
     marching: Callable[[Array, Array], Iterator[Array]],
     draw: Callable[[Array], Iterator[tuple[slice, Array]]],
 ) -> tuple[Array, Array]:
-    """States (k, 6, n) at the samples and what the sensors tell of them (k, 8, n).
+    """States (k, 6, n) at the samples and what the sensors measure of them (k, 8, n).
 
-    Prompt sensors tell of a stretch while it is at hand, late ones when all is known.
+    Sensors without delay measure each stretch as it is simulated, delayed ones after the last sample.
     """
     samples, runs = len(given), state.shape[1]
     states, seen = np.empty((samples, STATES, runs)), np.empty((samples, len(ROWS), runs))
@@ -214,14 +214,14 @@ def _stretches(
 
 def _drawn(rng: np.random.Generator, spread: Array, noise: Array, engine: str, part: slice) -> Array:
     """Standard normal numbers (k, 4, n) for the sea of a stretch; its sensor noise is filled in."""
-    told = noise[part]
-    count, rows, runs = told.shape
+    part_noise = noise[part]
+    count, rows, runs = part_noise.shape
     if engine == "numba":
         sea = np.empty((count, 4, runs))
-        kernels().normal(rng, spread, sea, told)
+        kernels().normal(rng, spread, sea, part_noise)
         return sea
     drawn = rng.standard_normal((count, 4 + rows, runs))
-    np.multiply(drawn[:, 4:], spread[:, None], out=told)
+    np.multiply(drawn[:, 4:], spread[:, None], out=part_noise)
     return drawn[:, :4]
 
 

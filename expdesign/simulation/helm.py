@@ -97,8 +97,8 @@ class Helm:
         for actuator in self.vessel.actuators:
             turned, order = angle_rad if actuator in steering else 0.0, drive
             if by_propellers and actuator in steering:
-                wish = drive - float(np.sign(actuator.starboard_m)) * ops.sin(turned)
-                order = (ops.abs(wish + 1.0) - ops.abs(wish - 1.0)) / 2  # no more than there is to either side
+                desired = drive - float(np.sign(actuator.starboard_m)) * ops.sin(turned)
+                order = (ops.abs(desired + 1.0) - ops.abs(desired - 1.0)) / 2  # no more than there is to either side
             thrust = 0.0 if actuator.kind in ("tunnel", "rudder") else _share(actuator.limits[0], order, ops)
             side = thrust * ops.sin(turned)
             row += {
@@ -208,12 +208,12 @@ def steady_ahead(vessel: Vessel, speed_mps: float | None = None, *, thrusters: s
     helm.check(drive, angle)
     tilt = 1e-3
     right, left = (helm.acceleration((speed, sway, 0.0), drive, angle + side * tilt)[2] for side in (1, -1))
-    felt = abs(right - left) > 1e-12 * (abs(right) + abs(left)) and right != left
+    steers = abs(right - left) > 1e-12 * (abs(right) + abs(left)) and right != left
     return Approach(
         helm=helm,
         drive=drive,
         angle_rad=angle,
-        starboard=(1 if right > left else -1) if felt else 0,
+        starboard=(1 if right > left else -1) if steers else 0,
         velocity=np.array([speed, sway, 0.0]),
     )
 

@@ -101,16 +101,16 @@ def simulate_many(
     """
     if isinstance(commands, Commands):
         _check_inputs(vessel, commands)
-        told, sample_time_s = commands.values[..., None], commands.sample_time_s
+        commanded, sample_time_s = commands.values[..., None], commands.sample_time_s
     else:
-        told, sample_time_s = commands.transpose(1, 2, 0), vessel.sample_time_s
-    before = None if standing is None else np.asarray(standing, dtype=float).T.reshape(told.shape[1], -1)
-    given = deliver(vessel.responses, told, sample_time_s=sample_time_s, substeps=substeps, standing=before)
+        commanded, sample_time_s = commands.transpose(1, 2, 0), vessel.sample_time_s
+    before = None if standing is None else np.asarray(standing, dtype=float).T.reshape(commanded.shape[1], -1)
+    given = deliver(vessel.responses, commanded, sample_time_s=sample_time_s, substeps=substeps, standing=before)
     runs = len(pose)
     program = RatesProgram(vessel.model, runs=runs, parameters=parameters)
-    weather = [np.broadcast_to(item, (len(told), runs, 2)) for item in (current_to, wind_to)]
+    weather = [np.broadcast_to(item, (len(commanded), runs, 2)) for item in (current_to, wind_to)]
     sea = np.concatenate(weather, axis=-1).swapaxes(1, 2)  # (k, 4, n)
-    start, result = np.array(begun(vessel.model, (*pose.T, *velocity.T))), np.empty((len(told) + 1, runs, STATES))
+    start, result = np.array(begun(vessel.model, (*pose.T, *velocity.T))), np.empty((len(commanded) + 1, runs, STATES))
     states = march(program, given, start, step=rk4_step, step_s=sample_time_s / substeps, substeps=substeps)
     with np.errstate(over="ignore", invalid="ignore"):
         for row, state, now in zip(result, states, (*sea, sea[-1:]), strict=True):

@@ -29,12 +29,12 @@ def noise_std(sensors: Sensors) -> Array:
 
 
 def prompt(sensors: Sensors) -> bool:
-    """True when every sample tells of itself: no delays, no repeated readings."""
+    """Whether every sample is measured at its own time: no delays, no repeated readings."""
     return not any(getattr(sensors, name).delay_s or getattr(sensors, name).interval_s for name in OWNERS)
 
 
 def observe(sensors: Sensors, states: Array, air: Array, noise: Array, *, sample_time_s: float) -> None:
-    """What sensors tell of a motion.
+    """What sensors measure of a motion.
 
         position = north/east + R(heading) (forward, starboard)       heading = heading + bias
         u = u - r starboard     v = v + r forward, along axes turned from the ship's by an angle     r = scale r
@@ -113,7 +113,7 @@ def _moved(place: Mounting, u: Array, v: Array, r: Array) -> tuple[Array, Array]
 
 
 def _readings(mounting: Mounting, count: int, sample_time_s: float) -> tuple[Array | None, Any]:
-    """For every sample the time of the reading told [samples], and the sample that first told it; None for now."""
+    """Time of the reading shown at each sample [samples], and the sample that first showed it; None without delay."""
     now = np.arange(count, dtype=float)
     delay, interval = mounting.delay_s / sample_time_s, mounting.interval_s / sample_time_s
     if interval <= 1.0:
@@ -147,7 +147,7 @@ def measure(
     environment: Environment | WeatherSeries,
     rng: np.random.Generator,
 ) -> dict[str, Array]:
-    """Measured signals as the vessel's sensors tell them, named and in units as in measured-data files.
+    """Measured signals as the vessel's sensors measure them, named and in units as in measured-data files.
 
     Args:
         vessel: whose sensors measure.
@@ -165,18 +165,18 @@ def measure(
     _, wind = weather_rows(environment, count)
     u_w, v_w = to_body(wind.T, states[:, 2], NUMPY)
     air = np.stack([states[:, 3] - u_w, states[:, 4] - v_w], axis=1)
-    told = noise_std(vessel.sensors)[:, None] * rng.standard_normal((len(ROWS), count))
-    observe(vessel.sensors, states, air, told.T, sample_time_s=commands.sample_time_s)
+    readings = noise_std(vessel.sensors)[:, None] * rng.standard_normal((len(ROWS), count))
+    observe(vessel.sensors, states, air, readings.T, sample_time_s=commands.sample_time_s)
     columns = {
         "time_s": trajectory.time_s[:count],
-        "north_m": told[0],
-        "east_m": told[1],
-        "heading_rad": wrap_angle(told[2]),
-        "u_mps": told[3],
-        "v_mps": told[4],
-        "r_radps": told[5],
-        "wind_u_mps": told[6],
-        "wind_v_mps": told[7],
+        "north_m": readings[0],
+        "east_m": readings[1],
+        "heading_rad": wrap_angle(readings[2]),
+        "u_mps": readings[3],
+        "v_mps": readings[4],
+        "r_radps": readings[5],
+        "wind_u_mps": readings[6],
+        "wind_v_mps": readings[7],
     }
     inputs = {column_name(name): commands.column(name) for name in commands.names}
     return {**columns, **inputs}
