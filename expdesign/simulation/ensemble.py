@@ -1,8 +1,8 @@
 """Many simulated trials at once, with everything that disturbs a real one: for Monte Carlo studies.
 
-Every run has its own current and wind, varying around a mean of its own in the n-frame, its own sensor noise, and, if
-required, its own commands and parameters. Arrays are (samples, runs, ...). Noise is drawn a stretch of samples at a time,
-so memory is that of the result.
+Every run has its own current and wind, varying around a mean of its own in the n-frame, its own sensor noise, and
+commands and parameters of its own where given. Arrays are (samples, runs, ...). Noise is drawn a stretch of samples at
+a time, so memory is that of the result.
 
 Source: F. Ljungberg, doctoral thesis, Linköping University, (3.18), (5.3), (5.61), (6.1)-(6.2).
 """
