@@ -65,12 +65,12 @@ FLOOR_OF = {
 }
 MOST_MODULES = 12
 """In one room, besides its façade."""
-CROWDED = ("durations", "plan/legs", "workflows")
+CROWDED = ("plan/legs", "workflows")
 """Rooms that still hold more."""
 EXCEPTIONS = {("__main__", "cli")}  # `python -m` is nothing but the command line under another name
 
 IMPORTERS = {
-    "cvxpy": (),
+    "cvxpy": ("durations/_cvxpy.py",),
     "ompl": ("plan/legs/_ompl.py",),
     "casadi": ("estimation/replay/_casadi.py", "growing/_casadi.py", "plan/legs/_casadi.py"),
     "matplotlib": ("export/",),

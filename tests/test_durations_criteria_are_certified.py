@@ -92,7 +92,7 @@ def test_the_sensitivities_are_the_slope_and_level_where_time_is_free(criterion:
         w, step = np.full(15, 1 / 15), 1e-6
         slope = [(by_definition(given, w + step * e) - by_definition(given, w - step * e)) / (2 * step)
                  for e in np.eye(15)]  # fmt: skip
-        from_package = Collected.of(given).pieces[0].tangent(w, 1e-9).slope
+        from_package = Collected.of(given).pieces[0].tangent(w).slope
         np.testing.assert_allclose(slope, from_package, rtol=1e-4, atol=1e-4)
 
 

@@ -18,7 +18,7 @@ from expdesign.durations import (
     solve_durations,
 )
 from expdesign.durations.collected import Collected
-from expdesign.durations.task import polytope_of
+from expdesign.durations.concave import polytope_of
 from expdesign.errors import ExpdesignError, InputError, NoAnswer, UnknownName
 
 

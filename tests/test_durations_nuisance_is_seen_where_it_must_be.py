@@ -8,10 +8,9 @@ import pytest
 
 from design_case import duration_problem, one_line, random_matrices
 from expdesign.durations import Aim, DurationProblem, optimal_shares, solve_durations, with_repeats
-from expdesign.durations.collected import Collected
+from expdesign.durations.collected import Collected, merged_nuisance, unseen
 from expdesign.durations.criteria import LogDet, LogSmallest, LogTrace
-from expdesign.durations.estimable import merged_nuisance, unseen
-from expdesign.durations.objective import stacked_values
+from expdesign.durations.criteria.models import stacked_values
 from expdesign.errors import NotInformative
 
 OF_INTEREST = Aim(criterion="D_s", interest=("parameter 0",))

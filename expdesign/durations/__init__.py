@@ -1,13 +1,22 @@
 """Durations: how long to run each primitive, with a certificate."""
 
-from expdesign.durations.certificate import log_det, sensitivities
-from expdesign.durations.constraints import NO_CONSTRAINTS, Budget, Constraints
+from expdesign.durations.certificate import Certificate, DurationDesign, log_det, scaled, sensitivities, whitened
+from expdesign.durations.collected import Collected
 from expdesign.durations.criteria import CRITERIA, Aim, Criterion
 from expdesign.durations.efficiency import Efficiencies, Kept, efficiencies, limits_kept
-from expdesign.durations.fused import build_fused, monte_carlo_covariance
+from expdesign.durations.large_scale import LargeDesign, d_optimal, rows_of
+from expdesign.durations.limits import NO_CONSTRAINTS, Budget, Constraints
 from expdesign.durations.mining import Subset, best_subset
-from expdesign.durations.solve import bordered, build_durations, optimal_shares, solve_durations, with_repeats
-from expdesign.durations.values import ROBUST, Certificate, DurationDesign, DurationProblem
+from expdesign.durations.problem import (
+    ROBUST,
+    DurationProblem,
+    bordered,
+    bordered_moments,
+    build_durations,
+    build_fused,
+    monte_carlo_covariance,
+)
+from expdesign.durations.solve import optimal_shares, solve_durations, with_repeats
 from expdesign.information import MEAN_SUBTRACTIONS
 
 __all__ = [
@@ -18,23 +27,30 @@ __all__ = [
     "Aim",
     "Budget",
     "Certificate",
+    "Collected",
     "Constraints",
     "Criterion",
     "DurationDesign",
     "DurationProblem",
     "Efficiencies",
     "Kept",
+    "LargeDesign",
     "Subset",
     "best_subset",
     "bordered",
+    "bordered_moments",
     "build_durations",
     "build_fused",
+    "d_optimal",
     "efficiencies",
     "limits_kept",
     "log_det",
     "monte_carlo_covariance",
     "optimal_shares",
+    "rows_of",
+    "scaled",
     "sensitivities",
     "solve_durations",
+    "whitened",
     "with_repeats",
 ]

@@ -13,9 +13,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import linprog, minimize
 
-from expdesign.durations.constraints import Polytope
-from expdesign.durations.task import symmetric_part
-from expdesign.durations.values import DurationProblem
+from expdesign.durations.concave import symmetric_part
+from expdesign.durations.limits import Polytope
+from expdesign.durations.problem import DurationProblem
 from expdesign.errors import NotInformative
 from expdesign.values import Array
 
@@ -104,7 +104,7 @@ def improved(problem: DurationProblem, polytope: Polytope, start: Array | None, 
             ],
             options={"maxiter": 500, "ftol": 1e-13},
         )
-        found.append(_feasible(answer.x, polytope))
+        found.append(polytope.tidied(answer.x))
     values = [-minus(w)[0] if _keeps(w, polytope) else -np.inf for w in found]
     if max(values) <= -1e9:
         raise NotInformative(
@@ -131,13 +131,6 @@ def _unit_scaled(problem: DurationProblem) -> tuple[Array, Array]:
     diagonal = np.abs(np.diagonal(problem.matrices, axis1=1, axis2=2)).mean(axis=0) + np.abs(np.diag(problem.prior))
     size = np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
     return problem.matrices / np.outer(size, size), problem.prior / np.outer(size, size)
-
-
-def _feasible(w: Array, polytope: Polytope) -> Array:
-    """Rounding taken off: clipped into the box and brought back to sum one."""
-    clipped = np.clip(w, polytope.least, polytope.most)
-    above = clipped - polytope.least
-    return np.asarray(polytope.least + above * (1.0 - polytope.least.sum()) / max(float(above.sum()), 1e-300))
 
 
 def _keeps(w: Array, polytope: Polytope) -> bool:

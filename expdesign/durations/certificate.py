@@ -2,8 +2,12 @@
 
 For f(w) = log det B(w), B(w) = sum_q w_q B_q with B_q positive semidefinite, the sensitivities
 d_q = trace(B(w)^-1 B_q) are the gradient of f, their w-weighted mean is the dimension, and concavity bounds every
-other design by f(w) + max_q d_q - dimension. The same goes for every concave criterion, with limits at their prices,
-and for the average or the least over several models with a mixture of their tangents.
+other design by f(w) + max_q d_q - dimension.
+
+In general every measure is bounded by linear functions of the information matrix (see `criteria.measures`), so every
+model and every floor is bounded by a linear function of the fractions. The largest value under all these and the
+linear limits is a linear programme; its dual solution gives the mixture of the models and the prices of the limits. The
+bound that is given out is computed from them by weak duality, so it holds whatever they are.
 
 Source: J. Kiefer and J. Wolfowitz, The equivalence of two extremum problems, Canad. J. Math. 12 (1960), 363-366;
 F. Pukelsheim, Optimal Design of Experiments (2006), 7.19-7.23 (general equivalence theorem) and 11 (mixtures).
@@ -11,16 +15,109 @@ F. Pukelsheim, Optimal Design of Experiments (2006), 7.19-7.23 (general equivale
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
+from scipy.optimize import linprog
 
-from expdesign.durations.interior import Interior, Task
-from expdesign.durations.objective import SINGULAR
-from expdesign.durations.values import Certificate
-from expdesign.values import Array
+from expdesign.durations.concave import ConcaveProblem
+from expdesign.durations.criteria.models import SINGULAR, Tangent
+from expdesign.durations.problem import DurationProblem
+from expdesign.values import Array, seal
 
-BLURS = (1.0, 10.0, 100.0)
-"""Multiples of the last barrier that are tried for the mixture of tangents; every one gives a valid bound."""
+LP_TOLERANCE = 1e-10
+"""Of the linear programme's feasibility and optimality."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Certificate:
+    """Why no other sharing can be better by more than the gap, as numbers that anyone can check.
+
+    For any feasible v the criterion is at most `value` + slope (v - w), with the slope mixed from the models and the
+    limits at their prices; the largest value of that over all feasible v is the bound.
+
+    Attributes:
+        kind: the theorem in a few words, or why there is none.
+        value: the criterion at the design, as a logarithm; `degree` of it are one unit of information.
+        bound: no feasible sharing has more; inf when there is no certificate.
+        degree: value of twice the information is higher by degree x log 2.
+        level: what every sensitivity less its price is at most, and where time is free to move, exactly.
+        mixture: (m,) weights of the sampled models.
+        prices: (q,) what the limits take off each sensitivity.
+        multipliers: price of every limit by name; a limit whose price is zero does not matter.
+        guaranteed: for recorded primitives, the log det that the symmetric part guarantees; -inf when it is nowhere
+            positive definite; nan where the problem is convex.
+    """
+
+    kind: str
+    value: float
+    bound: float
+    degree: int
+    level: float
+    mixture: Array
+    prices: Array
+    multipliers: Mapping[str, float]
+    guaranteed: float = float("nan")
+
+    def __post_init__(self) -> None:
+        seal(self, mixture="m", prices="q")
+
+    @property
+    def gap(self) -> float:
+        """bound - value."""
+        return self.bound - self.value
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DurationDesign:
+    """How long to run each primitive, with the proof.
+
+    Attributes:
+        problem: what was asked.
+        fractions: (q,) optimal time fractions, sum 1; less where budgets make it better to leave time unused.
+        sensitivities: (q,) slope of the criterion; for D trace(B(w)^-1 B_q), at the optimum at most `dimension`, equal
+            where w_q > 0.
+        log_det: log det B at `fractions`, by the nominal model.
+        gap: what any other design may be better by, in the criterion's logarithm (for D in log det).
+        repeats: (q,) whole runs.
+        efficiency_repeats: of the whole runs against the optimum, by the criterion: share of the time that the optimum
+            would need for the same.
+        efficiency_uniform: the same for equal time on every primitive, whether that is allowed or not.
+        certificate: the proof.
+        note: what has to be known of the whole runs, in a sentence, or "".
+    """
+
+    problem: DurationProblem
+    fractions: Array
+    sensitivities: Array
+    log_det: float
+    gap: float
+    repeats: tuple[int, ...]
+    efficiency_repeats: float
+    efficiency_uniform: float
+    certificate: Certificate
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        seal(self, fractions="q", sensitivities="q")
+
+    @property
+    def log_det_bound(self) -> float:
+        """Upper bound on the log det of any design; inf when the certificate is about something else."""
+        own = self.problem.aim.criterion == "D" and self.problem.robust == "nominal"
+        return self.log_det + self.gap if own else float("inf")
+
+    @property
+    def gap_relative(self) -> float:
+        """The gap per degree of the criterion: the share of information that may be missing."""
+        return self.gap / self.certificate.degree
+
+    @property
+    def durations_s(self) -> Array:
+        """(q,) time of each primitive before rounding [s]."""
+        return np.asarray(self.fractions * self.problem.total_s)
 
 
 def scaled(matrices: Array) -> tuple[Array, float]:
@@ -69,30 +166,48 @@ def sensitivities(matrices: Array, fractions: Array) -> Array:
     return np.asarray(np.einsum("ij,qji->q", inverse, matrices))
 
 
-def certify(task: Task, found: Interior, *, kind: str) -> tuple[Certificate, Array]:
-    """The best bound that tangents at a design give, and the criterion's sensitivities (q,) there.
+def certify(
+    task: ConcaveProblem, w: Array, *, kind: str, multipliers: Sequence[Array] = ()
+) -> tuple[Certificate, Array]:
+    """The best bound at a design, and the criterion's sensitivities (q,) there.
 
     Args:
         task: the problem.
-        found: the design, with guesses of the limits' prices; the bound holds whatever they are.
+        w: (q,) the design.
         kind: the theorem, in words.
+        multipliers: (d, d) for each model, tried beside the gradients; the bound holds whatever they are.
 
     Raises:
-        numpy.linalg.LinAlgError: the design is singular.
+        numpy.linalg.LinAlgError: the design is singular, and no multipliers are given.
     """
-    tried = [_certified(task, found, blur * found.barrier, kind) for blur in BLURS]
+    tried: list[tuple[Certificate, Array]] = []
+    for given in ([None] * len(task.objective.pieces), multipliers):
+        try:
+            tangents = [piece.tangent(w, G) for piece, G in zip(task.objective.pieces, given, strict=bool(given))]
+            floors = [_floor_tangent(floor.pieces[0].tangent(w), floor.levels[0]) for floor in task.floors]
+        except np.linalg.LinAlgError:
+            continue
+        if tangents and all(np.isfinite(item.value) for item in (*tangents, *floors)):
+            tried.append(_certified(task, w, tangents, floors, kind))
+    if not tried:
+        raise np.linalg.LinAlgError
     return min(tried, key=lambda pair: pair[0].bound)
 
 
-def _certified(task: Task, found: Interior, blur: float, kind: str) -> tuple[Certificate, Array]:
-    w, polytope = found.fractions, task.polytope
-    tangent = task.objective.tangent(w, blur)
-    value, slope = tangent.value, np.array(tangent.slope)
-    for floor, price in zip(task.floors, found.floor_prices, strict=True):
-        bound = floor.tangent(w, blur)
-        value, slope = value + price * bound.value, slope + price * bound.slope
-    bounds = {polytope.bound(slope, prices): prices for prices in (found.prices, polytope.prices(slope))}
-    prices = bounds[min(bounds)]
+def _floor_tangent(tangent: Tangent, level: float) -> Tangent:
+    return Tangent(tangent.value - float(level), tangent.slope)
+
+
+def _certified(
+    task: ConcaveProblem, w: Array, tangents: Sequence[Tangent], floors: Sequence[Tangent], kind: str
+) -> tuple[Certificate, Array]:
+    polytope, values = task.polytope, np.array([item.value for item in tangents]) - task.objective.levels
+    slopes = np.array([item.slope for item in tangents])
+    mixture, prices, floor_prices = _dual(task, w, values, slopes, floors)
+    own = mixture @ slopes
+    value, slope = float(mixture @ values), own
+    for floor, price in zip(floors, floor_prices, strict=True):
+        value, slope = value + price * floor.value, slope + price * floor.slope
     net = slope - polytope.rows.T @ prices
     level = _level(task, w, net)
     net = np.where(w >= polytope.most - 1e-9, np.minimum(net, level), net)
@@ -100,17 +215,51 @@ def _certified(task: Task, found: Interior, blur: float, kind: str) -> tuple[Cer
     certificate = Certificate(
         kind=kind,
         value=task.objective.value(w),
-        bound=float(value - slope @ w + min(bounds)),
-        degree=task.objective.pieces[0].measure.degree,
+        bound=float(value - slope @ w + polytope.bound(slope, prices)),
+        degree=task.objective.degree,
         level=level,
-        mixture=tangent.mixture,
-        prices=tangent.slope - net,
-        multipliers=dict(zip(names, (*prices.tolist(), *found.floor_prices.tolist()), strict=True)),
+        mixture=mixture,
+        prices=own - net,
+        multipliers=dict(zip(names, (*prices.tolist(), *floor_prices.tolist()), strict=True)),
     )
-    return certificate, tangent.slope
+    return certificate, own
 
 
-def _level(task: Task, w: Array, net: Array) -> float:
+def _dual(
+    task: ConcaveProblem, w: Array, values: Array, slopes: Array, floors: Sequence[Tangent]
+) -> tuple[Array, Array, Array]:
+    """Weights (m,) of the models, prices (i,) of the polytope's rows and (j,) of the floors, from linear programming.
+
+    The programme: the largest t with t <= values + slopes (v - w) for every model, or for their average, every floor's
+    tangent at 0 or more, v in the polytope.
+    """
+    polytope, count = task.polytope, len(values)
+    worst = task.objective.worst and count > 1
+    if not (worst or len(polytope.rows) or floors):
+        return np.full(count, 1.0 / count), np.zeros(0), np.zeros(0)
+    heights, tilts = (values, slopes) if worst else (values.mean()[None], slopes.mean(axis=0)[None])
+    models, rows = len(heights), len(polytope.rows)
+    floor_slopes = np.array([item.slope for item in floors]).reshape(len(floors), len(w))
+    A = np.block(
+        [
+            [-tilts, np.ones((models, 1))],
+            [polytope.rows, np.zeros((rows, 1))],
+            [-floor_slopes, np.zeros((len(floors), 1))],
+        ]
+    )
+    b = np.r_[heights - tilts @ w, polytope.limits, [item.value - item.slope @ w for item in floors]]
+    bounds = [*zip(polytope.least, np.maximum(polytope.most, polytope.least), strict=True), (None, None)]
+    whole = np.r_[np.ones(len(w)), 0.0][None]
+    options = {"primal_feasibility_tolerance": LP_TOLERANCE, "dual_feasibility_tolerance": LP_TOLERANCE}
+    answer = linprog(np.r_[np.zeros(len(w)), -1.0], A, b, whole, [1.0], bounds, method="highs", options=options)
+    dual = np.zeros(len(b)) if answer.status else np.maximum(-answer.ineqlin.marginals, 0.0)
+    mixture = np.full(count, 1.0 / count)
+    if worst and dual[:models].sum() > 0:
+        mixture = dual[:models] / dual[:models].sum()
+    return mixture, dual[models : models + rows], dual[models + rows :]
+
+
+def _level(task: ConcaveProblem, w: Array, net: Array) -> float:
     """The net sensitivity of primitives whose time is free to move both ways."""
     least, most = task.polytope.least, task.polytope.most
     free = (w > least + 1e-6) & (w < np.where(most < 1.0, most - 1e-9, 2.0))

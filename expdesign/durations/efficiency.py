@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from expdesign.durations.certificate import DurationDesign
 from expdesign.durations.collected import Collected
+from expdesign.durations.concave import with_idle
 from expdesign.durations.criteria import CRITERIA
-from expdesign.durations.objective import stacked_values
-from expdesign.durations.solve import optimal_shares
-from expdesign.durations.task import floors_of, with_idle
-from expdesign.durations.values import DurationDesign, DurationProblem
+from expdesign.durations.criteria.models import stacked_values
+from expdesign.durations.problem import DurationProblem
+from expdesign.durations.solve import floors_of, optimal_shares
 from expdesign.errors import InputError, NoAnswer
 from expdesign.values import Array
 

@@ -17,11 +17,11 @@ from math import comb
 import numpy as np
 
 from expdesign.durations.collected import Collected
-from expdesign.durations.constraints import Constraints
+from expdesign.durations.concave import symmetric_part
 from expdesign.durations.criteria import Aim
+from expdesign.durations.limits import Constraints
+from expdesign.durations.problem import DurationProblem
 from expdesign.durations.solve import optimal_shares
-from expdesign.durations.task import symmetric_part
-from expdesign.durations.values import DurationProblem
 from expdesign.errors import InputError, NotInformative
 from expdesign.information.recorded import BatchInformation
 from expdesign.values import Array, seal

@@ -8,12 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from expdesign.durations.collected import Collected
-from expdesign.durations.constraints import TIGHT, Polytope
-from expdesign.durations.estimable import merged_nuisance, unseen
-from expdesign.durations.objective import SINGULAR
-from expdesign.durations.task import limits_of
-from expdesign.durations.values import DurationProblem
+from expdesign.durations.collected import Collected, merged_nuisance, sees_everything
+from expdesign.durations.concave import limits_of
+from expdesign.durations.limits import TIGHT, Polytope
+from expdesign.durations.problem import DurationProblem
 from expdesign.errors import NoAnswer
 from expdesign.values import Array
 
@@ -93,11 +91,6 @@ def note_on_runs(problem: DurationProblem, runs: Array) -> str:
         f"in these whole runs {len(pairs)} regressors of disturbances coincide with others, and the estimator merges "
         f"them: {shown}{more}"
     )
-
-
-def efficiency_of_runs(problem: DurationProblem, fractions: Array, runs: Array) -> float:
-    """Efficiency of whole runs (q,) against fractions (q,) of the total time, by the problem's criterion."""
-    return Collected.of(problem).efficiency(runs * problem.run_s / problem.total_s, fractions)
 
 
 def efficiency_of_shares(problem: DurationProblem, fractions: Array, shares: Array) -> float:
@@ -248,20 +241,6 @@ def _swapped(search: _Search, runs: Array, target: float, accepted: Callable[[Ar
                 target, best = float(worths[place]), swapped
                 break
     return best
-
-
-def sees_everything(problem: DurationProblem, collected: Collected, shares: Array) -> bool:
-    """Whether time shares (q,) inform about every parameter, nuisance regressors that coincide counted once."""
-    if not collected.symmetric:
-        return bool(np.isfinite(collected.value(shares)))
-    if not np.isfinite(collected.value(shares)):
-        return False
-    return _regular(collected, shares) or (bool(problem.nuisance) and not unseen(problem, shares))
-
-
-def _regular(collected: Collected, shares: Array) -> bool:
-    values = [np.linalg.eigvalsh(total) for total in collected.totals(shares)]
-    return all(item[0] > SINGULAR * item[-1] for item in values)
 
 
 def _nearly_singular(collected: Collected, shares: Array) -> bool:

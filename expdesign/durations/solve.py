@@ -1,38 +1,45 @@
-"""Problem -> durations with a certificate."""
+"""Problem -> durations with a certificate.
+
+Plain D goes through the working-set method for many candidates. Every other criterion and limit is stated in cvxpy; a
+few Newton steps sharpen its answer. Either way the certificate is computed from the problem alone, and a design without
+one is not given out.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from expdesign.durations.asymmetric import definite_start, improved, log_abs_det
-from expdesign.durations.certificate import certify
-from expdesign.durations.collected import Collected
-from expdesign.durations.constraints import NO_CONSTRAINTS, Constraints
-from expdesign.durations.criteria import Aim
-from expdesign.durations.estimable import unseen
-from expdesign.durations.interior import Task, climb
-from expdesign.durations.objective import SHAKY
-from expdesign.durations.rounding import (
-    efficiency_of_runs,
-    efficiency_of_shares,
-    note_on_runs,
-    sees_everything,
-    whole_runs,
+from expdesign.durations.certificate import Certificate, DurationDesign, certify
+from expdesign.durations.collected import Collected, sees_everything, unseen
+from expdesign.durations.concave import (
+    ConcaveProblem,
+    collected_measure,
+    floor_of,
+    objective_of,
+    polytope_of,
+    with_idle,
 )
-from expdesign.durations.task import polytope_of, start_of, task_of
-from expdesign.durations.values import Certificate, DurationDesign, DurationProblem
-from expdesign.errors import InputError, NoAnswer, NotInformative, UnknownName
-from expdesign.information import MEAN_SUBTRACTIONS, PrimitiveInformation, check_informative
+from expdesign.durations.criteria import criterion
+from expdesign.durations.criteria.models import Objective
+from expdesign.durations.large_scale import d_optimal, rows_of
+from expdesign.durations.limits import TIGHT
+from expdesign.durations.problem import DurationProblem
+from expdesign.durations.rounding import efficiency_of_shares, note_on_runs, whole_runs
+from expdesign.errors import InputError, NoAnswer, NotInformative
 from expdesign.values import Array
 
 LARGEST_GAP = 1e-6
 """Certificates above this, per degree, are not given out as optimal designs."""
-WIDEST = 1e-7
-TOLERANCES = {"smooth": (1e-10, 1e-8, WIDEST), "cornered": (1e-7, 1e-8, 1e-9)}
-"""What the solver aims at, per degree, one after the other until the certificate holds."""
+AIM = 1e-10
+"""Gap per degree at which sharpening ends."""
+NEWTON_STEPS = 30
+"""Most steps that sharpen an answer; from the convex solver's two or three are usual."""
+FLOOR_ROUNDING = 1e-6
+"""A floor missed by less, as a logarithm, is rounding."""
 THEOREMS = {
     "D": "Kiefer and Wolfowitz 1960",
     "D_s": "Pukelsheim 2006, general equivalence theorem",
@@ -49,79 +56,6 @@ NOTHING_DEFINITE = (
     "none: recorded primitives make the problem non-convex, and no sharing makes the symmetric part positive definite; "
     "found by local search from random starts"
 )
-
-
-def build_durations(
-    information: Sequence[PrimitiveInformation],
-    parameters: Sequence[str],
-    *,
-    total_s: float,
-    mean_subtraction: str = "complete",
-    aim: Aim | None = None,
-    constraints: Constraints = NO_CONSTRAINTS,
-    prior: Array | None = None,
-    sampled: Sequence[Sequence[PrimitiveInformation]] = (),
-    robust: str = "nominal",
-    equations: Sequence[str] = (),
-    nuisance: Sequence[str] = (),
-) -> DurationProblem:
-    """The duration problem of a scored dictionary.
-
-    Args:
-        information: of each primitive, by the nominal model.
-        parameters: p names in the order of the matrices.
-        total_s: time to share out [s].
-        mean_subtraction: "none", "batch" or "complete".
-        aim: criterion and what it needs; D when not given.
-        constraints: limits on the sharing.
-        prior: (d, d) what is known already, per sample of the total time; see `prior_information`.
-        sampled: the information again by every model drawn from the prior of the nominal parameters.
-        robust: "nominal", or what the sampled models count for: "average" or "worst".
-        equations: of each parameter; only needed for `constraints.balance`.
-        nuisance: parameters of disturbances that are estimated along.
-
-    Raises:
-        UnknownName: no such mean subtraction.
-        NotInformative: no shares of these primitives inform about every parameter.
-    """
-    if mean_subtraction not in MEAN_SUBTRACTIONS:
-        raise UnknownName("mean subtraction", mean_subtraction, known=MEAN_SUBTRACTIONS)
-    if prior is None:
-        allowed = [item for item in information if item.primitive.name not in constraints.excluded]
-        check_informative(allowed or information, parameters, mean_subtraction)
-    return DurationProblem(
-        names=tuple(item.primitive.name for item in information),
-        parameters=tuple(parameters),
-        mean_subtraction=mean_subtraction,
-        matrices=_stack(information, mean_subtraction),
-        run_s=np.array([item.primitive.duration_s for item in information]),
-        total_s=total_s,
-        aim=aim or Aim(),
-        constraints=constraints,
-        prior=np.zeros((0, 0)) if prior is None else prior,
-        robust=robust,
-        sampled=np.array([_stack(items, mean_subtraction) for items in sampled]),
-        equations=tuple(equations),
-        nuisance=tuple(nuisance),
-    )
-
-
-def _stack(information: Sequence[PrimitiveInformation], mean_subtraction: str) -> Array:
-    return np.array([bordered(item, mean_subtraction) for item in information])
-
-
-def bordered(item: PrimitiveInformation, mean_subtraction: str) -> Array:
-    """B_q of one primitive, linear in time fractions: see `DurationProblem`."""
-    return bordered_moments(item.X, item.Y, item.Z, item.YZ, mean_subtraction)
-
-
-def bordered_moments(X: Array, Y: Array, Z: Array, YZ: Array, mean_subtraction: str) -> Array:
-    """The same of moments X (p, p), means Y and Z (p, outputs) and the means' products YZ (p, p)."""
-    if mean_subtraction == "none":
-        return X
-    if mean_subtraction == "batch":
-        return X - YZ
-    return np.block([[X, Y], [Z.T, np.eye(Y.shape[1])]])
 
 
 def solve_durations(problem: DurationProblem) -> DurationDesign:
@@ -155,6 +89,162 @@ def _blinded(problem: DurationProblem) -> NotInformative:
     )
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Optimum:
+    """Fractions (q,), what they prove, and the criterion's sensitivities (q,) there."""
+
+    fractions: Array
+    certificate: Certificate
+    sensitivities: Array
+
+    @property
+    def gap(self) -> float:
+        """Per degree."""
+        return self.certificate.gap / self.certificate.degree
+
+
+def concave_problem(problem: DurationProblem, *, within: Array | None = None) -> ConcaveProblem:
+    """The concave problem of a duration problem; `within` as in `objective_of`.
+
+    Where budgets limit what is used up, some of the time may be better left unused: there is then one more primitive at
+    the end, idling, which informs about nothing and costs nothing.
+
+    Raises:
+        UnknownName, InputError: the aim or the limits are wrong.
+        NotInformative: equal shares do not inform about every parameter.
+        NoAnswer: no sharing meets the limits.
+    """
+    measure = criterion(problem.aim.criterion).measure(problem.picked)
+    if problem.constraints.budgets:
+        problem, measure = with_idle(problem), collected_measure(problem, problem.aim.criterion)
+    floors = floors_of(problem)
+    return ConcaveProblem(
+        objective=objective_of(problem, measure, within=within),
+        polytope=polytope_of(problem),
+        floors=tuple(floors.values()),
+        floor_names=tuple(f"balance of equation {equation}" for equation in floors),
+    )
+
+
+def floors_of(problem: DurationProblem) -> dict[str, Objective]:
+    """One concave function per equation: its log det above the balanced share of the best for it alone."""
+    balance = problem.constraints.balance
+    if not balance > 0:
+        return {}
+    if len(problem.equations) != len(problem.parameters):
+        raise InputError("design.balance needs the equation of every parameter")
+    polytope, floors = polytope_of(problem), {}
+    for equation in dict.fromkeys(problem.equations):
+        alone = floor_of(problem, equation)
+        best = _maximised(ConcaveProblem(objective=alone, polytope=polytope)).certificate.value
+        floors[equation] = replace(alone, levels=np.array([best + alone.degree * np.log(balance)]))
+    return floors
+
+
+def _maximised(task: ConcaveProblem, kind: str = "") -> _Optimum:
+    """The optimum with its certificate.
+
+    Raises:
+        NoAnswer: the floors cannot all be kept.
+        numpy.linalg.LinAlgError: what the limits leave is singular.
+    """
+    least = task.polytope.least
+    if not 1.0 - least.sum() > TIGHT:  # least times take everything
+        return _proven(task, least / least.sum(), kind)
+    if task.plain_d and (w := _plain_d(task)) is not None:
+        return _proven(task, w, kind)
+    if (
+        len(task.objective.pieces) > 1 and task.smooth and not task.floors
+    ):  # Newton's method is quicker with many models
+        found = _sharpened(task, _proven(task, task.polytope.middle(), kind))
+        if found.gap < LARGEST_GAP:
+            return found
+    from expdesign.durations._cvxpy import conic_optimum
+
+    answer = conic_optimum(task)
+    if task.floors:
+        _check_floors(task, None if answer is None else answer[0])
+    if answer is None:
+        raise np.linalg.LinAlgError
+    w, multipliers = answer
+    return _sharpened(task, _proven(task, task.polytope.tidied(w), kind, multipliers))
+
+
+def _proven(task: ConcaveProblem, w: Array, kind: str, multipliers: Sequence[Array] = ()) -> _Optimum:
+    certificate, slope = certify(task, w, kind=kind, multipliers=multipliers)
+    return _Optimum(fractions=w, certificate=certificate, sensitivities=slope)
+
+
+def _plain_d(task: ConcaveProblem) -> Array | None:
+    """The D-optimal fractions, what has to be spent counted as known before; None where a B_q is indefinite."""
+    (piece,), polytope = task.objective.pieces, task.polytope
+    free = np.flatnonzero(polytope.most > polytope.least)
+    left = 1.0 - float(polytope.least.sum())
+    rows = rows_of(piece.matrices[free])
+    if rows is None:
+        return None
+    w = np.array(polytope.least)
+    w[free] += left * d_optimal(rows, prior=piece.matrix(polytope.least) / left, tolerance=AIM).fractions
+    return w
+
+
+def _sharpened(task: ConcaveProblem, best: _Optimum) -> _Optimum:
+    """The same or better by Newton's method with all limits kept, where every measure is smooth."""
+    if not task.smooth:
+        return best
+    from expdesign.durations._cvxpy import newton_step
+
+    here = best
+    for _ in range(NEWTON_STEPS):
+        if best.gap < AIM:
+            break
+        proof, w = here.certificate, here.fractions
+        prices = [proof.multipliers[name] for name in task.floor_names]
+        try:
+            step = newton_step(task, w, mixture=proof.mixture, floor_prices=prices)
+            moved = None if step is None else _ascended(task, w, step, prices)
+            if moved is None:
+                break
+            here = _proven(task, moved, proof.kind)
+        except np.linalg.LinAlgError:
+            break
+        best = min(best, here, key=lambda item: item.gap)
+    return best
+
+
+def _ascended(task: ConcaveProblem, w: Array, step: Array, prices: Sequence[float]) -> Array | None:
+    """Fractions (q,) that gain along a step, halved until they do; None where none gain."""
+
+    def merit(v: Array) -> float:
+        missed = [min(floor.value(v), 0.0) for floor in task.floors]
+        return task.objective.value(v) + sum((2 * p + 1) * short for p, short in zip(prices, missed, strict=True))
+
+    before = merit(w)
+    for length in 0.5 ** np.arange(20):
+        moved = task.polytope.tidied(w + length * step)
+        if merit(moved) > before - 1e-13 * abs(before):
+            return moved
+    return None
+
+
+def _check_floors(task: ConcaveProblem, w: Array | None) -> None:
+    """Raises NoAnswer where fractions (q,) miss a floor because all cannot be kept together."""
+    if w is not None and all(floor.value(w) > -FLOOR_ROUNDING for floor in task.floors):
+        return
+    together = Objective(
+        tuple(floor.pieces[0] for floor in task.floors),
+        np.concatenate([floor.levels for floor in task.floors]),
+        worst=True,
+    )
+    best = _maximised(ConcaveProblem(objective=together, polytope=task.polytope)).fractions
+    kept = min(float(np.exp(floor.value(best) / floor.degree)) for floor in task.floors)
+    if kept < 1.0:
+        raise NoAnswer(
+            "design.balance cannot be met: no sharing within the other limits informs so well about every equation; "
+            f"{kept:.3g} times the asked share was found"
+        )
+
+
 def _certified_shares(problem: DurationProblem, within: Array | None) -> DurationDesign:
     """The optimum of the concave problem.
 
@@ -162,41 +252,25 @@ def _certified_shares(problem: DurationProblem, within: Array | None) -> Duratio
         problem: whose symmetric parts count.
         within: (q,) fractions at which the information is positive definite, where equal ones are not known to be.
     """
-    task = task_of(problem, within=within)
-    start, best = start_of(task, within=within), None
-    if not np.isfinite(task.objective.value(start)):
+    task = concave_problem(problem, within=within)
+    if within is None and not np.isfinite(task.objective.value(task.polytope.middle())):
         raise np.linalg.LinAlgError
-    cornered = problem.aim.criterion == "E" or problem.robust == "worst"
-    for tolerance in TOLERANCES["cornered" if cornered else "smooth"]:
-        try:
-            found = climb(task, start, tolerance=tolerance)
-            answer = certify(task, found, kind=THEOREMS.get(problem.aim.criterion, ""))
-        except np.linalg.LinAlgError:
-            continue
-        if _shaky(task, found.fractions) and tolerance < WIDEST:
-            continue  # the optimum is singular; a wider barrier keeps so far away that the certificate means something
-        if best is None or answer[0].bound - answer[0].value < best[1][0].gap:
-            best = (found, answer)
-        if best[1][0].gap < 0.3 * LARGEST_GAP * best[1][0].degree:
-            break
-    if best is None:
-        raise np.linalg.LinAlgError
-    found, (certificate, slope) = best
-    if not certificate.gap < LARGEST_GAP * certificate.degree:
+    best = _maximised(task, THEOREMS.get(problem.aim.criterion, ""))
+    if not best.gap < LARGEST_GAP:
         raise NoAnswer(
-            f"the durations could not be certified: a design better by {certificate.gap / certificate.degree:.2g} "
+            f"the durations could not be certified: a design better by {best.gap:.2g} "
             f"in {problem.aim.criterion}-efficiency is not excluded, at most {LARGEST_GAP:g} is accepted"
         )
-    gap, count = max(certificate.gap, 0.0), len(problem.names)
-    certificate = replace(certificate, bound=certificate.value + gap, prices=certificate.prices[:count])
-    fractions, own = found.fractions[:count], problem.aim.criterion == "D" and problem.robust == "nominal"
+    gap, count = max(best.certificate.gap, 0.0), len(problem.names)
+    certificate = replace(best.certificate, bound=best.certificate.value + gap, prices=best.certificate.prices[:count])
+    fractions, own = best.fractions[:count], problem.aim.criterion == "D" and problem.robust == "nominal"
     log_det = log_abs_det(problem, fractions, symmetric=within is not None)
     if problem.constraints.budgets:  # unused time: what is collected counts, with means eliminated
         log_det = certificate.value if own else Collected.of(problem, "D").value(fractions)
     return DurationDesign(
         problem=problem,
         fractions=fractions,
-        sensitivities=slope[:count],
+        sensitivities=best.sensitivities[:count],
         log_det=log_det,
         gap=gap,
         repeats=(0,) * len(problem.names),
@@ -204,12 +278,6 @@ def _certified_shares(problem: DurationProblem, within: Array | None) -> Duratio
         efficiency_uniform=_uniform_efficiency(problem, fractions),
         certificate=certificate,
     )
-
-
-def _shaky(task: Task, fractions: Array) -> bool:
-    """Whether rounding shows in what is computed at fractions (q,)."""
-    values = [np.linalg.eigvalsh(piece.matrix(fractions)) for piece in task.objective.pieces]
-    return any(item[0] < SHAKY * item[-1] for item in values)
 
 
 def _improved_shares(problem: DurationProblem) -> DurationDesign:
@@ -268,7 +336,9 @@ def with_repeats(design: DurationDesign, repeats: Sequence[int]) -> DurationDesi
 
 def _with_runs(design: DurationDesign, repeats: tuple[int, ...]) -> DurationDesign:
     runs = np.array(repeats)
-    efficiency = efficiency_of_runs(design.problem, design.fractions, runs)
+    efficiency = efficiency_of_shares(
+        design.problem, design.fractions, runs * design.problem.run_s / design.problem.total_s
+    )
     return replace(design, repeats=repeats, efficiency_repeats=efficiency, note=note_on_runs(design.problem, runs))
 
 

@@ -7,9 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from expdesign.durations.certificate import log_det, whitened
-from expdesign.durations.polish import polish
-from expdesign.durations.solve import bordered
+from expdesign.durations import bordered, d_optimal, log_det, rows_of, whitened
 from expdesign.information import PrimitiveInformation
 from expdesign.values import Array, seal
 
@@ -40,7 +38,9 @@ class Optimum:
 def optimum(information: Sequence[PrimitiveInformation], mean_subtraction: str) -> Optimum:
     """D-optimal time fractions of a dictionary that informs about every parameter."""
     white, _ = whitened(np.array([bordered(item, mean_subtraction) for item in information]))
-    return shared(information, polish(white, np.full(len(white), 1.0 / len(white))), mean_subtraction)
+    rows = rows_of(white)
+    assert rows is not None  # simulated runs have positive semidefinite information
+    return shared(information, d_optimal(rows, tolerance=1e-10).fractions, mean_subtraction)
 
 
 def shared(

@@ -12,8 +12,7 @@ import numpy as np
 from joblib import Parallel, delayed, parallel_config
 
 from expdesign import __version__
-from expdesign.durations import DurationDesign
-from expdesign.durations.efficiency import efficiencies
+from expdesign.durations import DurationDesign, efficiencies
 from expdesign.errors import InputError, NoAnswer
 from expdesign.export import write_files
 from expdesign.export.whatif_page import Case, WhatIfContent, explanations, whatif_html, whatif_json

@@ -1,15 +1,45 @@
-"""Criteria: what makes one sharing of the time better than another. A new one is a file and a line here."""
+"""Criteria: what makes one sharing of the time better than another.
 
-from expdesign.durations.criteria.average import AVERAGE
-from expdesign.durations.criteria.criterion import Aim, Criterion, Picked
-from expdesign.durations.criteria.determinant import DETERMINANT
-from expdesign.durations.criteria.eigenvalue import EIGENVALUE
+A new criterion is a line in the table `CRITERIA`. If its measure is new too, that is a class beside `LogDet` and one
+expression in the convex solver.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from expdesign.durations.criteria.aim import Aim, Criterion, Picked, prediction_columns
 from expdesign.durations.criteria.measures import LogDet, LogSmallest, LogTrace, Measure
-from expdesign.durations.criteria.prediction import PREDICTION
-from expdesign.durations.criteria.subset import SUBSET
 from expdesign.errors import UnknownName
 
-CRITERIA = (DETERMINANT, SUBSET, AVERAGE, EIGENVALUE, PREDICTION)
+CRITERIA = (
+    # The means count in D too: their part of the determinant is constant when fractions sum to one.
+    Criterion(
+        name="D",
+        title="volume of the confidence region of all parameters",
+        measure=lambda picked: LogDet(np.eye(picked.dimension)),
+    ),
+    Criterion(
+        name="D_s",
+        title="volume of the confidence region of the parameters of interest",
+        measure=lambda picked: LogDet(picked.columns(picked.interest)),
+    ),
+    Criterion(
+        name="A",
+        title="mean square relative error of the parameters",
+        measure=lambda picked: LogTrace(picked.scaled_columns("A")),
+    ),
+    Criterion(
+        name="E",
+        title="worst relative error of any combination of parameters",
+        measure=lambda picked: LogSmallest(picked.scaled_columns("E")),
+    ),
+    Criterion(
+        name="V",
+        title="mean square error of the predicted outcomes",
+        measure=lambda picked: LogTrace(prediction_columns(picked)),
+    ),
+)
 
 
 def criterion(name: str) -> Criterion:

@@ -1,29 +1,23 @@
-"""Concave measures of an information matrix, each a function of the covariance V = L^T M^-1 L of what L picks out.
+"""Concave measures of an information matrix: functions of the covariance V = L^T M^-1 L of what L picks out.
 
-M is (d, d), L is (d, k). All values are logarithms of positively homogeneous, concave functions of M, so that a gain of
-0.01 reads as one per cent of information per degree. Whatever is concave in M is concave in time fractions.
+M is (d, d), L is (d, k). Every value is the logarithm of a positively homogeneous, concave function of M, so that a
+gain of 0.01 reads as one per cent of information per degree. Whatever is concave in M is concave in time fractions.
 
-Source: F. Pukelsheim, Optimal Design of Experiments (2006), chapters 3, 6 and 7 (information functions, subgradients).
+Each measure f has a concave conjugate f*(G) = inf over M of trace(G M) - f(M). It turns any positive semidefinite G
+into an upper bound, f(M) <= trace(G M) - f*(G) for every M; with G the gradient of f the bound touches f.
+
+Source: F. Pukelsheim, Optimal Design of Experiments (2006), chapters 3, 6 and 7 (information functions, polars,
+subgradients).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
-from scipy.optimize import brentq
 
 from expdesign.values import Array, seal
-
-
-@dataclass(frozen=True, eq=False)
-class Local:
-    """Second-order picture of a function of fractions: value, slope (c,), minus the Hessian (c, c)."""
-
-    value: float
-    slope: Array
-    curvature: Array
 
 
 class Measure(Protocol):
@@ -31,7 +25,7 @@ class Measure(Protocol):
 
     Attributes:
         L: (d, k) what is picked out.
-        degree: homogeneity of exp(value): information twice as long is worth `degree` x log 2 more.
+        degree: homogeneity of exp(value): twice the information adds `degree` x log 2 to the value.
     """
 
     @property
@@ -41,23 +35,28 @@ class Measure(Protocol):
     def degree(self) -> int: ...  # noqa: D102
 
     def values(self, M: Array) -> Array:
-        """(...) values of matrices (..., d, d) that are positive definite."""
+        """(...) values of positive definite matrices (..., d, d)."""
         ...
 
-    def smooth(self, M: Array, blur: float) -> float:
-        """The value, with corners rounded off as much as `blur` says; the same where there are none."""
+    def gradient(self, M: Array) -> Array:
+        """(d, d) a supergradient G at M; trace(G M) is `degree`."""
         ...
 
-    def local(self, M: Array, parts: Array, blur: float) -> Local:
-        """`smooth` as a function of the weights of parts (c, d, d) in M."""
-        ...
-
-    def tangent(self, M: Array, blur: float) -> tuple[float, Array]:
-        """(a, G): for every M' the value is at most a + trace(G (M' - M)); trace(G M) is `degree`."""
+    def conjugate(self, G: Array) -> float:
+        """f*(G) of a positive semidefinite G; -inf where G bounds nothing."""
         ...
 
     def transformed(self, T: Array) -> Measure:
         """The same measure for matrices T M T^T."""
+        ...
+
+
+@runtime_checkable
+class SmoothMeasure(Measure, Protocol):
+    """A measure with second derivatives."""
+
+    def curvature(self, M: Array, parts: Array) -> Array:
+        """(c, c) minus the Hessian in the weights of parts (c, d, d) of M."""
         ...
 
 
@@ -104,26 +103,26 @@ class LogDet:
         rest = np.linalg.qr(self.L, mode="complete")[0][:, k:]  # what L does not see, eliminated by its own block
         return np.asarray(value - np.linalg.slogdet(rest.T @ M @ rest)[1])
 
-    def smooth(self, M: Array, blur: float) -> float:
-        """As `Measure`."""
-        return float(self.values(M))
-
-    def local(self, M: Array, parts: Array, blur: float) -> Local:
-        """As `Measure`."""
-        T = root(M)
-        white = T @ parts @ T.T
-        if self.L.shape[0] == self.L.shape[1]:
-            return Local(self.smooth(M, blur), np.trace(white, axis1=1, axis2=2), gram(white))
-        basis = np.linalg.qr(T @ self.L)[0]
-        seen = white @ basis
-        inner = basis.T @ seen
-        return Local(self.smooth(M, blur), np.trace(inner, axis1=1, axis2=2), 2 * gram(seen) - gram(inner))
-
-    def tangent(self, M: Array, blur: float) -> tuple[float, Array]:
+    def gradient(self, M: Array) -> Array:
         """As `Measure`."""
         T = root(M)
         basis = T.T @ np.linalg.qr(T @ self.L)[0]
-        return self.smooth(M, blur), basis @ basis.T
+        return np.asarray(basis @ basis.T)
+
+    def curvature(self, M: Array, parts: Array) -> Array:
+        """As `SmoothMeasure`."""
+        T = root(M)
+        white = T @ parts @ T.T
+        if self.L.shape[0] == self.L.shape[1]:
+            return gram(white)
+        basis = np.linalg.qr(T @ self.L)[0]
+        seen = white @ basis
+        return 2 * gram(seen) - gram(basis.T @ seen)
+
+    def conjugate(self, G: Array) -> float:
+        """As `Measure`: k + log det L^T G L."""
+        sign, value = np.linalg.slogdet(self.L.T @ G @ self.L)
+        return self.degree + float(value) if sign > 0 else -np.inf
 
     def transformed(self, T: Array) -> LogDet:
         """As `Measure`."""
@@ -148,27 +147,28 @@ class LogTrace:
         """As `Measure`."""
         return np.asarray(-np.log(np.trace(covariance(self.L, M), axis1=-2, axis2=-1)))
 
-    def smooth(self, M: Array, blur: float) -> float:
-        """As `Measure`."""
-        return float(self.values(M))
-
-    def local(self, M: Array, parts: Array, blur: float) -> Local:
+    def gradient(self, M: Array) -> Array:
         """As `Measure`."""
         T = root(M)
         seen = T @ self.L
-        weight = float(np.sum(seen**2))
-        seen = seen / np.sqrt(weight)
+        back = T.T @ seen
+        return np.asarray(back @ back.T / np.sum(seen**2))
+
+    def curvature(self, M: Array, parts: Array) -> Array:
+        """As `SmoothMeasure`."""
+        T = root(M)
+        seen = T @ self.L
+        seen = seen / np.linalg.norm(seen)
         moved = (T @ parts @ T.T) @ seen
         slope = np.einsum("dk,cdk->c", seen, moved)
-        return Local(-np.log(weight), slope, 2 * gram(moved) - np.outer(slope, slope))
+        return 2 * gram(moved) - np.outer(slope, slope)
 
-    def tangent(self, M: Array, blur: float) -> tuple[float, Array]:
-        """As `Measure`."""
-        T = root(M)
-        seen = T @ self.L
-        weight = float(np.sum(seen**2))
-        back = T.T @ seen
-        return -float(np.log(weight)), back @ back.T / weight
+    def conjugate(self, G: Array) -> float:
+        """As `Measure`: 1 + 2 log of the nuclear norm of G^(1/2) L."""
+        values, vectors = np.linalg.eigh(G)
+        half = np.sqrt(np.maximum(values, 0.0))[:, None] * (vectors.T @ self.L)
+        size = float(np.linalg.svd(half, compute_uv=False).sum())
+        return 1.0 + 2.0 * float(np.log(size)) if size > 0 else -np.inf
 
     def transformed(self, T: Array) -> LogTrace:
         """As `Measure`."""
@@ -177,12 +177,7 @@ class LogTrace:
 
 @dataclass(frozen=True, eq=False)
 class LogSmallest:
-    """-log of the largest eigenvalue of V: E.
-
-    The corner where eigenvalues meet is rounded by max over t of log t + blur log det(M - t L L^T), which is concave
-    and gives the mixture of eigenvectors that the certificate needs: for any Z >= 0 with trace(L^T Z L) = 1,
-    1 / lambda_max(V) <= trace(Z M).
-    """
+    """-log of the largest eigenvalue of V: E. Where eigenvalues meet it has a corner."""
 
     L: Array
 
@@ -198,46 +193,16 @@ class LogSmallest:
         """As `Measure`."""
         return np.asarray(-np.log(np.linalg.eigvalsh(covariance(self.L, M))[..., -1]))
 
-    def _level(self, M: Array, blur: float) -> tuple[float, Array]:
-        """The best t, and M - t L L^T."""
-        eigenvalues = np.linalg.eigvalsh(covariance(self.L, M))
-        shares = eigenvalues / eigenvalues[-1]
+    def gradient(self, M: Array) -> Array:
+        """As `Measure`: of the eigenvector that comes last; at a corner it is one of many."""
+        values, vectors = np.linalg.eigh(covariance(self.L, M))
+        back = np.linalg.solve(M, self.L @ vectors[:, -1])
+        return np.asarray(np.outer(back, back) / values[-1])
 
-        def excess(z: float) -> float:  # zero at t = (1 - z) / lambda_max
-            return blur * float(np.sum((1.0 - z) * shares / ((1.0 - shares) + z * shares))) - 1.0
-
-        low, high = blur / (1.0 + blur), blur * len(shares) / (1.0 + blur * len(shares))
-        inside = excess(low) > 0.0 > excess(high)
-        z = float(brentq(excess, low, high, xtol=1e-300)) if inside else low
-        t = (1.0 - z) / float(eigenvalues[-1])
-        return t, M - t * self.L @ self.L.T
-
-    def smooth(self, M: Array, blur: float) -> float:
-        """As `Measure`."""
-        t, S = self._level(M, blur)
-        return float(np.log(t) + blur * np.linalg.slogdet(S)[1])
-
-    def local(self, M: Array, parts: Array, blur: float) -> Local:
-        """As `Measure`."""
-        t, S = self._level(M, blur)
-        T = root(S)
-        white = T @ parts @ T.T
-        seen = T @ self.L
-        J = seen @ seen.T
-        slope = blur * np.trace(white, axis1=1, axis2=2)
-        tilt = blur * np.einsum("ij,cji->c", J, white)
-        stiffness = 1 / t**2 + blur * float(np.sum(J**2))
-        value = float(np.log(t) + blur * np.linalg.slogdet(S)[1])
-        return Local(value, slope, blur * gram(white) - np.outer(tilt, tilt) / stiffness)
-
-    def tangent(self, M: Array, blur: float) -> tuple[float, Array]:
-        """As `Measure`."""
-        _, S = self._level(M, blur)
-        T = root(S)
-        mixture = T.T @ T
-        mixture /= np.trace(self.L.T @ mixture @ self.L)
-        bound = float(np.trace(mixture @ M))
-        return float(np.log(bound)), mixture / bound
+    def conjugate(self, G: Array) -> float:
+        """As `Measure`: 1 + log trace(L^T G L)."""
+        size = float(np.sum(self.L * (G @ self.L)))
+        return 1.0 + float(np.log(size)) if size > 0 else -np.inf
 
     def transformed(self, T: Array) -> LogSmallest:
         """As `Measure`."""

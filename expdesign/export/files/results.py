@@ -16,8 +16,7 @@ import numpy as np
 
 from expdesign.conventions import POSE_COLUMNS, VELOCITY_COLUMNS, to_b_frame, to_n_frame
 from expdesign.dictionary.primitive import Primitive
-from expdesign.durations import Efficiencies, limits_kept
-from expdesign.durations.values import DurationDesign
+from expdesign.durations import DurationDesign, Efficiencies, limits_kept
 from expdesign.export.routes import build_fence, require_verified
 from expdesign.information.primitive_information import PrimitiveInformation
 from expdesign.plan.values import Leg, Plan, Promise

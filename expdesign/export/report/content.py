@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from expdesign.durations import Efficiencies
-from expdesign.durations.values import DurationDesign
+from expdesign.durations import DurationDesign, Efficiencies
 from expdesign.export.files import Known
 from expdesign.export.routes import Route
 from expdesign.growing import Growth

@@ -7,9 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from expdesign.durations import DurationDesign
-from expdesign.durations.collected import Collected
-from expdesign.durations.solve import bordered_moments
+from expdesign.durations import Collected, DurationDesign, bordered_moments
 from expdesign.information import moments, regressor_rows
 from expdesign.plan.values import Leg
 from expdesign.signals import Commands, Trajectory

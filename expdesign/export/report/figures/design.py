@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
-from expdesign.durations.values import DurationDesign
+from expdesign.durations import DurationDesign
 from expdesign.export.report.content import ReportContent, relative_information
 from expdesign.export.report.figures.style import BLUE, GREY, PRIMITIVE, light_grid, new_figure, short, svg
 

@@ -18,6 +18,8 @@ from scipy.optimize import linprog
 from expdesign.errors import InputError, NoAnswer, UnknownName
 from expdesign.values import Array, seal
 
+CRUMB = 1e-9
+"""Fractions less than this above their least are rounding."""
 TIGHT = 1e-9
 """Limits are loosened by this share of themselves where they leave no room inside."""
 
@@ -103,14 +105,6 @@ class Polytope:
         taken = np.clip(left - np.r_[0.0, np.cumsum(room)[:-1]], 0.0, room)
         return float(prices @ self.limits + reduced @ self.least + reduced[order] @ taken)
 
-    def prices(self, slope: Array) -> Array:
-        """(i,) prices that make `bound` tight, from linear programming; zero where that fails."""
-        if not len(self.rows):
-            return np.zeros(0)
-        bounds = np.stack([self.least, np.maximum(self.most, self.least)], axis=1)
-        answer = linprog(-slope, self.rows, self.limits, np.ones((1, len(slope))), [1.0], bounds, method="highs")
-        return np.maximum(-answer.ineqlin.marginals, 0.0) if answer.status == 0 else np.zeros(len(self.rows))
-
     def inside(self) -> Array | None:
         """(q,) fractions as far from every bound as possible, or None when there is no room."""
         free = self.most > self.least
@@ -127,6 +121,21 @@ class Polytope:
         if answer.status != 0 or answer.x[-1] <= TIGHT:
             return None
         return np.asarray(answer.x[:-1])
+
+    def middle(self) -> Array:
+        """(q,) fractions well inside the limits where there is room, else as far as rounding allows."""
+        if self.plain:
+            return np.full(len(self.least), 1.0 / len(self.least))
+        found = self.inside()
+        if found is None:  # a checked polytope has points; only rounding leaves it no inside
+            found = self.loosened().inside()
+        return self.tidied(np.array(self.least)) if found is None else found
+
+    def tidied(self, w: Array) -> Array:
+        """(q,) with rounding taken off: in the box, nothing where next to nothing was, and of sum one."""
+        above = np.clip(w, self.least, np.maximum(self.most, self.least)) - self.least
+        above = np.where(above > CRUMB, above, 0.0)
+        return np.asarray(self.least + above * (1.0 - self.least.sum()) / max(float(above.sum()), 1e-300))
 
     def feasible(self) -> bool:
         """Whether there are fractions within the limits at all."""

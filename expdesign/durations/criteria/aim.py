@@ -1,4 +1,4 @@
-"""What a design is good for: a criterion, and what the user has to say for it."""
+"""The aim of a design: a criterion, and what it needs to know from the user."""
 
 from __future__ import annotations
 
@@ -110,3 +110,23 @@ class Criterion:
     name: str
     title: str
     measure: Callable[[Picked], Measure]
+
+
+def prediction_columns(picked: Picked) -> Array:
+    """(d, o) slopes of the outcomes with the parameters, times the residual noise of their equations.
+
+    Raises:
+        InputError: the outcomes are not stated, or no estimated parameter moves them.
+    """
+    aim, p = picked.aim, len(picked.parameters)
+    if not aim.gradients.size:
+        raise InputError("criterion V needs outcomes to predict")
+    if aim.gradients.shape[1] != p:
+        raise InputError(f"gradients of outcomes have {aim.gradients.shape[1]} columns for {p} parameters")
+    moved = tuple(name for name, column in zip(picked.parameters, aim.gradients.T, strict=True) if column.any())
+    if not moved:
+        raise InputError(f"no parameter to be estimated moves {', '.join(aim.outcomes)}")
+    L = np.zeros((picked.dimension, len(aim.gradients)))
+    index = [picked.parameters.index(name) for name in moved]
+    L[index] = (aim.gradients[:, index] * picked.noise("V", moved)).T
+    return L

@@ -1,0 +1,147 @@
+"""The convex problem of any criterion and any limits, stated in cvxpy; the only importer of it, imported when needed.
+
+A new limit is one expression in `_limits`, a new criterion one in `_hypograph`. Answers are approximate: the solver's
+status is not looked at, `newton_step` sharpens what is smooth, and the certificate is computed elsewhere, from the
+problem.
+
+Source: S. Diamond and S. Boyd, CVXPY: a Python-embedded modeling language for convex optimization, J. Mach. Learn. Res.
+17 (2016), no. 83; P. J. Goulart and Y. Chen, Clarabel: an interior-point solver for conic programs with quadratic
+objectives (2024), arXiv:2405.12762; linear matrix inequalities of the criteria: F. Pukelsheim, Optimal Design of
+Experiments (2006), 3.2 (information matrices for subsystems), and S. Boyd and L. Vandenberghe, Convex Optimization
+(2004), 7.5.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from typing import Any
+
+import cvxpy as cp
+import numpy as np
+
+from expdesign.durations.concave import ConcaveProblem
+from expdesign.durations.criteria import LogDet, LogTrace, Measure
+from expdesign.durations.criteria.models import Piece
+from expdesign.durations.limits import Polytope
+from expdesign.values import Array
+
+PRECISION = {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11}
+"""What the solver aims at; where rounding stops it earlier, its last iterate is taken."""
+
+
+def conic_optimum(task: ConcaveProblem) -> tuple[Array, tuple[Array, ...]] | None:
+    """Fractions (q,) near the optimum, and for each model a multiplier (d, d) for its certificate.
+
+    Returns:
+        None where the solver gives no numbers, e.g. because the floors cannot be kept.
+    """
+    w, values, held = cp.Variable(len(task.polytope.least)), [], []
+    constraints = _limits(task.polytope, w)
+    for piece, level in zip(task.objective.pieces, task.objective.levels, strict=True):
+        value, conditions = _hypograph(piece, w)
+        values.append(value - float(level))
+        held.append(conditions)
+        constraints += conditions
+    for floor in task.floors:
+        value, conditions = _hypograph(floor.pieces[0], w)
+        constraints += [*conditions, value >= float(floor.levels[0])]
+    stacked = cp.hstack(values)
+    _solve(
+        cp.Problem(cp.Maximize(cp.min(stacked) if task.objective.worst else cp.sum(stacked) / len(values)), constraints)
+    )
+    if w.value is None or not np.isfinite(w.value).all():
+        return None
+    found = [item[0].dual_value if item else None for item in held]
+    pairs = zip(task.objective.pieces, found, strict=True)
+    return w.value, tuple(_multiplier(piece, dual, w.value) for piece, dual in pairs)
+
+
+def newton_step(task: ConcaveProblem, w: Array, *, mixture: Array, floor_prices: Sequence[float]) -> Array | None:
+    """A step (q,) of Newton's method under all limits.
+
+    It maximises the quadratic model of the Lagrangian, with the floors and the models of a worst case to first order.
+
+    Args:
+        task: with smooth measures.
+        w: (q,) where B is positive definite for every model.
+        mixture: (m,) weights of the models.
+        floor_prices: of the floors.
+
+    Returns:
+        None where the solver gives no numbers.
+    """
+    pieces, every = task.objective.pieces, np.arange(len(w))
+    weighed = zip((*mixture, *floor_prices), (*pieces, *(floor.pieces[0] for floor in task.floors)), strict=True)
+    curvatures = [weight * piece.curvature(w, every) for weight, piece in weighed if weight > 0]
+    H = np.sum(curvatures, axis=0)
+    values, vectors = np.linalg.eigh(H)
+    kept = values > 1e-14 * values[-1]
+    step, height = cp.Variable(len(w)), cp.Variable()
+    constraints = _limits(task.polytope, w + step)
+    tangents = [piece.tangent(w) for piece in pieces]
+    heights = np.array([item.value for item in tangents]) - task.objective.levels
+    tilts = np.array([item.slope for item in tangents])
+    if task.objective.worst:
+        constraints.append(height <= (heights - heights.min()) + tilts @ step)
+    else:
+        constraints.append(height == tilts.mean(axis=0) @ step)
+    for floor in task.floors:
+        tangent = floor.pieces[0].tangent(w)
+        constraints.append(tangent.value - float(floor.levels[0]) + tangent.slope @ step >= 0)
+    root = np.sqrt(values[kept])[:, None] * vectors[:, kept].T
+    _solve(cp.Problem(cp.Maximize(height - cp.sum_squares(root @ step) / 2), constraints))
+    return None if step.value is None or not np.isfinite(step.value).all() else np.asarray(step.value)
+
+
+def _limits(polytope: Polytope, w: Any) -> list[Any]:
+    """All linear limits on fractions w."""
+    limits = [cp.sum(w) == 1, w >= polytope.least]
+    bounded = np.flatnonzero(polytope.most < 1.0)
+    if len(bounded):
+        limits.append(w[bounded] <= np.maximum(polytope.most, polytope.least)[bounded])
+    if len(polytope.rows):
+        limits.append(polytope.rows @ w <= polytope.limits)
+    return limits
+
+
+def _hypograph(piece: Piece, w: Any) -> tuple[Any, list[Any]]:
+    """A concave expression for a piece's value, and what it holds under, the matrix inequality in M first."""
+    count, d = piece.matrices.shape[:2]
+    total = piece.prior + cp.reshape(piece.matrices.reshape(count, d * d).T @ w, (d, d), order="C")
+    M = (total + total.T) / 2
+    measure: Measure = piece.measure
+    if isinstance(measure, LogDet):
+        Q, R = np.linalg.qr(measure.L)
+        offset = 2 * float(np.log(np.abs(np.diag(R))).sum())
+        if measure.degree == d:
+            return cp.log_det(M) - offset, []
+        K = cp.Variable((measure.degree, measure.degree), symmetric=True)
+        return cp.log_det(K) - offset, [M - Q @ K @ Q.T >> 0]  # the largest K with M >= L K L^T is V^-1
+    size = float(np.linalg.norm(measure.L, 2))
+    L, u = measure.L / size, cp.Variable()
+    value = cp.log(u) - 2 * np.log(size)
+    if isinstance(measure, LogTrace):
+        W = cp.Variable((L.shape[1],) * 2, symmetric=True)
+        return value, [cp.bmat([[M, u * L], [u * L.T, W]]) >> 0, cp.trace(W) <= u]  # W >= u^2 V, so u trace V <= 1
+    return value, [M - u * (L @ L.T) >> 0]  # u V <= I
+
+
+def _multiplier(piece: Piece, dual: Array | None, w: Array) -> Array:
+    """The (d, d) block of a matrix inequality's dual solution that multiplies M, positive semidefinite, to scale."""
+    d = len(piece.prior)
+    if dual is None or not np.isfinite(dual).all():
+        return np.eye(d)
+    values, vectors = np.linalg.eigh((dual[:d, :d] + dual[:d, :d].T) / 2)
+    G = (vectors * np.maximum(values, 0.0)) @ vectors.T
+    size = float(np.sum(G * piece.matrix(w)))
+    return np.asarray(G * piece.measure.degree / size) if size > 0 else np.eye(d)
+
+
+def _solve(problem: Any) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # an inaccurate answer is judged by its certificate
+        try:
+            problem.solve(solver=cp.CLARABEL, **PRECISION)
+        except cp.error.SolverError:
+            return

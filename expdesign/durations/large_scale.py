@@ -1,0 +1,255 @@
+"""D-optimal fractions of very many candidates: Newton's method on a small working set, and passes over all of them.
+
+    maximise log det (B_prior + sum_q w_q R_q^T R_q)    over w >= 0, sum w = 1
+
+A candidate is its r regressor rows R_q, (r, d), never a dense matrix. The fractions of a working set are found by
+Newton's method for log det + mu sum log w_q with a falling mu. One pass over all candidates then gives every
+sensitivity d_q = trace(M^-1 B_q). Candidates with d_q above the dimension join the working set, until none is left: by
+the equivalence theorem no other design has a log det higher by more than max d_q - sum w_q d_q.
+
+Source: J. Kiefer and J. Wolfowitz, The equivalence of two extremum problems, Canad. J. Math. 12 (1960), 363-366;
+S. Boyd and L. Vandenberghe, Convex Optimization (2004), 11.3 (barrier method); working set: C. L. Atwood, Sequences
+converging to D-optimal designs of experiments, Ann. Statist. 1 (1973), 342-352.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+
+from expdesign.durations.criteria.measures import gram, root
+from expdesign.durations.criteria.models import whitening
+from expdesign.values import Array, seal
+
+Indices = NDArray[np.intp]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tuning:
+    """Settings of the working-set method.
+
+    Attributes:
+        smallest_set: candidates in the first working set at least, and about as many as may join at a time.
+        set_per_dimension: the same per dimension d.
+        first_tolerance: relative gap to which the first working set is solved.
+        sharper: factor between tolerances of one working set and the next.
+        newton_steps: most steps for one mu.
+        most_sets: working sets that are tried.
+        crumb: fractions below this are left out at the end.
+        chunk: rows that a pass handles at a time, so that they stay in the processor's cache.
+    """
+
+    smallest_set: int = 50
+    set_per_dimension: int = 4
+    first_tolerance: float = 1e-2
+    sharper: float = 1e-2
+    newton_steps: int = 60
+    most_sets: int = 60
+    crumb: float = 1e-7
+    chunk: int = 16384
+
+
+TUNING = Tuning()
+INDEFINITE = 1e-9
+"""Eigenvalues below minus this, relative to the largest, are not rounding."""
+REGULAR = 1e-8
+"""A first working set has a least eigenvalue above this, relative to the largest."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LargeDesign:
+    """A D-optimal approximate design.
+
+    Attributes:
+        fractions: (q,) of the candidates, sum 1.
+        gap: no other design has a log det higher by more.
+        dimension: d.
+    """
+
+    fractions: Array
+    gap: float
+    dimension: int
+
+    def __post_init__(self) -> None:
+        seal(self, fractions="q")
+
+    @property
+    def gap_relative(self) -> float:
+        """The gap over the dimension."""
+        return self.gap / self.dimension
+
+
+def rows_of(matrices: Array) -> Array | None:
+    """(q, r, d) rows R_q with R_q^T R_q = B_q of (q, d, d), or None where one is not positive semidefinite."""
+    values, vectors = np.linalg.eigh(matrices)
+    if (values[:, 0] < -INDEFINITE * np.maximum(values[:, -1], 0.0)).any():
+        return None
+    return np.asarray(np.sqrt(np.maximum(values, 0.0))[:, :, None] * np.swapaxes(vectors, 1, 2))
+
+
+def d_optimal(rows: Array, *, prior: Array | None = None, tolerance: float = 1e-7) -> LargeDesign:
+    """The D-optimal fractions of candidates.
+
+    Args:
+        rows: (q, r, d) regressor rows of each candidate; (q, d) for one row each.
+        prior: (d, d) information that is there already; none when not given.
+        tolerance: gap per dimension to aim at; rounding may leave a larger one.
+
+    Raises:
+        NotInformative: all candidates together are singular to working precision.
+    """
+    pool = _Pool.of(rows[:, None, :] if rows.ndim == 2 else rows, prior)
+    chosen = _first_set(pool)
+    w, aim = np.full(len(chosen), 1.0 / len(chosen)), max(TUNING.first_tolerance, tolerance)
+    best = _spread(pool, chosen, w)
+    for _ in range(TUNING.most_sets):
+        w = _solved(pool, chosen, w, aim)
+        found = _spread(pool, chosen, w)
+        best = min(best, found, key=lambda item: item[0].gap)
+        _, sensitivities = found
+        worth = (1 + aim) * pool.dimension
+        joining = np.setdiff1d(np.flatnonzero(sensitivities > worth), chosen)
+        if not len(joining) and aim <= tolerance:
+            break
+        if len(joining):
+            joining = joining[np.argsort(-sensitivities[joining], kind="stable")[: _set_size(pool.dimension)]]
+            kept = (sensitivities[chosen] > (1 - max(10 * aim, 1e-3)) * pool.dimension) | (w > TUNING.crumb)
+            chosen, w = np.r_[chosen[kept], joining], np.r_[w[kept], np.zeros(len(joining))]
+        aim = max(TUNING.sharper * aim, tolerance)
+    return _without_crumbs(pool, best[0], tolerance)
+
+
+@dataclass(frozen=True, eq=False)
+class _Pool:
+    """All candidates.
+
+    Attributes:
+        rows: (q, r, d).
+        T: (d, d) whitening: equal fractions have the information T^-1 T^-T.
+        prior: (d, d) whitened.
+    """
+
+    rows: Array
+    T: Array
+    prior: Array
+
+    @staticmethod
+    def of(rows: Array, prior: Array | None) -> _Pool:
+        count, d = len(rows), rows.shape[2]
+        flat = rows.reshape(-1, d)
+        known = np.zeros((d, d)) if prior is None else prior
+        T = whitening((flat.T @ flat)[None] / count, known)
+        return _Pool(rows, T, T @ known @ T.T)
+
+    @property
+    def dimension(self) -> int:
+        """Size d of the information matrix."""
+        return int(self.rows.shape[2])
+
+    def parts(self, chosen: Indices) -> Array:
+        """(c, d, d) whitened matrices of some candidates."""
+        white = self.rows[chosen] @ self.T.T
+        return np.asarray(np.swapaxes(white, 1, 2) @ white)
+
+    def sensitivities(self, M: Array) -> Array:
+        """(q,) trace(M^-1 B_q) of every candidate for a whitened M (d, d)."""
+        count, r, d = self.rows.shape
+        flat, A = self.rows.reshape(-1, d), (root(M) @ self.T).T
+        found = np.empty(count * r)
+        for first in range(0, count * r, TUNING.chunk):
+            some = flat[first : first + TUNING.chunk] @ A
+            np.einsum("ij,ij->i", some, some, out=found[first : first + TUNING.chunk])
+        return found if r == 1 else found.reshape(count, r).sum(axis=1)
+
+
+def _set_size(dimension: int) -> int:
+    return max(TUNING.smallest_set, TUNING.set_per_dimension * dimension)
+
+
+def _first_set(pool: _Pool) -> Indices:
+    """Candidates of largest sensitivity at equal fractions, completed until they inform about every direction."""
+    count, d = len(pool.rows), pool.dimension
+    size = _set_size(d)
+    if count <= 2 * size:
+        return np.arange(count)
+    leverage = pool.sensitivities(np.eye(d))
+    chosen = np.argpartition(-leverage, size)[:size]
+    for _ in range(d):
+        values, vectors = np.linalg.eigh(pool.prior + pool.parts(chosen).mean(axis=0))
+        if values[0] > REGULAR * values[-1]:
+            return np.sort(chosen)
+        dark = vectors[:, values <= REGULAR * values[-1]]
+        within = pool.sensitivities(np.eye(d) + 1e12 * (np.eye(d) - dark @ dark.T))
+        chosen = np.union1d(chosen, np.argsort(-within, kind="stable")[:d])
+    return np.arange(count)
+
+
+def _spread(pool: _Pool, chosen: Indices, w: Array) -> tuple[LargeDesign, Array]:
+    """The design that gives fractions (c,) to the chosen candidates, and all sensitivities (q,) there."""
+    fractions = np.zeros(len(pool.rows))
+    fractions[chosen] = w
+    sensitivities = pool.sensitivities(pool.prior + np.tensordot(w, pool.parts(chosen), axes=1))
+    gap = max(float(sensitivities.max() - w @ sensitivities[chosen]), 0.0)
+    return LargeDesign(fractions=fractions, gap=gap, dimension=pool.dimension), sensitivities
+
+
+def _solved(pool: _Pool, chosen: Indices, w: Array, tolerance: float) -> Array:
+    """The best fractions (c,) of the chosen candidates, to a gap of `tolerance` per dimension."""
+    parts, count = pool.parts(chosen), len(chosen)
+    if count == 1:
+        return np.ones(1)
+    w = 0.5 * w / w.sum() + 0.5 / count
+    barrier = pool.dimension / count
+    while count * barrier > tolerance / 2 * pool.dimension:
+        barrier /= 10
+        w = _centred(pool, parts, w, barrier)
+    return w
+
+
+def _centred(pool: _Pool, parts: Array, w: Array, barrier: float) -> Array:
+    """The maximum (c,) of log det + barrier sum log w by Newton's method in relative steps of w.
+
+    Near the maximum, where the decrement is small against the barrier, full steps are safe, because the function is
+    self-concordant; farther away the step is halved until it gains.
+    """
+    for _ in range(TUNING.newton_steps):
+        T = root(pool.prior + np.tensordot(w, parts, axes=1))
+        white = T @ parts @ T.T
+        slope = w * np.trace(white, axis1=1, axis2=2) + barrier
+        curvature = w[:, None] * gram(white) * w + barrier * np.eye(len(w))
+        free, price = cho_solve(cho_factor(curvature), np.stack([slope, w], axis=1)).T
+        relative = free - (w @ free) / (w @ price) * price
+        decrement = float(relative @ curvature @ relative)
+        length = min(1.0, 0.99 / max(float(-relative.min()), 1e-300))
+        if decrement > 0.05 * barrier:
+            value = _merit(pool, parts, w, barrier)
+            while not _merit(pool, parts, w * (1 + length * relative), barrier) >= value + 0.1 * length * decrement:
+                length /= 2
+                if length < 1e-10:
+                    return w
+        w = w * (1 + length * relative)
+        w = w / w.sum()
+        if decrement < 1e-6 * barrier:
+            break
+    return w
+
+
+def _merit(pool: _Pool, parts: Array, w: Array, barrier: float) -> float:
+    sign, value = np.linalg.slogdet(pool.prior + np.tensordot(w, parts, axes=1))
+    return float(value + barrier * np.log(w).sum()) if sign > 0 and w.min() > 0 else -np.inf
+
+
+def _without_crumbs(pool: _Pool, design: LargeDesign, tolerance: float) -> LargeDesign:
+    """The design with nothing where only the barrier kept a fraction above zero, unless that widens the gap."""
+    kept = np.flatnonzero(design.fractions > TUNING.crumb)
+    w = design.fractions[kept] / design.fractions[kept].sum()
+    try:
+        if len(kept) > 1:
+            w = _centred(pool, pool.parts(kept), w, tolerance * pool.dimension / (10 * len(kept)))
+        trimmed, _ = _spread(pool, kept, w)
+    except np.linalg.LinAlgError:
+        return design
+    return trimmed if trimmed.gap <= max(design.gap, tolerance * pool.dimension) else design

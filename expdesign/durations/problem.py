@@ -1,0 +1,244 @@
+"""The duration problem, built from scored primitives or from covariances of estimates.
+
+In the covariance domain every primitive is informative on its own and has a covariance P_q of its own estimate, that
+one total time of it alone would give:
+
+    P(w)^-1 = sum_q w_q P_q^-1
+
+Estimates from separate runs are fused by their covariances. Covariances from Monte Carlo runs of the estimator count
+everything that the information matrix leaves out: coloured residuals, bias of the method, weak instruments.
+
+Source: F. Ljungberg, doctoral thesis, Linköping University, (7.50)-(7.63).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from expdesign.durations.criteria import Aim, Picked
+from expdesign.durations.limits import NO_CONSTRAINTS, Constraints
+from expdesign.errors import InputError, NotInformative, UnknownName
+from expdesign.information import MEAN_SUBTRACTIONS, PrimitiveInformation, check_informative
+from expdesign.values import Array, frozen_set, seal
+
+ROBUST = ("nominal", "average", "worst")
+"""What several models of the ship count for: only the nominal one, their average, or the least of them."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DurationProblem:
+    """Maximise a criterion of B(w) = B_prior + sum_q w_q B_q over time fractions w.
+
+    With complete mean subtraction B_q = [[X_q, Y_q], [Z_q^T, I]], of dimension p + n: its Schur complement is the
+    information matrix after subtraction, because sum w = 1. Otherwise B_q has dimension p.
+
+    Attributes:
+        names: of the primitives.
+        parameters: names of the p parameters.
+        mean_subtraction: "none", "batch" or "complete".
+        matrices: (q, d, d) B_q of the nominal model, in physical parameter scale.
+        run_s: (q,) duration of one whole run of each primitive [s].
+        total_s: time to share out [s].
+        aim: the criterion and what it needs to know.
+        constraints: limits on the sharing.
+        prior: (d, d) what is known already, per sample of the total time (thesis (7.58)).
+        robust: one of `ROBUST`.
+        sampled: (m, q, d, d) B_q of models drawn from the prior of the nominal parameters; m is 0 for "nominal".
+        equations: (p) equation, "u", "v" or "r", of each parameter; only `constraints.balance` needs it.
+        nuisance: parameters of disturbances that are estimated along; where runs make two of their regressors coincide,
+            the estimator merges them, see `estimable`.
+
+    Source: F. Ljungberg, doctoral thesis, Linköping University, (7.50)-(7.58); Schur complement form derived here.
+    """
+
+    names: tuple[str, ...]
+    parameters: tuple[str, ...]
+    mean_subtraction: str
+    matrices: Array
+    run_s: Array
+    total_s: float
+    aim: Aim = field(default_factory=Aim)
+    constraints: Constraints = NO_CONSTRAINTS
+    prior: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    robust: str = "nominal"
+    sampled: Array = field(default_factory=lambda: np.zeros((0, 0, 0, 0)))
+    equations: tuple[str, ...] = ()
+    nuisance: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if np.size(self.prior) == 0:
+            frozen_set(self, "prior", np.zeros(np.shape(self.matrices)[1:]))
+        if np.size(self.sampled) == 0:
+            frozen_set(self, "sampled", np.zeros((0, *np.shape(self.matrices))))
+        seal(self, matrices="q d d", run_s="q", prior="d d", sampled="m q d d")
+        if len(set(self.names)) < len(self.names):
+            twice = next(name for name in self.names if self.names.count(name) > 1)
+            raise InputError(f"two primitives are named {twice!r}, expected every name once")
+        if not 0 < self.total_s < np.inf:
+            raise InputError(f"total_s is {self.total_s:g}, expected more than 0")
+        if self.robust not in ROBUST:
+            raise UnknownName("robust", self.robust, known=ROBUST)
+        if (self.robust != "nominal") != bool(len(self.sampled)):
+            raise InputError(f"robust is {self.robust!r} and {len(self.sampled)} models were sampled")
+
+    @property
+    def dimension(self) -> int:
+        """Size d of B: parameters, and means when they are subtracted over the complete data."""
+        return int(self.matrices.shape[1])
+
+    @property
+    def picked(self) -> Picked:
+        """What a criterion works on."""
+        return Picked(aim=self.aim, parameters=self.parameters, dimension=self.dimension)
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether regressors and instruments come from the same noise-free run, so that the problem is convex."""
+        stacks = (self.matrices, self.prior[None], *self.sampled)
+        return all(_symmetric(stack) for stack in stacks)
+
+
+def _symmetric(stack: Array) -> bool:
+    size = np.sqrt(np.abs(np.diagonal(stack, axis1=1, axis2=2)).max(axis=0))
+    size = np.where(size > 0, size, 1.0)
+    return bool(np.all(np.abs(stack - np.swapaxes(stack, 1, 2)) <= 1e-9 * np.outer(size, size)))
+
+
+def build_durations(
+    information: Sequence[PrimitiveInformation],
+    parameters: Sequence[str],
+    *,
+    total_s: float,
+    mean_subtraction: str = "complete",
+    aim: Aim | None = None,
+    constraints: Constraints = NO_CONSTRAINTS,
+    prior: Array | None = None,
+    sampled: Sequence[Sequence[PrimitiveInformation]] = (),
+    robust: str = "nominal",
+    equations: Sequence[str] = (),
+    nuisance: Sequence[str] = (),
+) -> DurationProblem:
+    """The duration problem of a scored dictionary.
+
+    Args:
+        information: of each primitive, by the nominal model.
+        parameters: p names in the order of the matrices.
+        total_s: time to share out [s].
+        mean_subtraction: "none", "batch" or "complete".
+        aim: criterion and what it needs; D when not given.
+        constraints: limits on the sharing.
+        prior: (d, d) what is known already, per sample of the total time; see `prior_information`.
+        sampled: the information again by every model drawn from the prior of the nominal parameters.
+        robust: "nominal", or what the sampled models count for: "average" or "worst".
+        equations: of each parameter; only needed for `constraints.balance`.
+        nuisance: parameters of disturbances that are estimated along.
+
+    Raises:
+        UnknownName: no such mean subtraction.
+        NotInformative: no shares of these primitives inform about every parameter.
+    """
+    if mean_subtraction not in MEAN_SUBTRACTIONS:
+        raise UnknownName("mean subtraction", mean_subtraction, known=MEAN_SUBTRACTIONS)
+    if prior is None:
+        allowed = [item for item in information if item.primitive.name not in constraints.excluded]
+        check_informative(allowed or information, parameters, mean_subtraction)
+    return DurationProblem(
+        names=tuple(item.primitive.name for item in information),
+        parameters=tuple(parameters),
+        mean_subtraction=mean_subtraction,
+        matrices=_stack(information, mean_subtraction),
+        run_s=np.array([item.primitive.duration_s for item in information]),
+        total_s=total_s,
+        aim=aim or Aim(),
+        constraints=constraints,
+        prior=np.zeros((0, 0)) if prior is None else prior,
+        robust=robust,
+        sampled=np.array([_stack(items, mean_subtraction) for items in sampled]),
+        equations=tuple(equations),
+        nuisance=tuple(nuisance),
+    )
+
+
+def _stack(information: Sequence[PrimitiveInformation], mean_subtraction: str) -> Array:
+    return np.array([bordered(item, mean_subtraction) for item in information])
+
+
+def bordered(item: PrimitiveInformation, mean_subtraction: str) -> Array:
+    """B_q of one primitive, linear in time fractions: see `DurationProblem`."""
+    return bordered_moments(item.X, item.Y, item.Z, item.YZ, mean_subtraction)
+
+
+def bordered_moments(X: Array, Y: Array, Z: Array, YZ: Array, mean_subtraction: str) -> Array:
+    """The same of moments X (p, p), means Y and Z (p, outputs) and the means' products YZ (p, p)."""
+    if mean_subtraction == "none":
+        return X
+    if mean_subtraction == "batch":
+        return X - YZ
+    return np.block([[X, Y], [Z.T, np.eye(Y.shape[1])]])
+
+
+def monte_carlo_covariance(estimates: Array) -> Array:
+    """(p, p) sample covariance of estimates (runs, p) of the same parameters from independent runs.
+
+    Raises:
+        InputError: too few runs for a regular covariance, or numbers missing.
+    """
+    runs, p = estimates.shape
+    if runs <= p + 1 or not np.isfinite(estimates).all():
+        raise InputError(f"a covariance of {p} parameters needs more than {p + 1} finite estimates, found {runs}")
+    return np.asarray(np.cov(estimates, rowvar=False).reshape(p, p))
+
+
+def build_fused(
+    names: Sequence[str],
+    parameters: Sequence[str],
+    covariances: Array,
+    *,
+    seconds: Array,
+    run_s: Array,
+    total_s: float,
+    aim: Aim | None = None,
+    constraints: Constraints = NO_CONSTRAINTS,
+) -> DurationProblem:
+    """The duration problem of fused estimates; solve it with `solve_durations`.
+
+    Args:
+        names: of the q primitives.
+        parameters: p names.
+        covariances: (q, p, p) of estimates from each primitive alone.
+        seconds: (q,) length of the data that each covariance is for; covariances fall with time as 1/t.
+        run_s: (q,) duration of one whole run [s].
+        total_s: time to share out [s].
+        aim: criterion; D when not given. Covariances are in physical units, so noise counts as one.
+        constraints: limits.
+
+    Raises:
+        NotInformative: a primitive that is not informative on its own.
+    """
+    scale = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2).mean(axis=0))
+    matrices = []
+    for name, covariance, time_s in zip(names, covariances, seconds, strict=True):
+        try:
+            root = np.linalg.inv(np.linalg.cholesky(covariance / np.outer(scale, scale)))
+        except np.linalg.LinAlgError:
+            raise NotInformative(
+                f"primitive {name!r} is not informative on its own: its covariance is not positive definite",
+                parameters=tuple(parameters),
+            ) from None
+        matrices.append(root.T @ root / np.outer(scale, scale) * total_s / time_s)
+    wish = aim or Aim()
+    if wish.noise.size and not np.allclose(wish.noise, 1.0):
+        raise InputError("covariances are in physical units already, expected a noise of 1 for every parameter")
+    return DurationProblem(
+        names=tuple(names),
+        parameters=tuple(parameters),
+        mean_subtraction="none",
+        matrices=np.array(matrices),
+        run_s=run_s,
+        total_s=total_s,
+        aim=wish,
+        constraints=constraints,
+    )
