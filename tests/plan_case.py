@@ -12,11 +12,10 @@ from expdesign.dictionary import Primitive, PrimitiveSpec, build_primitive, comp
 from expdesign.plan import PlanSettings
 from expdesign.plan.chart.clearance_grid import clearance_field
 from expdesign.plan.chart.goal_distance import build_goal_ways
-from expdesign.plan.control.acceleration_limits import leg_end
 from expdesign.plan.control.capability import capability
-from expdesign.plan.legs.agile_times import leg_times
-from expdesign.plan.legs.find import LegWater
-from expdesign.plan.search.state import SearchSpace, stamp
+from expdesign.plan.legs import LegTask, LegWater
+from expdesign.plan.local_planner import SearchSpace, local_planner
+from expdesign.plan.runs import footprint
 from expdesign.scenario import load_vessel
 from expdesign.sea_area import LocalFrame, SeaArea, as_multipolygon
 from expdesign.simulation import CALM
@@ -81,19 +80,22 @@ def leg_water(water: shapely.Geometry, *, clearance_m: float = 20.0) -> LegWater
     )
 
 
+def find_leg(task: LegTask, water: LegWater) -> np.ndarray | None:
+    """Commands of the ship's own local planner."""
+    return local_planner(water).leg(task, water)
+
+
 def space_of(sea: LegWater, run: Primitive, goal: np.ndarray) -> SearchSpace:
     """What a search that places one kind of run on its way to a goal (3,) works on, in calm water."""
-    vessel, ship = sea.vessel, sea.ship
-    changes = leg_end(vessel, CALM, 0.0, None, top_mps=ship.transit_speed_mps, yaw_rate_radps=0.3).changes
+    vessel = sea.vessel
     room = np.full(len(run.trajectory), 25.0)
     return SearchSpace(
-        stamps=(stamp(run, room, length_m=vessel.length_m, beam_m=vessel.beam_m),),
+        footprints=(footprint(run, room, length_m=vessel.length_m, beam_m=vessel.beam_m),),
         frame=sea.area.frame,
         field=sea.field,
-        goal_way=build_goal_ways(sea.narrowest_ways, sea.field, goal[:2]),
+        goal_distance=build_goal_ways(sea.narrowest_ways, sea.field, goal[:2]),
         goal=goal,
-        ship=ship,
-        times=leg_times(vessel, ship, changes),
+        planner=local_planner(sea, (run,)),
         hull_m=vessel.length_m,
         leg_margin_m=25.0,
         current_to=np.zeros(2),

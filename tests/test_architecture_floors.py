@@ -51,6 +51,7 @@ FLOORS = {
         ("verify", "chart", "control", "runs"),
         ("problem", "timeline"),
         ("legs",),
+        ("local_planner",),
         ("bounds",),
         ("search", "monte_carlo"),
         ("assembly",),
@@ -65,7 +66,7 @@ FLOOR_OF = {
 }
 MOST_MODULES = 12
 """In one room, besides its façade."""
-CROWDED = ("plan/legs", "workflows")
+CROWDED = ("workflows",)
 """Rooms that still hold more."""
 EXCEPTIONS = {("__main__", "cli")}  # `python -m` is nothing but the command line under another name
 

@@ -14,12 +14,12 @@ from expdesign.plan.bounds.displacement import Carry, Headway, carry, exit_motio
 from expdesign.plan.bounds.repositioning import _grown, joint_losses, reposition_bound_s, time_to_sail_s
 from expdesign.plan.control.acceleration_limits import LegEnd, SpeedChanges, least_loss, leg_end
 from expdesign.plan.control.capability import capability
-from expdesign.plan.legs.find import LegTask, find_leg
+from expdesign.plan.legs import LegTask
 from expdesign.plan.legs.water import leg_speed_mps, through_water
 from expdesign.signals import Commands
 from expdesign.simulation import CALM, Environment, simulate, to_body
 from expdesign.vessel import NUMPY
-from plan_case import area, at_rest, leg_water, primitive, random_path, ship
+from plan_case import area, at_rest, find_leg, leg_water, primitive, random_path, ship
 
 OPEN = shapely.box(-1000, -1000, 1000, 1000)
 WALL = shapely.box(-10, -1000, 10, 300)

@@ -54,7 +54,7 @@ def attempts(monkeypatch):
 
     kept = solve.broken_promise
     monkeypatch.setattr(solve, "broken_promise", noted)
-    monkeypatch.setattr(solve, "_finished", lambda problem, water, commands, trajectory, legs, **rest: trajectory)
+    monkeypatch.setattr(solve, "_finished", lambda problem, water, sailed, **rest: sailed.trajectory)
     return found
 
 
@@ -87,4 +87,4 @@ def test_without_one_the_refusal_names_the_share_the_leg_and_the_place(attempts)
     assert text.startswith(f"{attempts[0].left:.1%} of {attempts[0].trials} drawn trials")
     assert "on the leg to the goal" in text
     np.testing.assert_allclose(place_in(text), [STRAIT_M, 0.0], atol=30.0)
-    assert text.endswith("there is no way to the goal that keeps farther off")
+    assert text.endswith("there is no path to the goal with more clearance")

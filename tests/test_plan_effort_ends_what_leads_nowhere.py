@@ -10,14 +10,15 @@ import pytest
 import shapely
 
 from expdesign.errors import NoPlan
-from expdesign.plan import PlanSettings, sailing
-from expdesign.plan.legs.find import LegTask, find_leg
+from expdesign.plan import PlanSettings
+from expdesign.plan.legs import LegTask
+from expdesign.plan.local_planner import TransitionTrials
+from expdesign.plan.local_planner.agile import AgilePlanner
 from expdesign.plan.problem import PlanProblem
-from expdesign.plan.search.transitions import settled
 from expdesign.plan.solve import plan_trial
-from expdesign.plan.work_budget import Effort
+from expdesign.plan.work_budget import WorkBudget
 from expdesign.simulation import CALM
-from plan_case import acceleration, area, at_rest, leg_water, primitive, ship, space_of
+from plan_case import acceleration, area, at_rest, find_leg, leg_water, primitive, ship, space_of
 
 
 @pytest.fixture(scope="module")
@@ -32,9 +33,9 @@ def task(end: np.ndarray) -> LegTask:
 def test_the_same_leg_costs_the_same_each_time(water):
     spent = []
     for _ in range(2):
-        asked = replace(task(at_rest(30, 60, 2.0)), effort=Effort())
+        asked = replace(task(at_rest(30, 60, 2.0)), budget=WorkBudget())
         assert find_leg(asked, water) is not None
-        spent.append(asked.effort.spent_s)
+        spent.append(asked.budget.spent_s)
     assert spent[0] == spent[1] > 0.0
 
 
@@ -42,27 +43,28 @@ def test_a_leg_that_cannot_be_sailed_costs_no_more_than_it_may(water):
     ends = at_rest(60, 0, 0.0) + np.array([0.0, 0.0, 0.0, -1.2, 1.2, 0.0])  # faster sideways than the ship can go
     without = task(ends)
     assert find_leg(without, water) is None
-    few = replace(without, effort=Effort(most_s=without.effort.spent_s / 10))
+    few = replace(without, budget=WorkBudget(most_s=without.budget.spent_s / 10))
     assert find_leg(few, water) is None
-    assert few.effort.exhausted
-    assert few.effort.spent_s < without.effort.spent_s / 2
+    assert few.budget.exhausted
+    assert few.budget.spent_s < without.budget.spent_s / 2
 
 
-def test_joints_are_left_to_the_rule_when_there_is_nothing_left_to_spend(water):
+def test_transitions_are_left_to_the_rule_when_there_is_nothing_left_to_spend(water):
     go = primitive(water.vessel)
-    space, spent = space_of(water, go, np.array([0.0, 300.0, 0.0])), Effort(most_s=1.0)
+    space, spent = space_of(water, go, np.array([0.0, 300.0, 0.0])), WorkBudget(most_s=1.0)
     spent.optimised(iterations=100, samples=100)
     assert spent.exhausted
-    found = settled(space, water, {"go": go}, [("go", "go")], start=np.zeros(3), carried=True, effort=spent)
+    trials = TransitionTrials(water=water, primitives={"go": go}, start=np.zeros(3), made_good=True, budget=spent)
+    found = space.planner.with_transitions(space, [("go", "go")], trials)
     assert found.tried == space.tried
 
 
 @pytest.mark.parametrize(("leg_s", "tries"), [(0.0, 11), (8.0, 3)])  # 2 s each at least: 11 x 2, or 3 x 8, pass 20
 def test_a_search_that_is_stuck_ends_when_its_budget_is_worked_off_not_when_a_clock_says_so(monkeypatch, leg_s, tries):
-    def nowhere(asked: LegTask, water) -> None:
-        asked.effort.spent_s += leg_s
+    def nowhere(planner, asked: LegTask, water) -> None:
+        asked.budget.spent_s += leg_s
 
-    monkeypatch.setattr(sailing, "find_leg", nowhere)
+    monkeypatch.setattr(AgilePlanner, "leg", nowhere)
     vessel = ship()
     go = acceleration(vessel)
     problem = PlanProblem(

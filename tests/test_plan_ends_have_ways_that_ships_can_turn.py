@@ -12,11 +12,12 @@ from expdesign.errors import NoPlan
 from expdesign.plan import PlanSettings
 from expdesign.plan.chart.clearance_grid import clearance_field
 from expdesign.plan.control.capability import capability
+from expdesign.plan.legs import LegWater
 from expdesign.plan.legs.escape_check import check_ends, gets_away
-from expdesign.plan.legs.find import LegWater
+from expdesign.plan.local_planner import local_planner
 from expdesign.simulation import CALM
 from helm_case import catamaran
-from plan_case import area
+from plan_case import area, ship
 
 VESSEL, CLEARANCE = catamaran(), 0.5
 SHIP = capability(VESSEL, PlanSettings(clearance_m=CLEARANCE))
@@ -74,4 +75,7 @@ def test_the_message_names_the_end_and_its_place_and_agile_ships_are_not_asked()
             check_ends(*ends, narrow)
         assert f"near {lat:.5f}, {lon:.5f}" in str(caught.value)
         assert f"{RADIUS:.3g} m radius" in str(caught.value)
-    check_ends(into, out, replace(narrow, ship=replace(SHIP, approach=None)))
+    agile = capability(ship(), PlanSettings(clearance_m=CLEARANCE))
+    local_planner(replace(narrow, ship=agile)).check_ends(into, out, narrow)
+    with pytest.raises(NoPlan):
+        local_planner(narrow).check_ends(into, out, narrow)

@@ -16,9 +16,8 @@ from export_case import design, plan, tug
 
 def split(legs: tuple[Leg, ...], trajectory: Trajectory | None = None) -> tuple[float, float]:
     sailed = plan()
-    placed, whole = realised_efficiencies(
-        tug(), design(), CALM, commands=sailed.commands, trajectory=trajectory or sailed.trajectory, legs=legs
-    )
+    trial = replace(sailed.sailed, trajectory=trajectory or sailed.trajectory, legs=legs)
+    placed, whole = realised_efficiencies(tug(), design(), CALM, trial)
     assert placed is not None
     assert whole is not None
     return placed, whole
@@ -26,7 +25,7 @@ def split(legs: tuple[Leg, ...], trajectory: Trajectory | None = None) -> tuple[
 
 def test_runs_placed_in_calm_water_have_the_information_of_the_designs_whole_runs():
     placed, _ = split(plan().legs)
-    # entries differ from the primitives' own by what the joints leave over: parts in a hundred of speed
+    # entries differ from the primitives' own by what the legs leave over: parts in a hundred of speed
     assert placed == pytest.approx(design().efficiency_repeats, rel=0.1)
 
 

@@ -1,4 +1,4 @@
-"""Joints between runs are tried with optimised legs before the search counts on them."""
+"""Transitions between runs are tried with optimised legs before the search counts on them."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import shapely
 
-from expdesign.plan.legs.find import LegTask, find_leg
-from expdesign.plan.search.transitions import pairs_of, settled
+from expdesign.plan.legs import LegTask
+from expdesign.plan.local_planner import TransitionTrials, pairs_of
 from expdesign.plan.values import Placement
-from plan_case import leg_water, primitive, space_of
+from plan_case import find_leg, leg_water, primitive, space_of
 
 
 @pytest.fixture(scope="module")
@@ -23,18 +23,24 @@ def space(water):
     return space_of(water, primitive(water.vessel), np.array([0.0, 500.0, 0.0]))
 
 
+def tried(space, water, runs, *, made_good=True):
+    """The space with the transition between two accelerations tried."""
+    trials = TransitionTrials(water=water, primitives=runs, start=np.zeros(3), made_good=made_good)
+    return space.planner.with_transitions(space, [("go", "go")], trials)
+
+
 def test_each_pair_of_runs_counts_once_and_so_do_both_ends():
     places = [Placement(primitive=name, pose=np.zeros(3)) for name in ("a", "b", "b", "b", "a")]
     assert pairs_of(places) == [("", "a"), ("a", "b"), ("b", "b"), ("b", "a"), ("a", "")]
     assert pairs_of(places[:1], "c") == [("c", "a"), ("a", "")]
 
 
-def test_a_joint_that_was_tried_is_sailed_as_told_and_loses_no_more_than_others(water, space):
+def test_a_transition_that_was_tried_is_sailed_as_told_and_loses_no_more_than_others(water, space):
     go = primitive(water.vessel)
-    known = settled(space, water, {"go": go}, [("go", "go")], start=np.zeros(3), carried=True)
-    again = settled(known, water, {}, [("go", "go")], start=np.zeros(3), carried=True)  # nothing is tried twice
+    known = tried(space, water, {"go": go})
+    again = tried(known, water, {})  # nothing is tried twice
     assert again.tried == known.tried
-    joint, sample_s = known.tried[("go", "go")], water.vessel.sample_time_s
+    transition, sample_s = known.tried[("go", "go")], water.vessel.sample_time_s
 
     def leg_s(step):
         task = LegTask(
@@ -46,16 +52,13 @@ def test_a_joint_that_was_tried_is_sailed_as_told_and_loses_no_more_than_others(
         )
         return len(find_leg(task, water)) * sample_s
 
-    assert leg_s(joint.step) <= joint.seconds + sample_s
-    lost_s = joint.seconds - joint.step[0] / space.times.speed_mps
+    assert leg_s(transition.step) <= transition.seconds + sample_s
+    lost_s = transition.seconds - transition.step[0] / space.planner.times.speed_mps
     others = np.column_stack([[15.0, 30.0, 60.0], np.zeros((3, 2))])
-    assert lost_s <= min(leg_s(step) - step[0] / space.times.speed_mps for step in others) + sample_s
+    assert lost_s <= min(leg_s(step) - step[0] / space.planner.times.speed_mps for step in others) + sample_s
 
 
-def test_where_it_does_not_matter_where_joints_lead_the_quickest_counts(water, space):
+def test_where_it_does_not_matter_where_transitions_lead_the_quickest_counts(water, space):
     go = primitive(water.vessel)
-    found = [
-        settled(space, water, {"go": go}, [("go", "go")], start=np.zeros(3), carried=carried).tried[("go", "go")]
-        for carried in (False, True)
-    ]
+    found = [tried(space, water, {"go": go}, made_good=made_good).tried[("go", "go")] for made_good in (False, True)]
     assert found[0].seconds <= found[1].seconds + water.vessel.sample_time_s

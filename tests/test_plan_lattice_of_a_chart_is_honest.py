@@ -3,18 +3,19 @@ import pytest
 import shapely
 
 from expdesign.plan.chart.goal_distance import build_goal_ways
+from expdesign.plan.local_planner import SearchSpace, local_planner
+from expdesign.plan.runs import Footprint
 from expdesign.plan.search.lattice import search_lattice
 from expdesign.plan.search.lattice_moves import build_lattice
-from expdesign.plan.search.state import SearchSpace, Stamp
 from plan_case import leg_water
 
 SPACING_M = 60.0
 
 
-def stamp(name: str, displacement, *, room_m: float = 20.0) -> Stamp:
+def stamp(name: str, displacement, *, room_m: float = 20.0) -> Footprint:
     """A run along its own chord."""
     chord = np.linspace(0, 1, 8)[:, None] * np.array(displacement[:2])
-    return Stamp(
+    return Footprint(
         name=name,
         discs=chord,
         times_s=np.linspace(0, 60, 8),
@@ -26,16 +27,16 @@ def stamp(name: str, displacement, *, room_m: float = 20.0) -> Stamp:
     )
 
 
-def space(water: shapely.Geometry, goal, *stamps: Stamp) -> SearchSpace:
+def space(water: shapely.Geometry, goal, *runs: Footprint) -> SearchSpace:
     legs = leg_water(water)
     margin = legs.path_margin_m + legs.field.cell_m / 2
     return SearchSpace(
-        stamps=stamps,
+        footprints=runs,
         frame=legs.area.frame,
         field=legs.field,
-        goal_way=build_goal_ways(legs.narrowest_ways, legs.field, np.array(goal[:2])),
+        goal_distance=build_goal_ways(legs.narrowest_ways, legs.field, np.array(goal[:2])),
         goal=np.array(goal, dtype=float),
-        ship=legs.ship,
+        planner=local_planner(legs),
         hull_m=30.0,
         leg_margin_m=margin,
         current_to=np.zeros(2),

@@ -11,21 +11,21 @@ from scipy.stats import binom
 
 from expdesign.dictionary.build import trim
 from expdesign.plan.control.acceleration_limits import leg_end, to_work_s
-from expdesign.plan.legs.agile_times import (
+from expdesign.plan.legs import LegTask
+from expdesign.plan.local_planner.agile_times import (
     COURSES,
+    DIRECTIONS,
     GOING_ON,
     LENGTHS,
     SETTLE,
     TURNS,
-    WISHES,
     LegTimes,
-    joint_lost_s,
-    joints,
     leg_times,
+    transition_losses_s,
+    transitions,
 )
-from expdesign.plan.legs.find import LegTask, find_leg
 from expdesign.simulation import CALM
-from plan_case import leg_water
+from plan_case import find_leg, leg_water
 
 RULE = LegTimes(speed_mps=2.0, push_mps2=0.5, swing_radps=0.25, settle_s=4.0, hull_m=20.0)
 REST = np.zeros(1)
@@ -50,8 +50,8 @@ def test_going_on_as_before_loses_nothing_but_what_the_speed_falls_short():
         assert spent == pytest.approx(RULE.settle_s)
 
 
-def test_joints_on_offer_to_port_are_on_offer_to_starboard():
-    found = joints(RULE, 0.8, 1.2)
+def test_transitions_on_offer_to_port_are_on_offer_to_starboard():
+    found = transitions(RULE, 0.8, 1.2)
     rows = {(*np.round(step, 6), round(seconds, 6)) for step, seconds in zip(found.step, found.seconds, strict=True)}
     for forward, starboard, turn, seconds in rows:
         other = (forward, -starboard, -turn % (2 * np.pi), seconds)
@@ -68,8 +68,8 @@ def test_mirrored_legs_take_as_long_and_so_do_reversed_ones():
     assert (seconds >= (length - 4.0 * (begin + end) / 2) / 2.0).all()
 
 
-def test_no_joint_on_offer_is_beaten_by_another_with_its_turn_in_its_direction():
-    found = joints(RULE, 1.0, 0.5)
+def test_no_transition_on_offer_is_beaten_by_another_with_its_turn_in_its_direction():
+    found = transitions(RULE, 1.0, 0.5)
     np.testing.assert_allclose(found.seconds, RULE.step_s(found.step, np.array(1.0), np.array(0.5)))
     lengths = np.r_[RULE.hull_m * LENGTHS, RULE.settle_s * 0.75 * GOING_ON]
     length, course = (grid.ravel() for grid in np.meshgrid(lengths, COURSES))
@@ -78,17 +78,17 @@ def test_no_joint_on_offer_is_beaten_by_another_with_its_turn_in_its_direction()
         seconds = RULE.step_s(every, np.array(1.0), np.array(0.5))
         offered = np.isclose(found.step[:, 2], turn)
         assert seconds.min() == pytest.approx(found.seconds[offered].min())  # no wish at all: the shortest
-        for wish in WISHES:
+        for wish in DIRECTIONS:
             ahead = np.array([np.cos(wish), np.sin(wish)])
             lost = found.seconds[offered] - found.step[offered, :2] @ ahead / RULE.speed_mps
             least = (seconds - every[:, :2] @ ahead / RULE.speed_mps).min()
             assert lost.min() == pytest.approx(least)
-            assert joint_lost_s(RULE, 1.0, 0.5)[turn == TURNS, wish == WISHES] == pytest.approx(least)
+            assert transition_losses_s(RULE, 1.0, 0.5)[turn == TURNS, wish == DIRECTIONS] == pytest.approx(least)
 
 
 def test_actuators_that_need_longer_lose_no_less():
     slow = replace(RULE, settle_s=6.0)
-    assert (joint_lost_s(RULE, 1.0, 0.5) <= joint_lost_s(slow, 1.0, 0.5) + 1e-9).all()
+    assert (transition_losses_s(RULE, 1.0, 0.5) <= transition_losses_s(slow, 1.0, 0.5) + 1e-9).all()
 
 
 @pytest.mark.parametrize("legs", [8, pytest.param(60, marks=pytest.mark.slow)])

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from expdesign.plan.chart.visibility_graph import polyline_length
+from expdesign.plan.legs import LegTask
 from expdesign.plan.legs._ompl import dubins_curve
-from expdesign.plan.legs.dubins_length import dubins_m
-from expdesign.plan.legs.find import LegTask, find_leg
-from expdesign.plan.legs.helm_times import helm_times
+from expdesign.plan.local_planner.dubins_length import dubins_m
+from expdesign.plan.local_planner.helm_times import helm_times
 from expdesign.simulation import steady_ahead
 from helm_case import coaster, open_water
+from plan_case import find_leg
 
 
 def rule():
@@ -57,10 +58,10 @@ def test_a_longer_leg_takes_longer_and_never_less_than_its_way_at_transit_speed(
 
 def test_going_on_as_before_loses_hardly_anything_and_a_start_what_gathering_way_loses():
     times = rule()
-    assert times.lost_s(6.0, 6.0, carried=True) < 5.0
+    assert times.lost_s(6.0, 6.0, made_good=True) < 5.0
     ways = times.gathered
     rest = float(np.interp(5.0, ways[:, 0], ways[:, 2]) - np.interp(5.0, ways[:, 0], ways[:, 1]) / times.speed_mps)
-    assert rest < times.lost_s(0.0, 5.0, carried=True) < rest + 10.0
+    assert rest < times.lost_s(0.0, 5.0, made_good=True) < rest + 10.0
 
 
 def moving(vessel, speed):

@@ -9,14 +9,14 @@ import shapely
 from expdesign.plan import PlanSettings
 from expdesign.plan.chart.clearance_grid import clearance_field
 from expdesign.plan.control.capability import capability
+from expdesign.plan.legs import LegTask, LegWater
 from expdesign.plan.legs._ompl import dubins_curve
 from expdesign.plan.legs.dubins import find_path
-from expdesign.plan.legs.find import LegTask, LegWater, find_leg, leg_trajectory
 from expdesign.plan.legs.water import nearest_turns
 from expdesign.scenario import load_vessel
 from expdesign.simulation import CALM
 from expdesign.vessel.hull import swept_area
-from plan_case import VESSELS, area, at_rest, leg_water
+from plan_case import VESSELS, area, at_rest, find_leg, leg_water
 
 OPEN = shapely.box(-1500, -1500, 1500, 1500)
 BASIN = shapely.box(-350, -350, 350, 350)
@@ -67,7 +67,7 @@ def test_commands_take_the_vessel_to_the_wanted_state_within_limits_and_rates(st
     begin = np.array([5.0, 0.3, -2.0, 0.1])
     values = find_leg(task(start, end, begin), water)
     assert values is not None
-    track = leg_trajectory(water, start, values)
+    track = water.sail(start, values)
     assert np.allclose(track.pose[-1, :2], end[:2], atol=0.03)
     assert abs((track.pose[-1, 2] - end[2] + np.pi) % (2 * np.pi) - np.pi) < 1e-3
     assert np.allclose(track.velocity[-1], end[3:], atol=2e-3)
@@ -86,7 +86,7 @@ def test_a_leg_through_a_gap_keeps_the_hull_clear_of_both_sides():
     water = leg_water(OPEN.difference(gap))
     values = find_leg(task(at_rest(-150, -350, 0.5), at_rest(150, 350, 1.0)), water)
     assert values is not None
-    track = leg_trajectory(water, at_rest(-150, -350, 0.5), values)
+    track = water.sail(at_rest(-150, -350, 0.5), values)
     assert shapely.contains_properly(water.safe, swept_area(track.pose, water.vessel.hull_b))
 
 
@@ -134,5 +134,5 @@ def test_legs_do_not_cheat_the_transit_speed_by_going_sideways():
     start, end = at_rest(-50, 0, 0.0), at_rest(50, 0, 0.0)
     values = find_leg(task(start, end, np.zeros(3), np.zeros(3)), water)
     assert values is not None
-    speed = np.hypot(*leg_trajectory(water, start, values).velocity[:, :2].T)
+    speed = np.hypot(*water.sail(start, values).velocity[:, :2].T)
     assert speed.max() < 1.01 * water.ship.transit_speed_mps

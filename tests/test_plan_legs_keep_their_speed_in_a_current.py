@@ -11,12 +11,12 @@ import shapely
 from expdesign.dictionary.build import trim
 from expdesign.plan.bounds.displacement import Headway
 from expdesign.plan.bounds.repositioning import reposition_bound_s
+from expdesign.plan.legs import LegTask, LegWater
 from expdesign.plan.legs.dubins import curved_leg
-from expdesign.plan.legs.find import LegTask, LegWater, find_leg
 from expdesign.plan.legs.water import through_water
 from expdesign.simulation import Environment, steady_ahead
 from helm_case import coaster, open_water
-from plan_case import leg_water
+from plan_case import find_leg, leg_water
 
 OPEN = shapely.box(-1500, -1500, 1500, 1500)
 CURRENTS = {

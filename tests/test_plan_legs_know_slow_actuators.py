@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 import shapely
 
-from expdesign.plan.legs.find import LegTask, find_leg, leg_trajectory
+from expdesign.plan.legs import LegTask
 from expdesign.signals import Commands
 from expdesign.simulation import CALM, delivered_at_samples, simulate
 from expdesign.vessel import Response
-from plan_case import at_rest, leg_water
+from plan_case import at_rest, find_leg, leg_water
 
 OPEN = shapely.box(-1500, -1500, 1500, 1500)
 CASES = {
@@ -40,7 +40,7 @@ def test_a_leg_arrives_although_actuators_are_slow(name):
     before = np.array([[0.0] * 4, [1.5, 0.1, -1.5, 0.1], [3.0, 0.2, -2.0, 0.2]])
     values = slow_leg(water, start, end, before)
     assert values is not None
-    track = leg_trajectory(water, start, values, before)
+    track = water.sail(start, values, before)
     np.testing.assert_allclose(track.pose[-1], end[:3], atol=0.03)
     np.testing.assert_allclose(track.velocity[-1], end[3:], atol=2e-3)
     told = np.concatenate([before, values])
@@ -57,6 +57,6 @@ def test_sailing_in_two_parts_is_sailing_at_once(name):
     commands = Commands(sample_time_s=1.0, names=water.vessel.model.inputs, values=values)
     whole = simulate(water.vessel, commands, environment=CALM)
     half = np.r_[whole.pose[30], whole.velocity[30]]
-    second = leg_trajectory(water, half, values[30:], values[:30])
+    second = water.sail(half, values[30:], values[:30])
     np.testing.assert_allclose(second.pose, whole.pose[30:], atol=1e-9)
     np.testing.assert_allclose(second.velocity, whole.velocity[30:], atol=1e-9)

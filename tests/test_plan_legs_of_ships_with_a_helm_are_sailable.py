@@ -7,13 +7,14 @@ from functools import cache
 import numpy as np
 import pytest
 
-from expdesign.plan.control.capability import RUN_UP
-from expdesign.plan.legs.find import LegTask, find_leg
+from expdesign.plan.control import CONTROL
+from expdesign.plan.legs import LegTask
 from expdesign.plan.legs.helm import _shortest_first
 from expdesign.plan.legs.recovery import displaced, recover
 from expdesign.signals import Commands
 from expdesign.simulation import simulate, steady_ahead
 from helm_case import catamaran, coaster, open_water
+from plan_case import find_leg
 
 SHIPS = {"coaster": coaster, "catamaran": catamaran}
 
@@ -95,7 +96,9 @@ def test_no_leg_asks_for_more_than_the_helm_gives(ship, case):
     assert speed.max() <= 1.01 * max(water.ship.transit_speed_mps, speed[0])
     moving = speed > 0.05 * water.ship.transit_speed_mps
     assert rate[~moving].max(initial=0.0) < 0.3 * hardest  # nothing turns it where it stands
-    planned = [item.length_m(water.ship.turning_radius_m) for item in _shortest_first(task.start, task, water)]
+    planned = [
+        item.length_m(water.ship.turning_radius_m) for item in _shortest_first(task.start, task, water, water.ship)
+    ]
     sailed_m = speed.sum() * water.vessel.sample_time_s
     assert sailed_m < max(planned) + 6 * water.vessel.length_m
 
@@ -104,17 +107,20 @@ def test_no_leg_asks_for_more_than_the_helm_gives(ship, case):
 def test_a_run_begins_after_a_steady_run_up_with_its_own_commands(ship):
     water, task, values = sailed(ship, "after a turn")
     track = water.sail(task.start, values, task.past)
-    count = int(np.ceil(RUN_UP * water.vessel.length_m / task.end[3] / water.vessel.sample_time_s))
+    count = int(np.ceil(CONTROL.approach_hulls * water.vessel.length_m / task.end[3] / water.vessel.sample_time_s))
     np.testing.assert_allclose(values[-count:], np.tile(task.end_inputs, (count, 1)), atol=1e-6)
     steady = track.velocity[-count - 1 :]
     np.testing.assert_allclose(steady, np.tile(task.end[3:], (count + 1, 1)), atol=2e-3 * task.end[3])
-    assert np.hypot(*(track.pose[-1] - track.pose[-count - 1])[:2]) >= 0.99 * RUN_UP * water.vessel.length_m
+    assert (
+        np.hypot(*(track.pose[-1] - track.pose[-count - 1])[:2])
+        >= 0.99 * CONTROL.approach_hulls * water.vessel.length_m
+    )
 
 
 @ONE
 def test_a_swing_is_checked_on_the_side_where_the_ship_turned(ship):
     water, task, _ = sailed(ship, "after a turn")
-    check = recover(task.start, task.past, water)
+    check = recover(task.start, task.past, water, water.ship)
     assert abs(check.states[-1, 5]) < 0.1 * abs(task.start[5])
     scales = {"sample_time_s": water.vessel.sample_time_s, "hull_m": water.vessel.length_m}
     ahead, starboard, turned, time_s = displaced(check, water.ship, **scales)
@@ -124,7 +130,7 @@ def test_a_swing_is_checked_on_the_side_where_the_ship_turned(ship):
     mirrored = task.start * [1, -1, -1, 1, -1, -1]
     over = task.past[-1].copy()
     over = over[::-1] if ship == "catamaran" else over * [1, -1]
-    other = displaced(recover(mirrored, over[None], water), water.ship, **scales)
+    other = displaced(recover(mirrored, over[None], water, water.ship), water.ship, **scales)
     np.testing.assert_allclose(other, [ahead, -starboard, -turned, time_s], rtol=1e-6)
 
 
@@ -132,5 +138,5 @@ def test_a_swing_is_checked_on_the_side_where_the_ship_turned(ship):
 def test_a_ship_that_goes_straight_needs_no_check(ship):
     water = open_water(SHIPS[ship]())
     ahead = steady_ahead(water.vessel, 0.8 * water.ship.transit_speed_mps)
-    check = recover(np.r_[0.0, 0.0, 1.0, ahead.velocity], ahead.inputs[None], water)
+    check = recover(np.r_[0.0, 0.0, 1.0, ahead.velocity], ahead.inputs[None], water, water.ship)
     assert len(check.commands) == 0

@@ -9,8 +9,8 @@ import pytest
 import shapely
 
 from expdesign.plan.chart.visibility_graph import polyline_length
+from expdesign.plan.local_planner import SearchSpace, TriedTransition
 from expdesign.plan.search.local_search import ChainEnds, measured_s, polished
-from expdesign.plan.search.state import SearchSpace, TriedJoint
 from expdesign.plan.search.successors import run_ends, runs_clear
 from plan_case import leg_water, primitive, space_of
 
@@ -45,9 +45,9 @@ def test_no_plan_takes_less_than_its_way_at_full_speed(space):
     ends = ChainEnds(start=START, exit_mps=0.0, last=-1)
     found = polished(space, [0, 0, 0], POSES, ends)
     froms, tos = np.vstack([START, run_ends(space, np.zeros(3, dtype=int), found)]), np.vstack([found, space.goal])
-    ways = [space.goal_way.ways.shortest(a[:2], b[:2]) for a, b in zip(froms, tos, strict=True)]
+    ways = [space.goal_distance.ways.shortest(a[:2], b[:2]) for a, b in zip(froms, tos, strict=True)]
     way_m = sum(polyline_length(way) for way in ways)
-    assert measured_s(space, [0, 0, 0], found, ends) >= way_m / space.times.speed_mps
+    assert measured_s(space, [0, 0, 0], found, ends) >= way_m / space.planner.times.speed_mps
 
 
 def test_a_mirrored_plan_in_mirrored_water_takes_as_long():
@@ -63,12 +63,12 @@ def test_a_mirrored_plan_in_mirrored_water_takes_as_long():
     assert totals[0] == pytest.approx(totals[1], rel=0.01)
 
 
-def test_a_joint_that_was_tried_takes_what_it_took(space):
+def test_a_transition_that_was_tried_takes_what_it_took(space):
     pose = np.array([-300.0, -300.0, 0.0])
     end = run_ends(space, np.zeros(1, dtype=int), pose[None])[0]
-    joint = TriedJoint(step=np.array([7.0, 2.0, 0.3]), seconds=3.0, more_s=0.0)
-    known = replace(space, tried={("go", "go"): joint})
-    after = end + joint.step  # the run is straight: its end still points north
+    transition = TriedTransition(step=np.array([7.0, 2.0, 0.3]), seconds=3.0, more_s=0.0)
+    known = replace(space, tried={("go", "go"): transition})
+    after = end + transition.step  # the run is straight: its end still points north
     ends = ChainEnds(start=START, exit_mps=0.0, last=-1)
     apart = [measured_s(one, [0, 0], np.stack([pose, after]), ends) for one in (known, space)]
     assert apart[0] < apart[1] - 1.0

@@ -13,7 +13,7 @@ import shapely
 
 from expdesign import workflows
 from expdesign.plan.control.tracking import Helmsman
-from expdesign.plan.legs.find import LegTask, find_leg, leg_trajectory
+from expdesign.plan.legs import LegTask
 from expdesign.plan.monte_carlo.collision import HullWatch
 from expdesign.plan.monte_carlo.guidance import ARRIVED, Pilot
 from expdesign.plan.monte_carlo.procedure import ROUNDS, tolerances
@@ -25,7 +25,7 @@ from expdesign.plan.timeline import Timeline
 from expdesign.plan.values import Leg
 from expdesign.scenario import load_scenario
 from expdesign.simulation import CALM, Environment
-from plan_case import at_rest, leg_water, primitive
+from plan_case import at_rest, find_leg, leg_water, primitive
 
 ROOT = Path(__file__).parents[1]
 OPEN = shapely.box(-400, -300, 400, 500)
@@ -37,22 +37,19 @@ def planned():
     water = leg_water(OPEN)
     run = primitive(water.vessel)
     line = Timeline(begin=at_rest(0, 0, 0.0), begin_inputs=np.zeros(4))
-    line.sail(
-        "primitive", "go", run.commands.values, leg_trajectory(water, line.begin, run.commands.values, line.given)
-    )
+    line.sail("primitive", "go", run.commands.values, water.sail(line.begin, run.commands.values, line.given))
     for index, end in enumerate((at_rest(60, 60, np.pi / 2), at_rest(0, 0, 0.0))):
         task = LegTask(start=line.state, end=end, start_inputs=line.inputs, end_inputs=np.zeros(4), seed=1)
         leg = find_leg(task, water)
         assert leg is not None
-        line.sail("reposition", "go" if index == 0 else "goal", leg, leg_trajectory(water, line.state, leg, line.given))
+        line.sail("reposition", "go" if index == 0 else "goal", leg, water.sail(line.state, leg, line.given))
         if index == 0:
             values = run.commands.values + 2 * np.pi * np.round(line.inputs / (2 * np.pi)) * [0, 1, 0, 1]
-            line.sail("primitive", "go", values, leg_trajectory(water, line.state, values, line.given))
+            line.sail("primitive", "go", values, water.sail(line.state, values, line.given))
     return line.joined(sample_time_s=1.0, names=water.vessel.model.inputs)
 
 
 def sailing(basin=OPEN, environment=None, *, certain=False, draws=30, seed=0):
-    commands, track, legs = planned()
     water = leg_water(basin, clearance_m=5.0)
     if environment is not None:
         water = replace(water, environment=environment)
@@ -60,14 +57,14 @@ def sailing(basin=OPEN, environment=None, *, certain=False, draws=30, seed=0):
         model = replace(water.vessel.model, parameter_std=np.zeros(len(water.vessel.model.names)))
         water = replace(water, vessel=replace(water.vessel, model=model))
     rng = np.random.default_rng(seed)
-    return water, sail_trials(water, commands=commands, trajectory=track, legs=legs, draws=draws, rng=rng)
+    return water, sail_trials(water, planned(), draws=draws, rng=rng)
 
 
 def test_ships_that_are_as_planned_come_to_the_goal_without_going_round():
     _, trials = sailing(certain=True, draws=3)
     assert trials.completed.all()
     assert not trials.rounds.any()
-    runs = [leg.kind == "primitive" for leg in planned()[2]]
+    runs = [leg.kind == "primitive" for leg in planned().legs]
     assert (trials.used[runs] < 1.0).all()
 
 
@@ -84,13 +81,9 @@ def test_every_trial_ends_in_one_way_and_runs_begin_within_tolerance():
 
 
 def test_a_strange_current_makes_ships_go_round_and_costs_time():
-    commands, track, legs = planned()
     calm = leg_water(OPEN, clearance_m=5.0)
     windy = replace(calm, environment=Environment(current_std_mps=0.5))
-    few, many = (
-        promised(water, commands=commands, trajectory=track, legs=legs, rng=np.random.default_rng(1), draws=30)[0]
-        for water in (calm, windy)
-    )
+    few, many = (promised(water, planned(), rng=np.random.default_rng(1), draws=30)[0] for water in (calm, windy))
     assert sum(leg.rounds for leg in many.legs) > sum(leg.rounds for leg in few.legs)
     assert many.extra_median_s > few.extra_median_s
 
@@ -102,7 +95,7 @@ def test_a_ship_whose_way_back_to_a_long_leg_passes_by_an_island_goes_round_it()
         start=at_rest(0, 0, 0.0), end=at_rest(500, 0, 0.0), start_inputs=np.zeros(4), end_inputs=np.zeros(4), seed=1
     )
     leg = find_leg(task, water)
-    track = leg_trajectory(water, task.start, leg)
+    track = water.sail(task.start, leg)
     helm = Helmsman(vessel=water.vessel, environment=CALM, ship=water.ship)
     certain = Truths(
         parameters=np.tile(water.vessel.model.parameters, (2, 1)), current_to=np.zeros((2, 2)), wind_to=np.zeros((2, 2))
@@ -125,15 +118,13 @@ def test_a_ship_whose_way_back_to_a_long_leg_passes_by_an_island_goes_round_it()
 
 
 def test_water_that_ends_on_a_run_is_left_there_and_the_message_says_where():
-    commands, track, legs = planned()
-    reach = float(track.pose[legs[0].last, 0])
+    legs = planned().legs
+    reach = float(planned().trajectory.pose[legs[0].last, 0])
     water, trials = sailing(shapely.box(-400, -300, 400, reach), certain=True, draws=3)
     assert trials.left[0].all()
     assert not trials.samples[1:].any()
     assert (np.abs(trials.place[0, :, 0] - reach) < water.vessel.length_m).all()
-    promise, trials = promised(
-        water, commands=commands, trajectory=track, legs=legs, rng=np.random.default_rng(0), draws=20
-    )
+    promise, trials = promised(water, planned(), rng=np.random.default_rng(0), draws=20)
     told = broken_promise(promise, trials, legs, water.area, confidence=0.95)
     lat, lon = water.area.frame.to_degrees(np.nanmedian(trials.place[0], axis=0))
     assert "in run 1, 'go'" in told
@@ -179,9 +170,9 @@ def test_many_trials_broken_off_are_told_first_and_most_of_them_are_no_plan():
 
 
 def test_ships_have_come_to_the_goal_only_where_they_are_there():
-    _, track, legs = planned()
+    whole, legs = planned().states, planned().legs
     water = replace(leg_water(OPEN, clearance_m=5.0), environment=Environment(current_std_mps=0.5))
-    whole, ships = np.hstack([track.pose, track.velocity]), 20
+    ships = 20
     last = whole[legs[-1].first : legs[-1].last + 1]
     helm = Helmsman(vessel=water.vessel, environment=water.environment, ship=water.ship)
     rng = np.random.default_rng(0)
@@ -205,9 +196,8 @@ def test_ships_have_come_to_the_goal_only_where_they_are_there():
 
 @cache
 def sailed_promise():
-    commands, track, legs = planned()
     water = leg_water(OPEN, clearance_m=5.0)
-    return promised(water, commands=commands, trajectory=track, legs=legs, rng=np.random.default_rng(0), draws=4)[0]
+    return promised(water, planned(), rng=np.random.default_rng(0), draws=4)[0]
 
 
 @pytest.mark.slow

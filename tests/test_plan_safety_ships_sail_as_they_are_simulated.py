@@ -147,7 +147,7 @@ def test_a_helmsman_brings_a_ship_with_a_rudder_to_a_course_and_holds_its_speed(
     vessel = nomoto_ship()
     settings = PlanSettings(transit_speed_mps=7.0)
     helm = Helmsman(vessel=vessel, environment=CALM, ship=capability(vessel, settings))
-    assert not helm.sideways
+    assert not helm.ship.keeps_station
     start = np.array([0.0, 0.0, 0.0, 7.0, 0.0, 0.0])
     standing = np.array(helm.ship.approach.inputs)
     other = truths(vessel, 2)
@@ -159,7 +159,7 @@ def test_a_helmsman_brings_a_ship_with_a_rudder_to_a_course_and_holds_its_speed(
     for _ in range(800):
         before = fleet.states
         wanted = np.column_stack([before[:, :2], np.full(2, 0.6), np.full(2, 6.0), np.zeros((2, 2))])
-        fleet.advance(helm.commands(wanted, before, fleet.given, felt=felt), np.ones(2, dtype=bool))
+        fleet.advance(helm.commands(wanted, before, fleet.given, unexplained=felt), np.ones(2, dtype=bool))
         felt = helm.unexplained(felt, before, fleet.states, fleet.delivered)
     np.testing.assert_allclose(fleet.states[:, 2], 0.6, atol=0.01)
     np.testing.assert_allclose(fleet.states[:, 3], 6.0, atol=0.05)

@@ -11,7 +11,7 @@ from expdesign.plan.control.capability import capability
 from expdesign.plan.control.tracking import Helmsman
 from expdesign.plan.monte_carlo.collision import HullWatch
 from expdesign.plan.monte_carlo.guidance import open_loop
-from expdesign.plan.runs.dispersion import draw_truths, stray_m
+from expdesign.plan.runs.dispersion import dispersion_m, draw_truths
 from expdesign.plan.runs.ensemble import Fleet
 from expdesign.plan.values import PlanSettings
 from expdesign.simulation import CALM, Environment, Variation
@@ -27,7 +27,7 @@ def certain(vessel):
 
 def stray(vessel, environment=CALM, confidence=0.9, seed=0, draws=400):
     rng = np.random.default_rng(seed)
-    return stray_m(
+    return dispersion_m(
         vessel, primitive(vessel), environment, centres_m=CENTRES, confidence=confidence, rng=rng, draws=draws
     )
 

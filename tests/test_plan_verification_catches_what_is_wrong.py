@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import shapely
 
-from expdesign.plan.values import Leg
+from expdesign.plan.values import Leg, SailedTrial
 from expdesign.plan.verify.checks import hull_clearance, verify_plan
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import CALM, simulate
@@ -46,7 +46,8 @@ def sound():
 
 def check(plan):
     plan = dict(plan)
-    return verify_plan(plan.pop("vessel"), plan.pop("area"), plan.pop("environment"), **plan)
+    sailed = SailedTrial(**{name: plan.pop(name) for name in ("commands", "trajectory", "legs")})
+    return verify_plan(plan.pop("vessel"), plan.pop("area"), plan.pop("environment"), sailed, **plan)
 
 
 def bent(track: Trajectory, name: str, column: int, by: float) -> Trajectory:

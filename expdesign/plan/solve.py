@@ -1,4 +1,4 @@
-"""The continuous planner: prepare, sail, verify, try with drawn ships; with more room where they leave the water."""
+"""The planner: place the runs, sail them, verify the plan, try it with drawn ships; with more room where those fail."""
 
 from __future__ import annotations
 
@@ -7,23 +7,25 @@ from dataclasses import replace
 import numpy as np
 
 from expdesign.errors import NoPlan
-from expdesign.plan.assembly import leg_water, search_space, with_joints
+from expdesign.plan.assembly import leg_water, search_space, with_transitions
 from expdesign.plan.bounds import reposition_bound_s
-from expdesign.plan.legs import LegWater, check_ends
+from expdesign.plan.legs import LegWater
+from expdesign.plan.local_planner import local_planner
 from expdesign.plan.monte_carlo import Trials, broken_promise, leaves_too_often, promised, trials_for, worst_leg
 from expdesign.plan.problem import PlanProblem
-from expdesign.plan.sailing import sail_all
-from expdesign.plan.search import LatticePlan, SearchSpace, build_lattice, search_lattice
-from expdesign.plan.values import Leg, Plan, Progress, Promise, Verification
+from expdesign.plan.sailing import PlanRoom, sail_all
+from expdesign.plan.search import LatticePlan, build_lattice, search_lattice
+from expdesign.plan.values import Leg, Plan, Progress, Promise, SailedTrial, Verification
 from expdesign.plan.verify import realised_efficiencies, verify_plan
-from expdesign.plan.work_budget import Effort
-from expdesign.signals import Commands, Trajectory
+from expdesign.plan.work_budget import WorkBudget
 
-SAILED = 1
-"""Sets the chance of drawn trials apart from that of other draws of the same seed."""
-REPLANS, WIDER = 2, 1.4
-"""Plans made anew, with so much more room where trials of the last one leave the water, before giving up."""
-ALL = 2.0
+TRIALS_STREAM = 1
+"""Random stream of the drawn trials, apart from other draws of the same seed."""
+REPLANS = 2
+"""Plans made anew before giving up, each with more room where trials of the one before leave the water."""
+WIDER = 1.4
+"""Factor on a run's room then; legs get the same share of a hull length more clearance."""
+REPLAN_BUDGETS = 2.0
 """Time budgets of counted work within which a plan made anew must be expected to end."""
 
 
@@ -31,38 +33,26 @@ def plan_trial(problem: PlanProblem, *, progress: Progress = lambda what, share:
     """One continuous, verified trial from start to goal with every run the design asks for.
 
     Raises:
-        NoPlan: no way, no room, or no dynamically feasible leg; the message names what and where.
+        NoPlan: no path, no room, or no dynamically feasible leg; the message names what and where.
     """
     progress("measuring the water", 0.0)
-    stated = water = leg_water(problem)
-    check_ends(problem.start, problem.goal, water)
-    space = with_joints(problem, water, search_space(problem, water), progress)
-    told, effort = progress, Effort(most_s=ALL * problem.settings.time_budget_s)
-    for replan in range(REPLANS + 1):
-        before_s = effort.spent_s
-        line = sail_all(problem, water, space, told, stated=stated, effort=effort)
-        sailed = line.joined(sample_time_s=problem.vessel.sample_time_s, names=problem.vessel.model.inputs)
-        told("verifying", 0.85)
-        verification = _verified(problem, stated.ship.transit_speed_mps, *sailed)
-        told("sailing drawn trials", 0.9)
-        promise, trials = _promised(problem, stated, *sailed, attempt=replan)
-        broken = broken_promise(promise, trials, sailed[2], problem.area, confidence=problem.settings.confidence)
+    stated = leg_water(problem)
+    room, budget = _room(problem, stated, progress), WorkBudget(most_s=REPLAN_BUDGETS * problem.settings.time_budget_s)
+    for attempt in range(REPLANS + 1):
+        before_s = budget.spent_s
+        sailed = sail_all(problem, room, progress, stated=stated, budget=budget)
+        progress("verifying", 0.85)
+        verification = _verified(problem, stated, sailed)
+        progress("sailing drawn trials", 0.9)
+        promise, trials = _drawn_trials(problem, stated, sailed, attempt=attempt)
+        broken = broken_promise(promise, trials, sailed.legs, problem.area, confidence=problem.settings.confidence)
         if not broken:
-            return _finished(problem, stated, *sailed, verification=verification, promise=promise)
-        leaving = leaves_too_often(promise, problem.settings.confidence)
-        effort.sailed(int(trials.samples.max(axis=1).sum()))
-        again_s = effort.spent_s - before_s
-        if replan == REPLANS or not leaving or effort.spent_s + again_s > effort.most_s:
-            more = "; more plan.clearance_m helps" if leaving else ""
-            raise NoPlan(f"the plan found does not keep its promise: {broken}{more}")
-        water, space = _wider(problem, water, space, trials, sailed[2], broken)
-        told = _not_back(progress)
+            return _finished(problem, stated, sailed, verification=verification, promise=promise)
+        budget.sailed(int(trials.samples.max(axis=1).sum()))
+        _check_worth_replanning(problem, promise, broken, budget, attempt=attempt, before_s=before_s)
+        room = _wider(problem, room, trials, sailed.legs, broken)
+        progress = _replanning(progress)
     raise AssertionError("the last plan is returned or refused")
-
-
-def _not_back(progress: Progress) -> Progress:
-    """Progress of a plan made anew: most of the work is done, however much of it is to be done again."""
-    return lambda what, share: progress(f"with more room: {what}", max(share, 0.9))
 
 
 def lattice_reference(problem: PlanProblem, *, spacing_m: float, suboptimality: float = 0.02) -> LatticePlan:
@@ -71,26 +61,32 @@ def lattice_reference(problem: PlanProblem, *, spacing_m: float, suboptimality: 
     Changes of speed and the current are left out there, which favours the lattice.
 
     Raises:
-        NoPlan: the lattice is too coarse for the water, or there is no way.
+        NoPlan: the lattice is too coarse for the water, or there is no path.
     """
-    space = search_space(problem, leg_water(problem))
-    counts = [problem.repeats[item.name] for item in space.stamps]
+    water = leg_water(problem)
+    space = search_space(problem, water, local_planner(water, problem.used))
+    counts = [problem.repeats[item.name] for item in space.footprints]
     lattice = build_lattice(space, counts, problem.start, spacing_m=spacing_m)
     return search_lattice(lattice, suboptimality=suboptimality)
 
 
-def _verified(
-    problem: PlanProblem, transit_mps: float, commands: Commands, trajectory: Trajectory, legs: tuple[Leg, ...]
-) -> Verification:
+def _room(problem: PlanProblem, water: LegWater, progress: Progress) -> PlanRoom:
+    """The water and the search space of the first plan."""
+    planner = local_planner(water, problem.used)
+    planner.check_ends(problem.start, problem.goal, water)
+    space = search_space(problem, water, planner)
+    return PlanRoom(water=water, space=with_transitions(problem, water, space, progress))
+
+
+def _verified(problem: PlanProblem, water: LegWater, sailed: SailedTrial) -> Verification:
+    """The independent check of a plan; NoPlan where it fails."""
     verification = verify_plan(
         problem.vessel,
         problem.area,
         problem.environment,
-        commands=commands,
-        trajectory=trajectory,
-        legs=legs,
+        sailed,
         clearance_m=problem.settings.clearance_m,
-        transit_mps=transit_mps,
+        transit_mps=water.ship.transit_speed_mps,
         primitives={item.name: item for item in problem.primitives},
         repeats=problem.repeats,
         start=problem.start,
@@ -101,63 +97,59 @@ def _verified(
     return verification
 
 
-def _promised(
-    problem: PlanProblem,
-    water: LegWater,
-    commands: Commands,
-    trajectory: Trajectory,
-    legs: tuple[Leg, ...],
-    *,
-    attempt: int,
+def _drawn_trials(
+    problem: PlanProblem, water: LegWater, sailed: SailedTrial, *, attempt: int
 ) -> tuple[Promise, Trials]:
-    """What the trial as sailed comes to; no ship is the same that runs keep room for, or that an attempt failed for."""
-    rng = np.random.default_rng((problem.seed, SAILED, attempt))
-    draws = trials_for(problem.settings.confidence)
-    return promised(water, commands=commands, trajectory=trajectory, legs=legs, rng=rng, draws=draws)
+    """Outcomes of drawn trials. Uses random streams independent of planning and of earlier attempts."""
+    rng = np.random.default_rng((problem.seed, TRIALS_STREAM, attempt))
+    return promised(water, sailed, rng=rng, draws=trials_for(problem.settings.confidence))
 
 
-def _wider(
-    problem: PlanProblem,
-    water: LegWater,
-    space: SearchSpace,
-    trials: Trials,
-    legs: tuple[Leg, ...],
-    broken: str,
-) -> tuple[LegWater, SearchSpace]:
+def _check_worth_replanning(
+    problem: PlanProblem, promise: Promise, broken: str, budget: WorkBudget, *, attempt: int, before_s: float
+) -> None:
+    """Raise NoPlan where more room would not help, or where there is no budget left to try."""
+    leaving = leaves_too_often(promise, problem.settings.confidence)
+    expected_s = budget.spent_s + (budget.spent_s - before_s)
+    if attempt == REPLANS or not leaving or expected_s > budget.most_s:
+        more = "; more plan.clearance_m helps" if leaving else ""
+        raise NoPlan(f"the plan found does not keep its promise: {broken}{more}")
+
+
+def _wider(problem: PlanProblem, room: PlanRoom, trials: Trials, legs: tuple[Leg, ...], broken: str) -> PlanRoom:
     """More room where trials leave the water most: for that run, or for all legs.
 
     Raises:
-        NoPlan: with more room there is no way at all.
+        NoPlan: with more room there is no path at all.
     """
-    worst = legs[worst_leg(trials)]
+    worst, space = legs[worst_leg(trials)], room.space
     if worst.kind == "primitive":
-        stamps = tuple(
-            replace(item, room_m=WIDER * item.room_m) if item.name == worst.name else item for item in space.stamps
+        widened = tuple(
+            replace(run, room_m=WIDER * run.room_m) if run.name == worst.name else run for run in space.footprints
         )
-        return water, replace(space, stamps=stamps)
-    wide = replace(water, clearance_m=water.clearance_m + (WIDER - 1.0) * problem.vessel.length_m)
+        return replace(room, space=replace(space, footprints=widened))
+    water = replace(room.water, clearance_m=room.water.clearance_m + (WIDER - 1.0) * problem.vessel.length_m)
     try:
-        found = search_space(problem, wide)
+        found = search_space(problem, water, space.planner)
     except NoPlan:
-        raise NoPlan(f"{broken}; and there is no way to the goal that keeps farther off") from None
-    return wide, replace(found, stamps=space.stamps, tried=space.tried)
+        raise NoPlan(f"{broken}; and there is no path to the goal with more clearance") from None
+    return PlanRoom(water=water, space=replace(found, footprints=space.footprints, tried=space.tried))
+
+
+def _replanning(progress: Progress) -> Progress:
+    """Progress of a plan made anew: most of the work is done, however much of it is to be done again."""
+    return lambda what, share: progress(f"with more room: {what}", max(share, 0.9))
 
 
 def _finished(
-    problem: PlanProblem,
-    water: LegWater,
-    commands: Commands,
-    trajectory: Trajectory,
-    legs: tuple[Leg, ...],
-    *,
-    verification: Verification,
-    promise: Promise,
+    problem: PlanProblem, water: LegWater, sailed: SailedTrial, *, verification: Verification, promise: Promise
 ) -> Plan:
-    sailed = {"commands": commands, "trajectory": trajectory, "legs": legs}
-    placed, realised = realised_efficiencies(problem.vessel, problem.design, problem.environment, **sailed)  # type: ignore[arg-type]
+    placed, realised = realised_efficiencies(problem.vessel, problem.design, problem.environment, sailed)
     return Plan(
         area=problem.area,
-        **sailed,  # type: ignore[arg-type]
+        commands=sailed.commands,
+        trajectory=sailed.trajectory,
+        legs=sailed.legs,
         reposition_bound_s=_reposition_bound_s(problem, water),
         leave_water_probability=promise.left,
         leave_water_by_leg=tuple(leg.left for leg in promise.legs),

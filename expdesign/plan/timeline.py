@@ -1,4 +1,4 @@
-"""The trial as it grows: stretches sailed one after the other, and what they come to."""
+"""The trial as it grows, stretch after stretch."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from expdesign.plan.values import Leg, Placement
+from expdesign.plan.values import Leg, Placement, SailedTrial
 from expdesign.signals import Commands, Trajectory
 from expdesign.values import Array
 
@@ -23,7 +23,7 @@ class SailedStretch:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Timeline:
-    """What has been sailed so far.
+    """The trial so far.
 
     Attributes:
         begin: (6,) state before the first stretch.
@@ -61,12 +61,12 @@ class Timeline:
         self.stretches.append(SailedStretch(kind=kind, name=name, commands=commands, states=states))
 
     def undo_run(self) -> Placement:
-        """Forget the last run and the leg to it; where the run began."""
+        """Remove the last run and the leg to it; where the run began."""
         run = self.stretches.pop()
         self.stretches.pop()
         return Placement(primitive=run.name, pose=run.states[0, :3])
 
-    def joined(self, *, sample_time_s: float, names: tuple[str, ...]) -> tuple[Commands, Trajectory, tuple[Leg, ...]]:
+    def joined(self, *, sample_time_s: float, names: tuple[str, ...]) -> SailedTrial:
         """Everything as one command series, one trajectory and the legs in it."""
         values = np.concatenate([stretch.commands for stretch in self.stretches])
         states = np.concatenate([self.begin[None], *(stretch.states[1:] for stretch in self.stretches)])
@@ -77,4 +77,4 @@ class Timeline:
         )
         commands = Commands(sample_time_s=sample_time_s, names=names, values=values)
         track = Trajectory(sample_time_s=sample_time_s, pose=states[:, :3], velocity=states[:, 3:])
-        return commands, track, legs
+        return SailedTrial(commands=commands, trajectory=track, legs=legs)

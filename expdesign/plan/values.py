@@ -56,6 +56,26 @@ class Leg:
     last: int
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SailedTrial:
+    """A trial as planned: commands, the motion they give, and the legs in it.
+
+    Attributes:
+        commands: (k, m) actuator commands from start to goal.
+        trajectory: k + 1 samples.
+        legs: in time order, without gaps.
+    """
+
+    commands: Commands
+    trajectory: Trajectory
+    legs: tuple[Leg, ...]
+
+    @property
+    def states(self) -> Array:
+        """(k + 1, 6) pose and velocity over ground."""
+        return np.hstack([self.trajectory.pose, self.trajectory.velocity])
+
+
 @dataclass(frozen=True, kw_only=True)
 class Verification:
     """What the independent check of a plan found.
@@ -179,6 +199,11 @@ class Plan:
     leave_water_by_leg: tuple[float | None, ...] = ()
     design_efficiency_placed: float | None = None
     promise: Promise | None = None
+
+    @property
+    def sailed(self) -> SailedTrial:
+        """Commands, motion and legs."""
+        return SailedTrial(commands=self.commands, trajectory=self.trajectory, legs=self.legs)
 
     @property
     def sample_leg(self) -> np.ndarray:

@@ -10,21 +10,21 @@ STEP_S = 2.5e-3
 """What one sample of some hundred drawn ships costs there [s]."""
 
 
-class Effort:
-    """Work that a search has cost, in seconds of one machine that stands for all.
+class WorkBudget:
+    """Counted work of a search, in seconds of a reference machine.
 
     Attributes:
         spent_s: so far.
-        most_s: that there is; what is spent is never refused, only what comes after.
+        most_s: the budget. Work under way is never stopped; only what comes after it is refused.
     """
 
     def __init__(self, most_s: float = math.inf) -> None:
-        """Nothing is spent yet."""
+        """Begin with nothing spent."""
         self.spent_s, self.most_s = 0.0, most_s
 
     @property
     def exhausted(self) -> bool:
-        """Whether there is none left."""
+        """Whether nothing is left."""
         return self.spent_s > self.most_s
 
     def optimised(self, iterations: int, samples: int) -> None:

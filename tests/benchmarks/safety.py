@@ -67,11 +67,10 @@ def unbroken() -> Iterator[None]:
 
 def sailed(water: LegWater, plan: Plan, *, draws: int, breaks: bool, rng: np.random.Generator) -> Promise:
     """Drawn trials of a plan."""
-    parts = {"commands": plan.commands, "trajectory": plan.trajectory, "legs": plan.legs}
     if breaks:
-        return promised(water, draws=draws, rng=rng, **parts)[0]
+        return promised(water, plan.sailed, draws=draws, rng=rng)[0]
     with unbroken():
-        return promised(water, draws=draws, rng=rng, **parts)[0]
+        return promised(water, plan.sailed, draws=draws, rng=rng)[0]
 
 
 def water_of(case: Scenario, plan: Plan) -> LegWater:

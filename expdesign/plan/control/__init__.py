@@ -1,28 +1,28 @@
 """What the ship can do on legs, and how she is steered along them."""
 
 from expdesign.plan.control.acceleration_limits import LegEnd, SpeedChanges, least_loss, leg_end, to_work_s
-from expdesign.plan.control.capability import RUN_UP, SETTLE, Capability, capability, joint_m, speed_loss_s, turn_loss_s
+from expdesign.plan.control.capability import capability
 from expdesign.plan.control.helm_capability import full_ahead, stopped
-from expdesign.plan.control.tracking import CATCH_UP, LEAD, Helmsman, Reference, over_ground
+from expdesign.plan.control.ships import AgileShip, Capability, DubinsShip, HelmShip, arc_spare_m
+from expdesign.plan.control.tracking import Helmsman, Reference, over_ground
+from expdesign.plan.control.tuning import CONTROL
 
 __all__ = [
-    "CATCH_UP",
-    "LEAD",
-    "RUN_UP",
-    "SETTLE",
+    "CONTROL",
+    "AgileShip",
     "Capability",
+    "DubinsShip",
+    "HelmShip",
     "Helmsman",
     "LegEnd",
     "Reference",
     "SpeedChanges",
+    "arc_spare_m",
     "capability",
     "full_ahead",
-    "joint_m",
     "least_loss",
     "leg_end",
     "over_ground",
-    "speed_loss_s",
     "stopped",
     "to_work_s",
-    "turn_loss_s",
 ]

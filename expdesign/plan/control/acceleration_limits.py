@@ -7,22 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.conventions import wrap_angle
+from expdesign.plan.control.tuning import CONTROL
 from expdesign.simulation import Environment
 from expdesign.values import Array, seal
 from expdesign.vessel import IDEAL, NUMPY, Vessel
-
-BANDS = 12
-"""Bands of speed with a largest acceleration each."""
-STAGES = np.array([0.1, 0.2, 0.35, 0.6, 1.0])
-"""Shares of the time in which actuators get from nothing to full: until then they reach only so far."""
-STATES = 240
-"""Motions and commands drawn for each band and stage."""
-CLIMBS, BEST = 5, 12
-"""Rounds in which the best of them are varied, and how many are."""
-SPARE = 1.1
-"""What the search may have missed."""
-STEP, MOST_STEPS = 0.01, 3000
-"""Steps of time, in those of the actuators from nothing to full, and their number in the longest leg looked at."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -46,7 +34,7 @@ class SpeedChanges:
     @property
     def mean_mps2(self) -> float:
         """Mean over all speeds of the largest rate at which speed was found to grow, actuators being anywhere."""
-        return float(self.faster_mps2[-1].mean()) / SPARE
+        return float(self.faster_mps2[-1].mean()) / CONTROL.rate_margin
 
     def most(self, speed_mps: float, time_s: Array) -> Array:
         """(n,) speed that is reached at most at even times (n,) from one, or from which one can be reached."""
@@ -112,12 +100,12 @@ def leg_end(
         top_mps: speed of the fastest leg.
         yaw_rate_radps: no turn is faster.
     """
-    edges = np.linspace(0.0, top_mps, BANDS + 1)
+    edges = np.linspace(0.0, top_mps, CONTROL.speed_bands + 1)
     until_s, boxes = _boxes(vessel, inputs)
     wind = float(np.hypot(*(environment.wind_to - environment.current_to)))
     found = [_most(vessel, boxes, edges, wind, yaw_rate_radps, sign) for sign in (1.0, -1.0)]
     least = 1e-3 * max(rate.max() for rate in found)  # a band that nothing passes through costs much, but not all
-    faster, slower = (SPARE * np.maximum(rate, least) for rate in found)
+    faster, slower = (CONTROL.rate_margin * np.maximum(rate, least) for rate in found)
     changes = SpeedChanges(edges_mps=edges, until_s=until_s, faster_mps2=faster, slower_mps2=slower)
     return LegEnd(slowest_mps=speed_mps, fastest_mps=speed_mps, inputs=inputs, changes=changes)
 
@@ -140,7 +128,7 @@ def _boxes(vessel: Vessel, inputs: Array | None) -> tuple[Array, Array]:
     )
     if inputs is None or any(response != IDEAL for response in vessel.responses):
         return np.array([np.inf]), np.stack([low, high])[None]
-    until_s = to_work_s(vessel) * STAGES
+    until_s = to_work_s(vessel) * np.array(CONTROL.stage_shares)
     rates = np.array([limit.rate for limit in vessel.limits])
     # a command may move before the first sample of a leg is over
     reach = np.minimum(rates * (until_s[:, None] + vessel.sample_time_s), np.where(limited, np.inf, np.pi))
@@ -153,16 +141,16 @@ def _boxes(vessel: Vessel, inputs: Array | None) -> tuple[Array, Array]:
 def _most(vessel: Vessel, boxes: Array, edges: Array, wind_mps: float, yaw_rate_radps: float, sign: float) -> Array:
     """(s, k) largest rate of change of speed found in each stage and band, faster or slower."""
     rng = np.random.default_rng(0)
-    shares = rng.uniform(-0.5, 1.5, (STATES, len(boxes), len(edges) - 1, 4 + boxes.shape[-1]))
+    shares = rng.uniform(-0.5, 1.5, (CONTROL.drawn_motions, len(boxes), len(edges) - 1, 4 + boxes.shape[-1]))
     shares[..., :4] = (shares[..., :4] + 0.5) / 2
     shares = shares.clip(0.0, 1.0)
     most = np.full(shares.shape[1:3], -np.inf)
-    for spread in 0.3 * 0.5 ** np.arange(CLIMBS):
+    for spread in 0.3 * 0.5 ** np.arange(CONTROL.refinements):
         rates = sign * _rates(vessel, shares, boxes, edges, wind_mps, yaw_rate_radps)
         most = np.maximum(most, rates.max(axis=0))
-        order = np.argpartition(-rates, BEST, axis=0)[:BEST]
+        order = np.argpartition(-rates, CONTROL.refined_motions, axis=0)[: CONTROL.refined_motions]
         best = np.take_along_axis(shares, order[..., None], axis=0)
-        varied = np.repeat(best, STATES // BEST, axis=0)
+        varied = np.repeat(best, CONTROL.drawn_motions // CONTROL.refined_motions, axis=0)
         shares = (varied + spread * rng.standard_normal(varied.shape)).clip(0.0, 1.0)
     rates = sign * _rates(vessel, shares, boxes, edges, wind_mps, yaw_rate_radps)
     most = np.maximum(most, rates.max(axis=0))
@@ -188,13 +176,13 @@ def least_loss(first: LegEnd, last: LegEnd, vessel: Vessel) -> tuple[float, floa
     The speed at any time is at most what can be reached by then and what can still be shed, so the longer a leg, the
     more is lost: the shortest one counts in which the one speed can become the other, and the one command the other.
     """
-    step_s, back = STEP * to_work_s(vessel), last.changes.reversed()
+    step_s, back = CONTROL.loss_step * to_work_s(vessel), last.changes.reversed()
     moved_s = 0.0 if first.inputs is None or last.inputs is None else _moved_s(vessel, first.inputs, last.inputs)
-    time_s: Array = step_s * np.arange(MOST_STEPS, dtype=np.float64)
+    time_s: Array = step_s * np.arange(CONTROL.loss_steps, dtype=np.float64)
     fast, slow = first.changes.most(first.fastest_mps, time_s), first.changes.least(first.slowest_mps, time_s)
     shed, kept = back.most(last.fastest_mps, time_s), back.least(last.slowest_mps, time_s)
-    count = min(int(moved_s / step_s), MOST_STEPS - 1)
-    while count < MOST_STEPS - 1 and not _can_meet(fast, slow, shed, kept, count):
+    count = min(int(moved_s / step_s), CONTROL.loss_steps - 1)
+    while count < CONTROL.loss_steps - 1 and not _can_meet(fast, slow, shed, kept, count):
         count += 1
     sailed_m = step_s * float(np.minimum(fast[: count + 1], shed[count::-1]).sum())  # no less than the integral
     least_s = step_s * max(0, count - 1)  # the step before was too short

@@ -1,4 +1,4 @@
-"""What a ship with a helm can do on legs, by simulating it: the turns it sails, gathering way, stopping."""
+"""What a ship with a helm can do on legs, by simulating it: the turns it sails, full ahead from rest, stopping."""
 
 from __future__ import annotations
 
@@ -6,23 +6,12 @@ import numpy as np
 
 from expdesign.errors import InputError, NoAnswer, NoPlan
 from expdesign.plan.control.steady_turns import SteadyTurn, side_by_side, steady_turns
+from expdesign.plan.control.tuning import CONTROL
 from expdesign.plan.values import PlanSettings
 from expdesign.signals import Trajectory
 from expdesign.simulation import Approach, Conduct, simulate_many, steady_ahead, stopping
 from expdesign.values import Array
 from expdesign.vessel import Vessel
-
-LATERAL_MPS2 = 0.03 * 9.81
-"""Lateral acceleration of turns on legs: small enough not to heel the ship."""
-
-HELM_SHARE = 0.65
-"""Share of the hardest helm at which ships turn on legs: the rest is for getting into turns and out of them."""
-
-SLOW_SHARE = 0.5
-"""The slowest speed, in transit speeds, at which a ship with a helm must still turn as tightly as legs ask."""
-
-GATHERING = 200.0
-"""Hull lengths at transit speed in whose time a ship that gathers way is watched."""
 
 
 def why_not_ahead(vessel: Vessel, speed: float) -> str:
@@ -35,46 +24,46 @@ def why_not_ahead(vessel: Vessel, speed: float) -> str:
 
 
 def _slower(approach: Approach) -> Approach:
-    return steady_ahead(approach.helm.vessel, SLOW_SHARE * approach.speed_mps)
+    return steady_ahead(approach.helm.vessel, CONTROL.helm_slow_share * approach.speed_mps)
 
 
 def leg_radius_m(approach: Approach, settings: PlanSettings, pairs: list[tuple[SteadyTurn, SteadyTurn]]) -> float:
-    """The wished radius, or what the ship turns on to both sides, at transit speed and slower, with helm to spare.
+    """The radius asked for, or what the ship turns on to both sides, at transit speed and slower, with helm to spare.
 
     Args:
         approach: at transit speed.
-        settings: may wish for a radius.
+        settings: may ask for a radius.
         pairs: steady turns to both sides from there, by `side_by_side`.
 
     Raises:
-        NoPlan: the wished radius is too small.
+        NoPlan: the radius asked for is too small.
     """
     vessel, transit = approach.helm.vessel, approach.speed_mps
     at_speeds = pairs, side_by_side(steady_turns(_slower(approach)))
     tightest = max(max(turn.radius_m for turn in some[-1]) for some in at_speeds if some)
-    wish = settings.turning_radius_m
-    if wish is not None and wish < tightest:
+    asked_m = settings.turning_radius_m
+    if asked_m is not None and asked_m < tightest:
         raise NoPlan(
-            f"plan.turning_radius_m is {wish:g}, at {transit:.3g} m/s vessel {vessel.name!r} needs {tightest:.3g} m or "
-            "more with its helm hard over"
+            f"plan.turning_radius_m is {asked_m:g}, at {transit:.3g} m/s vessel {vessel.name!r} needs {tightest:.3g} m "
+            "or more with its helm hard over"
         )
     found = [tightest, 1.5 * vessel.length_m]
     for some in at_speeds:
         most = max((pair[1].helm_rad for pair in some), default=0.0)
-        eased = [pair for pair in some if pair[1].helm_rad <= HELM_SHARE * most and _gentle(pair)]
-        found.append(max(turn.radius_m for turn in eased[-1]) if eased else transit**2 / LATERAL_MPS2)
-    return wish or max(found)
+        eased = [pair for pair in some if pair[1].helm_rad <= CONTROL.helm_share * most and _gentle(pair)]
+        found.append(max(turn.radius_m for turn in eased[-1]) if eased else transit**2 / CONTROL.lateral_mps2)
+    return asked_m or max(found)
 
 
 def _gentle(pair: tuple[SteadyTurn, SteadyTurn]) -> bool:
-    return all(abs(turn.surge_mps * turn.yaw_rate_radps) <= LATERAL_MPS2 for turn in pair)
+    return all(abs(turn.surge_mps * turn.yaw_rate_radps) <= CONTROL.lateral_mps2 for turn in pair)
 
 
 def full_ahead(approach: Approach) -> Array:
     """(k, 6) pose and velocity from rest with the engines full ahead, as fast as they answer, at every sample."""
     helm, vessel = approach.helm, approach.helm.vessel
     step_s = vessel.sample_time_s
-    count = int(np.ceil(GATHERING * vessel.length_m / approach.speed_mps / step_s))
+    count = int(np.ceil(CONTROL.full_ahead_hulls * vessel.length_m / approach.speed_mps / step_s))
     orders = np.minimum(1.0, np.arange(1, count + 1) * step_s * helm.drive_rate)
     rows = np.array([helm.inputs(order, approach.angle_rad) for order in orders.tolist()])
     states = simulate_many(
@@ -115,8 +104,8 @@ def stopped(vessel: Vessel, speed: float) -> Trajectory:
     raise NoPlan(f"vessel {vessel.name!r} cannot be stopped at the goal: {reason}")
 
 
-def stopping_way_m(vessel: Vessel, speed: float) -> float:
-    """Way of a stop from a steady speed [m].
+def stopping_distance_m(vessel: Vessel, speed: float) -> float:
+    """Distance of a stop from a steady speed [m].
 
     Raises:
         NoPlan: as `stopped`.

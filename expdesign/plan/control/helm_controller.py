@@ -1,4 +1,4 @@
-"""The helmsman of ships that are steered by a helm: helm and engine orders, for many ships at once."""
+"""The controller of helm-steered ships: helm and engine orders, for many ships at once."""
 
 from __future__ import annotations
 
@@ -8,89 +8,98 @@ from functools import cached_property
 import numpy as np
 
 from expdesign.conventions import wrap_angle
-from expdesign.plan.control.capability import Capability
+from expdesign.plan.control.controllers import Demand
+from expdesign.plan.control.steady_turns import SteadyTurn
+from expdesign.plan.control.tuning import CONTROL
 from expdesign.simulation import Approach
 from expdesign.values import Array
 from expdesign.vessel import Vessel
 
-QUICK = 1.2
-"""Natural frequency wished for in courses, in that of a hull length at transit speed."""
-DAMPED = 0.9
-"""Damping wished for in courses."""
-SLOWEST = 0.3
-"""Speed, in transit speeds, below which the helm is not taken to bite less."""
-FARTHEST_RAD = 1.0
-"""Change of course that the helmsman answers to at most."""
 ORDERS = np.linspace(-1.0, 1.0, 9)
-"""Engine orders looked at."""
+"""Engine orders compared."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class HelmOrders:
-    """Helm and engine orders for wished courses and speeds.
+class HelmController:
+    """Helm and engine orders for desired courses and speeds.
 
     Attributes:
         vessel: with the nominal model.
-        ship: its approach and steady turns.
+        approach: straight ahead at transit speed.
+        turns: steady turns from there.
+        transit_speed_mps: of legs.
     """
 
     vessel: Vessel
-    ship: Capability
-
-    def commands(self, wish: Array, moving: Array, felt: Array) -> Array:
-        """(n, m) commands, whatever stands before them.
-
-        Args:
-            wish: (n, 3) surge speed through water, change of heading, yaw rate.
-            moving: (n, 3) velocity through water.
-            felt: (n, 3) acceleration that the model does not explain.
-        """
-        angle = self._helm(wish, moving, felt)
-        return np.asarray(self._approach.helm.rows(self._drive(wish[:, 0], moving, angle, felt[:, 0]), angle))
+    approach: Approach
+    turns: tuple[SteadyTurn, ...]
+    transit_speed_mps: float
 
     @property
-    def pace_s(self) -> float:
-        """Time of a hull length at transit speed [s]."""
-        return self.vessel.length_m / self.ship.transit_speed_mps
+    def answer_s(self) -> float:
+        """Time of a hull length at transit speed, at least three samples [s]."""
+        return max(self._pace_s, 3.0 * self.vessel.sample_time_s)
 
-    def _helm(self, wish: Array, moving: Array, felt: Array) -> Array:
+    def commands(self, demand: Demand) -> Array:
+        """(n, m) desired actuator values."""
+        speed, course = self._pointed(demand)
+        desired = np.column_stack([speed, course - demand.states[:, 2], demand.reference[:, 5]])
+        angle = self._helm(desired, demand.moving, demand.unexplained)
+        drive = self._drive(desired[:, 0], demand.moving, angle, demand.unexplained[:, 0])
+        return np.asarray(self.approach.helm.rows(drive, angle))
+
+    def _pointed(self, demand: Demand) -> tuple[Array, Array]:
+        """(n,) surge speeds and headings of ships that go where they point.
+
+        Ships that hardly move keep the reference's heading. So do those that are to go astern, as after a crash stop:
+        their helm does not lead them anywhere.
+        """
+        wanted, through = demand.reference, demand.through
+        speed = np.hypot(*through.T)
+        moves = speed > 0.05 * self.transit_speed_mps
+        ahead = np.cos(wanted[:, 2]) * through[:, 0] + np.sin(wanted[:, 2]) * through[:, 1]
+        astern = moves & (demand.reference_through[:, 0] < 0.0)
+        pointing = np.where(moves & ~astern, np.arctan2(through[:, 1], through[:, 0]), wanted[:, 2])
+        return np.where(astern, np.minimum(ahead, 0.0), speed), pointing
+
+    @property
+    def _pace_s(self) -> float:
+        """Time of a hull length at transit speed [s]."""
+        return self.vessel.length_m / self.transit_speed_mps
+
+    def _helm(self, desired: Array, moving: Array, unexplained: Array) -> Array:
         """(n,) helm angles: those of steady turns, and more or less by what is missing in heading and yaw rate."""
-        approach = self._approach
-        quick = QUICK / self.pace_s
-        turn = np.clip(wrap_angle(wish[:, 1]), -FARTHEST_RAD, FARTHEST_RAD)
-        damping = 2 * DAMPED * quick - self._own_damping
-        missing = quick**2 * turn + damping * (wish[:, 2] - moving[:, 2]) - felt[:, 2]
-        bite = self._bite * np.maximum(moving[:, 0] / self.ship.transit_speed_mps, SLOWEST) ** 2
-        change = np.interp(wish[:, 2], *self._turns) + missing / bite
+        approach = self.approach
+        quick = CONTROL.course_frequency / self._pace_s
+        turn = np.clip(wrap_angle(desired[:, 1]), -CONTROL.helm_farthest_rad, CONTROL.helm_farthest_rad)
+        damping = 2 * CONTROL.course_damping * quick - self._own_damping
+        missing = quick**2 * turn + damping * (desired[:, 2] - moving[:, 2]) - unexplained[:, 2]
+        bite = self._bite * np.maximum(moving[:, 0] / self.transit_speed_mps, CONTROL.helm_slowest) ** 2
+        change = np.interp(desired[:, 2], *self._turns) + missing / bite
         return np.asarray(approach.angle_rad + approach.starboard * np.clip(change, -self._hardest, self._hardest))
 
-    def _drive(self, speed: Array, moving: Array, angle: Array, felt: Array) -> Array:
-        """(n,) engine orders by which the nominal model comes to the wished speed in the time of a hull length."""
-        given = self._approach.helm.rows(ORDERS[:, None], angle)  # (o, n, m)
+    def _drive(self, speed: Array, moving: Array, angle: Array, unexplained: Array) -> Array:
+        """(n,) engine orders by which the nominal model comes to the desired speed in the time of a hull length."""
+        given = self.approach.helm.rows(ORDERS[:, None], angle)  # (o, n, m)
         motion = tuple(np.broadcast_to(column, given.shape[:2]) for column in moving.T)
-        told = self.vessel.model.accelerations(motion, motion[:2], tuple(np.moveaxis(given, -1, 0)))[0]
-        gains = np.maximum.accumulate(np.broadcast_to(told, given.shape[:2]), axis=0)
-        wanted = (speed - moving[:, 0]) / self.pace_s - felt
+        predicted = self.vessel.model.accelerations(motion, motion[:2], tuple(np.moveaxis(given, -1, 0)))[0]
+        gains = np.maximum.accumulate(np.broadcast_to(predicted, given.shape[:2]), axis=0)
+        wanted = (speed - moving[:, 0]) / self._pace_s - unexplained
         above = np.clip((gains < wanted).sum(axis=0), 1, len(ORDERS) - 1)
         ships = np.arange(len(angle))
         low, high = gains[above - 1, ships], gains[above, ships]
         share = np.clip((wanted - low) / np.maximum(high - low, 1e-12), 0.0, 1.0)
         return np.asarray(ORDERS[above - 1] + share * (ORDERS[above] - ORDERS[above - 1]))
 
-    @property
-    def _approach(self) -> Approach:
-        assert self.ship.approach is not None
-        return self.ship.approach
-
     @cached_property
     def _hardest(self) -> float:
-        approach = self._approach
+        approach = self.approach
         return float(approach.helm.hardest(approach.drive) - abs(approach.angle_rad))
 
     @cached_property
     def _bite(self) -> float:
         """Yaw acceleration per helm angle on the straight approach [1/s2]."""
-        approach, tilt = self._approach, 1e-3
+        approach, tilt = self.approach, 1e-3
         motion = tuple(approach.velocity.tolist())
         sides = [
             approach.helm.acceleration(motion, approach.drive, approach.angle_rad + side * approach.starboard * tilt)[2]
@@ -108,6 +117,6 @@ class HelmOrders:
     @cached_property
     def _turns(self) -> tuple[Array, Array]:
         """Yaw rates of steady turns, and changes of helm that hold them."""
-        rows = sorted([(turn.yaw_rate_radps, turn.helm_rad) for turn in self.ship.turns] + [(0.0, 0.0)])
+        rows = sorted([(turn.yaw_rate_radps, turn.helm_rad) for turn in self.turns] + [(0.0, 0.0)])
         rates, angles = np.array(rows).T
         return rates, angles

@@ -12,19 +12,10 @@ import numpy as np
 from scipy.optimize import root
 
 from expdesign.conventions import OUTPUTS
+from expdesign.plan.control.tuning import CONTROL
 from expdesign.simulation import simulate_many
 from expdesign.simulation.helm import Approach
 from expdesign.values import Array
-
-HELMS = 8
-"""Helm angles to each side."""
-SETTLING = 30.0
-"""Hull lengths at approach speed after which a turn counts as steady."""
-STEADY = 1e-6
-"""Share of the approach speed, per time of a hull length, that a steady turn may still gain or lose."""
-
-MOVED = 0.3
-"""Shares of the approach's scales that the exact turn may be away from where the simulation ended."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,9 +55,9 @@ def steady_turns(approach: Approach) -> tuple[SteadyTurn, ...]:
     """
     helm, vessel = approach.helm, approach.helm.vessel
     hardest = helm.hardest(approach.drive) - abs(approach.angle_rad)
-    shares = np.arange(1, HELMS + 1) / HELMS
+    shares = np.arange(1, CONTROL.helm_angles + 1) / CONTROL.helm_angles
     angles = hardest * np.r_[-shares[::-1], shares]
-    count = max(2, math.ceil(SETTLING * vessel.length_m / approach.speed_mps / vessel.sample_time_s))
+    count = max(2, math.ceil(CONTROL.steady_hulls * vessel.length_m / approach.speed_mps / vessel.sample_time_s))
     rows = helm.rows(np.array(approach.drive), approach.angle_rad + approach.starboard * angles)
     runs, still = len(rows), np.zeros((len(rows), 2))
     states = simulate_many(
@@ -101,7 +92,11 @@ def _solved(approach: Approach, angle: float, motion: Array) -> SteadyTurn | Non
     whole = np.zeros(3)
     whole[used] = share * scale
     turns = whole[0] > 0 and whole[2] * angle > 0
-    if not turns or np.abs(excess(share)).max() > STEADY or np.abs(share - motion[used] / scale).max() > MOVED:
+    if (
+        not turns
+        or np.abs(excess(share)).max() > CONTROL.steady_share
+        or np.abs(share - motion[used] / scale).max() > CONTROL.steady_offset
+    ):
         return None
     return SteadyTurn(
         helm_rad=angle, surge_mps=float(whole[0]), sway_mps=float(whole[1]), yaw_rate_radps=float(whole[2])

@@ -19,7 +19,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from expdesign.plan.work_budget import Effort
+from expdesign.plan.work_budget import WorkBudget
 from expdesign.simulation import Environment, motion_rates, rk4_step, sample_map
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array, seal
@@ -61,7 +61,7 @@ class LegProblem:
         node_s: least time between nodes; 0 for the sample time.
         wish: (2,) seconds that a metre made good north and east is worth to legs that may end anywhere, and if it is
             zero with any heading; None for those that have to end at `end`.
-        effort: that may be spent, and that is; without any left, nothing is found.
+        budget: that may be spent, and that is; without any left, nothing is found.
     """
 
     vessel: Vessel
@@ -86,7 +86,7 @@ class LegProblem:
     lateral_mps2: float
     node_s: float = 0.0
     wish: Array | None = None
-    effort: Effort = field(default_factory=Effort)
+    budget: WorkBudget = field(default_factory=WorkBudget)
 
     def __post_init__(self) -> None:
         seal(self, start="6", end="6", start_inputs="m", end_inputs="m", states="j 6", inputs="j m")
@@ -325,7 +325,7 @@ class _Program:
 
     def solve(self, problem: LegProblem, step_s: float) -> tuple[LegProblem, float] | None:
         """The problem with states and inputs replaced by the answer, and the sample time found; or None."""
-        if problem.effort.exhausted:
+        if problem.budget.exhausted:
             return None
         j, m = self.nodes, len(self.limits)
         origin = np.array([*problem.start[:2], 0, 0, 0, 0])
@@ -356,7 +356,7 @@ class _Program:
             ubg=most,
         )
         outcome = self.solver.stats()
-        problem.effort.optimised(outcome["iter_count"], j * self.block)
+        problem.budget.optimised(outcome["iter_count"], j * self.block)
         if outcome["return_status"] == "NonIpopt_Exception_Thrown":
             raise KeyboardInterrupt  # the only exception there can be, as nothing in the program calls back to Python
         if not outcome["success"]:

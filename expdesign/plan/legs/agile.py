@@ -13,7 +13,7 @@ import numpy as np
 
 from expdesign.conventions import whole_turns, wrap_angle
 from expdesign.plan.chart import polyline_length
-from expdesign.plan.control import Capability, Helmsman, Reference, joint_m, speed_loss_s, turn_loss_s
+from expdesign.plan.control import AgileShip, Helmsman, Reference
 from expdesign.plan.legs._casadi import LegProblem, solve_joint, solve_leg
 from expdesign.plan.legs.problem import hull_discs, leg_problem
 from expdesign.plan.legs.water import LegTask, LegWater, acceptable, last_state, nearest_turns
@@ -60,17 +60,17 @@ class Line:
         return np.column_stack([*columns, np.interp(along_m, middle, course)])
 
 
-def agile_leg(task: LegTask, water: LegWater) -> Array | None:
+def agile_leg(task: LegTask, water: LegWater, ship: AgileShip) -> Array | None:
     """Commands (k, m) from one state to the other, or None."""
-    for way in water.candidate_ways(task.start[:2], task.end[:2]):
+    for way in water.candidate_paths(task.start[:2], task.end[:2]):
         line = _line(water, way)
-        first_m, last_m = _joint_lengths(task, water, line)
+        first_m, last_m = _end_lengths(task, water, ship, line)
         short = line.length_m < first_m + last_m + 2 * water.vessel.length_m
         brief_m = WHOLE * water.vessel.sample_time_s * water.ship.transit_speed_mps
         whole = short or (len(way) == 2 and line.length_m < brief_m)  # loses less, where it is not too much to ask
-        values = _optimised(task, water, line) if whole else None
+        values = _optimised(task, water, ship, line) if whole else None
         if values is None and not short:
-            values = _in_parts(task, water, line, first_m, last_m)
+            values = _in_parts(task, water, ship, line, first_m, last_m)
         if values is not None:
             return values
     return None
@@ -112,16 +112,19 @@ def _integral(along: Array, values: Array, where: Array) -> Array:
     return np.asarray(sums[k] + part * (values[k] + (values[k + 1] - values[k]) / steps[k] * part / 2))
 
 
-def _joint_lengths(task: LegTask, water: LegWater, line: Line) -> tuple[float, float]:
+def _end_lengths(task: LegTask, water: LegWater, ship: AgileShip, line: Line) -> tuple[float, float]:
     course = line.at(np.array([0.0, line.length_m]))[:, 2]
-    first = joint_m(water.ship, float(task.start[2] - course[0]), water.vessel.length_m)
-    return first, joint_m(water.ship, float(task.end[2] - course[1]), water.vessel.length_m)
+    turns = float(task.start[2] - course[0]), float(task.end[2] - course[1])
+    first_m, last_m = (ship.departure_m(turn, water.vessel.length_m) for turn in turns)
+    return first_m, last_m
 
 
-def _in_parts(task: LegTask, water: LegWater, line: Line, first_m: float, last_m: float) -> Array | None:
+def _in_parts(
+    task: LegTask, water: LegWater, ship: AgileShip, line: Line, first_m: float, last_m: float
+) -> Array | None:
     track, inputs = _steady(water, line, first_m, line.length_m - last_m, task.start[2])
     departure = replace(task, end=track[0], end_inputs=inputs)
-    first = _optimised(departure, water, _cut(line, 0.0, first_m))
+    first = _optimised(departure, water, ship, _cut(line, 0.0, first_m))
     if first is None:
         return None
     given = np.concatenate([task.past, first])
@@ -130,7 +133,7 @@ def _in_parts(task: LegTask, water: LegWater, line: Line, first_m: float, last_m
     )
     given = water.remembered(np.concatenate([given, middle]))
     arrival = replace(task, start=state, start_inputs=middle[-1], before=given)
-    last = _optimised(arrival, water, _cut(line, line.length_m - last_m, line.length_m))
+    last = _optimised(arrival, water, ship, _cut(line, line.length_m - last_m, line.length_m))
     if last is None:
         return None
     values = np.concatenate([first, middle, last])
@@ -188,24 +191,24 @@ def _steered(water: LegWater, reference: Reference, state: Array, before: Array)
     return np.array(given[first:]), states[0]
 
 
-def _optimised(task: LegTask, water: LegWater, line: Line) -> Array | None:
+def _optimised(task: LegTask, water: LegWater, ship: AgileShip, line: Line) -> Array | None:
     """The fastest leg in the water beside a line."""
-    for problem in _problems(task, water, line):
+    for problem in _problems(task, water, ship, line):
         values = solve_leg(problem)
         if values is not None and acceptable(problem.start, problem.end, water, values, task.past):
             return values
     return None
 
 
-def _problems(task: LegTask, water: LegWater, line: Line) -> Iterator[LegProblem]:
+def _problems(task: LegTask, water: LegWater, ship: AgileShip, line: Line) -> Iterator[LegProblem]:
     """First guesses: the short way round, then, for great turns, the long one; each in its region of free water."""
     turn = float(wrap_angle(task.end[2] - task.start[2]))
     ways = [turn] if abs(turn) < np.pi / 2 else [turn, turn - np.copysign(2 * np.pi, turn)]
     for way in ways:
-        yield _problem(task, water, line, way)
+        yield _problem(task, water, ship, line, way)
 
 
-def joint(task: LegTask, water: LegWater, wish: Array) -> tuple[float, Array] | None:
+def free_leg(task: LegTask, water: LegWater, ship: AgileShip, wish: Array) -> tuple[float, Array] | None:
     """Time and end pose (3,) of the leg that gains most from a state, in open water, or None.
 
     Args:
@@ -215,14 +218,14 @@ def joint(task: LegTask, water: LegWater, wish: Array) -> tuple[float, Array] | 
     """
     line = _line(water, np.stack([task.start[:2], task.end[:2]]))
     problems = (
-        replace(problem, wish=wish, node_s=problem.duration_s / MOST_NODES) for problem in _problems(task, water, line)
+        replace(problem, wish=wish, node_s=problem.duration_s / MOST_NODES)
+        for problem in _problems(task, water, ship, line)
     )
     found = [answer for problem in problems if (answer := solve_joint(problem)) is not None]
     return min(found, key=lambda answer: answer[0] - float(wish @ answer[1][:2]), default=None)
 
 
-def _problem(task: LegTask, water: LegWater, line: Line, turn: float) -> LegProblem:
-    ship = water.ship
+def _problem(task: LegTask, water: LegWater, ship: AgileShip, line: Line, turn: float) -> LegProblem:
     duration_s = _duration_s(task, ship, line, turn)
     states = _guess(task, line, turn, duration_s)
     path = line.at(np.linspace(0.0, line.length_m, GUESS_NODES + 1))
@@ -234,7 +237,7 @@ def _problem(task: LegTask, water: LegWater, line: Line, turn: float) -> LegProb
         inputs=_guessed_inputs(task, water, states, duration_s),
         path=path,
         duration_s=duration_s,
-        turning_rate_radps=max(ship.spot_rate_radps, ship.yaw_rate_radps),
+        turning_rate_radps=ship.turn_rate_radps,
     )
     arm, margin = hull_discs(water)
     circle = _circle(water, line, arm, margin)
@@ -257,12 +260,12 @@ def _circle(water: LegWater, line: Line, arm: float, margin_m: float) -> Array |
     return np.r_[middle, radius] if radius >= needed else None
 
 
-def _duration_s(task: LegTask, ship: Capability, line: Line, turn: float) -> float:
+def _duration_s(task: LegTask, ship: AgileShip, line: Line, turn: float) -> float:
     course = line.at(np.array([0.0, line.length_m]))[:, 2]
     spot_s, way_s = 1.3 * abs(turn) / ship.swing_radps, line.length_m / ship.transit_speed_mps
     if line.length_m > 0.1 * ship.turning_radius_m:
-        way_s += float(turn_loss_s(ship, task.start[2] - course[0], task.end[2] - course[1]))
-    return max(way_s, spot_s) + float(speed_loss_s(ship, task.start[3], task.end[3]))
+        way_s += float(ship.turn_loss_s(task.start[2] - course[0], task.end[2] - course[1]))
+    return max(way_s, spot_s) + float(ship.speed_loss_s(task.start[3], task.end[3]))
 
 
 def _guess(task: LegTask, line: Line, turn: float, duration_s: float) -> Array:

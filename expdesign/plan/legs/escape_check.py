@@ -71,14 +71,12 @@ def _cell(pose: Array, radius: float) -> tuple[int, ...]:
 
 
 def check_ends(start: Array, goal: Array, water: LegWater) -> None:
-    """Raise NoPlan where a ship that is steered by a helm cannot sail off from its start, or up to its goal.
+    """Raise NoPlan where a ship that sails arcs cannot depart from its start, or reach its goal.
 
     Args:
         start, goal: (3,) poses.
         water: as of the plan.
     """
-    if water.ship.approach is None:
-        return
     for name, pose, backwards, to in (("start", start, False, "from"), ("goal", goal, True, "to")):
         if not gets_away(pose, water, backwards=backwards):
             lat, lon = water.area.frame.to_degrees(pose[:2])

@@ -14,7 +14,7 @@ import numpy as np
 
 from expdesign.conventions import whole_turns
 from expdesign.plan.chart import polyline_length
-from expdesign.plan.control import RUN_UP, SETTLE, Capability
+from expdesign.plan.control import CONTROL, HelmShip
 from expdesign.plan.legs._casadi import LegProblem, solve_leg
 from expdesign.plan.legs._ompl import dubins_curve
 from expdesign.plan.legs.dubins import find_path
@@ -26,23 +26,23 @@ from expdesign.values import Array
 SLOW = 0.3
 """Transit speeds below which a ship is about to gather way or to stop."""
 STRAIGHTS = ((1.0, 2.0, 1.0), (1.0, 1.0, 0.7), (0.5, 0.5, 0.4), (0.0, 0.0, 0.1))
-"""What is tried: shares of `OFF`, of `SETTLE` before a run-up, and ways of a crash stop before a goal."""
+"""Shares tried of `OFF`, of the hull lengths to settle before a run-up, and of the stopping distance before a goal."""
 NODE = 0.25
 """Time between nodes, in that of a hull length at transit speed."""
 SMOOTHED = 1.0
 """Hull lengths over which the guess eases into turns."""
 
 
-def helmed_leg(task: LegTask, water: LegWater) -> Array | None:
+def helm_leg(task: LegTask, water: LegWater, ship: HelmShip) -> Array | None:
     """Commands (k, m) from one state to the other, the run-up to a run included, or None."""
     before_run, samples = _run_up(task, water)
     tail = np.tile(task.end_inputs, (samples, 1))
-    check = recover(task.start, task.past, water)
-    for straights in _shortest_first(check.states[-1], before_run, water):
+    check = recover(task.start, task.past, water, ship)
+    for straights in _shortest_first(check.states[-1], before_run, water, ship):
         path = _path(before_run, water, straights)
         if path is None:
             continue
-        problem = _problem(before_run, water, check, path)
+        problem = _problem(before_run, water, ship, check, path)
         values = solve_leg(problem)
         if values is None:
             continue
@@ -62,7 +62,7 @@ def _speed_mps(water: LegWater, state: Array) -> float:
 def _run_up(task: LegTask, water: LegWater) -> tuple[LegTask, int]:
     """The leg up to the run-up, and the samples of that: none before a goal, or where wind would turn the ship."""
     vessel, speed = water.vessel, _speed_mps(water, task.end)
-    samples = int(np.ceil(RUN_UP * vessel.length_m / max(speed, 1e-9) / vessel.sample_time_s))
+    samples = int(np.ceil(CONTROL.approach_hulls * vessel.length_m / max(speed, 1e-9) / vessel.sample_time_s))
     if speed < SLOW * water.ship.transit_speed_mps:
         return task, 0
     track = water.sail(task.end, np.tile(task.end_inputs, (samples, 1)))
@@ -98,12 +98,12 @@ class Straights:
         return self.off_m + polyline_length(curve[:, :2]) + self.into_m
 
 
-def _shortest_first(start: Array, task: LegTask, water: LegWater) -> list[Straights]:
+def _shortest_first(start: Array, task: LegTask, water: LegWater, ship: HelmShip) -> list[Straights]:
     """What is tried: of paths hardly longer than the shortest those with the longest straights, then others.
 
     Not those with a turn all round for want of length: another place for the run is better.
     """
-    length, radius = water.vessel.length_m, water.ship.turning_radius_m
+    length, radius = water.vessel.length_m, ship.turning_radius_m
     first, last = _course_pose(start, water), _course_pose(task.end, water)
     stopping = _speed_mps(water, task.end) < SLOW * water.ship.transit_speed_mps
     tries = [
@@ -111,7 +111,7 @@ def _shortest_first(start: Array, task: LegTask, water: LegWater) -> list[Straig
             first=first,
             last=last,
             off_m=off * OFF * length,
-            into_m=stop * water.ship.stopping_m if stopping else settle * SETTLE * length,
+            into_m=stop * ship.stopping_m if stopping else settle * CONTROL.settling_hulls * length,
         )
         for off, settle, stop in STRAIGHTS
     ]
@@ -149,9 +149,8 @@ def _straight(pose: Array, length_m: float, hull_m: float) -> Array:
     return np.stack([_moved(pose, float(ahead)) for ahead in along])
 
 
-def _problem(task: LegTask, water: LegWater, check: Recovery, path: Array) -> LegProblem:
-    ship = water.ship
-    states, inputs, places, duration_s = _guess(task, water, check, path)
+def _problem(task: LegTask, water: LegWater, ship: HelmShip, check: Recovery, path: Array) -> LegProblem:
+    states, inputs, places, duration_s = _guess(task, water, ship, check, path)
     turned = whole_turns(states[-1, 2] - task.end[2])
     inputs[0], inputs[-1] = task.start_inputs, nearest_turns(water.vessel, task.end_inputs, inputs[-1])
     return leg_problem(
@@ -167,31 +166,32 @@ def _problem(task: LegTask, water: LegWater, check: Recovery, path: Array) -> Le
     )
 
 
-def _guess(task: LegTask, water: LegWater, check: Recovery, path: Array) -> tuple[Array, Array, Array, float]:
+def _guess(
+    task: LegTask, water: LegWater, ship: HelmShip, check: Recovery, path: Array
+) -> tuple[Array, Array, Array, float]:
     """States (j + 1, 6), commands (j + 1, m), places with courses (j + 1, 3) at even times, and the time they take."""
-    time_s, states, inputs, course = _steady_along(check.states[-1], task.end, water, path)
+    time_s, states, inputs, course = _steady_along(check.states[-1], task.end, ship, path)
     lead_s = np.arange(len(check.commands)) * water.vessel.sample_time_s
     before = check.states[:-1]
     drift = np.where(before[:, 3] > 0, np.arctan2(before[:, 4], np.maximum(before[:, 3], 1e-9)), 0.0)
     time_s = np.r_[lead_s, len(lead_s) * water.vessel.sample_time_s + time_s]
     states, inputs = np.vstack([before, states]), np.vstack([check.commands, inputs])
     course = np.r_[before[:, 2] + drift, course]
-    nodes = int(np.clip(np.ceil(time_s[-1] * water.ship.transit_speed_mps / (0.5 * water.vessel.length_m)), 24, 160))
+    nodes = int(np.clip(np.ceil(time_s[-1] * ship.transit_speed_mps / (0.5 * water.vessel.length_m)), 24, 160))
     even = np.linspace(0.0, time_s[-1], nodes + 1)
     whole = np.column_stack([states, course, inputs])
     rows = np.stack([np.interp(even, time_s, column) for column in whole.T], axis=1)
     return rows[:, :6], rows[:, 7:], rows[:, [0, 1, 6]], float(time_s[-1])
 
 
-def _steady_along(start: Array, end: Array, water: LegWater, path: Array) -> tuple[Array, Array, Array, Array]:
+def _steady_along(start: Array, end: Array, ship: HelmShip, path: Array) -> tuple[Array, Array, Array, Array]:
     """Times (k,), states (k, 6), commands (k, m) and courses (k,) along a path from one state (6,) to another.
 
     Every point is in the steady turn of its place, slowed down by it; sway, yaw rate and helm are those of the turn.
     """
-    ship, approach = water.ship, water.ship.approach
-    assert approach is not None
+    approach = ship.approach
     along = np.r_[0.0, np.cumsum(np.hypot(*np.diff(path[:, :2], axis=0).T))]
-    bend = _eased(along, path[:, 2], SMOOTHED * water.vessel.length_m)
+    bend = _eased(along, path[:, 2], SMOOTHED * approach.helm.vessel.length_m)
     helm, slowed, drift = _turn_at(ship, bend)
     speed = _speeds((start, end), ship, along, slowed * ship.transit_speed_mps)
     time_s = np.r_[0.0, np.cumsum(np.diff(along) * 2 / (speed[1:] + speed[:-1]))]
@@ -210,10 +210,9 @@ def _eased(along: Array, course: Array, window_m: float) -> Array:
     return np.asarray(turned / np.maximum(ahead - astern, 1e-9))
 
 
-def _turn_at(ship: Capability, curvature: Array) -> tuple[Array, Array, Array]:
+def _turn_at(ship: HelmShip, curvature: Array) -> tuple[Array, Array, Array]:
     """(k,) helm from the approach's, share of its speed that is left, and drift of steady turns of these curvatures."""
     approach = ship.approach
-    assert approach is not None
     u, v = approach.velocity[:2]
     straight = (0.0, 0.0, 1.0, float(np.arctan2(v, u)))
     rows = [
@@ -230,7 +229,7 @@ def _turn_at(ship: Capability, curvature: Array) -> tuple[Array, Array, Array]:
     return helm, slowed, drift
 
 
-def _speeds(ends: tuple[Array, Array], ship: Capability, along: Array, most: Array) -> Array:
+def _speeds(ends: tuple[Array, Array], ship: HelmShip, along: Array, most: Array) -> Array:
     """(k,) speeds along the path between two states (6,) that gathering way, turns and stopping allow [m/s]."""
     first, last = (float(np.hypot(*state[3:5])) for state in ends)
     braking = ship.transit_speed_mps**2 / (2 * max(ship.stopping_m, 1e-9))
@@ -239,10 +238,9 @@ def _speeds(ends: tuple[Array, Array], ship: Capability, along: Array, most: Arr
     return np.asarray(np.maximum(np.minimum(np.minimum(most, gathered), stopping), 0.15 * ship.transit_speed_mps))
 
 
-def _engine_orders(ship: Capability, speed: Array, gain: Array) -> Array:
+def _engine_orders(ship: HelmShip, speed: Array, gain: Array) -> Array:
     """(k,) engine orders that would hold speeds and change them at rates `gain` [m/s2], roughly."""
     approach = ship.approach
-    assert approach is not None
     braking = ship.transit_speed_mps**2 / (2 * max(ship.stopping_m, 1e-9))
     holding = approach.drive * speed / ship.transit_speed_mps
     change = np.where(gain > 0, gain / ship.acceleration_mps2, gain / braking)

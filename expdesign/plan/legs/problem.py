@@ -66,5 +66,5 @@ def leg_problem(
         yaw_rate_radps=max(turning_rate_radps, *(BEYOND_ENDS * abs(motion[2]) for motion in ends)),
         lateral_mps2=max(water.ship.lateral_mps2, *(1.05 * abs(motion[0] * motion[2]) for motion in ends)),
         node_s=node_s,
-        effort=task.effort,
+        budget=task.budget,
     )

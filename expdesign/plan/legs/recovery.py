@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from expdesign.plan.control import Capability
+from expdesign.plan.control import Capability, HelmShip
 from expdesign.plan.legs.water import LegWater, last_state
 from expdesign.values import Array, seal
 from expdesign.vessel import within_limits
@@ -41,11 +41,9 @@ class Recovery:
         seal(self, states="n 6", commands="k m")
 
 
-def recover(state: Array, past: Array, water: LegWater) -> Recovery:
+def recover(state: Array, past: Array, water: LegWater, ship: HelmShip) -> Recovery:
     """Check the swing of a ship at a state (6,) after commands (h, m); empty where it does not turn."""
-    ship, vessel = water.ship, water.vessel
-    approach = ship.approach
-    assert approach is not None
+    vessel, approach = water.vessel, ship.approach
     pace_s, swing = vessel.length_m / ship.transit_speed_mps, ship.transit_speed_mps / ship.turning_radius_m
     hardest = approach.helm.hardest(approach.drive) - abs(approach.angle_rad)
     states, rows = [np.asarray(state)], [past[-1]]

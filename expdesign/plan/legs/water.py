@@ -11,8 +11,8 @@ import shapely
 
 from expdesign.conventions import whole_turns
 from expdesign.plan.chart import ClearanceField, Ways, build_ways, polyline_length, simplified
-from expdesign.plan.control import Capability
-from expdesign.plan.work_budget import Effort
+from expdesign.plan.control import Capability, arc_spare_m
+from expdesign.plan.work_budget import WorkBudget
 from expdesign.sea_area import ARC_SEGMENTS, SeaArea
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import Environment, deliver, delivered_at_samples, simulate, to_body
@@ -31,9 +31,6 @@ ROUND = 1.0 / float(np.cos(np.pi / (4 * ARC_SEGMENTS)))
 """Taken off a shore by so much more, no rounded corner is nearer than asked: arcs are drawn inside their circles."""
 BEYOND_ENDS = 1.02
 """Largest speed and yaw rate of legs whose ends are faster than legs need be, in those of their ends."""
-SPARES = (0.25, 0.1, 0.02)
-"""Hull lengths that ways keep from the shore beyond clearance and half the beam: more gives smoother ways, less leads
-through narrower water."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -46,7 +43,7 @@ class LegTask:
         seed: of the path search.
         before: (h, m) commands given before the leg, the standing one last; None when it has stood for long. Only
             lagging and late actuators remember them.
-        effort: that may be spent on it, and that is.
+        budget: that may be spent on it, and that is.
     """
 
     start: Array
@@ -55,7 +52,7 @@ class LegTask:
     end_inputs: Array
     seed: int
     before: Array | None = None
-    effort: Effort = field(default_factory=Effort)
+    budget: WorkBudget = field(default_factory=WorkBudget)
 
     def __post_init__(self) -> None:
         seal(self, start="6", end="6", start_inputs="m", end_inputs="m")
@@ -98,12 +95,9 @@ class LegWater:
     @cached_property
     def ways(self) -> tuple[Ways, ...]:
         """Shortest ways for amidships of a hull that points along them, from wide to narrow."""
-        length = self.vessel.length_m
-        margins = [self.straight_margin_m + spare * length for spare in SPARES]
-        if not self.ship.agile:
-            margins = [self.path_margin_m]
-        waters = [self.area.safe_water(margin) for margin in margins]
-        return tuple(build_ways(simplified(water, grow=False, tolerance_m=length / 60)) for water in waters)
+        spares, tolerance_m = self.ship.path_spares_m(self.vessel), self.vessel.length_m / 60
+        waters = [self.area.safe_water(self.clearance_m + spare) for spare in spares]
+        return tuple(build_ways(simplified(water, grow=False, tolerance_m=tolerance_m)) for water in waters)
 
     @property
     def narrowest_ways(self) -> Ways:
@@ -118,19 +112,14 @@ class LegWater:
     @property
     def leg_margin_m(self) -> float:
         """Clearance that the centre lines of legs need."""
-        return self.straight_margin_m + SPARES[-1] * self.vessel.length_m if self.ship.agile else self.path_margin_m
+        return self.clearance_m + self.ship.path_spares_m(self.vessel)[-1]
 
     @property
     def path_margin_m(self) -> float:
         """Clearance of the centre line that keeps the hull clear on an arc of the turning radius."""
-        radius, half_length, half_beam = (
-            self.ship.turning_radius_m,
-            self.vessel.length_m / 2,
-            self.vessel.beam_m / 2,
-        )
-        return self.clearance_m + float(np.hypot(radius + half_beam, half_length)) - radius
+        return self.clearance_m + arc_spare_m(self.ship, self.vessel)
 
-    def candidate_ways(self, start: Array, end: Array) -> list[Array]:
+    def candidate_paths(self, start: Array, end: Array) -> list[Array]:
         """Ways (k, 2) between two points, shortest first, of like ones the one farther from the shore.
 
         A straight one where a hull may go straight; none where there is none.
@@ -201,11 +190,6 @@ class LegWater:
         sample_s = self.vessel.sample_time_s
         values = delivered_at_samples(self.vessel.responses, before, sample_time_s=sample_s, standing=before[0])
         return np.asarray(values[-1])
-
-
-def leg_trajectory(water: LegWater, start: Array, values: Array, before: Array | None = None) -> Trajectory:
-    """The motion that commands (k, m) give from a state (6,) after commands `before` (h, m)."""
-    return water.sail(start, values, before)
 
 
 def last_state(track: Trajectory) -> Array:

@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from expdesign.plan.control import CATCH_UP, LEAD, Helmsman, Reference
+from expdesign.plan.control import CONTROL, Helmsman, Reference
 from expdesign.plan.legs import LegWater, nearest_turns
 from expdesign.plan.monte_carlo.go_around import Rounds
 from expdesign.plan.monte_carlo.procedure import AFTER, MISSED, ROUNDS, Tolerances, planned_stretch, run_up, under_way
@@ -105,7 +105,9 @@ class Pilot:
         while (moving := self._looked(fleet)).any():
             before, wanted = fleet.states, self._next(fleet.states)
             near = self._near(fleet.given)
-            told = self._helm.commands(wanted, before, fleet.given, felt=felt, near=near, delivered=fleet.delivered)
+            told = self._helm.commands(
+                wanted, before, fleet.given, unexplained=felt, near=near, delivered=fleet.delivered
+            )
             fleet.advance(told, moving)
             learnt = self._helm.unexplained(felt, before, fleet.states, fleet.delivered)
             felt = np.where(moving[:, None], learnt, felt)
@@ -141,7 +143,7 @@ class Pilot:
         used = shares.max(axis=1)
         if self._last:
             there = np.hypot(*(states[:, :2] - self._wanted[:2]).T) <= ARRIVED * self._helm.vessel.length_m
-            waits = self._helm.sideways & (self._spent <= self._limit - self._spare / 2)
+            waits = self._helm.ship.keeps_station & (self._spent <= self._limit - self._spare / 2)
             return at_end & (there | ~waits), there
         if not self._moves:
             waited = self._spent > self._limit - self._spare / 2
@@ -160,7 +162,7 @@ class Pilot:
         first, helm = self._reference.states[0, :2], self._helm
         off_m = np.hypot(*(states[:, :2] - first).T)
         leg_s = self._end[0] * helm.vessel.sample_time_s
-        good_m = self._within.position_m + MADE_GOOD * CATCH_UP * helm.ship.transit_speed_mps * leg_s
+        good_m = self._within.position_m + MADE_GOOD * CONTROL.catch_up * helm.ship.transit_speed_mps * leg_s
         strayed = (self.doing == ON_STRETCH) & (off_m > self._within.position_m)
         some = np.flatnonzero(strayed)
         if len(some):
@@ -172,7 +174,7 @@ class Pilot:
         """(k, 2) about how a ship at a place comes back to the leg, while the leg goes on abeam of her."""
         track, helm = self._reference.states[: self._first, :2], self._helm
         off = place - track[0]
-        back_s = float(np.hypot(*off)) / (CATCH_UP * helm.ship.transit_speed_mps)
+        back_s = float(np.hypot(*off)) / (CONTROL.catch_up * helm.ship.transit_speed_mps)
         thinned = np.unique(np.r_[np.arange(0, self._first, COARSE), self._first - 1])
         left = np.maximum(0.0, 1.0 - thinned * helm.vessel.sample_time_s / back_s)
         return np.asarray((track[thinned] + left[:, None] * off)[: int((left > 0.0).sum()) + 1])
@@ -184,7 +186,7 @@ class Pilot:
         if not len(some):
             return
         self.rounds[some] += 1
-        sideways = self._helm.sideways
+        sideways = self._helm.ship.keeps_station
         ways = self._tree.find(states[some, :2]) if sideways else [self._arcs.find(x) for x in states[some, :3]]
         for ship, way in zip(some.tolist(), ways, strict=True):
             if way is None:
@@ -234,7 +236,7 @@ class Pilot:
     def _steadies(self) -> np.ndarray:
         """(n,) whether a ship that an unknown current sets aside no longer points into it, to begin as planned."""
         helm = self._helm
-        if self._last or helm.sideways or not self._moves:
+        if self._last or helm.ship.keeps_station or not self._moves:
             return np.zeros(len(self._sample), dtype=bool)
         sample_m = float(np.hypot(*self._wanted[3:5])) * helm.vessel.sample_time_s
         return np.asarray(self._end - self._sample <= STEADY * helm.vessel.length_m / sample_m)
@@ -245,7 +247,7 @@ class Pilot:
 
     @property
     def _spare(self) -> float:
-        return SPARE * LEAD * self._helm.answer_s / self._helm.vessel.sample_time_s
+        return SPARE * CONTROL.track_lead * self._helm.answer_s / self._helm.vessel.sample_time_s
 
     def _allowed(self, samples: Array | float) -> Array | float:
         return PATIENCE * samples + self._spare

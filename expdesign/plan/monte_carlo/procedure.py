@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.conventions import wrap_angle
-from expdesign.plan.control import LEAD, Helmsman, over_ground
+from expdesign.plan.control import CONTROL, Helmsman, over_ground
 from expdesign.plan.legs import LegWater
 from expdesign.values import Array, seal
 
@@ -26,16 +26,12 @@ OFF_PLACE, OFF_HEADING_RAD, OFF_SPEED, OFF_YAW_RATE = 0.2, float(np.radians(3.0)
 """Tolerances: in hull lengths; [rad]; in transit speeds; in the largest yaw rate on legs."""
 ROOM_SHARE, FARTHEST_OFF = 0.25, 1.0
 """Share of the room besides the clearance that the position of a run's start may take up; hull lengths at most."""
-RUN_UP = 3.0
-"""Time constants of the way back to the track that a run-up lasts."""
 SHORTER = (1.0, 0.75, 0.5, 0.35, 0.25)
 """Shares of a run-up tried where a whole one has no room."""
 AFTER = 1.0
 """Hull lengths past the start that a reference goes on steadily."""
 REST = 0.05
 """Speed over ground in transit speeds, and yaw rate in the largest, up to which a run begins from a standstill."""
-STRAIGHT = 8.0
-"""Hull lengths of the run-up of ships that are steered by a helm."""
 
 
 MISSED = ("position", "heading", "speed", "yaw rate", "time", "no way round")
@@ -80,7 +76,7 @@ def tolerances(water: LegWater, spare_m: float = 0.0) -> Tolerances:
         position_m=float(np.clip(ROOM_SHARE * spare_m, OFF_PLACE * length_m, FARTHEST_OFF * length_m)),
         heading_rad=OFF_HEADING_RAD,
         speed_mps=OFF_SPEED * ship.transit_speed_mps,
-        yaw_rate_radps=OFF_YAW_RATE * max(ship.yaw_rate_radps, ship.spot_rate_radps),
+        yaw_rate_radps=OFF_YAW_RATE * ship.turn_rate_radps,
     )
 
 
@@ -115,12 +111,9 @@ def run_up(helm: Helmsman, water: LegWater, leg: Array, after_m: float) -> Stret
     """
     wanted, sample_s = leg[-1], helm.vessel.sample_time_s
     moves = under_way(helm, wanted)
-    if not moves and helm.sideways:
+    if not moves and helm.ship.keeps_station:
         return Stretch(states=np.stack([wanted, wanted]), arrival=1)
-    samples = RUN_UP * LEAD * helm.answer_s / sample_s
-    if not helm.sideways:
-        speed = max(float(np.hypot(*wanted[3:5])), 0.5 * helm.ship.transit_speed_mps)
-        samples = STRAIGHT * helm.vessel.length_m / speed / sample_s
+    samples = helm.ship.run_up_s(helm.vessel, float(np.hypot(*wanted[3:5]))) / sample_s
     for share in SHORTER:
         count = max(2, round(share * samples))
         before = steady_states(helm, wanted, np.arange(-count, 0)) if moves else slowing(helm, wanted, count)
@@ -135,10 +128,7 @@ def run_up(helm: Helmsman, water: LegWater, leg: Array, after_m: float) -> Stret
 def under_way(helm: Helmsman, state: Array) -> bool:
     """Whether a state (6,) is more than a ship that keeps her place over ground."""
     ship = helm.ship
-    return bool(
-        np.hypot(*state[3:5]) > REST * ship.transit_speed_mps
-        or abs(state[5]) > REST * max(ship.yaw_rate_radps, ship.spot_rate_radps)
-    )
+    return bool(np.hypot(*state[3:5]) > REST * ship.transit_speed_mps or abs(state[5]) > REST * ship.turn_rate_radps)
 
 
 def steady_states(helm: Helmsman, state: Array, samples: np.ndarray) -> Array:
@@ -164,7 +154,7 @@ def slowing(helm: Helmsman, wanted: Array, count: int) -> Array:
     ship, sample_s = helm.ship, helm.vessel.sample_time_s
     time_s = sample_s * np.arange(count, 0, -1)
     cruise = ship.transit_speed_mps / 2
-    brake = ship.acceleration_mps2 / 4 if helm.sideways else cruise**2 / (2 * ship.stopping_m)
+    brake = ship.braking_mps2(cruise)
     slowed = np.minimum(time_s, cruise / brake)
     distance = brake * slowed**2 / 2 + cruise * (time_s - slowed)
     states: Array = np.tile(wanted, (count, 1))
@@ -178,4 +168,5 @@ def _after(helm: Helmsman, state: Array, after_m: float) -> int:
     if not under_way(helm, state):
         return 0
     speed, sample_s = float(np.hypot(*state[3:5])) + 1e-9, helm.vessel.sample_time_s
-    return int(np.ceil(min(after_m / speed, RUN_UP * LEAD * helm.answer_s) / sample_s)) if after_m else 0
+    longest_s = CONTROL.run_up_time_constants * CONTROL.track_lead * helm.answer_s
+    return int(np.ceil(min(after_m / speed, longest_s) / sample_s)) if after_m else 0

@@ -13,7 +13,7 @@ import shapely
 
 from expdesign.conventions import wrap_angle
 from expdesign.plan.chart import Ways, first_bends, ways_to
-from expdesign.plan.control import LEAD, Helmsman
+from expdesign.plan.control import CONTROL, Helmsman
 from expdesign.values import Array
 
 NEAR = 2.0
@@ -108,7 +108,7 @@ class Convoy:
         self._way[ship, :count] = way
         length = np.hypot(*steps.T)
         self._left[ship, :count] = np.r_[np.cumsum(length[::-1])[::-1], 0.0]
-        self._bend[ship] = TURNED_OFF * fastest if self._helm.sideways else fastest
+        self._bend[ship] = TURNED_OFF * fastest if self._helm.ship.keeps_station else fastest
         if count > 2:
             turn = np.abs(wrap_angle(np.diff(np.arctan2(steps[:, 1], steps[:, 0]))))
             self._bend[ship, 1 : count - 1] = fastest * np.maximum(TURNED_OFF, np.cos(np.minimum(turn, np.pi / 2)))
@@ -120,7 +120,7 @@ class Convoy:
         there = np.hypot(*(states[:, :2] - self.goal[:2]).T) < self._reach_m
         turned = np.abs(wrap_angle(states[:, 2] - self.goal[2])) < TURNED_RAD
         turned &= np.abs(states[:, 5]) < TURNED_RAD / (2.0 * helm.answer_s)
-        if helm.sideways:
+        if helm.ship.keeps_station:
             return np.asarray(there & turned)
         ahead = np.stack([np.cos(self.goal[2]), np.sin(self.goal[2])])
         on_last = self._left[np.arange(len(states)), self._next] <= 0.0
@@ -143,21 +143,23 @@ class Convoy:
         speed = np.sqrt(self._bend[everyone, self._next] ** 2 + 2 * brake * np.maximum(ahead - REACH * length, 0.0))
         near = left < NEAR * length
         lengthways = np.cos(np.arctan2(offset[:, 1], offset[:, 0]) - self.goal[2])
-        slow = np.minimum(fastest * np.maximum(lengthways, CRAB), left / (LEAD * helm.answer_s))
-        speed = np.minimum(np.minimum(speed, fastest), np.where(near & helm.sideways, slow, np.inf))
+        slow = np.minimum(fastest * np.maximum(lengthways, CRAB), left / (CONTROL.track_lead * helm.answer_s))
+        speed = np.minimum(np.minimum(speed, fastest), np.where(near & helm.ship.keeps_station, slow, np.inf))
         leg = there - before
         leg = leg / np.maximum(np.hypot(*leg.T), 1e-9)[:, None]
         across = offset - (offset * leg).sum(axis=1)[:, None] * leg
-        look = length if helm.sideways else PURSUED * length
+        look = length if helm.ship.keeps_station else PURSUED * length
         pursued = leg * look + across  # a point ahead on the way
-        if helm.sideways:
+        if helm.ship.keeps_station:
             pursued = np.where((near | (ahead < look))[:, None], offset, pursued)
         course = pursued / np.maximum(np.hypot(*pursued.T), 1e-9)[:, None]
         through = course * speed[:, None] - helm.environment.current_to
         pointing = np.arctan2(through[:, 1], through[:, 0])
-        heading = np.where(near & helm.sideways, self.goal[2], pointing)
+        heading = np.where(near & helm.ship.keeps_station, self.goal[2], pointing)
         off = np.cos(np.minimum(np.abs(wrap_angle(heading - states[:, 2])), np.pi / 2))
-        ground = course * (speed * np.where(near | (not helm.sideways), 1.0, np.maximum(off, TURNED_OFF)))[:, None]
+        ground = (
+            course * (speed * np.where(near | (not helm.ship.keeps_station), 1.0, np.maximum(off, TURNED_OFF)))[:, None]
+        )
         c, s = np.cos(heading), np.sin(heading)
         return np.column_stack(
             [

@@ -17,9 +17,9 @@ from scipy.stats import beta
 from expdesign.plan.legs import LegWater
 from expdesign.plan.monte_carlo.procedure import MISSED, ROUNDS
 from expdesign.plan.monte_carlo.trials import Trials, sail_trials
-from expdesign.plan.values import Leg, LegOutcome, Promise
+from expdesign.plan.values import Leg, LegOutcome, Promise, SailedTrial
 from expdesign.sea_area import SeaArea
-from expdesign.signals import Commands, Trajectory
+from expdesign.signals import Trajectory
 from expdesign.values import Array
 
 TRIALS, MOST_TRIALS, SEEN = 500, 2000, 2.0
@@ -36,10 +36,8 @@ WHY = tuple(
 
 def promised(
     water: LegWater,
+    sailed: SailedTrial,
     *,
-    commands: Commands,
-    trajectory: Trajectory,
-    legs: Sequence[Leg],
     rng: np.random.Generator,
     draws: int = TRIALS,
 ) -> tuple[Promise, Trials]:
@@ -47,7 +45,8 @@ def promised(
 
     The shares' standard errors are sqrt(p (1 - p) / draws).
     """
-    trials = sail_trials(water, commands=commands, trajectory=trajectory, legs=legs, draws=draws, rng=rng)
+    trials = sail_trials(water, sailed, draws=draws, rng=rng)
+    commands, trajectory, legs = sailed.commands, sailed.trajectory, sailed.legs
     within, sample_s = trials.within[0], commands.sample_time_s
     gone, done = int(trials.left.any(axis=0).sum()), trials.completed
     extra = (trials.samples.sum(axis=0)[done] - len(commands)) * sample_s

@@ -7,7 +7,6 @@ same parameters, mean current and mean wind throughout; current and wind vary ro
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,9 +17,8 @@ from expdesign.plan.monte_carlo.collision import HullWatch
 from expdesign.plan.monte_carlo.guidance import Pilot, open_loop
 from expdesign.plan.monte_carlo.procedure import Tolerances, tolerances
 from expdesign.plan.runs import Fleet, draw_truths
-from expdesign.plan.values import Leg
+from expdesign.plan.values import SailedTrial
 from expdesign.plan.verify import hull_clearance
-from expdesign.signals import Commands, Trajectory
 from expdesign.values import Array
 
 
@@ -58,10 +56,8 @@ class Trials:
 
 def sail_trials(
     water: LegWater,
+    sailed: SailedTrial,
     *,
-    commands: Commands,
-    trajectory: Trajectory,
-    legs: Sequence[Leg],
     draws: int,
     rng: np.random.Generator,
 ) -> Trials:
@@ -69,15 +65,15 @@ def sail_trials(
 
     Args:
         water: who sails, in which forecast and area, and where ways may lead.
-        commands, trajectory, legs: the plan.
+        sailed: the plan.
         draws: number of trials.
         rng: all chance.
     """
-    vessel, track = water.vessel, np.hstack([trajectory.pose, trajectory.velocity])
+    vessel, track, legs, commands = water.vessel, sailed.states, sailed.legs, sailed.commands
     helm = Helmsman(vessel=vessel, environment=water.environment, ship=water.ship)
     truths = draw_truths(vessel, water.environment, draws, rng)
     fleet = Fleet(vessel, water.environment, truths, state=track[0], standing=np.zeros(len(vessel.limits)), rng=rng)
-    watch, within = HullWatch(area=water.area, vessel=vessel), start_tolerances(water, trajectory, legs)
+    watch, within = HullWatch(area=water.area, vessel=vessel), start_tolerances(water, sailed)
     sailing, felt = np.ones(draws, dtype=bool), np.zeros((draws, 3))
     shape = (len(legs), draws)
     left, aborted = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
@@ -111,9 +107,9 @@ def sail_trials(
     )
 
 
-def start_tolerances(water: LegWater, trajectory: Trajectory, legs: Sequence[Leg]) -> tuple[Tolerances, ...]:
+def start_tolerances(water: LegWater, sailed: SailedTrial) -> tuple[Tolerances, ...]:
     """Within which each leg begins; for runs by the room that the hull has round all of the planned run."""
-    clearance = hull_clearance(water.area, trajectory, water.vessel.hull_b)
-    spare = [float(clearance[leg.first : leg.last + 1].min()) - water.clearance_m for leg in legs]
-    runs = [leg.kind == "primitive" for leg in legs]
+    clearance = hull_clearance(water.area, sailed.trajectory, water.vessel.hull_b)
+    spare = [float(clearance[leg.first : leg.last + 1].min()) - water.clearance_m for leg in sailed.legs]
+    runs = [leg.kind == "primitive" for leg in sailed.legs]
     return tuple(tolerances(water, room if run else 0.0) for room, run in zip(spare, runs, strict=True))

@@ -31,7 +31,7 @@ def draw_truths(vessel: Vessel, environment: Environment, draws: int, rng: np.ra
     )
 
 
-def stray_m(
+def dispersion_m(
     vessel: Vessel,
     primitive: Primitive,
     environment: Environment,

@@ -15,8 +15,9 @@ from scipy.sparse import csr_array
 
 from expdesign.plan.chart import ClearanceField
 from expdesign.plan.legs import dubins_curve
+from expdesign.plan.local_planner import SearchSpace
+from expdesign.plan.runs import Footprint
 from expdesign.plan.search.lattice import LatticeProblem
-from expdesign.plan.search.state import SearchSpace, Stamp
 from expdesign.values import Array
 
 HEADINGS = np.arange(4) * np.pi / 2
@@ -77,7 +78,7 @@ def build_lattice(space: SearchSpace, counts: Sequence[int], start: Array, *, sp
     """
     grid = _Grid(space.field, max(spacing_m, space.ship.turning_radius_m), space.leg_margin_m)
     poses = grid.clear.size * 4
-    runs = [_run_ends(grid, space, stamp) for stamp in space.stamps]
+    runs = [_run_ends(grid, space, run) for run in space.footprints]
     entries = np.concatenate(
         [
             _moves(grid, space),
@@ -132,13 +133,13 @@ def _stepped(
     return rows + step[0] * c - step[1] * s, columns + step[0] * s + step[1] * c
 
 
-def _run_ends(grid: _Grid, space: SearchSpace, stamp: Stamp) -> tuple[np.ndarray, Array]:
+def _run_ends(grid: _Grid, space: SearchSpace, run: Footprint) -> tuple[np.ndarray, Array]:
     """Pose after a run and the Dubins curve that follows it, and that curve's seconds, from every pose."""
     ends, costs = np.full((grid.clear.size, 4), -1), np.zeros((grid.clear.size, 4))
-    step, quarter, curve = _snap(grid, space, stamp.displacement)
+    step, quarter, curve = _snap(grid, space, run.displacement)
     seconds = _length(curve) / space.ship.transit_speed_mps
     for heading in range(4):
-        clear = grid.path_clear(stamp.discs, heading, stamp.room_m)
+        clear = grid.path_clear(run.discs, heading, run.room_m)
         clear &= grid.path_clear(curve[:, :2], heading, grid.margin_m)
         rows, columns = np.nonzero(clear)
         to_rows, to_columns = _stepped(rows, columns, step, heading)

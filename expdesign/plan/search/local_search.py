@@ -1,7 +1,7 @@
 """Placements polished: blocks of runs are moved and turned as one while that shortens the legs at their two ends.
 
 The search places runs at a few distances and headings. Here they may have any, their order kept: a pattern search over
-all blocks of consecutive runs, by the rule for the time of legs. Joints inside a block stay as they are through water.
+all blocks of consecutive runs, by the rule for the time of legs. Legs inside a block stay as they are through water.
 """
 
 from __future__ import annotations
@@ -15,25 +15,11 @@ import numpy as np
 import shapely
 
 from expdesign.conventions import wrap_angle
-from expdesign.plan.chart import polyline_length, sight_lines
-from expdesign.plan.legs import NEAR, HelmTimes
-from expdesign.plan.search.state import SearchSpace
+from expdesign.plan.chart import sight_lines
+from expdesign.plan.local_planner import LegEnds, Pair, SearchSpace
 from expdesign.plan.search.successors import run_ends, runs_clear
+from expdesign.plan.search.tuning import SEARCH
 from expdesign.values import Array
-
-SHIFTS = 8.0 * 0.5 ** np.arange(8)
-"""Steps of the pattern, in hull lengths, and with each a turn."""
-TURNS = np.deg2rad([90.0, 60.0, 40.0, 25.0, 15.0, 8.0, 4.0, 2.0])
-SWEEPS = 20
-"""Rounds over all blocks at most."""
-FAR = 4.0
-"""Hull lengths that are enough for any leg."""
-SAME = 1e-3
-"""Hull lengths and radians by which a leg may differ from a joint that was tried."""
-GAIN_S = 0.05
-"""Smallest gain for which a block is moved [s]."""
-DRIFTS = 3
-"""Rounds in which the time of a leg and the drift in that time are made to agree."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -80,7 +66,7 @@ def polished(space: SearchSpace, runs: Sequence[int], poses: Array, ends: ChainE
     legs = _Legs(space=space, ends=ends)
     chain = legs.measured(np.asarray(runs), poses)
     blocks = [(i, j) for i in range(len(runs)) for j in range(i, len(runs))]
-    for _ in range(SWEEPS):
+    for _ in range(SEARCH.sweeps):
         before = chain
         for i, j in blocks:
             chain = legs.moved(chain, i, j)
@@ -105,7 +91,7 @@ class _Legs:
     def measured(self, runs: np.ndarray, poses: Array) -> Chain:
         """A chain with the shortest ways for its legs."""
         froms, tos = self._ends(runs, poses)
-        ways = [self.space.goal_way.ways.shortest(a[:2], b[:2]) for a, b in zip(froms, tos, strict=True)]
+        ways = [self.space.goal_distance.ways.shortest(a[:2], b[:2]) for a, b in zip(froms, tos, strict=True)]
         bends = tuple(np.zeros((0, 2)) if way is None else way[1:-1] for way in ways)
         legs_s = [
             self._tried_s(runs, k, froms[k], tos[k])
@@ -129,7 +115,7 @@ class _Legs:
         before, after = [*froms[i : i + 1, :2], *chain.bends[i]][-1], [*chain.bends[j + 1], *tos[j + 1 : j + 2, :2]][0]
         gain_s[(legs_m[0] < self._least_m(chain.runs, i)) | (legs_m[1] < self._least_m(chain.runs, j + 1))] = -np.inf
         order = np.argsort(-gain_s, kind="stable")
-        for row in order[gain_s[order] > GAIN_S]:
+        for row in order[gain_s[order] > SEARCH.least_gain_s]:
             if self._clear(chain.runs[i : j + 1], blocks[row], before, after):
                 poses, legs_s = chain.poses.copy(), chain.legs_s.copy()
                 poses[i : j + 1], legs_s[i], legs_s[j + 1] = blocks[row], arrive_s[row], leave_s[row]
@@ -138,39 +124,34 @@ class _Legs:
 
     def _least_m(self, runs: np.ndarray, k: int) -> float:
         """Length from which on leg k takes as long as the rule says."""
-        if self.space.helm_times is not None:
-            return 0.0
-        joint = self.space.tried.get((self._name(runs, k - 1), self._name(runs, k)))
-        tried_m = 0.0 if joint is None else float(np.hypot(*joint.step[:2]))
-        return self.space.hull_m * float(np.clip(tried_m / self.space.hull_m, NEAR, FAR))
+        return self.space.planner.least_m(self.space, self._pair(runs, k))
 
     def _tried_s(self, runs: np.ndarray, k: int, before: Array, after: Array) -> float:
         """Time of leg k as tried, or 0 if it is another than that."""
-        joint = self.space.tried.get((self._name(runs, k - 1), self._name(runs, k)))
-        if joint is None:
+        tried = self.space.tried.get(self._pair(runs, k))
+        if tried is None:
             return 0.0
         c, s = np.cos(before[2]), np.sin(before[2])
-        north, east = after[:2] - before[:2] - joint.seconds * self.space.current_to
-        away = np.hypot(c * north + s * east - joint.step[0], c * east - s * north - joint.step[1])
-        turned = abs(float(wrap_angle(after[2] - before[2] - joint.step[2])))
-        return joint.seconds if away < SAME * self.space.hull_m and turned < SAME else 0.0
+        north, east = after[:2] - before[:2] - tried.seconds * self.space.current_to
+        away = np.hypot(c * north + s * east - tried.step[0], c * east - s * north - tried.step[1])
+        turned = abs(float(wrap_angle(after[2] - before[2] - tried.step[2])))
+        return tried.seconds if away < SEARCH.same * self.space.hull_m and turned < SEARCH.same else 0.0
 
     def _kept(self, runs: np.ndarray, k: int) -> bool:
         """Whether leg k failed elsewhere and was given more room: it is left alone."""
-        return (self._name(runs, k - 1), self._name(runs, k)) in self.space.run_up
+        return self._pair(runs, k) in self.space.run_up
 
-    def _name(self, runs: np.ndarray, k: int) -> str:
-        if k == len(runs):
-            return ""
-        index = runs[k] if k >= 0 else self.ends.last
-        return self.space.stamps[index].name if index >= 0 else ""
+    def _pair(self, runs: np.ndarray, k: int) -> Pair:
+        """Names of the runs before and after leg k."""
+        chain = [self.ends.last, *runs.tolist(), -1]
+        return self.space.pair(chain[k], chain[k + 1])
 
     def _clear(self, runs: np.ndarray, poses: Array, before: Array, after: Array) -> bool:
         """Whether runs have room, and straight lines between them and two places (2,) lead through water."""
         lines = sight_lines(
             np.vstack([before, run_ends(self.space, runs, poses)[:, :2]]), np.vstack([poses[:, :2], after])
         )
-        seen = shapely.covers(self.space.goal_way.ways.water, lines).all()
+        seen = shapely.covers(self.space.goal_distance.ways.water, lines).all()
         return bool(seen and runs_clear(self.space, runs, poses).all())
 
     def _blocks(self, chain: Chain, i: int, j: int) -> Array:
@@ -178,7 +159,9 @@ class _Legs:
         moves, origin = _pattern(self.space.hull_m), chain.poses[i]
         c, s = np.cos(origin[2]), np.sin(origin[2])
         firsts = origin[:2] + np.stack([c * moves[:, 0] - s * moves[:, 1], s * moves[:, 0] + c * moves[:, 1]], axis=1)
-        lasting_s = np.array([self.space.stamps[q].duration_s for q in chain.runs])[i:j] + chain.legs_s[i + 1 : j + 1]
+        lasting_s = (
+            np.array([self.space.footprints[q].duration_s for q in chain.runs])[i:j] + chain.legs_s[i + 1 : j + 1]
+        )
         drift = np.r_[0.0, np.cumsum(lasting_s)][:, None] * self.space.current_to
         apart = chain.poses[i : j + 1, :2] - origin[:2] - drift
         c, s = np.cos(moves[:, 2])[:, None], np.sin(moves[:, 2])[:, None]
@@ -192,48 +175,20 @@ class _Legs:
 
     def _leg_s(self, runs: np.ndarray, k: int, froms: Array, tos: Array, bends: Array) -> Array:
         """(m,) time of leg k from poses (m, 3) to poses (m, 3) along a way's bends (b, 2)."""
-        space = self.space
-        exit_mps = space.stamps[runs[k - 1]].exit_mps if k else self.ends.exit_mps
-        entry_mps = space.stamps[runs[k]].entry_mps if k < len(runs) else 0.0
-        last = int(runs[k - 1]) if k else self.ends.last
-        if space.helm_times is not None:
-            return self._helmed_s(space.helm_times, last, (exit_mps, entry_mps), froms, tos, bends)
-        rule = space.times
-        assert rule is not None
-        more_s = space.more_s(last, int(runs[k]) if k < len(runs) else -1)
-        speeds = np.array(exit_mps), np.array(entry_mps)
-        away, turn = tos[..., :2] - froms[..., :2], tos[..., 2] - froms[..., 2]
-        if len(bends):
-            ahead, behind = bends[0] - froms[..., :2], tos[..., :2] - bends[-1]
-            length_m = np.hypot(*ahead.T) + polyline_length(bends) + np.hypot(*behind.T)
-            through_m = np.maximum(length_m - away @ space.current_to / rule.speed_mps, 0.0)
-            first, last = (np.arctan2(step[..., 1], step[..., 0]) for step in (ahead, behind))
-            return rule.seconds(through_m, froms[..., 2] - first, tos[..., 2] - last, turn, *speeds) + more_s
-        leg_s = np.zeros(len(away))
-        for _ in range(DRIFTS if space.current_to.any() else 1):
-            step = away - leg_s[:, None] * space.current_to
-            course = np.arctan2(step[..., 1], step[..., 0])
-            leg_s = (
-                rule.seconds(np.hypot(*step.T), froms[..., 2] - course, tos[..., 2] - course, turn, *speeds) + more_s
-            )
-        return leg_s
-
-    def _helmed_s(
-        self, times: HelmTimes, last: int, speeds: tuple[float, float], froms: Array, tos: Array, bends: Array
-    ) -> Array:
-        """(m,) time of legs of ships with a helm."""
-        froms, tos = (np.broadcast_to(ends, (max(len(froms), len(tos)), 3)) for ends in (froms, tos))
-        leg_s = times.between_s(froms, tos, self.space.off(last), *speeds, current_to=self.space.current_to)
-        if not len(bends):
-            return leg_s
-        ahead, behind = bends[0] - froms[:, :2], tos[:, :2] - bends[-1]
-        length_m = np.hypot(*ahead.T) + polyline_length(bends) + np.hypot(*behind.T)
-        return np.maximum(leg_s, times.seconds(length_m, *speeds))
+        runs_of = self.space.footprints
+        ends = LegEnds(
+            before=int(runs[k - 1]) if k else self.ends.last,
+            after=int(runs[k]) if k < len(runs) else -1,
+            exit_mps=runs_of[runs[k - 1]].exit_mps if k else self.ends.exit_mps,
+            entry_mps=runs_of[runs[k]].entry_mps if k < len(runs) else 0.0,
+        )
+        return self.space.planner.leg_s(self.space, ends, froms, tos, bends)
 
 
 @lru_cache(maxsize=16)
 def _pattern(hull_m: float) -> Array:
     """(n, 3) moves forward, to starboard and round, of every size, to all sides alike."""
+    shifts = hull_m * np.array(SEARCH.shift_hulls)
     sides = np.array([side for side in product((-1.0, 0.0, 1.0), repeat=3) if any(side)])
-    sizes = np.column_stack([hull_m * SHIFTS, hull_m * SHIFTS, TURNS])
+    sizes = np.column_stack([shifts, shifts, np.deg2rad(SEARCH.turn_deg)])
     return np.concatenate([sides * size for size in sizes])

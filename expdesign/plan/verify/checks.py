@@ -13,7 +13,7 @@ import shapely
 
 from expdesign.conventions import wrap_angle
 from expdesign.dictionary import Primitive
-from expdesign.plan.values import Leg, Verification
+from expdesign.plan.values import Leg, SailedTrial, Verification
 from expdesign.sea_area import SeaArea
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import Environment, simulate, to_body
@@ -34,10 +34,8 @@ def verify_plan(
     vessel: Vessel,
     area: SeaArea,
     environment: Environment,
+    sailed: SailedTrial,
     *,
-    commands: Commands,
-    trajectory: Trajectory,
-    legs: Sequence[Leg],
     clearance_m: float,
     transit_mps: float,
     primitives: Mapping[str, Primitive],
@@ -52,13 +50,14 @@ def verify_plan(
     Args:
         vessel, environment: the nominal model and the forecast's means.
         area: allowed water.
-        commands, trajectory, legs: the plan.
+        sailed: the plan.
         clearance_m: promised distance from hull to forbidden water.
         transit_mps: stated speed of legs through water.
         primitives: the dictionary by name.
         repeats: how often each is to be run.
         start, goal: (3,) poses where the ship is to begin and end at rest through the water.
     """
+    commands, trajectory, legs = sailed.commands, sailed.trajectory, sailed.legs
     misfit = _legs_problems(commands, legs, primitives)
     again = simulate(
         vessel,

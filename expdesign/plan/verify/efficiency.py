@@ -9,8 +9,7 @@ import numpy as np
 
 from expdesign.durations import Collected, DurationDesign, bordered_moments
 from expdesign.information import moments, regressor_rows
-from expdesign.plan.values import Leg
-from expdesign.signals import Commands, Trajectory
+from expdesign.plan.values import SailedTrial
 from expdesign.simulation import Environment, delivered
 from expdesign.values import Array
 from expdesign.vessel import Vessel
@@ -20,10 +19,7 @@ def realised_efficiencies(
     vessel: Vessel,
     design: DurationDesign,
     environment: Environment,
-    *,
-    commands: Commands,
-    trajectory: Trajectory,
-    legs: Sequence[Leg],
+    sailed: SailedTrial,
 ) -> tuple[float | None, float | None]:
     """Efficiencies of the runs as they are placed, and of the whole trial, against the optimum in the time asked for.
 
@@ -35,7 +31,8 @@ def realised_efficiencies(
     problem = replace(design.problem, robust="nominal", sampled=np.zeros((0, 0, 0, 0)))
     if not set(problem.parameters) <= set(vessel.model.names) or not problem.symmetric:
         return None, None
-    rows = regressor_rows(vessel.model, trajectory, delivered(vessel, commands), environment)
+    commands, legs = sailed.commands, sailed.legs
+    rows = regressor_rows(vessel.model, sailed.trajectory, delivered(vessel, commands), environment)
     collected, sample_s = Collected.of(problem), commands.sample_time_s
 
     def efficiency(batches: list[Array]) -> float:

@@ -9,7 +9,7 @@ import shapely
 
 from expdesign.errors import NoPlan
 from expdesign.export.report.content import ReportContent
-from expdesign.plan.runs import stray_m
+from expdesign.plan.runs import dispersion_m
 from expdesign.values import Array
 from expdesign.vessel.hull import covering_discs, hull_polygons
 
@@ -30,7 +30,7 @@ def footprints(content: ReportContent) -> list[shapely.Geometry]:
             continue
         if leg.name not in radii:
             try:
-                radii[leg.name] = stray_m(
+                radii[leg.name] = dispersion_m(
                     vessel,
                     primitives[leg.name],
                     content.environment,

@@ -14,7 +14,7 @@ from functools import lru_cache
 import numpy as np
 
 from expdesign.conventions import wrap_angle
-from expdesign.plan.control import Capability, SpeedChanges, to_work_s
+from expdesign.plan.control import AgileShip, SpeedChanges, to_work_s
 from expdesign.values import Array
 from expdesign.vessel import Vessel
 
@@ -26,13 +26,13 @@ three seconds, half of the model's within 0.4 s."""
 NEAR = 1.5
 """Hull lengths that a leg needs to suit any place, heading and speed at its ends; shorter ones have to be tried."""
 LENGTHS = np.array([0.0, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9, 1.2, 1.5, 2.0, 2.7, 3.5, 5.0])
-"""Lengths of joints between runs, in hull lengths."""
+"""Lengths of transitions between runs, in hull lengths."""
 GOING_ON = np.array([1.0, 1.1, 1.25])
 """More of them, in how far the ship goes while it settles."""
 TURNS = np.arange(16) * np.pi / 8
 """Turns in them, and courses from the heading before."""
 COURSES = np.arange(24) * np.pi / 12
-WISHES = np.arange(12) * np.pi / 6
+DIRECTIONS = np.arange(12) * np.pi / 6
 """Directions to go, from the heading before."""
 
 
@@ -84,7 +84,7 @@ class LegTimes:
         return np.asarray((np.maximum(along, across) ** POWER + turn_s**POWER) ** (1 / POWER) + self.settle_s)
 
 
-def leg_times(vessel: Vessel, ship: Capability, changes: SpeedChanges) -> LegTimes:
+def leg_times(vessel: Vessel, ship: AgileShip, changes: SpeedChanges) -> LegTimes:
     """The rule for a vessel."""
     return LegTimes(
         speed_mps=ship.transit_speed_mps,
@@ -107,7 +107,7 @@ def _least_s(way: Array, first: Array, last: Array, a: float, top: float) -> Arr
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Joints:
+class Transitions:
     """Short legs between two runs in open water, through water, the heading before being zero.
 
     Attributes:
@@ -120,26 +120,28 @@ class Joints:
 
 
 @lru_cache(maxsize=512)
-def joints(times: LegTimes, exit_mps: float, entry_mps: float, *, short: bool = True) -> Joints:
+def transitions(times: LegTimes, exit_mps: float, entry_mps: float, *, short: bool = True) -> Transitions:
     """The best legs between two speeds: for every turn and every direction to go, the one that loses least time.
 
     Unless they may be `short` they are `NEAR` hull lengths long.
     """
-    course, length, turn, seconds = _all_joints(times, exit_mps, entry_mps, short)
-    along = np.cos(course - WISHES[:, None, None, None]) * length / times.speed_mps
-    lost = np.concatenate([seconds - along, seconds[None]]).reshape(len(WISHES) + 1, len(TURNS), -1)
+    course, length, turn, seconds = _all_transitions(times, exit_mps, entry_mps, short)
+    along = np.cos(course - DIRECTIONS[:, None, None, None]) * length / times.speed_mps
+    lost = np.concatenate([seconds - along, seconds[None]]).reshape(len(DIRECTIONS) + 1, len(TURNS), -1)
     length_of, course_of = np.divmod(lost.argmin(axis=-1), len(COURSES))
     turn_of = np.arange(len(TURNS))
-    # equals to port and to starboard: both are on offer
+    # of equals to port and to starboard both are kept
     both = [(turn_of, length_of, course_of), (-turn_of % len(TURNS), length_of, -course_of % len(COURSES))]
     best = np.unique([np.ravel_multi_index((a + 0 * b, b, c), seconds.shape) for a, b, c in both])
     course, length, turn, seconds = (
         np.broadcast_to(grid, seconds.shape).ravel()[best] for grid in (course, length, turn, seconds)
     )
-    return Joints(step=np.stack([length * np.cos(course), length * np.sin(course), turn], axis=1), seconds=seconds)
+    return Transitions(step=np.stack([length * np.cos(course), length * np.sin(course), turn], axis=1), seconds=seconds)
 
 
-def _all_joints(times: LegTimes, exit_mps: float, entry_mps: float, short: bool) -> tuple[Array, Array, Array, Array]:
+def _all_transitions(
+    times: LegTimes, exit_mps: float, entry_mps: float, short: bool
+) -> tuple[Array, Array, Array, Array]:
     going_on_m = times.settle_s * (exit_mps + entry_mps) / 2
     lengths = np.r_[times.hull_m * LENGTHS, going_on_m * GOING_ON]
     lengths = lengths[short | (lengths >= NEAR * times.hull_m)]
@@ -150,8 +152,13 @@ def _all_joints(times: LegTimes, exit_mps: float, entry_mps: float, short: bool)
 
 
 @lru_cache(maxsize=512)
-def joint_lost_s(times: LegTimes, exit_mps: float, entry_mps: float, *, short: bool = True) -> Array:
-    """(turns, wishes) least time that joints lose against going straight on at full speed in a wished direction [s]."""
-    course, length, _, seconds = _all_joints(times, exit_mps, entry_mps, short)
-    along = np.cos(course - WISHES[:, None, None, None]) * length / times.speed_mps
-    return np.asarray((seconds - along).reshape(len(WISHES), len(TURNS), -1).min(axis=-1).T)
+def transition_losses_s(times: LegTimes, exit_mps: float, entry_mps: float, *, short: bool = True) -> Array:
+    """(turns, directions) least time that transitions lose against going on at full speed in a direction [s]."""
+    course, length, _, seconds = _all_transitions(times, exit_mps, entry_mps, short)
+    along = np.cos(course - DIRECTIONS[:, None, None, None]) * length / times.speed_mps
+    return np.asarray((seconds - along).reshape(len(DIRECTIONS), len(TURNS), -1).min(axis=-1).T)
+
+
+def nearest_direction(course_rad: float) -> int:
+    """Index in `DIRECTIONS` of the one nearest to a course."""
+    return int(np.abs(wrap_angle(DIRECTIONS - course_rad)).argmin())

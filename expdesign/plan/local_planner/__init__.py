@@ -1,0 +1,30 @@
+"""Local planners: how each kind of ship gets from one state to another, as the search and the voyage ask it."""
+
+from expdesign.plan.local_planner.arcs import arc_end, moved
+from expdesign.plan.local_planner.factory import local_planner
+from expdesign.plan.local_planner.protocol import (
+    LegEnds,
+    LocalPlanner,
+    Pair,
+    PartialPlans,
+    SearchSpace,
+    Successors,
+    TransitionTrials,
+    TriedTransition,
+)
+from expdesign.plan.local_planner.transitions import pairs_of
+
+__all__ = [
+    "LegEnds",
+    "LocalPlanner",
+    "Pair",
+    "PartialPlans",
+    "SearchSpace",
+    "Successors",
+    "TransitionTrials",
+    "TriedTransition",
+    "arc_end",
+    "local_planner",
+    "moved",
+    "pairs_of",
+]

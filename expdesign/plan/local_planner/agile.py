@@ -1,0 +1,244 @@
+"""Local planner of agile ships: they turn where they are and go straight, or along the path to the goal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from expdesign.conventions import wrap_angle
+from expdesign.plan.chart import polyline_length
+from expdesign.plan.control import AgileShip, leg_end
+from expdesign.plan.legs import LegTask, LegWater, agile_leg, curved_leg
+from expdesign.plan.local_planner.agile_times import (
+    NEAR,
+    TURNS,
+    LegTimes,
+    leg_times,
+    nearest_direction,
+    transition_losses_s,
+    transitions,
+)
+from expdesign.plan.local_planner.arcs import moved, on_paths, path_points
+from expdesign.plan.local_planner.protocol import (
+    LegEnds,
+    Pair,
+    PartialPlans,
+    SearchSpace,
+    Successors,
+    TransitionTrials,
+)
+from expdesign.plan.local_planner.transitions import with_transitions
+from expdesign.plan.local_planner.tuning import LOCAL
+from expdesign.plan.runs import Footprint
+from expdesign.simulation import CALM
+from expdesign.values import Array
+from expdesign.vessel import Vessel
+
+COURSES = np.arange(6) * np.pi / 3
+"""Courses of straight legs, from the heading that the run before ends with."""
+HEADINGS = np.arange(16) * np.pi / 8
+"""Headings of runs, from that heading or from the direction of the path."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class AgilePlanner:
+    """Legs turn on the spot and follow the shortest path; short ones between runs are tried beforehand.
+
+    Attributes:
+        ship: speeds and turns.
+        vessel: whose actuators accelerate it.
+    """
+
+    ship: AgileShip
+    vessel: Vessel
+
+    @cached_property
+    def times(self) -> LegTimes:
+        """The rule for leg times."""
+        ship, rate = self.ship, self.ship.spot_rate_radps + self.ship.yaw_rate_radps
+        end = leg_end(self.vessel, CALM, 0.0, None, top_mps=ship.transit_speed_mps, yaw_rate_radps=rate)
+        return leg_times(self.vessel, ship, end.changes)
+
+    @property
+    def transition_trials(self) -> int:
+        """How short a leg may be depends on the runs: no rule tells, so it is tried."""
+        return LOCAL.transition_trials
+
+    def check_ends(self, start: Array, goal: Array, water: LegWater) -> None:
+        """Nothing: such ships leave and reach any place."""
+
+    def leg(self, task: LegTask, water: LegWater) -> Array | None:
+        """Commands (k, m): the shortest path with turns where the ship is, or else a Dubins curve, or None."""
+        if water.parted(task.start[:2], task.end[:2]):
+            return None
+        found = agile_leg(task, water, self.ship)
+        return curved_leg(task, water) if found is None else found
+
+    def with_transitions(self, space: SearchSpace, pairs: Sequence[Pair], trials: TransitionTrials) -> SearchSpace:
+        """The space with the transitions of these pairs tried."""
+        return with_transitions(space, self.ship, self.times, pairs, trials)
+
+    def successors(self, space: SearchSpace, plans: PartialPlans, q: int) -> list[Successors]:
+        """Transitions, straight legs, and points of the path to the goal."""
+        able = np.flatnonzero(plans.left[:, q] > 0)
+        more_m = np.array([space.more_run_up_m(int(last), q) for last in plans.last[able]])
+        return [
+            self._transitions(space, plans, able, q, more_m),
+            self._straights(space, plans, able, q, more_m),
+            self._on_path(space, plans, able, q),
+        ]
+
+    def leg_s(self, space: SearchSpace, ends: LegEnds, froms: Array, tos: Array, bends: Array) -> Array:
+        """(n,) time of legs straight on, or along the path with bends [s]."""
+        rule, more_s = self.times, space.more_s(ends.before, ends.after)
+        speeds = np.array(ends.exit_mps), np.array(ends.entry_mps)
+        away, turn = tos[..., :2] - froms[..., :2], tos[..., 2] - froms[..., 2]
+        if len(bends):
+            ahead, behind = bends[0] - froms[..., :2], tos[..., :2] - bends[-1]
+            length_m = np.hypot(*ahead.T) + polyline_length(bends) + np.hypot(*behind.T)
+            through_m = np.maximum(length_m - away @ space.current_to / rule.speed_mps, 0.0)
+            first, last = (np.arctan2(step[..., 1], step[..., 0]) for step in (ahead, behind))
+            return rule.seconds(through_m, froms[..., 2] - first, tos[..., 2] - last, turn, *speeds) + more_s
+        leg_s = np.zeros(len(away))
+        for _ in range(LOCAL.drift_rounds if space.current_to.any() else 1):
+            step = away - leg_s[:, None] * space.current_to
+            course = np.arctan2(step[..., 1], step[..., 0])
+            angles = froms[..., 2] - course, tos[..., 2] - course, turn
+            leg_s = rule.seconds(np.hypot(*step.T), *angles, *speeds) + more_s
+        return leg_s
+
+    def to_goal_s(self, space: SearchSpace, plans: PartialPlans) -> Array:
+        """(b,) time of the path to the goal and of the turns at its ends [s]."""
+        pose, rule = plans.pose, self.times
+        away = space.goal[:2] - pose[:, :2]
+        direct = np.arctan2(away[:, 1], away[:, 0])
+        helped_m = away @ space.current_to / rule.speed_mps
+        path_m = np.maximum(space.goal_distance.to_goal(pose[:, :2]) - helped_m, 0.0)
+        more_s = np.where(path_m < NEAR * space.hull_m, rule.settle_s / 2, 0.0)  # may turn out to be too near
+        more_s += np.array([space.more_s(int(last), -1) for last in plans.last])
+        angles = pose[:, 2] - direct, space.goal[2] - direct, space.goal[2] - pose[:, 2]
+        return rule.seconds(path_m, *angles, plans.exit_mps, np.zeros(1)) + more_s
+
+    def least_m(self, space: SearchSpace, pair: Pair) -> float:
+        """Length from which on a leg takes as long as the rule says [m]."""
+        tried = space.tried.get(pair)
+        tried_m = 0.0 if tried is None else float(np.hypot(*tried.step[:2]))
+        return space.hull_m * float(np.clip(tried_m / space.hull_m, NEAR, LOCAL.far_hulls))
+
+    def losses_s(self, space: SearchSpace, *, made_good: bool) -> tuple[Array, Array]:
+        """Least losses of transitions.
+
+        A run begins at a heading that makes good the ship's course, or at one that suits the transition better, at the
+        price of the displacement lost.
+        """
+        runs = space.footprints
+        pairs = [[self._loss_s(space, a, b, made_good=made_good) for b in runs] for a in runs]
+        home = [self._home_s(run) + space.more_s(k, -1) for k, run in enumerate(runs)]
+        return np.array(pairs), np.array(home)
+
+    def _loss_s(self, space: SearchSpace, before: Footprint, after: Footprint, *, made_good: bool) -> float:
+        """Least time lost between two runs that make good the same course."""
+        tried = space.tried.get((before.name, after.name))
+        lost = transition_losses_s(self.times, before.exit_mps, after.entry_mps, short=tried is None)
+        if not made_good:
+            return min(float(lost.min()), np.inf if tried is None else tried.seconds)
+        course = before.course_from_end_rad
+        off_course = wrap_angle(TURNS - course + after.course_rad)
+        displaced_s = after.displacement_m / self.times.speed_mps
+        least_s = float((lost[:, nearest_direction(course)] + displaced_s * (1 - np.cos(off_course))).min())
+        if tried is None:
+            return least_s
+        least_s += tried.more_s
+        made_good_m = float(tried.step[:2] @ np.array([np.cos(course), np.sin(course)]))
+        return min(least_s, tried.seconds - made_good_m / self.times.speed_mps)
+
+    def _home_s(self, last: Footprint) -> float:
+        lost = transition_losses_s(self.times, last.exit_mps, 0.0)
+        return float(lost[:, nearest_direction(last.course_from_end_rad)].min())
+
+    def _transitions(
+        self, space: SearchSpace, plans: PartialPlans, able: np.ndarray, q: int, more_m: Array
+    ) -> Successors:
+        """Runs near the end of the one before, placed and headed as suits the transition."""
+        parents, steps, seconds = [np.zeros(0, dtype=int)], [np.zeros((0, 3))], [np.zeros(0)]
+        entry = np.array(space.footprints[q].entry_mps)
+        for (last, exit_mps), where in plans.alike(able).items():
+            tried, longer = space.tried.get(space.pair(last, q)), float(more_m[where[0]])
+            found = transitions(self.times, exit_mps, float(entry), short=tried is None)
+            step, leg_s = found.step, found.seconds + space.more_s(last, q)
+            if tried is not None:
+                step, leg_s = np.vstack([step, tried.step]), np.r_[leg_s, tried.seconds]
+            if longer:  # straight before the run
+                step = step + longer * np.column_stack([np.cos(step[:, 2]), np.sin(step[:, 2]), 0 * leg_s])
+                leg_s = self.times.step_s(step, np.array(exit_mps), entry) + space.more_s(last, q)
+            parents.append(np.repeat(able[where], len(leg_s)))
+            steps.append(np.tile(step, (len(where), 1)))
+            seconds.append(np.tile(leg_s, len(where)))
+        return _stepped(space, plans, q, *(np.concatenate(part) for part in (parents, steps, seconds)))
+
+    def _straights(
+        self, space: SearchSpace, plans: PartialPlans, able: np.ndarray, q: int, more_m: Array
+    ) -> Successors:
+        """Straight legs to all sides, the run with any heading."""
+        lengths = space.hull_m * np.array(LOCAL.agile_straights)
+        course, length, heading = (grid.ravel() for grid in np.meshgrid(COURSES, lengths, HEADINGS, indexing="ij"))
+        parent = np.repeat(able, len(course))
+        course, heading = np.tile(course, len(able)), np.tile(heading, len(able))
+        length = np.tile(length, len(able)) + np.repeat(more_m, len(parent) // max(len(able), 1))
+        step = np.column_stack([length * np.cos(course), length * np.sin(course), heading])
+        leg_s = self.times.step_s(step, plans.exit_mps[parent], np.array(space.footprints[q].entry_mps))
+        leg_s += np.array([space.more_s(int(last), q) for last in plans.last])[parent]
+        return _stepped(space, plans, q, parent, step, leg_s)
+
+    def _on_path(self, space: SearchSpace, plans: PartialPlans, able: np.ndarray, q: int) -> Successors:
+        """Runs at points of the path to the goal, with any heading."""
+        parents, starts, seconds = [np.zeros(0, dtype=int)], [np.zeros((0, 3))], [np.zeros(0)]
+        for index in able:
+            points, along = path_points(space, plans.pose[index], np.array(LOCAL.agile_path_stretches))
+            if len(points):
+                heading = np.arctan2(points[:, 3], points[:, 2])[:, None] + HEADINGS
+                leg_s = self._along_s(space, plans, int(index), q, points, along)
+                placed = np.repeat(points[:, :2], len(HEADINGS), axis=0)
+                starts.append(np.column_stack([placed, heading.ravel()]))
+                seconds.append(leg_s.ravel())
+                parents.append(np.full(len(placed), index))
+        return on_paths(q, plans.pose, np.concatenate(parents), np.concatenate(starts), np.concatenate(seconds))
+
+    def _along_s(
+        self, space: SearchSpace, plans: PartialPlans, index: int, q: int, points: Array, along: Array
+    ) -> Array:
+        """(points, headings) time of legs along the path [s]."""
+        pose, direction = plans.pose[index], np.arctan2(points[:, 3], points[:, 2])
+        near = along < 10 * space.hull_m
+        to_point = np.arctan2(*(points[:, :2] - pose[:2]).T[::-1])
+        first = pose[2] - np.where(near, to_point, direction[0])
+        heading = direction[:, None] + HEADINGS
+        helped_m = (points[:, :2] - pose[:2]) @ space.current_to / self.times.speed_mps
+        return self.times.seconds(
+            np.maximum(along - helped_m, 0.0)[:, None],
+            first[:, None],
+            heading - np.where(near, to_point, direction)[:, None],
+            heading - pose[2],
+            plans.exit_mps[index],
+            np.array(space.footprints[q].entry_mps),
+        ) + space.more_s(int(plans.last[index]), q)
+
+
+def _stepped(
+    space: SearchSpace, plans: PartialPlans, q: int, parent: np.ndarray, step: Array, leg_s: Array
+) -> Successors:
+    """Straight legs by steps through water (n, 3) from where partial plans end."""
+    n, start = len(parent), moved(plans.pose[parent], step)
+    start[:, :2] += leg_s[:, None] * space.current_to
+    return Successors(
+        parent=parent,
+        primitive=np.full(n, q),
+        departure=plans.pose[parent],
+        start=start,
+        leg_s=leg_s,
+        turn=np.full(n, np.nan),
+        straight=np.ones(n, dtype=bool),
+    )

@@ -1,0 +1,95 @@
+"""Local planner of ships that forces steer but that hardly turn without way: Dubins curves at transit speed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from expdesign.conventions import wrap_angle
+from expdesign.plan.chart import polyline_length
+from expdesign.plan.control import DubinsShip
+from expdesign.plan.legs import LegTask, LegWater, curved_leg
+from expdesign.plan.local_planner.arcs import Departures, arc_successors, moved, path_successors
+from expdesign.plan.local_planner.dubins_length import dubins_m
+from expdesign.plan.local_planner.protocol import (
+    LegEnds,
+    Pair,
+    PartialPlans,
+    SearchSpace,
+    Successors,
+    TransitionTrials,
+)
+from expdesign.values import Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DubinsPlanner:
+    """Legs are Dubins curves; changes of speed take the time of the mean acceleration.
+
+    Attributes:
+        ship: speeds and turns.
+    """
+
+    ship: DubinsShip
+
+    @property
+    def transition_trials(self) -> int:
+        """None: legs are long enough for the rule."""
+        return 0
+
+    def check_ends(self, start: Array, goal: Array, water: LegWater) -> None:
+        """Nothing: such ships leave and reach any place."""
+
+    def leg(self, task: LegTask, water: LegWater) -> Array | None:
+        """Commands (k, m) along a Dubins path, or None."""
+        return None if water.parted(task.start[:2], task.end[:2]) else curved_leg(task, water)
+
+    def with_transitions(self, space: SearchSpace, pairs: Sequence[Pair], trials: TransitionTrials) -> SearchSpace:
+        """The space itself."""
+        return space
+
+    def successors(self, space: SearchSpace, plans: PartialPlans, q: int) -> list[Successors]:
+        """Arcs, and stretches of the path to the goal."""
+        able = np.flatnonzero(plans.left[:, q] > 0)
+        run_up_m = space.hull_m + np.array([space.more_run_up_m(int(last), q) for last in plans.last[able]])
+        departures = Departures(pose=plans.pose, wait_s=self._change_s(plans.exit_mps, space.footprints[q].entry_mps))
+        return [
+            arc_successors(space, departures, able, q, run_up_m),
+            path_successors(space, departures, able, q, turning_radius_m=self.ship.turning_radius_m),
+        ]
+
+    def leg_s(self, space: SearchSpace, ends: LegEnds, froms: Array, tos: Array, bends: Array) -> Array:
+        """(n,) time of the Dubins curve, or of the path with bends where that is longer [s]."""
+        froms, tos = np.broadcast_arrays(froms, tos)
+        run_ups = moved(tos, np.array([[-space.hull_m, 0.0, 0.0]]))
+        length_m = dubins_m(froms, run_ups, radius_m=self.ship.turning_radius_m) + space.hull_m
+        if len(bends):
+            ahead, behind = bends[0] - froms[:, :2], tos[:, :2] - bends[-1]
+            length_m = np.maximum(length_m, np.hypot(*ahead.T) + polyline_length(bends) + np.hypot(*behind.T))
+        helped_m = (tos[:, :2] - froms[:, :2]) @ space.current_to / self.ship.transit_speed_mps
+        sail_s = np.maximum(length_m - helped_m, 0.0) / self.ship.transit_speed_mps
+        return np.asarray(sail_s + self._change_s(np.array(ends.exit_mps), ends.entry_mps))
+
+    def to_goal_s(self, space: SearchSpace, plans: PartialPlans) -> Array:
+        """(b,) time of the path to the goal and of the turns at its ends [s]."""
+        away = space.goal[:2] - plans.pose[:, :2]
+        direct = np.arctan2(away[:, 1], away[:, 0])
+        turns = np.abs(wrap_angle(plans.pose[:, 2] - direct)) + np.abs(wrap_angle(space.goal[2] - direct))
+        length_m = space.goal_distance.to_goal(plans.pose[:, :2]) + self.ship.turning_radius_m * turns
+        return np.asarray(length_m / self.ship.transit_speed_mps)
+
+    def least_m(self, space: SearchSpace, pair: Pair) -> float:
+        """None."""
+        return 0.0
+
+    def losses_s(self, space: SearchSpace, *, made_good: bool) -> tuple[Array, Array]:
+        """Changes of speed."""
+        exits, entries = (
+            np.array([getattr(run, end) for run in space.footprints]) for end in ("exit_mps", "entry_mps")
+        )
+        return self._change_s(exits[:, None], entries), self._change_s(exits, 0.0)
+
+    def _change_s(self, exit_mps: Array, entry_mps: Array | float) -> Array:
+        return np.asarray(np.abs(exit_mps - entry_mps) / self.ship.acceleration_mps2)

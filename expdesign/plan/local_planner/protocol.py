@@ -1,0 +1,245 @@
+"""What the search knows, and what it asks the local planner: how one kind of ship gets from one state to another.
+
+The local planner is the only part that knows the kind of ship. Everything above it asks through `LocalPlanner`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from expdesign.conventions import wrap_angle
+from expdesign.dictionary import Primitive
+from expdesign.plan.chart import ClearanceField, GoalWays
+from expdesign.plan.control import Capability
+from expdesign.plan.legs import LegTask, LegWater
+from expdesign.plan.runs import Footprint
+from expdesign.plan.values import Placement
+from expdesign.plan.work_budget import WorkBudget
+from expdesign.sea_area import LocalFrame
+from expdesign.values import Array, seal
+
+Pair = tuple[str, str]
+"""Names of the runs before and after a leg; "" for start and goal."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TriedTransition:
+    """A short leg between two runs as it was optimised in open water.
+
+    Attributes:
+        step: (3,) forward m, starboard m and turn rad through water.
+        seconds: its time.
+        more_s: how much longer that is than the rule for legs says, where the rule can be trusted.
+    """
+
+    step: Array
+    seconds: float
+    more_s: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SearchSpace:
+    """What the search looks up.
+
+    Attributes:
+        footprints: the primitives to place.
+        frame: for messages.
+        field, goal_distance: clearance, and the shortest path to the goal from everywhere.
+        goal: (3,) pose.
+        planner: how this kind of ship gets from run to run.
+        hull_m: hull length [m].
+        leg_margin_m: clearance that leg centre lines need on the grid [m].
+        current_to: (2,) mean current [m/s].
+        tried: transitions that were tried; None where no leg was found.
+        run_up: extra straight before a run in hull lengths; grows where a leg failed.
+        refused: (b, 3) start poses that turned out unreachable or unsafe; none is tried near them again.
+    """
+
+    footprints: tuple[Footprint, ...]
+    frame: LocalFrame
+    field: ClearanceField
+    goal_distance: GoalWays
+    goal: Array
+    planner: LocalPlanner
+    hull_m: float
+    leg_margin_m: float
+    current_to: Array
+    tried: Mapping[Pair, TriedTransition | None] = dataclasses.field(default_factory=dict)
+    run_up: Mapping[Pair, float] = dataclasses.field(default_factory=dict)
+    refused: Array = dataclasses.field(default_factory=lambda: np.zeros((0, 3)))
+
+    def __post_init__(self) -> None:
+        seal(self, goal="3", current_to="2", refused="b 3")
+
+    @property
+    def ship(self) -> Capability:
+        """Speeds and turns on legs."""
+        return self.planner.ship
+
+    def pair(self, before: int, after: int) -> Pair:
+        """Names of two runs; -1 for start and goal."""
+        first, last = (self.footprints[index].name if index >= 0 else "" for index in (before, after))
+        return first, last
+
+    def more_s(self, before: int, after: int) -> float:
+        """How much longer legs from one run to another take than the rule says; -1 for start and goal."""
+        tried = self.tried.get(self.pair(before, after))
+        return 0.0 if tried is None else tried.more_s
+
+    def more_run_up_m(self, before: int, after: int) -> float:
+        """Extra straight before a run [m]."""
+        return self.hull_m * self.run_up.get(self.pair(before, after), 0.0)
+
+    def is_refused(self, pose: Array) -> np.ndarray:
+        """(n,) whether poses (n, 3) are near one that was refused."""
+        found = np.zeros(len(pose), dtype=bool)
+        for bad in self.refused:
+            near = np.hypot(*(pose[:, :2] - bad[:2]).T) < self.hull_m / 2
+            found |= near & (np.abs(wrap_angle(pose[:, 2] - bad[2])) < 0.2)
+        return found
+
+    def refusing(self, before: str, placement: Placement) -> SearchSpace:
+        """The same space after a leg to, or a run from, a placement failed: not there again, and more run-up."""
+        pair = (before, placement.primitive)
+        grown = {**self.run_up, pair: self.run_up.get(pair, 0.0) + 0.5}
+        return replace(self, run_up=grown, refused=np.vstack([self.refused, placement.pose]))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PartialPlans:
+    """Partial plans with equally many runs.
+
+    Attributes:
+        pose: (b, 3) where they end; exit_mps (b,) how fast; last (b,) index of the last primitive, -1 at the start.
+        left: (b, q) runs still to do.
+        cost_s: (b,) repositioning time so far.
+        history: per plan, its (primitive index, start pose) so far.
+    """
+
+    pose: Array
+    exit_mps: Array
+    last: np.ndarray
+    left: np.ndarray
+    cost_s: Array
+    history: tuple[tuple[tuple[int, Array], ...], ...]
+
+    def alike(self, rows: np.ndarray) -> dict[tuple[int, float], np.ndarray]:
+        """Indices into `rows` by the run that was last and its exit speed."""
+        found: dict[tuple[int, float], list[int]] = {}
+        for where, index in enumerate(rows):
+            found.setdefault((int(self.last[index]), float(self.exit_mps[index])), []).append(where)
+        return {key: np.array(where) for key, where in found.items()}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Successors:
+    """Ways to continue partial plans by one run, one per row.
+
+    Attributes:
+        parent: (n,) index of the partial plan.
+        primitive: (n,) index of the run to do next.
+        departure: (n, 3) pose from which its leg is checked for clearance.
+        start: (n, 3) where the run begins.
+        leg_s: (n,) time to get there.
+        turn: (n,) angle of the arc that leads there, before a straight; nan for others.
+        straight: (n,) whether a straight line leads there.
+    """
+
+    parent: np.ndarray
+    primitive: np.ndarray
+    departure: Array
+    start: Array
+    leg_s: Array
+    turn: Array
+    straight: np.ndarray
+
+    def __getitem__(self, rows: np.ndarray) -> Successors:
+        return Successors(**{name: column[rows] for name, column in vars(self).items()})
+
+    @classmethod
+    def joined(cls, parts: Sequence[Successors]) -> Successors:
+        """All rows of several sets."""
+        return cls(**{name: np.concatenate([vars(part)[name] for part in parts]) for name in vars(parts[0])})
+
+
+@dataclass(frozen=True, kw_only=True)
+class LegEnds:
+    """The runs that a leg leads from and to.
+
+    Attributes:
+        before, after: indices of the runs; -1 for start and goal.
+        exit_mps, entry_mps: surge speeds there.
+    """
+
+    before: int
+    after: int
+    exit_mps: float
+    entry_mps: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TransitionTrials:
+    """How transitions are tried before the search proper.
+
+    Attributes:
+        water: of the plan.
+        primitives: the runs by name.
+        start: (3,) pose of the plan.
+        made_good: whether displacement towards the goal saves time on later legs.
+        budget: that may be spent; transitions that are not tried then are left to the rule.
+    """
+
+    water: LegWater
+    primitives: Mapping[str, Primitive]
+    start: Array
+    made_good: bool
+    budget: WorkBudget = dataclasses.field(default_factory=WorkBudget)
+
+
+class LocalPlanner(Protocol):
+    """How one kind of ship gets from one state to another."""
+
+    @property
+    def ship(self) -> Capability:
+        """Speeds and turns on legs."""
+
+    @property
+    def transition_trials(self) -> int:
+        """Plans whose transitions are tried before the search proper; 0 where the rule for leg times is enough."""
+
+    def check_ends(self, start: Array, goal: Array, water: LegWater) -> None:
+        """Raise NoPlan where the ship cannot leave its start pose (3,) or reach its goal."""
+
+    def leg(self, task: LegTask, water: LegWater) -> Array | None:
+        """Commands (k, m) from one state to another in safe water, or None where none is found.
+
+        The last commands of azimuths without angle limits may differ from the task's by whole turns.
+        """
+
+    def with_transitions(self, space: SearchSpace, pairs: Sequence[Pair], trials: TransitionTrials) -> SearchSpace:
+        """The space with the transitions of these pairs tried."""
+
+    def successors(self, space: SearchSpace, plans: PartialPlans, q: int) -> list[Successors]:
+        """Ways to begin run q after each partial plan."""
+
+    def leg_s(self, space: SearchSpace, ends: LegEnds, froms: Array, tos: Array, bends: Array) -> Array:
+        """(n,) time of legs between poses (n or 1, 3) along a path with bends (b, 2) [s]."""
+
+    def to_goal_s(self, space: SearchSpace, plans: PartialPlans) -> Array:
+        """(b,) estimated time of the last leg [s]."""
+
+    def least_m(self, space: SearchSpace, pair: Pair) -> float:
+        """Length from which on `leg_s` holds [m]."""
+
+    def losses_s(self, space: SearchSpace, *, made_good: bool) -> tuple[Array, Array]:
+        """Least time that legs lose: (q, q) between runs, the run before in rows, and (q,) to the goal [s].
+
+        Args:
+            space: with the runs.
+            made_good: whether displacement towards the goal counts, at transit speed.
+        """

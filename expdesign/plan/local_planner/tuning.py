@@ -1,0 +1,46 @@
+"""The numbers of this room that are chosen, not derived."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tuning:
+    """Local planners.
+
+    Attributes:
+        arc_straights: straight after an arc, beyond the run-up, in hull lengths.
+        path_stretches: of the shortest path to the goal, in hull lengths; the whole path is always tried too.
+        agile_path_stretches, agile_straights: the same of agile ships, and lengths of their straight legs besides the
+            best transitions, beyond the run-up.
+        far_hulls: hull lengths that are enough for any leg.
+        drift_rounds: rounds in which the time of a leg and the drift in that time are made to agree.
+        transition_trials: plans whose transitions are tried before the search proper.
+        transition_guess_hulls: length of the leg with which the optimiser begins.
+        open_water_hulls: of open water to every side of a transition that is tried.
+        too_short: what a metre costs that a helm-steered leg is too short by, in metres at transit speed: the ship
+            goes back for it, slowly.
+        stop_leg_hulls: least length of helm-steered legs to a stop: a ship off the track returns to it before.
+        run_leg_spare_hulls: length of helm-steered legs to runs beyond what changes of speed need: the helm takes some.
+        tabled_speeds: highest speeds of helm-steered legs that are tabulated.
+        stopped_share: of transit speed below which a ship has stopped or is about to: no run-up then.
+    """
+
+    arc_straights: tuple[float, ...] = (0.0, 1.0, 2.0, 3.0, 4.5, 6.0)
+    path_stretches: tuple[float, ...] = (5.0, 12.0, 25.0, 50.0, 100.0)
+    agile_path_stretches: tuple[float, ...] = (1.5, 2.5, 4.0, 7.0, 12.0, 25.0, 50.0, 100.0)
+    agile_straights: tuple[float, ...] = (1.5, 2.5, 6.0)
+    far_hulls: float = 4.0
+    drift_rounds: int = 3
+    transition_trials: int = 4
+    transition_guess_hulls: float = 0.5
+    open_water_hulls: float = 25.0
+    too_short: float = 12.0
+    stop_leg_hulls: float = 5.0
+    run_leg_spare_hulls: float = 0.8
+    tabled_speeds: int = 60
+    stopped_share: float = 0.3
+
+
+LOCAL = Tuning()
