@@ -59,7 +59,7 @@ def test_a_longer_leg_takes_longer_and_never_less_than_its_way_at_transit_speed(
 def test_going_on_as_before_loses_hardly_anything_and_a_start_what_gathering_way_loses():
     times = rule()
     assert times.lost_s(6.0, 6.0, made_good=True) < 5.0
-    ways = times.gathered
+    ways = times.speeding_up
     rest = float(np.interp(5.0, ways[:, 0], ways[:, 2]) - np.interp(5.0, ways[:, 0], ways[:, 1]) / times.speed_mps)
     assert rest < times.lost_s(0.0, 5.0, made_good=True) < rest + 10.0
 
