@@ -97,7 +97,7 @@ def test_noise_of_other_shape_is_noticed_and_noise_of_these_parts_is_not() -> No
     assert noticed(waves) == 1.0
     u = rng.normal(size=(2000, 1))
     found = solve_iv(single_output(u, u[:, 0] + waves[0], parameters=("theta",)), u[:, None, :].copy(), Weighting())
-    assert any("coloured otherwise" in warning for warning in found.warnings)
+    assert any("do not explain the colour" in warning for warning in found.warnings)
 
 
 def test_variance_that_changes_with_the_instruments_is_allowed_for() -> None:

@@ -50,10 +50,10 @@ def test_each_run_says_where_when_and_how_to_begin_and_to_stop() -> None:
             leg = next(legs)
             heading = round(math.degrees(plan.trajectory.pose[leg.first, 2])) % 360
             assert told["Heading"][place] == f"{heading:03d}\N{DEGREE SIGN}"
-            assert told["Starts at"][place] == f"{leg.first // 3600}:{leg.first // 60 % 60:02d}:{leg.first % 60:02d}"
-            assert told["Ends at"][place] == f"{leg.last // 3600}:{leg.last // 60 % 60:02d}:{leg.last % 60:02d}"
-            assert told["Abort off track by"][place].endswith("m")
-            assert told["Began (UTC)"][place] == ""
+            assert told["Start time"][place] == f"{leg.first // 3600}:{leg.first // 60 % 60:02d}:{leg.first % 60:02d}"
+            assert told["End time"][place] == f"{leg.last // 3600}:{leg.last // 60 % 60:02d}:{leg.last % 60:02d}"
+            assert told["Abort if off track by"][place].endswith("m")
+            assert told["Start (UTC)"][place] == ""
         for word in ("Purpose", "Abort", "Record", "Remarks", "Orders"):
             assert word in text(card)
 

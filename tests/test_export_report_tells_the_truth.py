@@ -269,11 +269,11 @@ def test_what_was_added_to_the_dictionary_is_told_with_what_it_brought() -> None
     told = Page(report_html(case.report_content(growth=growth_of("found-1")))).text.replace("\N{NO-BREAK SPACE}", " ")
     assert "1 found-1 steps; speed 1.5 m/s, duration 60 s 20.25 +2.125 125 % holds" in told
     assert "2 found-1 steps; speed 1.5 m/s, duration 60 s 19.25 +2.125 225 % does not hold" in told
-    assert "321 candidates were looked at, with u from 0.00 to 3.00 m/s" in told
-    assert f"at least {100 * math.exp(-0.05):.1f} % among all candidates" in told
-    assert "Manoeuvres that were searched for" not in page()
+    assert "The search evaluated 321 candidates, with u from 0.00 to 3.00 m/s" in told
+    assert f"at least {100 * math.exp(-0.05):.1f} % among all evaluated candidates" in told
+    assert "Manoeuvres added by the search" not in page()
     empty = Page(report_html(case.report_content(growth=replace(growth_of("x"), rounds=())))).text
-    assert "None was found that adds anything." in empty
+    assert "The search found no manoeuvre that improves the design." in empty
     assert "<script>" not in report_html(case.report_content(growth=growth_of(ODD)))
 
 
@@ -282,7 +282,7 @@ def test_a_chart_without_depths_is_called_that_before_anything_else(deep: bool) 
     area = case.plan().area
     charted = replace(area, depths=((10.0, area.water),) if deep else ())
     told = Page(report_html(case.report_content(plan=replace(case.plan(), area=charted)))).text
-    assert ("No depths were checked" not in told.partition("How long")[0]) is deep
+    assert ("No depths were checked" not in told.partition("Durations")[0]) is deep
     assert ("depths not checked" not in told) is deep
 
 
@@ -290,7 +290,7 @@ def test_the_chain_of_proofs_ends_at_the_route_that_was_written() -> None:
     content = noisy_content()
     links = chain(content, short_of_optimum="0.1 %")
     steps = [link.step for link in links]
-    assert steps == ["Best sharing of the time", "Whole runs", "One stitched track", "Allowed water", "Exported route"]
+    assert steps == ["Optimal durations", "Whole runs", "Whole track", "Allowed water", "Exported route"]
     assert words.number(content.route.xtd_m) in links[-1].found
     assert "every leg in allowed water" in links[-1].found
     assert (

@@ -67,32 +67,35 @@ def told(plan: Rehearsal, *, spread: float, noisy: tuple[str, ...] = ()) -> str:
 
 def test_where_predictions_hold_no_assumption_is_blamed():
     said = told(rehearsal(environment=CURRENT, integrator="rk4"), spread=1.0, noisy=("tau01",))
-    assert "every standard deviation found is within 10% of the predicted one" in said
+    assert "every observed standard deviation is within 10% of the predicted one" in said
     assert "ssumption" not in said
 
 
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"environment": CURRENT}, "no current and wind. Method iv only takes off a constant"),
-        ({"environment": WIND}, "--method iv-air, iv-wind or iv-augmented allows for weather"),
-        ({"environment": CURRENT, "method": "iv-air"}, "no current. Method iv-air allows for measured wind only"),
-        ({"method": "iv-wind"}, "the current known. Method iv-wind estimates more parameters"),
-        ({"method": "iv-augmented"}, "current and wind known. Method iv-augmented estimates more parameters"),
-        ({"method": "ls"}, "regressors without noise"),
-        ({"integrator": "rk4"}, "--integrator euler leaves this out"),
-        ({"environment": Environment(wind_std_mps=1.0), "method": "iv-air"}, "Here each has its own, drawn around it"),
-        ({"truth": without_cross_force()}, "the true ship has other terms"),
+        ({"environment": CURRENT}, "no current and wind. Method iv removes only a constant"),
+        ({"environment": WIND}, "--method iv-air, iv-wind or iv-augmented accounts for weather"),
+        ({"environment": CURRENT, "method": "iv-air"}, "no current. Method iv-air accounts for measured wind only"),
+        ({"method": "iv-wind"}, "the current known. Method iv-wind estimates additional parameters"),
+        ({"method": "iv-augmented"}, "current and wind known. Method iv-augmented estimates additional parameters"),
+        ({"method": "ls"}, "the regressors have no noise"),
+        ({"integrator": "rk4"}, "--integrator euler removes this difference"),
+        (
+            {"environment": Environment(wind_std_mps=1.0), "method": "iv-air"},
+            "Here the weather of each trial is random",
+        ),
+        ({"truth": without_cross_force()}, "the model has the terms of the true ship"),
     ],
 )
 def test_each_assumption_that_fails_is_named(changes: dict[str, object], words: str):
     said = told(rehearsal(**changes), spread=1.5)
-    assert "predicted and found standard deviations differ for X_u" in said
+    assert "predicted and observed standard deviations differ for X_u" in said
     assert words in said
 
 
 def test_moduli_are_named_with_their_primitives():
-    assert "It may turn in tau01, tau09" in told(rehearsal(), spread=1.5, noisy=("tau01", "tau09"))
+    assert "The sign may change in tau01, tau09" in told(rehearsal(), spread=1.5, noisy=("tau01", "tau09"))
 
 
 def test_when_nothing_that_can_be_checked_fails_noise_is_left():
@@ -121,5 +124,5 @@ def test_wind_that_the_method_does_not_know_is_found_and_named():
         scenario="any", rehearsal=plan, results=validate(plan), noisy_moduli=(), command="", version=""
     )
     said = " ".join(judgements(content))
-    assert "biased by more than half a standard deviation" in said
-    assert "no current and wind. Method iv only takes off a constant" in said
+    assert "the bias exceeds half a standard deviation" in said
+    assert "no current and wind. Method iv removes only a constant" in said

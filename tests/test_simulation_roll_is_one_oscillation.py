@@ -106,9 +106,9 @@ def test_roll_stands_still_where_the_side_acceleration_holds_it():
 
 def test_what_does_not_follow_roll_says_so(tmp_path):
     record = hidden_record("barge", seed=2, batches=1, samples=120)
-    with pytest.raises(InputError, match=r"roll mode.*nothing is estimated"):
+    with pytest.raises(InputError, match=r"roll mode.*estimate does not support"):
         estimate(record, SHIP.model)
-    with pytest.raises(InputError, match=r"roll mode.*does not follow"):
+    with pytest.raises(InputError, match=r"roll mode.*does not support"):
         ROLL.rates((0.0, 0.0, 0.0), 0.0, ())
     with pytest.raises(InputError, match="expected integrator rk4"):
         simulate(SHIP, COMMANDS, integrator="euler", substeps=1)

@@ -174,7 +174,7 @@ def test_wind_is_used_where_it_is_measured_and_modelled(tmp_path: Path) -> None:
     found = estimates(tmp_path / "out")
     assert {"ls", "iv", "ls-air"} <= set(found)
     assert set(found["ls-air"]["parameters"]) - set(found["ls"]["parameters"]) == {"W_abs_u_u", "W_abs_v_v", "W_uv"}
-    assert any("stands for X_abs_u_u + W_abs_u_u" in text for text in found["ls"]["warnings"])
+    assert any("X_abs_u_u is the sum of X_abs_u_u and W_abs_u_u" in text for text in found["ls"]["warnings"])
 
 
 def test_a_broken_experiment_condition_is_told(tmp_path: Path) -> None:

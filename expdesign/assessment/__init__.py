@@ -1,4 +1,4 @@
-"""Assessment: estimates put to the test, on the runs they come from and on runs kept apart."""
+"""Assessment: estimates are validated on their estimation runs and on test runs."""
 
 from expdesign.assessment.assess import NO_TESTS, Wish, assess, default_methods
 from expdesign.assessment.limits import Limits, sentence, what_limits

@@ -30,7 +30,7 @@ USES_WIND = {item.name: item.wind for item in PREDICTORS}
 
 @dataclass(frozen=True, kw_only=True)
 class Wish:
-    """What is to be estimated, and how.
+    """Options of an estimation.
 
     Attributes:
         methods: names in `estimation.methods.METHODS`; empty for those that suit the data.
@@ -40,7 +40,7 @@ class Wish:
             for the vessel's values unless they are all zero or fail.
         motion: what the parameters describe: "continuous" the motion between samples too, which is what plans are made
             from; "euler" Euler's map at the sample time.
-        horizon_s: how far output error simulates before it starts anew from the data [s], None for whole runs.
+        horizon_s: simulation horizon of output error [s], None for whole runs.
         constant: whether output error gives every run a constant force of its own.
     """
 
@@ -92,19 +92,19 @@ def assess(
 ) -> Assessment:
     """Estimate by every method and simulate every run with every estimate.
 
-    Methods that are named must succeed. Of the ones tried on our own account those with wind may fail, and any whose
-    instruments run away, as long as one gives an estimate; that is told.
+    Requested methods must succeed. Among the default methods, those with wind may fail, and any whose instruments
+    diverge, as long as one gives an estimate; failures are listed in `left_out`.
 
     Args:
         vessel: structure, start values and sensors.
         record: what the estimates come from.
         wish: methods and what is held fixed.
         tests: runs that are simulated but not used.
-        progress: told what is being done and the share done.
+        progress: called with the current activity and the share done.
 
     Raises:
         InputError: the data lack what a method needs, or a name is unknown.
-        NotInformative: parameters that the data cannot tell apart; the message names them.
+        NotInformative: parameters that the data cannot separate; the message names them.
         Diverged: no stable model to make instruments with.
     """
     wish = wish or Wish()
@@ -119,10 +119,10 @@ def assess(
         except (InputError, NoAnswer) as error:
             spare = USES_WIND[method.predictor] or isinstance(error, Diverged)
             if named or not spare or (method is chosen[-1] and not done):
-                raise _told(error, method) from None
+                raise _prefixed(error, method) from None
             left_out.append(f"Method {method.name} gave no estimate: {error}.")
     chosen_one = preferred(done)
-    progress("finding what limits the fit", 1.0)
+    progress("decomposing the misfit", 1.0)
     return Assessment(
         record=record,
         tests=tests,
@@ -152,7 +152,7 @@ def preferred(found: Sequence[Assessed]) -> int:
     return next((index for index in stable if found[index].uses_instruments), (stable or [fewest])[0])
 
 
-def _told(error: InputError | NoAnswer, method: Method) -> InputError | NoAnswer:
+def _prefixed(error: InputError | NoAnswer, method: Method) -> InputError | NoAnswer:
     """The same error with the method in front."""
     if isinstance(error, NotInformative):
         return NotInformative(f"method {method.name}: {error}", parameters=error.parameters)
@@ -212,7 +212,7 @@ def _estimated(vessel: Vessel, record: Record, method: Method, wish: Wish) -> tu
     if wish.start != AUTO:
         return attempt(wish.start), wish.start
     if not vessel.model.parameters.any():
-        return _noted(attempt(ls), "those of the vessel file are all zero"), ls
+        return _noted(attempt(ls), "the parameters of the vessel file are all zero"), ls
     try:
         return attempt(nominal), nominal
     except (Diverged, NotInformative) as error:
@@ -221,5 +221,5 @@ def _estimated(vessel: Vessel, record: Record, method: Method, wish: Wish) -> tu
 
 
 def _noted(found: Estimate, why: str) -> Estimate:
-    note = f"The first instruments are simulated with the least-squares parameters, since {why}."
+    note = f"The first instruments are simulated with the least-squares estimate, because {why}."
     return replace(found, warnings=(*found.warnings, note))

@@ -1,15 +1,14 @@
-"""What limits the fit of a simulated run: the misfit taken apart into what makes it, in numbers.
+"""The causes of misfit of a simulated run: a decomposition of the simulation error.
 
-With y measured, x simulated, f one sample of the model, the misfit e = y - x obeys
+With y measured, x simulated and f one step of the model, the misfit e = y - x obeys
 
     e(k+1) = A(k) e(k) + eps(k)        eps(k) = y(k+1) - f(y(k)), A(k) the slope of f half-way between y(k) and x(k)
 
-so it is a sum of what each part of the one-step residuals eps has grown into: their mean over the run (a constant force
-outside the model, or a wrong parameter that acts like one), their slow part (gusts, current, missing terms), and the
-rest (measurement noise, quick disturbances). Shares are projections on the misfit and add up to one less what a slope
-half-way cannot tell. The same slopes say how an error grows on its own: where it does, the ship is unstable under the
-inputs that were recorded, however good the model. A helmsman or an autopilot held her; the steering is in the data, its
-reaction to the motion is not in the simulation.
+so it is the sum of the propagated parts of the one-step residuals eps: their mean over the run (a constant unmodelled
+force, or a wrong parameter with the same effect), their slow part (gusts, current, missing terms), and the rest
+(measurement noise, fast disturbances). Shares are projections on the misfit and add up to one, apart from the error of
+the half-way slope. The same slopes give the growth of an initial error. Where it grows, the ship is unstable under the
+recorded inputs, for any model: the recorded steering stabilised her, but the simulation does not react to the motion.
 """
 
 from __future__ import annotations
@@ -31,14 +30,14 @@ from expdesign.vessel import VesselModel
 SLOW_S = 20.0
 """Periods longer than this [s], or than 40 samples, count as slow."""
 AHEAD_S = 30.0
-"""How far predictions from measured states go [s]."""
+"""Prediction horizon from measured states [s]."""
 UNSTABLE = 5.0
 """Growth of an error over a run that counts as unstable."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Limits:
-    """The misfit of one run taken apart.
+    """The decomposed misfit of one run.
 
     Attributes:
         outputs: names.
@@ -79,7 +78,7 @@ class Limits:
 
 
 def what_limits(model: VesselModel, run: RunCheck, found: Estimate, *, wind: bool, integration: Integration) -> Limits:
-    """Take the misfit of a run apart.
+    """Decompose the misfit of a run.
 
     Args:
         model: with the estimate.
@@ -192,34 +191,34 @@ def _whole(values: Array) -> Array:
 
 
 def sentence(limits: Limits, run: RunCheck) -> str:
-    """What limits the fit of a run, in words with the numbers that say so."""
+    """The causes of misfit of a run in words and numbers."""
     ahead = _listed(limits, 100 * limits.ahead_share)
-    tail = f"{AHEAD_S:g} s ahead from measured velocities the error is {ahead} of the motion's spread."
+    tail = f"The {AHEAD_S:g} s prediction from measured velocities has an error of {ahead} of the standard deviation."
     if not np.isfinite(limits.ahead_rms).all():
-        tail = f"Even {AHEAD_S:g} s ahead from measured velocities a prediction runs away."
+        tail = f"Even the {AHEAD_S:g} s prediction from measured velocities diverges."
     if run.problem:
-        return f"The simulation runs away. {tail}"
+        return f"The simulation diverges. {tail}"
     if limits.unstable:
         return (
-            f"An error grows {limits.growth:.2g}-fold over the run (doubles every {limits.doubling_s:.2g} s): the ship "
-            "is unstable under the inputs recorded, and what held her, helmsman or autopilot, does not act in the "
-            f"simulation. {tail}"
+            f"The ship is unstable under the recorded inputs: an error grows {limits.growth:.2g}-fold over the run and "
+            f"doubles every {limits.doubling_s:.2g} s. The helmsman or autopilot that stabilised her does not act in "
+            f"the simulation. {tail}"
         )
     if not np.isfinite(run.fit_percent).any():
-        return f"No output varies. {tail}"
+        return f"All measured outputs are constant. {tail}"
     worst = int(np.nanargmin(run.fit_percent))
     causes = (
-        ("a constant force outside the model", limits.constant[worst]),
-        (f"slow ones (periods over {SLOW_S:g} s)", limits.slow[worst]),
-        ("quick ones and measurement noise", limits.quick[worst]),
+        ("a constant unmodelled force", limits.constant[worst]),
+        (f"slow forces (periods over {SLOW_S:g} s)", limits.slow[worst]),
+        ("fast forces and measurement noise", limits.quick[worst]),
     )
     if not np.isfinite([share for _, share in causes]).all():
         return tail
     parts = ", ".join(f"{round(100 * share)} % from {what}" for what, share in sorted(causes, key=lambda c: -c[1]))
-    uncertain = f" Uncertain parameters would account for {100 * limits.parameters[worst]:.0f} %."
+    uncertain = f" Parameter uncertainty explains {100 * limits.parameters[worst]:.0f} %."
     ceiling = limits.ceiling_percent[worst]
-    quiet = f" Noise alone would hold this fit to {ceiling:.0f} %." if ceiling < 95 else ""
-    return f"{limits.outputs[worst]} fits worst; of its squared error {parts}.{uncertain}{quiet} {tail}"
+    quiet = f" Noise alone limits this fit to {ceiling:.0f} %." if ceiling < 95 else ""
+    return f"The worst output is {limits.outputs[worst]}. Its squared error: {parts}.{uncertain}{quiet} {tail}"
 
 
 def _listed(limits: Limits, values: Array) -> str:

@@ -1,4 +1,4 @@
-"""One-step residuals of an estimate: how much of the accelerations it explains, and what is left over time."""
+"""One-step residuals of an estimate: the explained share of the accelerations, and the residuals over time."""
 
 from __future__ import annotations
 
@@ -58,9 +58,9 @@ def one_step(
 
     Args:
         record: the data.
-        model: the one the estimation began with; its values are those of the parameters held fixed.
+        model: the initial model; gives the values of the fixed parameters.
         found: the estimate.
-        fixed: parameters held fixed.
+        fixed: fixed parameters.
         quadrature: one of `predictors.QUADRATURES`.
     """
     predictor = method_named(found.method).predictor

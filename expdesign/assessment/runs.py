@@ -1,4 +1,4 @@
-"""One run, simulated with an estimated model from its first measured state and set against what was measured."""
+"""One run, simulated with an estimated model from its first measured state and compared with the measurement."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class RunCheck:
 
     Attributes:
         batch: the run.
-        use: "estimation" for a run the estimate comes from, "test" for one kept apart.
+        use: "estimation" or "test".
         outputs: the velocities that have an equation.
         fit_percent: (n,) of the simulated output, nan where the measured one is constant or the simulation diverges.
         rmse: (n,) root-mean-square error [m/s, rad/s], nan likewise.

@@ -1,4 +1,4 @@
-"""Estimates with everything that speaks for and against them."""
+"""Estimates with their diagnostics."""
 
 from __future__ import annotations
 
@@ -43,10 +43,10 @@ class Assessed:
         estimate: parameters with their uncertainty.
         start: what the first instruments were simulated with, "nominal" or "ls"; "" for least squares.
         model: the vessel's model with the estimate.
-        runs: every run simulated with it, first those of the estimation, then those kept apart.
+        runs: every run simulated with it, first the estimation runs, then the test runs.
         one_step: its residuals.
-        breaches: where the data break the experiment condition, for the signals this method uses.
-        current: the mean current that the nuisance parameters speak of, or None where they do not.
+        breaches: where the data break the excitation condition, for the signals this method uses.
+        current: the mean current from the nuisance parameters, or None without them.
     """
 
     method: Method
@@ -75,9 +75,9 @@ class Assessment:
 
     Attributes:
         record: what the estimates come from.
-        tests: runs kept apart; none when empty.
+        tests: test runs, not used for estimation; may be empty.
         methods: one entry for each method that gave an estimate, in the order asked for.
-        left_out: one sentence for each method tried on our own account that gave none.
+        left_out: one sentence for each default method that gave no estimate.
         chosen: index of the method whose estimate goes into the vessel file.
         mean: how the mean was subtracted from instruments.
         fixed: parameters held at the vessel file's values.

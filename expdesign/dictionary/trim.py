@@ -79,7 +79,11 @@ def motion_text(velocity: Array) -> str:
 def reach_text(vessel: Vessel, velocity: Array) -> str:
     """What of a velocity (3,) the actuators hold, for messages."""
     share = held_share(vessel, velocity)
-    return f"in that direction they reach {motion_text(share * velocity)}" if share else "they reach nothing like it"
+    return (
+        f"in that direction they reach {motion_text(share * velocity)}"
+        if share
+        else "they reach no motion in that direction"
+    )
 
 
 def _direct_trim(vessel: Vessel, velocity: Array) -> Array:

@@ -31,7 +31,7 @@ def mean_current(estimate: Estimate, *, heading_std_rad: float = 0.0) -> tuple[A
     names = (*estimate.names, *estimate.nuisance_names)
     lacking = [name for name in (DAMPING, *COLUMNS) if name not in names]
     if lacking:
-        raise InputError(f"the current cannot be read from method {estimate.method!r}: it estimates no {lacking[0]!r}")
+        raise InputError(f"method {estimate.method!r} does not estimate the current: it has no {lacking[0]!r}")
     joint = np.concatenate([estimate.values, estimate.nuisance_values])
     places = [names.index(name) for name in (DAMPING, *COLUMNS)]
     damping, *rho = joint[places]

@@ -96,9 +96,9 @@ class Breach:
 
     def __str__(self) -> str:
         return (
-            f"{self.batch}: {self.inside}, inside a modulus of {', '.join(self.parameters)}, changes sign or comes "
-            f"nearer to zero than {self.margin:.3g} in {len(self.samples)} of {self.count} samples "
-            f"(rows {_spans(self.rows)})"
+            f"{self.batch}: {self.inside}, inside an absolute value in the term of {', '.join(self.parameters)}, "
+            f"changes sign or comes closer to zero than {self.margin:.3g} in {len(self.samples)} of {self.count} "
+            f"samples (rows {_spans(self.rows)})"
         )
 
 

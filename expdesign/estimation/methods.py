@@ -84,8 +84,8 @@ class Settings:
 
 STARTS = ("nominal", "ls")
 ROLLS = (
-    "the vessel's model has a roll mode, [model.roll], beside which nothing is estimated; expected a vessel file "
-    "without that table, or expdesign diagnose, which judges parameters beside it"
+    "the vessel's model has a roll mode, [model.roll], which estimate does not support; expected a vessel file "
+    "without that table, or use expdesign diagnose"
 )
 
 
@@ -219,9 +219,12 @@ def _statistics(regression: Regression, solution: Solution, left_out: int) -> Re
 
 
 def _row_notes(rows: Rows) -> Sequence[str]:
-    return [f"{rows.left_out} samples are left out because numbers are missing."] if rows.left_out else []
+    return [f"{rows.left_out} samples with missing values are not used."] if rows.left_out else []
 
 
 def faint_notes(found: NullSpace) -> Sequence[str]:
     """One sentence per combination of parameters that the data hardly show."""
-    return [f"The data hardly show this combination of parameters: {direction}." for direction in found.faint]
+    return [
+        f"The data contain almost no information about this combination of parameters: {direction}."
+        for direction in found.faint
+    ]

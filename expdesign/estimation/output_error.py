@@ -250,9 +250,7 @@ def _minimised(problem: Problem, values: Array, *, settled: float) -> tuple[Arra
     return values, starts
 
 
-_RUNS_AWAY = (
-    "output error: the best model found so far runs away over {seconds:.0f} s; a shorter horizon (--horizon) helps"
-)
+_RUNS_AWAY = "output error: the best model found diverges within {seconds:.0f} s; try a shorter horizon (--horizon)"
 
 
 @dataclass(frozen=True, eq=False)

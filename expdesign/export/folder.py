@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all."""
+"""Files are written completely or not at all."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from expdesign.interruptions import interruptions_wait
 
 @dataclass(frozen=True)
 class _Slot:
-    """One file on its way: written to `beside`, an older file of that name kept in `before` until all are in place."""
+    """One file during writing: the new content in `beside`, an older file in `before` until all are in place."""
 
     target: Path
     beside: Path
@@ -37,7 +37,7 @@ class _Slot:
             shutil.copy2(self.target, self.before)
 
     def undo(self) -> None:
-        """Back to how it was, wherever the placing stopped: decided by what is on the disk."""
+        """Restore the previous state from what is on the disk."""
         renamed = not self.beside.exists()
         if renamed and self.before.exists():
             self.before.replace(self.target)
@@ -46,7 +46,7 @@ class _Slot:
         self.forget()
 
     def forget(self) -> None:
-        """Remove what lies beside the target."""
+        """Remove the temporary files."""
         for path in (self.beside, self.before):
             with suppress(OSError):
                 path.unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""Numbers in words that a reader can use: friendly units, compass names, positions."""
+"""Numbers as text: units, compass names, positions."""
 
 from __future__ import annotations
 
@@ -74,8 +74,8 @@ def compass(radians: float) -> str:
 
 
 def current(velocity: Array, std_mps: float) -> str:
-    """A current in the sailor's way: where it sets to."""
-    spread = f", each component uncertain by {number(std_mps)}{NB}m/s (standard deviation)" if std_mps > 0 else ""
+    """A current by speed and direction of flow."""
+    spread = f", standard deviation {number(std_mps)}{NB}m/s per component" if std_mps > 0 else ""
     if not np.any(velocity):
         return f"no mean current{spread}"
     towards = math.atan2(velocity[1], velocity[0])
@@ -83,8 +83,8 @@ def current(velocity: Array, std_mps: float) -> str:
 
 
 def wind(velocity: Array, std_mps: float) -> str:
-    """A wind in the sailor's way: where it comes from."""
-    spread = f", each component uncertain by {number(std_mps)}{NB}m/s (standard deviation)" if std_mps > 0 else ""
+    """A wind by speed and direction of origin."""
+    spread = f", standard deviation {number(std_mps)}{NB}m/s per component" if std_mps > 0 else ""
     if not np.any(velocity):
         return f"no mean wind{spread}"
     origin = math.atan2(-velocity[1], -velocity[0])

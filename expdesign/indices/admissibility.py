@@ -43,9 +43,9 @@ class Condition:
 
     Attributes:
         what: the condition.
-        found: what is known beforehand.
-        required: what the source asks for.
-        met: True, False, or None where nobody can tell beforehand.
+        found: what is known in advance.
+        required: what the source requires.
+        met: True, False, or None where it cannot be known in advance.
     """
 
     what: str
@@ -60,16 +60,14 @@ def beaufort(wind_mps: float) -> int:
 
 
 def admissibility(known: Conditions) -> tuple[Condition, ...]:
-    """Each condition that can be looked at beforehand."""
+    """Each condition that can be judged in advance."""
     return (_depth(known), _wind(known), _sea(known), _current(known), _room(known))
 
 
 def _depth(known: Conditions) -> Condition:
     needed = DEPTH_BY_DRAUGHT * known.draught_m
     depth = known.least_depth_m
-    found = (
-        "the chart does not tell" if depth is None else f"at least {depth:g} m ({depth / known.draught_m:.1f} draughts)"
-    )
+    found = "not charted" if depth is None else f"at least {depth:g} m ({depth / known.draught_m:.1f} draughts)"
     return Condition(
         what="Water depth under the track",
         found=found,
@@ -102,8 +100,8 @@ def _sea(known: Conditions) -> Condition:
 def _current(known: Conditions) -> Condition:
     return Condition(
         what="Current",
-        found=f"{known.current_mps:.2f} m/s, planned as uniform; uncertain by {known.current_std_mps:.2f} m/s",
-        required="uniform, so that it can be taken out",
+        found=f"{known.current_mps:.2f} m/s, assumed uniform; standard deviation {known.current_std_mps:.2f} m/s",
+        required="uniform, so that it can be corrected for",
         met=None,
     )
 
@@ -111,7 +109,7 @@ def _current(known: Conditions) -> Condition:
 def _room(known: Conditions) -> Condition:
     return Condition(
         what="Sea room",
-        found=f"{known.room_m:.0f} m from hull to forbidden water at the nearest",
+        found=f"{known.room_m:.0f} m from the hull to forbidden water",
         required=f"at least {known.room_asked_m:g} m",
         met=known.room_m >= known.room_asked_m,
     )

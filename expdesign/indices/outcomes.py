@@ -203,5 +203,5 @@ def outcomes(
 
 def _shown(vessel: Vessel, name: str, value: float | None) -> float:
     if value is None:
-        raise NoAnswer(f"vessel {vessel.name!r}: its trial does not show {OUTCOMES[name]}")
+        raise NoAnswer(f"vessel {vessel.name!r}: its trial gives no {OUTCOMES[name]}")
     return value

@@ -78,7 +78,7 @@ def expected_covariance(
         integrator: "rk4" for the motion of a ship, "euler" for the map that the discrete parameters are defined by.
 
     Raises:
-        NotInformative: the trial does not inform about every parameter.
+        NotInformative: the trial contains no information about some parameters.
     """
     rows = [_rows(vessel, part, parameters, environment, instruments or vessel.model, integrator) for part in parts]
     weights = np.array([part.repeats for part in parts], dtype=float)
@@ -204,7 +204,7 @@ def _sandwich(G: Array, Omega: Array, parameters: Sequence[str]) -> Array:
     scaled = G / np.outer(np.where(scale > 0, scale, 1.0), np.where(scale > 0, scale, 1.0))
     if blind or np.linalg.cond(scaled) > 1e12:
         raise NotInformative(
-            f"the trial does not inform about every parameter{': ' + ', '.join(blind) if blind else ''}",
+            f"the trial contains no information about some parameters{': ' + ', '.join(blind) if blind else ''}",
             parameters=blind or tuple(parameters),
         )
     inverse = np.linalg.inv(scaled) / np.outer(scale, scale)

@@ -176,7 +176,7 @@ def check_informative(information: Sequence[PrimitiveInformation], names: Sequen
         return
     blind = tuple(name for name, is_unseen in zip(names, unseen, strict=True) if is_unseen)
     raise NotInformative(
-        f"the dictionary cannot tell these parameters apart: {', '.join(blind)}; add primitives that excite them, "
+        f"the dictionary cannot separate these parameters: {', '.join(blind)}; add primitives that excite them, "
         "state a mean wind if they are W terms, or list some in design.fixed_parameters",
         parameters=blind,
     )

@@ -21,12 +21,12 @@ def table_remarks(table: Table) -> Iterator[str]:
     for name, values in table.columns.items():
         if name in UNTOLD or np.ptp(values) > 0:
             continue
-        what = "an input that tells nothing of its effect" if is_input(name) else "a dead sensor?"
+        what = "so its effect cannot be estimated" if is_input(name) else "a dead sensor?"
         yield f"{table.sources[name].header} is {table.value(name, 0)} in all rows, {what}"
     if "north_m" in table.columns:
         still = np.all(np.diff(table.stack("north_m", "east_m"), axis=0) == 0, axis=1)
         if HELD < np.mean(still) < 1:
-            yield f"the position stands still in {np.mean(still):.0%} of the rows: held values make poor differences"
+            yield f"the position repeats in {np.mean(still):.0%} of the rows: differences of held values are inaccurate"
 
 
 def motion_remarks(batches: list[Batch], origins: Mapping[str, str]) -> Iterator[str]:

@@ -28,8 +28,8 @@ def required_force(model: VesselModel, velocity: Array, acceleration: Array) -> 
     direct = direct_terms(model)
     if direct:
         raise InputError(
-            f"term {direct[0]}: velocities can be wished for only where the model sees its actuators through "
-            f"{', '.join(FORCE_SIGNALS)}; use families that give commands"
+            f"term {direct[0]}: desired velocities need a model whose inputs are "
+            f"{', '.join(FORCE_SIGNALS)}; use families with commands"
         )
     motion = dict(zip(("u", "v", "r"), np.moveaxis(velocity, -1, 0), strict=True))
     signals = motion | {"u_q": motion["u"], "v_q": motion["v"], SHOAL: 0.0}

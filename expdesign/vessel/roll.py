@@ -70,6 +70,6 @@ class Roll:
 
 
 NOT_FOLLOWED = (
-    "the vessel's model has a roll mode, [model.roll], which this calculation does not follow; expected a vessel file "
-    "without it, which leaves its oscillation out"
+    "the vessel's model has a roll mode, [model.roll], which this calculation does not support; expected a vessel "
+    "file without it"
 )

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from expdesign import __version__
 from expdesign.dictionary import build_dictionary
-from expdesign.dictionary.wishes import strayed
+from expdesign.dictionary.desired import deviating
 from expdesign.durations import DurationDesign, efficiencies, with_repeats
 from expdesign.errors import InputError
 from expdesign.export import (
@@ -76,7 +76,7 @@ def score(scenario: Path, out: Path | None, *, seed: int = 0, progress: Progress
         "parameters": len(_parameters(case)),
         "meet_excitation_condition": sum(item.excitation_condition for item in information),
         "informative_alone": sum(item.log_det_alone is not None for item in information),
-        "stray_from_their_wish": [item.name for item in strayed([item.primitive for item in information])],
+        "stray_from_their_wish": [item.name for item in deviating([item.primitive for item in information])],
     }
     return _written(case, out, _dictionary_files(case, information), summary, progress)
 

@@ -170,7 +170,7 @@ def build_layout(
     merged = () if chosen.wind else tuple(n for n in model.names if n in reads_air and n not in fixed)
     parameters = tuple(name for name in model.names if name not in merged and name not in fixed)
     if not parameters:
-        raise InputError("every parameter is held fixed, nothing is left to estimate")
+        raise InputError("all parameters are fixed, none is left to estimate")
     nuisance: tuple[Nuisance, ...] = ()
     if chosen.nuisance:
         nuisance = nuisance_regressors(model, model.names, tables, wind_measured=chosen.wind)
@@ -247,5 +247,7 @@ def _merged_note(model: VesselModel, name: str) -> str:
     for term, expression in zip(model.terms, model.expressions, strict=True):
         same = term.equation == model.terms[index].equation and not set(AIR) & set(expression.signals)
         if same and str(symbolic(expression, algebra, wind_measured=False)) == str(own):
-            return f"No wind is used, so {term.name} stands for {term.name} + {name}, and {name} is set to 0."
-    return f"No wind is used, so {name} is set to 0 and its effect left out."
+            return (
+                f"This method uses no wind: {term.name} is the sum of {term.name} and {name}, and {name} is set to 0."
+            )
+    return f"This method uses no wind: {name} is set to 0."

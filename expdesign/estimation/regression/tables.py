@@ -53,7 +53,7 @@ def with_depth(record: Record, draught_m: float) -> Record:
         inputs = np.column_stack([batch.inputs, shoal])
         batches.append(replace(batch, inputs=inputs, input_names=(*batch.input_names, SHOAL)))
     missing = [batch.name for batch in record.batches if batch.depth_m is None]
-    told = [f"{', '.join(missing)}: no depth_m is measured; the model's dependence on depth is that of deep water."]
+    told = [f"{', '.join(missing)}: depth_m is not measured, deep water is assumed."]
     return replace(record, batches=tuple(batches), notes=(*record.notes, *(told if missing else [])))
 
 

@@ -109,7 +109,7 @@ def apart_from_start(rows: Rows) -> Rows:
     regression = rows.regression
     later = np.flatnonzero(regression.step_of > 0)
     if not len(later):
-        raise NotInformative("instruments need batches of three samples or more")
+        raise NotInformative("instruments need batches of at least three samples")
     kept = _run(later)
     shorter = replace(
         regression,

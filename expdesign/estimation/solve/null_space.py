@@ -138,7 +138,7 @@ def require_informative(found: NullSpace) -> None:
     names = tuple(dict.fromkeys(name for direction in found.unseen for name in direction.parameters))
     listed = "; ".join(str(direction) for direction in found.unseen)
     raise NotInformative(
-        f"the data cannot see these parameters or combinations: {listed}; excite them, or hold some of them fixed",
+        f"the data contain no information about these parameters or combinations: {listed}; excite them, or fix some",
         parameters=names,
     )
 

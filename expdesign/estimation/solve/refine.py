@@ -73,5 +73,5 @@ def refine_iv(
         if moved < settled:
             break
     if count == most and moved >= settled:
-        warnings.append(f"After {most} refinements the estimate still moves by {moved:.2g} standard deviations.")
+        warnings.append(f"The estimate still changes by {moved:.2g} standard deviations after {most} refinements.")
     return Refined(solve(equations, instruments), count, tuple(warnings))

@@ -159,8 +159,8 @@ def _by_components(
 
 def _misfit_note(outputs: Sequence[str]) -> str:
     return (
-        f"Residuals of {', '.join(outputs)} are coloured otherwise than by sensor noise and lasting disturbances; "
-        "standard deviations are the larger of two kinds and less certain than usual."
+        f"Sensor noise and slow disturbances do not explain the colour of the residuals of {', '.join(outputs)}. The "
+        "standard deviations are the larger of two estimates, and less reliable than usual."
     )
 
 

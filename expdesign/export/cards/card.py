@@ -1,4 +1,4 @@
-"""What stands on one card: a sheet for the runs of one manoeuvre that follow one another."""
+"""The content of one card: a sheet for consecutive runs of one manoeuvre."""
 
 from __future__ import annotations
 
@@ -23,24 +23,24 @@ STEADY_SPEED_SHARE, STEADY_SPEED_MPS = 0.1, 0.1
 MOST_RUNS = 3
 """Runs on one sheet."""
 LONG, WIDE = 12, 5
-"""Rows of orders from which they stand in columns beside another, and how many cells leave room for a third column."""
+"""Number of rows above which the orders use several columns, and cells per row up to which there are three."""
 HASTE_S = 10.0
-"""Orders that follow each other faster than this, on average, are not for calling out."""
-TOLD = 4
-"""Parameters named as what a run is for."""
+"""Mean time between orders below which they are too fast to be called out."""
+NAMED_PARAMETERS = 4
+"""Parameters named in the purpose of a run."""
 TURN = 2 * math.pi
-BLANKS = ("Began (UTC)", "Wind, from", "Sea state; current, to", "Depth", "File")
-"""What is written down at every run."""
+BLANKS = ("Start (UTC)", "Wind, from", "Sea state; current, to", "Depth", "File")
+"""Blanks to be filled in at every run."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Card:
-    """A sheet: runs of one manoeuvre that follow one another, in words and figures ready to be printed.
+    """A sheet: consecutive runs of one manoeuvre, as printable text and figures.
 
     Attributes:
         runs: numbers of the runs.
-        approach, danger, stop: (name, one text for each run) row by row.
-        orders: the rows of orders in columns beside another.
+        approach, danger, end: (name, one text for each run) row by row.
+        orders: the rows of orders, in one or several columns.
         signals: (name, unit) of the columns of orders.
         room: (name, text) pairs.
     """
@@ -52,7 +52,7 @@ class Card:
     purpose: str
     approach: list[tuple[str, tuple[str, ...]]]
     danger: list[tuple[str, tuple[str, ...]]]
-    stop: list[tuple[str, tuple[str, ...]]]
+    end: list[tuple[str, tuple[str, ...]]]
     signals: list[tuple[str, str]]
     orders: list[list[tuple[str, ...]]]
     orders_notes: list[str]
@@ -69,7 +69,7 @@ class Card:
 
 
 def card_groups(content: ReportContent, runs: Sequence[Run]) -> list[list[Run]]:
-    """Runs sheet by sheet, in time order: neighbours with the same name and the same orders share one."""
+    """Runs sheet by sheet, in time order: neighbours with equal names and orders share one."""
     groups: list[list[Run]] = []
     for run in runs:
         if groups and _alike(content, groups[-1][-1], run):
@@ -90,7 +90,7 @@ def _alike(content: ReportContent, one: Run, other: Run) -> bool:
 
 
 def run_orders(content: ReportContent, run: Run) -> Array:
-    """(k, m) commands of a run; angles of thrusters that turn round and round begin between -180 and 180 degrees."""
+    """(k, m) commands of a run; angles of thrusters start between -180 and 180 degrees."""
     leg, commands = content.plan.legs[run.leg], content.plan.commands
     values = np.array(commands.values[leg.first : leg.last])
     for column, name in enumerate(commands.names):
@@ -118,7 +118,7 @@ def build_card(content: ReportContent, runs: Sequence[Run]) -> Card:
         purpose=_purpose(content, names.index(legs[0].name)),
         approach=_together([_approach(content, leg.first) for leg in legs]),
         danger=_together([_danger(danger, leg.first, step) for danger, leg in zip(dangers, legs, strict=True)]),
-        stop=_together([_stop(content, leg.first, leg.last) for leg in legs]),
+        end=_together([_end(content, leg.first, leg.last) for leg in legs]),
         signals=[(name, unit) for name, unit, _ in order_columns(vessel)],
         orders=_columns(rows),
         orders_notes=_orders_notes(content, legs[0], rows, missed),
@@ -144,13 +144,14 @@ def _orders_notes(content: ReportContent, leg: Leg, rows: list[tuple[str, ...]],
     every = (leg.last - leg.first) * step / len(rows)
     signs = [meaning for what, meaning in SIGNS.items() if any(stem(n) == what for n in content.vessel.model.inputs)]
     notes = [
-        f"Between the rows all orders change evenly; they differ from the full commands, every {step:g} s in "
-        f"commands.csv, by {100 * missed:.0f} % of each order's span at most. {' '.join(signs)}".rstrip()
+        f"Between the rows all orders change linearly. They deviate from commands.csv (one command every {step:g} s) "
+        "by at "
+        f"most {100 * missed:.0f} % of the range of each order. {' '.join(signs)}".rstrip()
     ]
     if every < HASTE_S:
         notes.append(
-            f"An order every {every:.2g} s is too fast to be called out: let the control system play commands.csv, "
-            "and use these rows to see that it does."
+            f"One order every {every:.2g} s is too fast to be called out. Let the control system execute "
+            "commands.csv, and use these rows to monitor it."
         )
     return notes
 
@@ -158,16 +159,17 @@ def _orders_notes(content: ReportContent, leg: Leg, rows: list[tuple[str, ...]],
 SIGNS = {
     "n": "n: propeller speed, ahead positive.",
     "a": "a: direction of thrust, 0 ahead, 90 to starboard.",
-    "rudder": "rudder: 0 amidships; the sign is the vessel file's.",
+    "rudder": "rudder: 0 amidships; sign as in the vessel file.",
 }
 """Stem of a signal -> what its sign means."""
 
 
 def _purpose(content: ReportContent, index: int) -> str:
     share = relative_information(content)[index]
-    order = np.argsort(-share, kind="stable")[:TOLD]
-    told = [f"{content.parameters[k]} ({words.percent(float(share[k]))})" for k in order.tolist() if share[k] > 0]
-    return f"tells most about {', '.join(told)}, in per cent of the run that tells most of each" if told else "none"
+    order = np.argsort(-share, kind="stable")[:NAMED_PARAMETERS]
+    named = [f"{content.parameters[k]} ({words.percent(float(share[k]))})" for k in order.tolist() if share[k] > 0]
+    listed = ", ".join(named)
+    return f"{listed}: information in per cent of the most informative manoeuvre for each" if named else "none"
 
 
 def _approach(content: ReportContent, first: int) -> list[tuple[str, str]]:
@@ -176,19 +178,19 @@ def _approach(content: ReportContent, first: int) -> list[tuple[str, str]]:
     lat, lon = plan.area.frame.to_degrees(pose[:2]).tolist()
     sway, rate = words.number(velocity[1]), words.number(math.degrees(velocity[2]), 1)
     return [
-        ("Starts at", words.clock(first * plan.commands.sample_time_s)),
+        ("Start time", words.clock(first * plan.commands.sample_time_s)),
         ("Latitude", words.latitude(lat)),
         ("Longitude", words.longitude(lon)),
         ("Heading", words.bearing(float(pose[2]))),
         ("Speed over ground", words.speed(float(np.hypot(*velocity[:2])))),
         ("Sway; yaw rate", f"{sway}{words.NB}m/s; {rate}{words.NB}\N{DEGREE SIGN}/s"),
-        ("Steady before", words.duration(steady_s(content, first))),
+        ("Steady for", words.duration(steady_s(content, first))),
         *_within(plan, first),
     ]
 
 
 def _within(plan: Plan, first: int) -> list[tuple[str, str]]:
-    """How far from all this the run that begins at a sample may begin; nothing where no trials were drawn."""
+    """Start tolerances of the run that begins at a sample; none without Monte Carlo trials."""
     promise = plan.promise
     if promise is None:
         return []
@@ -198,15 +200,15 @@ def _within(plan: Plan, first: int) -> list[tuple[str, str]]:
     )
     return [
         (
-            "Begin within",
+            "Start tolerance",
             f"{words.distance(off_m)}; {heading}{words.NB}\N{DEGREE SIGN}; "
-            f"{words.number(promise.speed_mps)}{words.NB}m/s; {rate}{words.NB}\N{DEGREE SIGN}/s; else go round",
+            f"{words.number(promise.speed_mps)}{words.NB}m/s; {rate}{words.NB}\N{DEGREE SIGN}/s; else go-around",
         )
     ]
 
 
 def steady_s(content: ReportContent, first: int) -> float:
-    """For how long before a sample heading and speed stay near what they are at it, by the plan [s]."""
+    """How long the planned heading and speed are constant before a sample [s]."""
     motion = content.plan.trajectory
     speed = np.hypot(*motion.velocity[: first + 1, :2].T)
     close = np.abs(motion.pose[: first + 1, 2] - motion.pose[first, 2]) < STEADY_HEADING_RAD
@@ -215,15 +217,15 @@ def steady_s(content: ReportContent, first: int) -> float:
     return float(first - (away[-1] + 1 if len(away) else 0)) * motion.sample_time_s
 
 
-def _stop(content: ReportContent, first: int, last: int) -> list[tuple[str, str]]:
+def _end(content: ReportContent, first: int, last: int) -> list[tuple[str, str]]:
     plan = content.plan
     pose, step = plan.trajectory.pose, plan.commands.sample_time_s
     turned = math.degrees(float(pose[last, 2] - pose[first, 2]))
     side = "starboard" if turned > 0 else "port"
     way = f" ({abs(turned):.0f}\N{DEGREE SIGN} to {side})" if round(abs(turned)) else ""
     return [
-        ("Ends at", words.clock(last * step)),
-        ("Heading then", f"{words.bearing(float(pose[last, 2]))}{way}"),
+        ("End time", words.clock(last * step)),
+        ("Final heading", f"{words.bearing(float(pose[last, 2]))}{way}"),
     ]
 
 
@@ -233,8 +235,8 @@ def _danger(danger: Danger, first: int, step: float) -> list[tuple[str, str]]:
         ("Ahead", _reach(danger.ahead_m)),
         ("To port", _reach(danger.port_m)),
         ("To starboard", _reach(danger.starboard_m)),
-        ("Nearest", f"{words.distance(danger.nearest_m)} at {when}"),
-        ("Abort off track by", words.distance(danger.nearest_m / 2)),
+        ("Least distance", f"{words.distance(danger.nearest_m)} at {when}"),
+        ("Abort if off track by", words.distance(danger.nearest_m / 2)),
     ]
 
 
@@ -245,11 +247,11 @@ def _reach(distance_m: float) -> str:
 def _room(content: ReportContent, room_m: tuple[float, float]) -> list[tuple[str, str]]:
     draught = content.vessel.draught_m
     return [
-        ("Hull sweeps", " by ".join(words.distance(side) for side in room_m)),
+        ("Swept area", " by ".join(words.distance(side) for side in room_m)),
         ("With clearance", " by ".join(words.distance(side + 2 * content.clearance_m) for side in room_m)),
         (
             "Depth",
-            f"more than {4 * draught:g} m for results free of the bottom (4 draughts). {content.plan.area.depth_rule}",
+            f"more than {4 * draught:g} m (4 draughts) for deep-water results. {content.plan.area.depth_rule}",
         ),
     ]
 
@@ -258,6 +260,6 @@ def _record(content: ReportContent) -> str:
     step = content.plan.commands.sample_time_s
     inputs = ", ".join(column_name(name) for name in content.vessel.model.inputs)
     return (
-        f"every {step:g} s with one clock: time_s, lat_deg, lon_deg, heading_deg, u_mps, v_mps, r_radps, {inputs}, "
-        "wind_speed_mps, wind_angle_rad; begin 30 s before the run and end 30 s after it"
+        f"every {step:g} s, with a common clock: time_s, lat_deg, lon_deg, heading_deg, u_mps, v_mps, r_radps, "
+        f"{inputs}, wind_speed_mps, wind_angle_rad; from 30 s before the run to 30 s after it"
     )

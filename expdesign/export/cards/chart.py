@@ -1,4 +1,4 @@
-"""The small chart of a card: the way in, the runs, the hull where they start and end, and the water around."""
+"""The chart of a card: approach, runs, hull at start and end, and the water around."""
 
 from __future__ import annotations
 

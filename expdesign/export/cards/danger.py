@@ -1,4 +1,4 @@
-"""How far it is to forbidden water ahead, to port and to starboard of a ship on her planned run."""
+"""Distances to forbidden water ahead, to port and to starboard during a planned run."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Danger:
         ahead_m, port_m, starboard_m: from the hull along straight lines to forbidden water, `FARTHEST_M` at most [m].
         nearest_m: from the hull in any direction [m].
         nearest_sample: when.
-        room_m: (length, width) of the smallest rectangle around all that the hull sweeps [m].
+        room_m: (length, width) of the smallest rectangle around the swept area of the hull [m].
     """
 
     ahead_m: float

@@ -1,4 +1,4 @@
-"""Actuator commands condensed to the few moments between which they change evenly, as a helmsman can follow them."""
+"""Actuator commands reduced to few samples with linear changes between them, for a helmsman."""
 
 from __future__ import annotations
 
@@ -10,16 +10,17 @@ from expdesign.values import Array
 from expdesign.vessel import Vessel, stem
 
 TOLERANCE = 0.02
-"""Of each signal's span over the run: what the condensed orders may miss at most, unless rows run out."""
+"""Largest error of the condensed orders, as a share of the range of each signal; larger where `MOST_ROWS` is "
+"reached."""
 MOST_ROWS = 48
 UNITS = {"n": ("rpm", 60.0), "a": ("deg", 180.0 / math.pi), "rudder": ("deg", 180.0 / math.pi)}
 
 
 def condensed(values: Array) -> tuple[list[int], float]:
-    """Samples of (k, m) commands to be called out, and the largest miss of straight lines between them.
+    """Samples of (k, m) commands to be called out, and the largest error of linear interpolation between them.
 
     Returns:
-        indices, the first and the last sample among them; the miss as a share of each signal's span.
+        Indices, the first and the last sample among them; the error as a share of the range of each signal.
 
     Source: D. H. Douglas and T. K. Peucker (1973), on all signals together.
     """
@@ -47,7 +48,7 @@ def order_columns(vessel: Vessel) -> list[tuple[str, str, float]]:
 
 
 def order_rows(vessel: Vessel, values: Array, step_s: float) -> tuple[list[tuple[str, ...]], float]:
-    """Time from the start of the run [s] and every signal, row by row; and the largest miss as a share of its span.
+    """Time from the start of the run [s] and every signal, row by row; and the largest error as a share of its range.
 
     Args:
         vessel: whose signals they are.

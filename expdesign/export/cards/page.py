@@ -14,10 +14,10 @@ from expdesign.export.routes import require_verified
 
 
 def cards_html(content: ReportContent) -> str:
-    """One HTML page without outside references; runs of one manoeuvre that follow one another share a sheet.
+    """One HTML page without outside references; consecutive runs of one manoeuvre share a sheet.
 
     Raises:
-        NoPlan: the plan is not verified: nobody shall sail it.
+        NoPlan: the plan is not verified and must not be sailed.
     """
     require_verified(content.plan)
     runs = primitive_runs(content.plan)

@@ -1,4 +1,4 @@
-"""What the page is made from."""
+"""The content of the page."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from expdesign.assessment import Assessed, Assessment
 from expdesign.vessel import Vessel
 
 DRAWN = 3
-"""Simulations drawn beside the measured velocities, at most."""
+"""Largest number of methods in the figures of runs."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class EstimateContent:
-    """Everything the page tells, as values.
+    """The values that the page shows.
 
     Attributes:
         vessel: as it was before the estimation.
-        found: the estimates and what they were set against.
+        found: the estimates and their assessment.
         command: the command line that reproduces the result.
         version: of the program.
     """

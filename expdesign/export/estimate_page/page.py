@@ -32,7 +32,7 @@ class ParameterRow:
 
 @dataclass(frozen=True, kw_only=True)
 class MethodNotes:
-    """What there is to say about one method."""
+    """Remarks on one method."""
 
     name: str
     title: str
@@ -47,6 +47,7 @@ class MethodNotes:
 def estimate_html(content: EstimateContent) -> str:
     """One HTML page without any outside reference."""
     found = content.found
+    methods = [_notes(content, item) for item in found.methods]
     page = page_templates("expdesign.export.estimate_page").get_template("estimate.html")
     return page.render(
         content=content,
@@ -59,7 +60,8 @@ def estimate_html(content: EstimateContent) -> str:
         limits=limit_rows(found),
         why=[sentence(limits, run) for limits, run in zip(found.limits, found.best.runs, strict=True)],
         ahead_s=AHEAD_S,
-        methods=[_notes(content, item) for item in found.methods],
+        methods=methods,
+        explained=[(item.name, item.explained, item.correlation) for item in methods],
         conditions=_conditions(content),
         advice=advice(content),
         notes=[*found.record.notes, *found.tests.notes, *found.left_out],
@@ -88,16 +90,12 @@ def summary(content: EstimateContent) -> list[str]:
     seconds = sum(len(batch) * batch.sample_time_s for batch in batches)
     samples = sum(len(batch) for batch in batches)
     tests = words.counted(len(found.tests.batches), "run")
-    apart = (
-        f" {tests} {'is' if len(found.tests.batches) == 1 else 'are'} kept apart to test on."
-        if found.tests.batches
-        else ""
-    )
-    fixed = f" Held fixed: {', '.join(found.fixed)}." if found.fixed else ""
+    apart = f" Test data, not used for estimation: {tests}." if found.tests.batches else ""
+    fixed = f" Fixed parameters: {', '.join(found.fixed)}." if found.fixed else ""
     return [
-        f"{words.counted(len(best.estimate.names), 'parameter')} of {content.vessel.name} from "
-        f"{words.counted(len(batches), 'run')}, {samples} samples, {words.duration(seconds)} in all.{apart}{fixed}",
-        f"The vessel file vessel-estimated.toml holds the estimate of {best.method.title} ({best.method.name}).",
+        f"Estimated: {words.counted(len(best.estimate.names), 'parameter')} of {content.vessel.name}, from "
+        f"{words.counted(len(batches), 'run')} with {samples} samples in {words.duration(seconds)}.{apart}{fixed}",
+        f"The file vessel-estimated.toml holds the estimate by {best.method.title} ({best.method.name}).",
         _fit_sentence(best),
     ]
 
@@ -116,8 +114,8 @@ def _fit_sentence(best: Assessed) -> str:
             parts.append(f"{medians} on the {use} runs")
         failed = sum(bool(run.problem) for run in runs)
         if failed:
-            parts.append(f"{failed} of {len(runs)} {use} runs cannot be simulated")
-    return f"Its simulations fit (median over runs): {'; '.join(parts)}." if parts else "No run could be simulated."
+            parts.append(f"{failed} of {len(runs)} {use} runs diverge")
+    return f"Fit of its simulations, median over runs: {'; '.join(parts)}." if parts else "No run could be simulated."
 
 
 def parameter_rows(content: EstimateContent) -> list[ParameterRow]:
@@ -168,10 +166,10 @@ DIES_OUT = 1e-3
 
 
 def _growth(factor: float) -> str:
-    """By how much an error grows by itself; nothing where that is not known."""
+    """Growth of an initial error; "" where it is not known."""
     if not math.isfinite(factor):
         return ""
-    return "dies out" if factor < DIES_OUT else f"\N{MULTIPLICATION SIGN}{words.significant(factor, 2)}"
+    return "decays" if factor < DIES_OUT else f"\N{MULTIPLICATION SIGN}{words.significant(factor, 2)}"
 
 
 def _percent(value: float) -> str:
@@ -180,12 +178,12 @@ def _percent(value: float) -> str:
 
 def _notes(content: EstimateContent, item: Assessed) -> MethodNotes:
     estimate, found = item.estimate, item.one_step
-    how = "no instruments"
+    how = "No instruments."
     if item.uses_instruments:
-        source = "the vessel file's values" if item.start == "nominal" else "the least-squares estimate"
+        source = "the parameters of the vessel file" if item.start == "nominal" else "the least-squares estimate"
         how = (
-            f"instruments simulated first with {source}, refined {words.counted(estimate.refinements, 'time')}; "
-            f"mean taken off: {content.found.mean}"
+            f"The first instruments are simulated with {source}, and refined "
+            f"{words.counted(estimate.refinements, 'time')}. Subtracted mean: {content.found.mean}."
         )
     diverged = tuple(f"Simulation fails: {run.problem}." for run in item.runs if run.problem)
     return MethodNotes(
@@ -207,7 +205,7 @@ def _current(item: Assessed) -> str:
         plus_minus(float(value), float(std)).replace("-", words.MINUS)
         for value, std in zip(item.current.to_mps, item.current.std_mps, strict=True)
     )
-    return f"Mean current read out of the nuisance parameters: {north} m/s to north, {east} m/s to east."
+    return f"Mean current, estimated from the nuisance parameters: {north} m/s to north, {east} m/s to east."
 
 
 def _listed(outputs: tuple[str, ...], values: list[float], decimals: int) -> str:
@@ -220,30 +218,30 @@ def _conditions(content: EstimateContent) -> list[str]:
 
 
 def advice(content: EstimateContent) -> list[str]:
-    """Honest words on which estimate to believe when, the ones that these data call for first."""
+    """Advice on the choice of the estimate, from the residuals of these data."""
     best = content.found.best
     lag = best.one_step.autocorrelation[1]
     sentences = [*unstable_warning(content.found)]
     if (lag < -0.25).any():
         sentences.append(
-            f"Successive residuals of {_names(best, lag < -0.25)} are negatively correlated, the mark of measurement "
-            "noise in the velocities. Least squares is then biased; estimates by instruments need not be."
+            f"Successive residuals of {_names(best, lag < -0.25)} are negatively correlated. This indicates "
+            "measurement noise in the velocities, which biases least squares. Prefer instrumental variables."
         )
     if (lag > 0.25).any():
         sentences.append(
-            f"Successive residuals of {_names(best, lag > 0.25)} are positively correlated: a slow effect is missing "
-            "from the model, such as wind, current, waves or a term. No method is consistent for a model that "
-            "lacks what moved the ship, and the standard deviations do not count that error."
+            f"Successive residuals of {_names(best, lag > 0.25)} are positively correlated. The model lacks a slow "
+            "effect, such as wind, current, waves or a term. No method is consistent with a wrong model structure, "
+            "and the standard deviations do not include this error. The command diagnose searches for the cause."
         )
     if not best.stable:
         sentences.append(
-            "No estimate can simulate every run, so none is fit for use as it is. Output error with a horizon "
-            "(--method oe, or oe-air where wind is measured, --horizon 30) asks only for short simulations and often "
-            "gives a model that stays stable; runs with less of what is not modelled help too."
+            "No estimate can simulate every run, so none is ready for use. Try output error with a horizon "
+            "(--method oe --horizon 30, or oe-air with measured wind): it needs only short simulations and often gives "
+            "a stable model. Runs with smaller unmodelled effects help too."
         )
     elif not best.uses_instruments and not best.method.name.startswith("oe"):
         sentences.append(
-            f"No stable estimate by instruments is at hand, so the vessel file holds that of {best.method.title}."
+            f"No instrumental-variable estimate is stable, so the vessel file holds the one by {best.method.title}."
         )
     return sentences
 

@@ -17,7 +17,7 @@ from expdesign.vessel import column_name
 def dictionary_files(
     specs: Sequence[PrimitiveSpec], *, name: str, stem: str, comments: Sequence[str] = ()
 ) -> dict[str, str | bytes]:
-    """`<stem>.toml` and a CSV for each recorded primitive; read back they give the same requests, to the last bit.
+    """`<stem>.toml` and a CSV for each recorded primitive; reading them gives exactly the same requests.
 
     Args:
         specs: requests.
@@ -40,7 +40,7 @@ def dictionary_files(
 
 
 def growth_json(growth: Growth) -> str:
-    """What was added to a dictionary, what each addition brought, and what the search guarantees, as growth.json."""
+    """Additions to a dictionary, the gain of each, and the guarantee of the search, as growth.json."""
     velocities = zip(("u_mps", "v_mps", "r_radps"), growth.limits.tolist(), strict=True)
     return strict_json(
         {

@@ -71,44 +71,44 @@ def fit_entries(item: Assessed) -> dict[str, Any]:
 
 
 def estimate_warnings(found: Assessment, item: Assessed) -> tuple[str, ...]:
-    """Everything that a user of an estimate must hear, one sentence each."""
-    diverged = [f"Simulation fails: {run.problem}." for run in item.runs if run.problem]
+    """Warnings for the user of an estimate, one sentence each."""
+    diverged = [f"The simulation diverges: {run.problem}." for run in item.runs if run.problem]
     unstable = unstable_warning(found) if item is found.best else ()
     breaches = breach_sentences(item.breaches, len(found.record.batches))
     return (*item.estimate.warnings, *diverged, *unstable, *breaches)
 
 
 def unstable_warning(found: Assessment) -> tuple[str, ...]:
-    """A sentence where the ship is unstable under recorded inputs, so that its simulated fit says little."""
+    """A warning where the ship is unstable under recorded inputs; the simulated fit is then not meaningful."""
     runs = [run.batch.name for limits, run in zip(found.limits, found.best.runs, strict=True) if limits.unstable]
     if not runs:
         return ()
     worst = max(limits.growth for limits in found.limits if limits.unstable)
     return (
-        f"In {', '.join(runs)} the ship is unstable under the inputs recorded: by this estimate an error at the start "
-        f"of a simulation grows up to {worst:.2g}-fold. Judge these runs by predictions {AHEAD_S:g} s ahead; output "
-        "error needs a horizon (--horizon) with them.",
+        f"The ship is unstable under the recorded inputs in {', '.join(runs)}: with this estimate an initial error of "
+        f"a simulation grows up to {worst:.2g}-fold. Judge these runs by the {AHEAD_S:g} s prediction. Output error "
+        "needs a horizon (--horizon) with them.",
     )
 
 
 def breach_sentences(breaches: Sequence[Breach], runs: int) -> list[str]:
-    """One sentence for each modulus that breaks the experiment condition, over all runs."""
+    """One sentence for each absolute value that breaks the excitation condition, over all runs."""
     sentences = []
     for inside in dict.fromkeys(breach.inside for breach in breaches):
         same = [breach for breach in breaches if breach.inside == inside]
         share = sum(len(breach.samples) for breach in same) / sum(breach.count for breach in same)
         worst = max(breach.margin for breach in same)
-        nearer = f"changes sign or comes nearer to zero than {worst:.3g}" if worst > 0 else "changes sign"
+        nearer = f"changes sign or comes closer to zero than {worst:.3g}" if worst > 0 else "changes sign"
         sentences.append(
-            f"The experiment condition does not hold for {inside}, inside a modulus of "
-            f"{', '.join(same[0].parameters)}: it {nearer} in {len(same)} of {words.counted(runs, 'run')}, in "
-            f"{words.percent(share)} of their samples; noise and disturbances then bias these parameters."
+            f"The excitation condition does not hold for {inside}, inside an absolute value in the term of "
+            f"{', '.join(same[0].parameters)}. It {nearer} in {len(same)} of {words.counted(runs, 'run')} and "
+            f"{words.percent(share)} of their samples. Noise and disturbances then bias these parameters."
         )
     return sentences
 
 
 def estimated_vessel(found: Assessment, vessel: Vessel, *, command: str) -> str:
-    """The vessel file with the estimate, and a comment that says whose it is."""
+    """The vessel file with the estimate, and comments on its origin."""
     best = found.best
     files = ", ".join(batch.name for batch in found.record.batches[:3])
     more = f" and {len(found.record.batches) - 3} more" if len(found.record.batches) > 3 else ""
@@ -116,11 +116,11 @@ def estimated_vessel(found: Assessment, vessel: Vessel, *, command: str) -> str:
     comments = [
         f"Parameters estimated by {best.method.title} ({best.method.name}) from",
         f"{files}{more}.",
-        "Of the methods asked for this is the first with instruments whose model can simulate every run, or the first",
-        "that can where none has instruments: with noisy regressors least squares is biased. The others are in",
-        "estimate.json. parameter_std holds standard deviations of the estimates.",
+        "This is the first of the requested methods with instruments whose model can simulate every run; without",
+        "instruments, the first that can. Reason: noisy regressors bias least squares. The other estimates are in",
+        "estimate.json. parameter_std holds the standard deviations of the estimates.",
         motion_words(found),
-        *([f"Not estimated, hence without a standard deviation: {held}."] if held else []),
+        *([f"Fixed parameters, without standard deviation: {held}."] if held else []),
         f"Made by: {command}",
     ]
     return vessel_toml(replace(vessel, model=best.model), comments=comments)
@@ -144,7 +144,7 @@ def fit_table(found: Assessment) -> tuple[tuple[str, ...], list[tuple[str, ...]]
 
 
 def limit_entries(found: Assessment) -> dict[str, Any]:
-    """Run -> what limits the fit of its simulation with the chosen estimate: numbers, and a sentence."""
+    """Run -> causes of misfit of its simulation with the chosen estimate: numbers and a sentence."""
     shares = ("constant", "slow", "quick", "parameters", "ceiling_percent", "ahead_rms", "ahead_share")
     return {
         run.batch.name: {
@@ -160,14 +160,14 @@ def limit_entries(found: Assessment) -> dict[str, Any]:
 def limit_table(found: Assessment) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Header and rows: one sentence for each run."""
     pairs = zip(found.limits, found.best.runs, strict=True)
-    return ("run", "why"), [(run.batch.name, sentence(limits, run)) for limits, run in pairs]
+    return ("run", "cause of misfit"), [(run.batch.name, sentence(limits, run)) for limits, run in pairs]
 
 
 def motion_words(found: Assessment) -> str:
-    """Whose parameters the values are."""
+    """The discretisation that the parameters belong to."""
     if found.motion == "euler":
-        return "The values are those of Euler's map at the sample time of the data."
-    return "The values are those of the continuous motion, with inputs held between samples."
+        return "The parameters belong to the Euler discretisation at the sample time of the data."
+    return "The parameters belong to the continuous-time motion, with inputs held constant between samples."
 
 
 def plus_minus(value: float, std: float) -> str:
@@ -184,7 +184,7 @@ def plus_minus(value: float, std: float) -> str:
 
 def _cell(item: Assessed, name: str) -> str:
     if name not in item.estimate.names:
-        return f"{words.significant(item.estimate.held[name])} held"
+        return f"{words.significant(item.estimate.held[name])} fixed"
     index = item.estimate.names.index(name)
     return plus_minus(float(item.estimate.values[index]), float(item.estimate.std[index]))
 

@@ -1,4 +1,4 @@
-"""What is known when the rest of a trial is planned, and what the rest buys; as replan.json."""
+"""What is known when the rest of a trial is planned, and what the rest adds; as replan.json."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from expdesign.values import Array, seal
 
 @dataclass(frozen=True, kw_only=True)
 class Purchase:
-    """The manoeuvre whose runs buy most of a parameter.
+    """The manoeuvre whose runs are most informative about a parameter.
 
     Attributes:
         primitive: its name; "" where no single manoeuvre matters.
-        runs: of it in the plan.
-        without: how many times larger the parameter's standard deviation would be without them; inf where nothing
-            else tells.
+        runs: number of its runs in the plan.
+        without: ratio of the standard deviations of the parameter without and with them; inf where it is not
+            estimable without them.
     """
 
     primitive: str
@@ -30,27 +30,27 @@ class Purchase:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Known:
-    """The state of a trial that goes on.
+    """The state of a trial in progress.
 
     Attributes:
         data: files so far.
         sailed_s: time in them [s].
-        total_s: informative time asked for in the whole trial [s].
+        total_s: informative time of the whole trial [s].
         remaining_s: informative time left [s].
-        remaining_stated: whether that was said rather than counted.
+        remaining_stated: whether the user stated it.
         pose: (3,) of the ship at the end of the data, in the area's frame.
         speed_mps: over ground in the last sample.
-        model: where the model that the rest is planned with comes from.
-        environment: current and wind that the rest is planned for.
-        weather: where they come from.
-        notes: what else a reader must hear, one sentence each.
+        model: origin of the model for the rest.
+        environment: current and wind of the rest.
+        weather: their origin.
+        notes: further remarks, one sentence each.
         parameters: p names.
         before: (p,) values before the trial, nan for parameters that the model did not have.
         now: (p,) values now.
         stated: (p,) standard deviations stated before the trial, 0 where none was.
-        so_far: (p,) of estimates from the data so far, as theory gives them; nan where they do not tell.
+        so_far: (p,) of estimates from the data so far, predicted; nan where it is not estimable.
         after: (p,) likewise from these data and the rest together.
-        purchases: (p,) what buys them.
+        purchases: (p,) most informative runs.
     """
 
     data: tuple[str, ...]

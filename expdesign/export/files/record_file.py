@@ -12,11 +12,11 @@ from expdesign.values import Array
 from expdesign.vessel import column_name
 
 GAP_SAMPLES = 10
-"""Between the time of one batch and that of the next."""
+"""Gap between the times of two batches, in samples."""
 
 
 def record_csv(batches: Sequence[Batch]) -> str:
-    """Batches as one file of measured data, told apart by the column `batch`; what is not measured is left out."""
+    """Batches as one file of measured data, numbered in the column `batch`, without signals that are not measured."""
     tables = [_columns(batch) for batch in batches]
     kept = [name for name in tables[0] if all(name in table and np.isfinite(table[name]).all() for table in tables)]
     lines, begin = [",".join(["time_s", "batch", *kept])], 0

@@ -1,7 +1,7 @@
 """Results as files: strict JSON in SI units, units in the names, and CSV with one header row.
 
 Numbers in JSON and in commands.csv are written so that reading them back gives the same float. Velocities are over
-ground in plan.json and track.csv; in dictionary.json, which knows calm water only, ground and water are the same.
+ground in plan.json and track.csv; in dictionary.json, which holds motions in calm water, ground and water are the same.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ METRE_DECIMALS, MOTION_DECIMALS, DEGREE_DECIMALS, TIME_DECIMALS = 6, 9, 9, 9
 
 
 def dictionary_json(information: Sequence[PrimitiveInformation], parameters: Sequence[str], *, vessel: Vessel) -> str:
-    """The dictionary with what each primitive tells, as dictionary.json.
+    """The dictionary with the information of each primitive, as dictionary.json.
 
     Args:
         information: of each primitive.
@@ -124,7 +124,7 @@ def durations_json(design: DurationDesign, *, compared: Sequence[Efficiencies] =
 
 
 def _certificate_entry(design: DurationDesign) -> dict[str, Any]:
-    """No feasible sharing has a criterion value above `bound`; sensitivity less price is at most `level`."""
+    """No feasible durations have a criterion value above `bound`; sensitivity minus price is at most `level`."""
     proof = design.certificate
     return {
         "theorem": proof.kind,
@@ -143,14 +143,14 @@ def _efficiency_entry(item: Efficiencies) -> dict[str, Any]:
 
 
 def plan_json(plan: Plan, *, scenario: str, vessel: Vessel, environment: Environment, clearance_m: float) -> str:
-    """The plan, leg by leg, with what the independent check found, as plan.json.
+    """The plan, leg by leg, with the results of the independent check, as plan.json.
 
     Args:
         plan: verified.
         scenario: its name.
         vessel: for name and particulars.
         environment: the forecast it was planned for.
-        clearance_m: the clearance that was asked for [m].
+        clearance_m: the required clearance [m].
 
     Raises:
         NoPlan: the plan is not verified.
@@ -210,7 +210,7 @@ def _fence_entry(plan: Plan, vessel: Vessel, clearance_m: float) -> dict[str, An
 
 
 def _promise_entry(promise: Promise | None) -> dict[str, Any] | None:
-    """What whole trials of drawn ships came to; shares of all trials, times beyond the plan's."""
+    """Results of the Monte Carlo trials: shares of all trials, times in addition to the plan."""
     if promise is None:
         return None
     return {
@@ -233,7 +233,7 @@ def _promise_entry(promise: Promise | None) -> dict[str, Any] | None:
 
 
 def _sailed_entry(plan: Plan, index: int) -> dict[str, float | None]:
-    """What drawn trials did on a leg."""
+    """Results of the Monte Carlo trials on a leg."""
     if plan.promise is None:
         return {"leave_water_probability": dict(enumerate(plan.leave_water_by_leg)).get(index)}
     leg = plan.promise.legs[index]

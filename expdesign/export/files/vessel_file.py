@@ -1,4 +1,4 @@
-"""A vessel as a vessel file, so that what was estimated can go on being used."""
+"""A vessel as a vessel file."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def vessel_toml(vessel: Vessel, *, comments: Sequence[str] = ()) -> str:
         comments: lines to go first.
 
     Raises:
-        InputError: the model's sample time is not the vessel's, which a file cannot say.
+        InputError: the model's sample time is not the vessel's, which a file cannot express.
     """
     if vessel.model.sample_time_s != vessel.sample_time_s:
         raise InputError(
@@ -69,7 +69,7 @@ def _actuator(actuator: Actuator) -> dict[str, str | float]:
 
 
 def _sensors(sensors: Sensors) -> dict[str, str | float]:
-    """What is not as it is when nothing is said."""
+    """Entries that differ from the defaults."""
     usual = Sensors()
     entries = {
         name: value for name, value in vars(sensors).items() if name not in SENSORS and value != getattr(usual, name)

@@ -90,7 +90,7 @@ def _parsed(content: bytes) -> etree._Element | str:
         root = etree.fromstring(content, parser)
     except etree.XMLSyntaxError as error:
         return f"is not well-formed XML: {error.msg}"
-    return "declares a document type, which may hide entities" if root.getroottree().docinfo.doctype else root
+    return "declares a document type, which is not allowed" if root.getroottree().docinfo.doctype else root
 
 
 def _rtz_problems(root: etree._Element, file_stem: str, size: int) -> Iterator[str]:
@@ -170,7 +170,7 @@ def _schedule(schedule: etree._Element, space: str, ids: list[str | None]) -> It
     named = [element.get("waypointId") for element in elements]
     for one in named:
         if one not in ids:
-            yield f"schedule speaks of waypoint {one}, which is not in the route"
+            yield f"schedule refers to waypoint {one}, which is not in the route"
     places = [ids.index(one) for one in named if one in ids]
     if any(two <= one for one, two in pairwise(places)):
         yield "schedule does not follow the order of the waypoints"
@@ -224,6 +224,6 @@ def _gpx_problems(root: etree._Element) -> Iterator[str]:
                 yield from _attribute("rtept", str(key), str(text))
         times = [_moment(time.text or "") for time in route.iterfind(f"{{{GPX}}}rtept/{{{GPX}}}time")]
         if None in times:
-            yield f"route {number} has a time that is none"
+            yield f"route {number} has an invalid time"
         if any(two < one for one, two in pairwise([time for time in times if time is not None])):
             yield f"route {number} goes back in time"

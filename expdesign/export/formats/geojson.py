@@ -61,7 +61,7 @@ def _water(route: Route) -> list[dict[str, Any]]:
     if route.fence is None or crosses_antimeridian(route.fence.inside):
         return []
     rings = [[[lon, lat] for lat, lon in (*ring, ring[0])] for ring in (route.fence.inside, *route.fence.outside)]
-    properties = {"name": "allowed water around the track, simplified to its safe side"}
+    properties = {"name": "allowed water around the track, conservatively simplified"}
     return [{"type": "Feature", "geometry": {"type": "Polygon", "coordinates": rings}, "properties": properties}]
 
 

@@ -21,7 +21,7 @@ def write(route: Route) -> bytes:
     root = etree.Element(f"{{{GPX}}}gpx", nsmap={None: GPX, "opencpn": OPENCPN}, version="1.1", creator="expdesign")
     line = etree.SubElement(root, f"{{{GPX}}}rte")
     _text(line, "name", route.name)
-    _text(line, "desc", f"{route.scenario}, {route.vessel}; primitives are flown with commands.csv")
+    _text(line, "desc", f"{route.scenario}, {route.vessel}; manoeuvres are executed with commands.csv")
     extensions = etree.SubElement(line, f"{{{GPX}}}extensions")
     _extension(extensions, "planned_speed", f"{route.speed_mps * KNOTS_PER_MPS:.3f}")
     departure = route.utc(0.0)

@@ -24,7 +24,7 @@ def write(route: Route) -> bytes:
     root = etree.Element(f"{{{KML}}}kml", nsmap={None: KML})
     document = _add(root, "Document")
     _text(document, "name", route.scenario)
-    _text(document, "description", f"{route.vessel}; runs are steered by commands.csv. Not for navigation.")
+    _text(document, "description", f"{route.vessel}; manoeuvres are executed with commands.csv. Not for navigation.")
     for kind, colour in COLOURS.items():
         style = _add(document, "Style", id=kind)
         line = _add(style, "LineStyle")

@@ -18,7 +18,10 @@ GROUPS = (
         (("overshoot_10_10_rad", "First overshoot"), ("second_overshoot_10_10_rad", "Second overshoot")),
     ),
     ("Zig-zag 20\N{DEGREE SIGN}/20\N{DEGREE SIGN}", (("overshoot_20_20_rad", "First overshoot"),)),
-    ("Initial turning", (("initial_turning_m", "Way to 10\N{DEGREE SIGN} of heading at 10\N{DEGREE SIGN} of helm"),)),
+    (
+        "Initial turning",
+        (("initial_turning_m", "Distance to 10\N{DEGREE SIGN} of heading at 10\N{DEGREE SIGN} of helm"),),
+    ),
     ("Stopping", (("track_reach_m", "Track reach, full astern"),)),
 )
 """Trial -> (index, name) in the order of the form."""
@@ -103,7 +106,7 @@ def _criterion(content: IndicesContent, verdicts: list[Verdict], key: str) -> st
 
 
 def ship_rows(content: IndicesContent) -> list[tuple[str, str]]:
-    """Ship data; what the vessel file does not hold is left open, to be filled in."""
+    """Ship data; blanks for what the vessel file does not hold."""
     vessel = content.vessel
     size = ", ".join(
         f"{letter} {value:.4g} m"
@@ -134,7 +137,7 @@ def _length_by_speed(content: IndicesContent) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class Shown:
-    """A condition of the measured trials beside its limit; `met` is None where it was not told."""
+    """A condition of the measured trials beside its limit; `met` is None where it was not stated."""
 
     name: str
     found: str

@@ -19,7 +19,7 @@ Found = Circle | ZigZag | Stop | NotStandard
 
 @dataclass(frozen=True, kw_only=True)
 class Held:
-    """Where and in what weather the measured trials were held; None where it is not told.
+    """Depth and weather of the measured trials; None where it is not stated.
 
     Attributes:
         depth_m: of the water.
@@ -50,13 +50,13 @@ class IndicesContent:
     Attributes:
         vessel: particulars.
         scale: ship length by model length; 1 for a ship.
-        simulated: what the vessel's model does, or None where it cannot be sailed.
+        simulated: results of the vessel model, or None where it cannot be simulated.
         simulated_why_not: why it cannot, or "".
-        measured: what measured runs show.
-        notes: what was found in the files, one sentence each.
+        measured: results of measured runs.
+        notes: remarks on the files, one sentence each.
         command: the command line.
         version: of the program.
-        held: where and in what weather the measured trials were held.
+        held: depth and weather of the measured trials.
     """
 
     vessel: Vessel
@@ -71,7 +71,7 @@ class IndicesContent:
 
     @property
     def trials(self) -> tuple[tuple[str, Circle | ZigZag | Stop], ...]:
-        """(source, trial) of everything that shows indices, measured ones first."""
+        """(source, trial) of every standard trial, measured ones first."""
         seen = [("measured", item) for item in self.measured if not isinstance(item, NotStandard)]
         return (*seen, *(("simulated", item) for item in (self.simulated.trials if self.simulated else ())))
 
@@ -87,20 +87,20 @@ class IndicesContent:
 
     @property
     def applies(self) -> str:
-        """Whether the resolution speaks of this ship, as a sentence."""
+        """Whether the resolution applies to this ship, as a sentence."""
         full = self.vessel.length_m * self.scale
         if full >= LEAST_LENGTH_M:
-            return f"The resolution applies to ships of 100 m and over; this one is {full:.0f} m long."
+            return f"The resolution applies to ships of 100 m and over. This ship is {full:.0f} m long."
         return (
-            "The resolution applies to ships of 100 m and over, and chemical tankers and gas carriers of any length; "
-            f"for this one of {full:.4g} m its limits are a yardstick."
+            "The resolution applies to ships of 100 m and over, and to chemical tankers and gas carriers of any "
+            f"length. For this ship of {full:.4g} m its limits are for comparison only."
         )
 
 
 def shown(key: str, value: float | None) -> str:
     """A value of an index in metres or degrees."""
     if value is None:
-        return "not shown"
+        return "no result"
     return f"{math.degrees(value):.1f} deg" if key.endswith("_rad") else f"{value:.4g} m"
 
 

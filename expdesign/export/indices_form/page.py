@@ -39,12 +39,12 @@ def _metres(value: float | None) -> str:
 
 
 def _circle(source: str, trial: Circle) -> tuple[str, ...]:
-    ways = (trial.advance_m, trial.transfer_m, trial.tactical_diameter_m, trial.steady_diameter_m)
+    lengths = (trial.advance_m, trial.transfer_m, trial.tactical_diameter_m, trial.steady_diameter_m)
     current = ""
     if trial.current_north_mps is not None and trial.current_east_mps is not None:
         current = f"{trial.current_north_mps:.3f}, {trial.current_east_mps:.3f}"
     head = (source, trial.name, trial.side, _degrees(trial.helm_rad), f"{trial.speed_mps:.3g}")
-    return (*head, *(_metres(way) for way in ways), current)
+    return (*head, *(_metres(length) for length in lengths), current)
 
 
 def _zigzag(source: str, trial: ZigZag) -> tuple[str, ...]:
@@ -56,6 +56,6 @@ def _zigzag(source: str, trial: ZigZag) -> tuple[str, ...]:
 
 
 def _stop(source: str, trial: Stop) -> tuple[str, ...]:
-    ways = (trial.track_reach_m, trial.head_reach_m, trial.lateral_m)
+    lengths = (trial.track_reach_m, trial.head_reach_m, trial.lateral_m)
     times = (_degrees(trial.heading_change_rad), f"{trial.time_s:.0f}")
-    return (source, trial.name, f"{trial.speed_mps:.3g}", *(shown("_m", way) for way in ways), *times)
+    return (source, trial.name, f"{trial.speed_mps:.3g}", *(shown("_m", length) for length in lengths), *times)

@@ -1,4 +1,4 @@
-"""What of IMO MSC/Circ.1053 can be said of the planned trial before anyone sails."""
+"""Conditions of IMO MSC/Circ.1053 that can be judged from the plan."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def conditions(content: ReportContent) -> tuple[Condition, ...]:
 
 
 def least_charted_depth(area: SeaArea, points: Array) -> float | None:
-    """Least depth that the chart promises along a track (k, 2) north, east [m]; None where it tells none for a part."""
+    """Least charted depth along a track (k, 2) north, east [m]; None where a part of it has no charted depth."""
     east, north = points[:, 1], points[:, 0]
     depth = np.full(len(points), -np.inf)
     for least, polygons in area.depths:

@@ -19,7 +19,7 @@ from expdesign.vessel import Vessel
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ReportContent:
-    """Everything the report tells, as values.
+    """The values that the report shows.
 
     Attributes:
         scenario: name.
@@ -28,17 +28,17 @@ class ReportContent:
         start, goal: (3,) poses asked for [north m, east m, heading rad].
         criterion: of the design, e.g. "D".
         fixed_parameters: parameters that are not estimated.
-        clearance_m: least distance from the hull to forbidden water that was asked for [m].
+        clearance_m: least distance from the hull to forbidden water that is required [m].
         confidence: share of sampled truths that must stay in safe water.
         information: of every primitive in the dictionary, in the order of the design.
         design: the durations with their certificate.
-        plan: the trial; a plan that failed its checks may be shown, and is called that.
+        plan: the trial; a plan that failed its checks is shown as such.
         command: the command line that reproduces the result.
         version: of the program.
         compared: the design under every criterion.
         route: the waypoints as exported, or None when there are none.
-        known: what a trial that goes on has told so far, or None for one that begins.
-        growth: what was added to the dictionary, or None when that was not wished.
+        known: the state of a trial in progress, or None for a new trial.
+        growth: what was added to the dictionary, or None without a search.
     """
 
     scenario: str
@@ -117,7 +117,7 @@ def information_rate(content: ReportContent) -> Array:
 
 
 def relative_information(content: ReportContent) -> Array:
-    """(q, p) information rate relative to the primitive that tells most about the parameter: 0 to 1."""
+    """(q, p) information rate relative to the most informative primitive for the parameter: 0 to 1."""
     rate = information_rate(content)
     best = rate.max(axis=0)
     return readonly(np.divide(rate, best, out=np.zeros_like(rate), where=best > 0))

@@ -1,4 +1,4 @@
-"""What the durations were made best for, how that is proven, and what other criteria say."""
+"""The criterion of the design, its certificate, and the efficiency under other criteria."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from expdesign.export.report.content import ReportContent
 
 @dataclass(frozen=True, kw_only=True)
 class Comparison:
-    """Efficiencies as a table; `missing` tells why a criterion is not in it."""
+    """Efficiencies as a table; `missing` gives the reason why a criterion is not in it."""
 
     designs: tuple[str, ...]
     rows: tuple[tuple[str, str, tuple[str, ...]], ...]
     missing: tuple[tuple[str, str], ...]
 
 
-NAMES = {"continuous": "optimal shares", "repeats": "whole runs", "uniform": "equal time"}
+NAMES = {"continuous": "optimal allocation", "repeats": "whole runs", "uniform": "equal time"}
 
 
 def comparison(content: ReportContent) -> Comparison:
@@ -36,7 +36,7 @@ def comparison(content: ReportContent) -> Comparison:
 
 
 def limit_rows(content: ReportContent) -> list[tuple[str, str, str, str, str]]:
-    """Name, what was asked, optimal shares, whole runs and price of every limit."""
+    """Name, required value, optimal allocation, whole runs and price of every limit."""
     return [
         (
             kept.name,
@@ -50,7 +50,7 @@ def limit_rows(content: ReportContent) -> list[tuple[str, str, str, str, str]]:
 
 
 def criterion_sentence(content: ReportContent) -> str:
-    """The criterion, what it counts, and against which models."""
+    """The criterion, its scope, and its models."""
     problem = content.design.problem
     title = {item.name: item.title for item in CRITERIA}[problem.aim.criterion]
     about = f", of {', '.join(problem.aim.interest)}" if problem.aim.interest else ""
@@ -61,8 +61,8 @@ def criterion_sentence(content: ReportContent) -> str:
         "average": f", on average over {len(problem.sampled)} models drawn from the prior",
         "worst": f", for the worst of {len(problem.sampled)} models drawn from the prior",
     }[problem.robust]
-    prior = " What is known before the trial is counted in." if problem.prior.any() else ""
-    return f"Criterion {problem.aim.criterion}: the least {title}{about}{models}.{prior}"
+    prior = " Prior knowledge is included." if problem.prior.any() else ""
+    return f"Criterion {problem.aim.criterion} minimises the {title}{about}{models}.{prior}"
 
 
 def certificate(content: ReportContent) -> str:
@@ -72,14 +72,14 @@ def certificate(content: ReportContent) -> str:
     if not math.isfinite(proof.bound):
         return f"There is no certificate of optimality: {proof.kind.removeprefix('none: ')}."
     best = int(net.argmax())
-    price = ", less what the limits take off it," if proof.multipliers else ""
+    price = " minus the price of the limits" if proof.multipliers else ""
     gap = words.significant(design.gap, 2) if design.gap > 1e-6 else "0.000001"
     return (
-        f"A sharing of the time is optimal exactly when no sensitivity{price} exceeds the bound "
-        f"{words.significant(proof.level, 6)} and every manoeuvre whose time is free touches it ({proof.kind}). The "
-        f"largest here is {words.number(float(net[best]), 6)} ({design.problem.names[best]}), so the criterion's "
-        f"logarithm, {words.number(proof.value, 3)}, cannot be raised by more than {gap}: no other sharing among these "
-        f"manoeuvres is better by more than {short_of_optimum(content)} in {design.problem.aim.criterion}-efficiency."
+        f"The durations are optimal if no sensitivity{price} exceeds the bound {words.significant(proof.level, 6)}, "
+        f"and every used manoeuvre reaches it ({proof.kind}). The largest value is {words.number(float(net[best]), 6)} "
+        f"({design.problem.names[best]}). The logarithm of the criterion, {words.number(proof.value, 3)}, can "
+        f"therefore increase by {gap} at most: no other durations of these manoeuvres are better by more than "
+        f"{short_of_optimum(content)} in {design.problem.aim.criterion}-efficiency."
     )
 
 

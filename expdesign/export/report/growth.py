@@ -1,4 +1,4 @@
-"""What a search added to the dictionary, and what each addition brought."""
+"""Manoeuvres that a search added to the dictionary, and the gain of each."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class GrowthRow:
 
 
 def growth_rows(growth: Growth) -> list[GrowthRow]:
-    """Additions in the order in which they came."""
+    """Additions in order."""
     return [_row(number, found) for number, found in enumerate(growth.rounds, start=1)]
 
 
@@ -43,18 +43,18 @@ def _row(number: int, found: GrowRound) -> GrowthRow:
 
 
 def growth_sentences(growth: Growth) -> tuple[str, str]:
-    """What the search looked for before its table, and what it promises after it."""
+    """Sentences before and after the table: the search space, and the guarantee."""
     (u, v, r) = growth.limits.tolist()
     turning = [words.number(float(np.degrees(rate)), 1) for rate in r]
     before = (
-        f"{words.counted(growth.evaluated, 'candidate')} were looked at, with u from {words.number(u[0])} to "
+        f"The search evaluated {words.counted(growth.evaluated, 'candidate')}, with u from {words.number(u[0])} to "
         f"{words.number(u[1])} m/s, v from {words.number(v[0])} to {words.number(v[1])} m/s and r from {turning[0]} to "
-        f"{turning[1]} \N{DEGREE SIGN}/s. A manoeuvre helps where its sensitivity is above {growth.dimension}; each "
-        "round adds the one with the largest, and shares the time out again."
+        f"{turning[1]} \N{DEGREE SIGN}/s. A manoeuvre improves the design if its sensitivity exceeds "
+        f"{growth.dimension}. Each step adds the most sensitive one and optimises the durations again."
     )
     after = (
-        f"In the end the most sensitive candidate found has {words.number(growth.best_left)}, so that the optimum has "
-        f"an efficiency of at least {words.percent(growth.efficiency_left)} among all candidates that were looked at. "
-        "Of manoeuvres that the search did not come across it says nothing."
+        f"The most sensitive remaining candidate has {words.number(growth.best_left)}. The final design therefore has "
+        f"an efficiency of at least {words.percent(growth.efficiency_left)} among all evaluated candidates. There is "
+        "no guarantee about manoeuvres that were not evaluated."
     )
     return before, after

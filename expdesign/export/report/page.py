@@ -23,17 +23,17 @@ from expdesign.export.report.trust import chain
 from expdesign.export.report.uncertainty import Expected, expected, measures_velocity
 
 SUBTRACTION = {
-    "none": "nothing is subtracted from the regressors before estimation",
-    "batch": "each run's own mean is subtracted from the regressors before estimation",
-    "complete": "the mean over the whole data is subtracted from the regressors before estimation, which takes out "
-    "constant disturbances",
+    "none": "no mean is subtracted from the instruments",
+    "batch": "the mean of each run is subtracted from the instruments",
+    "complete": "the mean over all data is subtracted from the instruments; this removes the effect of constant "
+    "disturbances",
 }
 
 
 MORE_THAN_OPTIMAL = (
-    ", because the legs between the runs take time of their own and do what no manoeuvre in the dictionary does"
+    " (more than 100 % because the legs between the runs add time, and motions that no manoeuvre of the dictionary has)"
 )
-UNKNOWN_DEPTH = "No depths were checked: the chart tells only land. Check the whole track against the official chart."
+UNKNOWN_DEPTH = "No depths were checked: the chart shows only land. Check the whole track against the official chart."
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,23 +106,24 @@ def _origin(content: ReportContent) -> str:
 
 
 def summary(content: ReportContent) -> list[str]:
-    """The trial in a few sentences, key numbers first."""
+    """The trial in a few sentences."""
     plan, check = content.plan, content.plan.verification
     total, runs = plan.commands.duration_s, len(primitive_runs(plan))
     bound = (
-        f" (at this transit speed no plan with these runs needs less than {words.duration(plan.reposition_bound_s)}, "
-        "as far as the fastest changes of speed are known)"
+        f" (lower bound for these runs at this transit speed: {words.duration(plan.reposition_bound_s)}, with the "
+        "fastest known changes of speed)"
     )
     verdict = (
-        f"The plan is verified: with its commands simulated again, the hull comes no nearer to forbidden water than "
-        f"{words.distance(check.clearance_min_m)} ({words.distance(content.clearance_m)} asked for)."
+        f"The plan is verified. An independent simulation of its commands keeps the hull at least "
+        f"{words.distance(check.clearance_min_m)} from forbidden water ({words.distance(content.clearance_m)} "
+        "required)."
         if check.verified
         else f"The plan is NOT verified and must not be sailed: {'; '.join(check.problems)}."
     )
     depths = [] if plan.area.depths else [UNKNOWN_DEPTH]
     return [
-        f"{words.duration(total)} and {words.distance(plan.trajectory.distance_m)} from start to goal: "
-        f"{words.counted(runs, 'informative run')} taking {words.duration(plan.seconds('primitive'))}, and "
+        f"The trial takes {words.duration(total)} and {words.distance(plan.trajectory.distance_m)} from start to goal: "
+        f"{words.duration(plan.seconds('primitive'))} in {words.counted(runs, 'informative run')}, and "
         f"{words.duration(plan.seconds('reposition'))} of repositioning{bound if plan.reposition_bound_s > 0 else ''}.",
         *([day] if (day := day_sentence(plan.promise, total)) else []),
         verdict,
@@ -134,31 +135,31 @@ def summary(content: ReportContent) -> list[str]:
 def _design_sentence(content: ReportContent) -> str:
     design, realised = content.design, content.plan.design_efficiency_realised
     text = (
-        f"The time is shared so that {words.counted(len(content.parameters), 'model parameter')} can be estimated "
-        f"best: whole runs reach {words.percent(design.efficiency_repeats)} of the certified optimum, equal time on "
-        f"every manoeuvre would reach {words.percent(design.efficiency_uniform)}"
+        f"The durations are optimal for the estimation of {words.counted(len(content.parameters), 'model parameter')}. "
+        f"Rounded to whole runs they reach {words.percent(design.efficiency_repeats)} of the certified optimum; equal "
+        f"time for every manoeuvre would reach {words.percent(design.efficiency_uniform)}"
     )
     if realised is None:
         return f"{text}."
     optimal = words.duration(design.problem.total_s)
     more = MORE_THAN_OPTIMAL if realised > 1 else ""
     placed = content.plan.design_efficiency_placed
-    runs = "" if placed is None else f"The runs as placed collect {words.percent(placed)}, the"
+    runs = "" if placed is None else f"the runs as placed collect {words.percent(placed)}, and "
     return (
-        f"{text}. {runs or 'The'} whole track, repositioning included, {'' if runs else 'collects '}"
-        f"{words.percent(realised)} of the information of an optimal {optimal}{more}."
+        f"{text}. Compared with {optimal} of the optimal design, {runs}the whole track including repositioning "
+        f"collects {words.percent(realised)}{more}."
     )
 
 
 def facts(content: ReportContent) -> list[Fact]:
-    """The key numbers, for a glance."""
+    """The key numbers."""
     plan, check, design = content.plan, content.plan.verification, content.design
     realised = plan.design_efficiency_realised
     return [
         Fact(
             name="Time",
             value=words.duration(plan.commands.duration_s),
-            remark=f"{words.duration(plan.seconds('primitive'))} informative",
+            remark=f"{words.duration(plan.seconds('primitive'))} in informative runs",
         ),
         Fact(
             name="Distance",
@@ -168,23 +169,23 @@ def facts(content: ReportContent) -> list[Fact]:
         Fact(
             name="Least clearance",
             value=words.distance(check.clearance_min_m),
-            remark=f"{words.distance(content.clearance_m)} asked for{'' if plan.area.depths else '; to land only'}",
+            remark=f"{words.distance(content.clearance_m)} required{'' if plan.area.depths else '; to land only'}",
         ),
         Fact(
-            name="Optimal to within",
+            name="Optimality gap",
             value=criteria.short_of_optimum(content),
-            remark=f"certified; whole runs reach {words.percent(design.efficiency_repeats)}",
+            remark=f"certified bound; whole runs reach {words.percent(design.efficiency_repeats)}",
         ),
         Fact(
             name="Information realised",
             value="not computed" if realised is None else words.percent(realised),
-            remark=f"of an optimal {words.duration(design.problem.total_s)}, repositioning included",
+            remark=f"of {words.duration(design.problem.total_s)} of the optimal design, repositioning included",
         ),
     ]
 
 
 def assumptions(content: ReportContent) -> list[tuple[str, str]]:
-    """What the numbers rest on, as topic and sentence."""
+    """The assumptions behind the numbers: (topic, sentence)."""
     area, environment, vessel, model = content.plan.area, content.environment, content.vessel, content.vessel.model
     fixed = ", ".join(content.fixed_parameters)
     return [
@@ -195,11 +196,14 @@ def assumptions(content: ReportContent) -> list[tuple[str, str]]:
         ("Wind", words.wind(environment.wind_to, environment.wind_std_mps)),
         (
             "Vessel model",
-            f"{words.counted(len(model.terms), 'term')} with their nominal parameters, in {model.form} form; "
-            "what the real ship does differently is not in the track, only in the stated uncertainties",
+            f"{words.counted(len(model.terms), 'term')} with nominal parameters, in {model.form} form. The track is "
+            "that of the nominal model; the stated uncertainties cover the difference from the real ship",
         ),
-        ("Fixed parameters", f"{fixed}: held at the vessel file's values" if fixed else "none, all are estimated"),
+        (
+            "Fixed parameters",
+            f"{fixed}: fixed at the values of the vessel file" if fixed else "none, all are estimated",
+        ),
         ("Mean subtraction", SUBTRACTION[content.design.problem.mean_subtraction]),
-        ("Hull", f"a rectangle of {vessel.length_m:g} m by {vessel.beam_m:g} m, which contains the waterline"),
-        ("Start and goal", "the ship starts and ends at rest through the water"),
+        ("Hull", f"a rectangle of {vessel.length_m:g} m by {vessel.beam_m:g} m that contains the waterline"),
+        ("Start and goal", "the ship is at rest relative to the water"),
     ]

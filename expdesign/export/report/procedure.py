@@ -1,4 +1,4 @@
-"""How a trial is sailed, and what was found when drawn ships sailed it so: the same words in report and run cards."""
+"""The procedure on board, and the result of its Monte Carlo simulation: shared by the report and the run cards."""
 
 from __future__ import annotations
 
@@ -9,27 +9,27 @@ from expdesign.plan.values import Plan, Promise
 
 
 def procedure_sentences(plan: Plan) -> list[str]:
-    """What the crew does between runs, one sentence for each step; none where nothing is promised."""
+    """The steps between runs, one text each; none where no Monte Carlo trials were simulated."""
     promise = plan.promise
     if promise is None:
         return []
     within = _tolerances(promise, [leg.kind == "primitive" for leg in plan.legs])
     return [
-        "Run: give the orders of the card open loop, from the state the ship really has.",
-        "After it: come back to the planned leg from wherever the run has ended, and follow it, steered. Where that "
-        "way does not lie in safe water, or the leg is too short to make the distance good, go round at once.",
-        f"Start: begin the next run if {within}.",
-        "Otherwise go round: the shortest way in safe water to a place behind the start, then steady on the planned "
-        f"heading at the planned speed up to the start once more; {words.counted(promise.rounds, 'time')} at most, "
-        "then break the trial off.",
+        "Run: give the orders on the card without correcting for the motion of the ship.",
+        "After the run: return to the planned leg and follow it under control. If the return path is not in safe "
+        "water, or the leg is too short to correct the deviation, make a go-around at once.",
+        f"Start gate: begin the next run if {within}.",
+        "Go-around, if not: take the shortest path in safe water to a point behind the start. Approach the start again "
+        f"on the planned heading at the planned speed. After {words.counted(promise.rounds, 'go-around')}, abort the "
+        "trial.",
     ]
 
 
 def _tolerances(promise: Promise, runs: list[bool]) -> str:
-    """Within which a run may begin."""
+    """Tolerances at the start of a run, in words."""
     off = [leg.position_m for leg, run in zip(promise.legs, runs, strict=True) if run] or [math.nan]
     least, most = words.distance(min(off)), words.distance(max(off))
-    position = least if least == most else f"what its card says ({least} to {most}, by the room there is)"
+    position = least if least == most else f"the distance on its card ({least} to {most}, depending on the sea room)"
     return (
         f"the position is within {position} of the planned start, the heading within "
         f"{words.significant(math.degrees(promise.heading_rad), 2)}{words.NB}\N{DEGREE SIGN}, the velocity over ground "
@@ -39,28 +39,26 @@ def _tolerances(promise: Promise, runs: list[bool]) -> str:
 
 
 def left_words(promise: Promise) -> str:
-    """The share of drawn trials that left allowed water, with how sure that is."""
-    most = f"below {words.percent(promise.left_most)} with 95{words.NB}% confidence"
+    """The share of simulated trials that left allowed water, with its confidence bound."""
+    most = f"probability below {words.percent(promise.left_most)} with 95{words.NB}% confidence"
     count = round(promise.left * promise.trials)
     if count == 0:
-        return f"none of {promise.trials} drawn trials: {most}"
-    return f"{words.percent(promise.left)}, {count} of {promise.trials} drawn trials: {most}"
+        return f"none of {promise.trials} simulated trials; {most}"
+    return f"{words.percent(promise.left)}, {count} of {promise.trials} simulated trials; {most}"
 
 
 def aborted_words(promise: Promise) -> str:
-    """How many trials were broken off, and where and why."""
+    """How many trials were aborted, where and why."""
     if promise.aborted == 0.0:
-        return f"none of {promise.trials} drawn trials"
-    return f"{words.percent(promise.aborted)} of {promise.trials} drawn trials: {'; '.join(promise.reasons)}"
+        return f"none of {promise.trials} simulated trials"
+    return f"{words.percent(promise.aborted)} of {promise.trials} simulated trials: {'; '.join(promise.reasons)}"
 
 
 def extra_words(promise: Promise) -> str:
-    """Time beyond the plan's."""
+    """Time in addition to the planned time."""
     if math.isnan(promise.extra_median_s):
-        return "no drawn trial came to the goal"
-    return (
-        f"{_more(promise.extra_median_s)} in the middle, up to {_more(promise.extra_most_s)} in 95{words.NB}% of trials"
-    )
+        return "no simulated trial reached the goal"
+    return f"median {_more(promise.extra_median_s)}, 95th percentile {_more(promise.extra_most_s)}"
 
 
 def _more(seconds: float) -> str:
@@ -68,12 +66,12 @@ def _more(seconds: float) -> str:
 
 
 def day_sentence(promise: Promise | None, planned_s: float) -> str:
-    """That the trial may well be broken off, and how long to book; "" where it is not known."""
+    """The probability of an abort where it is high, and the time to reserve; "" where it is not known."""
     if promise is None or math.isnan(promise.extra_median_s):
         return ""
-    warning = f"Mind: {promise.note}. " if promise.note else ""
+    warning = f"Warning: {promise.note}. " if promise.note else ""
     whole = words.duration(planned_s + max(promise.extra_most_s, 0.0))
     return (
-        f"{warning}Coming back to the starts takes time that the plan does not show: {extra_words(promise)}. Book "
-        f"{whole} from start to goal, besides breaks."
+        f"{warning}Returning to the start of each run takes time in addition to the plan: {extra_words(promise)}. "
+        f"Reserve {whole} from start to goal, without breaks."
     )

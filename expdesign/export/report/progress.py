@@ -1,4 +1,4 @@
-"""The part of the report about a trial that goes on: what is known, and what the rest buys."""
+"""The section of the report on a trial in progress: what is known, and what the rest of the trial adds."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class KnownRow:
 
 
 def known_rows(known: Known | None) -> list[KnownRow]:
-    """Parameters in order; none for a trial that begins."""
+    """Parameters in order; none for a new trial."""
     if known is None:
         return []
     columns = (known.before, known.now, known.stated, known.so_far, known.after)
@@ -42,9 +42,7 @@ def known_rows(known: Known | None) -> list[KnownRow]:
             stated=words.significant(stated, 2) if stated > 0 else "not stated",
             so_far=_std(so_far),
             after=_std(after),
-            bought=f"{item.runs} \N{MULTIPLICATION SIGN} {item.primitive}"
-            if item.primitive
-            else "no run in particular",
+            bought=f"{item.runs} \N{MULTIPLICATION SIGN} {item.primitive}" if item.primitive else "no single manoeuvre",
             without=_without(item),
         )
         for name, before, now, stated, so_far, after, item in rows
@@ -52,17 +50,17 @@ def known_rows(known: Known | None) -> list[KnownRow]:
 
 
 def _std(value: float) -> str:
-    return "not told" if math.isnan(value) else words.significant(value, 2)
+    return "not estimable" if math.isnan(value) else words.significant(value, 2)
 
 
 def _without(item: Purchase) -> str:
     if not item.primitive:
         return ""
-    return "not told" if math.isinf(item.without) else f"{words.significant(item.without, 2)} times larger"
+    return "not estimable" if math.isinf(item.without) else f"{words.significant(item.without, 2)} times larger"
 
 
 def known_sentences(known: Known | None, frame: LocalFrame) -> list[str]:
-    """Where the trial stands; none for a trial that begins."""
+    """The state of the trial; none for a new trial."""
     if known is None:
         return []
     lat, lon = frame.to_degrees(known.pose[:2]).tolist()
@@ -70,35 +68,35 @@ def known_sentences(known: Known | None, frame: LocalFrame) -> list[str]:
     left = (
         "as stated"
         if known.remaining_stated
-        else f"the {words.duration(known.total_s)} of the whole trial less the time of the data"
+        else f"that is {words.duration(known.total_s)} for the whole trial minus the duration of the data"
     )
     current = words.current(known.environment.current_to, known.environment.current_std_mps)
     wind = words.wind(known.environment.wind_to, known.environment.wind_std_mps)
     moving = (
-        f"Its speed over ground there was {words.speed(known.speed_mps)}; this plan takes it to be stopped through the "
-        "water before it goes on."
+        f"The speed over ground was {words.speed(known.speed_mps)}. The plan assumes that the ship then stops "
+        "relative to the water."
     )
     return [
-        f"This is the rest of a trial. So far {words.duration(known.sailed_s)} of data are there ({files}); "
-        f"{words.duration(known.remaining_s)} of informative time are left, {left}.",
+        f"This plan is for the rest of a trial. Data so far: {words.duration(known.sailed_s)} ({files}). Informative "
+        f"time left: {words.duration(known.remaining_s)}, {left}.",
         f"The data end with the ship at {words.latitude(lat)}, {words.longitude(lon)}, heading "
         f"{words.bearing(float(known.pose[2]))}. {moving}",
-        f"The model: {known.model}. The weather: {current}; {wind} ({known.weather}).",
+        f"Model: {known.model}. Weather: {current}; {wind} ({known.weather}).",
         *known.notes,
         _gain(known),
     ]
 
 
 def _gain(known: Known) -> str:
-    """How much better the rest makes what the data have told."""
+    """The gain in accuracy by the rest of the trial."""
     both = np.isfinite(known.so_far) & np.isfinite(known.after) & (known.after > 0)
     if not both.any():
-        return "What the data so far have told of the parameters cannot be compared with what the rest adds."
+        return "The accuracy from the data so far cannot be compared with the accuracy after the rest."
     ratio = float(np.exp(np.mean(np.log(known.so_far[both] / known.after[both]))))
     first = np.isnan(known.so_far) & np.isfinite(known.after)
     names = [name for name, untold in zip(known.parameters, first, strict=True) if untold]
-    more = f" It tells {', '.join(names)} for the first time." if names else ""
+    more = f" The data so far cannot determine {', '.join(names)}; the rest can." if names else ""
     return (
-        f"With the rest, standard deviations are expected to be {words.significant(ratio, 2)} times smaller than by "
+        f"After the rest, the expected standard deviations are {words.significant(ratio, 2)} times smaller than from "
         f"the data so far (geometric mean).{more}"
     )

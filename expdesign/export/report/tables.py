@@ -1,4 +1,4 @@
-"""Tables of the report: rows of words and numbers, ready to be shown."""
+"""Tables of the report: rows of text."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ REST_MPS, REST_RADPS = 0.02, 0.0005
 
 @dataclass(frozen=True, kw_only=True)
 class AgendaRow:
-    """One leg as the bridge reads it."""
+    """One leg of the agenda."""
 
     leg: int
     run: int | None
@@ -57,7 +57,7 @@ def _agenda_row(plan: Plan, index: int, leg: Leg, run: int | None) -> AgendaRow:
 
 @dataclass(frozen=True, kw_only=True)
 class PrimitiveRow:
-    """One primitive: what it is, what it tells, how often it is run."""
+    """One primitive: description, information, number of runs."""
 
     name: str
     family: str
@@ -90,7 +90,7 @@ def primitive_rows(content: ReportContent) -> list[PrimitiveRow]:
             settings=settings_sentence(item),
             lasts=words.duration(item.primitive.duration_s),
             entry=_entry(item),
-            log_det="cannot alone" if item.log_det_alone is None else words.number(item.log_det_alone, 1),
+            log_det="singular" if item.log_det_alone is None else words.number(item.log_det_alone, 1),
             excites=item.excitation_condition,
             share=words.percent(float(fraction)),
             optimal=words.duration(float(seconds)),
@@ -150,7 +150,7 @@ class Check:
 
 
 def checks(content: ReportContent) -> list[Check]:
-    """What the independent check found, beside what was required."""
+    """Results of the independent check beside the requirements."""
     plan, found = content.plan, content.plan.verification
     rows = [
         Check(
@@ -160,13 +160,13 @@ def checks(content: ReportContent) -> list[Check]:
             passed=found.clearance_min_m >= content.clearance_m,
         ),
         Check(
-            what="Largest distance between the planned track and the commands run again",
+            what="Largest distance between the planned track and the independent simulation",
             found="less than 1 mm" if found.reproduction_error_m < 1e-3 else words.distance(found.reproduction_error_m),
             required="",
             passed=None,
         ),
         Check(
-            what="Largest violation of an actuator limit or rate",
+            what="Largest violation of an actuator limit or rate limit",
             found="none" if found.limit_excess < 1e-6 else f"{words.percent(found.limit_excess)} of its range",
             required="",
             passed=None,
@@ -176,22 +176,22 @@ def checks(content: ReportContent) -> list[Check]:
 
 
 def _promise_checks(promise: Promise, allowed: float) -> list[Check]:
-    """What drawn ships in drawn weather did with the plan."""
+    """Results of the Monte Carlo trials."""
     return [
         Check(
-            what="Chance that the hull leaves allowed water in the trial as it is sailed, runs and ways between them",
+            what="Probability that the hull leaves allowed water during the trial",
             found=left_words(promise),
             required=f"at most {words.percent(allowed)}",
             passed=promise.left <= allowed + 1e-12,
         ),
         Check(
-            what="Trials broken off because a run could not be begun within tolerance",
+            what="Trials aborted because a run could not start within its tolerances",
             found=aborted_words(promise),
             required="",
             passed=None,
         ),
         Check(
-            what="Time beyond the plan's, for coming back to the starts of runs",
+            what="Time in addition to the plan, for returning to the start of each run",
             found=extra_words(promise),
             required="",
             passed=None,
@@ -236,14 +236,14 @@ def parameter_rows(content: ReportContent, found: Expected) -> list[ParameterRow
 
 
 def _std(value: float) -> str:
-    return "cannot be told" if np.isnan(value) else _small(value)
+    return "not estimable" if np.isnan(value) else _small(value)
 
 
 SMALL = 1e-3
 
 
 def _small(value: float, digits: int = 2) -> str:
-    """Significant digits, as a power of ten where written out there would be more noughts than digits."""
+    """Significant digits; small values as a power of ten."""
     if not 0 < abs(value) < SMALL:
         return words.significant(value, digits)
     number, _, power = f"{value:.{digits - 1}e}".partition("e")
@@ -255,21 +255,24 @@ RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def equation_sentence(content: ReportContent) -> str:
-    """What the terms of the parameters are terms of."""
+    """Units and the sample time of the equations."""
     model = content.vessel.model
     units = "Parameters and standard deviations are in m, s and rad, and the model's units of force."
     if model.form == "discrete":
-        return f"T is the sample time that the parameters hold, {model.sample_time_s:g} s. {units}"
+        return f"T is the sample time of the model, {model.sample_time_s:g} s. {units}"
     return units
 
 
 def excitation_sentence(content: ReportContent) -> str:
-    """What follows for the estimation from where the excitation condition holds."""
+    """Consequences of the excitation condition for the estimation."""
     held = [item.primitive.name for item in content.information if item.excitation_condition]
     if len(held) == len(content.information):
-        return "The excitation condition holds everywhere: instrumental variables stay unbiased with noisy sensors."
-    where = f"only in {words.counted(len(held), 'manoeuvre')}" if held else "nowhere"
+        return (
+            "The excitation condition holds in all manoeuvres: instrumental variables are unbiased with noisy sensors."
+        )
+    where = f"only in {words.counted(len(held), 'manoeuvre')}" if held else "in no manoeuvre"
     return (
-        f"The excitation condition holds {where}: elsewhere noisy velocities bias the estimates of terms with a "
-        "modulus, also those by instrumental variables; output error avoids it where only sensors disturb."
+        f"The excitation condition holds {where}. In the others noisy velocities bias the terms with an absolute "
+        "value, also with instrumental variables. Output error avoids this bias if sensor noise is the only "
+        "disturbance."
     )

@@ -1,4 +1,4 @@
-"""The chain from the mathematical optimum to the file on the bridge: what is lost, and what is proved, at each link."""
+"""The steps from the mathematical optimum to the route file: the loss and the proof at each step."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from expdesign.export.routes import DEGREE_DECIMALS
 
 @dataclass(frozen=True, kw_only=True)
 class Link:
-    """One step: what it is, what was found, and what the number rests on."""
+    """One step: its name, its result, and the method behind the number."""
 
     step: str
     found: str
@@ -23,40 +23,40 @@ def chain(content: ReportContent, *, short_of_optimum: str) -> list[Link]:
     design, plan, check = content.design, content.plan, content.plan.verification
     links = [
         Link(
-            step="Best sharing of the time",
-            found=f"no other sharing among these manoeuvres is better by more than {short_of_optimum}",
-            proof="equivalence theorem, computed from the matrices in dictionary.json",
+            step="Optimal durations",
+            found=f"no other allocation of the time is better by more than {short_of_optimum}",
+            proof="equivalence theorem, with the matrices in dictionary.json",
         ),
         Link(
             step="Whole runs",
             found=f"{words.percent(design.efficiency_repeats)} of that optimum",
-            proof="the information of the runs as they are counted",
+            proof="information of the whole runs",
         ),
     ]
     if plan.design_efficiency_placed is not None:
         links.append(
             Link(
                 step="Runs as placed",
-                found=f"{words.percent(plan.design_efficiency_placed)} of the optimum's information",
-                proof="the information of the runs alone, on their headings in the wind and from the entries reached",
+                found=f"{words.percent(plan.design_efficiency_placed)} of the information of the optimum",
+                proof="information of the runs alone, with their planned headings and initial velocities",
             )
         )
     if plan.design_efficiency_realised is not None:
         links.append(
             Link(
-                step="One stitched track",
-                found=f"{words.percent(plan.design_efficiency_realised)} of the optimum's information",
-                proof="the information of the track as sailed, repositioning included",
+                step="Whole track",
+                found=f"{words.percent(plan.design_efficiency_realised)} of the information of the optimum",
+                proof="information of the whole track, repositioning included",
             )
         )
     links.append(
         Link(
             step="Allowed water",
             found=(
-                f"{words.distance(check.clearance_min_m)} at the nearest, "
-                f"{words.distance(content.clearance_m)} asked for"
+                f"least clearance {words.distance(check.clearance_min_m)}, "
+                f"{words.distance(content.clearance_m)} required"
             ),
-            proof="commands simulated again ten times finer, the hull swept against the chart's polygons",
+            proof="independent simulation with a ten times smaller step; swept hull against the polygons of the chart",
         )
     )
     return [*links, *_route_links(content)]
@@ -72,11 +72,11 @@ def _route_links(content: ReportContent) -> list[Link]:
         Link(
             step="Exported route",
             found=(
-                f"{len(route.waypoints)} waypoints; track within {words.number(fit.largest_m)} m of the legs, "
-                f"{words.number(route.xtd_m)} m stated as cross-track distance{water}"
+                f"{len(route.waypoints)} waypoints; track within {words.number(fit.largest_m)} m of the legs; "
+                f"stated cross-track distance {words.number(route.xtd_m)} m{water}"
             ),
             proof=(
-                f"measured at every sample, positions at {DEGREE_DECIMALS} decimals; rhumb lines stray from the "
+                f"computed at every sample, positions with {DEGREE_DECIMALS} decimals; rhumb lines deviate from the "
                 f"straight legs by {_small(fit.loxodrome_m)}, great circles by {_small(fit.orthodrome_m)}"
             ),
         )

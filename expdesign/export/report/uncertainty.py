@@ -19,7 +19,7 @@ class Expected:
 
     Attributes:
         before: prior, zero where none was stated.
-        runs: of estimates from the informative runs alone; not-a-numbers where they do not tell.
+        runs: of estimates from the informative runs alone; nan where they cannot be estimated.
         track: of estimates from the whole track.
     """
 

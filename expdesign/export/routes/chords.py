@@ -43,7 +43,7 @@ def cut_into_chords(
 
 
 def _split(points: Array, first: int, last: int, tolerance_m: float, water: shapely.MultiPolygon | None) -> int | None:
-    """Where the chord must be broken, or None when it serves."""
+    """Where the chord must be broken, or None when it is acceptable."""
     off, back = _off_and_back(points[first : last + 1])
     if last - first > 1 and off.max() > tolerance_m:
         return first + int(off.argmax())
@@ -59,7 +59,7 @@ def _split(points: Array, first: int, last: int, tolerance_m: float, water: shap
 
 
 def _off_and_back(points: Array) -> tuple[Array, tuple[int, float]]:
-    """(k,) distances to the chord from first to last point, and the sample before the largest way back along it [m]."""
+    """(k,) distances to the chord, and the sample before the largest backward motion along it with its size [m]."""
     chord = points[-1] - points[0]
     length = float(np.hypot(*chord))
     from_start = points - points[0]

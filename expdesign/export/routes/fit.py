@@ -1,4 +1,4 @@
-"""How well a route of waypoints, as its files tell it, fits the track: exact distances after rounding to file decimals.
+"""How well a route of waypoints fits the track: exact distances after rounding to file decimals.
 
 A chart system sails a leg as a rhumb line or a great circle, the plan's frame is a transverse Mercator projection: the
 three differ by less than the figures below, which are measured for every leg and not estimated.
@@ -26,8 +26,8 @@ class RouteFit:
 
     Attributes:
         cross_track_m: largest distance of the track from the leg sailed at that time, straight in the plan's frame.
-        loxodrome_m: farthest that a rhumb line between two waypoints strays from that straight line.
-        orthodrome_m: farthest that a great circle (the geodesic) does.
+        loxodrome_m: largest deviation of a rhumb line between two waypoints from that straight line.
+        orthodrome_m: the same for a great circle (the geodesic).
         in_water: whether every leg lies in the allowed water; None when the chart was not at hand.
     """
 
@@ -38,7 +38,7 @@ class RouteFit:
 
     @property
     def largest_m(self) -> float:
-        """Bound on the distance of the track from the leg, whichever way it is sailed [m]."""
+        """Bound on the distance of the track from the leg, for a rhumb line or a great circle [m]."""
         return self.cross_track_m + max(self.loxodrome_m, self.orthodrome_m)
 
 
@@ -64,7 +64,7 @@ def fit_route(
     for (one, two), (start, end) in zip(pairwise(groups), pairwise(places), strict=True):
         samples = shapely.points(points[one[0] : two[1] + 1])
         across = max(across, float(shapely.distance(samples, shapely.LineString([start, end])).max()))
-    rhumb, circle = zip(*(_strays(one, two, frame) for one, two in pairwise(places_deg)), strict=True)
+    rhumb, circle = zip(*(_deviations(one, two, frame) for one, two in pairwise(places_deg)), strict=True)
     lines = shapely.linestrings(np.stack([places[:-1, ::-1], places[1:, ::-1]], axis=1))
     return RouteFit(
         cross_track_m=across,
@@ -74,8 +74,8 @@ def fit_route(
     )
 
 
-def _strays(start_deg: Array, end_deg: Array, frame: LocalFrame) -> tuple[float, float]:
-    """How far the rhumb line and the geodesic between two places stray from the straight line in the frame [m]."""
+def _deviations(start_deg: Array, end_deg: Array, frame: LocalFrame) -> tuple[float, float]:
+    """Deviation of the rhumb line and the geodesic between two places from the straight line in the frame [m]."""
     ends = _unwrapped(np.stack([start_deg, end_deg]))
     straight = shapely.LineString(frame.to_metres(ends))
     mercator, geod = pyproj.Proj(proj="merc", ellps="WGS84", lon_0=float(ends[0, 1])), pyproj.Geod(ellps="WGS84")

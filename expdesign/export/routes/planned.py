@@ -1,4 +1,4 @@
-"""A verified plan as its files tell it: what routes are cut from and what a trial is simulated with."""
+"""A verified plan as its files hold it: input of routes and of simulated trials."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class PlannedTrack:
         commands: (k, m) actuator commands.
         trajectory: k + 1 samples.
         legs: in time order, without gaps.
-        clearance_m: least distance from the hull to forbidden water that was asked for [m].
+        clearance_m: least distance from the hull to forbidden water that is required [m].
         fence: allowed water around the track, or None when it is not known.
     """
 
@@ -53,7 +53,7 @@ class PlannedTrack:
 def planned_track(
     plan: Plan, *, scenario: str, vessel: Vessel, environment: Environment, clearance_m: float
 ) -> PlannedTrack:
-    """The part of a plan that its files carry.
+    """The part of a plan that its files hold.
 
     Raises:
         NoPlan: the plan is not verified.

@@ -1,6 +1,6 @@
 """Reading a plan back from plan.json with the track.csv and commands.csv beside it.
 
-Nothing is taken on trust: the three files must tell the same story, and the plan must be verified.
+The three files must agree, and the plan must be verified.
 """
 
 from __future__ import annotations

@@ -156,7 +156,7 @@ def build_route(
         raise InputError(f"the route has {len(groups)} distinct waypoints, expected 2 or more")
     fit = fit_route(points, groups, places, frame=track.frame, water=safe_water)
     if fit.in_water is False:
-        raise NoPlan("the route leaves the allowed water once its waypoints are rounded: give a smaller tolerance")
+        raise NoPlan("the route leaves the allowed water after rounding of its waypoints: give a smaller tolerance")
     return Route(
         name=ROUTE_NAME,
         scenario=track.scenario,
@@ -193,7 +193,9 @@ def _written_places(track: PlannedTrack, groups: list[tuple[int, int]]) -> Array
 def _tolerance(track: PlannedTrack, tolerance_m: float | None) -> float:
     value = min(max(track.clearance_m / 3, track.beam_m / 20), track.beam_m / 2) if tolerance_m is None else tolerance_m
     if not 0 < value < math.inf:
-        raise InputError(f"tolerance of the route is {value:g} m, expected more than 0: give one with the clearance 0")
+        raise InputError(
+            f"tolerance of the route is {value:g} m, expected more than 0; with clearance 0 a tolerance is needed"
+        )
     return value
 
 

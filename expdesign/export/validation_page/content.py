@@ -1,4 +1,4 @@
-"""Designs in simulated trials as JSON, and in sentences: do predictions hold, and which assumption fails if not."""
+"""Designs in Monte Carlo trials as JSON and sentences: which predictions hold, and which assumption fails if not."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from numpy.typing import NDArray
 from expdesign.rehearsal import Rehearsal, Validated
 
 AGREES = 0.10
-"""Relative difference of standard deviations that still counts as agreement, chance aside."""
+"""Largest relative difference of standard deviations that counts as agreement, apart from sampling error."""
 BIASED = 0.5
 """Bias over standard deviation beyond which an estimator does not count as consistent."""
 ERROR_LIMIT = 1.5
-"""Normalised error below which the thesis counts a trial as good."""
+"""Normalised error below which the thesis calls a trial good."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ValidationContent:
-    """Everything that is told.
+    """The values that page and file show.
 
     Attributes:
         scenario: its name.
-        rehearsal: what was tried.
+        rehearsal: the simulated trials.
         results: of every design.
-        noisy_moduli: primitives of the optimised design in which noise or weather may turn the sign of what stands
-            inside a modulus.
+        noisy_moduli: primitives of the optimised design in which noise or weather may change the sign of a velocity
+            inside an absolute value.
         command, version: to reproduce it.
     """
 
@@ -41,18 +41,18 @@ class ValidationContent:
 
 
 def chance(result: Validated) -> float:
-    """Relative standard error of a standard deviation found from so many trials."""
+    """Relative standard error of a standard deviation that is estimated from these trials."""
     return float(1.0 / np.sqrt(2.0 * len(result.estimates)))
 
 
 def off_theory(result: Validated) -> list[str]:
-    """Parameters whose standard deviation is not the predicted one, chance allowed for; none without a prediction."""
+    """Parameters whose observed and predicted standard deviations differ significantly; none without a prediction."""
     allowed = AGREES + 2.0 * chance(result)
     return _named(result, np.abs(result.found / result.theory - 1.0) > allowed)
 
 
 def biased(result: Validated) -> list[str]:
-    """Parameters whose bias matters beside their standard deviation, chance allowed for."""
+    """Parameters with a significant bias relative to their standard deviation."""
     allowed = BIASED + 2.0 / np.sqrt(len(result.estimates))
     return _named(result, np.abs(result.bias) > allowed * result.found)
 
@@ -62,7 +62,7 @@ def _named(result: Validated, chosen: NDArray[np.bool_]) -> list[str]:
 
 
 def judgements(content: ValidationContent) -> tuple[str, ...]:
-    """What the trials show, in sentences."""
+    """The conclusions from the trials, in sentences."""
     judged = [sentence for item in content.results for sentence in _judged(item)]
     doubtful = any(biased(item) or off_theory(item) for item in content.results)
     return (*_comparison(content), *judged, *(_assumptions(content) if doubtful else ()))
@@ -73,9 +73,9 @@ def _comparison(content: ValidationContent) -> Iterator[str]:
     for other in others:
         ratio = float(np.exp(np.mean(np.log(other.found / best.found))))
         yield (
-            f"{best.design.capitalize()} against {other.design}: standard deviations of {other.design} are "
-            f"{ratio:.2f} times as large on (geometric) average; median normalised error "
-            f"{np.median(best.errors):.3g} against {np.median(other.errors):.3g}."
+            f"{best.design.capitalize()} against {other.design}: the standard deviations of {other.design} are "
+            f"{ratio:.2f} times as large (geometric mean). The median normalised errors are "
+            f"{np.median(best.errors):.3g} and {np.median(other.errors):.3g}."
         )
 
 
@@ -86,13 +86,13 @@ def _judged(result: Validated) -> Iterator[str]:
     off, shifted = off_theory(result), biased(result)
     if np.isfinite(result.theory).all() and not off:
         yield (
-            f"{result.design.capitalize()}: every standard deviation found is within {AGREES:.0%} of the predicted "
-            f"one, chance of {2 * chance(result):.0%} allowed for."
+            f"{result.design.capitalize()}: every observed standard deviation is within {AGREES:.0%} of the predicted "
+            f"one, apart from a sampling error of {2 * chance(result):.0%}."
         )
     if off:
-        yield f"{result.design.capitalize()}: predicted and found standard deviations differ for {', '.join(off)}."
+        yield f"{result.design.capitalize()}: predicted and observed standard deviations differ for {', '.join(off)}."
     if shifted:
-        yield f"{result.design.capitalize()}: biased by more than half a standard deviation: {', '.join(shifted)}."
+        yield f"{result.design.capitalize()}: the bias exceeds half a standard deviation for {', '.join(shifted)}."
 
 
 def _assumptions(content: ValidationContent) -> Iterator[str]:
@@ -102,8 +102,8 @@ def _assumptions(content: ValidationContent) -> Iterator[str]:
     yield from found
     if not found:
         yield (
-            "No assumption that can be checked from the files fails. What is left is that noise is small: predictions "
-            "take the derivative of the residual by it; quieter sensors in the true vessel's file would show."
+            "No assumption that can be checked from the files fails. One assumption remains: the noise is small enough "
+            "for first-order propagation. Test it with less noise in the vessel file of the true ship."
         )
 
 
@@ -111,21 +111,21 @@ def _of_motion(content: ValidationContent) -> Iterator[str]:
     rehearsal = content.rehearsal
     if rehearsal.method.startswith("ls"):
         yield (
-            "regressors without noise. Least squares is biased by the sensors' noise in them; the prediction is for "
-            "instrumental variables."
+            "the regressors have no noise. Sensor noise biases least squares. The prediction is for instrumental "
+            "variables."
         )
     if content.noisy_moduli:
         yield (
-            "whatever stands inside a modulus keeps its sign under noise. It may turn in "
+            "every velocity inside an absolute value keeps its sign under noise. The sign may change in "
             f"{', '.join(content.noisy_moduli)}."
         )
     if rehearsal.integrator == "rk4" and rehearsal.nominal.model.form == "discrete":
         yield (
-            "the parameters in the file are those of Euler's map, the simulated ship moves continuously between "
-            "samples, so its map has other values; --integrator euler leaves this out."
+            "the parameters are the same in both models. The file has parameters of the Euler discretisation, but the "
+            "simulated ship moves continuously between samples. --integrator euler removes this difference."
         )
     if rehearsal.truth.model.names != rehearsal.nominal.model.names:
-        yield "the true ship has other terms than the model."
+        yield "the model has the terms of the true ship. They differ."
 
 
 def _of_weather(rehearsal: Rehearsal) -> Iterator[str]:
@@ -135,20 +135,21 @@ def _of_weather(rehearsal: Rehearsal) -> Iterator[str]:
     solver, _, allows = method.partition("-")
     if (current or wind) and not allows:
         yield (
-            f"no current and wind. Method {method} only takes off a constant; --method {solver}-air, {solver}-wind or "
-            f"{solver}-augmented allows for weather."
+            f"no current and wind. Method {method} removes only a constant; --method {solver}-air, {solver}-wind or "
+            f"{solver}-augmented accounts for weather."
         )
     if current and allows == "air":
-        yield f"no current. Method {method} allows for measured wind only; --method {solver}-wind for current, too."
+        yield f"no current. Method {method} accounts for measured wind only; {solver}-wind also for current."
     if allows in ("wind", "augmented"):
         what = "the current" if allows == "wind" else "current and wind"
         yield (
-            f"{what} known. Method {method} estimates more parameters to allow for what it does not know, which costs "
-            'accuracy that the prediction does not count; design for it with predictor = "'
+            f"{what} known. Method {method} estimates additional parameters for it; the prediction does not include "
+            "the "
+            'loss of accuracy. Design for it with predictor = "'
             f'{allows}" in the scenario.'
         )
     if weather.current_std_mps > 0 or weather.wind_std_mps > 0:
-        yield "every trial meets the mean weather of the forecast. Here each has its own, drawn around it."
+        yield "every trial has the mean weather of the forecast. Here the weather of each trial is random."
 
 
 def validation_json(content: ValidationContent) -> str:

@@ -1,4 +1,4 @@
-"""How errors are spread for each design, and predicted against found standard deviations."""
+"""Distribution of the errors of each design, and observed against predicted standard deviations."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from expdesign.export.validation_page.content import ERROR_LIMIT, chance
 from expdesign.rehearsal import Validated
 
 WIDE = 10.0
-"""Ratio of the ends of an axis beyond which its ticks stand farther apart."""
+"""Ratio of the ends of an axis above which it has fewer ticks."""
 
 
 def error_figure(results: tuple[Validated, ...]) -> str:
@@ -34,7 +34,7 @@ def error_figure(results: tuple[Validated, ...]) -> str:
 
 
 def spread_figure(result: Validated) -> str:
-    """Found over predicted standard deviation for each parameter, with its chance error."""
+    """Observed over predicted standard deviation of each parameter, with its sampling error."""
     names = [plain(name) for name in result.parameters]
     figure = new_figure(8.0, 1.1 + 0.26 * len(names))
     axes = figure.subplots()
@@ -43,7 +43,7 @@ def spread_figure(result: Validated) -> str:
     error = 1.96 * chance(result)
     for ratio, marker, colour, label in (
         (result.found / result.theory, "o", BLUE, "predicted with the true ship"),
-        (result.found / result.forecast, "D", VERMILION, "forecast with the nominal ship"),
+        (result.found / result.forecast, "D", VERMILION, "forecast with the nominal model"),
     ):
         shift = -0.12 if marker == "o" else 0.12
         axes.errorbar(
@@ -56,14 +56,14 @@ def spread_figure(result: Validated) -> str:
     axes.set_xticks(_ticks(low, high), [f"{tick:g}" for tick in _ticks(low, high)])
     axes.minorticks_off()
     axes.set_xlim(low, high)
-    axes.set_xlabel("standard deviation found in trials / predicted")
+    axes.set_xlabel("standard deviation, observed / predicted")
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, fontsize=9)
     light_grid(axes, "x")
-    return svg(figure, key="spread", label="Standard deviation found over predicted, for each parameter")
+    return svg(figure, key="spread", label="Observed over predicted standard deviation of each parameter")
 
 
 def _ticks(low: float, high: float) -> list[float]:
-    """Round ratios on a logarithmic axis, closer together where it is short."""
+    """Round ratios on a logarithmic axis."""
     wide = high / low > WIDE
     ladder = (1.0, 2.0, 5.0) if wide else (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)
     decades = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)

@@ -1,4 +1,4 @@
-"""The page about designs in simulated trials."""
+"""The page on designs in Monte Carlo trials."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def _design_row(content: ValidationContent, result: Validated) -> tuple[str, ...
     runs = content.rehearsal.designs[result.design]
     names = [primitive.name for primitive in content.rehearsal.primitives]
     spelled = (
-        "drawn anew for every trial"
+        "random in every trial"
         if runs is None
         else ", ".join(
             f"{count} \N{MULTIPLICATION SIGN} {name}" for name, count in zip(names, runs, strict=True) if count

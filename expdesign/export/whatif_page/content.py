@@ -11,7 +11,7 @@ import numpy as np
 from expdesign.values import Array
 
 NOTICED = 0.02
-"""Relative differences below this are not worth a sentence."""
+"""Relative differences below this are not reported."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -20,8 +20,8 @@ class Case:
 
     Attributes:
         name: of the scenario.
-        changes: what it says otherwise than the first, one line each.
-        problem: why there is no answer, or "".
+        changes: differences from the scenario, one line each.
+        problem: why there is no result, or "".
         criterion: of the design.
         runs: whole runs by primitive, only those used.
         informative_s: time of all runs [s].
@@ -57,8 +57,9 @@ class Against:
     Attributes:
         common: those parameters.
         ratios: (c,) standard deviation over the first case's.
-        accuracy: information by the determinant, per parameter: 2 means half the variance in every direction.
-        same_accuracy_s: informative time in which the variant's mix of runs is as accurate as the first case [s].
+        accuracy: ratio of information determinants to the power 1/c: 2 means half the variance.
+        same_accuracy_s: informative time in which the runs of the variant, in the same proportions, are as accurate as
+            the first case [s].
     """
 
     common: tuple[str, ...]
@@ -69,7 +70,7 @@ class Against:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class WhatIfContent:
-    """Everything the page tells.
+    """The values that the page shows.
 
     Attributes:
         cases: the scenario first, then its variants.
@@ -83,7 +84,7 @@ class WhatIfContent:
     version: str
 
     def against(self, case: Case) -> Against | None:
-        """A case against the first, or None when one of them has no answer or they share no parameter."""
+        """A case against the first, or None when one of them has no result or they share no parameter."""
         first = self.cases[0]
         common = tuple(name for name in first.parameters if name in case.parameters)
         if first.problem or case.problem or not common:
@@ -107,18 +108,18 @@ def _part(case: Case, names: tuple[str, ...]) -> Array:
 
 
 def explanations(content: WhatIfContent) -> tuple[tuple[str, tuple[str, ...]], ...]:
-    """For every variant its sentences."""
+    """(variant, sentences) of every variant."""
     return tuple((case.name, tuple(_sentences(content, case))) for case in content.cases[1:])
 
 
 def _sentences(content: WhatIfContent, case: Case) -> Iterator[str]:
     first = content.cases[0]
     if case.problem:
-        yield f"There is no answer: {case.problem}."
+        yield f"No result: {case.problem}."
         return
     against = content.against(case)
     if against is None:
-        yield "It cannot be compared with the scenario: no parameter is estimated in both."
+        yield "It cannot be compared with the scenario, because they have no common parameter."
         return
     yield _accuracy(first, case, against)
     yield from _parameters(against)
@@ -135,26 +136,26 @@ def _sentences(content: WhatIfContent, case: Case) -> Iterator[str]:
 def _accuracy(first: Case, case: Case, against: Against) -> str:
     minutes, needed = case.informative_s / 60, against.same_accuracy_s / 60
     if abs(against.accuracy - 1) < NOTICED:
-        return f"In {minutes:.1f} min it tells as much as the scenario in {first.informative_s / 60:.1f} min."
+        scenario = f"the scenario in {first.informative_s / 60:.1f} min"
+        return f"In {minutes:.1f} min it collects the same information as {scenario}."
     return (
-        f"In {minutes:.1f} min it tells {against.accuracy:.2f} times what the scenario tells in "
-        f"{first.informative_s / 60:.1f} min (by the determinant, per parameter); the same accuracy takes "
-        f"{needed:.1f} min."
+        f"In {minutes:.1f} min it collects {against.accuracy:.2f} times the information of the scenario in "
+        f"{first.informative_s / 60:.1f} min (determinant, per parameter). The same accuracy takes {needed:.1f} min."
     )
 
 
 def _parameters(against: Against) -> Iterator[str]:
     ratios = np.array(against.ratios)
     if np.abs(ratios - 1).max() < NOTICED:
-        yield "No standard deviation changes noticeably."
+        yield "No standard deviation changes by more than 2 %."
         return
     best, worst = int(ratios.argmin()), int(ratios.argmax())
     if ratios.max() / ratios.min() < 1 + 2 * NOTICED:
-        yield f"All standard deviations are about {np.median(ratios):.2f} times the scenario's."
+        yield f"All standard deviations are about {np.median(ratios):.2f} times those of the scenario."
         return
     yield (
         f"Standard deviations are between {ratios.min():.2f} ({against.common[best]}) and {ratios.max():.2f} "
-        f"({against.common[worst]}) times the scenario's."
+        f"({against.common[worst]}) times those of the scenario."
     )
 
 
@@ -179,10 +180,10 @@ def _plan(first: Case, case: Case) -> Iterator[str]:
 
 def whatif_json(content: WhatIfContent) -> str:
     """`whatif.json`."""
-    told = dict(explanations(content))
+    sentences = dict(explanations(content))
     described = {
         "scenario": content.cases[0].name,
-        "cases": [_entry(content, case, told.get(case.name, ())) for case in content.cases],
+        "cases": [_entry(content, case, sentences.get(case.name, ())) for case in content.cases],
     }
     return json.dumps(described, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 

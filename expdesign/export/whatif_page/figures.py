@@ -1,4 +1,4 @@
-"""Variants in pictures: what they cost for the same accuracy, and each parameter's standard deviation."""
+"""Figures of variants: time for the same accuracy, standard deviation of each parameter, runs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from expdesign.export.whatif_page.content import WhatIfContent
 
 
 def time_figure(content: WhatIfContent) -> str:
-    """Informative time, with the repositioning where planned, and the time for the scenario's accuracy."""
+    """Informative time, with the repositioning where planned, and the time for the accuracy of the scenario."""
     cases = [case for case in content.cases if not case.problem]
     figure = new_figure(8.0, 1.3 + 0.42 * len(cases))
     axes = figure.subplots()
@@ -21,7 +21,7 @@ def time_figure(content: WhatIfContent) -> str:
         begin = [case.informative_s / 60 for case in cases]
         axes.barh(rows, moving, left=begin, height=0.55, color=REPOSITION, alpha=0.6, label="repositioning")
     same = [against.same_accuracy_s / 60 if (against := content.against(case)) else np.nan for case in cases]
-    axes.plot(same, rows, "D", color="white", markeredgecolor="black", label="runs for the scenario's accuracy")
+    axes.plot(same, rows, "D", color="white", markeredgecolor="black", label="runs for the accuracy of the scenario")
     axes.set_yticks(rows, [plain(case.name) for case in cases])
     axes.invert_yaxis()
     axes.set_xlabel("time [min]")
@@ -31,7 +31,7 @@ def time_figure(content: WhatIfContent) -> str:
 
 
 def ratio_figure(content: WhatIfContent) -> str | None:
-    """Standard deviations over the scenario's, for each parameter; None when nothing can be compared."""
+    """Standard deviations over those of the scenario, for each parameter; None when nothing can be compared."""
     compared = [(case, against) for case in content.cases[1:] if (against := content.against(case))]
     if not compared:
         return None
@@ -48,10 +48,10 @@ def ratio_figure(content: WhatIfContent) -> str | None:
     ticks = [tick for tick in (0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5, 10) if _within(axes, tick)]
     axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
     axes.minorticks_off()
-    axes.set_xlabel("expected standard deviation / the scenario's")
+    axes.set_xlabel("expected standard deviation / that of the scenario")
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=9)
     light_grid(axes, "x")
-    return svg(figure, key="ratios", label="Expected standard deviation of each parameter over the scenario's")
+    return svg(figure, key="ratios", label="Expected standard deviation of each parameter over that of the scenario")
 
 
 def _within(axes: Axes, value: float) -> bool:

@@ -1,4 +1,4 @@
-"""The page of variants side by side."""
+"""The page that compares variants."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def whatif_html(content: WhatIfContent) -> str:
             content=content,
             header=table_header(content),
             rows=[_row(content, case) for case in content.cases],
-            told=explanations(content),
+            explanations=explanations(content),
             figures=figures,
         )
     )
@@ -28,11 +28,20 @@ def whatif_html(content: WhatIfContent) -> str:
 def table_header(content: WhatIfContent) -> tuple[str, ...]:
     """Names of the columns of `table_row`."""
     planned = ("repositioning [min]", "whole trial [min]", "clearance [m]") if content.planned else ()
-    return ("Case", "criterion", "runs", "time [min]", "tells", "same accuracy [min]", "certificate", *planned)
+    return (
+        "Case",
+        "criterion",
+        "runs",
+        "time [min]",
+        "information",
+        "same accuracy [min]",
+        "certificate gap",
+        *planned,
+    )
 
 
 def table_row(content: WhatIfContent, case: Case) -> tuple[str, ...]:
-    """One case in a line; dashes where it has no answer."""
+    """One case as a row; dashes where it has no result."""
     if case.problem:
         return (case.name, *("-",) * (len(table_header(content)) - 1))
     against = content.against(case)

@@ -37,14 +37,14 @@ def _reference(settings: Mapping[str, float], time_s: Array) -> Array:
 
 MULTISINE = Family(
     name="multisine",
-    summary="surge speed, sway speed and yaw rate each swing with four frequencies of their own",
+    summary="multisines in surge speed, sway speed and yaw rate, with four different frequencies each",
     settings=(
         Setting(name="duration_s", meaning="length of one run, best a whole number of periods", low=1e-3, high=1e5),
         Setting(name="period_s", meaning="common period of all sines", low=1e-2, high=1e5, searched="time"),
         Setting(name="speed_mps", meaning="mean surge speed", low=-50, high=50, searched="surge"),
         Setting(
             name="speed_swing_mps",
-            meaning="largest departure of surge speed",
+            meaning="amplitude of surge speed",
             default=0.0,
             low=0,
             high=50,

@@ -40,7 +40,7 @@ TELEGRAPH = Family(
         Setting(name="speed_mps", meaning="mean surge speed", low=-50, high=50, searched="surge"),
         Setting(
             name="speed_swing_mps",
-            meaning="surge speed swings this far to both sides",
+            meaning="amplitude of surge speed",
             low=0,
             high=50,
             searched="surge",
@@ -49,12 +49,12 @@ TELEGRAPH = Family(
         Setting(name="yaw_rate_radps", meaning="yaw rate to both sides", low=0, high=5, searched="yaw"),
         Setting(name="hold_s", meaning="mean time between switches", low=1e-2, high=1e5, searched="time"),
         Setting(name="rise_s", meaning="time that a switch takes", low=1e-2, high=1e4, searched="time"),
-        Setting(name="draw", meaning="number of the random draw", default=1.0, low=0, high=2**31, searched="draw"),
+        Setting(name="draw", meaning="seed of the random numbers", default=1.0, low=0, high=2**31, searched="draw"),
         Setting(
-            name="sway_offset_mps", meaning="steady sway beneath it", default=0.0, low=-20, high=20, searched="sway"
+            name="sway_offset_mps", meaning="steady sway added to it", default=0.0, low=-20, high=20, searched="sway"
         ),
         Setting(
-            name="yaw_offset_radps", meaning="steady yaw rate beneath it", default=0.0, low=-5, high=5, searched="yaw"
+            name="yaw_offset_radps", meaning="steady yaw rate added to it", default=0.0, low=-5, high=5, searched="yaw"
         ),
     ),
     reference=_reference,

@@ -35,10 +35,10 @@ ZIGZAG = Family(
         Setting(name="period_s", meaning="time of one full swing", low=1e-2, high=1e5, searched="time"),
         Setting(name="sway_mps", meaning="largest outward sway speed", default=0.0, low=-20, high=20, searched="sway"),
         Setting(
-            name="sway_offset_mps", meaning="steady sway beneath it", default=0.0, low=-20, high=20, searched="sway"
+            name="sway_offset_mps", meaning="steady sway added to it", default=0.0, low=-20, high=20, searched="sway"
         ),
         Setting(
-            name="yaw_offset_radps", meaning="steady yaw rate beneath it", default=0.0, low=-5, high=5, searched="yaw"
+            name="yaw_offset_radps", meaning="steady yaw rate added to it", default=0.0, low=-5, high=5, searched="yaw"
         ),
     ),
     reference=_reference,

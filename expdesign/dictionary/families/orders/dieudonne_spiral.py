@@ -23,7 +23,7 @@ def _helm(request: PrimitiveSpec, time_s: Array) -> Array:
 
 DIEUDONNE_SPIRAL = Family(
     name="dieudonne_spiral",
-    summary="helm in equal steps from one side to the other and back, each held as long",
+    summary="helm in equal steps from one side to the other and back, each held for the same time",
     settings=(
         DURATION,
         APPROACH,

@@ -19,14 +19,14 @@ def _helm(request: PrimitiveSpec, time_s: Array) -> Array:
 
 PULL_OUT = Family(
     name="pull_out",
-    summary="helm over for a share of the run, then back to where it held the course",
+    summary="helm over for a share of the run, then back to the course-keeping angle",
     settings=(
         DURATION,
         APPROACH,
         helm_setting("helm in the turn, positive to starboard", default=float(np.radians(20.0))),
         Setting(
             name="turn_fraction",
-            meaning="share of the run that the helm is over",
+            meaning="share of the run with the helm over",
             default=0.5,
             low=0.05,
             high=0.95,

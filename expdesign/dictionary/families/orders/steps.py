@@ -51,7 +51,7 @@ STEPS = Family(
             searched="share",
         ),
         Setting(
-            name="helm_offset_rad", meaning="steady helm beneath it", default=0.0, low=-1.5, high=1.5, searched="helm"
+            name="helm_offset_rad", meaning="steady helm added to it", default=0.0, low=-1.5, high=1.5, searched="helm"
         ),
         Setting(
             name="levels",
@@ -60,7 +60,7 @@ STEPS = Family(
             low=0,
             high=100,
         ),
-        Setting(name="draw", meaning="number of the random draw", default=1.0, low=0, high=2**31, searched="draw"),
+        Setting(name="draw", meaning="seed of the random numbers", default=1.0, low=0, high=2**31, searched="draw"),
     ),
     orders=_orders,
 )

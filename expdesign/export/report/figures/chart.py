@@ -154,7 +154,7 @@ def _draw_runs(axes: Axes, plan: Plan, *, metres_per_inch: float) -> None:
 def _legend(content: ReportContent) -> Sequence[Line2D | Patch]:
     reposition, primitive = KINDS["reposition"], KINDS["primitive"]
     clearance = f"{content.clearance_m:g} m from forbidden water"
-    covered = f"where {100 * content.confidence:g} % of drawn ships stay"
+    covered = f"hull area with {100 * content.confidence:g} % probability"
     depths = content.plan.area.depths
     shown = (
         Patch(facecolor=depth_colour(number, len(depths)), edgecolor="#7aa6c2", alpha=0.6, label=f"{depth:g} m or more")
@@ -170,6 +170,6 @@ def _legend(content: ReportContent) -> Sequence[Line2D | Patch]:
         Line2D([], [], color=GREY, linewidth=0.8, linestyle=(0, (2, 2)), label=clearance),
         Patch(facecolor=WATER, edgecolor="#7aa6c2", label="allowed water"),
         Patch(facecolor=LAND, edgecolor="#8a7440", label="land"),
-        Patch(facecolor=FORBIDDEN, edgecolor=GREY, label="not allowed, or not charted"),
+        Patch(facecolor=FORBIDDEN, edgecolor=GREY, label="forbidden or uncharted"),
         *shown,
     )

@@ -1,4 +1,4 @@
-"""Durations with the equivalence theorem beside them, and who tells about what."""
+"""Durations with the equivalence theorem, and the information of each primitive about each parameter."""
 
 from __future__ import annotations
 
@@ -53,13 +53,13 @@ def _draw_sensitivities(axes: Axes, design: DurationDesign) -> None:
     axes.plot(net[~used], rows[~used], "o", color="white", markeredgecolor=BLUE, label="not used")
     low, high = min(0.0, float(net.min())), max(bound, float(net.max()))
     axes.set_xlim(low - 0.12 * (high - low) * (low < 0), high + 0.12 * (high - low))
-    axes.set_xlabel("sensitivity less price" if design.certificate.multipliers else "sensitivity")
+    axes.set_xlabel("sensitivity minus price" if design.certificate.multipliers else "sensitivity")
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=9, columnspacing=1.0)
     light_grid(axes, "x")
 
 
 def information_figure(content: ReportContent) -> str:
-    """Heat map: for each parameter, how much each primitive tells per minute next to the best one."""
+    """Heat map: for each parameter, information per minute of each primitive relative to the best one."""
     share = relative_information(content).T
     names = [short(name) for name in content.design.problem.names]
     figure = new_figure(min(2.2 + 0.62 * len(names), 14.0), 1.9 + 0.3 * len(content.parameters))
@@ -78,6 +78,6 @@ def information_figure(content: ReportContent) -> str:
     bar = figure.colorbar(mesh, ax=axes, ticks=(0, 0.5, 1.0), format=lambda value, _: f"{100 * value:.0f} %")
     bar.outline.set_visible(False)
     bar.solids.set(rasterized=False, edgecolor="face")  # type: ignore[union-attr]
-    bar.set_label("of the manoeuvre that tells most", fontsize=9)
+    bar.set_label("of the most informative manoeuvre", fontsize=9)
     label = "Heat map: information per minute of each primitive about each parameter, relative to the best primitive"
     return svg(figure, key="information", label=label)

@@ -1,4 +1,4 @@
-"""Where the hull may be during a run when ship, current and wind are drawn from their stated uncertainties."""
+"""The area that the hull covers during a run with random ship, current and wind."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from expdesign.values import Array
 from expdesign.vessel.hull import covering_discs, hull_polygons
 
 SEED = 0
-"""Of the draws for the picture; the planner's own are others."""
+"""Random seed of the picture; the planner uses other random numbers."""
 PIECES = 40
 
 
 def footprints(content: ReportContent) -> list[shapely.Geometry]:
-    """For every run what the hull covers with the plan's confidence, in (east, north); none where it cannot be told."""
+    """The area (east, north) that the hull covers in each run with the plan's confidence; none where not computable."""
     plan, vessel = content.plan, content.vessel
     centres, _ = covering_discs(vessel.length_m, vessel.beam_m)
     primitives = {item.primitive.name: item.primitive for item in content.information}

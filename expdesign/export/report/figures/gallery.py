@@ -1,4 +1,4 @@
-"""One picture for each primitive: where it takes the ship and how the velocities go."""
+"""One figure for each primitive: its path and its velocities."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from expdesign.conventions import to_n_frame
+from expdesign.dictionary.desired import desired_motion
 from expdesign.dictionary.primitive import Primitive
-from expdesign.dictionary.wishes import wished_motion
 from expdesign.export.report.figures.style import BLACK, BLUE, GREEN, GREY, PRIMITIVE, light_grid, new_figure, svg
 from expdesign.values import Array
 
@@ -23,23 +23,23 @@ CURVE_BOXES = tuple((0.655, bottom, 0.33, 0.235) for bottom in (0.735, 0.4425, 0
 
 
 def primitive_figure(primitive: Primitive, hull_b: Array, *, number: int) -> str:
-    """Path with hull outlines on the left; u, v and r over time on the right, dashed what the family wished for."""
+    """Path with hull outlines on the left; u, v and r over time on the right, dashed the desired velocities."""
     figure = new_figure(*SIZE_IN, arranged=False)  # fixed places: many small figures are drawn much sooner
     _draw_path(figure.add_axes(PATH_BOX), primitive.trajectory.pose, hull_b)
     time_s = primitive.trajectory.time_s
     velocity = primitive.trajectory.velocity * (1.0, 1.0, np.degrees(1.0))
-    wished = wished_motion(primitive)
-    shown = velocity if wished is None else wished * (1.0, 1.0, np.degrees(1.0))
+    desired = desired_motion(primitive)
+    shown = velocity if desired is None else desired * (1.0, 1.0, np.degrees(1.0))
     rows = [figure.add_axes(box) for box in CURVE_BOXES]
-    for axes, values, wish, (name, span) in zip(rows, velocity.T, shown.T, LEAST_SPAN.items(), strict=True):
+    for axes, values, aim, (name, span) in zip(rows, velocity.T, shown.T, LEAST_SPAN.items(), strict=True):
         axes.axhline(0.0, color=BLACK, linewidth=0.5)
-        if wished is not None:
-            axes.plot(time_s, wish, color=GREY, linewidth=1.0, linestyle="--")
+        if desired is not None:
+            axes.plot(time_s, aim, color=GREY, linewidth=1.0, linestyle="--")
         axes.plot(time_s, values, color=BLUE, linewidth=1.4)
         axes.set_ylabel(name)
         axes.yaxis.set_label_coords(-0.37, 0.5)
         axes.tick_params(labelsize=9, labelbottom=axes is rows[-1])
-        low, high = min(values.min(), wish.min(), 0.0), max(values.max(), wish.max(), 0.0)
+        low, high = min(values.min(), aim.min(), 0.0), max(values.max(), aim.max(), 0.0)
         slack = max(span - (high - low), 0.0) / 2 + 0.06 * (high - low)
         axes.set_ylim(low - slack, high + slack)
         axes.locator_params(nbins=4)

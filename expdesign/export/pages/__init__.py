@@ -8,13 +8,13 @@ from expdesign.export.formats.format import xml_text
 
 
 def page_templates(package: str) -> Environment:
-    """Templates of a package, and the report's style sheet.
+    """Templates of a package, and those that all pages share: `base.html`, `parts.html` and the style sheet.
 
     A name that a template uses and nobody gives is an error; text is escaped, and characters that no page may hold are
     replaced.
     """
     return Environment(
-        loader=ChoiceLoader([PackageLoader(name) for name in dict.fromkeys((package, "expdesign.export.report"))]),
+        loader=ChoiceLoader([PackageLoader(name) for name in (package, "expdesign.export.pages")]),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,

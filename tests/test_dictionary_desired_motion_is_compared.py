@@ -1,4 +1,4 @@
-"""What a family wishes for is compared with what the ship does; new families wish for what their settings say."""
+"""The desired motion of a family is compared with the motion of the ship; new families follow their settings."""
 
 from dataclasses import replace
 
@@ -7,7 +7,7 @@ import pytest
 
 from design_case import SCENARIOS, WIND, example_dictionary, spec, vessel, with_limit
 from expdesign.dictionary import build_dictionary, build_primitive, family
-from expdesign.dictionary.wishes import STRAYED, departure, strayed, wished_motion
+from expdesign.dictionary.desired import LARGEST_DEVIATION, desired_motion, deviating, deviation
 from expdesign.growing.optimum import optimum
 from expdesign.information import score_primitives
 from expdesign.scenario import load_dictionary
@@ -18,14 +18,14 @@ MULTISINE = {"period_s": 20.0, "speed_mps": 1.0, "speed_swing_mps": 0.5, "sway_m
 
 
 def test_a_multisine_swings_as_far_as_told_around_its_mean():
-    wished = family("multisine").reference(spec("multisine", duration_s=60.0, **MULTISINE).settings, TIME_S)
-    np.testing.assert_allclose(np.abs(wished - (1.0, 0.0, 0.0)).max(axis=0), (0.5, 0.2, 0.1), rtol=1e-12)
-    np.testing.assert_allclose(wished[0], (1.0, 0.0, 0.0), atol=1e-12)
+    desired = family("multisine").reference(spec("multisine", duration_s=60.0, **MULTISINE).settings, TIME_S)
+    np.testing.assert_allclose(np.abs(desired - (1.0, 0.0, 0.0)).max(axis=0), (0.5, 0.2, 0.1), rtol=1e-12)
+    np.testing.assert_allclose(desired[0], (1.0, 0.0, 0.0), atol=1e-12)
 
 
 def test_the_three_velocities_of_a_multisine_share_no_frequency():
-    wished = family("multisine").reference(spec("multisine", duration_s=60.0, **MULTISINE).settings, TIME_S)
-    middle = wished[2000:4000] - wished[2000:4000].mean(axis=0)  # one whole period, beyond what is faded in and out
+    desired = family("multisine").reference(spec("multisine", duration_s=60.0, **MULTISINE).settings, TIME_S)
+    middle = desired[2000:4000] - desired[2000:4000].mean(axis=0)  # one whole period, beyond what is faded in and out
     products = np.corrcoef(middle.T)
     np.testing.assert_allclose(products, np.eye(3), atol=1e-2)
 
@@ -60,29 +60,29 @@ def test_a_ship_with_slow_actuators_strays_and_a_ship_without_limits_does_not():
         build_primitive(with_limit(vessel("azimuth-30m"), Limit(low=-40, high=40, rate=rate)), request)
         for rate in (1e6, 0.5)
     )
-    assert departure(free) < 0.05
-    assert departure(slow) > STRAYED
-    assert strayed([free, slow]) == (slow,)
+    assert deviation(free) < 0.05
+    assert deviation(slow) > LARGEST_DEVIATION
+    assert deviating([free, slow]) == (slow,)
 
 
 def test_departure_is_the_largest_difference_by_hand():
     run = build_primitive(vessel("model-ship"), spec("acceleration", duration_s=20, speed_mps=0.8))
     moved = np.add(run.trajectory.velocity, (0.04, -0.02, 0.0))
     changed = replace(run, trajectory=replace(run.trajectory, velocity=moved))
-    wished = wished_motion(run)
-    assert wished is not None
-    assert departure(changed) == pytest.approx(np.abs(moved - wished)[:, 0].max() / 0.8, rel=1e-12)
+    desired = desired_motion(run)
+    assert desired is not None
+    assert deviation(changed) == pytest.approx(np.abs(moved - desired)[:, 0].max() / 0.8, rel=1e-12)
 
 
 def test_families_that_give_commands_wish_for_no_velocities():
     run = build_primitive(vessel("model-ship"), spec("turning_circle_helm", duration_s=20, speed_mps=0.8))
-    assert wished_motion(run) is None
-    assert departure(run) == 0.0
+    assert desired_motion(run) is None
+    assert deviation(run) == 0.0
 
 
 def test_slow_thrusters_keep_steep_waves_from_their_wish_and_nothing_else():
-    assert not strayed(example_dictionary("model-ship"))
-    names = {item.name for item in strayed(example_dictionary("standard"))}
+    assert not deviating(example_dictionary("model-ship"))
+    names = {item.name for item in deviating(example_dictionary("standard"))}
     waves = ("zigzag-steep", "sway-zigzag", "telegraph")
     assert {"zigzag-steep-speed-0.5", "sway-zigzag-speed-0"} <= names
     assert all(name.startswith(waves) for name in names)
@@ -91,7 +91,7 @@ def test_slow_thrusters_keep_steep_waves_from_their_wish_and_nothing_else():
 def test_the_compact_dictionary_does_what_it_says_in_little_room_and_tells_twice_as_much_per_minute():
     ship = vessel("azimuth-30m")
     runs = build_dictionary(ship, load_dictionary(SCENARIOS / "dictionaries" / "compact-azimuth-30m.toml"))
-    assert not strayed(runs)
+    assert not deviating(runs)
     compact, standard = (
         optimum(score_primitives(ship, items, environment=WIND), "complete").log_det
         for items in (runs, example_dictionary("standard"))
