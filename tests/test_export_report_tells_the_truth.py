@@ -15,14 +15,13 @@ import export_case as case
 from expdesign.durations import MEAN_SUBTRACTIONS, build_durations, solve_durations
 from expdesign.export import build_route, words
 from expdesign.export.report import report_html
-from expdesign.export.report.admission import least_charted_depth
+from expdesign.export.report.checks import least_charted_depth
 from expdesign.export.report.content import information_rate, primitive_runs, relative_information
 from expdesign.export.report.figures.footprints import footprints
 from expdesign.export.report.figures.labels import place_labels
 from expdesign.export.report.figures.position_axes import nice_step
-from expdesign.export.report.tables import parameter_rows
+from expdesign.export.report.parameters import expected, parameter_rows
 from expdesign.export.report.trust import chain
-from expdesign.export.report.uncertainty import expected
 from expdesign.growing.values import GrowRound, Growth
 from expdesign.information.expected import TrialPart, expected_covariance
 from expdesign.simulation import CALM

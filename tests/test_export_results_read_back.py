@@ -23,7 +23,7 @@ from expdesign.export import (
     track_csv,
     write_files,
 )
-from expdesign.export.files.results import strict_json
+from expdesign.export.files import strict_json
 from expdesign.export.routes import read_plan
 from expdesign.simulation import simulate
 

@@ -39,7 +39,7 @@ def test_every_index_stands_under_its_side_beside_its_criterion() -> None:
     lines = form_lines(form, "simulated")
     assert [line.name for line in lines] == [
         "Advance", "Tactical diameter", "First overshoot", "Second overshoot", "First overshoot",
-        "Way to 10° of heading at 10° of helm", "Track reach, full astern",
+        "Distance to 10° of heading at 10° of helm", "Track reach, full astern",
     ]  # fmt: skip
     port = next(circle for circle in found.circles if circle.side == "port")
     assert lines[0].port[0].value == f"{port.advance_m:.4g} m"
@@ -61,7 +61,7 @@ def test_what_exceeds_its_limit_is_marked_and_what_was_not_run_is_not_shown() ->
     assert (lines[0].port[0].met, lines[1].port[0].met, lines[0].starboard) == (False, True, ())
     page = html.fromstring(indices_html(content(simulated=None, measured=(wide,))))
     rows = {" ".join(" ".join(row.itertext()).split()) for row in page.iter("tr")}
-    assert any(row.startswith("Turning circle Advance 811 m 4.51 L \N{BALLOT X} exceeds not shown") for row in rows)
+    assert any(row.startswith("Turning circle Advance 811 m 4.51 L \N{BALLOT X} exceeds no result") for row in rows)
 
 
 def test_ship_data_are_the_vessels_and_what_no_file_tells_is_left_open() -> None:

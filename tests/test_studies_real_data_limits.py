@@ -50,8 +50,8 @@ def test_a_constant_force_is_named_as_one() -> None:
     assert limits.constant[1] == pytest.approx(1.0, abs=0.02)
     assert abs(limits.slow[1]) + abs(limits.quick[1]) < 0.03
     words = sentence(limits, run)
-    assert "v fits worst" in words
-    assert "100 % from a constant force" in words or "99 % from a constant force" in words
+    assert "The worst output is v" in words
+    assert "100 % from a constant unmodelled force" in words or "99 % from a constant unmodelled force" in words
 
 
 def test_noise_is_quick_and_its_size_is_seen() -> None:

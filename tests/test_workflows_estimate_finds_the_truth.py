@@ -177,7 +177,7 @@ def test_wind_is_used_where_it_is_measured_and_modelled(tmp_path: Path) -> None:
     assert any("X_abs_u_u is the sum of X_abs_u_u and W_abs_u_u" in text for text in found["ls"]["warnings"])
 
 
-def test_a_broken_experiment_condition_is_told(tmp_path: Path) -> None:
+def test_a_broken_excitation_condition_is_reported(tmp_path: Path) -> None:
     """Going ahead, then astern: u changes its sign within the run."""
     ahead, astern = model_ship_commands(800).values, model_ship_commands(800, seed=3, astern=True).values
     both = type(model_ship_commands(10))(
@@ -185,7 +185,7 @@ def test_a_broken_experiment_condition_is_told(tmp_path: Path) -> None:
     )
     path = write_run(tmp_path / "one.csv", MODEL_SHIP_TRUE, both, **EULER)
     workflows.estimate([path], tmp_path / "out", vessel=MODEL_SHIP, methods=["ls"])
-    (sentence,) = (text for text in estimates(tmp_path / "out")["ls"]["warnings"] if "experiment condition" in text)
+    (sentence,) = (text for text in estimates(tmp_path / "out")["ls"]["warnings"] if "excitation condition" in text)
     assert "X_abs_u_u" in sentence
 
 
@@ -237,7 +237,7 @@ def test_the_mean_current_is_read_out_of_an_augmented_estimate(tmp_path: Path) -
     for item, truth in zip(read, (0.2, -0.2), strict=True):
         assert abs(item["value"] - truth) < 4 * item["std"] < 0.8
     assert found["ls"]["current_to"] is None
-    assert "Mean current read out" in (tmp_path / "out" / "estimate.html").read_text(encoding="utf-8")
+    assert "Mean current, estimated" in (tmp_path / "out" / "estimate.html").read_text(encoding="utf-8")
 
 
 def test_a_vessel_file_without_values_starts_from_least_squares(trial: Path, tmp_path: Path) -> None:

@@ -73,7 +73,7 @@ def test_a_variant_without_answer_is_told_beside_the_others(tmp_path):
     found = cases(workflows.whatif(MODEL_SHIP, [alone], tmp_path / "out", jobs=1))
     assert "cannot tell these parameters apart" in found["circles-only"]["problem"]
     assert found["model-ship"]["problem"] is None
-    assert "There is no answer" in (tmp_path / "out" / "whatif.html").read_text("utf-8")
+    assert "No result" in (tmp_path / "out" / "whatif.html").read_text("utf-8")
 
 
 def _all_but_first() -> list[str]:

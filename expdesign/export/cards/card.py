@@ -11,24 +11,26 @@ import numpy as np
 from expdesign.export import words
 from expdesign.export.cards.chart import run_chart
 from expdesign.export.cards.danger import FARTHEST_M, Danger, look_out
-from expdesign.export.cards.orders import order_columns, order_rows
+from expdesign.export.cards.orders import columns_of, order_columns, order_rows, orders_notes, run_orders
 from expdesign.export.report.content import ReportContent, Run, relative_information
 from expdesign.export.report.tables import settings_sentence
-from expdesign.plan.values import Leg, Plan
-from expdesign.values import Array
-from expdesign.vessel import column_name, stem
+from expdesign.plan.values import Plan
+from expdesign.vessel import column_name
 
 STEADY_HEADING_RAD = math.radians(3.0)
+
+
 STEADY_SPEED_SHARE, STEADY_SPEED_MPS = 0.1, 0.1
+
+
 MOST_RUNS = 3
 """Runs on one sheet."""
-LONG, WIDE = 12, 5
-"""Number of rows above which the orders use several columns, and cells per row up to which there are three."""
-HASTE_S = 10.0
-"""Mean time between orders below which they are too fast to be called out."""
+
+
 NAMED_PARAMETERS = 4
 """Parameters named in the purpose of a run."""
-TURN = 2 * math.pi
+
+
 BLANKS = ("Start (UTC)", "Wind, from", "Sea state; current, to", "Depth", "File")
 """Blanks to be filled in at every run."""
 
@@ -89,16 +91,6 @@ def _alike(content: ReportContent, one: Run, other: Run) -> bool:
     return a.name == b.name and first.shape == second.shape and bool(np.allclose(first, second, rtol=0, atol=1e-6))
 
 
-def run_orders(content: ReportContent, run: Run) -> Array:
-    """(k, m) commands of a run; angles of thrusters start between -180 and 180 degrees."""
-    leg, commands = content.plan.legs[run.leg], content.plan.commands
-    values = np.array(commands.values[leg.first : leg.last])
-    for column, name in enumerate(commands.names):
-        if stem(name) == "a":
-            values[:, column] -= TURN * np.round(values[0, column] / TURN)
-    return values
-
-
 def build_card(content: ReportContent, runs: Sequence[Run]) -> Card:
     """The card of runs that share a sheet."""
     plan, vessel = content.plan, content.vessel
@@ -120,8 +112,8 @@ def build_card(content: ReportContent, runs: Sequence[Run]) -> Card:
         danger=_together([_danger(danger, leg.first, step) for danger, leg in zip(dangers, legs, strict=True)]),
         end=_together([_end(content, leg.first, leg.last) for leg in legs]),
         signals=[(name, unit) for name, unit, _ in order_columns(vessel)],
-        orders=_columns(rows),
-        orders_notes=_orders_notes(content, legs[0], rows, missed),
+        orders=columns_of(rows),
+        orders_notes=orders_notes(content, legs[0], rows, missed),
         room=_room(content, max((danger.room_m for danger in dangers), key=math.prod)),
         record=_record(content),
     )
@@ -130,38 +122,6 @@ def build_card(content: ReportContent, runs: Sequence[Run]) -> Card:
 def _together(runs: list[list[tuple[str, str]]]) -> list[tuple[str, tuple[str, ...]]]:
     """Rows with the same name of several runs as one row with a cell for each."""
     return [(rows[0][0], tuple(text for _, text in rows)) for rows in zip(*runs, strict=True)]
-
-
-def _columns(rows: list[tuple[str, ...]]) -> list[list[tuple[str, ...]]]:
-    """Rows in one column, or in two or three beside each other where they are many and narrow."""
-    count = 1 if len(rows) <= LONG else 3 if len(rows[0]) <= WIDE and len(rows) > 2 * LONG else 2
-    length = math.ceil(len(rows) / count)
-    return [rows[start : start + length] for start in range(0, len(rows), length)]
-
-
-def _orders_notes(content: ReportContent, leg: Leg, rows: list[tuple[str, ...]], missed: float) -> list[str]:
-    step = content.plan.commands.sample_time_s
-    every = (leg.last - leg.first) * step / len(rows)
-    signs = [meaning for what, meaning in SIGNS.items() if any(stem(n) == what for n in content.vessel.model.inputs)]
-    notes = [
-        f"Between the rows all orders change linearly. They deviate from commands.csv (one command every {step:g} s) "
-        "by at "
-        f"most {100 * missed:.0f} % of the range of each order. {' '.join(signs)}".rstrip()
-    ]
-    if every < HASTE_S:
-        notes.append(
-            f"One order every {every:.2g} s is too fast to be called out. Let the control system execute "
-            "commands.csv, and use these rows to monitor it."
-        )
-    return notes
-
-
-SIGNS = {
-    "n": "n: propeller speed, ahead positive.",
-    "a": "a: direction of thrust, 0 ahead, 90 to starboard.",
-    "rudder": "rudder: 0 amidships; sign as in the vessel file.",
-}
-"""Stem of a signal -> what its sign means."""
 
 
 def _purpose(content: ReportContent, index: int) -> str:

@@ -8,11 +8,11 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from expdesign.conventions import to_n_frame
+from expdesign.export.pages.figures import BLACK, GREEN, PRIMITIVE, REPOSITION, new_figure, svg
 from expdesign.export.report.content import ReportContent
 from expdesign.export.report.figures.chart import draw_sea
 from expdesign.export.report.figures.labels import place_labels
 from expdesign.export.report.figures.position_axes import draw_position_ticks, draw_scale_and_north
-from expdesign.export.report.figures.style import BLACK, GREEN, PRIMITIVE, REPOSITION, new_figure, svg
 from expdesign.plan.values import Leg
 from expdesign.values import Array
 

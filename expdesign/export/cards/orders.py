@@ -6,13 +6,19 @@ import math
 
 import numpy as np
 
+from expdesign.export.report.content import ReportContent, Run
+from expdesign.plan.values import Leg
 from expdesign.values import Array
 from expdesign.vessel import Vessel, stem
 
 TOLERANCE = 0.02
 """Largest error of the condensed orders, as a share of the range of each signal; larger where `MOST_ROWS` is "
 "reached."""
+
+
 MOST_ROWS = 48
+
+
 UNITS = {"n": ("rpm", 60.0), "a": ("deg", 180.0 / math.pi), "rudder": ("deg", 180.0 / math.pi)}
 
 
@@ -67,3 +73,57 @@ def order_rows(vessel: Vessel, values: Array, step_s: float) -> tuple[list[tuple
 def _figure(value: float) -> str:
     text = f"{value:.0f}" if abs(value) >= 20 else f"{value:.1f}"
     return "0" if float(text) == 0 else text.replace("-", "\N{MINUS SIGN}")
+
+
+LONG, WIDE = 12, 5
+"""Number of rows above which the orders use several columns, and cells per row up to which there are three."""
+
+
+HASTE_S = 10.0
+"""Mean time between orders below which they are too fast to be called out."""
+
+
+TURN = 2 * math.pi
+
+
+def run_orders(content: ReportContent, run: Run) -> Array:
+    """(k, m) commands of a run; angles of thrusters start between -180 and 180 degrees."""
+    leg, commands = content.plan.legs[run.leg], content.plan.commands
+    values = np.array(commands.values[leg.first : leg.last])
+    for column, name in enumerate(commands.names):
+        if stem(name) == "a":
+            values[:, column] -= TURN * np.round(values[0, column] / TURN)
+    return values
+
+
+def columns_of(rows: list[tuple[str, ...]]) -> list[list[tuple[str, ...]]]:
+    """Rows in one column, or in two or three beside each other where they are many and narrow."""
+    count = 1 if len(rows) <= LONG else 3 if len(rows[0]) <= WIDE and len(rows) > 2 * LONG else 2
+    length = math.ceil(len(rows) / count)
+    return [rows[start : start + length] for start in range(0, len(rows), length)]
+
+
+def orders_notes(content: ReportContent, leg: Leg, rows: list[tuple[str, ...]], missed: float) -> list[str]:
+    """How the rows of orders of a leg are to be used; `missed` is their largest error as a share of the range."""
+    step = content.plan.commands.sample_time_s
+    every = (leg.last - leg.first) * step / len(rows)
+    signs = [meaning for what, meaning in SIGNS.items() if any(stem(n) == what for n in content.vessel.model.inputs)]
+    notes = [
+        f"Between the rows all orders change linearly. They deviate from commands.csv (one command every {step:g} s) "
+        "by at "
+        f"most {100 * missed:.0f} % of the range of each order. {' '.join(signs)}".rstrip()
+    ]
+    if every < HASTE_S:
+        notes.append(
+            f"One order every {every:.2g} s is too fast to be called out. Let the control system execute "
+            "commands.csv, and use these rows to monitor it."
+        )
+    return notes
+
+
+SIGNS = {
+    "n": "n: propeller speed, ahead positive.",
+    "a": "a: direction of thrust, 0 ahead, 90 to starboard.",
+    "rudder": "rudder: 0 amidships; sign as in the vessel file.",
+}
+"""Stem of a signal -> what its sign means."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 from expdesign.export import words
 from expdesign.export.cards.card import BLANKS, build_card, card_groups
 from expdesign.export.pages import page_templates
+from expdesign.export.pages.figures import report_style
 from expdesign.export.report import tables
 from expdesign.export.report.content import ReportContent, primitive_runs
 from expdesign.export.report.figures.chart import chart
-from expdesign.export.report.figures.style import report_style
 from expdesign.export.report.procedure import day_sentence, procedure_sentences
 from expdesign.export.routes import require_verified
 

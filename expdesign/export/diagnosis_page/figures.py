@@ -10,7 +10,7 @@ from expdesign.diagnosis import Diagnosis
 from expdesign.diagnosis.model import ENOUGH, Dependence, dependence
 from expdesign.export.diagnosis_page.suspects import DEGREES, has_sign, is_force, suspected, suspected_force
 from expdesign.export.estimate_page.figures import AXES, thinned
-from expdesign.export.report.figures.style import BLUE, GREY, VERMILION, light_grid, new_figure, short, svg
+from expdesign.export.pages.figures import BLUE, GREY, VERMILION, light_grid, new_figure, short, svg
 from expdesign.values import Array
 from expdesign.vessel import column_name
 

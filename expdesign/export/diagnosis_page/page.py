@@ -21,7 +21,7 @@ from expdesign.export.diagnosis_page.suspects import has_sign, is_force
 from expdesign.export.diagnosis_page.wording import titled, worded
 from expdesign.export.files import plus_minus
 from expdesign.export.pages import page_templates
-from expdesign.export.report.figures.style import report_style
+from expdesign.export.pages.figures import report_style
 
 SHOWN = 4
 """Stretches of data drawn."""

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 
 from expdesign.assessment import Assessed, RunCheck
 from expdesign.conventions import OUTPUTS
-from expdesign.export.report.figures.style import BLUE, GREY, LINES, light_grid, new_figure, plain, svg
+from expdesign.export.pages.figures import BLUE, GREY, LINES, light_grid, new_figure, plain, svg
 from expdesign.values import Array
 
 AXES = {

@@ -5,16 +5,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
 from expdesign.assessment import Assessed, Assessment, sentence
 from expdesign.assessment.limits import AHEAD_S
 from expdesign.export import words
+from expdesign.export.estimate_page.advice import advice, conditions, summary
 from expdesign.export.estimate_page.content import EstimateContent
 from expdesign.export.estimate_page.figures import autocorrelation_figure, interval_figure, residual_figure, run_figure
-from expdesign.export.files import breach_sentences, fit_table, motion_words, plus_minus, unstable_warning
+from expdesign.export.files import fit_table, motion_words, plus_minus
 from expdesign.export.pages import page_templates
-from expdesign.export.report.figures.style import report_style
+from expdesign.export.pages.figures import report_style
 
 FACTOR = 1.959964
 """Standard deviations to either side that hold 95 % of a normal distribution."""
@@ -62,7 +61,7 @@ def estimate_html(content: EstimateContent) -> str:
         ahead_s=AHEAD_S,
         methods=methods,
         explained=[(item.name, item.explained, item.correlation) for item in methods],
-        conditions=_conditions(content),
+        conditions=conditions(content),
         advice=advice(content),
         notes=[*found.record.notes, *found.tests.notes, *found.left_out],
         figures=_figures(content),
@@ -81,41 +80,6 @@ def _figures(content: EstimateContent) -> dict[str, object]:
             "residuals": residual_figure(found.best, names, step),
             "autocorrelation": autocorrelation_figure(found.best, step),
         }
-
-
-def summary(content: EstimateContent) -> list[str]:
-    """What was estimated from what, in a few sentences."""
-    found, best = content.found, content.found.best
-    batches = found.record.batches
-    seconds = sum(len(batch) * batch.sample_time_s for batch in batches)
-    samples = sum(len(batch) for batch in batches)
-    tests = words.counted(len(found.tests.batches), "run")
-    apart = f" Test data, not used for estimation: {tests}." if found.tests.batches else ""
-    fixed = f" Fixed parameters: {', '.join(found.fixed)}." if found.fixed else ""
-    return [
-        f"Estimated: {words.counted(len(best.estimate.names), 'parameter')} of {content.vessel.name}, from "
-        f"{words.counted(len(batches), 'run')} with {samples} samples in {words.duration(seconds)}.{apart}{fixed}",
-        f"The file vessel-estimated.toml holds the estimate by {best.method.title} ({best.method.name}).",
-        _fit_sentence(best),
-    ]
-
-
-def _fit_sentence(best: Assessed) -> str:
-    kinds = [(use, [run for run in best.runs if run.use == use]) for use in ("estimation", "test")]
-    parts = []
-    for use, runs in kinds:
-        fits = np.array([run.fit_percent for run in runs if not run.problem])
-        if len(fits) and np.isfinite(fits).any():
-            medians = ", ".join(
-                f"{name} {words.number(float(np.nanmedian(column)), 0)}{words.NB}%"
-                for name, column in zip(best.model.outputs, fits.T, strict=True)
-                if np.isfinite(column).any()
-            )
-            parts.append(f"{medians} on the {use} runs")
-        failed = sum(bool(run.problem) for run in runs)
-        if failed:
-            parts.append(f"{failed} of {len(runs)} {use} runs diverge")
-    return f"Fit of its simulations, median over runs: {'; '.join(parts)}." if parts else "No run could be simulated."
 
 
 def parameter_rows(content: EstimateContent) -> list[ParameterRow]:
@@ -211,40 +175,3 @@ def _current(item: Assessed) -> str:
 def _listed(outputs: tuple[str, ...], values: list[float], decimals: int) -> str:
     texts = ("-" if math.isnan(value) else words.number(value, decimals) for value in values)
     return ", ".join(f"{name} {text}" for name, text in zip(outputs, texts, strict=True))
-
-
-def _conditions(content: EstimateContent) -> list[str]:
-    return breach_sentences(content.found.best.breaches, len(content.found.record.batches))
-
-
-def advice(content: EstimateContent) -> list[str]:
-    """Advice on the choice of the estimate, from the residuals of these data."""
-    best = content.found.best
-    lag = best.one_step.autocorrelation[1]
-    sentences = [*unstable_warning(content.found)]
-    if (lag < -0.25).any():
-        sentences.append(
-            f"Successive residuals of {_names(best, lag < -0.25)} are negatively correlated. This indicates "
-            "measurement noise in the velocities, which biases least squares. Prefer instrumental variables."
-        )
-    if (lag > 0.25).any():
-        sentences.append(
-            f"Successive residuals of {_names(best, lag > 0.25)} are positively correlated. The model lacks a slow "
-            "effect, such as wind, current, waves or a term. No method is consistent with a wrong model structure, "
-            "and the standard deviations do not include this error. The command diagnose searches for the cause."
-        )
-    if not best.stable:
-        sentences.append(
-            "No estimate can simulate every run, so none is ready for use. Try output error with a horizon "
-            "(--method oe --horizon 30, or oe-air with measured wind): it needs only short simulations and often gives "
-            "a stable model. Runs with smaller unmodelled effects help too."
-        )
-    elif not best.uses_instruments and not best.method.name.startswith("oe"):
-        sentences.append(
-            f"No instrumental-variable estimate is stable, so the vessel file holds the one by {best.method.title}."
-        )
-    return sentences
-
-
-def _names(best: Assessed, chosen: np.ndarray) -> str:
-    return " and ".join(name for name, is_in in zip(best.one_step.outputs, chosen, strict=True) if is_in)

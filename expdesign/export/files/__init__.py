@@ -1,31 +1,28 @@
 """Results as JSON, CSV and TOML files."""
 
+from expdesign.export.files.design_files import dictionary_json, durations_json
 from expdesign.export.files.dictionary_file import dictionary_files, growth_json
-from expdesign.export.files.estimates import (
+from expdesign.export.files.estimate_tables import (
     breach_sentences,
-    estimate_json,
     estimate_warnings,
-    estimated_vessel,
-    fit_entries,
     fit_table,
-    limit_entries,
     limit_table,
     motion_words,
-    parameter_entries,
     parameter_table,
     plus_minus,
     unstable_warning,
 )
-from expdesign.export.files.known import Known, Purchase, replan_json
-from expdesign.export.files.record_file import record_csv
-from expdesign.export.files.results import (
-    commands_csv,
-    dictionary_json,
-    durations_json,
-    plan_json,
-    strict_json,
-    track_csv,
+from expdesign.export.files.estimates import (
+    estimate_json,
+    estimated_vessel,
+    fit_entries,
+    limit_entries,
+    parameter_entries,
 )
+from expdesign.export.files.known import Known, Purchase, replan_json
+from expdesign.export.files.plan_files import commands_csv, plan_json, track_csv
+from expdesign.export.files.record_file import record_csv
+from expdesign.export.files.text import finite, strict_json
 from expdesign.export.files.vessel_file import vessel_toml
 
 __all__ = [
@@ -39,6 +36,7 @@ __all__ = [
     "estimate_json",
     "estimate_warnings",
     "estimated_vessel",
+    "finite",
     "fit_entries",
     "fit_table",
     "growth_json",

@@ -5,10 +5,8 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 
-import numpy as np
-
 from expdesign.dictionary.spec import PrimitiveSpec
-from expdesign.export.files.results import csv_text, sample_seconds, strict_json
+from expdesign.export.files.text import csv_text, finite, sample_seconds, strict_json
 from expdesign.growing import Growth
 from expdesign.signals import Commands
 from expdesign.vessel import column_name
@@ -48,7 +46,7 @@ def growth_json(growth: Growth) -> str:
             "dimension": growth.dimension,
             "limits": dict(velocities),
             "candidates": growth.evaluated,
-            "best_sensitivity_left": growth.best_left if np.isfinite(growth.best_left) else None,
+            "best_sensitivity_left": finite(growth.best_left),
             "efficiency_at_least_among_candidates": growth.efficiency_left,
             "rounds": [
                 {

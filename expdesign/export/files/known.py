@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from expdesign.conventions import POSE_COLUMNS
-from expdesign.export.files.results import strict_json
+from expdesign.export.files.text import finite, strict_json
 from expdesign.simulation.environment import Environment
 from expdesign.values import Array, seal
 
@@ -114,15 +114,11 @@ def replan_json(known: Known) -> str:
 
 def _entry(before: float, now: float, stated: float, so_far: float, after: float, purchase: Purchase) -> dict[str, Any]:
     return {
-        "before": _finite(before),
+        "before": finite(before),
         "now": now,
         "std_before": stated or None,
-        "std_so_far": _finite(so_far),
-        "std_after_rest": _finite(after),
+        "std_so_far": finite(so_far),
+        "std_after_rest": finite(after),
         "bought_by": purchase.primitive or None,
-        "std_ratio_without_it": _finite(purchase.without),
+        "std_ratio_without_it": finite(purchase.without),
     }
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None

@@ -6,21 +6,21 @@ from dataclasses import dataclass
 
 from expdesign.export import words
 from expdesign.export.pages import page_templates
+from expdesign.export.pages.figures import report_style
 from expdesign.export.report import criteria, tables
-from expdesign.export.report.admission import conditions
+from expdesign.export.report.checks import checks, conditions
 from expdesign.export.report.content import ReportContent, primitive_runs
 from expdesign.export.report.figures.chart import chart
 from expdesign.export.report.figures.design import durations_figure, information_figure
 from expdesign.export.report.figures.gallery import primitive_figure
-from expdesign.export.report.figures.style import report_style
 from expdesign.export.report.figures.timeline import timeline_figure
 from expdesign.export.report.figures.uncertainty import uncertainty_figure
 from expdesign.export.report.glossary import GLOSSARY
 from expdesign.export.report.growth import growth_rows, growth_sentences
+from expdesign.export.report.parameters import Expected, equation_sentence, expected, measures_velocity, parameter_rows
 from expdesign.export.report.procedure import day_sentence, procedure_sentences
 from expdesign.export.report.progress import known_rows, known_sentences
 from expdesign.export.report.trust import chain
-from expdesign.export.report.uncertainty import Expected, expected, measures_velocity
 
 SUBTRACTION = {
     "none": "no mean is subtracted from the instruments",
@@ -48,7 +48,7 @@ class Fact:
 def report_html(content: ReportContent) -> str:
     """One HTML page without any outside reference: figures inside as SVG, readable on a phone and on paper."""
     after = expected(content)
-    rows = tables.parameter_rows(content, after)
+    rows = parameter_rows(content, after)
     page = page_templates("expdesign.export.report").get_template("report.html")
     return page.render(
         content=content,
@@ -71,7 +71,7 @@ def report_html(content: ReportContent) -> str:
         noise=measures_velocity(content),
         chain=chain(content, short_of_optimum=criteria.short_of_optimum(content)),
         conditions=conditions(content),
-        checks=tables.checks(content),
+        checks=checks(content),
         procedure=procedure_sentences(content.plan),
         growth=[] if content.growth is None else growth_rows(content.growth),
         grown=("", "") if content.growth is None else growth_sentences(content.growth),
@@ -79,7 +79,7 @@ def report_html(content: ReportContent) -> str:
         figures=_figures(content, after),
         origin=_origin(content),
         percent=words.percent,
-        equation=tables.equation_sentence(content),
+        equation=equation_sentence(content),
         less=any(row.less for row in rows),
         told=tables.excitation_sentence(content),
     )

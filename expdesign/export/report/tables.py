@@ -8,10 +8,8 @@ import numpy as np
 
 from expdesign.export import words
 from expdesign.export.report.content import ReportContent, primitive_runs
-from expdesign.export.report.procedure import aborted_words, extra_words, left_words
-from expdesign.export.report.uncertainty import Expected
 from expdesign.information.primitive_information import PrimitiveInformation
-from expdesign.plan.values import Leg, Plan, Promise
+from expdesign.plan.values import Leg, Plan
 
 REST_MPS, REST_RADPS = 0.02, 0.0005
 
@@ -137,130 +135,6 @@ def _entry(item: PrimitiveInformation) -> str:
         side = "starboard" if r > 0 else "port"
         parts.append(f"turning {words.number(abs(np.degrees(r)))} \N{DEGREE SIGN}/s to {side}")
     return ", ".join(parts)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Check:
-    """One line of the verification; `passed` is None where a number is only reported."""
-
-    what: str
-    found: str
-    required: str
-    passed: bool | None
-
-
-def checks(content: ReportContent) -> list[Check]:
-    """Results of the independent check beside the requirements."""
-    plan, found = content.plan, content.plan.verification
-    rows = [
-        Check(
-            what="Least distance from the hull to forbidden water",
-            found=f"{words.distance(found.clearance_min_m)} at {words.clock(found.clearance_time_s)}",
-            required=f"at least {words.distance(content.clearance_m)}",
-            passed=found.clearance_min_m >= content.clearance_m,
-        ),
-        Check(
-            what="Largest distance between the planned track and the independent simulation",
-            found="less than 1 mm" if found.reproduction_error_m < 1e-3 else words.distance(found.reproduction_error_m),
-            required="",
-            passed=None,
-        ),
-        Check(
-            what="Largest violation of an actuator limit or rate limit",
-            found="none" if found.limit_excess < 1e-6 else f"{words.percent(found.limit_excess)} of its range",
-            required="",
-            passed=None,
-        ),
-    ]
-    return rows if plan.promise is None else [*rows, *_promise_checks(plan.promise, 1.0 - content.confidence)]
-
-
-def _promise_checks(promise: Promise, allowed: float) -> list[Check]:
-    """Results of the Monte Carlo trials."""
-    return [
-        Check(
-            what="Probability that the hull leaves allowed water during the trial",
-            found=left_words(promise),
-            required=f"at most {words.percent(allowed)}",
-            passed=promise.left <= allowed + 1e-12,
-        ),
-        Check(
-            what="Trials aborted because a run could not start within its tolerances",
-            found=aborted_words(promise),
-            required="",
-            passed=None,
-        ),
-        Check(
-            what="Time in addition to the plan, for returning to the start of each run",
-            found=extra_words(promise),
-            required="",
-            passed=None,
-        ),
-    ]
-
-
-@dataclass(frozen=True, kw_only=True)
-class ParameterRow:
-    """One parameter to be estimated: its term, its value, and how well it is known before and after."""
-
-    name: str
-    term: str
-    nominal: str
-    before: str
-    runs: str
-    track: str
-    gain: str
-    less: bool = False
-
-
-def parameter_rows(content: ReportContent, found: Expected) -> list[ParameterRow]:
-    """Parameters in order; standard deviations in the parameter's own unit."""
-    model = content.vessel.model
-    nominal = dict(zip(model.names, model.parameters.tolist(), strict=True))
-    left = "T d{}/dt" if model.form == "discrete" else "d{}/dt"
-    terms = {term.name: f"{left.format(term.equation)} = ... + {term.name} * {term.expression}" for term in model.terms}
-    columns = zip(content.parameters, found.before.tolist(), found.runs.tolist(), found.track.tolist(), strict=True)
-    return [
-        ParameterRow(
-            name=name,
-            term=terms[name],
-            nominal=_small(nominal[name], 3),
-            before=_small(before) if before > 0 else "not stated",
-            runs=_std(runs),
-            track=_std(track),
-            gain=f"{words.significant(before / track, 2)} times" if before > 0 and track > 0 else "",
-            less=0 < before < track,
-        )
-        for name, before, runs, track in columns
-    ]
-
-
-def _std(value: float) -> str:
-    return "not estimable" if np.isnan(value) else _small(value)
-
-
-SMALL = 1e-3
-
-
-def _small(value: float, digits: int = 2) -> str:
-    """Significant digits; small values as a power of ten."""
-    if not 0 < abs(value) < SMALL:
-        return words.significant(value, digits)
-    number, _, power = f"{value:.{digits - 1}e}".partition("e")
-    trimmed = (number.rstrip("0").rstrip(".") if digits > 2 else number).replace("-", words.MINUS)
-    return f"{trimmed}\N{MIDDLE DOT}10{str(int(power)).translate(RAISED)}"
-
-
-RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-
-
-def equation_sentence(content: ReportContent) -> str:
-    """Units and the sample time of the equations."""
-    model = content.vessel.model
-    units = "Parameters and standard deviations are in m, s and rad, and the model's units of force."
-    if model.form == "discrete":
-        return f"T is the sample time of the model, {model.sample_time_s:g} s. {units}"
-    return units
 
 
 def excitation_sentence(content: ReportContent) -> str:

@@ -7,101 +7,32 @@ from __future__ import annotations
 
 import csv
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import ValidationError
 
 from expdesign.conventions import POSE_COLUMNS, VELOCITY_COLUMNS
 from expdesign.errors import FileError
 from expdesign.export.routes.fence import Fence
+from expdesign.export.routes.plan_schema import PlanFile, environment_of
 from expdesign.export.routes.planned import PlannedTrack
 from expdesign.plan.values import Leg
 from expdesign.sea_area import LocalFrame
 from expdesign.signals import Commands, Trajectory
-from expdesign.simulation.environment import Environment
 from expdesign.values import Array
-from expdesign.vessel import Variation, column_name
+from expdesign.vessel import column_name
 
 TRACK_COLUMNS = ("time_s", *POSE_COLUMNS, *VELOCITY_COLUMNS, "leg", "lat_deg", "lon_deg")
+
+
 STATE_TOLERANCE = 1e-5
 """Between plan.json, which has every digit, and track.csv, which has micrometres [m, rad, m/s, rad/s]."""
+
+
 DEGREE_TOLERANCE = 1e-7
+
+
 TIME_TOLERANCE_S = 1e-6
-
-
-class _Entry(BaseModel):
-    model_config = ConfigDict(frozen=True, allow_inf_nan=False, extra="ignore")
-
-
-class _Vessel(_Entry):
-    name: str
-    length_m: float = Field(gt=0)
-    beam_m: float = Field(gt=0)
-
-
-class _Origin(_Entry):
-    lat_deg: float = Field(ge=-90, le=90)
-    lon_deg: float = Field(ge=-180, le=180)
-
-
-class _Frame(_Entry):
-    projection: str
-    origin: _Origin
-
-
-class _Medium(_Entry):
-    north_mps: float
-    east_mps: float
-    std_mps: float = Field(ge=0)
-    variation_std_mps: float = Field(default=0.0, ge=0)
-    correlation_s: float = Field(default=0.0, ge=0)
-
-
-class _Environment(_Entry):
-    current_to: _Medium
-    wind_to: _Medium
-    sea_state: int | None = Field(default=None, ge=0, le=9)
-
-
-class _State(_Entry):
-    time_s: float
-    north_m: float
-    east_m: float
-    heading_rad: float
-    u_mps: float
-    v_mps: float
-    r_radps: float
-
-    @property
-    def motion(self) -> Array:
-        return np.array([getattr(self, name) for name in (*POSE_COLUMNS, *VELOCITY_COLUMNS)])
-
-
-class _Leg(_Entry):
-    index: int
-    kind: Literal["primitive", "reposition"]
-    name: str
-    start: _State
-    end: _State
-
-
-class _Fence(_Entry):
-    inside: tuple[tuple[float, float], ...] = Field(min_length=3)
-    outside: tuple[tuple[tuple[float, float], ...], ...] = ()
-
-
-class _PlanFile(_Entry):
-    scenario: str
-    vessel: _Vessel
-    sample_time_s: float = Field(gt=0)
-    inputs: list[str] = Field(min_length=1)
-    frame: _Frame
-    environment: _Environment
-    legs: list[_Leg] = Field(min_length=1)
-    clearance_required_m: float = Field(ge=0)
-    fence: _Fence | None = None
-    verified: bool
 
 
 def read_plan(path: Path) -> PlannedTrack:
@@ -128,7 +59,7 @@ def read_plan(path: Path) -> PlannedTrack:
         length_m=file.vessel.length_m,
         beam_m=file.vessel.beam_m,
         frame=frame,
-        environment=_environment(file.environment),
+        environment=environment_of(file.environment),
         commands=Commands(sample_time_s=file.sample_time_s, names=tuple(file.inputs), values=commands[:, 1:-1]),
         trajectory=Trajectory(sample_time_s=file.sample_time_s, pose=track[:, 1:4], velocity=track[:, 4:7]),
         legs=legs,
@@ -137,9 +68,9 @@ def read_plan(path: Path) -> PlannedTrack:
     )
 
 
-def _parse(path: Path) -> _PlanFile:
+def _parse(path: Path) -> PlanFile:
     try:
-        return _PlanFile.model_validate_json(_text(path))
+        return PlanFile.model_validate_json(_text(path))
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         problem = first["msg"][:1].lower() + first["msg"][1:]
@@ -160,7 +91,7 @@ def _text(path: Path) -> str:
         raise FileError(path, "", f"cannot be read: {error.strerror or error}") from None
 
 
-def _legs(path: Path, file: _PlanFile) -> tuple[Leg, ...]:
+def _legs(path: Path, file: PlanFile) -> tuple[Leg, ...]:
     legs: list[Leg] = []
     for number, entry in enumerate(file.legs):
         key = f"legs.{number}"
@@ -177,7 +108,7 @@ def _legs(path: Path, file: _PlanFile) -> tuple[Leg, ...]:
     return tuple(legs)
 
 
-def _sample(path: Path, file: _PlanFile, key: str, time_s: float) -> int:
+def _sample(path: Path, file: PlanFile, key: str, time_s: float) -> int:
     sample = round(time_s / file.sample_time_s)
     if abs(sample * file.sample_time_s - time_s) > TIME_TOLERANCE_S:
         raise FileError(path, f"{key}.time_s", f"is {time_s!r}, expected a multiple of {file.sample_time_s:g} s")
@@ -223,7 +154,7 @@ def _check_rows(
             raise FileError(path, f"row {row + 2}, {name}", f"is {table[row, column]:g}, expected {right[row]:g}")
 
 
-def _check_track(path: Path, file: _PlanFile, frame: LocalFrame, legs: tuple[Leg, ...], track: Array) -> None:
+def _check_track(path: Path, file: PlanFile, frame: LocalFrame, legs: tuple[Leg, ...], track: Array) -> None:
     track_path = path.with_name("track.csv")
     column = TRACK_COLUMNS.index("leg")
     _check_rows(track_path, track, file.sample_time_s, legs, expected=legs[-1].last + 1, leg_column=column)
@@ -239,16 +170,3 @@ def _check_track(path: Path, file: _PlanFile, frame: LocalFrame, legs: tuple[Leg
         raise FileError(
             track_path, f"row {wrong[0] + 2}, lat_deg", "and lon_deg are not where north_m and east_m are in this frame"
         )
-
-
-def _environment(file: _Environment) -> Environment:
-    current, wind = file.current_to, file.wind_to
-    return Environment(
-        current_to=np.array([current.north_mps, current.east_mps]),
-        wind_to=np.array([wind.north_mps, wind.east_mps]),
-        current_std_mps=current.std_mps,
-        wind_std_mps=wind.std_mps,
-        current_variation=Variation(std_mps=current.variation_std_mps, correlation_s=current.correlation_s),
-        wind_variation=Variation(std_mps=wind.variation_std_mps, correlation_s=wind.correlation_s),
-        sea_state=file.sea_state,
-    )

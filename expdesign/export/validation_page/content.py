@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from expdesign.export.files import finite, strict_json
 from expdesign.rehearsal import Rehearsal, Validated
 
 AGREES = 0.10
@@ -166,7 +166,7 @@ def validation_json(content: ValidationContent) -> str:
         "designs": {item.design: _entry(rehearsal, item) for item in content.results},
         "judgements": list(judgements(content)),
     }
-    return json.dumps(described, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return strict_json(described)
 
 
 def _entry(rehearsal: Rehearsal, result: Validated) -> dict[str, object]:
@@ -182,18 +182,14 @@ def _entry(rehearsal: Rehearsal, result: Validated) -> dict[str, object]:
         },
         "parameters": {
             name: {
-                "truth": _number(result.truth[index]),
-                "bias": _number(result.bias[index]),
-                "std_found": _number(result.found[index]),
-                "std_predicted_at_truth": _number(result.theory[index]),
-                "std_forecast_by_nominal": _number(result.forecast[index]),
-                "std_stated_mean": _number(result.stated[:, index].mean()),
-                "coverage_95": _number(result.coverage[index]),
+                "truth": finite(result.truth[index]),
+                "bias": finite(result.bias[index]),
+                "std_found": finite(result.found[index]),
+                "std_predicted_at_truth": finite(result.theory[index]),
+                "std_forecast_by_nominal": finite(result.forecast[index]),
+                "std_stated_mean": finite(result.stated[:, index].mean()),
+                "coverage_95": finite(result.coverage[index]),
             }
             for index, name in enumerate(result.parameters)
         },
     }
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

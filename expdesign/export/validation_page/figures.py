@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from expdesign.export.report.figures.style import BLUE, GREY, LINES, VERMILION, light_grid, new_figure, plain, svg
+from expdesign.export.pages.figures import BLUE, GREY, LINES, VERMILION, light_grid, new_figure, plain, svg
 from expdesign.export.validation_page.content import ERROR_LIMIT, chance
 from expdesign.rehearsal import Validated
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from expdesign.export.pages import page_templates
-from expdesign.export.report.figures.style import report_style
+from expdesign.export.pages.figures import report_style
 from expdesign.export.validation_page.content import ERROR_LIMIT, ValidationContent, judgements
 from expdesign.export.validation_page.figures import error_figure, spread_figure
 from expdesign.rehearsal import Validated

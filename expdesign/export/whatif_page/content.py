@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from expdesign.export.files import strict_json
 from expdesign.values import Array
 
 NOTICED = 0.02
@@ -185,7 +185,7 @@ def whatif_json(content: WhatIfContent) -> str:
         "scenario": content.cases[0].name,
         "cases": [_entry(content, case, sentences.get(case.name, ())) for case in content.cases],
     }
-    return json.dumps(described, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return strict_json(described)
 
 
 def _entry(content: WhatIfContent, case: Case, sentences: tuple[str, ...]) -> dict[str, object]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
-from expdesign.export.report.figures.style import LINES, REPOSITION, VERMILION, light_grid, new_figure, plain, svg
+from expdesign.export.pages.figures import LINES, REPOSITION, VERMILION, light_grid, new_figure, plain, svg
 from expdesign.export.whatif_page.content import WhatIfContent
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from expdesign.export.pages import page_templates
-from expdesign.export.report.figures.style import report_style
+from expdesign.export.pages.figures import report_style
 from expdesign.export.whatif_page.content import Case, WhatIfContent, explanations
 from expdesign.export.whatif_page.figures import ratio_figure, runs_figure, time_figure
 

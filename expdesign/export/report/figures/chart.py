@@ -12,11 +12,7 @@ from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path as Outline
 
 from expdesign.conventions import to_n_frame
-from expdesign.export.report.content import ReportContent, primitive_runs
-from expdesign.export.report.figures.footprints import footprints
-from expdesign.export.report.figures.labels import place_labels
-from expdesign.export.report.figures.position_axes import draw_position_ticks, draw_scale_and_north
-from expdesign.export.report.figures.style import (
+from expdesign.export.pages.figures import (
     BLACK,
     FORBIDDEN,
     GREEN,
@@ -29,6 +25,10 @@ from expdesign.export.report.figures.style import (
     new_figure,
     svg,
 )
+from expdesign.export.report.content import ReportContent, primitive_runs
+from expdesign.export.report.figures.footprints import footprints
+from expdesign.export.report.figures.labels import place_labels
+from expdesign.export.report.figures.position_axes import draw_position_ticks, draw_scale_and_north
 from expdesign.plan.values import Plan
 from expdesign.sea_area import SeaArea, as_multipolygon, eroded
 from expdesign.values import Array

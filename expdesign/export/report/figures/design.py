@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from expdesign.durations import DurationDesign
+from expdesign.export.pages.figures import BLUE, GREY, PRIMITIVE, light_grid, new_figure, short, svg
 from expdesign.export.report.content import ReportContent, relative_information
-from expdesign.export.report.figures.style import BLUE, GREY, PRIMITIVE, light_grid, new_figure, short, svg
 
 USED = 1e-6
 """Time fractions below this count as none."""

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from expdesign.conventions import to_n_frame
 from expdesign.dictionary.desired import desired_motion
 from expdesign.dictionary.primitive import Primitive
-from expdesign.export.report.figures.style import BLACK, BLUE, GREEN, GREY, PRIMITIVE, light_grid, new_figure, svg
+from expdesign.export.pages.figures import BLACK, BLUE, GREEN, GREY, PRIMITIVE, light_grid, new_figure, svg
 from expdesign.values import Array
 
 HULLS = 5

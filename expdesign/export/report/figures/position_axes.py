@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from expdesign.export import words
-from expdesign.export.report.figures.style import BLACK
+from expdesign.export.pages.figures import BLACK
 from expdesign.sea_area import LocalFrame
 
 STEPS = (1.0, 2.0, 5.0, 10.0)

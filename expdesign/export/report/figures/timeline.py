@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from expdesign.conventions import KNOTS_PER_MPS
+from expdesign.export.pages.figures import LINES, PRIMITIVE, light_grid, new_figure, plain, short, svg
 from expdesign.export.report.content import primitive_runs
-from expdesign.export.report.figures.style import LINES, PRIMITIVE, light_grid, new_figure, plain, short, svg
 from expdesign.plan.values import Plan
 from expdesign.values import Array
 from expdesign.vessel import stem

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from expdesign.export.pages.figures import BLACK, BLUE, GREY, PRIMITIVE, light_grid, new_figure, short, svg
 from expdesign.export.report.content import ReportContent
-from expdesign.export.report.figures.style import BLACK, BLUE, GREY, PRIMITIVE, light_grid, new_figure, short, svg
-from expdesign.export.report.uncertainty import Expected
+from expdesign.export.report.parameters import Expected
 from expdesign.values import Array
 
 

@@ -10,7 +10,7 @@ from markupsafe import Markup
 from matplotlib.axes import Axes
 
 from expdesign.export.pages import page_templates
-from expdesign.export.report.figures.style import (
+from expdesign.export.pages.figures import (
     BLUE,
     LINES,
     VERMILION,

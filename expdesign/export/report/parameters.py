@@ -1,0 +1,140 @@
+"""Parameters: expected standard deviations before and after the trial, and their table."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from expdesign.errors import NoAnswer
+from expdesign.export import words
+from expdesign.export.report.content import ReportContent
+from expdesign.information.expected import TrialPart, expected_covariance
+from expdesign.signals import Commands
+from expdesign.values import Array, seal
+
+
+@dataclass(frozen=True, kw_only=True)
+class ParameterRow:
+    """One parameter to be estimated: its term, its value, and how well it is known before and after."""
+
+    name: str
+    term: str
+    nominal: str
+    before: str
+    runs: str
+    track: str
+    gain: str
+    less: bool = False
+
+
+def parameter_rows(content: ReportContent, found: Expected) -> list[ParameterRow]:
+    """Parameters in order; standard deviations in the parameter's own unit."""
+    model = content.vessel.model
+    nominal = dict(zip(model.names, model.parameters.tolist(), strict=True))
+    left = "T d{}/dt" if model.form == "discrete" else "d{}/dt"
+    terms = {term.name: f"{left.format(term.equation)} = ... + {term.name} * {term.expression}" for term in model.terms}
+    columns = zip(content.parameters, found.before.tolist(), found.runs.tolist(), found.track.tolist(), strict=True)
+    return [
+        ParameterRow(
+            name=name,
+            term=terms[name],
+            nominal=_small(nominal[name], 3),
+            before=_small(before) if before > 0 else "not stated",
+            runs=_std(runs),
+            track=_std(track),
+            gain=f"{words.significant(before / track, 2)} times" if before > 0 and track > 0 else "",
+            less=0 < before < track,
+        )
+        for name, before, runs, track in columns
+    ]
+
+
+def _std(value: float) -> str:
+    return "not estimable" if np.isnan(value) else _small(value)
+
+
+SMALL = 1e-3
+
+
+def _small(value: float, digits: int = 2) -> str:
+    """Significant digits; small values as a power of ten."""
+    if not 0 < abs(value) < SMALL:
+        return words.significant(value, digits)
+    number, _, power = f"{value:.{digits - 1}e}".partition("e")
+    trimmed = (number.rstrip("0").rstrip(".") if digits > 2 else number).replace("-", words.MINUS)
+    return f"{trimmed}\N{MIDDLE DOT}10{str(int(power)).translate(RAISED)}"
+
+
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def equation_sentence(content: ReportContent) -> str:
+    """Units and the sample time of the equations."""
+    model = content.vessel.model
+    units = "Parameters and standard deviations are in m, s and rad, and the model's units of force."
+    if model.form == "discrete":
+        return f"T is the sample time of the model, {model.sample_time_s:g} s. {units}"
+    return units
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Expected:
+    """Standard deviations (p,) in the order of the parameters.
+
+    Attributes:
+        before: prior, zero where none was stated.
+        runs: of estimates from the informative runs alone; nan where they cannot be estimated.
+        track: of estimates from the whole track.
+    """
+
+    before: Array
+    runs: Array
+    track: Array
+
+    def __post_init__(self) -> None:
+        seal(self, before="p", runs="p", track="p")
+
+
+def expected(content: ReportContent) -> Expected:
+    """By first-order propagation of the vessel file's sensor noise through instrumental-variable estimation."""
+    plan = content.plan
+    runs = [leg for leg in plan.legs if leg.kind == "primitive"]
+    whole = [_part(content, 0, len(plan.commands))]
+    return Expected(
+        before=content.parameter_std,
+        runs=_deviations(content, [_part(content, leg.first, leg.last) for leg in runs]),
+        track=_deviations(content, whole),
+    )
+
+
+def _part(content: ReportContent, first: int, last: int) -> TrialPart:
+    commands, motion = content.plan.commands, content.plan.trajectory
+    return TrialPart(
+        commands=Commands(
+            sample_time_s=commands.sample_time_s, names=commands.names, values=commands.values[first:last]
+        ),
+        velocity=motion.velocity[first],
+        heading_rad=float(motion.pose[first, 2]),
+        standing=commands.values[first - 1] if first else None,
+    )
+
+
+def _deviations(content: ReportContent, parts: list[TrialPart]) -> Array:
+    try:
+        covariance = expected_covariance(
+            content.vessel,
+            parts,
+            content.parameters,
+            environment=content.environment,
+            mean_subtraction=content.design.problem.mean_subtraction,
+        )
+    except NoAnswer:
+        return np.full(len(content.parameters), np.nan)
+    return np.sqrt(np.maximum(np.diag(covariance), 0.0))
+
+
+def measures_velocity(content: ReportContent) -> bool:
+    """Whether the vessel file states noise to propagate."""
+    sensors = content.vessel.sensors
+    return sensors.velocity_mps > 0 or sensors.yaw_rate_radps > 0
