@@ -48,8 +48,3 @@ def to_n_frame(points_b: Array, pose: Array) -> Array:
 def to_b_frame(points_n: Array, pose: Array) -> Array:
     """Points (..., 2) north/east as (..., 2) forward/starboard of a pose (3,) [m]."""
     return np.asarray((points_n - pose[:2]) @ rotation(float(pose[2])))
-
-
-def compose(pose: Array, step: Array) -> Array:
-    """The pose (3,) reached from `pose` by a displacement `step` (3,) [forward m, starboard m, turn rad]."""
-    return np.array([*to_n_frame(step[:2], pose), pose[2] + step[2]])

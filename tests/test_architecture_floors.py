@@ -27,7 +27,7 @@ FLOORS = {
     ),
     "records": (("file",), ("pose",), ("remarks",), ("load",)),
     "estimation": (
-        ("fit", "fusion", "physical"),
+        ("fit", "tuning"),
         ("regression",),
         ("noise", "replay"),
         ("solve",),

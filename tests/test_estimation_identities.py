@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from expdesign.errors import NotInformative
-from expdesign.estimation.fusion import fuse
 from expdesign.estimation.regression.regression import Regression
 from expdesign.estimation.solve.solution import Weighting, solve_iv, solve_ls
 
@@ -109,17 +108,3 @@ def test_lags_do_not_cross_batches_or_see_gaps_as_neighbours() -> None:
     per_batch = solve_iv(case, Z, weighting).covariance
     np.testing.assert_allclose(solve_iv(apart, Z, weighting).covariance, per_batch, rtol=1e-9)
     assert not np.allclose(solve_iv(joined, Z, weighting).covariance, per_batch, rtol=1e-3)
-
-
-def test_fusion_of_independent_halves_is_the_whole_in_any_order() -> None:
-    rng = np.random.default_rng(7)
-    factors = [rng.normal(size=(5, 3)) for _ in range(3)]
-    covariances = [np.linalg.inv(F.T @ F) for F in factors]
-    values = [rng.normal(size=3) for _ in range(3)]
-    whole = np.concatenate(factors)
-    P = np.linalg.inv(whole.T @ whole)
-    mean = P @ sum(F.T @ F @ v for F, v in zip(factors, values, strict=True))
-    np.testing.assert_allclose(fuse(values, covariances)[0], mean, rtol=1e-10)
-    np.testing.assert_allclose(fuse(values, covariances)[1], P, rtol=1e-10)
-    first = fuse(values[:2], covariances[:2])
-    np.testing.assert_allclose(fuse([first[0], values[2]], [first[1], covariances[2]])[0], mean, rtol=1e-10)

@@ -5,13 +5,14 @@ import pytest
 
 from estimation_case import CALM_CURRENT, NOMINAL, TRUE, commands, measured, record
 from expdesign.estimation.methods import estimate
-from expdesign.estimation.noise.components import MISFIT, Components, filtered, fit_components, score_covariance
+from expdesign.estimation.noise.components import Components, filtered, fit_components, score_covariance
 from expdesign.estimation.noise.components import _expected as expected_periodogram
 from expdesign.estimation.noise.timeline import stretches
 from expdesign.estimation.regression.predictors import build_layout, build_regression
 from expdesign.estimation.regression.regression import single_output
 from expdesign.estimation.replay.instruments import apart_from_start
 from expdesign.estimation.solve.solution import Weighting, solve_iv
+from expdesign.estimation.tuning import TUNING
 
 MEMORIES = np.array([4.0, 30.0, np.inf])
 
@@ -87,7 +88,7 @@ def test_noise_of_other_shape_is_noticed_and_noise_of_these_parts_is_not() -> No
     parts = stretches(np.zeros(2000, dtype=np.int64), np.arange(2000))
 
     def noticed(noise: np.ndarray) -> float:
-        return float(np.mean([fitted.misfit > MISFIT for fitted in fit_components(noise.T, parts)]))
+        return float(np.mean([fitted.misfit > TUNING.spectrum_misfit for fitted in fit_components(noise.T, parts)]))
 
     e = rng.normal(size=(100, 2001))
     assert noticed(np.diff(e) + 0.3 * rng.normal(size=(100, 2000))) < 0.01 + 4 * np.sqrt(0.01 * 0.99 / 100)

@@ -10,7 +10,7 @@ from estimation_case import NOMINAL, QUIET, TRUE, commands, measured, record
 from expdesign.errors import InputError
 from expdesign.estimation.fit import fit_percent
 from expdesign.estimation.methods import Settings, estimate
-from expdesign.estimation.replay._casadi import Stretches, compiled
+from expdesign.estimation.replay import Stretches, compiled
 from expdesign.estimation.replay.replay import Integration, build_replay, simulate_batch, start_state
 from expdesign.signals import Batch, Record
 from expdesign.simulation import Environment, Variation, motion_rates, simulate

@@ -1,4 +1,4 @@
-"""Fit, excitation condition, physical parameters and many trials at once: closed forms and round trips."""
+"""Fit, excitation condition and many trials at once: closed forms and round trips."""
 
 from dataclasses import replace
 
@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from estimation_case import CURRENT, NOMINAL, QUIET, TRUE, commands, measured, record
-from expdesign.errors import Diverged, InputError
+from expdesign.errors import Diverged
 from expdesign.estimation.excitation import WorstCase, check_excitation, worst_case
 from expdesign.estimation.fit import fit_percent
 from expdesign.estimation.methods import Settings, estimate
-from expdesign.estimation.physical import PhysicalModel, from_physical, to_physical
 from expdesign.estimation.replay.replay import Integration, simulate_batch
 from expdesign.signals import Commands
 from expdesign.simulation import CALM, Environment, Variation, simulate, simulate_ensemble
@@ -68,25 +67,6 @@ def test_the_excitation_condition_names_the_samples_that_break_it() -> None:
     )
     assert [b.inside for b in measured_wind] == ["u"]
     assert worst_case(TRUE.sensors).velocity_mps == pytest.approx(3 * TRUE.sensors.velocity_mps)
-
-
-def test_physical_parameters_come_back_given_one_scale() -> None:
-    forces = {"X_u": -900.0, "X_abs_u_u": -400.0, "X_mu": 300.0, "Y_v": -2e3, "Y_mu": 300.0, "N_r": -4e5, "N_mu": 300.0}
-    body = PhysicalModel(m_u=2e4, m_v=3e4, inertia=2e6, forces=forces, coupling_checks={})
-    terms = tuple(term for term in TRUE.model.terms if term.name in {*forces, "X_vr", "Y_ur", "N_uv"})
-    zeros = np.zeros(len(terms))
-    for form in ("discrete", "continuous"):
-        model = replace(TRUE.model, terms=terms, parameters=zeros, parameter_std=zeros, form=form, sample_time_s=0.5)
-        filled = from_physical(body, model)
-        values = dict(zip(filled.names, filled.parameters, strict=True))
-        assert values["X_vr"] * values["Y_ur"] == pytest.approx(-(model.time_scale_s**2))
-        for scale in ({"thrust_gain": 300.0}, {"m_u": 2e4}):
-            back = to_physical(filled, **scale)
-            assert (back.m_u, back.m_v, back.inertia) == pytest.approx((2e4, 3e4, 2e6))
-            assert {name: back.forces[name] for name in forces} == pytest.approx(forces)
-            assert back.coupling_checks == pytest.approx(dict.fromkeys(("X_vr", "Y_ur", "N_uv"), 1.0))
-    with pytest.raises(InputError, match="one scale"):
-        to_physical(TRUE.model)
 
 
 def test_many_trials_at_once_are_single_trials() -> None:

@@ -23,14 +23,13 @@ from expdesign.estimation.regression import (
     model_for,
     symbol,
 )
+from expdesign.estimation.tuning import TUNING
 from expdesign.signals import Batch, Record
 from expdesign.values import frozen_set
 from expdesign.vessel import Operators, Sensors, VesselModel
 from expdesign.vessel.expressions import Expression
 
 STATES = ("u", "v", "r", *AIR)
-SIGMAS = 3.0
-"""Standard deviations that count as the worst case of Gaussian noise."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,11 +55,11 @@ class WorstCase:
 
 
 def worst_case(sensors: Sensors, *, current_mps: float = 0.0, wind_mps: float = 0.0) -> WorstCase:
-    """`SIGMAS` standard deviations of the sensors, and the strongest current and wind."""
+    """`TUNING.worst_case_sigmas` standard deviations of the sensors, and the strongest current and wind."""
     return WorstCase(
-        velocity_mps=SIGMAS * sensors.velocity_mps,
-        yaw_rate_radps=SIGMAS * sensors.yaw_rate_radps,
-        wind_sensor_mps=SIGMAS * sensors.wind_mps,
+        velocity_mps=TUNING.worst_case_sigmas * sensors.velocity_mps,
+        yaw_rate_radps=TUNING.worst_case_sigmas * sensors.yaw_rate_radps,
+        wind_sensor_mps=TUNING.worst_case_sigmas * sensors.wind_mps,
         current_mps=current_mps,
         wind_mps=wind_mps,
     )

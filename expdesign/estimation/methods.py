@@ -11,7 +11,8 @@ from expdesign.errors import Diverged, InputError, UnknownName
 from expdesign.estimation.output_error import Fitting, minimise_output_error
 from expdesign.estimation.regression import Layout, Regression, Rows, build_layout, build_regression, model_for
 from expdesign.estimation.replay import InstrumentModel, Integration, apart_from_start, build_replay
-from expdesign.estimation.solve import MOST_REFINEMENTS, NullSpace, Refined, Solution, Weighting, refine_iv, solve_ls
+from expdesign.estimation.solve import NullSpace, Refined, Solution, Weighting, refine_iv, solve_ls
+from expdesign.estimation.tuning import TUNING
 from expdesign.estimation.values import Estimate, Residuals
 from expdesign.signals import Record
 from expdesign.values import Array
@@ -69,7 +70,7 @@ class Settings:
     fixed: tuple[str, ...] = ()
     weighting: Weighting = field(default_factory=lambda: Weighting(mean="complete"))
     start: str = "nominal"
-    most_refinements: int = MOST_REFINEMENTS
+    most_refinements: int = TUNING.most_refinements
     heading: str = "measured"
     wind: str = "lagged"
     integration: Integration = field(default_factory=Integration)

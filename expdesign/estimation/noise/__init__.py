@@ -1,13 +1,11 @@
 """The noise in residuals: its parts, its memory, and what whitens it."""
 
-from expdesign.estimation.noise.components import MISFIT, Components, fit_components, score_covariance
+from expdesign.estimation.noise.components import Components, fit_components, score_covariance
 from expdesign.estimation.noise.long_run import automatic_lags, long_run_covariance, lost_share
 from expdesign.estimation.noise.timeline import Timeline, stretches, timeline
-from expdesign.estimation.noise.whitening import PASSES, white_parts
+from expdesign.estimation.noise.whitening import white_parts
 
 __all__ = [
-    "MISFIT",
-    "PASSES",
     "Components",
     "Timeline",
     "automatic_lags",

@@ -32,16 +32,11 @@ from scipy.signal import lfilter
 
 from expdesign.estimation.noise.timeline import spread
 from expdesign.estimation.regression import Integers
+from expdesign.estimation.tuning import TUNING
 from expdesign.values import Array
 
 MEMORIES = 2.0 ** np.arange(1, 11)
 """Of the slow parts [samples]; a quarter of the longest stretch at most, and one that lasts for ever."""
-BINS = 80
-"""Bins of frequency, equally wide in its logarithm."""
-ROUNDS = 12
-"""Of reweighted non-negative least squares."""
-MISFIT = 1.628
-"""Bartlett's statistic at 1 % (Kolmogorov's distribution)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,7 +181,7 @@ def _binned(frequency: Array, ordinates: Array, shapes: Array) -> tuple[Array, A
     """Mean ordinates (b,) and shapes (2 + m, b) of bins, and how many frequencies each holds, half for zero."""
     least = frequency[frequency > 0].min()
     position = np.log(np.maximum(frequency, least) / least) / np.log(1.001 * np.pi / least)
-    place = np.where(frequency > 0, 1 + (BINS * position).astype(int), 0)
+    place = np.where(frequency > 0, 1 + (TUNING.spectrum_bins * position).astype(int), 0)
     _, place, count = np.unique(place, return_inverse=True, return_counts=True)
     means = [np.bincount(place, row) / count for row in (ordinates, *shapes)]
     weight = np.asarray(np.bincount(place, np.where(frequency > 0, 1.0, 0.5)), dtype=float)
@@ -197,7 +192,7 @@ def _most_likely(ordinates: Array, shapes: Array, count: Array, parts: int) -> t
     """Variances (parts,) of the first parts, and minus the logarithm of their likelihood."""
     shapes = shapes[:parts]
     expected = shapes[0] + shapes[1]
-    for _ in range(ROUNDS):
+    for _ in range(TUNING.spectrum_iterations):
         weight = np.sqrt(count) / expected
         variances, _ = nnls((shapes * weight).T, ordinates * weight, maxiter=100 * parts)
         expected = np.maximum(variances @ shapes, 1e-9 * np.max(variances @ shapes))

@@ -19,6 +19,7 @@ import numpy as np
 
 from expdesign.errors import UnknownName
 from expdesign.estimation.regression import Integers
+from expdesign.estimation.tuning import TUNING
 from expdesign.values import Array
 
 
@@ -36,10 +37,6 @@ def parzen(x: Array) -> Array:
 KERNELS: dict[str, Callable[[Array], Array]] = {"bartlett": bartlett, "parzen": parzen}
 PLUG_IN = {"bartlett": (1, 1.1447), "parzen": (2, 2.6614)}
 """Kernel -> order of its bias in 1 / L and Andrews's constant."""
-LONGEST_SHARE = 8
-"""Automatic lags stop at this part of the longest batch."""
-FEW_LAGS = 10
-"""Up to so many, sums of products are quicker than Fourier transforms."""
 
 
 def long_run_covariance(scores: Array, batch: Integers, step: Integers, *, lags: int, kernel: str = "parzen") -> Array:
@@ -87,7 +84,7 @@ def automatic_lags(scores: Array, batch: Integers, step: Integers, *, kernel: st
         return 0
     rho = np.clip(lagged[power > 0] / power[power > 0], -0.97, 0.97)
     alpha = 4.0 * rho**2 / (1.0 - rho) ** 4 if order == 2 else 4.0 * rho**2 / (1.0 - rho**2) ** 2
-    limit = max(1, max(len(rows) for rows in batches) // LONGEST_SHARE)
+    limit = max(1, max(len(rows) for rows in batches) // TUNING.longest_lag_share)
     lags = constant * (float(np.median(alpha)) * len(scores)) ** (1.0 / (2 * order + 1))
     return int(np.clip(np.ceil(lags), 1, limit))
 
@@ -107,7 +104,7 @@ def _filled(scores: Array, batch: Integers, step: Integers) -> list[Array]:
 def _windowed(series: Array, weights: Array) -> Array:
     """Sum over lags of w(l) Gamma(l); for many lags by way of the cross-periodogram."""
     lags = len(weights) - 1
-    if lags <= FEW_LAGS:
+    if lags <= TUNING.few_lags:
         near = series * (weights[0] / 2.0)
         for lag in range(1, min(lags, len(series) - 1) + 1):
             near[lag:] += weights[lag] * series[:-lag]

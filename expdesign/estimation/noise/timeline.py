@@ -8,17 +8,19 @@ from itertools import pairwise
 import numpy as np
 
 from expdesign.estimation.regression import Integers, batch_slices
+from expdesign.estimation.tuning import TUNING
 from expdesign.values import Array
-
-LONG_GAP = 500
-"""Samples left out in a row after which noise starts anew."""
 
 
 def stretches(batch: Integers, step: Integers) -> list[tuple[slice, Integers]]:
     """Rows of every stretch, and their sample numbers from its begin; long gaps part a batch."""
     result = []
     for rows in batch_slices(batch):
-        edges = [0, *(np.flatnonzero(np.diff(step[rows]) > LONG_GAP) + 1).tolist(), rows.stop - rows.start]
+        edges = [
+            0,
+            *(np.flatnonzero(np.diff(step[rows]) > TUNING.long_gap_samples) + 1).tolist(),
+            rows.stop - rows.start,
+        ]
         for low, high in pairwise(edges):
             part = slice(rows.start + low, rows.start + high)
             result.append((part, step[part] - step[part][0]))

@@ -28,14 +28,11 @@ from scipy.signal import lfilter
 
 from expdesign.estimation.noise.timeline import Timeline
 from expdesign.estimation.regression import batch_slices
+from expdesign.estimation.tuning import TUNING
 from expdesign.values import Array
 
 MOVING_AVERAGES = np.tanh(np.linspace(-2.3, 2.3, 18))
 """Values tried for c, from -0.98 to 0.98; they need not be exact."""
-SLOWEST = 0.98
-"""Bound on a."""
-PASSES = 2
-"""A second filter finds a slow disturbance under the measurement noise that the first one dealt with."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +46,9 @@ class Colour:
 WHITE = Colour(0.0, 0.0)
 
 
-def white_parts(Z: Array, residuals: Array, when: Timeline, *, passes: int = PASSES) -> tuple[Array, Array]:
+def white_parts(
+    Z: Array, residuals: Array, when: Timeline, *, passes: int = TUNING.whitening_passes
+) -> tuple[Array, Array]:
     """zeta (t, n, p) and n (t, n) from instruments (k, n, p) and residuals (k, n); no filter crosses batches."""
     zeta, white = when.spread(Z).copy(), when.spread(residuals).copy()
     batches, present = batch_slices(when.batch), when.spread(np.ones(len(when.place)))
@@ -101,5 +100,5 @@ def _fitted(series: Sequence[Array], present: Sequence[Array], c: float) -> tupl
     filtered = [lfilter([1.0], [1.0, c], rows) * ones for rows, ones in zip(series, present, strict=True)]
     power = sum(float(x @ x) for x in filtered)
     crossed = sum(float(x[1:] @ x[:-1]) for x in filtered)
-    a = float(np.clip(crossed / power, -SLOWEST, SLOWEST)) if power > 0 else 0.0
+    a = float(np.clip(crossed / power, -TUNING.slowest_pole, TUNING.slowest_pole)) if power > 0 else 0.0
     return power - 2.0 * a * crossed + a**2 * power, Colour(a, c)

@@ -1,8 +1,8 @@
 """Batches simulated again: instruments, and fast simulation for output error."""
 
-from expdesign.estimation.replay._casadi import Compiled, Stretches, compiled
 from expdesign.estimation.replay.instruments import InstrumentModel, apart_from_start, instrument_wind
 from expdesign.estimation.replay.replay import Integration, build_replay, simulate_batch
+from expdesign.estimation.replay.stretches import Compiled, Stretches, compiled
 
 __all__ = [
     "Compiled",

@@ -10,7 +10,7 @@ import numpy as np
 from expdesign.conventions import OUTPUTS
 from expdesign.errors import Diverged, InputError, UnknownName
 from expdesign.estimation.regression import inputs_of, model_for
-from expdesign.estimation.replay._casadi import STEPS, Simulate, batch_simulator
+from expdesign.estimation.replay.stretches import INTEGRATORS, Simulate
 from expdesign.signals import Batch, Record, Trajectory
 from expdesign.simulation.motion import begun
 from expdesign.simulation.program import STATES
@@ -32,8 +32,8 @@ class Integration:
     substeps: int = 1
 
     def __post_init__(self) -> None:
-        if self.integrator not in STEPS:
-            raise UnknownName("integrator", self.integrator, known=STEPS)
+        if self.integrator not in INTEGRATORS:
+            raise UnknownName("integrator", self.integrator, known=INTEGRATORS)
         if self.substeps < 1:
             raise InputError(f"substeps is {self.substeps}, expected 1 or more")
 
@@ -82,6 +82,8 @@ def build_replay(
     model: VesselModel, record: Record, integration: Integration | None = None, *, windy: bool = False
 ) -> Replay:
     """Compile the simulation of every length of batch in a record, for a model from `tables.model_for`."""
+    from expdesign.estimation.replay._casadi import batch_simulator  # CasADi takes a second to load
+
     how = integration or Integration()
     kinds = {(len(batch), batch.sample_time_s) for batch in record.batches}
     return Replay(

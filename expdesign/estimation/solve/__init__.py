@@ -1,11 +1,10 @@
 """Instrumental-variable equations solved, with covariance and null space."""
 
 from expdesign.estimation.solve.null_space import Direction, NullSpace
-from expdesign.estimation.solve.refine import MOST_REFINEMENTS, Refined, refine_iv
+from expdesign.estimation.solve.refine import Refined, refine_iv
 from expdesign.estimation.solve.solution import Solution, Weighting, solve_iv, solve_ls
 
 __all__ = [
-    "MOST_REFINEMENTS",
     "Direction",
     "NullSpace",
     "Refined",

@@ -15,18 +15,8 @@ import numpy as np
 import scipy
 
 from expdesign.errors import NotInformative
+from expdesign.estimation.tuning import TUNING
 from expdesign.values import Array, seal
-
-UNSEEN = 1e-10
-"""Relative singular value below which a combination is invisible to working precision."""
-FAINT = 1e-5
-"""The same for combinations that least squares sees so faintly that estimates along them mean little."""
-WEAK_STATISTIC = 10.0
-"""Cragg-Donald statistic per instrument below which a combination counts as weakly instrumented."""
-SMALL_WEIGHT = 0.05
-"""Parameters with less than this weight are left out of reports."""
-NAMED = 4
-"""Sentences name at most so many parameters of a combination."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -47,9 +37,13 @@ class Direction:
         seal(self, weights="k")
 
     def __str__(self) -> str:
-        pairs = list(zip(self.parameters, self.weights.tolist(), strict=True))[:NAMED]
+        pairs = list(zip(self.parameters, self.weights.tolist(), strict=True))[: TUNING.named_parameters]
         text = " ".join(f"{'-' if weight < 0 else '+'} {abs(weight):.2f} {name}" for name, weight in pairs)
-        more = f" and {len(self.parameters) - NAMED} more" if len(self.parameters) > NAMED else ""
+        more = (
+            f" and {len(self.parameters) - TUNING.named_parameters} more"
+            if len(self.parameters) > TUNING.named_parameters
+            else ""
+        )
         names = " and ".join(name for name, _ in pairs)
         return f"{names}: {text.removeprefix('+ ')}{more}" if len(pairs) > 1 else self.parameters[0]
 
@@ -87,11 +81,11 @@ def null_space(
     """
     sizes, rows = _right_vectors(moment)
     top = max(float(sizes[0]), 1e-300)
-    dark = sizes <= UNSEEN * top
+    dark = sizes <= TUNING.unseen * top
     unseen = [_direction(names, vector, 0.0) for vector in _sparse(rows[dark])]
     faint: list[Direction] = []
     if exogenous:
-        weak = ~dark & (sizes <= FAINT * top)
+        weak = ~dark & (sizes <= TUNING.faint * top)
         faint = [_direction(names, row, float(size / top)) for size, row in zip(sizes[weak], rows[weak], strict=True)]
     elif second is not None and not dark.any():
         faint = _weak(moment, second, names, samples)
@@ -122,7 +116,7 @@ def _weak(G: Array, second: Second, names: tuple[str, ...], samples: int) -> lis
     left = left + max(1e-9, -2.0 * float(np.linalg.eigvalsh(left)[0])) * np.eye(len(left))  # rounding
     ratios, vectors = scipy.linalg.eigh((explained + explained.T) / 2, (left + left.T) / 2)
     statistics = ratios * samples / len(names)
-    weak = statistics < WEAK_STATISTIC
+    weak = statistics < TUNING.weak_statistic
     unit = vectors / np.linalg.norm(vectors, axis=0)
     return [_direction(names, unit[:, i], float(np.clip(ratios[i], 0.0, 1.0))) for i in np.flatnonzero(weak)]
 
@@ -161,6 +155,6 @@ def _sparse(basis: Array) -> Array:
 
 
 def _direction(names: tuple[str, ...], vector: Array, strength: float) -> Direction:
-    order = [int(i) for i in np.argsort(-np.abs(vector)) if abs(vector[i]) > SMALL_WEIGHT]
+    order = [int(i) for i in np.argsort(-np.abs(vector)) if abs(vector[i]) > TUNING.small_weight]
     signed = vector * np.sign(vector[order[0]])
     return Direction(parameters=tuple(names[i] for i in order), weights=signed[order], strength=strength)

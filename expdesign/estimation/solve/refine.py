@@ -14,13 +14,11 @@ import numpy as np
 from expdesign.errors import Diverged, NotInformative
 from expdesign.estimation.regression import Regression
 from expdesign.estimation.solve.solution import Solution, Weighting, build_equations, solve, solve_quick
+from expdesign.estimation.tuning import TUNING
 from expdesign.values import Array
 
 Simulate = Callable[[Array], Array]
 """Parameter values (p,) of the regression -> instruments (k, n, p); raises Diverged."""
-MOST_REFINEMENTS = 30
-SETTLED = 1e-3
-"""Movement, in standard deviations, at which an estimate counts as settled."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +42,8 @@ def refine_iv(
     simulate: Simulate,
     weighting: Weighting,
     *,
-    most: int = MOST_REFINEMENTS,
-    settled: float = SETTLED,
+    most: int = TUNING.most_refinements,
+    settled: float = TUNING.settled_deviations,
 ) -> Refined:
     """Refine from first instruments (k, n, p).
 

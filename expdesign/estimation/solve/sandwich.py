@@ -24,11 +24,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from expdesign.estimation.noise import (
-    MISFIT,
-    PASSES,
     Components,
     Timeline,
     automatic_lags,
@@ -43,10 +41,8 @@ from expdesign.estimation.noise import (
 from expdesign.estimation.regression import Regression, batch_slices
 from expdesign.estimation.solve.systems import Part
 from expdesign.estimation.solve.weighting import Weighting
+from expdesign.estimation.tuning import TUNING
 from expdesign.values import Array
-
-LEVEL = 0.01
-"""Of White's test."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +66,7 @@ def covariance_of(regression: Regression, weighting: Weighting, parts: Sequence[
     factor = 1.0 if kind == "hc0" else residuals.size / max(1, residuals.size - p)
     if kind == "components":
         return _by_components(regression, weighting, parts, residuals, factor)
-    terms = _terms(regression, parts, residuals, passes=PASSES if kind == "hac" else 0)
+    terms = _terms(regression, parts, residuals, passes=TUNING.whitening_passes if kind == "hac" else 0)
     P, lags = _summed(terms, weighting, p, len(regression))
     return Uncertainty(factor * P, lags)
 
@@ -104,7 +100,7 @@ class _Terms:
             even += level * shares.sum(axis=0)
             changing += squares @ shares
             chance += ((squares - level) ** 2).mean() * ((shares - shares.mean(axis=0)) ** 2).sum(axis=0)
-        clear = changing - even > norm.isf(LEVEL / len(even)) * np.sqrt(chance)
+        clear = changing - even > -ndtri(TUNING.white_test_level / len(even)) * np.sqrt(chance)
         return np.where(clear, np.divide(changing, even, out=np.ones_like(even), where=even > 0), 1.0)
 
     def _led(self, scores: Array) -> Array:
@@ -147,13 +143,17 @@ def _by_components(
         scale[system.columns] = np.sqrt(item.white_factor())
         odd[system.columns] = max(fitted[output].misfit for output in system.outputs)
     P *= np.outer(scale, scale)
-    if (odd <= MISFIT).all():
+    if (odd <= TUNING.spectrum_misfit).all():
         return Uncertainty(P, 0)
-    robust, lags = _summed(_terms(regression, parts, residuals, passes=PASSES), weighting, len(P), len(regression))
+    robust, lags = _summed(
+        _terms(regression, parts, residuals, passes=TUNING.whitening_passes), weighting, len(P), len(regression)
+    )
     own, other = np.diag(P), factor * np.diag(robust)
-    larger = (odd > MISFIT) & (other > own) & (own > 0)
+    larger = (odd > TUNING.spectrum_misfit) & (other > own) & (own > 0)
     scale = np.sqrt(np.divide(other, own, out=np.ones_like(own), where=larger))
-    names = [name for name, item in zip(regression.outputs, fitted, strict=True) if item.misfit > MISFIT]
+    names = [
+        name for name, item in zip(regression.outputs, fitted, strict=True) if item.misfit > TUNING.spectrum_misfit
+    ]
     return Uncertainty(P * np.outer(scale, scale), lags, (_misfit_note(names),))
 
 

@@ -1,0 +1,6 @@
+"""Output error: the parameters whose simulations are closest to the measured velocities."""
+
+from expdesign.estimation.output_error.minimise import minimise_output_error
+from expdesign.estimation.output_error.problem import Fitting
+
+__all__ = ["Fitting", "minimise_output_error"]

@@ -1,0 +1,112 @@
+"""Levenberg and Marquardt for output error, with the first velocities of the stretches eliminated.
+
+Source: J. J. More, Lecture Notes in Mathematics 630 (1978), 105-116.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from expdesign.errors import NoAnswer
+from expdesign.estimation.output_error.problem import Problem, first_states
+from expdesign.estimation.tuning import TUNING
+from expdesign.values import Array
+
+
+def _cost(problem: Problem, residuals: Array) -> float:
+    cost = float(np.einsum("lwn,n->", residuals**2, problem.weights))
+    return cost if np.isfinite(cost) else np.inf
+
+
+def minimised(problem: Problem, values: Array, *, settled: float) -> tuple[Array, Array]:
+    """Values and starts (W, n) of least cost, from values and the measured starts."""
+    starts, damping = first_states(problem), 1e-4
+    with np.errstate(over="ignore", invalid="ignore"):
+        states = problem.states(values, starts)
+        cost = _cost(problem, problem.residuals(states))
+        if not np.isfinite(cost):
+            raise NoAnswer(_RUNS_AWAY.format(seconds=len(states) * problem.compiled.stretches.sample_time_s))
+        for _ in range(TUNING.most_steps):
+            normal = _normal(problem, values, states)
+            while damping < 1e10:
+                step, shift, expected = _step(normal, damping)
+                if expected < settled:
+                    return values, starts
+                newer = problem.states(values + step, starts + shift)
+                lower = _cost(problem, problem.residuals(newer))
+                if lower < cost:
+                    break
+                damping *= 10
+            else:
+                return values, starts
+            values, starts, states, cost, damping = values + step, starts + shift, newer, lower, damping / 10
+    return values, starts
+
+
+_RUNS_AWAY = "output error: the best model found diverges within {seconds:.0f} s; try a shorter horizon (--horizon)"
+
+
+@dataclass(frozen=True, eq=False)
+class Normal:
+    """Normal equations by blocks: starts S (W, n, n), coupling C (W, n, q), values V (q, q), and gradients."""
+
+    S: Array
+    C: Array
+    V: Array
+    gradient_s: Array
+    gradient_v: Array
+
+
+def _normal(problem: Problem, values: Array, states: Array) -> Normal:
+    Jv, Js = slopes_of(problem, values, states)
+    residuals, root = problem.residuals(states), np.sqrt(problem.weights)
+    p, n, count = problem.parameters, Js.shape[3], len(problem.batch)
+    by_v, by_s, left = (stretchwise(part * root[:, None]) for part in (Jv, Js, residuals[..., None]))
+    S, near, V_w = by_s.swapaxes(1, 2) @ by_s, by_s.swapaxes(1, 2) @ by_v, by_v.swapaxes(1, 2) @ by_v
+    g_w = (by_v.swapaxes(1, 2) @ left)[..., 0]
+    C, V, g = np.zeros((count, n, len(values))), np.zeros((len(values),) * 2), np.zeros(len(values))
+    for w, number in enumerate(problem.batch):
+        places = np.concatenate([np.arange(p), p + number * n + np.arange(n)])
+        C[w][:, places] = near[w]
+        V[np.ix_(places, places)] += V_w[w]
+        g[places] += g_w[w]
+    return Normal(S=S, C=C, V=V, gradient_s=(by_s.swapaxes(1, 2) @ left)[..., 0], gradient_v=g)
+
+
+def stretchwise(rows: Array) -> Array:
+    """(L, W, n, q) as (W, L n, q)."""
+    length, count, n, q = rows.shape
+    return rows.transpose(1, 0, 2, 3).reshape(count, length * n, q)
+
+
+def slopes_of(problem: Problem, values: Array, states: Array) -> tuple[Array, Array]:
+    """Derivatives where data exist, zero elsewhere; zero for constants that are not estimated."""
+    Jv, Js = problem.compiled.sensitivities(problem.local(values), states)
+    unseen = ~np.isfinite(problem.measured)
+    Jv[unseen], Js[unseen] = 0.0, 0.0
+    if not problem.constant:
+        Jv[..., problem.parameters :] = 0.0
+    return Jv, Js
+
+
+def _step(normal: Normal, damping: float) -> tuple[Array, Array, float]:
+    """Damped Gauss-Newton step with the starts eliminated, and the expected decrease of the cost.
+
+    The damping is relative to each diagonal entry.
+    """
+    inverse = np.linalg.inv(regular(normal.S) * (1 + damping * np.eye(normal.S.shape[1])))
+    carried = inverse @ normal.C  # (W, n, q)
+    scale = np.sqrt(np.where(np.diag(normal.V) > 0, np.diag(normal.V), 1.0))
+    reduced = normal.V + damping * np.diag(scale**2) - np.tensordot(normal.C, carried, axes=((0, 1), (0, 1)))
+    right = normal.gradient_v - np.einsum("wna,wn->a", carried, normal.gradient_s)
+    step = np.linalg.lstsq(reduced / np.outer(scale, scale), right / scale, rcond=1e-14)[0] / scale
+    shift = np.einsum("wab,wb->wa", inverse, normal.gradient_s) - carried @ step
+    return step, shift, float(normal.gradient_v @ step + (normal.gradient_s * shift).sum())
+
+
+def regular(S: Array) -> Array:
+    """Second moments of starts, made regular for outputs without data in a stretch."""
+    diagonal = np.einsum("wnn->wn", S)
+    return np.asarray(S + np.eye(S.shape[1]) * np.where(diagonal > 0, 0.0, 1.0)[:, None, :])

@@ -1,0 +1,136 @@
+"""Output error: the parameters whose simulations are closest to the measured velocities.
+
+Every run is cut into stretches of the length of the horizon; without a horizon a stretch is the whole run. The first
+velocity of each stretch is estimated together with the parameters. Simulated velocities contain no measurement noise:
+if the sensors are the only disturbance, whole runs give the maximum-likelihood estimate, the reference for the accuracy
+of IV. Unmodelled forces accumulate in a simulation, and simulations of course-unstable ships diverge from the measured
+motion; a shorter horizon limits both. Optionally each run has a constant acceleration, for steady unmodelled forces.
+Measured wind acts through the b-frame velocity of the air, ship velocity minus relative wind, without a heading.
+
+The method is Levenberg and Marquardt with exact derivatives. It starts from least squares with a short horizon, which
+grows by `TUNING.horizon_growth` until it is the requested one: a poor model diverges over a whole run, but not over few
+samples. The weight of an output is the inverse residual variance of the stage before. The covariance uses the
+derivatives of the simulation and is robust to coloured residuals, as for IV.
+
+Source: L. Ljung, System Identification, 2nd ed. (1999), 4.2 and 9.3; H. G. Bock, in Modelling of Chemical Reaction
+Systems (1981), 102-125, for the stretches.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from expdesign.conventions import OUTPUTS
+from expdesign.estimation.output_error.gauss_newton import minimised, regular, slopes_of, stretchwise
+from expdesign.estimation.output_error.problem import Fitting, Problem, build_problem, sample_time
+from expdesign.estimation.regression import Integers, Layout, Regression
+from expdesign.estimation.solve import Solution, Weighting, solve_ls
+from expdesign.estimation.tuning import TUNING
+from expdesign.signals import Record
+from expdesign.values import Array
+
+
+def minimise_output_error(
+    layout: Layout, record: Record, start: Solution, fitting: Fitting
+) -> tuple[Solution, Regression]:
+    """The estimate of the layout's parameters; then, if requested, one constant per run and output.
+
+    Returns the solution and the regression of its last Gauss-Newton step, for names and rows.
+
+    Args:
+        layout: with a predictor without nuisance regressors.
+        record: batches of one sample time.
+        start: a regression's solution, for the first guess.
+        fitting: how simulations are compared with the data.
+
+    Raises:
+        InputError: batches of different sample times, or inputs or wind that are not numbers.
+        NotInformative: parameters without effect on the simulated outputs.
+        NoAnswer: the best model found diverges within the horizon.
+    """
+    weights = 1.0 / _at_least(start.residuals.var(axis=0), record, layout)
+    values = np.concatenate(
+        [start.values[: len(layout.parameters)], np.zeros(len(record.batches) * len(layout.model.outputs))]
+    )
+    longest = max(len(batch) for batch in record.batches)
+    full = longest if fitting.horizon_s is None else max(2, round(fitting.horizon_s / sample_time(record)) + 1)
+    horizons = _horizons(min(full, longest))
+    for stage, samples in enumerate([*horizons, horizons[-1]]):
+        problem = build_problem(layout, record, fitting, samples, weights)
+        values, starts = minimised(
+            problem, values, settled=TUNING.rough_cost if stage < len(horizons) - 1 else TUNING.settled_cost
+        )
+        weights = 1.0 / _at_least(_variance(problem, values, starts), record, layout)
+    return _with_covariance(problem, layout, values, starts)
+
+
+def _horizons(full: int) -> list[int]:
+    horizons = [full]
+    while horizons[0] > TUNING.first_horizon_samples * TUNING.horizon_growth:
+        horizons.insert(0, -(-horizons[0] // TUNING.horizon_growth))
+    return horizons
+
+
+def _at_least(variance: Array, record: Record, layout: Layout) -> Array:
+    """Variances, not smaller than rounding errors."""
+    states = [OUTPUTS.index(name) for name in layout.model.outputs]
+    spread = np.nanvar(np.concatenate([batch.velocity[:, states] for batch in record.batches]), axis=0)
+    return np.asarray(np.maximum(variance, 1e-12 * np.where(spread > 0, spread, 1.0)))
+
+
+def _variance(problem: Problem, values: Array, starts: Array) -> Array:
+    """(n,) variance of the residuals, with one degree of freedom less for each start."""
+    residuals = problem.residuals(problem.states(values, starts))
+    count = np.isfinite(problem.measured).sum(axis=(0, 1)) - len(starts)
+    return np.asarray((residuals**2).sum(axis=(0, 1)) / np.maximum(count, 1))
+
+
+def _with_covariance(problem: Problem, layout: Layout, values: Array, starts: Array) -> tuple[Solution, Regression]:
+    """A last Gauss-Newton step as a least-squares problem, for its covariance and null space.
+
+    Its regressors are the derivatives, projected on the complement of the starts (Frisch and Waugh).
+    """
+    states = problem.states(values, starts)
+    Jv, Js = slopes_of(problem, values, states)
+    residuals, root = problem.residuals(states), np.sqrt(problem.weights)[:, None]
+    by_v, by_s = stretchwise(Jv * root), stretchwise(Js * root)
+    near = np.linalg.solve(regular(by_s.swapaxes(1, 2) @ by_s), by_s.swapaxes(1, 2) @ by_v)
+    slopes = Jv - Js @ near
+    batch, step, order = _places(problem)
+    n = Js.shape[3]
+    Phi, names = _columns(slopes, problem, layout)
+    regression = Regression(
+        parameters=names,
+        Phi=Phi.reshape(-1, n, Phi.shape[-1])[order],
+        y=residuals.reshape(-1, n)[order],
+        batch=batch,
+        step=step,
+        outputs=layout.model.outputs,
+    )
+    last = solve_ls(regression, Weighting(output_weights=tuple(problem.weights / problem.weights.max())))
+    return replace(last, values=values[: len(names)] + last.values), regression
+
+
+def _places(problem: Problem) -> tuple[Integers, Integers, Integers]:
+    """Batch, sample and index of every complete row, in the order of time."""
+    length, count = problem.measured.shape[:2]
+    whole = np.isfinite(problem.measured).all(axis=2).ravel()
+    batch = np.broadcast_to(problem.batch, (length, count)).ravel()
+    step = (problem.first + np.arange(length)[:, None]).ravel()
+    order = np.lexsort((step, batch))
+    order = order[whole[order]]
+    return batch[order], step[order], order
+
+
+def _columns(slopes: Array, problem: Problem, layout: Layout) -> tuple[Array, tuple[str, ...]]:
+    """Parameters, then the constants of each run."""
+    p, outputs = problem.parameters, layout.model.outputs
+    if not problem.constant:
+        return slopes[..., :p], layout.parameters
+    runs = int(problem.batch.max()) + 1
+    member = (problem.batch[:, None] == np.arange(runs)).astype(float)
+    own = np.einsum("lwns,wb->lwnbs", slopes[..., p:], member).reshape(*slopes.shape[:3], -1)
+    names = [f"constant d{name}/dt of run {number + 1}" for number in range(runs) for name in outputs]
+    return np.concatenate([slopes[..., :p], own], axis=3), (*layout.parameters, *names)

@@ -1,0 +1,153 @@
+"""The least-squares problem of output error: data and inputs, cut into stretches."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from expdesign.conventions import OUTPUTS
+from expdesign.errors import InputError
+from expdesign.estimation.regression import Integers, Layout, inputs_of
+from expdesign.estimation.replay import Compiled, Integration, Stretches, compiled
+from expdesign.signals import Batch, Record
+from expdesign.values import Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fitting:
+    """How simulations are compared with the data.
+
+    Attributes:
+        integration: how the model is simulated.
+        horizon_s: length of a stretch [s], None for whole runs.
+        constant: whether each run has a constant acceleration of its own.
+    """
+
+    integration: Integration
+    horizon_s: float | None = None
+    constant: bool = False
+
+    def __post_init__(self) -> None:
+        if self.horizon_s is not None and not 0 < self.horizon_s < np.inf:
+            raise InputError(f"horizon is {self.horizon_s:g} s, expected more than 0")
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Least squares over W stretches of L samples.
+
+    Attributes:
+        compiled: the stretches, ready to be simulated.
+        measured: (L, W, n), nan where missing or filled up.
+        weights: (n,) one over the variance of each output.
+        batch: (W,) number of the run.
+        first: (W,) sample of the run at which each stretch begins.
+        constant: whether constants are estimated.
+    """
+
+    compiled: Compiled
+    measured: Array
+    weights: Array
+    batch: Integers
+    first: Integers
+    constant: bool
+
+    @property
+    def parameters(self) -> int:
+        """Number of estimated parameters, without constants."""
+        return len(self.compiled.stretches.sought)
+
+    def local(self, values: Array) -> Array:
+        """(W, p + n) the values that act on each stretch."""
+        p, n = self.parameters, self.measured.shape[2]
+        own = values[p:].reshape(-1, n)[self.batch]
+        return np.concatenate([np.broadcast_to(values[:p], (len(own), p)), own], axis=1)
+
+    def states(self, values: Array, starts: Array) -> Array:
+        """(L, W, n) simulated; not finite where a simulation diverges."""
+        return self.compiled.states(self.local(values), starts)
+
+    def residuals(self, states: Array) -> Array:
+        """(L, W, n) measured minus simulated, zero where data are missing."""
+        return np.where(np.isfinite(self.measured), self.measured - states, 0.0)
+
+
+def sample_time(record: Record) -> float:
+    """The sample time of all batches [s].
+
+    Raises:
+        InputError: it differs between batches.
+    """
+    times = {batch.sample_time_s for batch in record.batches}
+    if len(times) > 1:
+        raise InputError(f"output error needs one sample time, found {', '.join(f'{t:g} s' for t in sorted(times))}")
+    return times.pop()
+
+
+def build_problem(layout: Layout, record: Record, fitting: Fitting, samples: int, weights: Array) -> Problem:
+    """The problem with stretches of so many samples and output weights (n,)."""
+    model, time_s = layout.model, sample_time(record)
+    states = tuple(OUTPUTS.index(name) for name in model.outputs)
+    cuts = [(number, first) for number, b in enumerate(record.batches) for first in _firsts(len(b), samples)]
+    drives = [_drive(layout, batch) for batch in record.batches]
+    ends = [_end(first, samples, len(record.batches[number])) for number, first in cuts]
+    length = max(end - first for (_, first), end in zip(cuts, ends, strict=True))
+
+    def stacked(rows: list[Array], fill: bool) -> Array:
+        parts = [rows[number][first:end] for (number, first), end in zip(cuts, ends, strict=True)]
+        tails = [np.repeat(part[-1:] if fill else part[-1:] * np.nan, length - len(part), axis=0) for part in parts]
+        return np.stack([np.concatenate(pair) for pair in zip(parts, tails, strict=True)], axis=1)
+
+    return Problem(
+        compiled=compiled(
+            Stretches(
+                model=model.with_parameters(dict.fromkeys(layout.merged, 0.0)),
+                sought=tuple(model.names.index(name) for name in layout.parameters),
+                states=states,
+                drive=stacked(drives, fill=True),
+                windy=layout.predictor.wind,
+                sample_time_s=time_s,
+                integrator=fitting.integration.integrator,
+                substeps=fitting.integration.substeps,
+            )
+        ),
+        measured=stacked([batch.velocity[:, states] for batch in record.batches], fill=False),
+        weights=weights,
+        batch=np.array([number for number, _ in cuts]),
+        first=np.array([first for _, first in cuts]),
+        constant=fitting.constant,
+    )
+
+
+def _firsts(count: int, samples: int) -> range:
+    """First samples of the stretches; the last stretch takes the remainder."""
+    return range(0, max(1, count - samples // 2), samples)
+
+
+def _end(first: int, samples: int, count: int) -> int:
+    """End of a stretch: no remainder shorter than half a stretch is left."""
+    return count if first + samples + (samples + 1) // 2 > count else first + samples
+
+
+def _drive(layout: Layout, batch: Batch) -> Array:
+    """(k, m) inputs, and the b-frame wind where it is used; missing wind takes the last known value."""
+    inputs = inputs_of(layout.model, batch)
+    if not np.isfinite(inputs).all():
+        raise InputError(f"{batch.name}: output error needs inputs at every sample; some are not numbers")
+    if not layout.predictor.wind:
+        return inputs
+    assert batch.wind is not None  # the regression was built from it
+    wind = batch.velocity[:, :2] - batch.wind
+    seen = np.isfinite(wind).all(axis=1)
+    if not seen.any():
+        raise InputError(f"{batch.name}: no sample has velocity and relative wind")
+    places = np.maximum.accumulate(np.where(seen, np.arange(len(batch)), int(seen.argmax())))
+    return np.concatenate([inputs, wind[places]], axis=1)
+
+
+def first_states(problem: Problem) -> Array:
+    """(W, n) first measured velocities, for a first guess."""
+    seen = np.isfinite(problem.measured)
+    first = np.take_along_axis(problem.measured, np.argmax(seen, axis=0)[None], axis=0)[0]
+    return np.where(seen.any(axis=0), first, 0.0)

@@ -1,0 +1,63 @@
+"""The tuning constants of the estimation, in one place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tuning:
+    """Constants that were chosen, not derived.
+
+    Attributes:
+        worst_case_sigmas: standard deviations of Gaussian noise in the excitation condition.
+        unseen: relative singular value below which a combination of parameters is not visible in the data.
+        faint: relative singular value below which least squares gets a warning.
+        weak_statistic: Cragg-Donald statistic per instrument below which instruments get a warning.
+        small_weight: least weight of a parameter that a message names.
+        named_parameters: most parameters of a combination that a message names.
+        most_refinements: of simulated instruments.
+        settled_deviations: change of an estimate, in standard deviations, that ends the refinement.
+        first_horizon_samples: of output error.
+        horizon_growth: ratio of successive horizons of output error.
+        most_steps: of Gauss and Newton at one horizon.
+        settled_cost: expected decrease of the cost, in squared standard deviations, that ends the last horizons.
+        rough_cost: the same for earlier horizons.
+        block_instructions: size of the flat CasADi functions that simulations are cut into.
+        spectrum_bins: bins of the periodogram, of equal width in the logarithm of frequency.
+        spectrum_iterations: of reweighted non-negative least squares.
+        spectrum_misfit: Bartlett's statistic at 1 % (Kolmogorov's distribution).
+        long_gap_samples: missing samples in a row after which the noise starts anew.
+        slowest_pole: bound on the autoregressive coefficient of a whitening filter.
+        whitening_passes: the second filter finds a slow disturbance below the measurement noise.
+        white_test_level: of White's test.
+        longest_lag_share: automatic lags end at the longest batch divided by this.
+        few_lags: up to this number, sums of products are faster than Fourier transforms.
+    """
+
+    worst_case_sigmas: float = 3.0
+    unseen: float = 1e-10
+    faint: float = 1e-5
+    weak_statistic: float = 10.0
+    small_weight: float = 0.05
+    named_parameters: int = 4
+    most_refinements: int = 30
+    settled_deviations: float = 1e-3
+    first_horizon_samples: int = 8
+    horizon_growth: int = 4
+    most_steps: int = 40
+    settled_cost: float = 1e-4
+    rough_cost: float = 0.1
+    block_instructions: int = 20_000
+    spectrum_bins: int = 80
+    spectrum_iterations: int = 12
+    spectrum_misfit: float = 1.628
+    long_gap_samples: int = 500
+    slowest_pole: float = 0.98
+    whitening_passes: int = 2
+    white_test_level: float = 0.01
+    longest_lag_share: int = 8
+    few_lags: int = 10
+
+
+TUNING = Tuning()
