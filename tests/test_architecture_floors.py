@@ -25,7 +25,7 @@ FLOORS = {
         ("workflows",),
         ("cli", "__main__"),
     ),
-    "records": (("file",), ("pose",), ("remarks",), ("load",)),
+    "records": (("tuning",), ("file",), ("pose",), ("remarks",), ("load",)),
     "estimation": (
         ("fit", "tuning"),
         ("regression",),

@@ -280,7 +280,7 @@ def test_dead_sensors_and_idle_inputs_are_noted(tmp_path: Path) -> None:
     data = motion()
     record = loaded(tmp_path, data | {"wind_speed_mps": 0 * data["u_mps"] + 3, "n1_rps": 0 * data["u_mps"] + 5})
     assert record.notes == (
-        "trial.csv: n1_rps is 5 in all rows, an input that tells nothing of its effect",
+        "trial.csv: n1_rps is 5 in all rows, so its effect cannot be estimated",
         "trial.csv: wind_speed_mps is 3 in all rows, a dead sensor?",
     )
 
@@ -289,7 +289,7 @@ def test_held_positions_are_noted(tmp_path: Path) -> None:
     data = motion()
     held = np.arange(80) // 5 * 5
     record = loaded(tmp_path, data | {name: data[name][held] for name in ("north_m", "east_m")})
-    found = "trial.csv: the position stands still in 81% of the rows: held values make poor differences"
+    found = "trial.csv: the position repeats in 81% of the rows: differences of held values are inaccurate"
     assert found in record.notes
 
 

@@ -253,7 +253,7 @@ def test_a_parameter_is_bought_by_the_runs_that_tell_of_it():
 def test_data_without_a_position_are_refused(tmp_path, capsys):
     measured(tmp_path / "a.csv", drop=("north_m", "east_m"))
     error = refused(capsys, STORY, "--data", tmp_path / "a.csv")
-    assert "a.csv: row 1: does not say where the ship is" in error
+    assert "a.csv: row 1: gives no final position and heading" in error
     measured(tmp_path / "a.csv", drop=("heading_rad",))
     assert "expected heading_rad" in refused(capsys, STORY, "--data", tmp_path / "a.csv")
 

@@ -1,4 +1,4 @@
-"""Measured data: CSV files read with suspicion, cut into batches, with velocities measured or derived from pose.
+"""Measured data: CSV files are checked and cut into batches; velocities are measured or derived from pose.
 
 One file has one header row (row 1 in every message) and one row per sample. Columns carry their unit in the name:
 
@@ -10,8 +10,8 @@ One file has one header row (row 1 in every message) and one row per sample. Col
   the direction it comes from, clockwise from the bow: u_q = V cos, v_q = V sin;
 - `depth_m`, water depth.
 
-Known quantities in other units (`u_knots`, `n1_rpm`, `wind_angle_deg`) are converted and noted; columns that mean
-nothing here are ignored and noted. Whatever is wrong becomes one `FileError` with the rows it was seen in.
+Known quantities in other units (`u_knots`, `n1_rpm`, `wind_angle_deg`) are converted and noted; unknown columns
+are ignored and noted. Every error is a `FileError` with the rows concerned.
 """
 
 from expdesign.records.load import load_records

@@ -1,9 +1,10 @@
-"""Files to a record: read, check, cut into batches, derive what is not measured."""
+"""From files to a record: read, check, cut into batches, derive missing velocities."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from expdesign.conventions import OUTPUTS, POSE_COLUMNS
@@ -47,18 +48,18 @@ def load_records(
         vessel_inputs: signals to read, e.g. ("n1", "a1", "rudder1"), in the order the record gives them; None for all
             inputs of the first file, in its order.
         sample_time_s: what every file must have [s]; None for what the first file has.
-        velocity: "measured"; "difference" or "smoothed" for velocities from pose even where measured ones stand; "auto"
-            for measured ones where they stand and differences elsewhere.
-        heading_std_rad: standard deviation of the heading's noise [rad], which corrects differences and informs the
-            smoother; None when not known: differences stay as they are, the smoother learns it.
-        outputs: which of u, v, r there must be; another one is nan in the record when nothing tells it.
+        velocity: "measured"; "difference" or "smoothed" for velocities from pose even where measured ones exist; "auto"
+            for measured ones where they exist and differences elsewhere.
+        heading_std_rad: standard deviation of the heading's noise [rad], which corrects differences and the
+            smoother; None where unknown: differences are not corrected, the smoother estimates it.
+        outputs: required velocities among u, v, r; others are nan in the record where they are unknown.
 
     Returns:
         Batches in file order. Positions of all files share one origin. A batch with a differenced velocity lacks the
         first and the last sample.
 
     Raises:
-        FileError: something in a file is wrong; one line with the column, the value, the rows and what would be right.
+        FileError: a file has an error; one line with the column, the value, the rows and the expectation.
         InputError: an argument is wrong.
     """
     files = _names(paths)
@@ -73,9 +74,9 @@ def load_records(
         if sample_time_s is None:
             sample_time_s, whose = clock.sample_time_s, f"the first file ({name})"
         inputs = inputs or Inputs(table.inputs, f"the first file ({name})")
-        found, told = _batches(_judged(table, clock, request), name, clock, request, inputs)
+        found, remarks = _batches(_judged(table, clock, request), name, clock, request, inputs)
         batches += found
-        for note in told:
+        for note in remarks:
             notes.setdefault(note, []).append(name)
     return Record(batches=tuple(batches), notes=tuple(f"{_listed(names)}: {note}" for note, names in notes.items()))
 
@@ -115,7 +116,7 @@ def _request(
 
 
 def _read(path: Path, inputs: Inputs | None, origin: LocalMetres | None) -> tuple[Table, LocalMetres | None]:
-    """One file in metres and radians, every number within reason."""
+    """One file in metres and radians, with every number in its range."""
     table = read_table(path, inputs=inputs)
     check_ranges(table)
     return with_metres(with_continuous_heading(check_wind(table)), origin)
@@ -136,20 +137,31 @@ def _batches(
 ) -> tuple[list[Batch], tuple[str, ...]]:
     """The batches of one file, and all notes on it."""
     origins = velocity_origins(table, request)
+    file = _File(table, clock, request, origins, inputs)
     parts = long_enough(clock.batches, origins)
     if not parts:
         raise table.error("time_s", "leaves no batch long enough to derive velocities in, expected 4 samples in a row")
     batches = [
-        _batch(table, part, f"{name}, batch {index}" if len(parts) > 1 else name, clock, request, origins, inputs)
+        _batch(file, part, f"{name}, batch {index}" if len(parts) > 1 else name)
         for index, part in enumerate(parts, start=1)
     ]
     left_out = left_out_notes(table, clock.batches, parts)
     return batches, (*table.notes, *left_out, *origin_notes(origins), *motion_remarks(batches, origins))
 
 
-def _batch(
-    table: Table, part: slice, name: str, clock: Clock, request: Request, origins: Mapping[str, str], inputs: Inputs
-) -> Batch:
+@dataclass(frozen=True, eq=False)
+class _File:
+    """A file with everything that its batches are made from."""
+
+    table: Table
+    clock: Clock
+    request: Request
+    origins: Mapping[str, str]
+    inputs: Inputs
+
+
+def _batch(file: _File, part: slice, name: str) -> Batch:
+    table, clock, inputs, origins = file.table, file.clock, file.inputs, file.origins
     kept = kept_samples(part, origins)
     wind, depth = relative_wind(table), table.columns.get("depth_m")
     return Batch(
@@ -157,7 +169,7 @@ def _batch(
         sample_time_s=clock.sample_time_s,
         input_names=tuple(column.removesuffix("_rps").removesuffix("_rad") for column in inputs.columns),
         inputs=table.stack(*inputs.columns)[kept],
-        velocity=batch_velocity(table, part, clock.sample_time_s, origins, request.heading_std_rad),
+        velocity=batch_velocity(table, part, clock.sample_time_s, origins, file.request.heading_std_rad),
         pose=table.stack(*POSE_COLUMNS)[kept] if set(POSE_COLUMNS) & set(table.columns) else None,
         wind=wind[kept] if wind is not None else None,
         depth_m=depth[kept] if depth is not None else None,

@@ -1,4 +1,4 @@
-"""The clock of a file: one sample time, and the stretches in which it ticks without a gap."""
+"""The clock of a file: its sample time, and the stretches without a gap."""
 
 from __future__ import annotations
 
@@ -9,19 +9,9 @@ import numpy as np
 
 from expdesign.errors import FileError
 from expdesign.records.file.table import Mask, Table
+from expdesign.records.tuning import TUNING
 from expdesign.values import Array
 
-GAP = 1.5
-"""Sample times between two rows that start a new batch."""
-JITTER = 0.25
-"""Largest deviation of one interval from the sample time, as a share of it."""
-MISMATCH = 0.01
-"""Largest relative difference between two sample times that count as the same."""
-GAPPY = 0.2
-"""Share of intervals that may be gaps before the sampling counts as irregular."""
-SLOWEST_S = 20.0
-"""No manoeuvre is sampled more slowly (IMO MSC/Circ.1053 asks for 20 s or less)."""
-FASTEST_S = 1e-4
 UNITS = ((1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds"), (1 / 60, "minutes"), (1 / 3600, "hours"))
 
 
@@ -46,7 +36,7 @@ def read_clock(table: Table, *, sample_time_s: float | None, whose: str = "the v
     Args:
         table: with `time_s`, and `batch` where there is one.
         sample_time_s: what the intervals should be [s], or None for whatever they are.
-        whose: sample time that is, for messages.
+        whose: owner of that sample time, for messages.
 
     Raises:
         FileError: times repeat, go backwards or are irregular; the sample time is another; batch numbers are no whole
@@ -60,7 +50,7 @@ def read_clock(table: Table, *, sample_time_s: float | None, whose: str = "the v
     inside = step[~announced]
     if not len(inside):
         raise table.error("batch", "changes at every row, expected batches of two or more samples")
-    gap = ~announced & (step > GAP * np.median(inside))
+    gap = ~announced & (step > TUNING.gap_sample_times * np.median(inside))
     regular = ~announced & ~gap
     found_s = float(f"{step[regular].mean():.6g}")
     _check_sample_time(table, found_s, sample_time_s, whose)
@@ -73,7 +63,7 @@ def read_clock(table: Table, *, sample_time_s: float | None, whose: str = "the v
 
 def same_sample_time(a_s: float, b_s: float) -> bool:
     """Whether two sample times differ by no more than rounding in files explains."""
-    return abs(a_s - b_s) <= MISMATCH * max(a_s, b_s)
+    return abs(a_s - b_s) <= TUNING.sample_time_mismatch * max(a_s, b_s)
 
 
 def _announced(table: Table) -> Mask:
@@ -110,12 +100,14 @@ def _check_increasing(table: Table, step: Array, announced: Mask) -> None:
 
 
 def _check_sample_time(table: Table, found_s: float, wanted_s: float | None, whose: str) -> None:
-    if found_s < FASTEST_S:
-        raise table.error("time_s", f"has a sample every {found_s:g} s, expected {FASTEST_S:g} s or more")
+    if found_s < TUNING.shortest_sample_time_s:
+        raise table.error(
+            "time_s", f"has a sample every {found_s:g} s, expected {TUNING.shortest_sample_time_s:g} s or more"
+        )
     if wanted_s is None:
-        if found_s > SLOWEST_S:
-            problem = f"has a sample every {found_s:g} s, expected at most {SLOWEST_S:g} s{_unit(found_s, None)}"
-            raise table.error("time_s", problem)
+        if found_s > TUNING.longest_sample_time_s:
+            most = f"expected at most {TUNING.longest_sample_time_s:g} s{_unit(found_s, None)}"
+            raise table.error("time_s", f"has a sample every {found_s:g} s, {most}")
     elif not same_sample_time(found_s, wanted_s):
         problem = f"has a sample every {found_s:g} s, expected every {wanted_s:g} s, as {whose} has it"
         raise table.error("time_s", problem + _unit(found_s, wanted_s))
@@ -131,13 +123,15 @@ def _unit(found_s: float, wanted_s: float | None) -> str:
 
 
 def _check_regular(table: Table, step: Array, gap: Mask, regular: Mask, sample_time_s: float) -> None:
-    odd = regular & (np.abs(step - sample_time_s) > JITTER * sample_time_s)
-    if gap.sum() > max(GAPPY * len(step), 2):
+    odd = regular & (np.abs(step - sample_time_s) > TUNING.jitter_share * sample_time_s)
+    if gap.sum() > max(TUNING.gap_share * len(step), 2):
         odd |= gap
     if odd.any():
         later = np.concatenate([[False], odd])
         found = f"advances by {step[int(np.argmax(odd))]:.6g} s in {table.rows(later)}"
-        raise table.error("time_s", f"{found}, expected even steps of {sample_time_s:g} s within {JITTER:.0%}")
+        raise table.error(
+            "time_s", f"{found}, expected even steps of {sample_time_s:g} s within {TUNING.jitter_share:.0%}"
+        )
 
 
 def _stretches(cut: Mask, count: int) -> list[slice]:

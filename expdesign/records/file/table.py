@@ -14,15 +14,12 @@ from expdesign.errors import FileError
 from expdesign.records.file.cells import Cells, read_cells, shown
 from expdesign.records.file.choice import Inputs, Sources, choose_columns
 from expdesign.records.file.names import Source, is_input
+from expdesign.records.tuning import TUNING
 from expdesign.values import Array
 
 FIRST_ROW = 2
 MISSING = ("", "na", "n/a", "nan", "-nan", "null", "none")
 OPTIONAL = (("wind_u_mps", "wind_v_mps"), ("wind_speed_mps", "wind_angle_rad"), ("depth_m",))
-LARGEST = 1e15
-"""No measurement is near it; what is larger would only overflow further on."""
-LISTED = 3
-"""Stretches of rows that a message names before it only counts."""
 
 Mask = NDArray[np.bool_]
 
@@ -103,8 +100,10 @@ def rows_in_words(rows: NDArray[np.int_]) -> str:
     """Row numbers, ascending: `row 12`, `rows 12 to 15, 20`, `rows 2, 4, 6 and 17 more`."""
     stretches = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
     words = [f"{part[0]} to {part[-1]}" if len(part) > 2 else ", ".join(map(str, part)) for part in stretches]
-    rest = sum(len(part) for part in stretches[LISTED:])
-    return f"row{'s' if len(rows) > 1 else ''} {', '.join(words[:LISTED])}" + (f" and {rest} more" if rest else "")
+    rest = sum(len(part) for part in stretches[TUNING.listed_rows :])
+    return f"row{'s' if len(rows) > 1 else ''} {', '.join(words[: TUNING.listed_rows])}" + (
+        f" and {rest} more" if rest else ""
+    )
 
 
 def _numbers(cells: Cells, source: Source) -> Array:
@@ -117,11 +116,13 @@ def _numbers(cells: Cells, source: Source) -> Array:
     if "_" in "".join(texts):
         row, text = next((row, text) for row, text in enumerate(texts, start=FIRST_ROW) if "_" in text)
         raise _not_a_number(cells, source, row, text)
-    huge = np.abs(values) > LARGEST
+    huge = np.abs(values) > TUNING.largest_number
     if huge.any():
         rows = rows_in_words(np.flatnonzero(huge) + FIRST_ROW)
         found = "infinite" if np.isinf(values).any() else f"{values[int(np.argmax(huge))]:.6g}"
-        raise FileError(cells.path, source.header, f"is {found} in {rows}, expected finite numbers up to {LARGEST:g}")
+        raise FileError(
+            cells.path, source.header, f"is {found} in {rows}, expected finite numbers up to {TUNING.largest_number:g}"
+        )
     return values * source.factor if source.factor != 1.0 else values
 
 

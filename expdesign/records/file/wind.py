@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from expdesign.records.file.table import Table
+from expdesign.records.tuning import TUNING
 from expdesign.values import Array
 
 CARTESIAN = ("wind_u_mps", "wind_v_mps")
 VANE = ("wind_speed_mps", "wind_angle_rad")
-DISAGREE = 0.3
-EXPLAINED = 0.1
 
 
 def relative_wind(table: Table) -> Array | None:
@@ -29,17 +28,17 @@ def check_wind(table: Table) -> Table:
     """Compare vane and Cartesian wind where a file has both; the latter is used.
 
     Raises:
-        FileError: they differ as if the angle were counted another way.
+        FileError: they differ by the direction convention of the angle.
     """
     if not {*CARTESIAN, *VANE} <= set(table.columns):
         return table
     cartesian, vane = table.stack(*CARTESIAN), vane_wind(*table.stack(*VANE).T)
     size = float(np.linalg.norm(cartesian)) or 1.0
     off = float(np.linalg.norm(cartesian - vane)) / size
-    if off <= DISAGREE:
+    if off <= TUNING.wind_disagreement:
         return table.noted("the vane's wind agrees with wind_u_mps and wind_v_mps, which are used")
     for text, signs in (("counts counter-clockwise", (1, -1)), ("says where it blows to", (-1, -1))):
-        if float(np.linalg.norm(cartesian - vane * signs)) / size < EXPLAINED:
+        if float(np.linalg.norm(cartesian - vane * signs)) / size < TUNING.wind_explained:
             problem = f"{text}, as wind_u_mps and wind_v_mps show; expected where it comes from, clockwise from the bow"
             raise table.error(VANE[1], problem)
     return table.noted(f"the vane's wind differs by {off:.0%} from wind_u_mps and wind_v_mps, which are used")

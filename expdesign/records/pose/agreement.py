@@ -1,7 +1,7 @@
-"""Whether measured velocities and poses tell the same story; if not, the mistake that would explain it.
+"""Agreement of measured velocities and poses; if they disagree, the mistake that explains it.
 
 Over windows of some seconds, the change of pose is compared with the integral of the measured velocity. Noise and
-antenna offsets average out there, while a wrong unit, sign or axis stays.
+antenna offsets average out, while a wrong unit, sign or axis does not.
 """
 
 from __future__ import annotations
@@ -13,19 +13,9 @@ import numpy as np
 from expdesign.conventions import KNOTS_PER_MPS
 from expdesign.records.file import Table
 from expdesign.records.pose.position import LocalMetres
+from expdesign.records.tuning import TUNING
 from expdesign.values import Array
 
-WINDOW_S = 10.0
-DISAGREE = 0.3
-"""Root-mean-square difference, relative to the larger of both changes, that is worth a note."""
-SUSPICIOUS = 0.1
-"""The same, from which a mistake is looked for."""
-EXPLAINED = 0.25
-"""What a mistake must bring the difference down to, as a share of it."""
-AS_GOOD = 1.5
-"""Mistakes that explain nearly as well as the best are named with it."""
-TURNING_RAD = 0.05
-"""Root-mean-square heading change over a window from which a disagreement is worth a note."""
 DEGREE = np.pi / 180.0
 
 SPEED_UNITS = (
@@ -47,12 +37,12 @@ RATE_UNITS = (
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Mistake:
-    """One way in which the file may be wrong.
+    """A possible mistake in the file.
 
     Attributes:
         text: what is wrong, for the message.
-        moved: (n, d) change of pose over the windows, if it were so.
-        expected: (n, d) integral of the measured velocity, if it were so.
+        moved: (n, d) change of pose over the windows, with the mistake corrected.
+        expected: (n, d) integral of the measured velocity, with the mistake corrected.
     """
 
     text: str
@@ -91,8 +81,8 @@ def _check_turning(table: Table, windows: Array, sample_time_s: float) -> Table:
     mistakes = [Mistake(text=text, moved=turned, expected=factor * expected) for text, factor in RATE_UNITS]
     as_is = Mistake(text="", moved=turned, expected=expected)
     _raise_explained(table, "r_radps", "disagrees with the change of heading", as_is, mistakes)
-    if as_is.difference > DISAGREE and np.sqrt(np.mean(turned**2)) > TURNING_RAD:
-        return table.noted(f"heading and r_radps disagree by {as_is.difference:.0%} over {WINDOW_S:g} s")
+    if as_is.difference > TUNING.pose_disagreement and np.sqrt(np.mean(turned**2)) > TUNING.turning_rad:
+        return table.noted(f"heading and r_radps disagree by {as_is.difference:.0%} over {TUNING.window_s:g} s")
     return table
 
 
@@ -120,29 +110,29 @@ def _check_moving(table: Table, windows: Array, sample_time_s: float) -> Table:
     names = f"{table.sources['north_m'].header} and {table.sources['east_m'].header}"
     mistakes.append(Mistake(text=f"{names} are exchanged", moved=swapped, expected=as_is.expected))
     _raise_explained(table, "u_mps", "disagrees with the positions", as_is, mistakes)
-    if as_is.difference > DISAGREE:
-        disagree = f"positions and measured velocities disagree by {as_is.difference:.0%} over {WINDOW_S:g} s"
+    if as_is.difference > TUNING.pose_disagreement:
+        disagree = f"positions and measured velocities disagree by {as_is.difference:.0%} over {TUNING.window_s:g} s"
         return table.noted(disagree + _heading_offset(as_is))
     return table
 
 
 def _heading_offset(as_is: Mistake) -> str:
-    """The constant error of the heading that would explain a disagreement, if one does."""
+    """The constant heading error that explains a disagreement, or ""."""
     moved, expected = (pairs[:, 0] + 1j * pairs[:, 1] for pairs in (as_is.moved, as_is.expected))
     offset = float(np.angle(np.vdot(expected, moved)))
     turned = expected * np.exp(1j * offset)
     mended = Mistake(text="", moved=as_is.moved, expected=np.stack([turned.real, turned.imag], axis=-1))
-    if mended.difference > EXPLAINED * as_is.difference:
+    if mended.difference > TUNING.pose_explained * as_is.difference:
         return ""
     return f", only by {mended.difference:.0%} with {offset / DEGREE:+.0f} degrees added to the heading"
 
 
 def _raise_explained(table: Table, name: str, problem: str, as_is: Mistake, mistakes: list[Mistake]) -> None:
-    """Raise when a mistake explains what the file as it is does not."""
+    """Raise where a mistake explains the disagreement."""
     best = min(mistake.difference for mistake in mistakes)
-    if as_is.difference <= SUSPICIOUS or best > EXPLAINED * as_is.difference:
+    if as_is.difference <= TUNING.pose_suspicion or best > TUNING.pose_explained * as_is.difference:
         return
-    likely = [mistake for mistake in mistakes if mistake.difference <= AS_GOOD * best + 0.01]
+    likely = [mistake for mistake in mistakes if mistake.difference <= TUNING.equally_good * best + 0.01]
     texts = ", or ".join(mistake.text for mistake in sorted(likely, key=lambda mistake: mistake.difference))
     found = f"{problem} by {as_is.difference:.0%}, but only by {best:.0%} if {texts}"
     raise table.error(name, f"{found}; expected units, signs and axes as in the column names")
@@ -150,7 +140,7 @@ def _raise_explained(table: Table, name: str, problem: str, as_is: Mistake, mist
 
 def _windows(batches: tuple[slice, ...], sample_time_s: float) -> Array:
     """(n, 2) first and last sample of windows that do not overlap and do not cross batches."""
-    length = max(round(WINDOW_S / sample_time_s), 1)
+    length = max(round(TUNING.window_s / sample_time_s), 1)
     pairs = [
         (start, start + step)
         for part in batches

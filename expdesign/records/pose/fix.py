@@ -12,7 +12,7 @@ from expdesign.values import Array, seal
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Fix:
-    """A measured position and heading, as the sensors tell them.
+    """A measured position and heading.
 
     Attributes:
         path: the file.
@@ -45,7 +45,7 @@ def last_fix(path: Path) -> Fix:
     missing = [name for name in (*names, "heading_rad") if name not in table.columns]
     if missing:
         wanted = "heading_rad or heading_deg" if missing == ["heading_rad"] else "lat_deg lon_deg, or north_m east_m"
-        raise FileError(path, "row 1", f"does not say where the ship is when the data end, expected {wanted}")
+        raise FileError(path, "row 1", f"gives no final position and heading of the ship, expected {wanted}")
     return Fix(
         path=path,
         row=table.first_row + len(table) - 1,

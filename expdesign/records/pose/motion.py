@@ -1,4 +1,4 @@
-"""Where each velocity comes from, and the batches that it gives."""
+"""The origin of each velocity, and the velocities of the batches."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ import numpy as np
 from expdesign.conventions import OUTPUTS, POSE_COLUMNS, VELOCITY_COLUMNS
 from expdesign.errors import FileError
 from expdesign.records.file import Table, mistyped
-from expdesign.records.pose.smoother import SHORTEST
 from expdesign.records.pose.velocity import central_difference, smoothed_velocity
+from expdesign.records.tuning import TUNING
 from expdesign.values import Array
 
 MEASURED, DIFFERENCE, SMOOTHED = "measured", "difference", "smoothed"
 COLUMN_OF = dict(zip(OUTPUTS, VELOCITY_COLUMNS, strict=True))
 NEEDS = {"u": POSE_COLUMNS, "v": POSE_COLUMNS, "r": POSE_COLUMNS[2:]}
-SAMPLES = {MEASURED: 2, DIFFERENCE: 4, SMOOTHED: SHORTEST}
+SAMPLES = {MEASURED: 2, DIFFERENCE: 4, SMOOTHED: TUNING.shortest_smoothed}
 """Samples that a batch must have."""
 DERIVED = "north_m and east_m (or lat_deg and lon_deg) with heading_rad (or heading_deg)"
 WORDS = {DIFFERENCE: "central differences of the pose", SMOOTHED: "the smoothed pose"}
@@ -25,12 +25,12 @@ WORDS = {DIFFERENCE: "central differences of the pose", SMOOTHED: "the smoothed 
 
 @dataclass(frozen=True, kw_only=True)
 class Request:
-    """How velocities are to be had.
+    """Options for velocities.
 
     Attributes:
         method: "auto", "measured", "difference" or "smoothed".
         heading_std_rad: of the heading's noise, or None.
-        outputs: the velocities that there must be.
+        outputs: required velocities.
     """
 
     method: str
@@ -39,10 +39,10 @@ class Request:
 
 
 def velocity_origins(table: Table, request: Request) -> dict[str, str]:
-    """For each of u, v, r that there is: measured, difference or smoothed.
+    """Available velocity (u, v, r) -> measured, difference or smoothed.
 
     Raises:
-        FileError: one that must be there can neither be read nor derived.
+        FileError: a required velocity can neither be read nor derived.
     """
     origins: dict[str, str] = {}
     for output, column in COLUMN_OF.items():
@@ -56,7 +56,7 @@ def velocity_origins(table: Table, request: Request) -> dict[str, str]:
 
 
 def needed_columns(origins: Mapping[str, str]) -> set[str]:
-    """The columns that velocities are taken or derived from, and the heading, which everything is turned by."""
+    """The columns that velocities are read or derived from, and the heading."""
     measured = {column for output, column in COLUMN_OF.items() if origins.get(output) == MEASURED}
     derived = (NEEDS[output] for output, origin in origins.items() if origin != MEASURED)
     return measured.union(["heading_rad"], *derived)
@@ -100,7 +100,7 @@ def batch_velocity(
 
 
 def origin_notes(origins: Mapping[str, str]) -> list[str]:
-    """What is derived and what is not known."""
+    """Notes on derived and unknown velocities."""
     notes = []
     for origin, words in WORDS.items():
         names = [output for output in OUTPUTS if origins.get(output) == origin]

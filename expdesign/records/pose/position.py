@@ -8,10 +8,9 @@ import numpy as np
 import pyproj
 
 from expdesign.records.file import Table
+from expdesign.records.tuning import TUNING
 from expdesign.values import Array
 
-JUMP = 10.0
-"""A step this many times the 95th percentile of all changes is out of the ordinary."""
 CHANGES = {
     "heading_rad": (0.5, 1.0, "rad"),
     "u_mps": (10.0, 0.0, "m/s"),
@@ -21,7 +20,7 @@ CHANGES = {
 }
 """Column -> change that is still possible: at any sample time, and per second of it; north_m stands for position."""
 NOTED = ("heading_rad", "north_m")
-"""Columns whose lesser jumps are told; filtered velocities may change unevenly without any harm."""
+"""Columns whose small jumps get a note; filtered velocities may change unevenly without harm."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +97,7 @@ def check_jumps(table: Table, batches: tuple[slice, ...], sample_time_s: float, 
         step = np.abs(_steps(table.columns[name], batches))
         if name == "north_m":
             step = np.hypot(step, _steps(table.columns["east_m"], batches))
-        ordinary = JUMP * float(np.percentile(step[step > 0], 95)) if step.any() else 0.0
+        ordinary = TUNING.jump_ratio * float(np.percentile(step[step > 0], 95)) if step.any() else 0.0
         jump = step > max(least, fastest * sample_time_s, ordinary)
         if jump.any() and name in needed:
             what = "position jumps" if name == "north_m" else "jumps"

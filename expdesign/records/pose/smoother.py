@@ -15,13 +15,8 @@ import numpy as np
 from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.optimize import minimize_scalar
 
+from expdesign.records.tuning import TUNING
 from expdesign.values import Array
-
-LOG10_RATIOS = (-9.0, 6.0)
-"""Range of q Ts^3 / variance: from smoothing over a hundred samples or more to none at all."""
-LEARN_FROM = 8192
-"""Samples, from the middle, that the ratio is learned from: more tell nothing new."""
-SHORTEST = 4
 
 
 def smooth(values: Array, sample_time_s: float, *, noise_std: float | None = None) -> tuple[Array, Array]:
@@ -35,7 +30,7 @@ def smooth(values: Array, sample_time_s: float, *, noise_std: float | None = Non
     Returns:
         Smoothed values (k, m) and rates (k, m) [per second].
     """
-    surplus = max(len(values) - LEARN_FROM, 0) // 2
+    surplus = max(len(values) - TUNING.learning_samples, 0) // 2
     ratio = _likeliest_ratio(values[surplus : len(values) - surplus], noise_std)
     state = _solve(values, ratio)[0]
     return state[:, 0], state[:, 1] / sample_time_s
@@ -47,9 +42,9 @@ def _likeliest_ratio(values: Array, noise_std: float | None) -> float:
     def cost(exponent: float) -> float:
         return _minus_log_likelihood(values, 10.0**exponent, noise_std)
 
-    grid = np.arange(LOG10_RATIOS[0], LOG10_RATIOS[1] + 0.5)
+    grid = np.arange(TUNING.log10_ratios[0], TUNING.log10_ratios[1] + 0.5)
     best = float(grid[np.argmin([cost(exponent) for exponent in grid])])
-    bounds = (max(best - 1.0, LOG10_RATIOS[0]), min(best + 1.0, LOG10_RATIOS[1]))
+    bounds = (max(best - 1.0, TUNING.log10_ratios[0]), min(best + 1.0, TUNING.log10_ratios[1]))
     return float(10.0 ** minimize_scalar(cost, bounds=bounds, method="bounded", options={"xatol": 0.02}).x)
 
 
