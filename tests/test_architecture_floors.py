@@ -37,13 +37,13 @@ FLOORS = {
     ),
     "diagnosis": (
         ("data",),
-        ("values",),
         ("model",),
-        ("causes",),
+        ("motion", "causes", "vessel_file"),
+        ("accuracy", "discriminating_manoeuvre"),
         ("fit",),
         ("select",),
-        ("found_model", "verdict"),
-        ("extension", "notes"),
+        ("values",),
+        ("conclusions",),
         ("diagnose",),
     ),
     "plan": (

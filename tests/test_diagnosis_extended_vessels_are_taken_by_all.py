@@ -7,14 +7,15 @@ import numpy as np
 import pytest
 
 from diagnosis_case import hidden_record, vessel_of
-from expdesign.diagnosis import CAUSES, Estimated, Finding
+from expdesign.diagnosis import CAUSES, Estimate, Finding
 from expdesign.diagnosis import diagnose as diagnose_record
-from expdesign.diagnosis.causes.environment.shallow_water import in_shallow_water
-from expdesign.diagnosis.extension import as_extended, extend
-from expdesign.diagnosis.model.accuracy import accuracy, first_states
-from expdesign.diagnosis.model.motion import simulate_windows
-from expdesign.diagnosis.model.rates import rates
-from expdesign.diagnosis.model.surroundings import Surroundings
+from expdesign.diagnosis.accuracy.simulated_fit import accuracy
+from expdesign.diagnosis.motion.equations_of_motion import state_rates
+from expdesign.diagnosis.motion.exogenous_inputs import ExogenousInputs
+from expdesign.diagnosis.motion.simulation import initial_states, simulate_windows
+from expdesign.diagnosis.vessel_file.reading import extended_model
+from expdesign.diagnosis.vessel_file.shallow_water import in_shallow_water
+from expdesign.diagnosis.vessel_file.writing import extend
 from expdesign.dictionary import PrimitiveSpec, build_dictionary
 from expdesign.dictionary.build import family
 from expdesign.dictionary.spec import complete_settings
@@ -74,17 +75,17 @@ def clean():
 def finding(cause: str) -> Finding:
     """A made-up finding; only its name and numbers are used."""
     numbers = GROWTH if cause == "shallow_water" else {}
-    estimates = tuple(Estimated(name=name, value=value, std=0.1, unit="") for name, value in numbers.items())
+    estimates = tuple(Estimate(name=name, value=value, std=0.1, unit="") for name, value in numbers.items())
     return Finding(
-        cause=cause, estimates=estimates, p_value=1e-6, fit_before=np.zeros(3), fit_after=np.ones(3), falls=(),
-        gain=1.0, gain_interval=(0.5, 1.5), not_distinguishable_from=(), would_tell_apart=None, explanation="made up",
-        worth=30.0, keys=tuple(EFFECTS[cause]),
+        cause=cause, estimates=estimates, p_value=1e-6, fit_before=np.zeros(3), fit_after=np.ones(3),
+        error_reductions=(), gain=1.0, gain_interval=(0.5, 1.5), not_distinguishable_from=(),
+        would_tell_apart=None, explanation="made up", likelihood_gain=30.0, keys=tuple(EFFECTS[cause]),
     )  # fmt: skip
 
 
 def as_found(clean, cause: str):
     """A diagnosis that found one cause, put together as `diagnose` does it."""
-    final = as_extended(TUG, clean.record).having(EFFECTS[cause])
+    final = extended_model(TUG, clean.record).with_effects(EFFECTS[cause])
     extended, missing = extend(TUG, final, {})
     return replace(clean, extended=extended, findings=(finding(cause),), notes=missing), final
 
@@ -105,14 +106,14 @@ def test_the_file_with_a_cause_is_read_simulates_it_and_is_scored(cause, clean, 
     assert vessel_toml(ship) != vessel_toml(TUG)
     assert not [note for note in found.notes if "not in the vessel file" in note]
     if "change:time" in final.effects:
-        final = final.having({"change:time": -1.0})  # the file describes the ship after it
-    start = first_states(clean.windows, final.states)
-    shown, wanted = (
-        simulate_windows(one, clean.windows, start).shown for one in (as_extended(ship, clean.record), final)
+        final = final.with_effects({"change:time": -1.0})  # the file describes the ship after it
+    start = initial_states(clean.windows, final.states)
+    predicted, wanted = (
+        simulate_windows(one, clean.windows, start).predicted for one in (extended_model(ship, clean.record), final)
     )
-    before = simulate_windows(as_extended(TUG, clean.record), clean.windows, start[:, :3]).shown
+    before = simulate_windows(extended_model(TUG, clean.record), clean.windows, start[:, :3]).predicted
     rough = 1e-3 if cause == "shallow_water" else 1e-9  # its factors are polynomials
-    assert np.abs(shown - wanted).max() <= rough * max(np.abs(wanted - before).max(), 1.0)
+    assert np.abs(predicted - wanted).max() <= rough * max(np.abs(wanted - before).max(), 1.0)
     assert np.abs(wanted - before).max() > 1e-3 or cause == "wind"  # which is measured in these data
 
 
@@ -123,9 +124,9 @@ def test_the_written_dependence_on_depth_is_the_one_found(clean):
     velocity, inputs = rng.uniform(-1, 1, (3, 40)), rng.uniform(-1, 1, (4, 40))
     shoal = rng.uniform(0.0, TUG.draught_m / 4.0, 40)
     own = final.model.signals(velocity, velocity[:2], inputs, NUMPY)
-    around = Surroundings({n: np.broadcast_to(x, 40) for n, x in own.items() if n not in ("u", "v", "r", "h")})
-    around["h"] = shoal
-    wanted = rates(final, tuple(velocity), around)
+    exogenous = ExogenousInputs({n: np.broadcast_to(x, 40) for n, x in own.items() if n not in ("u", "v", "r", "h")})
+    exogenous["h"] = shoal
+    wanted = state_rates(final, tuple(velocity), exogenous)
     record = with_depth(clean.record, found.extended.draught_m)
     driven = model_for(found.extended.model, record)
     given = driven.accelerations(velocity, velocity[:2], [*inputs, shoal])
@@ -162,11 +163,11 @@ def test_a_dependence_on_depth_counts_as_known_however_the_depth_is_recorded():
     """Python or command line: draught over depth among the inputs, or only the depth beside them."""
     model, _ = in_shallow_water(TUG.model, GROWTH, reach=0.6, known=TUG.model)
     ship, record = replace(TUG, model=model), shoaling()
-    plain, beside = (as_extended(ship, data) for data in (record, with_depth(record, TUG.draught_m)))
+    plain, beside = (extended_model(ship, data) for data in (record, with_depth(record, TUG.draught_m)))
     assert plain.model.inputs == beside.model.inputs == TUG.model.inputs
     found = accuracy(plain, record), accuracy(beside, with_depth(record, TUG.draught_m))
     np.testing.assert_array_equal(found[0].rmse, found[1].rmse)
-    assert np.abs(found[0].rmse / accuracy(as_extended(TUG, record), record).rmse - 1).max() > 0.05
+    assert np.abs(found[0].rmse / accuracy(extended_model(TUG, record), record).rmse - 1).max() > 0.05
     extended, _ = extend(ship, plain, {})
     assert extended.model.terms == model.terms
 
@@ -187,10 +188,14 @@ def test_the_page_of_a_lost_simulation_shows_no_astronomic_numbers(clean):
     before = replace(clean.before, fit=lost, rmse=np.full(3, np.inf), bias=np.full(3, -1e292))
     before = replace(before, growth=np.full_like(before.growth, 1e6))
     found = replace(
-        clean, before=before, findings=(finding("wind"),), errors=(clean.windows.measured,), lacking=(clean.residuals,)
+        clean,
+        before=before,
+        findings=(finding("wind"),),
+        errors=(clean.windows.measured,),
+        step_residuals=(clean.residuals,),
     )
     page = diagnosis_html(found, command="made up", version="0")
     text = re.sub(r"<svg.*?</svg>", "", page, flags=re.DOTALL)
     assert text.count("lost") >= 3
     assert not re.search(r"\binf\b|e\+\d|100000000", text)
-    assert "parts from the ship altogether" in text
+    assert "diverges from the ship" in text

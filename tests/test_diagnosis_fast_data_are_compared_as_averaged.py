@@ -8,9 +8,9 @@ import pytest
 import hidden_effects as sea
 from diagnosis_case import from_pose, hidden_record, vessel_of
 from expdesign.diagnosis.data.windows import cut_windows, fastest_rate
-from expdesign.diagnosis.extension import as_extended
-from expdesign.diagnosis.model.accuracy import simulate_from_first
-from expdesign.diagnosis.model.delivered_inputs import followed_inputs
+from expdesign.diagnosis.motion.delivered_inputs import delivered_inputs
+from expdesign.diagnosis.motion.simulation import simulate_from_measured
+from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.signals import Record
 
 CALM = sea.Weather(current_std=0.0, wind_std=0.0)
@@ -33,10 +33,10 @@ def quiet(step_s: float, *, pose: bool) -> Record:
 def test_nothing_is_left_over_where_the_model_is_right(step_s, pose):
     """A quarter of a per cent of what is measured: what the curvature of drag makes of a mean over a second."""
     record = quiet(step_s, pose=pose)
-    ship = as_extended(vessel_of("barge", sample_time_s=step_s), record)
+    ship = extended_model(vessel_of("barge", sample_time_s=step_s), record)
     windows = cut_windows(ship.model, record)
     assert windows.rows_per_step == round(1.0 / step_s)
-    motion = simulate_from_first(ship, windows)
+    motion = simulate_from_measured(ship, windows)
     known = np.isfinite(windows.measured[:, START:]).any(axis=(0, 1))
     left = np.sqrt(np.nanmean(motion.error[:, START:, known] ** 2, axis=(0, 1)))
     assert (left < 0.0025 * np.nanstd(windows.measured[:, START:, known], axis=(0, 1))).all()
@@ -46,19 +46,19 @@ def test_commands_are_followed_as_recorded_not_as_averaged():
     """Means over a second of a command that changes its sign pass through a dead band that no command was in."""
     step_s = 0.05
     record = quiet(step_s, pose=False)
-    ship = as_extended(vessel_of("barge", sample_time_s=step_s), record)
+    ship = extended_model(vessel_of("barge", sample_time_s=step_s), record)
     windows = cut_windows(ship.model, record)
     place = ship.model.inputs.index("tau_psi")
     orders = np.concatenate([batch.inputs[:, place] for batch in record.batches])
     width = 0.99 * np.abs(orders).min()
-    (acting, _), *_ = followed_inputs(ship.having({"deadband:tau_psi": width}), windows)
+    (acting, _), *_ = delivered_inputs(ship.with_effects({"deadband:tau_psi": width}), windows)
     assert np.abs(acting[:, place]).min() > width
 
 
 def test_inputs_of_a_step_are_the_mean_of_its_samples():
     record = quiet(0.2, pose=False)
     record = Record(batches=(replace(record.batches[0], name="one"),))
-    ship = as_extended(vessel_of("barge", sample_time_s=0.2), record)
+    ship = extended_model(vessel_of("barge", sample_time_s=0.2), record)
     windows = cut_windows(ship.model, record)
     rows = record.batches[0].inputs
     expected = rows[: len(rows) // 5 * 5].reshape(-1, 5, rows.shape[1]).mean(axis=1)
@@ -68,11 +68,11 @@ def test_inputs_of_a_step_are_the_mean_of_its_samples():
 
 def test_noise_of_differences_is_no_speed():
     """Positions good to 0.4 m, twenty times a second, differ by 5 m/s from one to the next: drag is not that quick."""
-    rates = []
+    state_rates = []
     for position in (0.0, 0.4):
         record = hidden_record(
             "tug", seed=4, batches=2, samples=1200, step_s=0.05, sensors=sea.Sensors(position=position)
         )
         data = Record(batches=tuple(from_pose(batch) for batch in record.batches))
-        rates.append(fastest_rate(as_extended(vessel_of("tug", sample_time_s=0.05), data).model, data))
-    assert rates[1] < 1.5 * rates[0]
+        state_rates.append(fastest_rate(extended_model(vessel_of("tug", sample_time_s=0.05), data).model, data))
+    assert state_rates[1] < 1.5 * state_rates[0]

@@ -5,36 +5,37 @@ import pytest
 
 from diagnosis_case import hidden_record, vessel_of
 from expdesign.diagnosis.data.windows import cut_windows
-from expdesign.diagnosis.extension import as_extended
+from expdesign.diagnosis.fit.fit import FitOptions
 from expdesign.diagnosis.fit.gauss_newton import fit
-from expdesign.diagnosis.fit.step_limits import moved
-from expdesign.diagnosis.model.accuracy import first_states
-from expdesign.diagnosis.model.terms import scales
-from expdesign.diagnosis.select.forward_search import settled
+from expdesign.diagnosis.fit.step_limits import after_step
+from expdesign.diagnosis.model.terms import term_factors
+from expdesign.diagnosis.motion.simulation import initial_states
+from expdesign.diagnosis.select.forward_selection import fit_nuisance
+from expdesign.diagnosis.vessel_file.reading import extended_model
 
 
 @pytest.mark.parametrize("ship", ["tug", "barge", "coaster"])
 def test_a_step_takes_products_straight_on(ship):
     """Every parameter times its factors changes by exactly what is linear in the step, however large that is."""
-    extended = as_extended(vessel_of(ship, relative_std=0.1), hidden_record(ship, seed=1, batches=1, samples=60))
+    extended = extended_model(vessel_of(ship, relative_std=0.1), hidden_record(ship, seed=1, batches=1, samples=60))
     names = extended.model.names
     rng = np.random.default_rng(0)
     size = np.abs(extended.model.parameters)
     keys = ("gain", "inertia:v", *(f"theta:{name}" for name in names))
-    extended = extended.having(
+    extended = extended.with_effects(
         dict(zip(keys, [0.2, -0.1, *(0.1 * size * rng.standard_normal(len(size)))], strict=True))
     )
     step = np.array([-0.4, 0.3, *(0.1 * size * rng.standard_normal(len(size)))])
 
     def products(effects):
         whole = [value + effects[f"theta:{name}"] for name, value in zip(names, extended.model.parameters, strict=True)]
-        factors = scales(extended.model, effects)
+        factors = term_factors(extended.model, effects)
         return np.array(whole) * np.array([factors[name] for name in names])
 
     before = {key: extended.get(key) for key in keys}
     along = {key: before[key] + 1e-7 * value for key, value in zip(keys, step, strict=True)}
     slope = (products(along) - products(before)) / 1e-7
-    after = moved(extended, keys, step)
+    after = after_step(extended, keys, step)
     assert after["gain"] == pytest.approx(-0.2)
     assert products(after) - products(before) == pytest.approx(slope, rel=1e-4, abs=1e-9)
 
@@ -42,12 +43,16 @@ def test_a_step_takes_products_straight_on(ship):
 @pytest.mark.parametrize(("key", "hidden", "truth"), [("gain", "gain", -0.2), ("inertia:v", "load_v", 0.4)])
 def test_factors_beside_uncertain_parameters_end_where_they_end_from_elsewhere(key, hidden, truth):
     record = hidden_record("barge", seed=3, batches=5, samples=150, effects={hidden: truth}, relative_std=0.05)
-    extended = as_extended(vessel_of("barge", relative_std=0.05), record)
+    extended = extended_model(vessel_of("barge", relative_std=0.05), record)
     windows = cut_windows(extended.model, record)
-    base = settled(extended, windows, first_states(windows))
-    found = fit(base.ship, windows, (key,), starts=base.starts, noise=base.noise)
+    base = fit_nuisance(extended, windows, initial_states(windows))
+    found = fit(base.ship, windows, (key,), starts=base.starts, options=FitOptions(noise=base.noise))
     other = fit(
-        extended.having({key: truth}), windows, (key,), starts=first_states(windows), noise=base.noise, steps=20
+        extended.with_effects({key: truth}),
+        windows,
+        (key,),
+        starts=initial_states(windows),
+        options=FitOptions(noise=base.noise, steps=20),
     )
     assert found.converged
     assert abs(found.value(key) - other.value(key)) < 0.3 * found.std(key)

@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 
 from diagnosis_case import vessel_of
-from expdesign.diagnosis.data.windows import cut_windows, derived_outputs
-from expdesign.diagnosis.extension import as_extended, extend
-from expdesign.diagnosis.model.accuracy import accuracy
-from expdesign.diagnosis.model.sensors import observed
+from expdesign.diagnosis.accuracy.simulated_fit import accuracy
+from expdesign.diagnosis.data.measured_channels import derived_outputs
+from expdesign.diagnosis.data.windows import cut_windows
+from expdesign.diagnosis.motion.sensors import sensor_outputs
+from expdesign.diagnosis.vessel_file.reading import extended_model
+from expdesign.diagnosis.vessel_file.writing import extend
 from expdesign.records import load_records
 from expdesign.signals import Commands
 from expdesign.simulation import CALM, measure, simulate
@@ -50,7 +52,7 @@ def test_a_stated_fault_of_a_sensor_explains_the_data_it_makes(fault, tmp_path):
     """Without noise what is left is integration and differencing; ignoring the fault leaves much more."""
     sensors, pose_only = FAULTS[fault]
     record, _ = trial(tmp_path, sensors, pose_only=pose_only)
-    knowing, blind = (accuracy(as_extended(ship, record), record) for ship in (replace(SHIP, sensors=sensors), SHIP))
+    knowing, blind = (accuracy(extended_model(ship, record), record) for ship in (replace(SHIP, sensors=sensors), SHIP))
     assert (knowing.rmse < 0.006).all()
     assert blind.rmse[1] > 5 * knowing.rmse[1]
 
@@ -61,26 +63,26 @@ def test_a_fault_of_the_other_sensor_is_not_seen(pose_only, tmp_path):
     sensors = Sensors(velocity_angle_rad=-BIAS) if pose_only else Sensors(heading_bias_rad=-BIAS)
     record, _ = trial(tmp_path, sensors, pose_only=pose_only)
     assert set(derived_outputs(record)) == (set("uvr") if pose_only else set())
-    assert as_extended(replace(SHIP, sensors=sensors), record).get("heading_bias") == 0.0
+    assert extended_model(replace(SHIP, sensors=sensors), record).get("heading_bias") == 0.0
 
 
 @pytest.mark.parametrize("pose_only", [True, False])
 def test_what_is_found_is_written_to_the_sensor_that_does_it(pose_only, tmp_path):
     record, _ = trial(tmp_path, Sensors(), pose_only=pose_only)
-    found = as_extended(SHIP, record).having({"heading_bias": BIAS, "lever:forward": 2.0})
+    found = extended_model(SHIP, record).with_effects({"heading_bias": BIAS, "lever:forward": 2.0})
     ship, _ = extend(SHIP, found, {})
     named = ("heading_bias_rad", "velocity_angle_rad")[:: 1 if pose_only else -1]
     assert [getattr(ship.sensors, name) for name in named] == [-BIAS, 0.0]
-    assert as_extended(ship, record).effects == found.effects
+    assert extended_model(ship, record).effects == found.effects
     again, _ = trial(tmp_path, ship.sensors, pose_only=pose_only)
-    assert (accuracy(as_extended(ship, again), again).rmse < 0.006).all()
+    assert (accuracy(extended_model(ship, again), again).rmse < 0.006).all()
 
 
 def test_surge_leaks_into_sway_by_the_sine_of_the_bias(tmp_path):
     record, _ = trial(tmp_path, Sensors(), pose_only=False)
-    ship = as_extended(SHIP, record).having({"heading_bias": BIAS})
+    ship = extended_model(SHIP, record).with_effects({"heading_bias": BIAS})
     windows = cut_windows(ship.model, record)
     states = np.zeros((len(windows.batch), windows.steps, 3))
     states[..., 0] = 2.0
-    shown = observed(ship, states, windows)
-    np.testing.assert_allclose(shown[..., 1], 2.0 * np.sin(BIAS), rtol=1e-12)
+    predicted = sensor_outputs(ship, states, windows)
+    np.testing.assert_allclose(predicted[..., 1], 2.0 * np.sin(BIAS), rtol=1e-12)

@@ -82,13 +82,13 @@ def test_the_generator_and_the_package_agree_on_calm_water():
 
     The first state comes from a straight line through five samples, so that its error is 0.77 of one sample's noise.
     """
-    from expdesign.diagnosis.extension import as_extended
-    from expdesign.diagnosis.model.accuracy import accuracy
+    from expdesign.diagnosis.accuracy.simulated_fit import accuracy
+    from expdesign.diagnosis.vessel_file.reading import extended_model
 
     calm = sea.Weather(current_std=0.0, wind_std=0.0)
     for ship in sea.SHIPS:
         record = hidden_record(ship, seed=1, batches=2, samples=150, weather=calm)
-        found = accuracy(as_extended(vessel_of(ship), record), record)
+        found = accuracy(extended_model(vessel_of(ship), record), record)
         noise = np.array([0.014, 0.014, 0.003])
         assert (found.rmse < 1.2 * np.hypot(1.0, 0.77) * noise).all(), ship
         assert (np.abs(found.bias) < 0.77 * noise).all(), ship

@@ -5,17 +5,18 @@ from dataclasses import replace
 import numpy as np
 
 from diagnosis_case import hidden_record, vessel_of
-from expdesign.diagnosis.extension import as_extended
-from expdesign.diagnosis.model.accuracy import MOST_SPREADS, accuracy, bounded
+from expdesign.diagnosis.accuracy.simulated_fit import accuracy, clipped
+from expdesign.diagnosis.accuracy.tuning import TUNING
+from expdesign.diagnosis.vessel_file.reading import extended_model
 
 
 def test_a_model_that_runs_away_has_a_bounded_error():
     """Anti-damping of 2 per second: the speeds pass every number within a minute."""
     record, ship = hidden_record("barge", seed=1, batches=2, samples=150), vessel_of("barge")
     wild = replace(ship, model=ship.model.with_parameters({"X_u": 2.0, "N_r": 2.0}))
-    found = accuracy(as_extended(wild, record), record)
+    found = accuracy(extended_model(wild, record), record)
     velocity = np.concatenate([batch.velocity for batch in record.batches])
-    assert (found.rmse <= (1 + 1e-6) * MOST_SPREADS * velocity.std(axis=0) + 1e-9).all()
+    assert (found.rmse <= (1 + 1e-6) * TUNING.largest_error * velocity.std(axis=0) + 1e-9).all()
     assert (np.abs(found.bias) <= found.rmse).all()
     assert (found.fit[[0, 2]] < -500).all()
     assert np.isfinite(found.growth).all()
@@ -25,4 +26,4 @@ def test_errors_of_simulations_that_hold_are_not_touched():
     rng = np.random.default_rng(0)
     measured = rng.standard_normal((3, 50, 2))
     error = rng.standard_normal((3, 50, 2))
-    np.testing.assert_array_equal(bounded(error, measured), error)
+    np.testing.assert_array_equal(clipped(error, measured), error)

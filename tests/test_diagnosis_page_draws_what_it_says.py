@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from diagnosis_case import hidden_record, vessel_of
-from expdesign.diagnosis import Estimated, Finding, diagnose
+from expdesign.diagnosis import Estimate, Finding, diagnose
+from expdesign.diagnosis.accuracy.residuals import Residuals, _slopes, dependence, mean_residual, one_step_residuals
 from expdesign.diagnosis.data.windows import cut_windows
-from expdesign.diagnosis.extension import as_extended, public_name
-from expdesign.diagnosis.model.residuals import _slopes, dependence, on_the_whole, short_residuals
-from expdesign.diagnosis.values import Residuals
+from expdesign.diagnosis.vessel_file.reading import extended_model
+from expdesign.diagnosis.vessel_file.result_names import public_name
 from expdesign.export.diagnosis_page import diagnosis_html, diagnosis_json
 from expdesign.export.diagnosis_page.suspects import has_sign, is_force, suspected, suspected_force
 
@@ -23,11 +23,11 @@ def clean():
     return diagnose(vessel_of("tug"), hidden_record("tug", seed=3, batches=3, samples=120))
 
 
-def finding(keys: tuple[str, ...], cause: str = "parameters", estimates: tuple[Estimated, ...] = ()) -> Finding:
+def finding(keys: tuple[str, ...], cause: str = "parameters", estimates: tuple[Estimate, ...] = ()) -> Finding:
     return Finding(
-        cause=cause, estimates=estimates, p_value=1e-6, fit_before=np.zeros(3), fit_after=np.ones(3), falls=(),
-        gain=1.0, gain_interval=(0.5, 1.5), not_distinguishable_from=(), would_tell_apart=None, explanation="made up",
-        worth=30.0, keys=keys,
+        cause=cause, estimates=estimates, p_value=1e-6, fit_before=np.zeros(3), fit_after=np.ones(3),
+        error_reductions=(), gain=1.0, gain_interval=(0.5, 1.5), not_distinguishable_from=(),
+        would_tell_apart=None, explanation="made up", likelihood_gain=30.0, keys=keys,
     )  # fmt: skip
 
 
@@ -47,11 +47,11 @@ def test_chance_alone_colours_no_more_than_it_should(alike, by, most):
     rng = np.random.default_rng(0)
     p_values = []
     for _ in range(400):
-        lacking, run = rng.standard_normal((160, 1)), np.repeat(np.arange(4.0), 40)
+        acceleration, run = rng.standard_normal((160, 1)), np.repeat(np.arange(4.0), 40)
         for k in range(1, 160):
-            lacking[k] += alike * lacking[k - 1]
+            acceleration[k] += alike * acceleration[k - 1]
         variables = {"u": rng.standard_normal(160), "time": np.arange(160.0), "run": run}
-        found = Residuals(outputs=("u",), stretch_s=10.0, lacking=lacking, variables=variables)
+        found = Residuals(outputs=("u",), stretch_s=10.0, acceleration=acceleration, variables=variables)
         p_values.append(dependence(found, "u", by).p_value)
     assert np.mean(np.array(p_values) < 0.05) < most + 4 * np.sqrt(0.05 * 0.95 / 400)
 
@@ -61,18 +61,18 @@ def test_the_mean_on_the_whole_is_as_uncertain_as_it_varies():
     rng, ratios = np.random.default_rng(3), []
     for _ in range(300):
         found = Residuals(
-            outputs=("u",), stretch_s=10.0, lacking=2.0 + rng.standard_normal((100, 1)),
+            outputs=("u",), stretch_s=10.0, acceleration=2.0 + rng.standard_normal((100, 1)),
             variables={"run": np.repeat(np.arange(4.0), 25)},
         )  # fmt: skip
-        mean, std = on_the_whole(found, "u")
+        mean, std = mean_residual(found, "u")
         ratios.append((mean - 2.0) / std)
     assert abs(np.sum(np.square(ratios)) - 300) < 4 * np.sqrt(600)
 
 
 def test_a_current_shows_by_heading_before_any_cause_is_named():
     record = hidden_record("tug", seed=3, batches=6, samples=200, current=(0.2, 0.1))
-    ship = as_extended(vessel_of("tug"), record)
-    residuals = short_residuals(ship, cut_windows(ship.model, record))
+    ship = extended_model(vessel_of("tug"), record)
+    residuals = one_step_residuals(ship, cut_windows(ship.model, record))
     assert tuple(residuals.variables) == ALONE
     for output in ("u", "v"):
         by = {name: dependence(residuals, output, name).p_value for name in residuals.variables}
@@ -86,10 +86,10 @@ def test_a_stretch_tells_the_acceleration_that_is_missing():
     What sway does to yaw beside it, and orders that change in a stretch, leave the comparison good to a seventh.
     """
     record = hidden_record("barge", seed=3, batches=4, samples=200)
-    ship = as_extended(vessel_of("barge"), record)
+    ship = extended_model(vessel_of("barge"), record)
     windows = cut_windows(ship.model, record)
-    right, wrong = (short_residuals(one, windows) for one in (ship, ship.having({"asymmetry": 0.6})))
-    slope = np.polyfit(right.variables["tau_x"], wrong.lacking[:, 2] - right.lacking[:, 2], 1)[0]
+    right, wrong = (one_step_residuals(one, windows) for one in (ship, ship.with_effects({"asymmetry": 0.6})))
+    slope = np.polyfit(right.variables["tau_x"], wrong.acceleration[:, 2] - right.acceleration[:, 2], 1)[0]
     time = np.arange(10.0)
     expected = -0.6 * 0.0004 * np.polyfit(time, (1 - np.exp(-0.12 * time)) / 0.12, 1)[0]
     assert slope == pytest.approx(expected, rel=1 / 7)
@@ -108,14 +108,14 @@ BY_ERROR = {
 
 @pytest.mark.parametrize("key", [*BY_FORCE, *BY_ERROR])
 def test_a_finding_is_drawn_against_what_it_depends_on(key, clean):
-    name = public_name(key, as_extended(clean.vessel, clean.record))[0]
-    item = finding((key,), estimates=(Estimated(name=name, value=1.0, std=0.1, unit=""),))
+    name = public_name(key, extended_model(clean.vessel, clean.record))[0]
+    item = finding((key,), estimates=(Estimate(name=name, value=1.0, std=0.1, unit=""),))
     item = replace(item, cause="parameters" if key.startswith("theta") else "any")
     assert is_force(clean, item) == (key in BY_FORCE)
     if key in BY_FORCE:
-        at = {**clean.residuals.variables, "depth": np.full(len(clean.residuals.lacking), 8.0)}
+        at = {**clean.residuals.variables, "depth": np.full(len(clean.residuals.acceleration), 8.0)}
         values, label = suspected_force(clean, item, at)
-        assert values.shape == clean.residuals.lacking[:, 0].shape
+        assert values.shape == clean.residuals.acceleration[:, 0].shape
     else:
         values, label = suspected(clean, item)
         assert values.shape == clean.windows.measured.shape[:2]
@@ -142,7 +142,7 @@ def test_of_several_parameters_the_clearest_is_drawn(clean):
     model = clean.vessel.model
     names = ("X_u", "Y_v")
     estimates = tuple(
-        Estimated(name=name, value=float(model.parameters[model.names.index(name)]) + moved, std=0.01, unit="")
+        Estimate(name=name, value=float(model.parameters[model.names.index(name)]) + moved, std=0.01, unit="")
         for name, moved in zip(names, (0.01, -0.2), strict=True)
     )
     item = finding(("theta:X_u", "theta:Y_v"), estimates=estimates)
@@ -151,10 +151,10 @@ def test_of_several_parameters_the_clearest_is_drawn(clean):
 
 def test_two_findings_of_one_cause_have_a_picture_each(clean):
     items = tuple(
-        finding((f"theta:{name}",), estimates=(Estimated(name=name, value=0.1, std=0.01, unit=""),))
+        finding((f"theta:{name}",), estimates=(Estimate(name=name, value=0.1, std=0.01, unit=""),))
         for name in ("X_u", "Y_v")
     )
-    found = replace(clean, findings=items, errors=(clean.windows.measured,) * 2, lacking=(clean.residuals,) * 2)
+    found = replace(clean, findings=items, errors=(clean.windows.measured,) * 2, step_residuals=(clean.residuals,) * 2)
     page = diagnosis_html(found, command="made up", version="0")
     assert "X_u: u" in page
     assert "Y_v: v" in page
@@ -164,7 +164,7 @@ def test_two_findings_of_one_cause_have_a_picture_each(clean):
 def test_data_too_short_for_the_residuals_are_told_so(clean):
     short = replace(
         clean.residuals,
-        lacking=clean.residuals.lacking[:5],
+        acceleration=clean.residuals.acceleration[:5],
         variables={name: values[:5] for name, values in clean.residuals.variables.items()},
     )
     found = replace(clean, residuals=short)

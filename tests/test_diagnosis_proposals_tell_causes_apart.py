@@ -5,15 +5,15 @@ import pytest
 
 from diagnosis_case import hidden_record, vessel_of
 from expdesign.diagnosis.data.windows import cut_windows
-from expdesign.diagnosis.extension import as_extended
-from expdesign.diagnosis.select.discriminating_manoeuvre import (
+from expdesign.diagnosis.discriminating_manoeuvre import (
     Proposal,
     _turning,
     _windows,
-    most_telling,
-    seen_wind,
+    mean_measured_wind,
+    most_discriminating,
     standard_proposals,
 )
+from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.errors import InputError
 from expdesign.signals import Commands
 from expdesign.workflows.diagnosed import as_inputs
@@ -23,7 +23,7 @@ STD = np.array([0.02, 0.02, 0.003, np.inf])
 
 def case(ship: str, **options):
     record = hidden_record(ship, seed=5, batches=3, samples=150, **options)
-    extended = as_extended(vessel_of(ship), record)
+    extended = extended_model(vessel_of(ship), record)
     return extended, cut_windows(extended.model, record)
 
 
@@ -33,8 +33,8 @@ def test_a_circle_is_sailed_through_all_headings():
     circle = next(one for one in standard_proposals(like, ship.model.inputs, 1.0) if one.name == "turning_circle")
     wind = np.array([3.0, -4.0])
     windows = _turning(ship, _windows(circle, like, wind), circle, wind)
-    turned = windows.heading - windows.heading[:, :1]
-    assert np.abs(turned).max() > 2 * np.pi
+    heading_change = windows.heading - windows.heading[:, :1]
+    assert np.abs(heading_change).max() > 2 * np.pi
     np.testing.assert_allclose(np.hypot(*np.moveaxis(windows.wind, -1, 0)), 5.0)
     again = _turning(ship, windows, circle, wind)
     assert np.abs(again.heading - windows.heading).max() < np.radians(1.0)
@@ -42,17 +42,19 @@ def test_a_circle_is_sailed_through_all_headings():
 
 def test_the_wind_of_the_data_blows():
     _, like = case("tug", wind=(6.0, 4.0))
-    np.testing.assert_allclose(seen_wind(like), [6.0, 4.0], atol=1.0)  # gusts of 0.5 m/s for a minute, in 450 s
+    np.testing.assert_allclose(
+        mean_measured_wind(like), [6.0, 4.0], atol=1.0
+    )  # gusts of 0.5 m/s for a minute, in 450 s
 
 
 def test_a_current_and_a_misaligned_sensor_part_where_the_ship_turns():
     """On a straight run either is a constant sideways speed; in a circle the current comes from all sides."""
     ship, like = case("barge")
-    current, bias = ship.having({"current:east": 0.1}), ship.having({"heading_bias": 0.05})
+    current, bias = ship.with_effects({"current:east": 0.1}), ship.with_effects({"heading_bias": 0.05})
     proposals = {one.name: one for one in standard_proposals(like, ship.model.inputs, 1.0)}
     pair = [proposals["straight"], proposals["turning_circle"]]
-    assert most_telling(current, [bias], pair, STD, like) == "turning_circle"
-    assert most_telling(current, [current], pair, STD, like) is None
+    assert most_discriminating(current, [bias], pair, STD, like) == "turning_circle"
+    assert most_discriminating(current, [current], pair, STD, like) is None
 
 
 def test_commands_become_the_inputs_that_the_data_have():
@@ -70,4 +72,4 @@ def test_commands_become_the_inputs_that_the_data_have():
 def test_without_thrust_a_wrong_thrust_is_not_seen():
     ship, like = case("barge")
     still = Proposal(name="drifting", inputs=np.zeros((60, 3)), velocity=np.zeros(3), sample_time_s=1.0)
-    assert most_telling(ship, [ship.having({"gain": 0.2})], [still], STD, like) is None
+    assert most_discriminating(ship, [ship.with_effects({"gain": 0.2})], [still], STD, like) is None

@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 
 from diagnosis_case import Told, from_pose, hidden_record, hidden_records, vessel_of
+from expdesign.diagnosis.accuracy.simulated_fit import accuracy
 from expdesign.diagnosis.causes import CAUSES
 from expdesign.diagnosis.causes.candidate import Situation
-from expdesign.diagnosis.data.windows import cut_windows, held_wind
-from expdesign.diagnosis.extension import as_extended, extend
-from expdesign.diagnosis.model.accuracy import accuracy, first_states
-from expdesign.diagnosis.model.motion import simulate_windows
-from expdesign.diagnosis.notes import notes_on_data
+from expdesign.diagnosis.conclusions.notes import notes_on_data
+from expdesign.diagnosis.data.sampled_batch import wind_held_over_gaps
+from expdesign.diagnosis.data.windows import cut_windows
+from expdesign.diagnosis.motion.simulation import initial_states, simulate_windows
+from expdesign.diagnosis.vessel_file.reading import extended_model
+from expdesign.diagnosis.vessel_file.writing import extend
 from expdesign.errors import InputError
 from expdesign.signals import Record
 from expdesign.vessel import Term, Vessel
@@ -20,7 +22,7 @@ from expdesign.vessel import Term, Vessel
 
 def causes_of(vessel: Vessel, record: Record) -> dict[frozenset[str], set[str]]:
     """Which causes have a candidate with just these free effects."""
-    ship = as_extended(vessel, record)
+    ship = extended_model(vessel, record)
     situation = Situation(ship=ship, windows=cut_windows(ship.model, record))
     found: dict[frozenset[str], set[str]] = {}
     for cause in CAUSES:
@@ -33,11 +35,11 @@ def test_a_late_heading_leaves_a_gyro_s_yaw_rate_alone_and_shifts_one_derived_fr
     record = hidden_record("barge", seed=1, batches=1, samples=120)
     derived = Record(batches=tuple(from_pose(batch) for batch in record.batches))
     for data, moves in ((record, False), (derived, True)):
-        ship = as_extended(vessel_of("barge"), data)
+        ship = extended_model(vessel_of("barge"), data)
         windows = cut_windows(ship.model, data)
         punctual, late = (
-            simulate_windows(one, windows, first_states(windows)).shown
-            for one in (ship, ship.having({"late:psi": 2.0}))
+            simulate_windows(one, windows, initial_states(windows)).predicted
+            for one in (ship, ship.with_effects({"late:psi": 2.0}))
         )
         assert np.array_equal(late[..., 2], punctual[..., 2]) != moves
         assert not np.array_equal(late[..., 3], punctual[..., 3])
@@ -49,7 +51,7 @@ def test_the_last_wind_seen_blows_on_from_where_it_blew():
     c, s = np.cos(heading), np.sin(heading)
     air = np.stack([3.0 * c - 5.0 * s, -5.0 * c - 3.0 * s], axis=-1)
     seen = np.where(np.isin(np.arange(40), (7, 8, 30))[:, None], air, np.nan)
-    np.testing.assert_allclose(held_wind(seen, heading), air, atol=1e-12)
+    np.testing.assert_allclose(wind_held_over_gaps(seen, heading), air, atol=1e-12)
 
 
 def test_wind_that_falls_out_is_no_calm():
@@ -62,11 +64,11 @@ def test_wind_that_falls_out_is_no_calm():
         )
     )
     vessel = vessel_of("tug")
-    whole, bridged = (accuracy(as_extended(vessel, data), data).fit for data in (record, gappy))
+    whole, bridged = (accuracy(extended_model(vessel, data), data).fit for data in (record, gappy))
     assert (bridged > whole - 3.0).all()
-    windows = cut_windows(as_extended(vessel, gappy).model, gappy)
+    windows = cut_windows(extended_model(vessel, gappy).model, gappy)
     assert any(
-        "No wind is measured in 50 % of the samples" in note for note in notes_on_data(vessel, gappy, windows, ())
+        "The wind is missing in 50 % of the samples" in note for note in notes_on_data(vessel, gappy, windows, ())
     )
 
 
@@ -110,7 +112,7 @@ def test_an_advance_loss_of_any_name_is_one_cause_and_no_other():
 
 def test_a_yaw_moment_of_thrust_that_the_file_has_is_an_asymmetry_and_no_parameter():
     record, vessel = hidden_record("barge", seed=1, batches=2, samples=120), vessel_of("barge")
-    again, _ = extend(vessel, as_extended(vessel, record).having({"asymmetry": 0.3}), {})
+    again, _ = extend(vessel, extended_model(vessel, record).with_effects({"asymmetry": 0.3}), {})
     found = causes_of(again, record)
     assert frozenset({"theta:N_tau_x"}) not in found
     assert found[frozenset({"asymmetry"})] == {"thruster_asymmetry"}

@@ -1,4 +1,4 @@
-"""Identities behind the diagnosis: linear answers, prior, noise, corrected p-values."""
+"""Identities of the diagnosis: sensitivities, priors, noise, adjusted p-values."""
 
 from dataclasses import replace
 
@@ -9,60 +9,64 @@ from scipy.stats import chi2
 import hidden_effects as sea
 from diagnosis_case import hidden_record, vessel_of
 from expdesign.diagnosis.causes.candidate import Candidate
-from expdesign.diagnosis.data.noise import FLOOR, Noise, fit_colour, hats, whitened
+from expdesign.diagnosis.data.noise import Noise, fit_ar_noise, linear_basis, whitened
+from expdesign.diagnosis.data.tuning import TUNING
 from expdesign.diagnosis.data.windows import cut_windows
-from expdesign.diagnosis.extension import as_extended, extend
 from expdesign.diagnosis.fit.gauss_newton import fit
-from expdesign.diagnosis.fit.score_tests import Scored, _effective_tests, screen
-from expdesign.diagnosis.model.accuracy import first_states
-from expdesign.diagnosis.model.motion import linearise, push_of, responses, simulate_windows
-from expdesign.diagnosis.select.contenders import contend, opening
-from expdesign.diagnosis.select.forward_search import _candidates, settled
-from expdesign.diagnosis.select.search_state import Step, superfluous
+from expdesign.diagnosis.motion.linearisation import disturbance_of, linearise, responses
+from expdesign.diagnosis.motion.simulation import initial_states, simulate_windows
+from expdesign.diagnosis.select.fitted_candidate import fit_candidate
+from expdesign.diagnosis.select.forward_selection import fit_nuisance
+from expdesign.diagnosis.select.score_tests import ScoreTest, _effective_tests, score_tests
+from expdesign.diagnosis.select.selection import Step, redundant_step
+from expdesign.diagnosis.select.selection_round import _candidates
+from expdesign.diagnosis.select.starting_point import starting_point
+from expdesign.diagnosis.vessel_file.reading import extended_model
+from expdesign.diagnosis.vessel_file.writing import extend
 
 SMALL = {"theta:X_u": 1e-5, "current:north": 1e-4, "gain": 1e-4, "inertia:v": 1e-4, "heading_bias": 1e-4}
 
 
 def case(ship="barge", **options):
     record = hidden_record(ship, seed=3, batches=2, samples=150, **options)
-    extended = as_extended(vessel_of(ship), record)
+    extended = extended_model(vessel_of(ship), record)
     return extended, cut_windows(extended.model, record)
 
 
-def test_linear_answers_are_differences_of_simulations():
+def test_sensitivities_are_differences_of_simulations():
     for ship in ("barge", "tug", "coaster"):
         extended, windows = case(ship)
-        start = first_states(windows)
+        start = initial_states(windows)
         motion = simulate_windows(extended, windows, start)
         linear = linearise(motion)
         for key, size in SMALL.items():
-            changed = extended.having({key: size})
-            answer = responses(linear, [push_of(linear, changed, 1.0)])[0]
-            difference = simulate_windows(changed, windows, start).shown - motion.shown
+            changed = extended.with_effects({key: size})
+            answer = responses(linear, [disturbance_of(linear, changed, 1.0)])[0]
+            difference = simulate_windows(changed, windows, start).predicted - motion.predicted
             assert np.abs(answer - difference).max() < 0.02 * np.abs(difference).max(), (ship, key)
 
 
-def test_all_steps_at_once_are_the_steps_one_by_one():
-    """Newton's method over all steps ends where Runge-Kutta goes, near and far from the motion it begins with."""
+def test_a_warm_start_changes_no_result():
+    """Newton's method over all steps converges to the Runge-Kutta solution, from a close and from a distant start."""
     for ship in ("barge", "tug", "coaster"):
         extended, windows = case(ship)
-        start = first_states(windows)
-        near = linearise(simulate_windows(extended, windows, start))
+        start = initial_states(windows)
+        warm_start = linearise(simulate_windows(extended, windows, start))
         for effects in ({"gain": 0.01}, {"gain": -0.4, "inertia:v": 0.5}, {"lag:all": 6.0, "current:north": 0.5}):
-            changed = extended.having(effects)
+            changed = extended.with_effects(effects)
             one = simulate_windows(changed, windows, start + 0.1)
-            other = simulate_windows(changed, windows, start + 0.1, near=near)
+            other = simulate_windows(changed, windows, start + 0.1, warm_start=warm_start)
             assert np.abs(one.states - other.states).max() < 1e-7, (ship, effects)
-            assert np.abs(one.turned - other.turned).max() < 1e-6, (ship, effects)
+            assert np.abs(one.heading_change - other.heading_change).max() < 1e-6, (ship, effects)
 
 
-def test_shortened_windows_hold_the_same_data():
+def test_shorter_windows_hold_the_same_data():
     """Every measurement once, each with the inputs and the heading that it had."""
     extended, windows = case("barge")
-    short = windows.shortened(40)
+    short = windows.cut_shorter(40)
     assert short.measured.shape[1] == 38  # 150 samples in four windows
     assert np.isclose(np.nansum(short.measured), np.nansum(windows.measured))
-    motion = simulate_windows(extended, windows, first_states(windows))
+    motion = simulate_windows(extended, windows, initial_states(windows))
     joints = motion.states[short.batch.astype(int), short.first.astype(int)]
     again = simulate_windows(extended, short, joints)
     errors = [np.sort(item.error[..., :3][np.isfinite(item.error[..., :3])]) for item in (motion, again)]
@@ -71,30 +75,30 @@ def test_shortened_windows_hold_the_same_data():
 
 def test_causes_have_equal_shares_of_false_alarms():
     """One candidate against twenty, all independent: closed forms; quantiles of 2000 draws have 10 % standard error."""
-    halves = [(np.array([index]), np.ones((1, 1))) for index in range(21)]
-    factors = _effective_tests(np.eye(21), halves, ["one", *["many"] * 20], np.random.default_rng(0))
+    roots = [(np.array([index]), np.ones((1, 1))) for index in range(21)]
+    factors = _effective_tests(np.eye(21), roots, ["one", *["many"] * 20], np.random.default_rng(0))
     every = 0.05 / (1 - 0.95**0.5)
     assert np.allclose(factors[0], every, rtol=0.4)
     assert np.allclose(factors[1:], every * 0.05 / (1 - 0.95**0.05), rtol=0.4)
 
 
-def test_colour_of_an_autoregression_with_the_white_floor_is_whitened():
-    """The filter fitted to a series makes it and its floor white and of unit size, but for chance."""
+def test_an_autoregression_with_its_white_share_is_whitened():
+    """The filter fitted to a series makes it and its white share white and of unit variance, within sampling error."""
     rng = np.random.default_rng(0)
     white = rng.standard_normal((4, 4000, 4))
     series = np.zeros_like(white)
     for k in range(1, 4000):
         series[:, k] = 0.8 * series[:, k - 1] + white[:, k]
-    noise = fit_colour(series)
-    floor = np.sqrt(FLOOR * (series**2).mean()) * rng.standard_normal(series.shape)
-    rest = whitened(series + floor, noise)
+    noise = fit_ar_noise(series)
+    white_part = np.sqrt(TUNING.white_share * (series**2).mean()) * rng.standard_normal(series.shape)
+    rest = whitened(series + white_part, noise)
     assert np.allclose(rest.std(axis=(0, 1)), 1.0, atol=4 / np.sqrt(2 * 16000))
     for lag in (1, 2, 3, 5, 10):
         assert np.allclose((rest[:, lag:] * rest[:, :-lag]).mean(axis=(0, 1)), 0.0, atol=4 / np.sqrt(16000))
 
 
-def test_hats_sum_to_one():
-    assert np.allclose(hats(100, 1.0, 10.0).sum(axis=0), 1.0)
+def test_linear_basis_functions_sum_to_one():
+    assert np.allclose(linear_basis(100, 1.0, 10.0).sum(axis=0), 1.0)
 
 
 def test_whitening_of_white_noise_only_scales():
@@ -118,9 +122,9 @@ def test_an_effect_that_is_not_there_is_estimated_as_zero_within_its_standard_er
     ratios = []
     for seed in range(4):
         record = hidden_record("barge", seed=500 + seed, batches=3, samples=120)
-        extended = as_extended(vessel_of("barge"), record)
+        extended = extended_model(vessel_of("barge"), record)
         windows = cut_windows(extended.model, record)
-        found = fit(extended, windows, ("gain", "heading_bias"), starts=first_states(windows))
+        found = fit(extended, windows, ("gain", "heading_bias"), starts=initial_states(windows))
         ratios += [found.value(key) / found.std(key) for key in ("gain", "heading_bias")]
     assert np.sum(np.square(ratios)) < chi2.isf(1e-3, len(ratios))
 
@@ -139,16 +143,16 @@ TOGETHER = (
 
 @pytest.mark.parametrize(("ship", "effects"), TOGETHER)
 def test_an_extended_vessel_simulates_as_the_extended_model(ship, effects):
-    """Effects survive the way into a vessel and back, however they act on each other."""
+    """Effects written to a vessel and read again act as before, also together."""
     record = hidden_record(ship, seed=1, batches=2, samples=120)
     vessel = vessel_of(ship)
-    extended = as_extended(vessel, record).having(effects)
+    extended = extended_model(vessel, record).with_effects(effects)
     again, missing = extend(vessel, extended, {})
     assert [note for note in missing if "after the change" not in note] == []
     windows = cut_windows(extended.model, record)
-    start = first_states(windows)
-    one = simulate_windows(extended, windows, start).shown
-    other = simulate_windows(as_extended(again, record), windows, start).shown
+    start = initial_states(windows)
+    one = simulate_windows(extended, windows, start).predicted
+    other = simulate_windows(extended_model(again, record), windows, start).predicted
     assert np.abs(one - other).max() < 1e-9
 
 
@@ -158,25 +162,26 @@ def test_a_yaw_moment_of_thrust_is_written_whatever_reads_it():
     terms = tuple(replace(term, expression="abs(tau_psi)*tau_psi*0.1") if term.name == "N_mu" else term
                   for term in vessel.model.terms)  # fmt: skip
     curved = replace(vessel, model=replace(vessel.model, terms=terms))
-    once, _ = extend(vessel, as_extended(vessel, record).having({"asymmetry": 0.3}), {})
+    once, _ = extend(vessel, extended_model(vessel, record).with_effects({"asymmetry": 0.3}), {})
     assert once.model.names[-1] == "N_tau_x"
     for ship in (curved, once):
-        extended = as_extended(ship, record).having({"asymmetry": 0.4, "gain": 0.1})
+        extended = extended_model(ship, record).with_effects({"asymmetry": 0.4, "gain": 0.1})
         again, _ = extend(ship, extended, {})
         assert again.model.names == ship.model.names
         windows = cut_windows(extended.model, record)
         one, other = (
-            simulate_windows(x, windows, first_states(windows)).shown for x in (extended, as_extended(again, record))
+            simulate_windows(x, windows, initial_states(windows)).predicted
+            for x in (extended, extended_model(again, record))
         )
         assert np.abs(one - other).max() < 1e-8
 
 
-def test_what_is_not_known_exactly_is_written_as_such():
+def test_standard_errors_of_factors_propagate_into_the_vessel_file():
     """A factor of 0.88 +- 0.03 on X_mu = 0.02 +- 0.001 and a yaw moment: first-order error propagation by hand."""
     record, vessel = hidden_record("barge", seed=1, batches=2, samples=120), vessel_of("barge")
     values = vessel.model.parameters
     vessel = replace(vessel, model=replace(vessel.model, parameter_std=np.where(values == 0.02, 0.001, 0.0)))
-    extended = as_extended(vessel, record).having({"gain": -0.12, "asymmetry": 0.5})
+    extended = extended_model(vessel, record).with_effects({"gain": -0.12, "asymmetry": 0.5})
     model = extend(vessel, extended, {"gain": 0.03, "asymmetry": 0.1})[0].model
     std = dict(zip(model.names, model.parameter_std, strict=True))
     assert np.isclose(std["X_mu"], np.hypot(0.88 * 0.001, 0.02 * 0.03))
@@ -185,26 +190,26 @@ def test_what_is_not_known_exactly_is_written_as_such():
     assert std["Y_v"] == 0.0
 
 
-def test_a_stand_in_is_superfluous_beside_the_true_cause_and_the_true_cause_is_not():
-    """A misaligned sensor that a drift term imitates: whichever is added first, only the imitation may go."""
+def test_an_imitation_is_redundant_beside_the_true_cause_and_the_true_cause_is_not():
+    """A misaligned sensor that a drift term imitates: only the imitation is redundant, whichever is added first."""
     record = hidden_record("barge", seed=41, batches=3, samples=150, faults={"heading_bias": 0.04})
-    extended = as_extended(vessel_of("barge"), record)
+    extended = extended_model(vessel_of("barge"), record)
     windows = cut_windows(extended.model, record)
     true = Candidate(cause="heading_bias", free={"heading_bias": 0.0})
-    stand_in = Candidate(cause="parameters", free={"theta:Y_ur": 0.0})
-    for order, idle in (((stand_in, true), 0), ((true, stand_in), None)):
-        before = fit(extended, windows, (), starts=first_states(windows))
+    imitation = Candidate(cause="parameters", free={"theta:Y_ur": 0.0})
+    for order, redundant in (((imitation, true), 0), ((true, imitation), None)):
+        before = fit(extended, windows, (), starts=initial_states(windows))
         steps = []
         for candidate in order:
-            scored = Scored(candidate=candidate, statistic=0.0, p_value=1.0, step=np.zeros(1), tests=20.0)
-            chosen = contend(before, windows, opening(before, scored))
+            scored = ScoreTest(candidate=candidate, statistic=0.0, p_value=1.0, step=np.zeros(1), multiplicity=20.0)
+            chosen = fit_candidate(before, windows, starting_point(before, scored))
             assert chosen is not None
-            steps.append(Step(chosen=chosen, p_value=0.0, rivals=(), before=before, screening=()))
+            steps.append(Step(chosen=chosen, p_value=0.0, alternatives=(), before=before, tests=()))
             before = chosen.fit
-        assert superfluous(steps, windows) == idle
+        assert redundant_step(steps, windows) == redundant
 
 
-def test_what_uncertain_parameters_explain_is_gone_before_anything_is_tested():
+def test_uncertain_parameters_are_fitted_before_anything_is_tested():
     """The remainder of a ship 20 % off everywhere is that of one whose parameters are known, within 5 %.
 
     Standard deviations of white remainders over 720 samples have a relative standard error of 2.6 %, and parameters
@@ -215,21 +220,21 @@ def test_what_uncertain_parameters_explain_is_gone_before_anything_is_tested():
     drawn = {name: value * (1 + 0.2 * rng.standard_normal()) for name, value in sea.SHIPS["coaster"].items()}
     vessel = vessel_of("coaster", relative_std=0.2)
     windows = cut_windows(vessel.model, record)
-    known = as_extended(vessel_of("coaster"), record)
+    known = extended_model(vessel_of("coaster"), record)
     wrong = {f"theta:{name}": drawn[name] - sea.SHIPS["coaster"][name] for name in known.model.names}
-    truth = settled(known.having(wrong), windows, first_states(windows))
-    found = settled(as_extended(vessel, record), windows, first_states(windows))
+    truth = fit_nuisance(known.with_effects(wrong), windows, initial_states(windows))
+    found = fit_nuisance(extended_model(vessel, record), windows, initial_states(windows))
     assert np.abs(found.noise.std / truth.noise.std - 1).max() < 0.05
 
 
-def test_uncertain_parameters_that_moved_are_still_looked_at_as_causes():
-    """A ship's own advance loss far beyond its bounds: settling moves it, and leaves it to be named."""
+def test_uncertain_parameters_beyond_their_bounds_are_still_tested_as_causes():
+    """A ship's own advance loss far beyond its bounds: the nuisance fit moves it, and it is still a candidate."""
     record = hidden_record("tug", seed=9, batches=3, samples=150, effects={"kappa": -0.0025})
-    extended = as_extended(vessel_of("tug", relative_std=0.1), record)
+    extended = extended_model(vessel_of("tug", relative_std=0.1), record)
     windows = cut_windows(extended.model, record)
-    base = settled(extended, windows, first_states(windows))
+    base = fit_nuisance(extended, windows, initial_states(windows))
     own = [item for item in _candidates(base, windows) if item.cause == "thrust_advance_loss"]
     assert [tuple(item.free) for item in own] == [("theta:X_kappa",)]
     assert base.ship.get("theta:X_kappa") < -2 * 0.00025  # beyond two of its standard deviations
-    (found,) = screen(base, own)
+    (found,) = score_tests(base, own)
     assert found.p_value < 1e-6

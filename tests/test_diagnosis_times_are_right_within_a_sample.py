@@ -7,13 +7,13 @@ import hidden_effects as sea
 from diagnosis_case import hidden_record, vessel_of
 from expdesign.diagnosis.causes.candidate import Candidate
 from expdesign.diagnosis.data.windows import cut_windows
-from expdesign.diagnosis.extension import as_extended
 from expdesign.diagnosis.fit.gauss_newton import fit
-from expdesign.diagnosis.fit.score_tests import Scored
-from expdesign.diagnosis.model.accuracy import first_states
-from expdesign.diagnosis.model.motion import simulate_windows
-from expdesign.diagnosis.select.contenders import contend, opening
-from expdesign.diagnosis.select.profile_likelihood import middle, sharpened
+from expdesign.diagnosis.motion.simulation import initial_states, simulate_windows
+from expdesign.diagnosis.select.fitted_candidate import fit_candidate
+from expdesign.diagnosis.select.profile_likelihood import profile_estimate, with_profile_estimate
+from expdesign.diagnosis.select.score_tests import ScoreTest
+from expdesign.diagnosis.select.starting_point import starting_point
+from expdesign.diagnosis.vessel_file.reading import extended_model
 
 CALM = sea.Weather(current_std=0.0, wind_std=0.0)
 PERFECT = sea.Sensors(position=0.0, heading=0.0, velocity=0.0, yaw_rate=0.0, wind=0.0)
@@ -37,9 +37,9 @@ def test_a_second_s_step_is_no_coarser_than_a_small_part_of_the_time(case):
     record = hidden_record(
         ship, seed=5, batches=2, samples=150, weather=CALM, sensors=PERFECT, effects=hidden, manoeuvre="zigzag"
     )
-    extended = as_extended(vessel_of(ship), record).having(effects)
+    extended = extended_model(vessel_of(ship), record).with_effects(effects)
     windows = cut_windows(extended.model, record)
-    starts = first_states(windows, extended.states)
+    starts = initial_states(windows, extended.states)
 
     def error(extended) -> float:
         found = simulate_windows(extended, windows, starts).error[..., :3]
@@ -47,7 +47,7 @@ def test_a_second_s_step_is_no_coarser_than_a_small_part_of_the_time(case):
 
     right = error(extended)
     for way in (-little, little):
-        assert right < error(extended.having({key: effects[key] + way}))
+        assert right < error(extended.with_effects({key: effects[key] + way}))
 
 
 @pytest.mark.parametrize(
@@ -70,18 +70,18 @@ def test_a_second_s_step_is_no_coarser_than_a_small_part_of_the_time(case):
 )  # fmt: skip
 def test_a_number_found_by_trying_lies_within_three_standard_errors(ship, hidden, candidate, key, truth):
     record = hidden_record(ship, seed=6, batches=5, samples=160, effects=hidden)
-    extended = as_extended(vessel_of(ship), record)
+    extended = extended_model(vessel_of(ship), record)
     windows = cut_windows(extended.model, record)
-    base = fit(extended, windows, (), starts=first_states(windows))
-    first = opening(base, Scored(candidate=candidate, statistic=0.0, p_value=0.0, step=np.zeros(1)))
-    rough = contend(base, windows, first)
+    base = fit(extended, windows, (), starts=initial_states(windows))
+    first = starting_point(base, ScoreTest(candidate=candidate, statistic=0.0, p_value=0.0, step=np.zeros(1)))
+    rough = fit_candidate(base, windows, first)
     assert rough is not None
-    found = sharpened(rough, base)
-    assert found.searched is not None
-    std = found.searched[1]
+    found = with_profile_estimate(rough, base)
+    assert found.profiled is not None
+    std = found.profiled[1]
     assert abs(found.fit.value(key) - truth) < 3 * std
     assert std < 0.1 * truth
-    assert found.gain >= rough.gain - 1.0
+    assert found.likelihood_gain >= rough.likelihood_gain - 1.0
 
 
 def test_a_width_is_as_unsure_as_the_commands_leave_it():
@@ -90,9 +90,9 @@ def test_a_width_is_as_unsure_as_the_commands_leave_it():
     record = hidden_record("barge", seed=7, batches=6, samples=160, effects=hidden, manoeuvre="zigzag")
     sizes = np.unique(np.concatenate([np.abs(batch.inputs[:, 2]).round(6) for batch in record.batches]))
     low, high = sizes[sizes < 34.0].max(), sizes[sizes > 34.0].min()
-    extended = as_extended(vessel_of("barge"), record)
+    extended = extended_model(vessel_of("barge"), record)
     windows = cut_windows(extended.model, record)
-    base = fit(extended.having({"deadband:tau_psi": low + 0.1}), windows, (), starts=first_states(windows))
-    found, std = middle(base, "deadband:tau_psi", 0.01)
+    base = fit(extended.with_effects({"deadband:tau_psi": low + 0.1}), windows, (), starts=initial_states(windows))
+    found, std = profile_estimate(base, "deadband:tau_psi", 0.01)
     assert found.value("deadband:tau_psi") == pytest.approx((low + high) / 2, abs=0.2 * (high - low))
     assert std == pytest.approx((high - low) / 2, rel=0.5)

@@ -8,14 +8,17 @@ from scipy.stats import chi2
 
 from diagnosis_case import from_pose, hidden_record, vessel_of
 from expdesign.diagnosis import diagnose
+from expdesign.diagnosis.accuracy.simulated_fit import accuracy
 from expdesign.diagnosis.causes import CAUSES
 from expdesign.diagnosis.causes.candidate import Candidate, Situation
 from expdesign.diagnosis.data.windows import cut_windows
-from expdesign.diagnosis.extension import as_extended, extend
+from expdesign.diagnosis.fit.fit import FitOptions
 from expdesign.diagnosis.fit.gauss_newton import fit
-from expdesign.diagnosis.fit.score_tests import screen
-from expdesign.diagnosis.model.accuracy import accuracy, first_states
-from expdesign.diagnosis.model.extended import Extended
+from expdesign.diagnosis.model.extended_model import ExtendedModel
+from expdesign.diagnosis.motion.simulation import initial_states
+from expdesign.diagnosis.select.score_tests import score_tests
+from expdesign.diagnosis.vessel_file.reading import extended_model
+from expdesign.diagnosis.vessel_file.writing import extend
 from expdesign.signals import Record
 from expdesign.vessel import Mounting, Response, Vessel
 
@@ -40,7 +43,7 @@ def stating_everything() -> Vessel:
     return replace(vessel, model=replace(vessel.model, actuators=actuators), sensors=sensors)
 
 
-def candidates(ship: Extended, record: Record) -> list[Candidate]:
+def candidates(ship: ExtendedModel, record: Record) -> list[Candidate]:
     situation = Situation(ship=ship, windows=cut_windows(ship.model, record))
     return [candidate for cause in CAUSES for candidate in cause.candidates(situation)]
 
@@ -48,7 +51,7 @@ def candidates(ship: Extended, record: Record) -> list[Candidate]:
 def test_whatever_is_stated_may_be_corrected():
     """Every stated value is free in some candidate, and what is stated of propellers leaves angles to be tested."""
     record = hidden_record("tug", seed=1, batches=2, samples=120)
-    ship = as_extended(stating_everything(), record)
+    ship = extended_model(stating_everything(), record)
     assert set(ship.stated) == EVERYTHING
     free = {key for candidate in candidates(ship, record) for key in candidate.free}
     assert free >= EVERYTHING
@@ -60,7 +63,7 @@ def test_a_lag_stated_of_every_actuator_may_be_wrong_of_some():
     vessel = vessel_of("tug")
     slow = tuple(replace(one, responses=(Response(lag_s=2.0),) * 2) for one in vessel.model.actuators)
     record = hidden_record("tug", seed=1, batches=2, samples=120)
-    ship = as_extended(replace(vessel, model=replace(vessel.model, actuators=slow)), record)
+    ship = extended_model(replace(vessel, model=replace(vessel.model, actuators=slow)), record)
     assert ship.stated == {"lag:n": 2.0, "lag:a": 2.0}
     free = {key for candidate in candidates(ship, record) for key in candidate.free}
     assert {key for key in free if key.startswith("lag:")} == {"lag:n", "lag:a"}
@@ -68,21 +71,23 @@ def test_a_lag_stated_of_every_actuator_may_be_wrong_of_some():
 
 def test_a_ship_whose_sensors_are_known_can_be_fitted_with_nothing_free():
     record = hidden_record("tug", seed=1, batches=2, samples=120)
-    ship = as_extended(stating_everything(), record)
+    ship = extended_model(stating_everything(), record)
     windows = replace(cut_windows(ship.model, record), has_heading=False)
-    assert fit(ship, windows, (), starts=first_states(windows), colour_order=0).keys == ()
+    assert fit(ship, windows, (), starts=initial_states(windows), options=FitOptions(ar_order=0)).keys == ()
 
 
 def test_what_was_found_is_not_sought_again_in_another_way():
     record = hidden_record("tug", seed=1, batches=2, samples=120)
-    ship = as_extended(stating_everything(), record).having({"lag:n": 3.0, "late:r": 2.0, "lever:forward": 4.0})
+    ship = extended_model(stating_everything(), record).with_effects(
+        {"lag:n": 3.0, "late:r": 2.0, "lever:forward": 4.0}
+    )
     assert not [c for c in candidates(ship, record) if c.cause in ("actuator_lag", "sensor_delay", "lever_arm")]
 
 
 def test_a_vessel_goes_through_a_diagnosis_that_finds_nothing_as_it_is():
     record = hidden_record("tug", seed=1, batches=2, samples=120)
     vessel = stating_everything()
-    again, missing = extend(vessel, as_extended(vessel, record), {})
+    again, missing = extend(vessel, extended_model(vessel, record), {})
     assert missing == ()
     assert again.model.actuators == vessel.model.actuators
     assert again.sensors == vessel.sensors
@@ -105,11 +110,11 @@ def test_a_current_that_is_as_stated_is_tested_against_what_is_stated():
     statistics = []
     for seed in range(6):
         record = hidden_record("barge", seed=600 + seed, batches=3, samples=120, current=(0.2, -0.1))
-        ship = as_extended(in_current("barge", 0.2, -0.1), record)
+        ship = extended_model(in_current("barge", 0.2, -0.1), record)
         windows = cut_windows(ship.model, record)
-        base = fit(ship, windows, (), starts=first_states(windows))
+        base = fit(ship, windows, (), starts=initial_states(windows))
         sought = [c for c in candidates(ship, record) if c.cause == "current"]
-        statistics += [item.statistic for item in screen(base, sought)]
+        statistics += [item.statistic for item in score_tests(base, sought)]
     assert len(statistics) == 6
     assert sum(statistics) < chi2.isf(1e-3, 12)
 
@@ -118,9 +123,9 @@ def test_a_stated_current_is_left_out_where_no_heading_is_measured():
     record = hidden_record("barge", seed=2, batches=2, samples=150)
     blind = Record(batches=tuple(replace(batch, pose=None) for batch in record.batches))
     vessel = in_current("barge", 0.3, 0.2)
-    one, other = (accuracy(as_extended(ship, blind), blind) for ship in (vessel, vessel_of("barge")))
+    one, other = (accuracy(extended_model(ship, blind), blind) for ship in (vessel, vessel_of("barge")))
     np.testing.assert_array_equal(one.fit, other.fit)
-    again, _ = extend(vessel, as_extended(vessel, blind), {})
+    again, _ = extend(vessel, extended_model(vessel, blind), {})
     np.testing.assert_array_equal(again.environment.current_to, [0.3, 0.2])
 
 

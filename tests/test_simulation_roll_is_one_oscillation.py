@@ -11,8 +11,10 @@ from design_case import SCENARIOS
 from diagnosis_case import hidden_record, vessel_of
 from expdesign import workflows
 from expdesign.diagnosis.data.windows import cut_windows
-from expdesign.diagnosis.extension import as_extended, extend
-from expdesign.diagnosis.model.motion import ROLL_ANGLE, simulate_windows
+from expdesign.diagnosis.motion.simulation import simulate_windows
+from expdesign.diagnosis.motion.tuning import TUNING
+from expdesign.diagnosis.vessel_file.reading import extended_model
+from expdesign.diagnosis.vessel_file.writing import extend
 from expdesign.dictionary.trim import drift
 from expdesign.errors import InputError
 from expdesign.estimation.methods import estimate
@@ -76,20 +78,20 @@ def test_every_simulation_gives_the_same_motion():
 def test_the_diagnosis_moves_as_the_file_that_it_writes(tmp_path):
     record = hidden_record("barge", seed=2, batches=2, samples=120)
     keys = {"roll:period": 7.0, "roll:damping": 0.06, "roll:sway": 0.3, "roll:yaw": 0.01}
-    final = as_extended(BARGE, record).having(keys)
+    final = extended_model(BARGE, record).with_effects(keys)
     extended, _ = extend(BARGE, final, {})
     assert extended.model.roll == ROLL
     path = tmp_path / "ship.toml"
     path.write_text(vessel_toml(extended), encoding="utf-8")
     assert load_vessel(path).model.roll == ROLL
     windows = cut_windows(final.model, record)
-    again = as_extended(load_vessel(path), record)
+    again = extended_model(load_vessel(path), record)
     assert again.effects == keys
     start = np.column_stack([np.tile([1.5, 0.1, 0.02], (len(windows.batch), 1)), np.zeros((len(windows.batch), 2))])
     states = simulate_windows(again, windows, start).states
     for index, inputs in enumerate(windows.batch_inputs):
         commands = Commands(sample_time_s=windows.step_s, names=SHIP.model.inputs, values=inputs)
-        parts = math.ceil(2 * math.pi / ROLL.period_s * windows.step_s / ROLL_ANGLE)
+        parts = math.ceil(2 * math.pi / ROLL.period_s * windows.step_s / TUNING.roll_angle_rad)
         sailed = simulate(extended, commands, velocity=STATE[1], substeps=parts)
         np.testing.assert_allclose(states[index, :, :3], sailed.velocity[:-1], atol=1e-9)
 

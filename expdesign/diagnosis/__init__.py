@@ -13,9 +13,10 @@ Sources: L. Ljung, System Identification, 2nd ed. (1999), chapters 7 and 16; C. 
 P. H. Westfall and S. S. Young (1993) for the correction for trying many.
 """
 
+from expdesign.diagnosis.accuracy import Accuracy
 from expdesign.diagnosis.causes import CAUSES
 from expdesign.diagnosis.diagnose import diagnose
-from expdesign.diagnosis.select import Proposal
-from expdesign.diagnosis.values import Accuracy, Diagnosis, Estimated, Finding
+from expdesign.diagnosis.discriminating_manoeuvre import Proposal
+from expdesign.diagnosis.values import Diagnosis, Estimate, Finding
 
-__all__ = ["CAUSES", "Accuracy", "Diagnosis", "Estimated", "Finding", "Proposal", "diagnose"]
+__all__ = ["CAUSES", "Accuracy", "Diagnosis", "Estimate", "Finding", "Proposal", "diagnose"]

@@ -1,48 +1,38 @@
-"""The diagnosis from data and vessel to findings."""
+"""The diagnosis: from data and vessel to findings."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from expdesign.diagnosis.causes import CAUSES, Cause, Values
-from expdesign.diagnosis.data import Windows, cut_windows, spread
-from expdesign.diagnosis.extension import as_extended, as_stated, extend, public_name
-from expdesign.diagnosis.fit import Fit, HeldOut, gained, held_out
-from expdesign.diagnosis.model import (
-    Extended,
-    accuracy,
-    check_support,
-    first_states,
-    linearise,
-    short_residuals,
-    simulate_from_first,
-    start_responses,
-    still_inputs,
+from expdesign.diagnosis.accuracy import accuracy, check_excitation, constant_inputs, one_step_residuals
+from expdesign.diagnosis.conclusions import (
+    finding_of,
+    note_on_nuisance,
+    note_on_random_current,
+    note_on_unconverged,
+    notes_on_data,
+    notes_on_rejected,
+    unit_name,
+    verdict,
 )
-from expdesign.diagnosis.notes import note_on_weather, notes_on_data, notes_on_dropped
-from expdesign.diagnosis.select import (
-    LEAST_GAIN,
-    Proposal,
-    Search,
-    Step,
-    kept,
-    most_telling,
-    only_moves,
-    search,
-    standard_proposals,
-)
-from expdesign.diagnosis.values import Diagnosis, Estimated, Finding
-from expdesign.diagnosis.verdict import error_falls, held_apart, verdict
+from expdesign.diagnosis.data import Windows
+from expdesign.diagnosis.discriminating_manoeuvre import Proposal, most_discriminating, standard_proposals
+from expdesign.diagnosis.fit import Fit, HeldOut, cross_validate
+from expdesign.diagnosis.model import ExtendedModel
+from expdesign.diagnosis.motion import initial_states, simulate_from_measured, stable_windows
+from expdesign.diagnosis.select import Selection, Step, eliminate_backward, only_nuisance, select_forward
+from expdesign.diagnosis.values import Diagnosis, Finding
+from expdesign.diagnosis.vessel_file import extend, extended_model
 from expdesign.errors import Diverged
 from expdesign.signals import Record
 from expdesign.vessel import Vessel
 
 Progress = Callable[[str, float], None]
-UNITS = 4
-SHORTENINGS, SHORTEST, LARGEST_GROWTH = 4, 30, 6.0
-"""Rounds and fewest samples of shortening windows of unstable models, and how much an error may grow in them."""
+SELECTED, VALIDATED = 0.65, 0.92
+"""Shares of the work after forward selection and after backward elimination."""
 
 
 def diagnose(
@@ -58,192 +48,135 @@ def diagnose(
     Args:
         vessel: the model in use; parameters with a standard deviation are re-estimated within it, others are known.
         record: measured data; velocities over ground, inputs, perhaps pose, wind and depth.
-        seed: of the draws behind corrected p-values and gain intervals.
-        proposals: manoeuvres to choose from for telling causes apart; standard ones when empty.
-        progress: told what is being done and the share of it done.
+        seed: of the draws behind adjusted p-values and gain intervals.
+        proposals: manoeuvres that may distinguish causes; standard ones when empty.
+        progress: is called with what is being done and the share done.
 
     Raises:
         NotInformative: the data cannot support a diagnosis; the message says what is missing.
         Diverged: the model in use cannot be simulated over the data.
     """
-    rng = np.random.default_rng(seed)
     progress("simulating the model in use", 0.0)
-    ship = as_extended(vessel, record)
-    windows = _windows(ship, record)
-    check_support(ship, windows)
-    before = accuracy(ship, record)
-    motion = simulate_from_first(ship, windows)
+    ship = extended_model(vessel, record)
+    windows = stable_windows(ship, record)
+    check_excitation(ship, windows)
+    motion = simulate_from_measured(ship, windows)
     if motion.diverged:
         raise Diverged(f"vessel {vessel.name!r}: its simulation of the data diverges; the model is unstable")
-    found = search(ship, windows, first_states(windows), rng, lambda what, share: progress(what, 0.05 + 0.6 * share))
-
-    def measured(found: Search) -> list[HeldOut]:
-        return _held_out(found, ship, windows, lambda share: progress("measuring the gain on held-out runs", share))
-
-    searched = found
-    found, held = kept(searched, windows, measured, seed)
-    progress("looking for manoeuvres that tell causes apart", 0.92)
-    proposed = proposals or standard_proposals(windows, ship.model.inputs, windows.sample_s)
-    findings = tuple(
-        _finding(step, found.last, held[index], held[index + 1], windows, proposed, seed)
-        for index, step in enumerate(found.steps)
-    )
-    last = found.last if found.steps else found.first
-    final = last.ship if found.steps else ship
-    extended, missing = extend(vessel, final, _stds(last) if found.steps else {})
-    after = accuracy(final, record)
+    chosen = _select(ship, windows, seed, progress)
+    progress("looking for manoeuvres that distinguish causes", VALIDATED)
+    proposals = proposals or standard_proposals(windows, ship.model.inputs, windows.sample_s)
+    findings = _findings(chosen, windows, proposals, seed)
     order = sorted(range(len(findings)), key=lambda index: -findings[index].gain)
+    steps = [chosen.kept.steps[index] for index in order]
+    ranked = tuple(findings[index] for index in order)
+    final = chosen.kept.last.ship if steps else ship
+    extended, not_written = extend(vessel, final, _standard_errors(chosen.kept.last) if steps else {})
+    before = accuracy(ship, record)
     return Diagnosis(
         vessel=vessel,
         extended=extended,
         record=record,
         windows=windows,
         before=before,
-        after=after,
-        findings=tuple(findings[index] for index in order),
-        verdict=verdict([findings[index] for index in order], before, held_apart(windows)),
-        simulated_before=motion.shown,
-        simulated_after=simulate_from_first(final, windows).shown,
-        errors=tuple(found.steps[index].before.linear.motion.error for index in order),
-        residuals=short_residuals(ship, windows),
-        lacking=tuple(short_residuals(found.steps[index].before.ship, windows) for index in order),
+        after=accuracy(final, record),
+        findings=ranked,
+        verdict=verdict(ranked, before, unit_name(windows)),
+        simulated_before=motion.predicted,
+        simulated_after=simulate_from_measured(final, windows).predicted,
+        errors=tuple(step.before.linear.motion.error for step in steps),
+        residuals=one_step_residuals(ship, windows),
+        step_residuals=tuple(one_step_residuals(step.before.ship, windows) for step in steps),
         notes=(
-            *notes_on_data(vessel, record, windows, still_inputs(ship, windows)),
-            *notes_on_dropped(searched, found, held_apart(windows)),
-            *_settled_note(found, ship, windows, held[0], seed),
-            *_stuck_note(held),
-            *note_on_weather(found.last.noise.wander_mps, found.last.noise.wander_time_s),
-            *missing,
+            *notes_on_data(vessel, record, windows, constant_inputs(ship, windows)),
+            *_notes_on_selection(chosen, ship, windows, seed),
+            *not_written,
         ),
-        screened=_screened(found),
+        screened=_smallest_p_values(chosen.kept),
     )
 
 
-def _windows(ship: Extended, record: Record) -> Windows:
-    """As long as may be, but at least four, and no longer than an error in a state stays of its own size."""
-    total = sum(len(batch) * batch.sample_time_s for batch in record.batches)
-    windows = cut_windows(ship.model, record)
-    if len(windows.batch) < UNITS:
-        windows = cut_windows(ship.model, record, longest_s=total / UNITS)
-    for _ in range(SHORTENINGS):
-        steady_s = _steady_time(ship, windows)
-        if steady_s >= windows.steps * windows.step_s:
-            break
-        windows = cut_windows(ship.model, record, longest_s=steady_s)
-    return windows
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Selected:
+    """Causes by forward selection, those that backward elimination kept, and their errors on held-out units."""
+
+    found: Selection
+    kept: Selection
+    held: list[HeldOut]
 
 
-def _steady_time(ship: Extended, windows: Windows) -> float:
-    """Time within which no error of a state, in units of the measured spread, grows beyond `LARGEST_GROWTH`."""
-    motion = simulate_from_first(ship, windows)
-    if motion.diverged:
-        return windows.steps * windows.step_s / 2
-    size = spread(windows.measured[..., :3])
-    scale = np.where(size > 0, size, 1.0)
-    answers = np.moveaxis(start_responses(linearise(motion))[..., :3], 0, -1) * scale / scale[:, None]
-    size = np.linalg.norm(answers, axis=(2, 3)) / np.sqrt(3.0)
-    grown = (size > LARGEST_GROWTH).any(axis=0)
-    samples = int(np.argmax(grown)) if grown.any() else len(grown)
-    return max(samples, SHORTEST) * windows.sample_s if grown.any() else windows.steps * windows.step_s
+def _select(ship: ExtendedModel, windows: Windows, seed: int, progress: Progress) -> _Selected:
+    rng = np.random.default_rng(seed)
+    found = select_forward(
+        ship, windows, initial_states(windows), rng, lambda what, share: progress(what, 0.05 + 0.6 * share)
+    )
+
+    def cross_validated(found: Selection) -> list[HeldOut]:
+        return _cross_validated(
+            found, ship, windows, lambda share: progress("measuring the gain on held-out runs", share)
+        )
+
+    kept, held = eliminate_backward(found, windows, cross_validated, seed)
+    return _Selected(found=found, kept=kept, held=held)
 
 
-def _held_out(found: Search, ship: Extended, windows: Windows, tell: Callable[[float], None]) -> list[HeldOut]:
-    """Of the model in use, uncertain parameters at their likeliest, then after every step.
+def _cross_validated(
+    found: Selection, ship: ExtendedModel, windows: Windows, progress: Callable[[float], None]
+) -> list[HeldOut]:
+    """Of the model in use with its uncertain parameters fitted, then after every step.
 
-    What uncertain parameters mend by themselves is no merit of a cause, but of parameters beyond their bounds it is.
+    The gain of uncertain parameters within their standard deviations is no merit of a cause. But if the first cause is
+    that they are beyond these, their gain is its merit, and the model in use is not fitted.
     """
-    settled = bool(found.first.keys) and not any(only_moves(step, found) for step in found.steps[:1])
-    fits: list[Fit | None] = [found.first if settled else None, *(step.chosen.fit for step in found.steps)]
+    fitted = bool(found.first.keys) and not any(only_nuisance(step, found) for step in found.steps[:1])
+    fits: list[Fit | None] = [found.first if fitted else None, *(step.chosen.fit for step in found.steps)]
+    part = (VALIDATED - SELECTED) / len(fits)
     results = []
     for number, item in enumerate(fits):
-        low, part = 0.65 + 0.27 * number / len(fits), 0.27 / len(fits)
-        results.append(held_out(item, ship if item is None else item.ship, windows, _onward(tell, low, part)))
+        low = SELECTED + number * part
+        model = ship if item is None else item.ship
+        results.append(cross_validate(item, model, windows, lambda share, low=low: progress(low + part * share)))  # type: ignore[misc]
     return results
 
 
-def _onward(tell: Callable[[float], None], low: float, part: float) -> Callable[[float], None]:
-    return lambda share: tell(low + part * share)
-
-
-def cause_of(name: str) -> Cause:
-    """The entry of the catalogue that a name belongs to."""
-    return next(cause for cause in CAUSES if cause.name == name.split(":")[0])
-
-
-def _finding(
-    step: Step, last: Fit, before: HeldOut, after: HeldOut, windows: Windows, proposals: Sequence[Proposal],
-    seed: int,
-) -> Finding:  # fmt: skip
-    """A step of the search in words; its numbers are estimated together with those of all other steps."""
-    chosen = step.chosen
-    gain, interval = gained(before, after, seed)
-    values: dict[str, tuple[float, float]] = {
-        key: (last.value(key), last.std(key)) if key in last.keys else (last.value(key), chosen.fit.std(key))
-        for key in chosen.keys
-    }
-    if chosen.searched is not None:
-        key, error = chosen.searched
-        values[key] = (last.value(key), error)
-    cause = cause_of(chosen.candidate.cause)
-    telling = None
-    if step.rivals:
-        std = np.where(np.isfinite(chosen.fit.noise.std), chosen.fit.noise.std, np.inf)
-        telling = most_telling(chosen.fit.ship, [rival.fit.ship for rival in step.rivals], proposals, std, windows)
-    return Finding(
-        cause=chosen.candidate.cause,
-        estimates=_estimates(values, chosen.fit.ship),
-        p_value=step.p_value,
-        fit_before=before.fit,
-        fit_after=after.fit,
-        falls=error_falls(chosen.fit.ship.model.outputs, before, after, seed),
-        gain=gain,
-        gain_interval=interval,
-        not_distinguishable_from=tuple(rival.candidate.cause for rival in step.rivals),
-        would_tell_apart=telling,
-        explanation=cause.explain(values, last.ship) + as_stated(values, last.ship),
-        worth=chosen.gain,
-        keys=tuple(values),
+def _findings(chosen: _Selected, windows: Windows, proposals: Sequence[Proposal], seed: int) -> tuple[Finding, ...]:
+    """Findings in the order of the selection."""
+    return tuple(
+        finding_of(
+            step,
+            chosen.kept.last,
+            (chosen.held[index], chosen.held[index + 1]),
+            seed,
+            would_tell_apart=_discriminating(step, proposals, windows),
+        )
+        for index, step in enumerate(chosen.kept.steps)
     )
 
 
-def _estimates(values: Values, ship: Extended) -> tuple[Estimated, ...]:
-    result = []
-    for key, (value, std) in values.items():
-        name, factor, offset, unit = public_name(key, ship)
-        result.append(Estimated(name=name, value=offset + factor * value, std=abs(factor) * std, unit=unit))
-    return tuple(result)
+def _discriminating(step: Step, proposals: Sequence[Proposal], windows: Windows) -> str | None:
+    """The manoeuvre that distinguishes a cause from its alternatives best; None where there are none."""
+    if not step.alternatives:
+        return None
+    found = step.chosen.fit
+    std = np.where(np.isfinite(found.noise.std), found.noise.std, np.inf)
+    return most_discriminating(found.ship, [other.fit.ship for other in step.alternatives], proposals, std, windows)
 
 
-def _stds(found: Fit) -> dict[str, float]:
+def _notes_on_selection(chosen: _Selected, ship: ExtendedModel, windows: Windows, seed: int) -> tuple[str, ...]:
+    notes = [*notes_on_rejected(chosen.found, chosen.kept, unit_name(windows))]
+    if chosen.kept.first.keys:
+        unfitted = cross_validate(None, ship, windows, lambda share: None)
+        notes += note_on_nuisance(unfitted, chosen.held[0], seed)
+    return (*notes, *note_on_unconverged(chosen.held), *note_on_random_current(chosen.kept.last.noise))
+
+
+def _standard_errors(found: Fit) -> dict[str, float]:
     return {key: found.std(key) for key in found.keys}
 
 
-def _settled_note(found: Search, ship: Extended, windows: Windows, settled: HeldOut, seed: int) -> tuple[str, ...]:
-    """What uncertain parameters gain by themselves: no cause is credited with it."""
-    if not found.first.keys:
-        return ()
-    gain, _ = gained(held_out(None, ship, windows, lambda share: None), settled, seed)
-    if not abs(gain) >= LEAST_GAIN:
-        return ()
-    return (
-        f"Moving the parameters within their stated standard deviations changes the fit on held-out runs by "
-        f"{gain:+.1f} points; the gains of causes come on top of that.",
-    )
-
-
-def _stuck_note(held: Sequence[HeldOut]) -> tuple[str, ...]:
-    """Gains that are not wholly measured on runs that the sizes have not seen."""
-    folds = sum(item.stuck for item in held)
-    if not folds:
-        return ()
-    return (
-        f"Of the fits without the runs held out, {folds} got nowhere from the fit to all runs and kept its sizes: "
-        "gains there are of sizes that have seen the runs.",
-    )
-
-
-def _screened(found: Search) -> tuple[tuple[str, float], ...]:
+def _smallest_p_values(found: Selection) -> tuple[tuple[str, float], ...]:
+    """(cause, smallest adjusted p-value) of the round that found nothing more, smallest first."""
     best: dict[str, float] = {}
-    for item in found.final_screening:
-        best[item.candidate.cause] = min(item.corrected, best.get(item.candidate.cause, 1.0))
+    for item in found.last_tests:
+        best[item.candidate.cause] = min(item.adjusted, best.get(item.candidate.cause, 1.0))
     return tuple(sorted(best.items(), key=lambda pair: pair[1]))

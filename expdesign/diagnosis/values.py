@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
+from expdesign.diagnosis.accuracy import Accuracy, Residuals
 from expdesign.diagnosis.data import Windows
 from expdesign.signals import Record
 from expdesign.values import Array
@@ -12,27 +12,7 @@ from expdesign.vessel import Vessel
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Accuracy:
-    """How well a model simulates: per output over all batches, each from its first state.
-
-    Attributes:
-        outputs: u, v, r, those that the model has.
-        fit, rmse, bias: (n,) fit [%], root mean square and mean of measured less simulated.
-        horizons_s: (h,) and growth (h, n): root mean square error that long after a start from a measured state.
-        per_batch: (b, n) fit of every batch.
-    """
-
-    outputs: tuple[str, ...]
-    fit: Array
-    rmse: Array
-    bias: Array
-    horizons_s: Array
-    growth: Array
-    per_batch: Array
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Estimated:
+class Estimate:
     """One number of a finding: its name in results, value, standard error and unit."""
 
     name: str
@@ -42,7 +22,7 @@ class Estimated:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Fall:
+class ErrorReduction:
     """The share by which the simulated error of one output falls on batches that were not used to estimate.
 
     Attributes:
@@ -71,41 +51,23 @@ class Finding:
         not_distinguishable_from: causes that explain the data as well.
         would_tell_apart: the manoeuvre for which they and this cause disagree most per minute, or None.
         explanation: a sentence or two.
-        worth: twice the log likelihood gained.
+        likelihood_gain: twice the log likelihood gained.
         keys: effects of the extended model that the estimates are of, in their order.
     """
 
     cause: str
-    estimates: tuple[Estimated, ...]
+    estimates: tuple[Estimate, ...]
     p_value: float
     fit_before: Array
     fit_after: Array
-    falls: tuple[Fall, ...]
+    error_reductions: tuple[ErrorReduction, ...]
     gain: float
     gain_interval: tuple[float, float]
     not_distinguishable_from: tuple[str, ...]
     would_tell_apart: str | None
     explanation: str
-    worth: float
+    likelihood_gain: float
     keys: tuple[str, ...]
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Residuals:
-    """Stretches, each with what the model lacks there and where that was.
-
-    Attributes:
-        outputs: of the model.
-        stretch_s: length of a stretch [s].
-        lacking: (k, n) measured less simulated acceleration [m/s^2, rad/s^2].
-        variables: (k,) means over the stretch by name: u v r as measured, inputs, `u_q v_q` through the air and `depth`
-            where they are measured, `heading` (0 to 2 pi), `time` since the data began and number of the `run`.
-    """
-
-    outputs: tuple[str, ...]
-    stretch_s: float
-    lacking: Array
-    variables: Mapping[str, Array]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -113,17 +75,19 @@ class Diagnosis:
     """Everything found.
 
     Attributes:
-        vessel: the model in use; extended: with all findings.
+        vessel: the model in use.
+        extended: the same with all findings.
         record: the data.
         windows: the data as compared.
         before, after: accuracy of both on all batches, in sample.
-        findings: by gain; that of each is against the model with what was found before it, in the order of the search.
+        findings: by gain, which is against the model with everything that was found before.
         verdict: one sentence.
         simulated_before, simulated_after: (w, s, 4) channels beside `windows.measured`.
-        errors: per finding, (w, s, 4) error without it, with what was found before it in the model.
-        residuals: of the model in use, within seconds; lacking: per finding likewise, of the same model as in `errors`.
-        notes: what a reader must know: what was left out, what could not be tested.
-        screened: (cause, p) of the last round, the smallest p per cause, corrected.
+        errors: per finding, (w, s, 4) error of the model with everything that was found before.
+        residuals: of the model in use.
+        step_residuals: per finding, of the same model as in `errors`.
+        notes: what was left out, and what could not be tested.
+        screened: (cause, smallest adjusted p-value) of the round that found nothing more.
     """
 
     vessel: Vessel
@@ -138,6 +102,6 @@ class Diagnosis:
     simulated_after: Array
     errors: tuple[Array, ...]
     residuals: Residuals
-    lacking: tuple[Residuals, ...]
+    step_residuals: tuple[Residuals, ...]
     notes: tuple[str, ...]
     screened: tuple[tuple[str, float], ...]

@@ -18,8 +18,8 @@ import hidden_effects as sea
 from diagnosis_case import hidden_record, vessel_of
 from expdesign.diagnosis import diagnose
 from expdesign.diagnosis.data.windows import cut_windows
-from expdesign.diagnosis.extension import as_extended
-from expdesign.diagnosis.model.accuracy import simulate_from_first
+from expdesign.diagnosis.motion.simulation import simulate_from_measured
+from expdesign.diagnosis.vessel_file.reading import extended_model
 
 RUNS, SAMPLES, TIMES = 8, 450, 5
 HIDDEN = {
@@ -31,11 +31,11 @@ HIDDEN = {
 
 def simulation_s(ship: str, record) -> float:
     """Of all data, once."""
-    extended = as_extended(vessel_of(ship), record)
+    extended = extended_model(vessel_of(ship), record)
     windows = cut_windows(extended.model, record)
     begin = time.perf_counter()
     for _ in range(TIMES):
-        simulate_from_first(extended, windows)
+        simulate_from_measured(extended, windows)
     return (time.perf_counter() - begin) / TIMES
 
 

@@ -16,12 +16,13 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 import hidden_effects as sea
 from diagnosis_case import Told, drawn_parameters, from_pose, hidden_records, vessel_of
 from expdesign.diagnosis import CAUSES, diagnose
+from expdesign.diagnosis.accuracy.simulated_fit import WHOLE_S, pooled_fit
 from expdesign.diagnosis.causes.candidate import Situation
 from expdesign.diagnosis.data.windows import cut_windows
-from expdesign.diagnosis.extension import as_extended
-from expdesign.diagnosis.fit.score_tests import screen
-from expdesign.diagnosis.model.accuracy import WHOLE_S, first_states, pooled_fit, simulate_from_first
-from expdesign.diagnosis.select.forward_search import settled
+from expdesign.diagnosis.motion.simulation import initial_states, simulate_from_measured
+from expdesign.diagnosis.select.forward_selection import fit_nuisance
+from expdesign.diagnosis.select.score_tests import score_tests
+from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.signals import Batch, Record
 from expdesign.vessel import Vessel
 
@@ -249,9 +250,9 @@ def drawn_case(ship: str, seed: int, rng: np.random.Generator) -> Case:
 def mean_fits(vessel: Vessel, records: Sequence[Record]) -> list[float]:
     """Of a model on each of the records, over u, v, r [%]; simulated as one record of many runs."""
     joined = Record(batches=tuple(batch for record in records for batch in record.batches))
-    ship = as_extended(vessel, joined)
+    ship = extended_model(vessel, joined)
     windows = cut_windows(ship.model, joined, longest_s=WHOLE_S)
-    motion = simulate_from_first(ship, windows)
+    motion = simulate_from_measured(ship, windows)
     parts = zip(*(np.split(item[..., :3], len(records)) for item in (motion.error, windows.measured)), strict=True)
     return [float(np.clip(pooled_fit(error, measured), -100, 100).mean()) for error, measured in parts]
 
@@ -273,13 +274,13 @@ def large_enough(case: Case, hidden: Hidden, std: float = 0.0, *, just: bool = F
 
 def oracle(vessel: Vessel, record: Record, cause_name: str) -> float:
     """Smallest p of the true cause's candidates, times their number, beside the nuisance alone."""
-    ship = as_extended(vessel, record)
+    ship = extended_model(vessel, record)
     windows = cut_windows(ship.model, record)
-    base = settled(ship, windows, first_states(windows))
+    base = fit_nuisance(ship, windows, initial_states(windows))
     situation = Situation(ship=ship, windows=windows)
     mine = [item for cause in CAUSES for item in cause.candidates(situation) if item.cause == cause_name]
-    found = screen(base, mine, np.random.default_rng(0))
-    return min((item.corrected for item in found), default=1.0) if mine else float("nan")
+    found = score_tests(base, mine, np.random.default_rng(0))
+    return min((item.adjusted for item in found), default=1.0) if mine else float("nan")
 
 
 def another(case: Case, hidden: Hidden, rng: np.random.Generator) -> Hidden:

@@ -9,8 +9,8 @@ from expdesign.diagnosis.causes.actuators import (
     THRUSTER_ASYMMETRY,
 )
 from expdesign.diagnosis.causes.candidate import Candidate, Cause, Situation, Values
-from expdesign.diagnosis.causes.environment import CURRENT, SHALLOW_WATER, WIND, in_shallow_water
-from expdesign.diagnosis.causes.hull import CHANGE_POINT, LOAD_CHANGE, MISSING_TERM, PARAMETERS, ROLL_COUPLING, library
+from expdesign.diagnosis.causes.environment import CURRENT, SHALLOW_WATER, WIND
+from expdesign.diagnosis.causes.hull import CHANGE_POINT, LOAD_CHANGE, MISSING_TERM, PARAMETERS, ROLL_COUPLING
 from expdesign.diagnosis.causes.sensors import GYRO_SCALE, HEADING_BIAS, LEVER_ARM, SENSOR_DELAY
 
 CAUSES: tuple[Cause, ...] = (
@@ -34,4 +34,4 @@ CAUSES: tuple[Cause, ...] = (
     CHANGE_POINT,
 )
 
-__all__ = ["CAUSES", "Candidate", "Cause", "Situation", "Values", "in_shallow_water", "library"]
+__all__ = ["CAUSES", "Candidate", "Cause", "Situation", "Values"]

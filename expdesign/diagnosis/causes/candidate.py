@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from expdesign.diagnosis.data import Windows
-from expdesign.diagnosis.model import Extended
+from expdesign.diagnosis.model import ExtendedModel
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,7 +38,7 @@ class Candidate:
 class Situation:
     """What candidates are made for: the model as it stands, and the data."""
 
-    ship: Extended
+    ship: ExtendedModel
     windows: Windows
 
     def has(self, key: str) -> bool:
@@ -62,4 +62,4 @@ class Cause:
 
     name: str
     candidates: Callable[[Situation], tuple[Candidate, ...]]
-    explain: Callable[[Values, Extended], str]
+    explain: Callable[[Values, ExtendedModel], str]

@@ -1,21 +1,30 @@
-"""Measured batches as a diagnosis reads them: windows, and the noise in them."""
+"""Measured batches as a diagnosis reads them: windows, what is measured in them, and noise."""
 
-from expdesign.diagnosis.data.noise import Noise, fit_colour, hats, wander_covariance, white_noise, whitened
-from expdesign.diagnosis.data.spread import spread
-from expdesign.diagnosis.data.windows import Windows, cut_windows, derived_outputs, half_width, has_heading, unseen_wind
+from expdesign.diagnosis.data.measured_channels import derived_outputs, has_heading, missing_wind_share
+from expdesign.diagnosis.data.noise import (
+    Noise,
+    channel_std,
+    fit_ar_noise,
+    linear_basis,
+    random_current_covariance,
+    white_noise,
+    whitened,
+)
+from expdesign.diagnosis.data.sampled_batch import averaging_half_width
+from expdesign.diagnosis.data.windows import Windows, cut_windows
 
 __all__ = [
     "Noise",
     "Windows",
+    "averaging_half_width",
+    "channel_std",
     "cut_windows",
     "derived_outputs",
-    "fit_colour",
-    "half_width",
+    "fit_ar_noise",
     "has_heading",
-    "hats",
-    "spread",
-    "unseen_wind",
-    "wander_covariance",
+    "linear_basis",
+    "missing_wind_share",
+    "random_current_covariance",
     "white_noise",
     "whitened",
 ]

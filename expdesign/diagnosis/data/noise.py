@@ -1,13 +1,4 @@
-"""What is left over when a simulation is right: coloured noise per channel, and currents that vary slowly.
-
-Each channel's remainder is taken as autoregressive; filtering it white is generalised least squares. A current that
-wanders in the n-frame pushes the ship differently on every heading, which no stationary colour describes; it enters as
-a random effect, a Gauss-Markov process on hat functions, with the standard deviation and correlation time that make the
-data most likely.
-
-Sources: D. Cochrane and G. H. Orcutt, Journal of the American Statistical Association 44 (1949), 32-61; H. D. Patterson
-and R. Thompson, Biometrika 58 (1971), 545-554.
-"""
+"""How much measured channels vary."""
 
 from __future__ import annotations
 
@@ -16,13 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
+from expdesign.diagnosis.data.tuning import TUNING
 from expdesign.values import Array
 
-ORDERS = (1, 2, 3, 4, 6, 8, 12)
-SHORTEST_PER_ORDER = 6
-FLOOR = 0.05
-"""White share of the remainder's variance that is taken for granted: no model is right at every frequency, and smoothed
-data would otherwise make the quickest motions, of which they tell nothing, count most."""
 NO_FEEDBACK = np.array([1.0, 0.0])
 """With one coefficient instead of two SciPy takes a path through Python loops."""
 
@@ -40,8 +27,8 @@ class Noise:
 
     filters: Array
     std: Array
-    wander_mps: float = 0.0
-    wander_time_s: float = 300.0
+    current_std_mps: float = 0.0
+    current_time_s: float = 300.0
 
     @property
     def order(self) -> int:
@@ -76,15 +63,15 @@ def _filtered(values: Array, taps: Array) -> Array:
     return np.where(touched, np.nan, result)
 
 
-def fit_colour(remainder: Array, *, order: int | None = None) -> Noise:
+def fit_ar_noise(remainder: Array, *, order: int | None = None) -> Noise:
     """Autoregressions of the channels of (w, s, 4), pooled over windows, all of one order.
 
     Args:
         remainder: nan where not measured.
         order: None to choose it by Schwarz's criterion; zero for white noise.
     """
-    longest = remainder.shape[1] // SHORTEST_PER_ORDER
-    orders = [p for p in ORDERS if p <= max(1, longest)] if order is None else [order]
+    longest = remainder.shape[1] // TUNING.samples_per_order
+    orders = [p for p in TUNING.ar_orders if p <= max(1, longest)] if order is None else [order]
     most = max(orders)
     best: tuple[float, Noise] | None = None
     for p in orders:
@@ -96,7 +83,7 @@ def fit_colour(remainder: Array, *, order: int | None = None) -> Noise:
             if len(rows) < 10 * (p + 1):
                 continue
             target, past = rows[:, 0], rows[:, 1 : p + 1]
-            floor = FLOOR * float(np.mean(target**2))
+            floor = TUNING.white_share * float(np.mean(target**2))
             moments = past.T @ past + floor * len(rows) * np.eye(p)
             taps = np.linalg.lstsq(moments, past.T @ target, rcond=None)[0] if p else np.zeros(0)
             filters[channel, 1:] = -taps
@@ -119,15 +106,23 @@ def _lagged_rows(values: Array, order: int) -> Array:
     return stacked[np.isfinite(stacked).all(axis=1)]
 
 
-def wander_covariance(count: int, spacing_s: float, time_s: float) -> Array:
+def random_current_covariance(count: int, spacing_s: float, time_s: float) -> Array:
     """(2 count, 2 count) of hat coefficients, north then east, for unit standard deviation."""
     apart = np.abs(np.subtract.outer(np.arange(count), np.arange(count))) * spacing_s
     return np.asarray(np.kron(np.eye(2), np.exp(-apart / time_s)), dtype=float)
 
 
-def hats(steps: int, step_s: float, spacing_s: float) -> Array:
+def linear_basis(steps: int, step_s: float, spacing_s: float) -> Array:
     """(count, steps) piecewise linear functions that sum to one."""
     time = np.arange(steps) * step_s
     count = max(2, round(time[-1] / spacing_s) + 1)
     knots = np.linspace(0.0, time[-1], count)
     return np.stack([np.interp(time, knots, row) for row in np.eye(count)])
+
+
+def channel_std(values: Array) -> Array:
+    """(n,) standard deviation of each channel of (w, s, n) over what is measured; 0 where nothing is."""
+    seen = np.isfinite(values)
+    count = np.maximum(seen.sum(axis=(0, 1)), 1)
+    mean = np.where(seen, values, 0.0).sum(axis=(0, 1)) / count
+    return np.asarray(np.sqrt(np.where(seen, (values - mean) ** 2, 0.0).sum(axis=(0, 1)) / count))

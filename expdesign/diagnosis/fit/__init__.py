@@ -1,24 +1,45 @@
-"""Fits of effects and parameters to all windows, and the tests that follow from them."""
+"""Gauss-Newton fits of effects and parameters to all windows, with their noise, covariance and cross-validation.
 
-from expdesign.diagnosis.fit.clusters import widened
-from expdesign.diagnosis.fit.cross_validation import DRAWS, HeldOut, gained, held_out, on_same, units
-from expdesign.diagnosis.fit.gauss_newton import Fit, fit, profile_cost
-from expdesign.diagnosis.fit.linear_model import answers
-from expdesign.diagnosis.fit.score_tests import LEVEL, Scored, screen
+A `Fit` holds a model, the noise of its remainder and the linear model around it. `fit` finds one, `log_likelihood_gain`
+compares two, `cluster_robust` corrects standard errors, `cross_validate` measures errors on held-out data.
+"""
+
+from expdesign.diagnosis.fit.cluster_robust import cluster_robust
+from expdesign.diagnosis.fit.cross_validation import (
+    HeldOut,
+    bootstrap_sums,
+    cross_validate,
+    held_out_gain,
+    on_common_units,
+    validation_units,
+)
+from expdesign.diagnosis.fit.fit import Fit, FitOptions, continuing, log_likelihood_gain, profile_cost
+from expdesign.diagnosis.fit.gauss_newton import fit
+from expdesign.diagnosis.fit.gram_matrices import information
+from expdesign.diagnosis.fit.linear_model import (
+    build_sensitivities,
+    difference_step,
+    effect_disturbances,
+    sensitivities_to,
+)
 
 __all__ = [
-    "DRAWS",
-    "LEVEL",
     "Fit",
+    "FitOptions",
     "HeldOut",
-    "Scored",
-    "answers",
+    "bootstrap_sums",
+    "build_sensitivities",
+    "cluster_robust",
+    "continuing",
+    "cross_validate",
+    "difference_step",
+    "effect_disturbances",
     "fit",
-    "gained",
-    "held_out",
-    "on_same",
+    "held_out_gain",
+    "information",
+    "log_likelihood_gain",
+    "on_common_units",
     "profile_cost",
-    "screen",
-    "units",
-    "widened",
+    "sensitivities_to",
+    "validation_units",
 ]

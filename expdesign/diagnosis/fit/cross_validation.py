@@ -1,8 +1,9 @@
-"""What mending gains where it was not fitted: cross-validation over batches, and a bootstrap over batches.
+"""Cross-validation: how well a model simulates data that it was not fitted to, with intervals by the bootstrap.
 
-Sizes are fitted without the batches that they are judged on; where such a fit gets nowhere from that to all batches,
-they stay as they are, have seen all batches, and are told of. Which causes, and what is searched on a grid
-(the width of a dead band, the time of a change, where the wind blows), were chosen with all of them.
+What is held out together is a unit: a batch, or a window where there are fewer than three batches. Effects are fitted
+without the units that they are judged on. Where such a fit finds no better point than the fit to all units, the effects
+of the latter are kept and have seen all units; `unconverged` counts these folds. The choice of causes, and what is
+searched on a grid (the width of a dead band, the time of a change, the direction of the wind), used all units.
 """
 
 from __future__ import annotations
@@ -14,111 +15,131 @@ import numpy as np
 from numpy.typing import NDArray
 
 from expdesign.conventions import OUTPUTS
+from expdesign.diagnosis.accuracy import squared_sums
 from expdesign.diagnosis.data import Windows
-from expdesign.diagnosis.fit.gauss_newton import Fit, fit
-from expdesign.diagnosis.model import Extended, simulate_from_first, sums
+from expdesign.diagnosis.fit.fit import Fit, FitOptions
+from expdesign.diagnosis.fit.gauss_newton import fit
+from expdesign.diagnosis.fit.tuning import TUNING
+from expdesign.diagnosis.model import ExtendedModel
+from expdesign.diagnosis.motion import simulate_from_measured
 from expdesign.values import Array
-
-FOLDS = 3
-DRAWS = 1000
-STEPS = 6
-"""Gauss-Newton steps from the fit to all batches to that of a fold."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HeldOut:
-    """Errors of one model on batches that it was not fitted to.
+    """Errors of one model on units that it was not fitted to.
 
     Attributes:
-        lost, spread: (b, n) squared error and squared deviation from the mean, per batch and output; nan for batches
-            whose fold could not be fitted.
-        stuck: folds whose numbers have seen all batches, as their own fit got nowhere.
+        squared_error: (b, n) sum per unit and output; nan for units whose fold could not be fitted.
+        squared_deviation: (b, n) of the measurements from their mean, likewise.
+        unconverged: folds whose effects have seen all units, because their own fit found no better point.
     """
 
-    lost: Array
-    spread: Array
-    stuck: int = 0
+    squared_error: Array
+    squared_deviation: Array
+    unconverged: int = 0
 
     @property
     def fit(self) -> Array:
-        """(n,) [%] over all batches that count."""
-        return _fit(np.nansum(self.lost, axis=0), np.nansum(self.spread, axis=0))
+        """(n,) [%] over all units that could be fitted."""
+        return _fit_percent(np.nansum(self.squared_error, axis=0), np.nansum(self.squared_deviation, axis=0))
 
 
-def _fit(lost: Array, spread: Array) -> Array:
+def _fit_percent(squared_error: Array, squared_deviation: Array) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(np.where(spread > 0, 100 * (1 - np.sqrt(lost / spread)), np.nan))
+        fit_percent = 100 * (1 - np.sqrt(squared_error / squared_deviation))
+        return np.asarray(np.where(squared_deviation > 0, fit_percent, np.nan))
 
 
-def units(windows: Windows) -> Array:
-    """(w,) what is held out together: batches, or windows where there are fewer than three batches."""
+def validation_units(windows: Windows) -> Array:
+    """(w,) number of the unit that every window belongs to."""
     return windows.batch if len(np.unique(windows.batch)) >= 3 else np.arange(len(windows.batch), dtype=float)
 
 
-def held_out(found: Fit | None, ship: Extended, windows: Windows, tell: Callable[[float], None]) -> HeldOut:
-    """Errors of a model, its free numbers fitted to the other batches.
+def cross_validate(
+    found: Fit | None, ship: ExtendedModel, windows: Windows, progress: Callable[[float], None]
+) -> HeldOut:
+    """Errors of a model whose effects are fitted to the other units.
 
     Args:
-        found: its fit to all batches; None for a model that is not fitted.
+        found: its fit to all units; None for a model that is not fitted.
         ship: the model.
         windows: all data.
-        tell: share done.
+        progress: is called with the share done.
     """
-    unit = units(windows)
+    unit = validation_units(windows)
     names = np.unique(unit)
-    folds = [names[index::FOLDS] for index in range(min(FOLDS, len(names)))]
+    folds = [names[index :: TUNING.folds] for index in range(min(TUNING.folds, len(names)))]
     columns = [OUTPUTS.index(name) for name in ship.model.outputs]
-    lost = np.zeros((len(names), len(columns)))
-    spread, stuck = np.zeros_like(lost), 0
+    error = np.zeros((len(names), len(columns)))
+    deviation, unconverged = np.zeros_like(error), 0
     for number, fold in enumerate(folds):
-        tell(number / len(folds))
+        progress(number / len(folds))
         test = np.isin(unit, fold)
         model = ship if found is None or test.all() else _fitted(found, windows, ~test)
         if model is None:
-            lost[np.isin(names, fold)], spread[np.isin(names, fold)] = np.nan, np.nan
+            error[np.isin(names, fold)], deviation[np.isin(names, fold)] = np.nan, np.nan
             continue
-        stuck += found is not None and model is found.ship
-        part = windows.picked(test)
-        motion = simulate_from_first(model, part, None if found is None else found.linear.picked(test))
-        some = sums(motion.error[..., columns], part.measured[..., columns])
-        for which, rows in zip((lost, spread), some, strict=True):
-            np.add.at(which, np.searchsorted(names, unit[test]), rows)
-    return HeldOut(lost=lost, spread=spread, stuck=stuck)
+        unconverged += found is not None and model is found.ship
+        part = windows.selected(test)
+        motion = simulate_from_measured(model, part, None if found is None else found.linear.selected(test))
+        sums = squared_sums(motion.error[..., columns], part.measured[..., columns])
+        for total, rows in zip((error, deviation), sums, strict=True):
+            np.add.at(total, np.searchsorted(names, unit[test]), rows)
+    return HeldOut(squared_error=error, squared_deviation=deviation, unconverged=unconverged)
 
 
-def _fitted(found: Fit, windows: Windows, train: NDArray[np.bool_]) -> Extended | None:
-    """The model with its numbers fitted to some windows, or None where they cannot be.
+def _fitted(found: Fit, windows: Windows, train: NDArray[np.bool_]) -> ExtendedModel | None:
+    """The model with its effects fitted to some windows, or None where that is impossible.
 
-    Where no step from the fit to all windows costs less on these, its numbers stay, converged or not.
+    The effects stay where no step from the fit to all windows costs less on these.
     """
-    free = tuple(key for key in found.keys[: found.free])
+    options = FitOptions(
+        noise=found.noise,
+        ar_order=found.noise.order,
+        steps=TUNING.fold_steps,
+        warm_start=found.linear.selected(train),
+        fixed_weights=True,
+    )
+    part = windows.selected(train)
     try:
-        return fit(
-            found.ship, windows.picked(train), free, starts=found.starts[train], noise=found.noise, steps=STEPS,
-            colour_order=found.noise.order, near=found.linear.picked(train), given_weights=True,
-        ).ship  # fmt: skip
+        return fit(found.ship, part, found.free_keys, starts=found.starts[train], options=options).ship
     except (FloatingPointError, np.linalg.LinAlgError):
         return None
 
 
-def on_same(before: HeldOut, after: HeldOut) -> tuple[HeldOut, HeldOut]:
-    """Two models on the batches that count for both."""
-    both = np.isfinite(before.lost).all(axis=1) & np.isfinite(after.lost).all(axis=1)
-    first, second = (HeldOut(lost=item.lost[both], spread=item.spread[both]) for item in (before, after))
+def on_common_units(before: HeldOut, after: HeldOut) -> tuple[HeldOut, HeldOut]:
+    """Two models on the units that could be fitted for both."""
+    both = np.isfinite(before.squared_error).all(axis=1) & np.isfinite(after.squared_error).all(axis=1)
+    first, second = (
+        HeldOut(squared_error=item.squared_error[both], squared_deviation=item.squared_deviation[both])
+        for item in (before, after)
+    )
     return first, second
 
 
-def gained(before: HeldOut, after: HeldOut, seed: int) -> tuple[float, tuple[float, float]]:
-    """Mean gain of fit over outputs [points], and its 95 % interval from drawing batches with replacement.
+def bootstrap_sums(before: HeldOut, after: HeldOut, seed: int) -> tuple[HeldOut, HeldOut]:
+    """Sums over units drawn with replacement, (draws, n), the same units for both models.
 
-    The same seed gives the same interval, to decide by and to report. Nan where no batch counts for both.
+    The same seed draws the same units, for decisions and for reports.
     """
-    before, after = on_same(before, after)
-    count = len(before.lost)
-    if not count:
+    count = len(before.squared_error)
+    drawn = np.random.default_rng(seed).integers(0, count, (TUNING.bootstrap_draws, count))
+    first, second = (
+        HeldOut(
+            squared_error=item.squared_error[drawn].sum(axis=1),
+            squared_deviation=item.squared_deviation[drawn].sum(axis=1),
+        )
+        for item in (before, after)
+    )
+    return first, second
+
+
+def held_out_gain(before: HeldOut, after: HeldOut, seed: int) -> tuple[float, tuple[float, float]]:
+    """Mean gain of fit over outputs [points] and its 95 % interval; nan where no unit could be fitted for both."""
+    before, after = on_common_units(before, after)
+    if not len(before.squared_error):
         return np.nan, (np.nan, np.nan)
-    drawn = np.random.default_rng(seed).integers(0, count, (DRAWS, count))
-    fits = [_fit(item.lost[drawn].sum(axis=1), item.spread[drawn].sum(axis=1)) for item in (before, after)]
-    gains = np.nanmean(fits[1] - fits[0], axis=1)
-    low, high = np.nanquantile(gains, [0.025, 0.975])
+    fits = [_fit_percent(item.squared_error, item.squared_deviation) for item in bootstrap_sums(before, after, seed)]
+    low, high = np.nanquantile(np.nanmean(fits[1] - fits[0], axis=1), [0.025, 0.975])
     return float(np.nanmean(after.fit - before.fit)), (float(low), float(high))

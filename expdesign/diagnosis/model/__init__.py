@@ -1,69 +1,41 @@
-"""The simulation model with effects added to it, and how well it simulates the data."""
+"""The simulation model with effects added to it: its terms, the terms that it may gain, its groups of inputs."""
 
-from expdesign.diagnosis.model.accuracy import accuracy, first_states, simulate_from_first, sums
-from expdesign.diagnosis.model.delivered_inputs import grouped, input_groups, members
-from expdesign.diagnosis.model.extended import ANGLE_STEMS, ROLL, Extended
-from expdesign.diagnosis.model.motion import (
-    Linear,
-    Motion,
-    Push,
-    linearise,
-    push_of,
-    responses,
-    simulate_windows,
-    start_responses,
-)
-from expdesign.diagnosis.model.residuals import ENOUGH, Dependence, dependence, on_the_whole, short_residuals
-from expdesign.diagnosis.model.support import check_support, still_inputs
-from expdesign.diagnosis.model.surroundings import mean_wind
+from expdesign.diagnosis.model.extended_model import ANGLE_STEMS, ROLL, ExtendedModel, mean_wind
+from expdesign.diagnosis.model.input_groups import RESPONSES, group_columns, input_groups, values_by_group
+from expdesign.diagnosis.model.term_library import ADVANCE_LOSS, AIR, own_advance_terms, own_air_terms, term_library
 from expdesign.diagnosis.model.terms import (
-    AIR_SIGNALS,
     ahead_force,
     ahead_force_text,
+    asymmetry_terms,
     is_coriolis,
     is_damping,
     is_thrust,
-    own_lean_terms,
     reads_rudder,
-    scales,
+    term_factors,
     turns_by_force,
 )
 
 __all__ = [
-    "AIR_SIGNALS",
+    "ADVANCE_LOSS",
+    "AIR",
     "ANGLE_STEMS",
-    "ENOUGH",
+    "RESPONSES",
     "ROLL",
-    "Dependence",
-    "Extended",
-    "Linear",
-    "Motion",
-    "Push",
-    "accuracy",
+    "ExtendedModel",
     "ahead_force",
     "ahead_force_text",
-    "check_support",
-    "dependence",
-    "first_states",
-    "grouped",
+    "asymmetry_terms",
+    "group_columns",
     "input_groups",
     "is_coriolis",
     "is_damping",
     "is_thrust",
-    "linearise",
     "mean_wind",
-    "members",
-    "on_the_whole",
-    "own_lean_terms",
-    "push_of",
+    "own_advance_terms",
+    "own_air_terms",
     "reads_rudder",
-    "responses",
-    "scales",
-    "short_residuals",
-    "simulate_from_first",
-    "simulate_windows",
-    "start_responses",
-    "still_inputs",
-    "sums",
+    "term_factors",
+    "term_library",
     "turns_by_force",
+    "values_by_group",
 ]

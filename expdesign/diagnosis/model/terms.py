@@ -19,7 +19,7 @@ AIR_SIGNALS = frozenset({"u_q", "v_q"})
 
 
 @dataclass(frozen=True, kw_only=True)
-class Part:
+class ScaledTerm:
     """One term of the extended model with everything that scales it.
 
     Attributes:
@@ -39,19 +39,19 @@ class Part:
     reads_air: bool = False
     reads_turn: bool = False
 
-    def after_factor(self, around: Mapping[str, Array]) -> Array:
+    def after_factor(self, exogenous: Mapping[str, Array]) -> Array:
         """The change of the factor at every time."""
-        return np.asarray(self.after * around["after"])
+        return np.asarray(self.after * exogenous["after"])
 
 
-def own_parts(model: VesselModel, effects: Effects) -> list[Part]:
+def own_terms(model: VesselModel, effects: Effects) -> list[ScaledTerm]:
     """The model's own terms."""
 
     def get(key: str) -> float:
         return effects.get(key, 0.0)
 
     parts = []
-    for kind, value in zip(_kinds(model), model.parameters.tolist(), strict=True):
+    for kind, value in zip(_term_kinds(model), model.parameters.tolist(), strict=True):
         name, equation = kind.name, kind.equation
         whole, changed = value + get(f"theta:{name}"), 0.0
         if kind.thrust:
@@ -60,7 +60,7 @@ def own_parts(model: VesselModel, effects: Effects) -> list[Part]:
         elif kind.damping:
             changed = whole * (get("change:damping") + get(f"change:damping_{equation}"))
         parts.append(
-            Part(
+            ScaledTerm(
                 equation=equation,
                 evaluate=kind.evaluate,
                 factor=whole / model.time_scale_s,
@@ -74,10 +74,10 @@ def own_parts(model: VesselModel, effects: Effects) -> list[Part]:
     return parts
 
 
-def scales(model: VesselModel, effects: Effects) -> dict[str, float]:
+def term_factors(model: VesselModel, effects: Effects) -> dict[str, float]:
     """What gains and inertia multiply every parameter of the model by, all the time."""
     result = {}
-    for kind in _kinds(model):
+    for kind in _term_kinds(model):
         result[kind.name] = 1.0 if kind.coriolis else 1.0 / (1 + effects.get(f"inertia:{kind.equation}", 0.0))
         if kind.thrust:
             result[kind.name] *= 1 + effects.get("gain", 0.0)
@@ -85,7 +85,7 @@ def scales(model: VesselModel, effects: Effects) -> dict[str, float]:
     return result
 
 
-def added_parts(model: VesselModel, library: Mapping[str, Term], effects: Effects) -> list[Part]:
+def library_terms(model: VesselModel, library: Mapping[str, Term], effects: Effects) -> list[ScaledTerm]:
     """Library terms that were added."""
     known = (*MOTION_SIGNALS, *dict.fromkeys((*FORCE_SIGNALS, *model.inputs)))
     parts = []
@@ -94,7 +94,7 @@ def added_parts(model: VesselModel, library: Mapping[str, Term], effects: Effect
             term = library[key[5:]]
             expression = _parsed(term.expression, known)
             parts.append(
-                Part(
+                ScaledTerm(
                     equation=term.equation,
                     evaluate=expression.evaluate,
                     factor=value / model.time_scale_s,
@@ -111,7 +111,7 @@ def _parsed(text: str, known: tuple[str, ...]) -> Expression:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Kind:
+class TermKind:
     """What kind of term it is."""
 
     name: str
@@ -126,9 +126,9 @@ class Kind:
 
 
 @lru_cache(maxsize=64)
-def _kinds(model: VesselModel) -> tuple[Kind, ...]:
+def _term_kinds(model: VesselModel) -> tuple[TermKind, ...]:
     return tuple(
-        Kind(
+        TermKind(
             name=term.name,
             equation=term.equation,
             evaluate=expression.evaluate,
@@ -158,7 +158,7 @@ def ahead_force_text(model: VesselModel) -> str:
     return " + ".join(f"abs({name})*{name}" for name in model.inputs if stem(name) == "n")
 
 
-def own_lean_terms(model: VesselModel) -> list[str]:
+def asymmetry_terms(model: VesselModel) -> list[str]:
     """Names of the model's terms by which ahead force turns it."""
     text = ahead_force_text(model)
     return [term.name for term in model.terms if term.equation == "r" and term.expression == text]

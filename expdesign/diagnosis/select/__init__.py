@@ -1,20 +1,8 @@
-"""Which causes explain the data: forward search, pruning, and what tells two apart."""
+"""Which causes explain the data: score tests, forward selection, backward elimination, profile likelihood."""
 
-from expdesign.diagnosis.select.discriminating_manoeuvre import Proposal, most_telling, standard_proposals
-from expdesign.diagnosis.select.forward_search import ALARM, LARGE_WANDER_MPS, search
-from expdesign.diagnosis.select.pruning import LEAST_GAIN, kept, only_moves
-from expdesign.diagnosis.select.search_state import Search, Step
+from expdesign.diagnosis.select.backward_elimination import eliminate_backward, only_nuisance
+from expdesign.diagnosis.select.forward_selection import select_forward
+from expdesign.diagnosis.select.selection import Selection, Step
+from expdesign.diagnosis.select.tuning import TUNING as SELECTION_TUNING
 
-__all__ = [
-    "ALARM",
-    "LARGE_WANDER_MPS",
-    "LEAST_GAIN",
-    "Proposal",
-    "Search",
-    "Step",
-    "kept",
-    "most_telling",
-    "only_moves",
-    "search",
-    "standard_proposals",
-]
+__all__ = ["SELECTION_TUNING", "Selection", "Step", "eliminate_backward", "only_nuisance", "select_forward"]

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 
 from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis import Diagnosis
-from expdesign.diagnosis.model import ENOUGH, Dependence, dependence
+from expdesign.diagnosis.accuracy import Dependence, dependence
 from expdesign.export.diagnosis_page.suspects import DEGREES, has_sign, is_force, suspected, suspected_force
 from expdesign.export.estimate_page.figures import AXES, thinned
 from expdesign.export.pages.figures import BLUE, GREY, VERMILION, light_grid, new_figure, short, svg
@@ -20,7 +20,7 @@ MOST_SPREADS = 3.0
 """Errors beyond so many standard deviations of what is measured are not drawn: the simulation is lost."""
 VISIBLE = 0.01
 """Chance of colouring any panel where nothing depends on anything."""
-LACKING = {
+ACCELERATION_AXES = {
     "u": ("u [mm/s\N{SUPERSCRIPT TWO}]", 1000.0),
     "v": ("v [mm/s\N{SUPERSCRIPT TWO}]", 1000.0),
     "r": ("r [\N{DEGREE SIGN}/min\N{SUPERSCRIPT TWO}]", 3600 * DEGREES),
@@ -90,8 +90,8 @@ def suspect_figure(found: Diagnosis, index: int, key: str) -> str:
     """The error without a finding, or what the model then lacks, against the variable that it should depend on."""
     outputs, item = found.before.outputs, found.findings[index]
     if is_force(found, item):
-        values, label = suspected_force(found, item, found.lacking[index].variables)
-        what, axis, rows = "lacking", LACKING, np.moveaxis(found.lacking[index].lacking, 1, 0)
+        values, label = suspected_force(found, item, found.step_residuals[index].variables)
+        what, axis, rows = "lacking", ACCELERATION_AXES, np.moveaxis(found.step_residuals[index].acceleration, 1, 0)
     else:
         values, label = suspected(found, item)
         what, axis = "error of", AXES
@@ -129,7 +129,7 @@ def _scatter(axes: Axes, x: Array, y: Array, *, signed: bool) -> None:
 def residual_figures(found: Diagnosis) -> list[tuple[bool, str]]:
     """Pictures of what the model lacks against every variable, clearest first, and whether it surely depends on it."""
     residuals = found.residuals
-    if len(residuals.lacking) < ENOUGH:
+    if not residuals.sufficient:
         return []
     tests = {
         name: [dependence(residuals, output, name) for output in residuals.outputs]
@@ -157,7 +157,7 @@ def _residual_figure(
     rows = np.atleast_1d(figure.subplots(len(outputs), 1, sharex=True))
     factor = DEGREES if name == "heading" else 1 / 60 if name == "time" else DEGREES if name == "r" else 1.0
     for axes, output, item, limit in zip(rows, outputs, items, limits, strict=True):
-        label, scale = LACKING[output]
+        label, scale = ACCELERATION_AXES[output]
         colour = VERMILION if item.p_value < clear else BLUE
         axes.axhline(0.0, color=GREY, linewidth=0.8)
         axes.errorbar(factor * item.middle + (name == "run"), scale * item.mean, 2 * scale * item.std, fmt="o-",

@@ -5,13 +5,21 @@ from __future__ import annotations
 import numpy as np
 
 from expdesign.diagnosis import Diagnosis, Finding
-from expdesign.diagnosis.model import on_the_whole
-from expdesign.diagnosis.select import ALARM
-from expdesign.diagnosis.values import Fall
-from expdesign.diagnosis.verdict import LOST_FIT, fits, held_apart, lacking, lost, manoeuvre, worth
+from expdesign.diagnosis.accuracy import mean_residual
+from expdesign.diagnosis.conclusions import (
+    DIVERGED_FIT,
+    accuracy_in_words,
+    benefit,
+    has_diverged,
+    manoeuvre,
+    missing_effect,
+    unit_name,
+)
+from expdesign.diagnosis.select import SELECTION_TUNING
+from expdesign.diagnosis.values import ErrorReduction
 from expdesign.export import words
 from expdesign.export.diagnosis_page.figures import (
-    LACKING,
+    ACCELERATION_AXES,
     growth_figure,
     residual_figures,
     suspect_figure,
@@ -40,11 +48,11 @@ def diagnosis_html(found: Diagnosis, *, command: str, version: str) -> str:
     page = page_templates("expdesign.export.diagnosis_page").get_template("diagnosis.html")
     return page.render(
         found=found,
-        alarm=f"{ALARM:g}",
-        apart=held_apart(found.windows),
+        alarm=f"{SELECTION_TUNING.accepted_p_value:g}",
+        apart=unit_name(found.windows),
         findings=[_finding(item, found) for item in found.findings],
-        before=fits(found.before),
-        astray=lost(found.before) or lost(found.after),
+        before=accuracy_in_words(found.before),
+        astray=has_diverged(found.before) or has_diverged(found.after),
         outputs=", ".join(found.before.outputs),
         whole=_on_the_whole(found),
         tested=[(titled(cause), p_value) for cause, p_value in found.screened],
@@ -60,9 +68,9 @@ def _on_the_whole(found: Diagnosis) -> list[str]:
     """Mean of what the model lacks, e.g. "u 10.2 +- 0.7 mm/s2"."""
     told = []
     for output in found.residuals.outputs:
-        label, factor = LACKING[output]
+        label, factor = ACCELERATION_AXES[output]
         name, _, unit = label.partition(" ")
-        mean, std = on_the_whole(found.residuals, output)
+        mean, std = mean_residual(found.residuals, output)
         told.append(f"{name} {plus_minus(factor * mean, factor * std)} {unit.strip('[]')}".replace("-", words.MINUS))
     return told
 
@@ -88,7 +96,7 @@ def _accuracy(found: Diagnosis) -> list[tuple[str, ...]]:
         unit, factor = ("\N{DEGREE SIGN}/s", float(np.degrees(1.0))) if name == "r" else ("m/s", 1.0)
         cells = [f"{name} [{unit}]"]
         for item in (found.before, found.after):
-            if not float(item.fit[index]) >= LOST_FIT:
+            if not float(item.fit[index]) >= DIVERGED_FIT:
                 cells += [_fit(float(item.fit[index])), UNTOLD, UNTOLD]
                 continue
             cells += [
@@ -120,20 +128,20 @@ def _finding(item: Finding, found: Diagnosis) -> dict[str, object]:
         "fits": rows,
         "signed": has_sign(item),
         "force": is_force(found, item),
-        "worth": worth(item),
-        "falls": [_fall(fall) for fall in item.falls if np.isfinite(fall.share)],
-        "rivals": [lacking(name) for name in item.not_distinguishable_from],
+        "worth": benefit(item),
+        "falls": [_fall(fall) for fall in item.error_reductions if np.isfinite(fall.share)],
+        "rivals": [missing_effect(name) for name in item.not_distinguishable_from],
         "telling": None if item.would_tell_apart is None else manoeuvre(item.would_tell_apart),
     }
 
 
-def _fall(item: Fall) -> str:
+def _fall(item: ErrorReduction) -> str:
     shares = (words.number(100 * value, 0) for value in (item.share, item.low, item.high))
     return "{} {}{nb}% ({} to {}{nb}%)".format(item.output, *shares, nb=words.NB)
 
 
 def _fit(value: float) -> str:
-    return "lost" if not value >= LOST_FIT else f"{words.number(value, 1)}{words.NB}%"
+    return "lost" if not value >= DIVERGED_FIT else f"{words.number(value, 1)}{words.NB}%"
 
 
 def _chance(p_value: float) -> str:

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from expdesign.diagnosis import Accuracy, Diagnosis, Finding
-from expdesign.diagnosis.model import dependence
-from expdesign.diagnosis.values import Residuals
+from expdesign.diagnosis.accuracy import Residuals, dependence
 from expdesign.export.files import plus_minus, strict_json, vessel_toml
 from expdesign.values import Array
 
@@ -66,7 +65,7 @@ def finding_entry(item: Finding, outputs: Sequence[str]) -> dict[str, Any]:
         "fit_after": _named(outputs, item.fit_after),
         "error_falls_by": {
             fall.output: {"share": _finite(fall.share), "interval": [_finite(fall.low), _finite(fall.high)]}
-            for fall in item.falls
+            for fall in item.error_reductions
         },
         "gain": _finite(item.gain),
         "gain_interval": [_finite(value) for value in item.gain_interval],

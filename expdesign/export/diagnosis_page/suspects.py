@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from expdesign.diagnosis import Diagnosis, Finding
-from expdesign.diagnosis.extension import as_extended
-from expdesign.diagnosis.model import Extended, ahead_force, ahead_force_text, members
+from expdesign.diagnosis.model import ExtendedModel, ahead_force, ahead_force_text, group_columns
+from expdesign.diagnosis.vessel_file import extended_model
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, column_name, generalised_force
 from expdesign.vessel.expressions import parse_expression
@@ -50,14 +50,14 @@ def suspected_force(found: Diagnosis, item: Finding, at: Mapping[str, Array]) ->
         item: one of its findings.
         at: (k,) variables of `Residuals` by name.
     """
-    ship = as_extended(found.vessel, found.record)
+    ship = extended_model(found.vessel, found.record)
     kind, _, rest = _telling(found, item).partition(":")
     if item.cause == "wind":
         return np.hypot(at["u_q"], at["v_q"]), "wind over deck [m/s]"
     if kind == "shallow":
         return at["depth"], "water depth [m]"
     if kind in ("deadband", "offset"):
-        name = ship.model.inputs[members(rest, ship.model.inputs)[0]]
+        name = ship.model.inputs[group_columns(rest, ship.model.inputs)[0]]
         return at[name], f"{name} [{column_name(name).removeprefix(name).strip('_') or 'force'}]"
     table = signals(ship, at)
     if kind in ("gain", "asymmetry"):
@@ -68,7 +68,7 @@ def suspected_force(found: Diagnosis, item: Finding, at: Mapping[str, Array]) ->
     return np.broadcast_to(values, at["time"].shape), f"{term.name}: {term.expression}"
 
 
-def signals(ship: Extended, at: Mapping[str, Array]) -> dict[str, Array]:
+def signals(ship: ExtendedModel, at: Mapping[str, Array]) -> dict[str, Array]:
     """(k,) signals that terms read; of what is not measured nothing is known."""
     nothing = np.full(at["time"].shape, np.nan)
     forces = generalised_force(ship.model.actuators, at, NUMPY)
@@ -83,8 +83,8 @@ def suspected(found: Diagnosis, item: Finding) -> tuple[Array, str]:
     key = item.keys[0]
     kind, _, rest = key.partition(":")
     if kind in ("lag", "delay"):
-        inputs = as_extended(found.vessel, found.record).model.inputs
-        return _since_change(found, members(rest, inputs))
+        inputs = extended_model(found.vessel, found.record).model.inputs
+        return _since_change(found, group_columns(rest, inputs))
     if kind == "inertia" or key in ("late:u", "late:v", "late:r"):
         return _rate(found, rest)
     if key in SHOWN_BY or kind in SHOWN_BY:

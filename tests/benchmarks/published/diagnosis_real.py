@@ -19,9 +19,9 @@ import numpy as np
 
 from expdesign.assessment import Wish, assess
 from expdesign.diagnosis import Diagnosis, diagnose
-from expdesign.diagnosis.data import cut_windows
-from expdesign.diagnosis.extension import as_extended
-from expdesign.diagnosis.model import simulate_from_first
+from expdesign.diagnosis.data.windows import cut_windows
+from expdesign.diagnosis.motion.simulation import simulate_from_measured
+from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.errors import InputError
 from expdesign.estimation.regression import AIR
 from expdesign.records import load_records
@@ -124,9 +124,9 @@ def fitted_vessel(case: Case, record: Record, *, wind: bool) -> Vessel:
 
 def error_ahead(vessel: Vessel, record: Record) -> Array:
     """(3,) root mean square error of u, v, r predicted 30 s ahead, anew every 30 s, over all samples."""
-    ship = as_extended(vessel, record)
+    ship = extended_model(vessel, record)
     windows = cut_windows(ship.model, record, longest_s=AHEAD_S)
-    return np.asarray(np.sqrt(np.nanmean(simulate_from_first(ship, windows).error[..., :3] ** 2, axis=(0, 1))))
+    return np.asarray(np.sqrt(np.nanmean(simulate_from_measured(ship, windows).error[..., :3] ** 2, axis=(0, 1))))
 
 
 def tried(case: Case, data: Path, *, seed: int = 0) -> Tried:

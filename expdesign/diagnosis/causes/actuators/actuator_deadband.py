@@ -7,7 +7,7 @@ import numpy as np
 from expdesign.diagnosis.causes.actuators.actuator_lag import open_groups
 from expdesign.diagnosis.causes.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.words import first, rounded
-from expdesign.diagnosis.model import Extended, members
+from expdesign.diagnosis.model import ExtendedModel, group_columns
 from expdesign.values import Array
 from expdesign.vessel import stem
 
@@ -25,7 +25,7 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     inputs = situation.ship.model.inputs
     found = []
     for group in open_groups(situation, "deadband"):
-        columns = members(group, inputs)
+        columns = group_columns(group, inputs)
         if len({stem(inputs[c]) for c in columns}) > 1:
             continue  # inputs of different units share no width
         sizes = np.concatenate([np.abs(rows[:, columns]).ravel() for rows in situation.windows.batch_inputs])
@@ -41,7 +41,7 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     return tuple(found)
 
 
-def _explain(values: Values, _ship: Extended) -> str:
+def _explain(values: Values, _ship: ExtendedModel) -> str:
     key, value, std = first(values)
     return f"The ship does not answer {key.split(':')[1]} commands smaller than {rounded(value, std)}: a dead band."
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 from expdesign.diagnosis.causes.actuators.actuator_lag import followers
 from expdesign.diagnosis.causes.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.words import first, rounded
-from expdesign.diagnosis.model import Extended
+from expdesign.diagnosis.model import ExtendedModel
 
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     return followers(situation, "delay", "actuator_delay")
 
 
-def _explain(values: Values, _ship: Extended) -> str:
+def _explain(values: Values, _ship: ExtendedModel) -> str:
     key, value, std = first(values)
     return (
         f"The error comes in bursts of fixed length after each change of command: {key.split(':')[1]} inputs act "

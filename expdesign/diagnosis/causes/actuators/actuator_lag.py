@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from expdesign.diagnosis.causes.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.words import first, rounded
-from expdesign.diagnosis.model import Extended, input_groups, members
+from expdesign.diagnosis.model import ExtendedModel, group_columns, input_groups
 
 SAMPLES = (0.5, 2.0, 6.0)
 SHARES = (0.5, 1.5)
@@ -16,12 +16,12 @@ def open_groups(situation: Situation, kind: str) -> list[str]:
     None once something of the kind was found: what is then left is another cause's.
     """
     ship = situation.ship
-    if ship.found(f"{kind}:"):
+    if ship.has_found(f"{kind}:"):
         return []
     inputs = ship.model.inputs
     stated = {key.split(":", 1)[1] for key in ship.stated if key.startswith(f"{kind}:")}
-    taken = {column for group in stated for column in members(group, inputs)}
-    return [group for group in input_groups(inputs) if group in stated or not taken & {*members(group, inputs)}]
+    taken = {column for group in stated for column in group_columns(group, inputs)}
+    return [group for group in input_groups(inputs) if group in stated or not taken & {*group_columns(group, inputs)}]
 
 
 def followers(situation: Situation, kind: str, cause: str) -> tuple[Candidate, ...]:
@@ -39,7 +39,7 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     return followers(situation, "lag", "actuator_lag")
 
 
-def _explain(values: Values, _ship: Extended) -> str:
+def _explain(values: Values, _ship: ExtendedModel) -> str:
     key, value, std = first(values)
     return (
         f"The error follows every change of command and dies out: {key.split(':')[1]} inputs lag behind their commands "

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from expdesign.diagnosis.causes.candidate import Candidate, Cause, Situation, Values
-from expdesign.diagnosis.causes.hull import ADVANCE_LOSS, own_advance_terms
 from expdesign.diagnosis.causes.words import first, rounded
-from expdesign.diagnosis.model import Extended
+from expdesign.diagnosis.model import ADVANCE_LOSS, ExtendedModel, own_advance_terms
 
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
@@ -17,7 +16,7 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     return tuple(Candidate(cause="thrust_advance_loss", free={key: 0.0}) for key in keys)
 
 
-def _explain(values: Values, _ship: Extended) -> str:
+def _explain(values: Values, _ship: ExtendedModel) -> str:
     key, value, std = first(values)
     way = "falls" if value < 0 else "grows"
     return f"The thrust error {way} with surge speed times thrust: {key.split(':')[1]} is off by {rounded(value, std)}."

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from expdesign.diagnosis.causes.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.words import first, rounded
-from expdesign.diagnosis.model import Extended, is_thrust, reads_rudder
+from expdesign.diagnosis.model import ExtendedModel, is_thrust, reads_rudder
 
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
@@ -18,7 +18,7 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     return tuple(found)
 
 
-def _explain(values: Values, _ship: Extended) -> str:
+def _explain(values: Values, _ship: ExtendedModel) -> str:
     _, value, std = first(values)
     way = "stronger" if value > 0 else "weaker"
     return (

@@ -7,20 +7,22 @@ import math
 from expdesign.diagnosis.causes.actuators.actuator_lag import open_groups
 from expdesign.diagnosis.causes.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.words import first, rounded
-from expdesign.diagnosis.model import ANGLE_STEMS, Extended, ahead_force_text, members, turns_by_force
+from expdesign.diagnosis.model import ANGLE_STEMS, ExtendedModel, ahead_force_text, group_columns, turns_by_force
 
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     ship = situation.ship
-    if ship.found("offset:") or ship.found("asymmetry") or "r" not in ship.model.outputs:
+    if ship.has_found("offset:") or ship.has_found("asymmetry") or "r" not in ship.model.outputs:
         return ()
-    angles = {column for stem in ANGLE_STEMS for column in members(stem, ship.model.inputs)}
-    groups = [group for group in open_groups(situation, "offset") if {*members(group, ship.model.inputs)} <= angles]
+    angles = {column for stem in ANGLE_STEMS for column in group_columns(stem, ship.model.inputs)}
+    groups = [
+        group for group in open_groups(situation, "offset") if {*group_columns(group, ship.model.inputs)} <= angles
+    ]
     lean = Candidate(cause="thruster_asymmetry", free={"asymmetry": 0.0})
     return (lean, *(Candidate(cause="thruster_asymmetry", free={f"offset:{group}": 0.0}) for group in groups))
 
 
-def _explain(values: Values, ship: Extended) -> str:
+def _explain(values: Values, ship: ExtendedModel) -> str:
     key, value, std = first(values)
     side = "port" if value > 0 else "starboard"
     if key == "asymmetry" and not turns_by_force(ship.model):

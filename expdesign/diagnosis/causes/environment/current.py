@@ -6,7 +6,7 @@ import math
 
 from expdesign.diagnosis.causes.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.words import rounded
-from expdesign.diagnosis.model import Extended
+from expdesign.diagnosis.model import ExtendedModel
 
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
@@ -15,7 +15,7 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     return (Candidate(cause="current", free={"current:north": 0.0, "current:east": 0.0}),)
 
 
-def _explain(values: Values, _ship: Extended) -> str:
+def _explain(values: Values, _ship: ExtendedModel) -> str:
     (north, _), (east, _) = values["current:north"], values["current:east"]
     toward = math.degrees(math.atan2(east, north)) % 360
     return (

@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from expdesign.diagnosis.causes.candidate import Candidate, Cause, Situation, Values
-from expdesign.diagnosis.causes.hull import lacking, own_air_terms
+from expdesign.diagnosis.causes.hull import absent_terms
 from expdesign.diagnosis.causes.words import listed, rounded
-from expdesign.diagnosis.model import Extended
+from expdesign.diagnosis.model import ExtendedModel, own_air_terms
 
 TAKEN_MPS, WAYS, FINER = 10.0, 8, 7
 """Of a wind that is not measured: its speed, directions looked in, and steps between them."""
@@ -19,7 +19,7 @@ DIRECTIONS = ((1.0, 0.0), (0.7, 0.7), (0.0, 1.0), (-0.7, 0.7), (-1.0, 0.0), (-0.
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     ship, windows = situation.ship, situation.windows
-    terms, reads_air = lacking(situation, air=True), own_air_terms(ship.model)
+    terms, reads_air = absent_terms(situation, air=True), own_air_terms(ship.model)
     found: list[Candidate] = []
     if windows.has_wind:
         if terms:
@@ -65,7 +65,7 @@ def _of_unknown_wind(situation: Situation, terms: list[str]) -> list[Candidate]:
     ]
 
 
-def _explain(values: Values, _ship: Extended) -> str:
+def _explain(values: Values, _ship: ExtendedModel) -> str:
     if "wind:toward" in values:
         toward, std = (math.degrees(number) for number in values["wind:toward"])
         drag = {key: pair for key, pair in values.items() if key != "wind:toward"}

@@ -6,7 +6,7 @@ import numpy as np
 
 from expdesign.diagnosis.causes.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.words import rounded
-from expdesign.diagnosis.model import Extended
+from expdesign.diagnosis.model import ExtendedModel
 
 COUNT = 12
 FINER = 6
@@ -39,7 +39,7 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     )
 
 
-def _explain(values: Values, _ship: Extended) -> str:
+def _explain(values: Values, _ship: ExtendedModel) -> str:
     time, std = values["change:time"]
     rest = {key: pair for key, pair in values.items() if key != "change:time"}
     words = ", ".join(f"{key.split(':')[1]} by {rounded(100 * v, 100 * s)} %" for key, (v, s) in rest.items())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from expdesign.diagnosis.causes.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.words import rounded
-from expdesign.diagnosis.model import Extended
+from expdesign.diagnosis.model import ExtendedModel
 
 WORDS = {"u": "surge", "v": "sway", "r": "yaw"}
 
@@ -19,7 +19,7 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     return tuple(Candidate(cause="load_change", free={f"inertia:{n}": 0.0 for n in group}) for group in groups)
 
 
-def _explain(values: Values, _ship: Extended) -> str:
+def _explain(values: Values, _ship: ExtendedModel) -> str:
     parts = ", ".join(
         f"{WORDS[key[-1]]} by {rounded(100 * value, 100 * std)} %" for key, (value, std) in values.items()
     )

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from expdesign.diagnosis.causes.candidate import Candidate, Cause, Situation, Values
-from expdesign.diagnosis.causes.hull.missing_term import own_advance_terms, own_air_terms
 from expdesign.diagnosis.causes.words import rounded
-from expdesign.diagnosis.model import Extended, own_lean_terms
+from expdesign.diagnosis.model import ExtendedModel, asymmetry_terms, own_advance_terms, own_air_terms
 
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     """Single ones, all of an equation, all; but singly none whose change has a physical name in the catalogue."""
     model = situation.ship.model
-    named = {*own_advance_terms(model), *own_air_terms(model), *own_lean_terms(model)}
+    named = {*own_advance_terms(model), *own_air_terms(model), *asymmetry_terms(model)}
     groups: list[tuple[str, ...]] = [(f"theta:{name}",) for name in model.names if name not in named]
     for equation in model.outputs:
         groups.append(tuple(f"theta:{term.name}" for term in model.terms if term.equation == equation))
@@ -19,7 +18,7 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     return tuple(Candidate(cause="parameters", free=dict.fromkeys(group, 0.0)) for group in dict.fromkeys(groups))
 
 
-def _explain(values: Values, _ship: Extended) -> str:
+def _explain(values: Values, _ship: ExtendedModel) -> str:
     changes = ", ".join(f"{key[6:]} by {rounded(value, std)}" for key, (value, std) in values.items())
     return f"The structure fits, its numbers do not: the data want parameters changed ({changes})."
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from expdesign.diagnosis.causes.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.words import rounded
-from expdesign.diagnosis.model import ROLL, Extended
+from expdesign.diagnosis.model import ROLL, ExtendedModel
 
 COUNT = 14
 DAMPING = 0.08
@@ -14,7 +14,7 @@ DAMPING = 0.08
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     outputs = set(situation.ship.model.outputs)
-    if situation.ship.found("roll:") or not {"v", "r"} <= outputs:
+    if situation.ship.has_found("roll:") or not {"v", "r"} <= outputs:
         return ()
     if situation.ship.has_roll:  # the vessel file has a mode, which may be another
         return (Candidate(cause="roll_coupling", free=dict.fromkeys(ROLL, 0.0)),)
@@ -30,7 +30,7 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     )
 
 
-def _explain(values: Values, _ship: Extended) -> str:
+def _explain(values: Values, _ship: ExtendedModel) -> str:
     period, std = values["roll:period"]
     return (
         f"Sway or yaw oscillate with a period of {rounded(period, std)} s, as a rolling ship makes them. Roll is not "

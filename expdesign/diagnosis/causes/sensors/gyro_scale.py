@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from expdesign.diagnosis.causes.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.words import first, rounded
-from expdesign.diagnosis.model import Extended
+from expdesign.diagnosis.model import ExtendedModel
 
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
@@ -14,7 +14,7 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     return (Candidate(cause="gyro_scale", free={"gyro": 0.0}),)
 
 
-def _explain(values: Values, _ship: Extended) -> str:
+def _explain(values: Values, _ship: ExtendedModel) -> str:
     _, value, std = first(values)
     return (
         f"The yaw rate sensor shows {rounded(100 * (1 + value), 100 * std)} % of the yaw rate that the heading and the "

@@ -6,7 +6,7 @@ import math
 
 from expdesign.diagnosis.causes.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.words import first, rounded
-from expdesign.diagnosis.model import Extended
+from expdesign.diagnosis.model import ExtendedModel
 
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
@@ -15,7 +15,7 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     return (Candidate(cause="heading_bias", free={"heading_bias": 0.0}),)
 
 
-def _explain(values: Values, ship: Extended) -> str:
+def _explain(values: Values, ship: ExtendedModel) -> str:
     _, value, std = first(values)
     size, less = rounded(math.degrees(abs(value)), math.degrees(std)), value > 0
     leak = "Measured sway contains surge speed, v_measured = v + u sin(bias)"

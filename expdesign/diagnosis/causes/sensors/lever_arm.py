@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from expdesign.diagnosis.causes.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.words import listed
-from expdesign.diagnosis.model import Extended
+from expdesign.diagnosis.model import ExtendedModel
 
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     outputs = set(situation.ship.model.outputs)
-    if situation.ship.found("lever:") or not {"v", "r"} <= outputs:
+    if situation.ship.has_found("lever:") or not {"v", "r"} <= outputs:
         return ()
     found = [Candidate(cause="lever_arm", free={"lever:forward": 0.0})]
     if "u" in outputs:
@@ -20,7 +20,7 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     return tuple(found)
 
 
-def _explain(values: Values, ship: Extended) -> str:
+def _explain(values: Values, ship: ExtendedModel) -> str:
     sensor = "the antenna of the positions" if "u" in ship.derived else "the velocity sensor"
     return (
         f"Measured velocities contain yaw rate times a length: {sensor} is not where the model counts from, but "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from expdesign.diagnosis.causes.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.words import rounded
-from expdesign.diagnosis.model import Extended
+from expdesign.diagnosis.model import ExtendedModel
 
 NAMES = {
     "u": "the speed ahead",
@@ -16,7 +16,7 @@ NAMES = {
 
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
-    if situation.ship.found("late:"):
+    if situation.ship.has_found("late:"):
         return ()
     outputs = situation.ship.model.outputs
     derived = set(situation.windows.derived)
@@ -29,7 +29,7 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     return tuple(found)
 
 
-def _explain(values: Values, _ship: Extended) -> str:
+def _explain(values: Values, _ship: ExtendedModel) -> str:
     parts = " and ".join(
         f"{NAMES.get(key[5:], key[5:])} is recorded {rounded(abs(value), std)} s {'late' if value >= 0 else 'early'}"
         for key, (value, std) in values.items()

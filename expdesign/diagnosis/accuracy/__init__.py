@@ -1,0 +1,18 @@
+"""How well the model simulates the data, what it gets wrong within seconds, and whether the inputs excite it."""
+
+from expdesign.diagnosis.accuracy.excitation import check_excitation, constant_inputs
+from expdesign.diagnosis.accuracy.residuals import Dependence, Residuals, dependence, mean_residual, one_step_residuals
+from expdesign.diagnosis.accuracy.simulated_fit import Accuracy, accuracy, squared_sums
+
+__all__ = [
+    "Accuracy",
+    "Dependence",
+    "Residuals",
+    "accuracy",
+    "check_excitation",
+    "constant_inputs",
+    "dependence",
+    "mean_residual",
+    "one_step_residuals",
+    "squared_sums",
+]

@@ -1,0 +1,37 @@
+"""What a diagnosis says: findings, verdict and notes."""
+
+from expdesign.diagnosis.conclusions.findings import finding_of
+from expdesign.diagnosis.conclusions.notes import (
+    note_on_nuisance,
+    note_on_random_current,
+    note_on_unconverged,
+    notes_on_data,
+    notes_on_rejected,
+)
+from expdesign.diagnosis.conclusions.verdict import (
+    DIVERGED_FIT,
+    accuracy_in_words,
+    benefit,
+    has_diverged,
+    manoeuvre,
+    missing_effect,
+    unit_name,
+    verdict,
+)
+
+__all__ = [
+    "DIVERGED_FIT",
+    "accuracy_in_words",
+    "benefit",
+    "finding_of",
+    "has_diverged",
+    "manoeuvre",
+    "missing_effect",
+    "note_on_nuisance",
+    "note_on_random_current",
+    "note_on_unconverged",
+    "notes_on_data",
+    "notes_on_rejected",
+    "unit_name",
+    "verdict",
+]

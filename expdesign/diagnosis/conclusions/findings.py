@@ -1,0 +1,89 @@
+"""Selected causes as findings: estimates, held-out gains, alternatives, explanations."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from expdesign.diagnosis.causes import CAUSES, Cause, Values
+from expdesign.diagnosis.fit import Fit, HeldOut, bootstrap_sums, held_out_gain, on_common_units
+from expdesign.diagnosis.model import ExtendedModel
+from expdesign.diagnosis.select import Step
+from expdesign.diagnosis.values import ErrorReduction, Estimate, Finding
+from expdesign.diagnosis.vessel_file import public_name, stated_values
+from expdesign.values import Array
+
+
+def finding_of(
+    step: Step, last: Fit, held: tuple[HeldOut, HeldOut], seed: int, *, would_tell_apart: str | None
+) -> Finding:
+    """A step of the selection as a finding.
+
+    Args:
+        step: of the selection.
+        last: the joint fit of all steps, which the estimates come from.
+        held: errors on held-out units without and with the cause.
+        seed: of the intervals.
+        would_tell_apart: the manoeuvre that distinguishes the cause from its alternatives best.
+    """
+    chosen, (before, after) = step.chosen, held
+    gain, interval = held_out_gain(before, after, seed)
+    values = _values(step, last)
+    return Finding(
+        cause=chosen.candidate.cause,
+        estimates=_estimates(values, chosen.fit.ship),
+        p_value=step.p_value,
+        fit_before=before.fit,
+        fit_after=after.fit,
+        error_reductions=error_reductions_of(chosen.fit.ship.model.outputs, before, after, seed),
+        gain=gain,
+        gain_interval=interval,
+        not_distinguishable_from=tuple(other.candidate.cause for other in step.alternatives),
+        would_tell_apart=would_tell_apart,
+        explanation=cause_of(chosen.candidate.cause).explain(values, last.ship) + stated_values(values, last.ship),
+        likelihood_gain=chosen.likelihood_gain,
+        keys=tuple(values),
+    )
+
+
+def cause_of(name: str) -> Cause:
+    """The entry of the catalogue that a name belongs to."""
+    return next(cause for cause in CAUSES if cause.name == name.split(":")[0])
+
+
+def _values(step: Step, last: Fit) -> dict[str, tuple[float, float]]:
+    """Effects of a step with estimate and standard error; a profiled effect comes last."""
+    chosen = step.chosen
+    values = {key: (last.value(key), (last if key in last.keys else chosen.fit).std(key)) for key in chosen.keys}
+    if chosen.profiled is not None:
+        key, error = chosen.profiled
+        values[key] = (last.value(key), error)
+    return values
+
+
+def _estimates(values: Values, ship: ExtendedModel) -> tuple[Estimate, ...]:
+    result = []
+    for key, (value, std) in values.items():
+        name, factor, offset, unit = public_name(key, ship)
+        result.append(Estimate(name=name, value=offset + factor * value, std=abs(factor) * std, unit=unit))
+    return tuple(result)
+
+
+def error_reductions_of(
+    outputs: Sequence[str], before: HeldOut, after: HeldOut, seed: int
+) -> tuple[ErrorReduction, ...]:
+    """Reductions of the simulated error of held-out units, with 95 % intervals by the bootstrap."""
+    before, after = on_common_units(before, after)
+    whole = _reduction(before.squared_error.sum(axis=0), after.squared_error.sum(axis=0))
+    drawn_before, drawn_after = bootstrap_sums(before, after, seed)
+    drawn = _reduction(drawn_before.squared_error, drawn_after.squared_error)
+    low, high = np.nanquantile(drawn, [0.025, 0.975], axis=0)
+    rows = zip(outputs, whole.tolist(), low.tolist(), high.tolist(), strict=True)
+    return tuple(ErrorReduction(output=name, share=share, low=least, high=most) for name, share, least, most in rows)
+
+
+def _reduction(before: Array, after: Array) -> Array:
+    """By which share a root mean square error falls, from sums of squares."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(1.0 - np.sqrt(after / before))

@@ -1,0 +1,104 @@
+"""Notes of a diagnosis: what was not measured, what was not tested, what was left out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from expdesign.diagnosis.conclusions.verdict import missing_effect
+from expdesign.diagnosis.data import Noise, Windows, missing_wind_share
+from expdesign.diagnosis.fit import HeldOut, held_out_gain
+from expdesign.diagnosis.select import SELECTION_TUNING, Selection
+from expdesign.signals import Record
+from expdesign.vessel import Vessel
+
+FEW = 0.002
+"""Share of missing samples that needs no note."""
+
+
+def notes_on_data(vessel: Vessel, record: Record, windows: Windows, constant: Sequence[str]) -> tuple[str, ...]:
+    """What the data do not show.
+
+    Args:
+        vessel: the model in use.
+        record: the data.
+        windows: the data as compared.
+        constant: inputs that never change.
+    """
+    notes = []
+    if not windows.has_heading:
+        notes.append("No heading is measured. Current and wind cannot be distinguished from the ship's own motion.")
+        weather = vessel.environment
+        if weather.current_to.any() or (weather.wind_to.any() and not windows.has_wind):
+            notes.append("The current and wind of the vessel file were left out, because they need a heading.")
+    missing = missing_wind_share(record)
+    if windows.has_wind and missing > FEW:
+        notes.append(f"The wind is missing in {100 * missing:.0f} % of the samples. Its last value was used there.")
+    if not windows.has_wind and any(batch.wind is not None for batch in record.batches):
+        notes.append("The wind is not measured in every run. The measured wind of the other runs was not used.")
+    if not windows.has_depth:
+        notes.append("No depth is measured. Shallow water was not tested.")
+    if "r" in windows.derived:
+        notes.append("The yaw rate is derived from the heading. The scale of a rate gyro was not tested.")
+    if constant:
+        verb = "changes" if len(constant) == 1 else "change"
+        notes.append(f"{', '.join(constant)} never {verb}. Faults that act only through them cannot be seen.")
+    if not (vessel.model.parameter_std > 0).any():
+        notes.append("The vessel file has no parameter_std. Its parameters count as known.")
+    return tuple(notes)
+
+
+def note_on_random_current(noise: Noise) -> tuple[str, ...]:
+    """A varying current that the tests allow for; the catalogue has no such cause."""
+    if noise.current_std_mps < SELECTION_TUNING.large_current_mps:
+        return ()
+    return (
+        f"Part of the error looks like a current that varies by {noise.current_std_mps:.2g} m/s with a correlation "
+        f"time of {noise.current_time_s:.0f} s. The tests allow for it. It is not in the catalogue of causes, and it "
+        "is not written to the vessel file.",
+    )
+
+
+def notes_on_rejected(found: Selection, kept: Selection, unit: str) -> tuple[str, ...]:
+    """Causes that were significant in a test and are no findings.
+
+    Args:
+        found: by forward selection.
+        kept: what backward elimination left of it.
+        unit: what gains are measured on.
+    """
+    names = {id(step.chosen.candidate) for step in kept.steps}
+    return tuple(
+        f"The data show a sign of {missing_effect(step.chosen.candidate.cause)} (p = {step.p_value:.1g}). It is not "
+        f"a finding, because it does not surely improve the simulation of {unit} held out of the fit, or because its "
+        "size may be zero."
+        for step in found.steps
+        if id(step.chosen.candidate) not in names
+    )
+
+
+def note_on_nuisance(unfitted: HeldOut, fitted: HeldOut, seed: int) -> tuple[str, ...]:
+    """What uncertain parameters gain by themselves; no cause is credited with it.
+
+    Args:
+        unfitted: errors of the model in use.
+        fitted: with its uncertain parameters fitted.
+        seed: of the interval.
+    """
+    gain, _ = held_out_gain(unfitted, fitted, seed)
+    if not abs(gain) >= SELECTION_TUNING.least_gain_points:
+        return ()
+    return (
+        f"Fitting the parameters within their stated standard deviations changes the fit on held-out runs by "
+        f"{gain:+.1f} points. The gains of causes come on top of that.",
+    )
+
+
+def note_on_unconverged(held: Sequence[HeldOut]) -> tuple[str, ...]:
+    """Gains that are not wholly measured on held-out data."""
+    folds = sum(item.unconverged for item in held)
+    if not folds:
+        return ()
+    return (
+        f"{folds} fits of the cross-validation did not improve on the fit to all runs. They used its estimates, so "
+        "part of the gains is measured on runs that these estimates have seen.",
+    )

@@ -1,0 +1,153 @@
+"""The verdict of a diagnosis, in one sentence: what the simulation lacks, what adding it gains, what is still open."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from expdesign.diagnosis.accuracy import Accuracy
+from expdesign.diagnosis.data import Windows
+from expdesign.diagnosis.fit import validation_units
+from expdesign.diagnosis.values import ErrorReduction, Finding
+
+DIVERGED_FIT = -300.0
+"""Fit [%] below which the simulation has diverged from the ship and the number means nothing."""
+MISSING_EFFECTS = {
+    "parameters": "the right values of some parameters",
+    "current": "a current",
+    "wind": "wind",
+    "thrust_gain": "the right size of thrust",
+    "thrust_advance_loss": "the loss of thrust with speed",
+    "thruster_asymmetry": "an asymmetry of thrust",
+    "actuator_lag": "the lag of the actuators",
+    "actuator_delay": "the dead time of the actuators",
+    "actuator_deadband": "the dead band of the actuators",
+    "load_change": "the right inertia",
+    "heading_bias": "the misalignment of a sensor",
+    "lever_arm": "the distance of a sensor from amidships",
+    "sensor_delay": "the delay of a sensor",
+    "gyro_scale": "the scale of the rate gyro",
+    "shallow_water": "shallow water",
+    "roll_coupling": "an oscillation like roll",
+    "change_point": "a change of the ship during the trial",
+}
+"""Cause -> what the simulation lacks."""
+VISIBLE = 0.01
+"""Reduction of an error below which no number is given."""
+WORDS = {"u": "surge", "v": "sway", "r": "yaw"}
+MANOEUVRES = {
+    "zigzag": "a zig-zag",
+    "zigzag_long": "a long zig-zag",
+    "turning_circle": "a turning circle",
+    "turning_circle_port": "a turning circle to port",
+    "acceleration": "an acceleration",
+    "deceleration": "a deceleration",
+    "inward_spiral": "an inward spiral",
+    "straight": "a straight run",
+    "telegraph": "a run of random orders",
+}
+"""Standard proposals in words; those of a scenario's dictionary keep their names."""
+
+
+def missing_effect(cause: str) -> str:
+    """What the simulation lacks, e.g. of "missing_term:Y_r"."""
+    kind, _, term = cause.partition(":")
+    return f"the term {term}" if kind == "missing_term" else MISSING_EFFECTS[kind]
+
+
+def manoeuvre(name: str) -> str:
+    """A proposal in words."""
+    return MANOEUVRES.get(name, f"the manoeuvre {name}")
+
+
+def benefit(item: Finding) -> str:
+    """What adding it does to the output that it surely helps most, e.g. "cuts the sway error by 52 % (45 to 60 %)"."""
+    known = [reduction for reduction in item.error_reductions if np.isfinite(reduction.share)]
+    if not known:
+        return f"gains {item.gain:.1f} points of fit"
+    best = max(known, key=lambda reduction: reduction.low)
+    if best.share < VISIBLE:
+        return "reduces no error by 1 % or more"
+    interval = f"({_percent(best.low)} to {_percent(best.high)} %)"
+    if abs(best.share - 0.5) < 0.025:
+        return f"halves the {WORDS[best.output]} error {interval}"
+    return f"cuts the {WORDS[best.output]} error by {_percent(best.share)} % {interval}"
+
+
+def unit_name(windows: Windows) -> str:
+    """What gains are measured on: whole runs, or stretches of them where there are too few runs."""
+    return "runs" if np.array_equal(validation_units(windows), windows.batch) else "stretches"
+
+
+def verdict(findings: Sequence[Finding], before: Accuracy, unit: str = "runs") -> str:
+    """The whole diagnosis in one sentence.
+
+    Args:
+        findings: by gain.
+        before: accuracy of the model in use.
+        unit: what gains are measured on.
+    """
+    if not findings:
+        return f"Nothing is wrong that this data can show: {accuracy_in_words(before)}."
+    parts = [f"The simulation lacks {listed([missing_effect(item.cause) for item in findings])}"]
+    parts += [_benefits(findings, unit), *_invisible(findings)]
+    parts += [_open_question(item) for item in findings if item.not_distinguishable_from]
+    return "; ".join(parts) + "."
+
+
+def _benefits(findings: Sequence[Finding], unit: str) -> str:
+    if len(findings) == 1:
+        return f"adding it {benefit(findings[0])} on {unit} held out of the fit"
+    first, *others = [f"{missing_effect(item.cause)} {benefit(item)}" for item in findings]
+    return f"on {unit} held out of the fit, {listed([f'adding {first}', *others])}"
+
+
+def _invisible(findings: Sequence[Finding]) -> list[str]:
+    """Findings that are significant and yet do not improve the simulation visibly."""
+    causes = [
+        item.cause for item in findings if item.error_reductions and not any(map(_is_visible, item.error_reductions))
+    ]
+    if not causes:
+        return []
+    names = "it" if len(findings) == 1 else listed([missing_effect(cause) for cause in causes])
+    verb = "is" if len(causes) == 1 else "are"
+    return [f"{names} {verb} significant in a test, but too small to show in velocities as noisy as these"]
+
+
+def _is_visible(reduction: ErrorReduction) -> bool:
+    return reduction.share >= VISIBLE
+
+
+def _open_question(item: Finding) -> str:
+    """What explains the data as well, and what would distinguish it."""
+    alternatives = listed([missing_effect(name) for name in item.not_distinguishable_from], "or")
+    if item.would_tell_apart is None:
+        return f"these data cannot distinguish {missing_effect(item.cause)} from {alternatives}"
+    verb = "explains" if len(item.not_distinguishable_from) == 1 else "explain"
+    return (
+        f"{manoeuvre(item.would_tell_apart)} would distinguish {missing_effect(item.cause)} from {alternatives}, which "
+        f"{verb} these data as well"
+    )
+
+
+def accuracy_in_words(found: Accuracy) -> str:
+    """How well a model simulates the data."""
+    if has_diverged(found):
+        return "simulated over whole runs, the model diverges from the ship"
+    rows = zip(found.outputs, found.fit.tolist(), strict=True)
+    return f"the model accounts for {listed([f'{value:.0f} % of {WORDS[name]}' for name, value in rows])}"
+
+
+def has_diverged(found: Accuracy) -> bool:
+    """Whether the simulation of some output has diverged from the ship."""
+    return bool((found.fit < DIVERGED_FIT).any())
+
+
+def listed(words: Sequence[str], last: str = "and") -> str:
+    """A, B and C."""
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} {last} {words[-1]}"
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f}".replace("-0", "0")

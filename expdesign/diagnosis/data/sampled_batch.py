@@ -1,0 +1,109 @@
+"""One measured batch on the grids of comparison and of integration."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from expdesign.conventions import OUTPUTS
+from expdesign.diagnosis.data.measured_channels import air_velocity, has_depth
+from expdesign.estimation.regression import inputs_of
+from expdesign.records import central_difference
+from expdesign.signals import Batch
+from expdesign.values import Array
+from expdesign.vessel import VesselModel
+
+
+def averaging_half_width(rows_per_step: int) -> int:
+    """How many samples on either side of an instant of comparison are averaged with it."""
+    return rows_per_step // 2
+
+
+class SampledBatch:
+    """One batch on the grids of comparison and integration."""
+
+    def __init__(self, model: VesselModel, batch: Batch, merged: int, between: int) -> None:
+        self.batch, self.merged, self.between = batch, merged, between
+        self.samples = (len(batch) - 1) // merged + 1
+        self.step_s = batch.sample_time_s * merged / between
+        raw = inputs_of(model, batch)
+        self.inputs = np.repeat(self._whole(raw), between, axis=0)
+        heading = np.zeros(len(batch)) if batch.pose is None else batch.pose[:, 2]
+        if not np.isfinite(heading).all():
+            heading = np.cumsum(np.nan_to_num(batch.velocity[:, 2])) * batch.sample_time_s
+        self.heading = midpoints(self._between(self._centred(heading)))
+        wind = air_velocity(batch)
+        wind = np.full((len(batch), 2), np.nan) if wind is None else wind_held_over_gaps(wind, heading)
+        self.wind = midpoints(self._between(self._centred(wind)))
+        self.depth = np.full(len(self.heading), np.inf)
+        if batch.depth_m is not None and has_depth(batch):
+            depth = batch.depth_m[_last_seen(np.isfinite(batch.depth_m))]
+            self.depth = self._between(self._centred(depth))
+
+    def measured(self, derived: tuple[str, ...]) -> Array:
+        """(s, 4) channels; the heading tells nothing more where the yaw rate is derived from it.
+
+        What comes from the pose is compared as central differences, however it was smoothed: smoothing leaves an error
+        whose colour no short filter undoes. Means over too few samples, at the ends, are left out.
+        """
+        velocity, rate = self.batch.velocity.copy(), np.full(len(self.batch), np.nan)
+        if self.batch.pose is not None and len(self.batch) > 2:
+            rates = central_difference(self.batch.pose, self.batch.sample_time_s)
+            columns = [OUTPUTS.index(name) for name in derived]
+            velocity[1:-1, columns] = rates[:, columns]
+            rate[1:-1] = np.nan if "r" in derived else rates[:, 2]
+        channels = self._centred(np.column_stack([velocity, rate]))
+        middle = self.merged * np.arange(len(channels))
+        half = averaging_half_width(self.merged)
+        channels[(middle < half) | (middle >= len(self.batch) - half)] = np.nan
+        return channels
+
+    def _whole(self, values: Array) -> Array:
+        """Held inputs to the end of the last step of comparison."""
+        return np.concatenate([values, np.repeat(values[-1:], self.samples * self.merged - len(values), axis=0)])
+
+    def _centred(self, values: Array) -> Array:
+        """Values at the instants of comparison, averaged over the samples around them."""
+        if self.merged == 1:
+            return np.asarray(values, dtype=float)
+        half = averaging_half_width(self.merged)
+        padded = np.concatenate([np.repeat(values[:1], half, axis=0), values, np.repeat(values[-1:], half, axis=0)])
+        total = np.cumsum(np.concatenate([np.zeros_like(padded[:1]), np.nan_to_num(padded, posinf=1e6)]), axis=0)
+        width = 2 * half + 1
+        mean = (total[width:] - total[:-width]) / width
+        bad = ~np.isfinite(padded)
+        seen = np.cumsum(np.concatenate([np.zeros_like(bad[:1]), bad]).astype(int), axis=0)
+        mean[(seen[width:] - seen[:-width]) > 0] = np.nan
+        exact = values.copy().astype(float)
+        exact[half : len(values) - half] = mean[half : len(values) - half]  # ends keep their single samples
+        return np.asarray(exact[:: self.merged][: self.samples])
+
+    def _between(self, values: Array) -> Array:
+        """Straight lines between the instants of comparison."""
+        if self.between == 1:
+            return values
+        following = np.concatenate([values[1:], values[-1:]])
+        share = (np.arange(self.between) / self.between).reshape(1, -1, *([1] * (values.ndim - 1)))
+        with np.errstate(invalid="ignore"):
+            mixed = values[:, None] * (1 - share) + following[:, None] * share
+        mixed[:, 0] = values
+        return np.asarray(mixed.reshape(-1, *values.shape[1:]))
+
+
+def wind_held_over_gaps(air: Array, heading: Array) -> Array:
+    """(k, 2) wind in the b-frame with the last one seen, in the n-frame, where it is not measured."""
+    step_numbers = _last_seen(np.asarray(np.isfinite(air).all(axis=1)))
+    turned = heading - heading[step_numbers]
+    c, s, held = np.cos(turned), np.sin(turned), air[step_numbers]
+    return np.stack([held[:, 0] * c + held[:, 1] * s, held[:, 1] * c - held[:, 0] * s], axis=-1)
+
+
+def _last_seen(seen: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """(k,) place of the last sample seen at every one; of the first seen before that."""
+    step_numbers = np.maximum.accumulate(np.where(seen, np.arange(len(seen)), -1))
+    return np.asarray(np.where(step_numbers < 0, np.argmax(seen), step_numbers))
+
+
+def midpoints(values: Array) -> Array:
+    """Values in the middle of every step from those at its ends: what acts on average while inputs are held."""
+    return np.concatenate([(values[:-1] + values[1:]) / 2, values[-1:]])

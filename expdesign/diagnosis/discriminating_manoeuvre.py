@@ -1,0 +1,150 @@
+"""The manoeuvre that tells two explanations apart: where the two extended models disagree most, per minute."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from expdesign.diagnosis.data import Windows
+from expdesign.diagnosis.model import ExtendedModel
+from expdesign.diagnosis.motion import Motion, simulate_windows
+from expdesign.simulation.motion import to_body
+from expdesign.values import Array
+from expdesign.vessel import NUMPY, stem
+
+HEADINGS = (0.0, np.pi / 2, np.pi, 3 * np.pi / 2)
+ROUNDS = 2
+"""Simulations after which the heading is known well enough: it depends a little on what acts by heading."""
+PROPOSED = 240
+"""Samples of a standard proposal."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Proposal:
+    """A manoeuvre that might tell causes apart.
+
+    Attributes:
+        name: of the primitive.
+        inputs: (k, m) commands in the model's order.
+        velocity: (3,) to start with.
+        sample_time_s: of the commands.
+    """
+
+    name: str
+    inputs: Array
+    velocity: Array
+    sample_time_s: float
+
+
+def most_discriminating(
+    one: ExtendedModel, others: Sequence[ExtendedModel], proposals: Sequence[Proposal], std: Array, like: Windows
+) -> str | None:
+    """Name of the proposal for which `one` and the nearest of the others disagree most per minute."""
+    best: tuple[float, str] | None = None
+    wind = mean_measured_wind(like)
+    for proposal in proposals:
+        windows = _turning(one, _windows(proposal, like, wind), proposal, wind)
+        predicted = [_shown(ship, windows, proposal) for ship in (one, *others)]
+        if any(values is None for values in predicted):
+            continue
+        first, *rest = predicted
+        minutes = len(proposal.inputs) * proposal.sample_time_s / 60
+        assert first is not None
+        apart = min(float(np.nansum(((first - other) / std) ** 2)) for other in rest if other is not None) / minutes
+        if best is None or apart > best[0]:
+            best = apart, proposal.name
+    return best[1] if best and best[0] > 0 else None
+
+
+def mean_measured_wind(like: Windows) -> Array | None:
+    """(2,) mean velocity of the air to north and east in data that measure it [m/s]."""
+    if not like.has_wind:
+        return None
+    c, s = np.cos(like.heading), np.sin(like.heading)
+    u, v = np.moveaxis(like.wind, -1, 0)
+    return np.array([np.mean(u * c - v * s), np.mean(u * s + v * c)])
+
+
+def _sailed(ship: ExtendedModel, windows: Windows, proposal: Proposal) -> Motion:
+    start = np.zeros((len(HEADINGS), ship.states))
+    start[:, :3] = proposal.velocity
+    return simulate_windows(ship, windows, start)
+
+
+def _shown(ship: ExtendedModel, windows: Windows, proposal: Proposal) -> Array | None:
+    motion = _sailed(ship, windows, proposal)
+    return None if motion.diverged else motion.predicted
+
+
+def _turning(ship: ExtendedModel, windows: Windows, proposal: Proposal, wind: Array | None) -> Windows:
+    """The same with the heading as the ship turns: what is fixed in the n-frame comes from all sides in a circle."""
+    for _ in range(ROUNDS):
+        heading_change = _sailed(ship, windows, proposal).heading_change
+        heading = np.array(HEADINGS)[:, None] + heading_change
+        windows = replace(windows, heading=heading, wind=_air(wind, heading))
+    return windows
+
+
+def _air(wind: Array | None, heading: Array) -> Array:
+    """(w, k, 2) a steady wind in the b-frame; none where it is not measured."""
+    return np.zeros((*heading.shape, 2)) if wind is None else np.stack(to_body(wind, heading, NUMPY), axis=-1)
+
+
+def _windows(proposal: Proposal, like: Windows, wind: Array | None) -> Windows:
+    """A window per heading, which does not change yet, in the mean wind."""
+    substeps = max(1, int(np.ceil(proposal.sample_time_s / like.step_s - 1e-9)))
+    inputs = np.repeat(proposal.inputs, substeps, axis=0)
+    count, w = len(inputs), len(HEADINGS)
+    heading = np.repeat(np.array(HEADINGS)[:, None], count, axis=1)
+    return Windows(
+        step_s=proposal.sample_time_s / substeps,
+        steps_per_sample=substeps,
+        batch=np.zeros(w),
+        batch_inputs=(inputs,),
+        first=np.zeros(w),
+        measured=np.zeros((w, -(-count // substeps), 4)),
+        heading=heading,
+        wind=_air(wind, heading),
+        depth_m=np.full((w, count), float(np.median(like.depth_m))),
+        time_s=np.broadcast_to(1e9 + np.arange(count, dtype=float), (w, count)),
+        has_heading=True,
+        has_wind=wind is not None,
+        has_depth=False,
+        derived=like.derived,
+        names=(proposal.name,),
+    )
+
+
+def standard_proposals(like: Windows, inputs: tuple[str, ...], sample_time_s: float) -> tuple[Proposal, ...]:
+    """Manoeuvres of the standard families within the inputs that the data use, each of as many compared samples."""
+    rows = np.concatenate(like.batch_inputs)
+    middle, low, high = np.median(rows, axis=0), np.quantile(rows, 0.05, axis=0), np.quantile(rows, 0.95, axis=0)
+    velocity = np.nanmedian(like.measured[..., :3].reshape(-1, 3), axis=0)
+    velocity = np.array([velocity[0], 0.0, 0.0])
+    count = max(40, round(PROPOSED * like.sample_s / sample_time_s))
+    time = np.arange(count) / count
+    steering = [i for i, n in enumerate(inputs) if stem(n) in ("a", "rudder", "tau_psi", "tau_y")]
+    driving = [i for i in range(len(inputs)) if i not in steering]
+    rng = np.random.default_rng(0)
+    shapes: Mapping[str, tuple[list[int], Array]] = {
+        "zigzag": (steering, np.sign(np.sin(2 * np.pi * 4 * time))),
+        "zigzag_long": (steering, np.sign(np.sin(2 * np.pi * 2 * time))),
+        "turning_circle": (steering, np.ones(count)),
+        "turning_circle_port": (steering, -np.ones(count)),
+        "acceleration": (driving, np.where(time < 0.2, -1.0, 1.0)),
+        "deceleration": (driving, np.where(time < 0.2, 1.0, -1.0)),
+        "inward_spiral": (steering, time),
+        "telegraph": ([*steering, *driving], np.repeat(rng.choice([-1.0, 1.0], 13), -(-count // 13))[:count]),
+        "straight": ([], np.zeros(count)),
+    }
+    proposals = []
+    for name, (which, shape) in shapes.items():
+        commands = np.tile(middle, (count, 1))
+        for index in which:
+            span = np.where(shape > 0, high[index] - middle[index], middle[index] - low[index])
+            commands[:, index] = middle[index] + shape * span
+        if which or name == "straight":
+            proposals.append(Proposal(name=name, inputs=commands, velocity=velocity, sample_time_s=sample_time_s))
+    return tuple(proposals)

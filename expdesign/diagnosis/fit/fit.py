@@ -1,0 +1,119 @@
+"""A fit of effects and uncertain parameters, and likelihoods of fits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from expdesign.diagnosis.data import Noise
+from expdesign.diagnosis.fit.gram_matrices import information
+from expdesign.diagnosis.fit.linear_model import Sensitivities
+from expdesign.diagnosis.fit.tuning import TUNING
+from expdesign.diagnosis.model import ExtendedModel
+from expdesign.diagnosis.motion import LinearisedMotion
+from expdesign.values import Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Fit:
+    """A model with effects fitted to all windows.
+
+    Attributes:
+        ship: with the fitted effects.
+        keys: the estimated effects, in order; uncertain parameters last.
+        free_count: how many of them have no prior.
+        covariance: (c, c).
+        starts: (w, n) initial states.
+        noise: of the remainder.
+        cost: weighted squared error at the end, while fitting.
+        linear, sensitivities: at the end.
+        precision: (c,) of the effects' priors.
+        step: (c,) to the best of the linear model.
+        converged: a further step would hardly lower the cost.
+    """
+
+    ship: ExtendedModel
+    keys: tuple[str, ...]
+    free_count: int
+    covariance: Array
+    starts: Array
+    noise: Noise
+    cost: float
+    linear: LinearisedMotion
+    sensitivities: Sensitivities
+    precision: Array
+    step: Array
+    converged: bool
+
+    @property
+    def free_keys(self) -> tuple[str, ...]:
+        """Estimated effects without a prior."""
+        return self.keys[: self.free_count]
+
+    def value(self, key: str) -> float:
+        """Estimate."""
+        return self.ship.get(key)
+
+    def std(self, key: str) -> float:
+        """Standard error."""
+        index = self.keys.index(key)
+        return float(np.sqrt(max(self.covariance[index, index], 0.0)))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FitOptions:
+    """How a fit begins and ends.
+
+    Attributes:
+        noise: first guess; estimated from white noise without one.
+        ar_order: of the noise's autoregressions, or None to choose it.
+        steps: Gauss-Newton steps, at most.
+        warm_start: linearised motion of a similar ship over the same windows; faster, with the same result.
+        fixed_weights: judge a step with the weights of initial states and random current where it began. They depend on
+            the effects, but a step of weighted least squares ignores that, and may raise the cost with weights of its
+            own. Fits that are compared with each other must be judged with their own weights.
+    """
+
+    noise: Noise | None = None
+    ar_order: int | None = None
+    steps: int = TUNING.steps
+    warm_start: LinearisedMotion | None = None
+    fixed_weights: bool = False
+
+
+def continuing(found: Fit, *, steps: int = TUNING.steps) -> FitOptions:
+    """Options of a fit that starts from another one: its noise, its order, its motion."""
+    return FitOptions(noise=found.noise, ar_order=found.noise.order, warm_start=found.linear, steps=steps)
+
+
+def uncertain_keys(ship: ExtendedModel) -> tuple[str, ...]:
+    """Parameters with a standard deviation in the vessel file."""
+    model = ship.model
+    return tuple(f"theta:{n}" for n, std in zip(model.names, model.parameter_std, strict=True) if std > 0)
+
+
+def prior_precision(ship: ExtendedModel, keys: tuple[str, ...]) -> Array:
+    """(c,) of effects: 1 / std^2 of uncertain parameters, else zero."""
+    model = ship.model
+    std = {f"theta:{n}": s for n, s in zip(model.names, model.parameter_std.tolist(), strict=True)}
+    return np.array([1.0 / std[key] ** 2 if std.get(key, 0.0) > 0 else 0.0 for key in keys])
+
+
+def values_of(ship: ExtendedModel, keys: tuple[str, ...]) -> Array:
+    """(c,) values of effects."""
+    return np.array([ship.get(key) for key in keys])
+
+
+def profile_cost(found: Fit, noise: Noise) -> float:
+    """Twice the negative log likelihood under some noise, every effect at its best in the linear model."""
+    m = information(found.sensitivities, noise)
+    now = values_of(found.ship, found.keys)
+    score = m.s - found.precision * now
+    best = score @ np.linalg.lstsq(m.A + np.diag(found.precision), score, rcond=None)[0] if len(now) else 0.0
+    return float(m.quadratic + found.precision @ now**2 - best)
+
+
+def log_likelihood_gain(base: Fit, found: Fit, judge: Fit) -> float:
+    """Likelihood ratio statistic of `found` against `base`, both under the noise of a third fit."""
+    return profile_cost(base, judge.noise) - profile_cost(found, judge.noise)

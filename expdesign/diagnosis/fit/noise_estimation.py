@@ -1,0 +1,92 @@
+"""Noise of the remainder, estimated together with a fit: autoregressions and a random current."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from expdesign.diagnosis.data import Noise, channel_std, fit_ar_noise, white_noise
+from expdesign.diagnosis.fit.gram_matrices import (
+    GramMatrices,
+    current_prior,
+    gram_matrices,
+    initial_state_steps,
+    marginalised,
+)
+from expdesign.diagnosis.fit.linear_model import Sensitivities
+from expdesign.diagnosis.fit.tuning import TUNING
+from expdesign.values import Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Prior:
+    """What is known of the estimated effects beforehand.
+
+    Attributes:
+        precision: (c,) of the Gaussian priors around zero change; zero for effects without a prior.
+        now: (c,) the effects that the sensitivities are taken at.
+    """
+
+    precision: Array
+    now: Array
+
+
+def estimate_noise(found: Sensitivities, prior: Prior, noise: Noise | None, *, ar_order: int | None) -> Noise:
+    """Noise of what remains after the best linear answer.
+
+    Args:
+        found: sensitivities and error.
+        prior: of the estimated effects.
+        noise: a first guess; without one the estimate takes a few passes from white noise.
+        ar_order: of the autoregressions, or None to choose it.
+    """
+    passes = 1
+    if noise is None:
+        size = channel_std(found.error)
+        noise, passes = white_noise(np.where(size > 0, size, np.inf)), TUNING.first_noise_passes
+    for _ in range(passes):
+        grams = gram_matrices(found, noise)
+        noise = _estimate_random_current(grams, found, noise, prior)
+        ar_noise = fit_ar_noise(_remainder(grams, found, noise, prior), order=ar_order)
+        noise = replace(ar_noise, current_std_mps=noise.current_std_mps, current_time_s=noise.current_time_s)
+    return noise
+
+
+def _estimate_random_current(grams: GramMatrices, found: Sensitivities, noise: Noise, prior: Prior) -> Noise:
+    """Standard deviation and correlation time of the random current with the largest restricted likelihood."""
+    if grams.XX.shape[1] == found.numbers:
+        return noise
+    best: tuple[float, Noise] = (np.inf, noise)
+    for std_mps in TUNING.current_stds_mps:
+        for time_s in TUNING.current_times_s if std_mps else TUNING.current_times_s[:1]:
+            trial = replace(noise, current_std_mps=std_mps, current_time_s=time_s)
+            m = marginalised(grams, found, trial)
+            A = m.A + np.diag(prior.precision)
+            cost = m.log_det + m.quadratic - float(m.s @ np.linalg.lstsq(A, m.s, rcond=None)[0])
+            cost += float(np.linalg.slogdet(A + 1e-12 * np.diag(np.diag(A) + 1e-30))[1])
+            if cost < best[0] - 1e-9:
+                best = (cost, trial)
+    return best[1]
+
+
+def _remainder(grams: GramMatrices, found: Sensitivities, noise: Noise, prior: Prior) -> Array:
+    """(w, s, 4) error less the best linear answer of effects and initial states, and less a likely random current.
+
+    The likeliest current would take noise with it and leave too little. A current drawn from its posterior does not
+    (stochastic EM: G. Celeux and J. Diebolt, Computational Statistics Quarterly 2 (1985), 73-82). The draw uses the
+    same random numbers every time, so that fits of candidates differ by what they explain and not by chance.
+    """
+    m = marginalised(grams, found, noise)
+    c = found.numbers
+    score = m.s - prior.precision * prior.now
+    step = np.linalg.lstsq(m.A + np.diag(prior.precision), score, rcond=None)[0] if c else np.zeros(0)
+    rest = found.error - np.tensordot(step, found.values[:c], axes=(0, 0))
+    if noise.current_std_mps > 0 and found.knot_count:
+        ZZ = grams.XX[:, c:, c:] + np.linalg.inv(current_prior(found, noise))
+        b = np.linalg.solve(ZZ, (grams.Xe[:, c:] - grams.XX[:, c:, :c] @ step)[..., None])[..., 0]
+        normal = np.random.default_rng(0).standard_normal((*b.shape, 1))
+        b = b + np.linalg.solve(np.swapaxes(np.linalg.cholesky(ZZ), 1, 2), normal)[..., 0]
+        rest = rest - np.einsum("wz,zwsn->wsn", b, found.values[c:])
+    starts = initial_state_steps(found, rest, noise)
+    return np.asarray(rest - np.einsum("wn,nwsk->wsk", starts, found.starts))

@@ -1,0 +1,49 @@
+"""Numbers that steer fits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tuning:
+    """Numbers of this room. "Cost" is twice the negative log likelihood.
+
+    Attributes:
+        steps: Gauss-Newton steps of a fit, at most.
+        converged_below: a fit has converged when the next step would lower the cost by less than this.
+        allowed_rise: a step may raise the cost by this, because the noise that it is measured with is an estimate.
+        halvings: of a step that costs more.
+        first_noise_passes: alternations between numbers and noise where nothing is known of the noise.
+        current_stds_mps: standard deviations of the random current that are tried [m/s].
+        current_times_s: correlation times of the random current that are tried [s].
+        knot_spacing_s: of the random current, at least [s].
+        most_knots: of the random current in a window.
+        largest_sensitivity: beyond it the model counts as unstable.
+        smallest_factor_change: factors of inertia, thrust and gyro stay above one plus this.
+        largest_ratio: times and widths change by this factor in a step, at most.
+        fewest_runs: for cluster-robust standard errors.
+        folds: of the cross-validation.
+        fold_steps: Gauss-Newton steps from the fit to all units to the fit without a fold.
+        bootstrap_draws: of units, for intervals.
+    """
+
+    steps: int = 8
+    converged_below: float = 0.05
+    allowed_rise: float = 1.0
+    halvings: int = 5
+    first_noise_passes: int = 3
+    current_stds_mps: tuple[float, ...] = (0.0, 0.005, 0.01, 0.02, 0.035, 0.06, 0.1, 0.2)
+    current_times_s: tuple[float, ...] = (60.0, 150.0, 400.0, 1000.0)
+    knot_spacing_s: float = 20.0
+    most_knots: int = 24
+    largest_sensitivity: float = 1e30
+    smallest_factor_change: float = -0.8
+    largest_ratio: float = 3.0
+    fewest_runs: int = 10
+    folds: int = 3
+    fold_steps: int = 6
+    bootstrap_draws: int = 1000
+
+
+TUNING = Tuning()

@@ -1,0 +1,111 @@
+"""A simulation model with effects added to it: every cause of the catalogue is a few named numbers, zero for "absent".
+
+Effects, by key:
+
+    theta:NAME            change of a model parameter
+    term:NAME             coefficient of a library term that the model lacks
+    current:north/east    steady current [m/s]
+    wind:north/east       mean wind where none is measured [m/s]; wind:speed [m/s] and wind:toward [rad] likewise
+    gain, gain:propeller  thrust too strong by this share; all terms of inputs, or those without a rudder
+    asymmetry             yaw moment per unit of ahead force: the thrust's line of action passes this far to port [m]
+    offset:GROUP          added to the angles of a group of inputs [rad]
+    lag:GROUP, delay:GROUP, deadband:GROUP    of a group of inputs [s], [s], [unit of the input]
+    inertia:u/v/r         inertia too small by this share
+    shallow:damping, shallow:inertia          growth per unit of draught over depth
+    roll:sway, roll:yaw   acceleration per unit of roll; roll:period [s] and roll:damping say which (`vessel.roll`)
+    change:time           [s]; change:gain, change:damping, change:damping_u/v/r act after it
+    heading_bias [rad], lever:forward/starboard [m], gyro (share), late:u/v/r/psi/position [s]   (sensors)
+
+Measured sway is v + u sin(heading_bias): velocities that come from the pose are turned so by a compass that shows too
+little, others by a sensor whose axes lie anticlockwise of the ship's. The lever is that of the position's antenna or of
+the velocity sensor likewise.
+
+A GROUP is the stem of input names ("n", "a", "rudder", "tau_x", ...), one input, or "all".
+
+What a vessel file states is where the search for a better value begins; every test is of the difference.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Set
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+from expdesign.diagnosis.model.terms import Effects, ScaledTerm, library_terms, own_terms
+from expdesign.vessel import Roll, Term, VesselModel
+
+ANGLE_STEMS = ("a", "rudder")
+ROLL = {"roll:period": "period_s", "roll:damping": "damping_ratio", "roll:sway": "Y_phi", "roll:yaw": "N_phi"}
+"""Effect -> attribute of a `Roll`."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ExtendedModel:
+    """A model with effects.
+
+    Attributes:
+        model: driven by the recorded inputs.
+        library: terms that the model lacks, by name.
+        draught_m: of the ship [m].
+        derived: those of u, v, r that the data derive from the pose, by its sensors.
+        shoalest: largest draught over depth in the data, 0 where no depth is known.
+        effects: key -> value; what is left out is zero.
+        stated: effects as the vessel file states them.
+    """
+
+    model: VesselModel
+    library: Mapping[str, Term]
+    draught_m: float
+    derived: tuple[str, ...] = ()
+    max_draught_over_depth: float = 0.0
+    effects: Effects = field(default_factory=dict)
+    stated: Effects = field(default_factory=dict)
+    scaled_terms: tuple[ScaledTerm, ...] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        parts = (
+            *own_terms(self.model, self.effects),
+            *library_terms(self.model, self.library, self.effects),
+        )
+        object.__setattr__(self, "scaled_terms", parts)
+
+    def with_effects(self, effects: Effects) -> ExtendedModel:
+        """The same with some effects set to other values."""
+        return replace(self, effects={**self.effects, **effects})
+
+    def without_effects(self, keys: Set[str]) -> ExtendedModel:
+        """The same with some effects as the vessel file states them, if it does."""
+        others = {key: value for key, value in self.effects.items() if key not in keys}
+        return replace(self, effects=others | {key: value for key, value in self.stated.items() if key in keys})
+
+    def has_found(self, prefix: str) -> bool:
+        """Some effect whose key begins so is not as the vessel file has it."""
+        return any(key.startswith(prefix) and value != self.stated.get(key) for key, value in self.effects.items())
+
+    def get(self, key: str) -> float:
+        """Value of an effect."""
+        return self.effects.get(key, 0.0)
+
+    @property
+    def has_roll(self) -> bool:
+        """Roll is part of the motion."""
+        return "roll:period" in self.effects
+
+    @cached_property
+    def roll(self) -> Roll | None:
+        """The mode."""
+        if not self.has_roll:
+            return None
+        return Roll(**{name: self.get(key) for key, name in ROLL.items()})
+
+    @property
+    def states(self) -> int:
+        """u, v, r, and with roll its angle and rate."""
+        return 5 if self.has_roll else 3
+
+
+def mean_wind(ship: ExtendedModel) -> tuple[float, float]:
+    """Velocity to north and east of the wind where none is measured [m/s]."""
+    speed, toward = ship.get("wind:speed"), ship.get("wind:toward")
+    return ship.get("wind:north") + speed * math.cos(toward), ship.get("wind:east") + speed * math.sin(toward)

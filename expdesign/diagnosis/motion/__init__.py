@@ -1,0 +1,20 @@
+"""Simulation of the extended model over all windows, and its linearisation."""
+
+from expdesign.diagnosis.motion.linearisation import Disturbance, disturbance_of, linearise, responses, start_responses
+from expdesign.diagnosis.motion.motion import LinearisedMotion, Motion
+from expdesign.diagnosis.motion.simulation import initial_states, simulate_from_measured, simulate_windows
+from expdesign.diagnosis.motion.window_length import stable_windows
+
+__all__ = [
+    "Disturbance",
+    "LinearisedMotion",
+    "Motion",
+    "disturbance_of",
+    "initial_states",
+    "linearise",
+    "responses",
+    "simulate_from_measured",
+    "simulate_windows",
+    "stable_windows",
+    "start_responses",
+]

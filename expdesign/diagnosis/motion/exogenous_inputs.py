@@ -1,0 +1,103 @@
+"""What acts on an extended model from outside: inputs, water, air, depth and time."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import convolve1d
+
+from expdesign.diagnosis.data import Windows, averaging_half_width
+from expdesign.diagnosis.model import ExtendedModel, mean_wind
+from expdesign.diagnosis.motion.delivered_inputs import delivered_inputs
+from expdesign.simulation.motion import to_body
+from expdesign.values import Array
+from expdesign.vessel import NUMPY, VesselModel, generalised_force
+from expdesign.vessel.structures import FORCE_SIGNALS, SHOAL
+
+RISE = "rise "
+
+
+class ExogenousInputs(dict[str, Array]):
+    """What acts on the ship at the integrator steps (w, k): inputs and forces by signal name, and besides.
+
+    `u_c v_c` water and `u_w v_w` air, their velocity in the b-frame [m/s], where they move;
+    `h`, draught over depth, and `after`, one after a change of the ship, where the model reads such things.
+    Values are means over each step; signals that move within steps also have a rise, `rise NAME`, from the beginning
+    of each step to its end, by which a force counts when it acts.
+    """
+
+    def at(self, step: int) -> ExogenousInputs:
+        """One integrator step of every window."""
+        return ExogenousInputs({name: values[:, step] for name, values in self.items()})
+
+    def at_fraction(self, share: float) -> ExogenousInputs:
+        """At a place within the steps, from -0.5 at their beginning to 0.5 at their end."""
+        rises = [name for name in self if name.startswith(RISE)]
+        if not rises:
+            return self
+        moved = {name.removeprefix(RISE): self[name.removeprefix(RISE)] + share * self[name] for name in rises}
+        return ExogenousInputs({**self, **moved})
+
+    def without_last_step(self) -> ExogenousInputs:
+        """All steps but the last."""
+        return ExogenousInputs({name: values[:, :-1] for name, values in self.items()})
+
+
+def exogenous_inputs(ship: ExtendedModel, windows: Windows) -> ExogenousInputs:
+    """Everything outside the ship, with the inputs as its actuators follow them."""
+    model, shape = ship.model, windows.heading.shape
+    names = (*dict.fromkeys((*model.inputs, *FORCE_SIGNALS)),)
+    followed = delivered_inputs(ship, windows)
+    moving = any(finer > 1 for _, finer in followed)
+    signals = windows.gather(tuple(_acting(model, *rows, windows.rows_per_step) for rows in followed))
+    names = (*names, *(f"{RISE}{name}" for name in names)) if moving else names
+    table = ExogenousInputs({n: np.broadcast_to(signals[..., i], shape) for i, n in enumerate(names)})
+    north, east = ship.get("current:north"), ship.get("current:east")
+    if north or east:
+        table["u_c"], table["v_c"] = to_body((north, east), true_heading(ship, windows), NUMPY)
+    if any(part.reads_air for part in ship.scaled_terms):
+        table["u_w"], table["v_w"] = _wind(ship, windows)
+    if model.reads_depth or any(key.startswith("shallow:") for key in ship.effects):
+        table[SHOAL] = ship.draught_m / windows.depth_m
+    if "change:time" in ship.effects:
+        since = windows.time_s + windows.step_s - ship.effects["change:time"]
+        table["after"] = np.clip(since / windows.step_s, 0.0, 1.0)  # share of the step
+    return table
+
+
+def _acting(model: VesselModel, rows: Array, finer: int, rows_per_step: int) -> Array:
+    """(k, m) inputs and forces, each its mean over the finer steps that it is known at, and (k, m) their rises.
+
+    A straight line of that mean and rise has the mean and the first moment that the signal has within the step. Where
+    what is measured is averaged over samples, so is the signal: the motion that it drives is then the mean motion.
+    """
+    table = dict(zip(model.inputs, rows.T, strict=True))
+    forces = generalised_force(model.actuators, table, NUMPY)
+    table |= dict(zip(FORCE_SIGNALS, forces, strict=True))
+    columns = [np.broadcast_to(np.asarray(values, dtype=float), len(rows)) for values in table.values()]
+    known = _averaged(np.stack(columns, axis=-1), finer, rows_per_step).reshape(len(rows) // finer, finer, -1)
+    place = (np.arange(finer) + 0.5) / finer - 0.5
+    rises = 12.0 * np.einsum("f,kfm->km", place, known) / finer
+    return np.asarray(np.column_stack([known.mean(axis=1), rises]))
+
+
+def _averaged(values: Array, finer: int, rows_per_step: int) -> Array:
+    """Means over the samples that are averaged around every instant."""
+    half, apart = averaging_half_width(rows_per_step), finer // rows_per_step
+    if not half:
+        return values
+    taps = np.zeros(2 * half * apart + 1)
+    taps[::apart] = 1.0 / (2 * half + 1)
+    return np.asarray(convolve1d(values, taps, axis=0, mode="nearest"))
+
+
+def _wind(ship: ExtendedModel, windows: Windows) -> tuple[Array, Array]:
+    """Measured where it is, else the mean wind of the model."""
+    if windows.has_wind:
+        return windows.wind[..., 0], windows.wind[..., 1]
+    u_w, v_w = to_body(mean_wind(ship), true_heading(ship, windows), NUMPY)
+    return u_w, v_w
+
+
+def true_heading(ship: ExtendedModel, windows: Windows) -> Array:
+    """(w, k) heading, that of a wrong compass put right: where velocities come from the pose, the compass is wrong."""
+    return windows.heading + ship.get("heading_bias") if "u" in ship.derived else windows.heading

@@ -1,0 +1,73 @@
+"""One integrator step of an extended model, and its derivatives by the state."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from expdesign.diagnosis.model import ExtendedModel
+from expdesign.diagnosis.motion.equations_of_motion import state_rates
+from expdesign.diagnosis.motion.exogenous_inputs import ExogenousInputs
+from expdesign.diagnosis.motion.tuning import TUNING
+from expdesign.values import Array
+
+
+def runge_kutta_step(
+    ship: ExtendedModel, x: tuple[Array, ...], exogenous: ExogenousInputs, h: float
+) -> tuple[tuple[Array, ...], Array]:
+    """The state one step on, and the heading gained; roll that is quick beside the step is followed in parts of it."""
+    turn = 0.0 if ship.roll is None else 2 * math.pi * h / ship.roll.period_s
+    parts = min(max(1, math.ceil(turn / TUNING.roll_angle_rad)), TUNING.most_roll_parts)
+    heading_gain: Array | float = 0.0
+    for part in range(parts):
+        stages = [exogenous.at_fraction((part + share) / parts - 0.5) for share in (0.0, 0.5, 1.0)]
+        x, more = _rk4_part(ship, x, stages, h / parts)
+        heading_gain = heading_gain + more
+    return x, np.asarray(heading_gain)
+
+
+def _rk4_part(
+    ship: ExtendedModel, x: tuple[Array, ...], exogenous: Sequence[ExogenousInputs], h: float
+) -> tuple[tuple[Array, ...], Array]:
+    """With surroundings at the beginning, in the middle and at the end."""
+    begin, middle, end = exogenous
+
+    def ahead(slope: tuple[Array, ...], share: float) -> tuple[Array, ...]:
+        return tuple(np.clip(a + share * h * b, -1e3, 1e3) for a, b in zip(x, slope, strict=True))
+
+    k1 = state_rates(ship, x, begin)
+    k2 = state_rates(ship, x2 := ahead(k1, 0.5), middle)
+    k3 = state_rates(ship, x3 := ahead(k2, 0.5), middle)
+    k4 = state_rates(ship, x4 := ahead(k3, 1.0), end)
+    transition = tuple(a + h / 6 * (p + 2 * q + 2 * s + t) for a, p, q, s, t in zip(x, k1, k2, k3, k4, strict=True))
+    return transition, h / 6 * (x[2] + 2 * x2[2] + 2 * x3[2] + x4[2])
+
+
+def state_jacobian(ship: ExtendedModel, states: Array, exogenous: ExogenousInputs) -> Array:
+    """(w, k, n, n) derivatives of the rates, by central differences."""
+    n = ship.states
+    jacobian = np.empty((*states.shape, n))
+    for axis in range(n):
+        step = np.zeros(n)
+        step[axis] = TUNING.difference
+        jacobian[..., axis] = (
+            stacked_rates(ship, states + step, exogenous) - stacked_rates(ship, states - step, exogenous)
+        ) / (2 * TUNING.difference)
+    return jacobian
+
+
+def transition_matrices(jacobian: Array, h: float) -> tuple[Array, Array]:
+    """Transition over a step, and the effect of a constant acceleration over it, to fourth order."""
+    A = jacobian * h
+    eye = np.eye(A.shape[-1])
+    A2 = A @ A
+    A3 = A2 @ A
+    return eye + A + A2 / 2 + A3 / 6 + A3 @ A / 24, h * (eye + A / 2 + A2 / 6 + A3 / 24)
+
+
+def stacked_rates(ship: ExtendedModel, states: Array, exogenous: ExogenousInputs) -> Array:
+    """(w, k, n) rates of states (w, k, n)."""
+    found = state_rates(ship, tuple(np.moveaxis(states, -1, 0)), exogenous)
+    return np.stack([np.broadcast_to(part, states.shape[:2]) for part in found], axis=-1)

@@ -1,0 +1,134 @@
+"""Simulation of all windows at once, and how small causes move it.
+
+The response to a small cause is that of the linearised motion to the change of acceleration that the cause makes along
+the simulated path; all causes share one linearisation, so hundreds of them cost little more than one simulation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from expdesign.diagnosis.model import ExtendedModel
+from expdesign.diagnosis.motion.exogenous_inputs import exogenous_inputs
+from expdesign.diagnosis.motion.integration import stacked_rates, state_jacobian, transition_matrices
+from expdesign.diagnosis.motion.motion import LinearisedMotion, Motion
+from expdesign.diagnosis.motion.sensors import sensor_outputs, simpson_mean
+from expdesign.values import Array
+
+INNER, OUTER = {"theta", "term", "gain", "inertia", "asymmetry"}, {"lever", "gyro"}
+"""Kinds of effects that change neither surroundings nor sensors, and those that change sensors alone."""
+
+
+def linearise(motion: Motion) -> LinearisedMotion:
+    """Transition matrices from finite differences of the rates, all steps at once."""
+    ends = (motion.states[:, :-1], motion.states[:, 1:])
+    exogenous = motion.exogenous.without_last_step()
+    path_rates = np.stack([stacked_rates(motion.ship, end, exogenous) for end in ends])
+    jacobian = (state_jacobian(motion.ship, ends[0], exogenous) + state_jacobian(motion.ship, ends[1], exogenous)) / 2
+    transition, forcing = transition_matrices(jacobian, motion.windows.step_s)
+    return LinearisedMotion(motion=motion, transition=transition, forcing=forcing, path_rates=path_rates)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Disturbance:
+    """A small cause along a path.
+
+    Attributes:
+        force: (w, k - 1, n) change of the rates per unit of the cause, or None.
+        sensor: (w, s, 4) change of what sensors show by themselves, or None.
+    """
+
+    force: Array | None
+    sensor: Array | None
+
+
+def disturbance_of(linear: LinearisedMotion, changed: ExtendedModel, per: float) -> Disturbance:
+    """What a change of effects does along the path, divided by `per`."""
+    motion = linear.motion
+    kinds = {key.split(":")[0] for key in _differing(motion.ship, changed)}
+    sensor = force = np.zeros(1)
+    if kinds - INNER:
+        sensor = sensor_outputs(changed, motion.states, motion.windows, motion.heading_change) - motion.predicted
+    if kinds - OUTER:
+        known = not kinds - INNER and (
+            "u_w" in motion.exogenous or not any(part.reads_air for part in changed.scaled_terms)
+        )
+        exogenous = (motion.exogenous if known else exogenous_inputs(changed, motion.windows)).without_last_step()
+        ends = (motion.states[:, :-1], motion.states[:, 1:])
+        force = np.mean([stacked_rates(changed, end, exogenous) for end in ends], axis=0) - linear.path_rates.mean(
+            axis=0
+        )
+    return Disturbance(
+        force=force / per if np.any(force) else None,
+        sensor=sensor / per if np.any(sensor) else None,
+    )
+
+
+def _differing(one: ExtendedModel, other: ExtendedModel) -> set[str]:
+    """Effects that two ships do not share."""
+    keys = {*one.effects, *other.effects}
+    return {key for key in keys if one.effects.get(key) != other.effects.get(key)}
+
+
+def responses(linear: LinearisedMotion, disturbances: Sequence[Disturbance]) -> Array:
+    """(c, w, s, 4) how the shown channels answer each push, from undisturbed initial states.
+
+    Answers of an unstable motion may grow beyond what numbers hold.
+    """
+    motion = linear.motion
+    n = motion.ship.states
+    w, k = motion.states.shape[:2]
+    moved = np.zeros((len(disturbances), w, k, n))
+    forces = {
+        index: disturbance.force for index, disturbance in enumerate(disturbances) if disturbance.force is not None
+    }
+    forcing = list(forces)
+    if forcing:
+        kicks = np.stack([np.einsum("wkij,wkj->wki", linear.forcing, force) for force in forces.values()], axis=-1)
+        x = np.zeros((w, n, len(forcing)))
+        path = np.zeros((k, w, n, len(forcing)))
+        with np.errstate(over="ignore", invalid="ignore"):
+            for step in range(k - 1):
+                x = linear.transition[:, step] @ x + kicks[:, step]
+                path[step + 1] = x
+        moved[forcing] = np.moveaxis(path, (3, 1, 0, 2), (0, 1, 2, 3))
+    with np.errstate(over="ignore", invalid="ignore"):
+        result = _shown(linear, moved)
+    for index, disturbance in enumerate(disturbances):
+        if disturbance.sensor is not None:
+            result[index] += disturbance.sensor
+    return np.nan_to_num(result, nan=0.0, posinf=0.0, neginf=0.0)
+
+
+def start_responses(linear: LinearisedMotion) -> Array:
+    """(3, w, s, 4) answers to unit initial velocities of every window; roll begins at rest."""
+    motion = linear.motion
+    w, k, n = motion.states.shape
+    x = np.broadcast_to(np.eye(n)[:, :3], (w, n, 3)).copy()
+    path = np.empty((k, w, n, 3))
+    path[0] = x
+    with np.errstate(over="ignore", invalid="ignore"):
+        for step in range(k - 1):
+            x = linear.transition[:, step] @ x
+            path[step + 1] = x
+        return _shown(linear, np.moveaxis(path, (3, 1, 0, 2), (0, 1, 2, 3)))
+
+
+def _shown(linear: LinearisedMotion, moved: Array) -> Array:
+    """Changes of the channels for changes of the states (c, w, k, n); sensors are nearly linear in the states."""
+    motion = linear.motion
+    if not any(key.startswith(("heading", "lever", "gyro", "late")) for key in motion.ship.effects):
+        windows = motion.windows
+        values = moved[:, :, :: windows.steps_per_sample, :3]
+        means = simpson_mean(np.moveaxis(values, -1, 0), windows.rows_per_step)
+        seen = [means[i] if n in windows.derived else values[..., i] for i, n in enumerate("uvr")]
+        return np.stack([*seen, means[2]], axis=-1)
+    size = 1e-4
+    still = sensor_outputs(motion.ship, motion.states, motion.windows)
+    changes = [
+        (sensor_outputs(motion.ship, motion.states + size * part, motion.windows) - still) / size for part in moved
+    ]
+    return np.array(changes).reshape(len(moved), *still.shape)

@@ -1,0 +1,79 @@
+"""A simulation of all windows, and its linearisation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from expdesign.diagnosis.data import Windows
+from expdesign.diagnosis.model import ExtendedModel
+from expdesign.diagnosis.motion.exogenous_inputs import ExogenousInputs
+from expdesign.diagnosis.motion.tuning import TUNING
+from expdesign.values import Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Motion:
+    """A simulation of all windows.
+
+    Attributes:
+        ship: what was simulated.
+        windows: the data it is set against.
+        around: inputs and surroundings.
+        states: (w, k, n) at integrator steps.
+        turned: (w, k) heading since the start [rad].
+        shown: (w, s, 4) what the sensors would show.
+    """
+
+    ship: ExtendedModel
+    windows: Windows
+    exogenous: ExogenousInputs
+    states: Array
+    heading_change: Array
+    predicted: Array
+
+    @property
+    def error(self) -> Array:
+        """(w, s, 4) measured less simulated, nan where nothing is measured."""
+        return np.asarray(self.windows.measured - self.predicted)
+
+    @property
+    def diverged(self) -> bool:
+        """A speed is out of all reason."""
+        return not bool(np.abs(self.states).max() < TUNING.largest_speed)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LinearisedMotion:
+    """The linearised motion along a simulation.
+
+    Attributes:
+        motion: where.
+        onward: (w, k - 1, n, n) transition over each step.
+        driven: (w, k - 1, n, n) effect of a constant acceleration over each step.
+        slopes: (w, k, n) rates along the path, of both ends of every step with its inputs, stacked (2, w, k - 1, n).
+    """
+
+    motion: Motion
+    transition: Array
+    forcing: Array
+    path_rates: Array
+
+    def selected(self, keep: NDArray[np.bool_]) -> LinearisedMotion:
+        """Only some of the windows, by a mask (w,)."""
+        motion = replace(
+            self.motion,
+            windows=self.motion.windows.selected(keep),
+            exogenous=ExogenousInputs({name: values[keep] for name, values in self.motion.exogenous.items()}),
+            states=self.motion.states[keep],
+            heading_change=self.motion.heading_change[keep],
+            predicted=self.motion.predicted[keep],
+        )
+        return LinearisedMotion(
+            motion=motion,
+            transition=self.transition[keep],
+            forcing=self.forcing[keep],
+            path_rates=self.path_rates[:, keep],
+        )

@@ -1,0 +1,126 @@
+"""Simulation of all windows at once."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from expdesign.conventions import OUTPUTS
+from expdesign.diagnosis.data import Windows
+from expdesign.diagnosis.model import ExtendedModel
+from expdesign.diagnosis.motion.exogenous_inputs import ExogenousInputs, exogenous_inputs
+from expdesign.diagnosis.motion.integration import runge_kutta_step, state_jacobian, transition_matrices
+from expdesign.diagnosis.motion.motion import LinearisedMotion, Motion
+from expdesign.diagnosis.motion.sensors import sensor_outputs, ship_velocities
+from expdesign.diagnosis.motion.tuning import TUNING
+from expdesign.values import Array
+
+
+def simulate_windows(
+    ship: ExtendedModel, windows: Windows, start: Array, *, warm_start: LinearisedMotion | None = None
+) -> Motion:
+    """Runge-Kutta of order four with inputs held over every step.
+
+    Args:
+        ship: model and effects.
+        windows: w windows.
+        start: (w, n) initial states.
+        near: linearised motion of a ship alike, which makes it quicker and no different.
+    """
+    exogenous = exogenous_inputs(ship, windows)
+    with np.errstate(over="ignore", invalid="ignore"):
+        states = None if warm_start is None else _newton_over_all_steps(ship, windows, exogenous, start, warm_start)
+        states = _step_by_step(ship, windows, exogenous, start) if states is None else states
+        turns = runge_kutta_step(
+            ship, tuple(np.moveaxis(states[:, :-1], -1, 0)), exogenous.without_last_step(), windows.step_s
+        )[1]
+    heading_change = np.zeros(states.shape[:2])
+    heading_change[:, 1:] = np.cumsum(turns, axis=1)
+    states = np.clip(np.nan_to_num(states, nan=1e3, posinf=1e3, neginf=-1e3), -1e3, 1e3)
+    heading_change = np.nan_to_num(heading_change, nan=1e3, posinf=1e3, neginf=-1e3)
+    predicted = sensor_outputs(ship, states, windows, heading_change)
+    return Motion(
+        ship=ship,
+        windows=windows,
+        exogenous=exogenous,
+        states=states,
+        heading_change=heading_change,
+        predicted=predicted,
+    )
+
+
+def _step_by_step(ship: ExtendedModel, windows: Windows, exogenous: ExogenousInputs, start: Array) -> Array:
+    """(w, k, n)."""
+    states = np.empty((len(start), windows.steps, ship.states))
+    states[:, 0] = start
+    x = tuple(start.T)
+    for step in range(windows.steps - 1):
+        x, _ = runge_kutta_step(ship, x, exogenous.at(step), windows.step_s)
+        states[:, step + 1] = np.stack(x, axis=-1)
+    return states
+
+
+def _newton_over_all_steps(
+    ship: ExtendedModel, windows: Windows, exogenous: ExogenousInputs, start: Array, warm_start: LinearisedMotion
+) -> Array | None:
+    """(w, k, n) by Newton's method for all steps as one system of equations, or None when that does not settle soon.
+
+    Every step is made at once from where the last round left it; what they miss each other by is handed on by the
+    transition matrices of the motion nearby. It ends where the steps join, which is what they do step by step.
+
+    Source: P. Bellen and M. Zennaro, Journal of Computational and Applied Mathematics 25 (1989), 341-350.
+    """
+    states = warm_start.motion.states
+    if states.shape != (len(start), windows.steps, ship.states):
+        return None
+    middle, last, transition = exogenous.without_last_step(), np.inf, warm_start.transition
+    for number in range(TUNING.newton_rounds):
+        made = np.stack(
+            runge_kutta_step(ship, tuple(np.moveaxis(states[:, :-1], -1, 0)), middle, windows.step_s)[0], axis=-1
+        )
+        change = _propagated(transition, start - states[:, 0], made - states[:, 1:])
+        size = float(np.abs(change).max())
+        if not size < min(TUNING.newton_divergence * last, TUNING.largest_speed):
+            return None
+        states, last = states + change, size
+        if size < TUNING.newton_tolerance:
+            return states
+        if size > TUNING.newton_refresh and number < TUNING.newton_rounds / 2:
+            transition, _ = transition_matrices(
+                state_jacobian(ship, (states[:, :-1] + states[:, 1:]) / 2, middle), windows.step_s
+            )
+    return None
+
+
+def _propagated(transition: Array, first: Array, missed: Array) -> Array:
+    """(w, k, n) what gaps (w, k - 1, n) between steps and at the start amount to."""
+    change = np.empty((missed.shape[1] + 1, *first.shape, 1))
+    change[0, ..., 0] = first
+    gaps, matrices = np.moveaxis(missed, 1, 0)[..., None], np.ascontiguousarray(np.moveaxis(transition, 1, 0))
+    for step, (matrix, gap) in enumerate(zip(matrices, gaps, strict=True)):
+        np.add(matrix @ change[step], gap, out=change[step + 1])
+    return np.moveaxis(change[..., 0], 0, 1)
+
+
+def initial_states(windows: Windows, states: int = 3) -> Array:
+    """(w, n) state at the beginning of every window: a straight line through its first samples, undisturbed roll."""
+    count = min(TUNING.start_samples, windows.measured.shape[1])
+    time = np.arange(count, dtype=float)
+    result = np.zeros((len(windows.measured), states))
+    for index, rows in enumerate(windows.measured[:, :count, :3]):
+        for channel in range(3):
+            seen = np.isfinite(rows[:, channel])
+            if seen.sum() >= 3:
+                result[index, channel] = np.polyfit(time[seen], rows[seen, channel], 1)[1]
+            elif seen.any():
+                result[index, channel] = rows[seen, channel].mean()
+    return result
+
+
+def simulate_from_measured(ship: ExtendedModel, windows: Windows, warm_start: LinearisedMotion | None = None) -> Motion:
+    """Every window from its own first measured state; a linearised motion nearby makes it quicker."""
+    start = initial_states(windows, ship.states)
+    start[:, :3] = ship_velocities(ship, start[:, :3])
+    for axis, name in enumerate(OUTPUTS):
+        if name not in ship.model.outputs:
+            start[:, axis] = 0.0
+    return simulate_windows(ship, windows, start, warm_start=warm_start)

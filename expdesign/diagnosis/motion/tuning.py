@@ -1,0 +1,46 @@
+"""Numbers that steer simulations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tuning:
+    """Numbers of this room.
+
+    Attributes:
+        largest_speed: state beyond which a simulation has diverged [m/s, rad/s].
+        difference: step of finite differences of the rates by the state.
+        actuator_substeps: parts of an integrator step in which moving actuators are followed, at least; forces are not
+            linear in angles.
+        roll_angle_rad: of a roll oscillation in one part of an integrator step, at most.
+        most_roll_parts: parts of an integrator step for roll.
+        newton_rounds: of a simulation of all steps at once.
+        newton_divergence: growth of the correction at which it is given up.
+        newton_refresh: correction above which the transition matrices are computed again.
+        newton_tolerance: correction below which it has converged.
+        start_samples: samples that measured initial states are estimated from.
+        fewest_windows: into which data are cut.
+        window_rounds: of shortening the windows of an unstable model.
+        fewest_window_samples: of shortened windows.
+        largest_growth: of an error of the initial state within a window.
+    """
+
+    largest_speed: float = 60.0
+    difference: float = 1e-5
+    actuator_substeps: int = 4
+    roll_angle_rad: float = 0.25
+    most_roll_parts: int = 16
+    newton_rounds: int = 12
+    newton_divergence: float = 5.0
+    newton_refresh: float = 3e-3
+    newton_tolerance: float = 1e-8
+    start_samples: int = 5
+    fewest_windows: int = 4
+    window_rounds: int = 4
+    fewest_window_samples: int = 30
+    largest_growth: float = 6.0
+
+
+TUNING = Tuning()

@@ -1,0 +1,105 @@
+"""Backward elimination: causes stay if they improve the simulation of held-out data and their sizes are significant."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from expdesign.diagnosis.causes import Candidate
+from expdesign.diagnosis.data import Windows
+from expdesign.diagnosis.fit import HeldOut, cluster_robust, held_out_gain, on_common_units
+from expdesign.diagnosis.select.selection import Selection, Step, least_significant_step, without_step
+from expdesign.diagnosis.select.tuning import TUNING
+
+
+def eliminate_backward(
+    found: Selection, windows: Windows, cross_validated: Callable[[Selection], list[HeldOut]], seed: int
+) -> tuple[Selection, list[HeldOut]]:
+    """Drop causes without held-out gain, and causes whose size is indistinguishable from zero.
+
+    Args:
+        found: the selection.
+        windows: data.
+        cross_validated: errors on held-out units of the model before any cause, then after every step.
+        seed: of the gains' intervals.
+
+    Returns:
+        The selection whose last fit has the standard errors that are reported, and the errors that belong to it.
+    """
+    reordered: list[Candidate] = []
+    while True:
+        held = cross_validated(found)
+        improves = improves_held_out(found, held, seed)
+        later = _moved_last(found, improves, windows, reordered)
+        if later is not None:
+            found = later
+            continue
+        found = before_first_without_gain(found, improves)
+        last = cluster_robust(found.last, windows.batch)
+        index = least_significant_step(found.steps, last)
+        others = None if index is None else without_step(list(found.steps), index, windows)
+        if others is None:
+            return replace(found, last=last), held
+        found = found.with_steps(tuple(others))
+
+
+def only_nuisance(step: Step, found: Selection) -> bool:
+    """Whether the step only says that uncertain parameters are beyond their stated standard deviations."""
+    return set(step.chosen.keys) <= set(found.first.keys)
+
+
+def _moved_last(
+    found: Selection, improves: Sequence[bool], windows: Windows, reordered: list[Candidate]
+) -> Selection | None:
+    """A cause without gain put after those that have one, once each; None where there is no such cause.
+
+    The fault of one sensor may seem to gain nothing while another fault of the same sensor is unknown.
+    """
+    steps = list(found.steps)
+    for index, step in enumerate(steps):
+        candidate = step.chosen.candidate
+        if improves[index] or not any(improves[index + 1 :]) or any(candidate is other for other in reordered):
+            continue
+        reordered.append(candidate)
+        others = without_step(steps, index, windows)
+        if others is not None:
+            last = replace(step, chosen=replace(step.chosen, fit=found.last), before=others[-1].chosen.fit)
+            return found.with_steps((*others, last))
+    return None
+
+
+def before_first_without_gain(found: Selection, improves: Sequence[bool]) -> Selection:
+    """The selection up to the first cause without gain."""
+    return found.with_steps(found.steps[: int(np.argmin([*improves, False]))])
+
+
+def improves_held_out(found: Selection, held: Sequence[HeldOut], seed: int) -> list[bool]:
+    """Which causes improve the simulation of held-out data.
+
+    The test of the first cause is more sensitive than any simulated fit. So the first cause stays, unless it makes the
+    simulation worse, or may cost more than a little and makes some output worse on average. (No model of a real ship is
+    exact, so something is always significant. Currents that vary make the intervals of few runs wide.) Later causes
+    need a gain: once a large error is explained, small differences between model and ship become significant. A small
+    gain counts if its interval excludes zero. Uncertain parameters are estimated anyway; as a cause they need no gain.
+    """
+    gains = [held_out_gain(one, other, seed) for one, other in pairwise(held)]
+    return [
+        _improves(index == 0 or only_nuisance(step, found), _no_output_worse(*held[index : index + 2]), gain, interval)
+        for index, (step, (gain, interval)) in enumerate(zip(found.steps, gains, strict=True))
+    ]
+
+
+def _no_output_worse(before: HeldOut, after: HeldOut) -> bool:
+    """No output is simulated worse on average."""
+    before, after = on_common_units(before, after)
+    return bool(len(before.squared_error) and (np.nan_to_num(after.fit - before.fit) >= 0.0).all())
+
+
+def _improves(certain: bool, no_output_worse: bool, gain: float, interval: tuple[float, float]) -> bool:
+    low, high = interval
+    if certain and high >= 0.0 and (low > -TUNING.most_loss_points or no_output_worse):
+        return True
+    return gain > TUNING.least_gain_points and (gain > TUNING.clear_gain_points or low > 0.0)

@@ -1,0 +1,102 @@
+"""Candidates fitted beside everything that was found before, and their likelihood gains."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from expdesign.diagnosis.causes import Candidate
+from expdesign.diagnosis.data import Windows
+from expdesign.diagnosis.fit import Fit, FitOptions, continuing, fit, log_likelihood_gain, profile_cost
+from expdesign.diagnosis.select.short_windows import start_nearer
+from expdesign.diagnosis.select.starting_point import StartingPoint, joint_keys
+from expdesign.diagnosis.select.tuning import TUNING
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FittedCandidate:
+    """A candidate fitted beside everything that was found before.
+
+    Attributes:
+        candidate: which.
+        fit: of all windows.
+        likelihood_gain: likelihood ratio statistic against the fit without it.
+        penalised_gain: the same less the price of its effects.
+        keys: its own estimated effects.
+        profiled: the effect that a grid or a profile likelihood found, with its standard error.
+        multiplicity: factor of its p-value, for all that was tried.
+    """
+
+    candidate: Candidate
+    fit: Fit
+    likelihood_gain: float
+    penalised_gain: float
+    keys: tuple[str, ...]
+    profiled: tuple[str, float] | None = None
+    multiplicity: float = 1.0
+
+    @property
+    def p_value(self) -> float:
+        """Of the likelihood ratio test, adjusted for all that was tried."""
+        return min(1.0, self.multiplicity * float(chi2.sf(max(self.likelihood_gain, 0.0), max(1, len(self.keys)))))
+
+    def with_gain(self, likelihood_gain: float) -> FittedCandidate:
+        """The same with another gain at the same price."""
+        price = self.likelihood_gain - self.penalised_gain
+        return replace(self, likelihood_gain=likelihood_gain, penalised_gain=likelihood_gain - price)
+
+
+def fit_candidate(
+    base: Fit, windows: Windows, point: StartingPoint, *, far: bool = False, steps: int = FitOptions().steps
+) -> FittedCandidate | None:
+    """Fit a candidate together with everything found before; None where it cannot be fitted.
+
+    Args:
+        base: the fit without it.
+        windows: data.
+        point: where to begin.
+        far: the effect is large; begin in windows of middle length.
+        steps: Gauss-Newton steps.
+    """
+    try:
+        nearby = base.ship.with_effects(point.effects), base.starts
+        ship, starts = start_nearer(base, windows, point) if far else nearby
+        options = continuing(base, steps=steps)
+        found = fit(ship, windows, joint_keys(base, point.keys), starts=starts, options=options)
+        gain = log_likelihood_gain(base, found, found)
+    except (FloatingPointError, np.linalg.LinAlgError):
+        return None
+    estimated = len(point.keys) + (point.profiled is not None)
+    return FittedCandidate(
+        candidate=point.test.candidate,
+        fit=found,
+        likelihood_gain=gain,
+        penalised_gain=gain - TUNING.price * estimated,
+        keys=point.keys,
+        profiled=point.profiled,
+        multiplicity=point.test.multiplicity,
+    )
+
+
+def fit_to_convergence(base: Fit, windows: Windows, rough: FittedCandidate) -> FittedCandidate:
+    """The same candidate with its fit continued."""
+    if rough.fit.converged:
+        return rough
+    try:
+        options = continuing(rough.fit)
+        found = fit(rough.fit.ship, windows, rough.fit.free_keys, starts=rough.fit.starts, options=options)
+    except (FloatingPointError, np.linalg.LinAlgError):
+        return rough
+    return replace(rough, fit=found).with_gain(log_likelihood_gain(base, found, found))
+
+
+def ranked_by_gain(base: Fit, fitted: list[FittedCandidate]) -> list[FittedCandidate]:
+    """Candidates by penalised gain, all under the noise of the best."""
+    if not fitted:
+        return []
+    judge = max(fitted, key=lambda item: item.penalised_gain).fit
+    without = profile_cost(base, judge.noise)
+    results = [item.with_gain(without - profile_cost(item.fit, judge.noise)) for item in fitted]
+    return sorted(results, key=lambda item: -item.penalised_gain)

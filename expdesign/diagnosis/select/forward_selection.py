@@ -1,0 +1,157 @@
+"""Forward selection: add the cause that explains most, until chance would explain as much."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from expdesign.diagnosis.causes import Candidate
+from expdesign.diagnosis.data import Windows
+from expdesign.diagnosis.fit import Fit, FitOptions, fit, log_likelihood_gain
+from expdesign.diagnosis.model import ExtendedModel
+from expdesign.diagnosis.select.fitted_candidate import FittedCandidate
+from expdesign.diagnosis.select.profile_likelihood import profile_estimate
+from expdesign.diagnosis.select.score_tests import ScoreTest
+from expdesign.diagnosis.select.selection import Selection, Step, redundant_step, without_step
+from expdesign.diagnosis.select.selection_round import Progress, same_effects_as_any, selection_round
+from expdesign.diagnosis.select.tuning import TUNING
+from expdesign.values import Array
+
+
+def select_forward(
+    ship: ExtendedModel, windows: Windows, starts: Array, rng: np.random.Generator, progress: Progress
+) -> Selection:
+    """Add causes until nothing significant is left, and take out those that later ones make redundant.
+
+    A cause that only stood in for another becomes redundant once that one is found. The selection then returns to the
+    step where it was added and continues without it, so that nothing found later depends on it. Many parameters at once
+    explain nearly anything. So before such a block is added, causes with fewer effects are tried one after the other.
+    When nothing more is found, every cause is compared once more with what would replace it beside the others.
+    """
+    progress = _monotonic(progress)
+    base = first = fit_nuisance(ship, windows, starts)
+    steps: list[Step] = []
+    rejected: list[Candidate] = []
+    rounds = exchanges = 0
+    while True:
+        rounds += 1
+        share = 1.0 - 0.7**rounds
+        progress(f"testing causes, round {rounds}", share)
+        search = _Search(windows=windows, rejected=tuple(rejected), rng=rng, progress=_part(progress, share))
+        step, tests = search.round(base)
+        if step is None and exchanges < TUNING.most_exchanges:
+            exchanges += 1
+            exchanged = _exchange(steps, search)
+            if exchanged is not None:
+                steps, base = exchanged, exchanged[-1].chosen.fit
+                continue
+        if step is None or len(steps) == TUNING.most_findings:
+            steps = _with_joint_profiles(steps)
+            return Selection(steps=tuple(steps), first=first, last=base, last_tests=tests).with_steps(tuple(steps))
+        steps += _smaller_causes(step, search) if _is_block(step.chosen) else [step]
+        del steps[TUNING.most_findings :]
+        base = steps[-1].chosen.fit
+        redundant = redundant_step(steps, windows) if len(rejected) < TUNING.most_rejected else None
+        if redundant is not None:
+            rejected.append(steps[redundant].chosen.candidate)
+            base = steps[redundant].before
+            del steps[redundant:]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Search:
+    """What the rounds of one stage of the selection share."""
+
+    windows: Windows
+    rejected: tuple[Candidate, ...]
+    rng: np.random.Generator
+    progress: Progress
+
+    def round(self, base: Fit, *, most: int = 99) -> tuple[Step | None, tuple[ScoreTest, ...]]:
+        """One round from a fit, with candidates of at most so many effects."""
+        return selection_round(base, self.windows, list(self.rejected), self.rng, self.progress, most=most)
+
+
+def fit_nuisance(ship: ExtendedModel, windows: Windows, starts: Array) -> Fit:
+    """The model in use at the likeliest values of its uncertain parameters, with the noise estimated there.
+
+    Far from there the remainder is a poor guide to the noise, and every cause that lets the fit continue looks true.
+    """
+    found = fit(ship, windows, (), starts=starts, options=FitOptions(steps=TUNING.nuisance_steps))
+    if not found.keys:
+        return found
+    options = FitOptions(noise=found.noise, steps=TUNING.nuisance_steps, warm_start=found.linear)
+    return fit(found.ship, windows, (), starts=found.starts, options=options)
+
+
+def _is_block(chosen: FittedCandidate) -> bool:
+    """Several parameters at once."""
+    return chosen.candidate.cause == "parameters" and len(chosen.keys) > 1
+
+
+def _smaller_causes(block: Step, search: _Search) -> list[Step]:
+    """Causes with fewer effects, one after the other, if they gain more than a block of parameters; else the block."""
+    size, base, path, count = len(block.chosen.keys), block.before, list[Step](), 0
+    while count < size and len(path) < TUNING.most_findings:
+        step, _ = search.round(base, most=size - 1)
+        if step is None:
+            break
+        path.append(step)
+        count += len(step.chosen.candidate.free)
+        base = step.chosen.fit
+    if all(step.chosen.candidate.cause == "parameters" for step in path):
+        return [block]
+    whole, other = block.chosen.fit, base
+    advantage = max(log_likelihood_gain(whole, other, judge) for judge in (whole, other))
+    return path if advantage - TUNING.price * (count - size) > 0 else [block]
+
+
+def _exchange(steps: list[Step], search: _Search) -> list[Step] | None:
+    """The steps with one of them exchanged for a cause that gains more beside the others; None where there is none."""
+    for index, old in enumerate(steps[:-1]):
+        others = without_step(steps, index, search.windows)
+        if others is None:
+            continue
+        new, _ = search.round(others[-1].chosen.fit)
+        if new is not None and _gains_more(new.chosen, old.chosen, steps[-1].chosen.fit):
+            return [*others, new]
+    return None
+
+
+def _gains_more(new: FittedCandidate, old: FittedCandidate, whole: Fit) -> bool:
+    """Whether the new cause gains more under the noise of either fit; `whole` is the fit with the old one."""
+    if same_effects_as_any(new.candidate, [old.candidate]):
+        return False
+    extra_price = (new.likelihood_gain - new.penalised_gain) - (old.likelihood_gain - old.penalised_gain)
+    return min(log_likelihood_gain(whole, new.fit, judge) for judge in (whole, new.fit)) > extra_price
+
+
+def _with_joint_profiles(steps: list[Step]) -> list[Step]:
+    """Profiled effects are estimated again beside the causes that were added after them."""
+    for index, step in enumerate(steps[:-1]):
+        if step.chosen.profiled is None or not step.chosen.profiled[1] > 0:
+            continue
+        key, std = step.chosen.profiled
+        *others, last = steps
+        found, std = profile_estimate(last.chosen.fit, key, std)
+        others[index] = replace(step, chosen=replace(step.chosen, profiled=(key, std)))
+        steps = [*others, replace(last, chosen=replace(last.chosen, fit=found))]
+    return steps
+
+
+def _monotonic(progress: Progress) -> Progress:
+    """Progress that never goes back, although rounds may look at something again."""
+    most = 0.0
+
+    def report(what: str, share: float) -> None:
+        nonlocal most
+        most = max(most, share)
+        progress(what, most)
+
+    return report
+
+
+def _part(progress: Progress, share: float) -> Progress:
+    """Progress of a round that begins when a share of the selection is done."""
+    return lambda what, part: progress(what, share + 0.2 * part * (1 - share))

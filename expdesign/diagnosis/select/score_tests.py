@@ -1,0 +1,144 @@
+"""Score tests of every candidate at once, with p-values adjusted for their number.
+
+A score is the inner product of the whitened error with a candidate's sensitivity, after parameters, random current and
+initial states have explained what they can. If nothing is wrong, all scores together are Gaussian with a known
+covariance. Draws from that distribution show how small the smallest p-value gets by chance, however similar candidates
+are. Every cause of the catalogue gets the same share of false alarms, so a cause with one candidate does not pay for
+another that is tried at many times and places.
+
+Sources: C. R. Rao (1948) for the score test; P. H. Westfall and S. S. Young, Resampling-Based Multiple Testing (1993);
+C. R. Genovese, K. Roeder and L. Wasserman, Biometrika 93 (2006), 509-524, for shares of the level.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from expdesign.diagnosis.causes import Candidate
+from expdesign.diagnosis.fit import Fit, build_sensitivities, effect_disturbances, information
+from expdesign.diagnosis.select.candidate_disturbances import candidate_disturbances
+from expdesign.diagnosis.select.tuning import TUNING
+from expdesign.values import Array
+
+TINY = 1e-12
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ScoreTest:
+    """A candidate with its test.
+
+    Attributes:
+        candidate: which.
+        statistic: chi-squared with `candidate.size` degrees of freedom when nothing is wrong.
+        p_value: of this candidate alone.
+        step: (size,) the linear estimate of its free effects; for finite ones the share of the first guess.
+        multiplicity: factor of its p-value, for all that was tried.
+    """
+
+    candidate: Candidate
+    statistic: float
+    p_value: float
+    step: Array
+    multiplicity: float = 1.0
+
+    @property
+    def adjusted(self) -> float:
+        """The p-value adjusted for all that was tried."""
+        return min(1.0, self.p_value * self.multiplicity)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Scores:
+    """Scores of all distinct disturbances, beside everything in the fit.
+
+    Attributes:
+        A: (m, m) information, s: (m,) scores.
+        size: (m,) norms of the disturbances before anything is projected out of them.
+        index: per candidate, its rows.
+    """
+
+    A: Array
+    s: Array
+    size: Array
+    index: tuple[Array, ...]
+
+
+def score_tests(
+    base: Fit, candidates: Sequence[Candidate], rng: np.random.Generator | None = None
+) -> tuple[ScoreTest, ...]:
+    """Tests of every candidate against the fit without it, best first; without `rng` not adjusted for their number."""
+    scores = _scores(base, candidates)
+    tests, roots = [], []
+    for candidate, index in zip(candidates, scores.index, strict=True):
+        size = scores.size[index]
+        block = scores.A[np.ix_(index, index)] / np.outer(size, size)
+        values, vectors = np.linalg.eigh(block)
+        if values[0] < TUNING.least_own_share or not np.isfinite(block).all():
+            continue  # the data cannot tell it from what the model already has
+        root = vectors / np.sqrt(values)
+        z = root.T @ (scores.s[index] / size)
+        statistic = float(z @ z)
+        p_value = float(chi2.sf(statistic, len(index)))
+        tests.append(ScoreTest(candidate=candidate, statistic=statistic, p_value=p_value, step=(root @ z) / size))
+        roots.append((index, root / size[:, None]))
+    if tests and rng is not None:
+        causes = [item.candidate.cause.split(":")[0] for item in tests]
+        multiplicity = _effective_tests(scores.A, roots, causes, rng)
+        tests = [replace(item, multiplicity=number) for item, number in zip(tests, multiplicity, strict=True)]
+    return tuple(sorted(tests, key=lambda item: item.p_value * item.multiplicity))
+
+
+def _scores(base: Fit, candidates: Sequence[Candidate]) -> _Scores:
+    disturbances = effect_disturbances(base.linear, base.keys)
+    shared: dict[object, int] = {}
+    places: list[list[int]] = []
+    for candidate in candidates:
+        rows = []
+        for tag, disturbance in candidate_disturbances(base.linear, candidate):
+            if tag not in shared:
+                shared[tag] = len(disturbances)
+                disturbances.append(disturbance())
+            rows.append(shared[tag])
+        places.append(rows)
+    found = build_sensitivities(base.linear, disturbances, random_current=base.noise.current_std_mps > 0)
+    m = information(found, base.noise)
+    c = len(base.keys)
+    now = np.array([base.ship.get(key) for key in base.keys])
+    A, s = m.A.copy(), m.s.copy()
+    own = A[:c, :c] + np.diag(base.precision)
+    if c:
+        solved = np.linalg.lstsq(own, np.column_stack([A[:c, c:], s[:c] - base.precision * now]), rcond=None)[0]
+        s = s[c:] - A[c:, :c] @ solved[:, -1]
+        A = A[c:, c:] - A[c:, :c] @ solved[:, :-1]
+    size = np.sqrt(np.maximum(np.diag(m.A)[c:], 1e-300))
+    return _Scores(A=A, s=s, size=size, index=tuple(np.array(rows) - c for rows in places))
+
+
+def _effective_tests(
+    A: Array, roots: list[tuple[Array, Array]], causes: Sequence[str], rng: np.random.Generator
+) -> list[float]:
+    """Factor of every p-value, for the candidates of its cause and for the number of causes."""
+    size = np.sqrt(np.maximum(np.diag(A), 1e-300))  # sizes may span more digits than numbers have
+    values, vectors = np.linalg.eigh((A + A.T) / 2 / np.outer(size, size))
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    drawn = rng.standard_normal((TUNING.draws, len(A))) @ root.T * size
+    largest: dict[tuple[str, int], Array] = {}
+    for cause, (index, own_root) in zip(causes, roots, strict=True):
+        statistic, key = ((drawn[:, index] @ own_root) ** 2).sum(axis=1), (cause, len(index))
+        largest[key] = np.maximum(largest[key], statistic) if key in largest else statistic
+    smallest: dict[str, Array] = {}
+    for (cause, freedom), statistic in largest.items():
+        p_values = chi2.sf(statistic, freedom)
+        smallest[cause] = np.minimum(smallest[cause], p_values) if cause in smallest else p_values
+    own = {cause: _inflation(p_values) for cause, p_values in smallest.items()}
+    every = _inflation(np.min([own[cause] * p_values for cause, p_values in smallest.items()], axis=0))
+    return [own[cause] * every for cause in causes]
+
+
+def _inflation(smallest: Array) -> float:
+    """Ratio of the level to the quantile of the smallest p-value at that level; one for a single test."""
+    return float(max(1.0, TUNING.level / max(float(np.quantile(smallest, TUNING.level)), TINY)))

@@ -1,0 +1,132 @@
+"""What the selection has found so far, and how a step is taken out of it again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from expdesign.diagnosis.data import Windows
+from expdesign.diagnosis.fit import Fit, continuing, fit, log_likelihood_gain
+from expdesign.diagnosis.select.fitted_candidate import FittedCandidate
+from expdesign.diagnosis.select.score_tests import ScoreTest
+from expdesign.diagnosis.select.tuning import TUNING
+
+SHAPE = ("roll:period", "roll:damping")
+"""Effects that describe the kind of an oscillation, not its size."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Step:
+    """One step of forward selection.
+
+    Attributes:
+        chosen: what was added.
+        p_value: adjusted for everything that was tried.
+        alternatives: candidates of other causes that explain the data as well, best first.
+        before: the fit without it.
+        tests: all score tests of the round.
+    """
+
+    chosen: FittedCandidate
+    p_value: float
+    alternatives: tuple[FittedCandidate, ...]
+    before: Fit
+    tests: tuple[ScoreTest, ...]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Selection:
+    """The selected causes.
+
+    Attributes:
+        steps: one per cause.
+        first: the fit before any cause.
+        last: the joint fit of all causes.
+        last_tests: score tests of the round that found nothing more.
+    """
+
+    steps: tuple[Step, ...]
+    first: Fit
+    last: Fit
+    last_tests: tuple[ScoreTest, ...]
+
+    def with_steps(self, steps: tuple[Step, ...]) -> Selection:
+        """The selection with other steps; where these are its first ones, the next round's tests become the last."""
+        last = steps[-1].chosen.fit if steps else self.first
+        cut = len(steps) < len(self.steps) and steps == self.steps[: len(steps)]
+        return replace(
+            self, steps=steps, last=last, last_tests=self.steps[len(steps)].tests if cut else self.last_tests
+        )
+
+
+def redundant_step(steps: list[Step], windows: Windows) -> int | None:
+    """The earliest step that the last fit does not need, by a likelihood ratio test."""
+    whole = steps[-1].chosen.fit
+    for index, step in enumerate(steps[:-1]):
+        reduced = _fit_without(whole, step, windows)
+        if reduced is None:
+            continue
+        lost, count = log_likelihood_gain(reduced, whole, whole), len(_own_effects(step))
+        p_value = step.chosen.multiplicity * float(chi2.sf(max(lost, 0.0), max(1, count)))
+        if p_value > TUNING.level or lost < TUNING.price * count:
+            return index
+    return None
+
+
+def without_step(steps: list[Step], index: int, windows: Windows) -> list[Step] | None:
+    """The other steps, the later ones fitted anew; None where one of them cannot be fitted."""
+    others, before = steps[:index], steps[index].before
+    for step in steps[index + 1 :]:
+        reduced = _fit_without(step.chosen.fit, steps[index], windows)
+        if reduced is None:
+            return None
+        others = [*others, replace(step, chosen=replace(step.chosen, fit=reduced), before=before)]
+        before = reduced
+    return others
+
+
+def _own_effects(step: Step) -> set[str]:
+    return {*step.chosen.keys, *step.chosen.candidate.free, *step.chosen.candidate.fixed}
+
+
+def _fit_without(whole: Fit, step: Step, windows: Windows) -> Fit | None:
+    """A later fit without the effects of a step, all others estimated anew."""
+    own = _own_effects(step)
+    others = tuple(key for key in whole.free_keys if key not in own)
+    try:
+        return fit(whole.ship.without_effects(own), windows, others, starts=whole.starts, options=continuing(whole))
+    except (FloatingPointError, np.linalg.LinAlgError):
+        return None
+
+
+def least_significant_step(steps: tuple[Step, ...], last: Fit) -> int | None:
+    """The step with the largest p-value by a Wald test, if that is not significant.
+
+    Args:
+        steps: of the selection.
+        last: the joint fit of all of them, with the standard errors that are reported.
+
+    Source: A. Wald, Transactions of the American Mathematical Society 54 (1943), 426-482.
+    """
+    p_values = [wald_p_value(step.chosen, last) for step in steps]
+    worst = int(np.argmax(p_values)) if p_values else 0
+    return worst if p_values and p_values[worst] > TUNING.level else None
+
+
+def wald_p_value(chosen: FittedCandidate, last: Fit) -> float:
+    """p-value of the joint estimate of a cause's sizes against zero, or against what the vessel file states."""
+    stated = last.ship.stated
+    sized = [key for key in chosen.keys if key in last.keys and (key not in SHAPE or key in stated)]
+    index = [last.keys.index(key) for key in sized]
+    values = np.array([last.value(key) - stated.get(key, 0.0) for key in sized])
+    statistic = float(values @ np.linalg.lstsq(last.covariance[np.ix_(index, index)], values, rcond=None)[0])
+    freedom = len(sized)
+    if chosen.profiled is not None and chosen.profiled[0] in chosen.candidate.free:
+        key, error = chosen.profiled
+        difference = last.value(key) - stated.get(key, 0.0)
+        statistic, freedom = statistic + (difference / error) ** 2, freedom + 1
+    if not np.isfinite(statistic):  # without a standard error nothing is significant
+        return 1.0
+    return float(chi2.sf(statistic, freedom)) if freedom else 0.0

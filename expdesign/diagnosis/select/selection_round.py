@@ -1,0 +1,169 @@
+"""One round of forward selection: test all candidates, fit the best of them, choose one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from expdesign.diagnosis.causes import CAUSES, Candidate, Situation
+from expdesign.diagnosis.data import Windows
+from expdesign.diagnosis.fit import Fit
+from expdesign.diagnosis.select.fitted_candidate import (
+    FittedCandidate,
+    fit_candidate,
+    fit_to_convergence,
+    ranked_by_gain,
+)
+from expdesign.diagnosis.select.profile_likelihood import with_profile_estimate
+from expdesign.diagnosis.select.score_tests import ScoreTest, score_tests
+from expdesign.diagnosis.select.selection import Step, wald_p_value
+from expdesign.diagnosis.select.short_windows import fit_short_windows, start_in_short_windows
+from expdesign.diagnosis.select.starting_point import StartingPoint, starting_point
+from expdesign.diagnosis.select.tuning import TUNING
+
+Progress = Callable[[str, float], None]
+"""Is called with what is being done and the share of it done."""
+
+
+def selection_round(
+    base: Fit,
+    windows: Windows,
+    rejected: list[Candidate],
+    rng: np.random.Generator,
+    progress: Progress,
+    *,
+    most: int = 99,
+) -> tuple[Step | None, tuple[ScoreTest, ...]]:
+    """Test and fit the candidates, and choose the best; None where none is significant.
+
+    Args:
+        base: the fit of everything found before.
+        windows: data.
+        rejected: candidates that are not tried again.
+        rng: of the null distribution.
+        progress: of this round.
+        most: effects that a candidate may have.
+    """
+    tests = score_tests(
+        base,
+        [c for c in _candidates(base, windows) if not same_effects_as_any(c, rejected) and len(c.free) <= most],
+        rng,
+    )
+    return _step(base, windows, tests, progress), tests
+
+
+def same_effects_as_any(candidate: Candidate, others: list[Candidate]) -> bool:
+    """Whether some other candidate has the same cause and effects, whatever its first guess."""
+    return any(candidate.cause == other.cause and set(candidate.free) == set(other.free) for other in others)
+
+
+def _candidates(base: Fit, windows: Windows) -> list[Candidate]:
+    situation = Situation(ship=base.ship, windows=windows)
+    return [
+        candidate
+        for cause in CAUSES
+        for candidate in cause.candidates(situation)
+        if not set(candidate.free) & set(base.free_keys)
+    ]
+
+
+def _step(base: Fit, windows: Windows, tests: tuple[ScoreTest, ...], progress: Progress) -> Step | None:
+    points, far = _starting_points(base, windows, tests)
+    rough: list[FittedCandidate] = []
+    for index, point in enumerate(points):
+        progress(f"fitting {point.test.candidate.cause}", index / len(points))
+        candidate = fit_candidate(base, windows, point, far=far, steps=TUNING.first_steps)
+        if candidate is not None:
+            rough.append(candidate)
+    fitted = _significant(base, windows, ranked_by_gain(base, rough))
+    chosen = next((item for item in fitted if item.p_value <= TUNING.accepted_p_value), None)
+    if chosen is None:
+        return None
+    return Step(
+        chosen=with_profile_estimate(chosen, base),
+        p_value=chosen.p_value,
+        alternatives=_alternatives(chosen, fitted),
+        before=base,
+        tests=tests,
+    )
+
+
+def _alternatives(chosen: FittedCandidate, fitted: list[FittedCandidate]) -> tuple[FittedCandidate, ...]:
+    """The best candidate of every other cause that explains the data as well."""
+    found: dict[str, FittedCandidate] = {}
+    for other in fitted:
+        close = chosen.penalised_gain - other.penalised_gain < TUNING.equivalent_within
+        if other.candidate.cause != chosen.candidate.cause and close:
+            found.setdefault(other.candidate.cause, other)
+    return tuple(found.values())
+
+
+def _significant(base: Fit, windows: Windows, rough: list[FittedCandidate]) -> list[FittedCandidate]:
+    """The best candidates, fitted to convergence and significant by a Wald test.
+
+    Some candidates converge to zero because the data call for more than they can give. Then the next best are fitted.
+    """
+    while rough:
+        most = max(item.likelihood_gain for item in rough)
+        leading = [
+            item for item in rough if item.likelihood_gain > TUNING.leading_share * most - TUNING.statistic_margin
+        ]
+        converged = [fit_to_convergence(base, windows, item) for item in leading]
+        significant = [item for item in converged if wald_p_value(item, item.fit) <= TUNING.level]
+        if significant or not leading:  # nothing gains anything
+            return ranked_by_gain(base, significant)
+        rough = [item for item in rough if item not in leading]
+    return []
+
+
+def _starting_points(base: Fit, windows: Windows, tests: tuple[ScoreTest, ...]) -> tuple[list[StartingPoint], bool]:
+    """What to fit, and whether the best candidate is a large effect; then short windows give the starting points."""
+    shortlist = [*_shortlist(tests), *_hidden_by_random_current(base, tests)]
+    short_fit = fit_short_windows(base, windows)
+    short_tests = None if short_fit is None else score_tests(short_fit, [item.candidate for item in tests])
+    if short_fit is None or short_tests is None or _explained_share(short_tests, short_fit) < TUNING.large_share:
+        return [starting_point(base, test) for test in shortlist], False
+    certain = shortlist[: TUNING.certain]
+    listed = {id(item.candidate) for item in certain}
+    multiplicity = {id(item.candidate): item.multiplicity for item in tests}
+    others = [
+        replace(item, multiplicity=multiplicity[id(item.candidate)])
+        for item in _shortlist(short_tests)
+        if id(item.candidate) not in listed
+    ]
+    return start_in_short_windows(short_fit, [*certain, *others], len(certain)), True
+
+
+def _explained_share(tests: tuple[ScoreTest, ...], base: Fit) -> float:
+    """Share of the remainder that the best candidate explains."""
+    rows = int(np.isfinite(base.sensitivities.error).sum())
+    return max((item.statistic for item in tests), default=0.0) / rows
+
+
+def _hidden_by_random_current(base: Fit, tests: tuple[ScoreTest, ...]) -> list[ScoreTest]:
+    """A steady current that a large random current may have absorbed: few runs cannot tell the two apart."""
+    if base.noise.current_std_mps < TUNING.large_current_mps:
+        return []
+    listed = {id(item.candidate) for item in _shortlist(tests)}
+    return [item for item in tests if item.candidate.cause == "current" and id(item.candidate) not in listed]
+
+
+def _shortlist(tests: tuple[ScoreTest, ...]) -> list[ScoreTest]:
+    """The best candidates of the best causes."""
+    ranked = sorted(tests, key=lambda item: TUNING.price * item.candidate.size - item.statistic)
+    largest = max((item.statistic for item in ranked), default=0.0)
+    least = TUNING.least_statistic_share * largest - TUNING.statistic_margin
+    found: list[ScoreTest] = []
+    count: dict[str, int] = {}
+    for test in ranked:
+        cause = test.candidate.cause
+        if test.p_value * test.multiplicity > 1.0 or test.statistic < least:
+            continue
+        if cause not in count and len(count) == TUNING.shortlist:
+            continue
+        if count.get(cause, 0) < TUNING.per_cause:
+            found.append(test)
+            count[cause] = count.get(cause, 0) + 1
+    return found

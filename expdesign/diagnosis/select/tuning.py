@@ -1,0 +1,84 @@
+"""Numbers that steer the selection of causes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tuning:
+    """Numbers of this room. "Statistic" and "gain" are twice a log likelihood ratio, where they are not points of fit.
+
+    Attributes:
+        level: of tests.
+        accepted_p_value: adjusted p-value up to which a cause is accepted: half of `level`, because p-values are exact
+            only for long data.
+        draws: of the null distribution, for adjusted p-values.
+        least_own_share: share of a candidate's sensitivity that nothing else in the model can imitate, at least, for it
+            to be tested.
+        price: of every estimated effect, so that causes with fewer effects are preferred.
+        shortlist: causes that are fitted in a round, at most.
+        per_cause: candidates of a cause that are fitted in a round, at most.
+        least_statistic_share, statistic_margin: candidates below this share of the largest statistic, and by more than
+            the margin, are not fitted.
+        equivalent_within: an alternative that trails by less is not distinguishable. A wrong cause that truly trails by
+            d comes out ahead by more than this with a probability below Phi(-sqrt(equivalent_within)).
+        first_steps: Gauss-Newton steps of every candidate.
+        leading_share: candidates that then gain less than this share of the most are given up.
+        nuisance_steps: Gauss-Newton steps of the fit before anything is tested, at most.
+        large_share: share of the remainder above which an effect counts as large and is fitted in short windows too.
+        certain: best candidates that are fitted in long windows whatever short windows say.
+        short_s, middle_s: length of short windows, and of those between short and long ones [s].
+        fewest_samples: of a short window.
+        short_steps: Gauss-Newton steps in short windows.
+        least_gain_share: candidates that gain less than this share of the most in short windows are not fitted in long
+            ones.
+        large_current_mps: standard deviation of the random current above which a steady current is fitted too.
+        most_findings: causes, at most.
+        most_rejected: causes that are taken out again, at most.
+        most_exchanges: of a cause for another that gains more beside the rest, at most.
+        refined_grid: values of the second grid search.
+        profile_points, profile_rounds: values per round of a profile likelihood, and rounds, at most.
+        equivalent_cost: values of a profile count as equally likely up to this cost: one standard error of a Gaussian.
+        equivalent_values: this many equally likely values in a round end the search.
+        least_gain_points: gain of fit on held-out data that causes after the first need, at least [points].
+        clear_gain_points: gain that suffices even where its interval, of few runs perhaps, includes zero [points].
+        most_loss_points: loss at the lower end of the interval that the first cause may risk, if some output is
+            simulated worse with it [points].
+    """
+
+    level: float = 0.05
+    accepted_p_value: float = 0.025
+    draws: int = 2000
+    least_own_share: float = 1e-5
+    price: float = 5.0
+    shortlist: int = 7
+    per_cause: int = 2
+    least_statistic_share: float = 0.4
+    statistic_margin: float = 20.0
+    equivalent_within: float = 5.0
+    first_steps: int = 3
+    leading_share: float = 0.6
+    nuisance_steps: int = 12
+    large_share: float = 0.15
+    certain: int = 2
+    short_s: float = 45.0
+    middle_s: float = 140.0
+    fewest_samples: int = 30
+    short_steps: int = 6
+    least_gain_share: float = 0.75
+    large_current_mps: float = 0.1
+    most_findings: int = 6
+    most_rejected: int = 4
+    most_exchanges: int = 2
+    refined_grid: int = 11
+    profile_points: int = 9
+    profile_rounds: int = 9
+    equivalent_cost: float = 1.0
+    equivalent_values: int = 3
+    least_gain_points: float = 0.1
+    clear_gain_points: float = 1.0
+    most_loss_points: float = 0.5
+
+
+TUNING = Tuning()

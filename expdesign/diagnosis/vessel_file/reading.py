@@ -1,0 +1,95 @@
+"""The extended model of a vessel file and a record."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from expdesign.diagnosis.data import derived_outputs, has_heading
+from expdesign.diagnosis.model import RESPONSES, ROLL, ExtendedModel, term_library, values_by_group
+from expdesign.errors import InputError
+from expdesign.estimation.regression import model_for
+from expdesign.signals import Batch, Record
+from expdesign.vessel import Environment, Roll, Sensors, Vessel, VesselModel
+from expdesign.vessel.structures import SHOAL
+
+
+def extended_model(vessel: Vessel, record: Record) -> ExtendedModel:
+    """The model in use, with the actuators, sensors and weather that its file states; no weather without a heading.
+
+    Raises:
+        InputError: draught over depth is an input of the record, but no depth is recorded.
+    """
+    model, max_draught_over_depth = _driven(vessel, record)
+    derived = derived_outputs(record)
+    effects = _answering(model) | _sensed(vessel.sensors, derived) | _rolled(model.roll)
+    effects |= _flowing(vessel.environment) if has_heading(record) else {}
+    known = {key: value for key, value in effects.items() if value}
+    return ExtendedModel(
+        model=model,
+        library=term_library(model),
+        draught_m=vessel.draught_m,
+        derived=derived,
+        max_draught_over_depth=max_draught_over_depth,
+        effects=known,
+        stated=known,
+    )
+
+
+def _answering(model: VesselModel) -> dict[str, float]:
+    """What a file says of how actuators answer."""
+    rows = [row for actuator in model.actuators for row in zip(actuator.signals, actuator.responses, strict=True)]
+    return {
+        f"{kind}:{group}": value
+        for kind, name in RESPONSES.items()
+        for group, value in values_by_group({signal: getattr(how, name) for signal, how in rows}, model.inputs).items()
+    }
+
+
+def _flowing(weather: Environment) -> dict[str, float]:
+    """What a file says of current and wind, which needs a heading to act in."""
+    flows = {"current": weather.current_to, "wind": weather.wind_to}
+    return {
+        f"{name}:{way}": float(part)
+        for name, flow in flows.items()
+        for way, part in zip(("north", "east"), flow, strict=True)
+    }
+
+
+def _sensed(sensors: Sensors, derived: tuple[str, ...]) -> dict[str, float]:
+    """What a file says of the sensors that the data come from."""
+    from_pose = "u" in derived
+    place = sensors.position if from_pose else sensors.velocity
+    velocity_s = 0.0 if from_pose else sensors.velocity.delay_s
+    return {
+        "heading_bias": -(sensors.heading_bias_rad if from_pose else sensors.velocity_angle_rad),
+        "gyro": 0.0 if "r" in derived else sensors.yaw_rate_scale - 1.0,
+        "lever:forward": place.forward_m,
+        "lever:starboard": place.starboard_m,
+        "late:u": velocity_s,
+        "late:v": velocity_s,
+        "late:r": 0.0 if "r" in derived else sensors.yaw_rate.delay_s,
+        "late:psi": sensors.heading.delay_s,
+        "late:position": sensors.position.delay_s if from_pose else 0.0,
+    }
+
+
+def _driven(vessel: Vessel, record: Record) -> tuple[VesselModel, float]:
+    """The model driven by the recorded inputs, and the largest draught over depth; depth is no input here."""
+    model = model_for(vessel.model, record)
+    depths = [batch.depth_m for batch in record.batches if batch.depth_m is not None]
+    if SHOAL in model.inputs and not depths and any(batch.inputs[:, _shoal(batch)].any() for batch in record.batches):
+        raise InputError(f"the record has {SHOAL}, draught over depth, among its inputs, expected depth_m beside them")
+    actuators = tuple(actuator for actuator in model.actuators if actuator.kind != "depth")
+    max_draught_over_depth = float(np.nan_to_num(vessel.draught_m / np.concatenate(depths)).max()) if depths else 0.0
+    return replace(model, actuators=actuators) if SHOAL in model.inputs else model, max_draught_over_depth
+
+
+def _rolled(roll: Roll | None) -> dict[str, float]:
+    """What a file says of roll."""
+    return {} if roll is None else {key: float(getattr(roll, name)) for key, name in ROLL.items()}
+
+
+def _shoal(batch: Batch) -> int:
+    return batch.input_names.index(SHOAL)

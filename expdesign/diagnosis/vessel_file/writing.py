@@ -1,0 +1,94 @@
+"""From a vessel to a model with effects, and back: everything found becomes part of a vessel file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from expdesign.diagnosis.model import RESPONSES, ExtendedModel, group_columns, mean_wind
+from expdesign.diagnosis.vessel_file.found_terms import found_model
+from expdesign.vessel import Actuator, Response, Sensors, Vessel
+
+
+def extend(vessel: Vessel, ship: ExtendedModel, std: Mapping[str, float]) -> tuple[Vessel, tuple[str, ...]]:
+    """The vessel with everything in `ship`, and what could not be written into it, one sentence each.
+
+    Args:
+        vessel: the model in use.
+        ship: with effects found.
+        std: standard errors of effects.
+    """
+    model, missing = found_model(vessel.model, ship, std)
+    actuators, more = _actuators(model.actuators, ship)
+    if "u" not in ship.derived and ship.get("late:u") != ship.get("late:v"):
+        more = (*more, "The delay of u or v alone is written as one of the whole velocity sensor.")
+    if any(key.startswith("late:") and value < 0 for key, value in ship.effects.items()):
+        more = (
+            *more,
+            "The vessel file leaves out a delay below zero, and its simulation gains nothing by that finding.",
+        )
+    weather = vessel.environment
+    if _has(ship, "current:"):
+        weather = replace(weather, current_to=np.array([ship.get("current:north"), ship.get("current:east")]))
+    if _has(ship, "wind:"):
+        weather = replace(weather, wind_to=np.array(mean_wind(ship)))
+    return (
+        replace(
+            vessel,
+            model=replace(model, actuators=actuators),
+            sensors=_sensors(vessel.sensors, ship),
+            environment=weather,
+        ),
+        (*missing, *more),
+    )
+
+
+def _has(ship: ExtendedModel, prefix: str) -> bool:
+    return any(key.startswith(prefix) for key in ship.effects)
+
+
+def _actuators(actuators: tuple[Actuator, ...], ship: ExtendedModel) -> tuple[tuple[Actuator, ...], tuple[str, ...]]:
+    own = tuple(name for actuator in actuators for name in actuator.signals)
+    recorded = ship.model.inputs
+    changes: dict[str, dict[str, float]] = {}
+    lost = []
+    for key, value in ship.effects.items():
+        kind, _, group = key.partition(":")
+        if kind not in RESPONSES:
+            continue
+        for index in group_columns(group, recorded):
+            if recorded[index] in own:
+                row = changes.setdefault(recorded[index], {})
+                row[RESPONSES[kind]] = row.get(RESPONSES[kind], 0.0) + value
+            else:
+                lost.append(
+                    f"{kind} of {recorded[index]} is not in the vessel file, whose actuators take other signals."
+                )
+    result = []
+    for actuator in actuators:
+        responses = tuple(
+            Response(**changes.get(signal, {})) if signal in recorded else response
+            for signal, response in zip(actuator.signals, actuator.responses, strict=True)
+        )
+        result.append(replace(actuator, responses=responses))
+    return tuple(result), tuple(dict.fromkeys(lost))
+
+
+def _sensors(sensors: Sensors, ship: ExtendedModel) -> Sensors:
+    get = ship.get
+
+    def late(*keys: str) -> float:
+        return max(0.0, *(get(key) for key in keys))
+
+    lever = {"forward_m": get("lever:forward"), "starboard_m": get("lever:starboard")}
+    sensors = replace(sensors, heading=replace(sensors.heading, delay_s=late("late:psi")))
+    if "r" not in ship.derived:
+        yaw_rate = replace(sensors.yaw_rate, delay_s=late("late:r"))
+        sensors = replace(sensors, yaw_rate_scale=1.0 + get("gyro"), yaw_rate=yaw_rate)
+    if "u" in ship.derived:
+        position = replace(sensors.position, **lever, delay_s=late("late:position"))
+        return replace(sensors, heading_bias_rad=0.0 - get("heading_bias"), position=position)
+    velocity = replace(sensors.velocity, **lever, delay_s=late("late:u", "late:v"))
+    return replace(sensors, velocity_angle_rad=0.0 - get("heading_bias"), velocity=velocity)
