@@ -11,7 +11,7 @@ from expdesign.information.recorded import recorded_information
 from expdesign.signals import Record
 from expdesign.simulation import CALM
 from expdesign.vessel import Term
-from expdesign.workflows.known import data_parts, expected_std, in_recorded_depth
+from expdesign.workflows.steps.known import data_parts, expected_std, in_recorded_depth
 
 SHOAL, GROWTH = 0.4, 0.8
 PARAMETERS = ("Y_v", "Y_ur", "Y_mu")

@@ -9,7 +9,7 @@ from expdesign import workflows
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import plan_trial
 from expdesign.scenario import load_scenario
-from expdesign.workflows.trial import plan_problem
+from expdesign.workflows import plan_problem
 
 MODEL_SHIP = Path(__file__).parents[1] / "scenarios" / "model-ship.toml"
 FLIP = np.array([1.0, -1.0, -1.0])

@@ -17,8 +17,8 @@ from expdesign.scenario import load_scenario, load_vessel
 from expdesign.signals import Batch, Commands, Record
 from expdesign.simulation import Environment, Variation, simulate
 from expdesign.vessel import Mounting
-from expdesign.workflows.known import combined, expected_std, purchases
-from expdesign.workflows.present import present_state, rest_of, weather_for_rest
+from expdesign.workflows.steps.known import combined, expected_std, purchases
+from expdesign.workflows.steps.present import present_state, rest_of, weather_for_rest
 from scenario_files import spoil
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"

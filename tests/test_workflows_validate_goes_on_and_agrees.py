@@ -11,7 +11,7 @@ from expdesign.cli import main
 from expdesign.errors import InputError
 from expdesign.rehearsal.validation import Rehearsal
 from expdesign.scenario import load_scenario
-from expdesign.workflows.validated import _identity
+from expdesign.workflows.trials.validate import _identity
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 MODEL_SHIP, TRUE = SCENARIOS / "model-ship.toml", SCENARIOS / "vessels" / "model-ship-true.toml"

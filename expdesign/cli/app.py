@@ -1,26 +1,23 @@
-"""The program, the arguments that its commands share, and how a command is carried out.
+"""The program and how its commands are carried out.
 
-The solvers behind the workflows take seconds to load; each command loads them when it runs, so that `--help` and
-typing mistakes do not wait.
+A command is a function that returns what it asks of which workflow; `command` registers it, adds the options that all
+commands share, loads the workflow only when the command runs, shows progress, and prints the summary.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
-from types import ModuleType
-from typing import TYPE_CHECKING, Annotated
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import wraps
+from typing import Annotated
 
 import typer
 
 from expdesign import __version__
-from expdesign.cli.arguments import parse_seed
 from expdesign.cli.progress import shown_progress
 from expdesign.cli.summary import as_json, print_summary
 from expdesign.interruptions import interruptions_wait
-
-if TYPE_CHECKING:
-    from expdesign.workflows import Outcome, Progress
 
 app = typer.Typer(
     add_completion=False,
@@ -29,28 +26,61 @@ app = typer.Typer(
     epilog="Exit status: 0 done; 2 the input is wrong; 3 the input is fine but has no answer; 130 interrupted.",
 )
 
-ScenarioFile = Annotated[
-    Path,
-    typer.Argument(metavar="SCENARIO.toml", help="Vessel, manoeuvres, sea area, start, goal and wishes."),
-]
-PlanFile = Annotated[
-    Path,
-    typer.Argument(metavar="PLAN.json", help="A plan made before, with the track.csv and commands.csv beside it."),
-]
-Out = Annotated[
-    Path | None,
-    typer.Option("--out", "-o", metavar="FOLDER", help="Where to write; runs/<name of the scenario> when not given."),
-]
-OutBeside = Annotated[
-    Path | None,
-    typer.Option("--out", "-o", metavar="FOLDER", help="Where to write; the plan's folder when not given."),
-]
-Seed = Annotated[
-    int,
-    typer.Option("--seed", parser=parse_seed, metavar="N", help="Start of the random numbers: same seed, same result."),
-]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print no progress and no summary, only errors.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the summary as JSON, and nothing else, on stdout.")]
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A workflow and its arguments.
+
+    Attributes:
+        workflow: name in `expdesign.workflows`.
+        arguments, options: what it is called with, besides progress.
+    """
+
+    workflow: str
+    arguments: tuple[object, ...]
+    options: Mapping[str, object]
+
+
+def ask(workflow: str, *arguments: object, **options: object) -> Asked:
+    """What a command asks for; lists become tuples."""
+    fixed = {name: tuple(value) if isinstance(value, list) else value for name, value in options.items()}
+    return Asked(workflow, tuple(tuple(value) if isinstance(value, list) else value for value in arguments), fixed)
+
+
+def command(name: str) -> Callable[[Callable[..., Asked]], Callable[..., Asked]]:
+    """Register a function as the command `name`, with the options --quiet and --json besides its own."""
+
+    def register(asking: Callable[..., Asked]) -> Callable[..., Asked]:
+        @wraps(asking)
+        def carry_out(*, quiet: bool, json: bool, **options: object) -> None:
+            asked = asking(**options)
+            with interruptions_wait():  # some solvers do not stand being interrupted while they load
+                from expdesign import workflows
+
+                work = getattr(workflows, asked.workflow)
+            with shown_progress(quiet=quiet) as progress:
+                outcome = work(*asked.arguments, progress=progress, **asked.options)
+            if json:
+                typer.echo(as_json(name, outcome))
+            elif not quiet:
+                print_summary(outcome)
+
+        kind = inspect.Parameter.KEYWORD_ONLY
+        own = inspect.signature(asking, eval_str=True).parameters.values()
+        shared = {"quiet": Quiet, "json": Json}
+        parameters = [part.replace(kind=kind) for part in own]
+        parameters += [
+            inspect.Parameter(option, kind, default=False, annotation=hint) for option, hint in shared.items()
+        ]
+        carry_out.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+        carry_out.__annotations__ = {part.name: part.annotation for part in parameters}
+        app.command(name)(carry_out)
+        return asking
+
+    return register
 
 
 def _show_version(asked: bool) -> None:
@@ -65,24 +95,14 @@ def expdesign(
         bool, typer.Option("--version", is_eager=True, callback=_show_version, help="Print the version and stop.")
     ] = False,
 ) -> None:
-    """Plan a trial that tells most about how a ship moves, in the water it may use.
+    """Plan full-scale manoeuvring trials of ships, and learn a ship's model from their data.
 
-    [bold]run[/bold] makes everything from one scenario file: what each manoeuvre tells,
-    how long to run each, one trajectory from start to goal, verified by
-    simulating it again, route files and a report. The other commands are its
-    steps, one at a time.
+    [bold]run[/bold] does everything from one scenario file: it simulates the manoeuvres,
+    decides how long to run each, plans one trajectory from start to goal in
+    allowed water, verifies it, and writes route files and a report. The other
+    commands are its steps, and what follows when data have been measured.
 
     Begin with: expdesign run scenarios/helsinki.toml
+
+    What may stand in a file: expdesign explain
     """
-
-
-def carry_out(name: str, work: Callable[[ModuleType, Progress], Outcome], quiet: bool, json: bool) -> None:
-    """Do the work of one command, given the workflows and whom to tell of progress, and say what came of it."""
-    with interruptions_wait():
-        from expdesign import workflows
-    with shown_progress(quiet=quiet) as progress:
-        outcome = work(workflows, progress)
-    if json:
-        typer.echo(as_json(name, outcome))
-    elif not quiet:
-        print_summary(outcome)

@@ -1,7 +1,4 @@
-"""Commands that design and plan a trial.
-
-Each hands its arguments to the workflow of the same name.
-"""
+"""Commands that design and plan a trial, and compare or export what they give."""
 
 from __future__ import annotations
 
@@ -10,84 +7,63 @@ from typing import Annotated
 
 import typer
 
-from expdesign.cli.app import Json, Out, OutBeside, PlanFile, Quiet, ScenarioFile, Seed, app, carry_out
-from expdesign.cli.arguments import check_out
+from expdesign.cli.app import Asked, ask, command
+from expdesign.cli.options import Jobs, Out, OutBesidePlan, OutWhatIf, PlanFile, ScenarioFile, Seed
 
 
-@app.command()
-def run(scenario: ScenarioFile, out: Out = None, seed: Seed = 0, quiet: Quiet = False, json: Json = False) -> None:
-    """Do everything: score, durations, plan, verify, export, report.
+@command("run")
+def run(scenario: ScenarioFile, out: Out = None, seed: Seed = 0) -> Asked:
+    """Do everything: score, durations, plan, verification, route files, report.
 
     Example: expdesign run scenarios/helsinki.toml
     """
-    carry_out(
-        "run", lambda workflows, tell: workflows.run(scenario, check_out(out), seed=seed, progress=tell), quiet, json
-    )
+    return ask("run", scenario, out, seed=seed)
 
 
-@app.command()
-def score(scenario: ScenarioFile, out: Out = None, seed: Seed = 0, quiet: Quiet = False, json: Json = False) -> None:
-    """Simulate the dictionary of manoeuvres and compute what each one tells.
+@command("score")
+def score(scenario: ScenarioFile, out: Out = None, seed: Seed = 0) -> Asked:
+    """Simulate the manoeuvres of the dictionary and compute the information of each.
 
     Writes dictionary.json.
     """
-    carry_out(
-        "score",
-        lambda workflows, tell: workflows.score(scenario, check_out(out), seed=seed, progress=tell),
-        quiet,
-        json,
-    )
+    return ask("score", scenario, out, seed=seed)
 
 
-@app.command()
+@command("durations")
 def durations(
     scenario: ScenarioFile,
     out: Out = None,
     grow: Annotated[
         bool,
-        typer.Option("--grow", help="Search for manoeuvres that add most, also where the scenario has no design.grow."),
+        typer.Option("--grow", help="Also search for manoeuvres to add, as the table [design.grow] does."),
     ] = False,
     seed: Seed = 0,
-    quiet: Quiet = False,
-    json: Json = False,
-) -> None:
-    """Choose how long to run each manoeuvre, and prove how close to the best that is.
+) -> Asked:
+    """Choose how long to run each manoeuvre, with a certificate of how close to the optimum that is.
 
     Writes durations.json; with --grow also growth.json and dictionary-grown.toml, which any scenario can name.
     """
-    carry_out(
-        "durations",
-        lambda workflows, tell: workflows.durations(scenario, check_out(out), grow=grow, seed=seed, progress=tell),
-        quiet,
-        json,
-    )
+    return ask("durations", scenario, out, grow=grow, seed=seed)
 
 
-@app.command()
+@command("plan")
 def plan(
     scenario: ScenarioFile,
     out: Out = None,
     durations: Annotated[
         Path | None,
-        typer.Option("--durations", metavar="FILE", help="A durations.json made before; computed when not given."),
+        typer.Option("--durations", metavar="FILE", help="A durations.json made before. Default: computed now."),
     ] = None,
     seed: Seed = 0,
-    quiet: Quiet = False,
-    json: Json = False,
-) -> None:
-    """Join the chosen manoeuvres into one trajectory in the sea area, and verify it.
+) -> Asked:
+    """Plan one trajectory that runs the chosen manoeuvres in allowed water, and verify it.
 
     Writes plan.json, track.csv and commands.csv.
     """
-    carry_out(
-        "plan",
-        lambda workflows, tell: workflows.plan(scenario, check_out(out), durations=durations, seed=seed, progress=tell),
-        quiet,
-        json,
-    )
+    return ask("plan", scenario, out, durations=durations, seed=seed)
 
 
-@app.command()
+@command("export")
 def export(
     plan: PlanFile,
     formats: Annotated[
@@ -96,7 +72,7 @@ def export(
             "--format",
             "-f",
             metavar="F ...",
-            help="One or more of: rtz rtz-1.0 rtz-1.1 gpx kml geojson qgc ardupilot csv.",
+            help="One or more of: rtz rtz-1.0 rtz-1.1 gpx kml geojson qgc ardupilot csv; see expdesign explain formats.",
         ),
     ],
     departure: Annotated[
@@ -108,37 +84,49 @@ def export(
         typer.Option(
             "--tolerance-m",
             metavar="D",
-            help="How far legs may cut corners; a third of the clearance when not given, half the beam at most.",
+            help="Largest distance between track and legs [m]. Default: a third of the clearance, at most half the "
+            "beam.",
         ),
     ] = None,
-    out: OutBeside = None,
-    quiet: Quiet = False,
-    json: Json = False,
-) -> None:
+    out: OutBesidePlan = None,
+) -> Asked:
     """Write a plan as route files for chart systems and autopilots.
 
     Example: expdesign export runs/helsinki/plan.json --format rtz gpx
     """
-    carry_out(
-        "export",
-        lambda workflows, tell: workflows.export(
-            plan,
-            check_out(out),
-            formats=tuple(formats),
-            departure=departure,
-            tolerance_m=tolerance,
-            progress=tell,
-        ),
-        quiet,
-        json,
-    )
+    return ask("export", plan, out, formats=formats, departure=departure, tolerance_m=tolerance)
 
 
-@app.command("check-route")
+@command("check-route")
 def check_route(
     files: Annotated[list[Path], typer.Argument(metavar="ROUTE.rtz ...", help="RTZ or GPX files of any origin.")],
-    quiet: Quiet = False,
-    json: Json = False,
-) -> None:
-    """Check route files beyond what their schemas can: ids, names, order of schedules, ranges, size."""
-    carry_out("check-route", lambda workflows, tell: workflows.check_routes(tuple(files)), quiet, json)
+) -> Asked:
+    """Check RTZ and GPX files beyond their schemas: ids, names, order of schedules, ranges, size."""
+    return ask("check_routes", files)
+
+
+@command("whatif")
+def whatif(
+    scenario: ScenarioFile,
+    variants: Annotated[
+        list[Path],
+        typer.Argument(metavar="VARIANT.toml ...", help="Scenario files, complete or with only the keys that differ."),
+    ],
+    plan: Annotated[
+        bool, typer.Option("--plan", help="Also plan the trials, to compare repositioning; takes minutes each.")
+    ] = False,
+    jobs: Jobs = 0,
+    scheduler: Annotated[
+        str | None,
+        typer.Option("--scheduler", metavar="ADDRESS", help="Dask scheduler to compute on, e.g. tcp://host:8786."),
+    ] = None,
+    out: OutWhatIf = None,
+    seed: Seed = 0,
+) -> Asked:
+    """Compare variants of a scenario side by side: what changes and what it costs.
+
+    Writes whatif.json and whatif.html.
+
+    Example: expdesign whatif scenarios/helsinki.toml scenarios/variants/half-an-hour.toml
+    """
+    return ask("whatif", scenario, variants, out, with_plan=plan, jobs=jobs, scheduler=scheduler, seed=seed)

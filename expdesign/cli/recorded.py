@@ -1,7 +1,4 @@
-"""Commands on measured data.
-
-Each hands its arguments to the workflow of the same name.
-"""
+"""Commands on measured data."""
 
 from __future__ import annotations
 
@@ -10,27 +7,11 @@ from typing import Annotated
 
 import typer
 
-from expdesign.cli.app import Json, Quiet, Seed, app, carry_out
-from expdesign.cli.arguments import check_out
-
-DataFiles = Annotated[
-    list[Path], typer.Argument(metavar="DATA.csv ...", help="Measured runs; what is read is told in the README.")
-]
-Velocity = Annotated[
-    str,
-    typer.Option(
-        metavar="HOW",
-        help="Where u, v, r come from: measured; difference or smoothed from the pose; auto: measured where they "
-        "stand, else differences.",
-    ),
-]
-OutByData = Annotated[
-    Path | None,
-    typer.Option("--out", "-o", metavar="FOLDER", help="Where to write; runs/<first data file> when not given."),
-]
+from expdesign.cli.app import Asked, ask, command
+from expdesign.cli.options import DataFiles, Fixed, Mean, OutByData, OutByVessel, Seed, Velocity
 
 
-@app.command()
+@command("estimate")
 def estimate(
     data: DataFiles,
     vessel: Annotated[
@@ -41,93 +22,79 @@ def estimate(
         typer.Option(
             "--method",
             metavar="M ...",
-            help="One or more of: ls ls-air ls-augmented ls-wind iv iv-air iv-augmented iv-wind oe oe-air. When not "
-            "given: ls and iv, and those with wind where wind is measured and the model has terms for it.",
+            help="One or more of: ls ls-air ls-augmented ls-wind iv iv-air iv-augmented iv-wind oe oe-air; see expdesign "
+            "explain methods. Default: ls and iv, and those with wind where wind is measured and the model has terms "
+            "for it.",
         ),
     ] = None,
-    fixed: Annotated[
-        list[str] | None,
-        typer.Option("--fixed", metavar="NAME ...", help="Parameters kept at the vessel file's values."),
-    ] = None,
+    fixed: Fixed = None,
     tests: Annotated[
         list[Path] | None,
-        typer.Option("--test", metavar="FILE ...", help="Runs kept apart: simulated, but not used to estimate."),
+        typer.Option("--test", metavar="FILE ...", help="Runs held out: simulated, but not used to estimate."),
     ] = None,
     velocity: Velocity = "auto",
-    mean: Annotated[
-        str,
-        typer.Option(
-            metavar="HOW",
-            help="Mean taken off the instruments, against constant disturbances: complete, batch or none. Where an "
-            "input never changes only none lets its effect be seen.",
-        ),
-    ] = "complete",
+    mean: Mean = "complete",
     start: Annotated[
         str,
         typer.Option(
             metavar="HOW",
-            help="First instruments simulated with: nominal, the vessel file's values; ls, least squares; auto: "
-            "nominal, unless they are all zero or fail.",
+            help="Parameters that the first instruments are simulated with: nominal, the vessel file's; ls, least "
+            "squares; auto: nominal, unless these are all zero or fail.",
         ),
     ] = "auto",
     motion: Annotated[
         str,
         typer.Option(
             metavar="WHAT",
-            help="What the parameters describe: continuous, the motion between samples too, as plans are made from; "
-            "euler, Euler's map at the sample time.",
+            help="What the parameters describe: continuous, the motion between samples too, as plans use it; euler, "
+            "Euler's map at the sample time.",
         ),
     ] = "continuous",
     horizon: Annotated[
         float | None,
         typer.Option(
             metavar="SECONDS",
-            help="How far output error simulates before it starts anew from the data; whole runs when not given. For "
-            "ships unstable on their course and for weather that is not measured.",
+            help="Output error restarts its simulations from the data after this time, for ships unstable on their "
+            "course and for weather that is not measured. Default: never.",
         ),
     ] = None,
     constant: Annotated[
         bool, typer.Option("--constant", help="Give every run a constant force of its own in output error.")
     ] = False,
     out: OutByData = None,
-    quiet: Quiet = False,
-    json: Json = False,
-) -> None:
+) -> Asked:
     """Estimate the model's parameters from measured data, with standard errors.
 
     Writes estimate.json, vessel-estimated.toml and estimate.html.
 
     Example: expdesign estimate zigzag.csv circle.csv --vessel ship.toml --method ls iv --test other.csv
     """
-    carry_out(
+    return ask(
         "estimate",
-        lambda workflows, tell: workflows.estimate(
-            tuple(data),
-            check_out(out),
-            vessel=vessel,
-            methods=tuple(methods or ()),
-            fixed=tuple(fixed or ()),
-            velocity=velocity,
-            mean=mean,
-            start=start,
-            motion=motion,
-            horizon_s=horizon,
-            constant=constant,
-            tests=tuple(tests or ()),
-            progress=tell,
-        ),
-        quiet,
-        json,
+        data,
+        out,
+        vessel=vessel,
+        methods=methods or (),
+        fixed=fixed or (),
+        velocity=velocity,
+        mean=mean,
+        start=start,
+        motion=motion,
+        horizon_s=horizon,
+        constant=constant,
+        tests=tests or (),
     )
 
 
-@app.command()
+@command("diagnose")
 def diagnose(
     data: DataFiles,
     vessel: Annotated[
         Path,
         typer.Option(
-            "--vessel", metavar="VESSEL.toml", help="The simulation model in use; parameter_std says how sure."
+            "--vessel",
+            metavar="VESSEL.toml",
+            help="The simulation model in use; its parameter_std says how far parameters may be off.",
         ),
     ],
     scenario: Annotated[
@@ -135,38 +102,24 @@ def diagnose(
         typer.Option(
             "--scenario",
             metavar="SCENARIO.toml",
-            help="Whose dictionary to search for manoeuvres that tell causes apart; standard ones when not given.",
+            help="Scenario whose dictionary is searched for manoeuvres that distinguish causes. Default: standard "
+            "manoeuvres.",
         ),
     ] = None,
     velocity: Velocity = "auto",
     out: OutByData = None,
     seed: Seed = 0,
-    quiet: Quiet = False,
-    json: Json = False,
-) -> None:
-    """Show what the simulation gets wrong, name the cause, extend the model.
+) -> Asked:
+    """Show what the simulation gets wrong, name the cause, and extend the model.
 
-    Writes diagnosis.json, diagnosis.html and vessel-extended.toml.
+    Writes diagnosis.json, diagnosis.html and vessel-extended.toml. The causes: expdesign explain causes
 
     Example: expdesign diagnose zigzag.csv circle.csv --vessel ship.toml
     """
-    carry_out(
-        "diagnose",
-        lambda workflows, tell: workflows.diagnose(
-            tuple(data),
-            check_out(out),
-            vessel=vessel,
-            scenario=scenario,
-            velocity=velocity,
-            seed=seed,
-            progress=tell,
-        ),
-        quiet,
-        json,
-    )
+    return ask("diagnose", data, out, vessel=vessel, scenario=scenario, velocity=velocity, seed=seed)
 
 
-@app.command()
+@command("indices")
 def indices(
     vessel: Annotated[
         Path, typer.Option("--vessel", metavar="VESSEL.toml", help="Model, length and actuators of the ship.")
@@ -176,59 +129,47 @@ def indices(
     ] = None,
     speed: Annotated[
         float | None,
-        typer.Option(
-            "--speed-mps", metavar="V", help="Approach speed of the simulated trials; 85 % power when not given."
-        ),
+        typer.Option("--speed-mps", metavar="V", help="Approach speed of the simulated trials. Default: 85 % power."),
     ] = None,
     scale: Annotated[
         float, typer.Option("--scale", metavar="S", help="Ship length by model length, for trials of a model.")
     ] = 1.0,
     antenna: Annotated[
         float,
-        typer.Option("--antenna-forward-m", metavar="X", help="How far forward of amidships the positions are."),
+        typer.Option("--antenna-forward-m", metavar="X", help="Distance of the antenna forward of amidships [m]."),
     ] = 0.0,
     depth: Annotated[
-        float | None, typer.Option("--depth-m", metavar="D", help="Depth of the water in the measured trials.")
+        float | None, typer.Option("--depth-m", metavar="D", help="Depth of the water in the measured trials [m].")
     ] = None,
     wind: Annotated[
-        float | None, typer.Option("--wind-mps", metavar="W", help="Mean true wind in the measured trials.")
+        float | None, typer.Option("--wind-mps", metavar="W", help="Mean true wind in the measured trials [m/s].")
     ] = None,
     sea: Annotated[
         int | None, typer.Option("--sea-state", metavar="N", help="Sea state in the measured trials, 0 to 9.")
     ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", "-o", metavar="FOLDER", help="Where to write; runs/<vessel>-indices when not given."),
-    ] = None,
-    quiet: Quiet = False,
-    json: Json = False,
-) -> None:
-    """Turning, zig-zag and stopping indices beside their IMO limits, simulated and measured.
+    out: OutByVessel = None,
+) -> Asked:
+    """Compute turning, zig-zag and stopping indices, simulated and measured, beside their IMO limits.
 
     Writes indices.json and indices.html.
 
     Example: expdesign indices zigzag.csv circle.csv --vessel ship.toml
     """
-    carry_out(
+    return ask(
         "indices",
-        lambda workflows, tell: workflows.indices(
-            tuple(data or ()),
-            check_out(out),
-            vessel=vessel,
-            speed_mps=speed,
-            scale=scale,
-            antenna_forward_m=antenna,
-            depth_m=depth,
-            wind_mps=wind,
-            sea_state=sea,
-            progress=tell,
-        ),
-        quiet,
-        json,
+        data or (),
+        out,
+        vessel=vessel,
+        speed_mps=speed,
+        scale=scale,
+        antenna_forward_m=antenna,
+        depth_m=depth,
+        wind_mps=wind,
+        sea_state=sea,
     )
 
 
-@app.command()
+@command("mine")
 def mine(
     data: DataFiles,
     vessel: Annotated[
@@ -239,36 +180,25 @@ def mine(
         float | None,
         typer.Option("--piece", metavar="SECONDS", help="Cut runs into pieces of about this length first."),
     ] = None,
-    fixed: Annotated[
-        list[str] | None, typer.Option("--fixed", metavar="NAME ...", help="Parameters that count as known.")
-    ] = None,
-    mean: Annotated[
-        str, typer.Option(metavar="HOW", help="Mean taken off the instruments, as in `estimate`.")
-    ] = "complete",
+    fixed: Fixed = None,
+    mean: Mean = "complete",
     velocity: Velocity = "auto",
     out: OutByData = None,
-    quiet: Quiet = False,
-    json: Json = False,
-) -> None:
-    """Rank recorded runs by what they tell, and choose the few to estimate from again.
+) -> Asked:
+    """Rank recorded runs by their information, and choose the few to estimate from.
 
     Writes mining.json and chosen.csv, which `estimate` reads.
 
     Example: expdesign mine voyage.csv --vessel ship.toml --piece 120 --keep 10
     """
-    carry_out(
+    return ask(
         "mine",
-        lambda workflows, tell: workflows.mine(
-            tuple(data),
-            check_out(out),
-            vessel=vessel,
-            keep=keep,
-            piece_s=piece,
-            fixed=tuple(fixed or ()),
-            mean=mean,
-            velocity=velocity,
-            progress=tell,
-        ),
-        quiet,
-        json,
+        data,
+        out,
+        vessel=vessel,
+        keep=keep,
+        piece_s=piece,
+        fixed=fixed or (),
+        mean=mean,
+        velocity=velocity,
     )

@@ -1,7 +1,4 @@
-"""Commands around a plan: rehearsal, validation, variants, and the rest of a trial.
-
-Each hands its arguments to the workflow of the same name.
-"""
+"""Commands that run, test or continue a planned trial."""
 
 from __future__ import annotations
 
@@ -10,11 +7,11 @@ from typing import Annotated
 
 import typer
 
-from expdesign.cli.app import Json, Out, OutBeside, PlanFile, Quiet, ScenarioFile, Seed, app, carry_out
-from expdesign.cli.arguments import check_out
+from expdesign.cli.app import Asked, ask, command
+from expdesign.cli.options import Jobs, Out, OutBesidePlan, PlanFile, ScenarioFile, Seed
 
 
-@app.command()
+@command("simulate")
 def simulate(
     plan: PlanFile,
     truth: Annotated[
@@ -22,129 +19,67 @@ def simulate(
     ],
     until: Annotated[
         float | None,
-        typer.Option("--until", metavar="S", help="End the data after S seconds, as of a trial broken off."),
+        typer.Option("--until", metavar="S", help="End the data after S seconds, as if the trial were broken off."),
     ] = None,
-    out: OutBeside = None,
+    out: OutBesidePlan = None,
     seed: Seed = 0,
-    quiet: Quiet = False,
-    json: Json = False,
-) -> None:
-    """Rehearse the trial: run the plan on another vessel and measure with noise.
+) -> Asked:
+    """Rehearse a trial: run its commands on another vessel and measure with noise.
 
     Writes measured.csv.
     """
-    carry_out(
-        "simulate",
-        lambda workflows, tell: workflows.simulate(
-            plan, check_out(out), truth=truth, until_s=until, seed=seed, progress=tell
-        ),
-        quiet,
-        json,
-    )
+    return ask("simulate", plan, out, truth=truth, until_s=until, seed=seed)
 
 
-@app.command()
+@command("validate")
 def validate(
     scenario: ScenarioFile,
     truth: Annotated[
         Path | None,
-        typer.Option(
-            "--truth", metavar="VESSEL.toml", help="The ship that sails; the scenario's own vessel when not given."
-        ),
+        typer.Option("--truth", metavar="VESSEL.toml", help="The true ship. Default: the scenario's own vessel."),
     ] = None,
     trials: Annotated[int, typer.Option("--trials", metavar="N", help="Simulated trials of each design.")] = 100,
-    method: Annotated[str, typer.Option("--method", metavar="M", help="Estimator, as in `estimate`.")] = "iv",
+    method: Annotated[str, typer.Option("--method", metavar="M", help="Estimator; see expdesign explain methods.")] = (
+        "iv"
+    ),
     integrator: Annotated[
         str,
         typer.Option(
             "--integrator",
             metavar="HOW",
-            help="How the ship moves between samples: rk4, or euler, the map that discrete parameters are defined by.",
+            help="Motion between samples: rk4, or euler, the map by which discrete parameters are defined.",
         ),
     ] = "rk4",
-    jobs: Annotated[int, typer.Option("--jobs", metavar="N", help="Processes; 0 for one per core.")] = 0,
+    jobs: Jobs = 0,
     out: Out = None,
     seed: Seed = 0,
-    quiet: Quiet = False,
-    json: Json = False,
-) -> None:
-    """Try the design in simulated trials: predicted against found accuracy, beside equal shares and random runs.
+) -> Asked:
+    """Test a design in simulated trials: predicted accuracy against what is found, beside equal shares and random runs.
 
-    Writes validation.json and validation.html. An interrupted call goes on where it stopped.
+    Writes validation.json and validation.html. An interrupted call continues where it stopped.
     """
-    carry_out(
-        "validate",
-        lambda workflows, tell: workflows.validate_design(
-            scenario,
-            check_out(out),
-            truth=truth,
-            trials=trials,
-            method=method,
-            integrator=integrator,
-            jobs=jobs,
-            seed=seed,
-            progress=tell,
-        ),
-        quiet,
-        json,
+    return ask(
+        "validate_design",
+        scenario,
+        out,
+        truth=truth,
+        trials=trials,
+        method=method,
+        integrator=integrator,
+        jobs=jobs,
+        seed=seed,
     )
 
 
-@app.command()
-def whatif(
-    scenario: ScenarioFile,
-    variants: Annotated[
-        list[Path],
-        typer.Argument(metavar="VARIANT.toml ...", help="Files with only what differs, or complete scenarios."),
-    ],
-    plan: Annotated[
-        bool, typer.Option("--plan", help="Plan the trials, too, so that repositioning counts; takes minutes each.")
-    ] = False,
-    jobs: Annotated[int, typer.Option("--jobs", metavar="N", help="Processes; 0 for one per core.")] = 0,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(
-            "--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers do it, e.g. tcp://host:8786."
-        ),
-    ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", "-o", metavar="FOLDER", help="Where to write; runs/<scenario>-whatif when not given."),
-    ] = None,
-    seed: Seed = 0,
-    quiet: Quiet = False,
-    json: Json = False,
-) -> None:
-    """Compare variants of a scenario side by side: what changes, and what it costs.
-
-    Writes whatif.json and whatif.html.
-
-    Example: expdesign whatif scenarios/helsinki.toml scenarios/variants/half-an-hour.toml
-    """
-    carry_out(
-        "whatif",
-        lambda workflows, tell: workflows.whatif(
-            scenario,
-            tuple(variants),
-            check_out(out),
-            with_plan=plan,
-            jobs=jobs,
-            scheduler=scheduler,
-            seed=seed,
-            progress=tell,
-        ),
-        quiet,
-        json,
-    )
-
-
-@app.command()
+@command("replan")
 def replan(
     scenario: ScenarioFile,
     data: Annotated[
         list[Path],
         typer.Option(
-            "--data", metavar="DATA.csv ...", help="Measured so far; the last row of the last file is the ship's place."
+            "--data",
+            metavar="DATA.csv ...",
+            help="Measured so far; the last row of the last file is the present position.",
         ),
     ],
     vessel: Annotated[
@@ -152,7 +87,7 @@ def replan(
         typer.Option(
             "--vessel",
             metavar="VESSEL.toml",
-            help="Model to go on with, e.g. vessel-extended.toml; estimated from the data when not given.",
+            help="Model to continue with, e.g. vessel-extended.toml. Default: estimated from the data.",
         ),
     ] = None,
     remaining: Annotated[
@@ -160,7 +95,7 @@ def replan(
         typer.Option(
             "--remaining",
             metavar="S",
-            help="Informative time that is left; design.total_s less the time of the data when not given.",
+            help="Informative time left [s]. Default: design.total_s less the time of the data.",
         ),
     ] = None,
     interest: Annotated[
@@ -168,33 +103,26 @@ def replan(
         typer.Option(
             "--interest",
             metavar="NAME ...",
-            help="Parameters that the rest is to be best for (criterion D_s), e.g. one that a diagnosis added.",
+            help="Parameters to optimise the rest for (criterion D_s), e.g. one that a diagnosis added.",
         ),
     ] = None,
     out: Out = None,
     seed: Seed = 0,
-    quiet: Quiet = False,
-    json: Json = False,
-) -> None:
-    """Plan the rest of a trial, from where the ship is now and with what the data so far have told.
+) -> Asked:
+    """Plan the rest of a trial, from the present position and with what the data so far show.
 
-    Writes what run writes, for the rest; and replan.json, what is known and what the rest buys, and vessel-used.toml,
-    the model it is planned with. The ship is taken to be stopped at the last position of the data.
+    Writes what run writes, for the rest; replan.json with what is known and what the rest will add; and
+    vessel-used.toml, the model it is planned with. The ship is assumed to be stopped at the last position of the data.
 
     Example: expdesign replan scenarios/story.toml --data measured.csv --vessel vessel-extended.toml --remaining 480
     """
-    carry_out(
+    return ask(
         "replan",
-        lambda workflows, tell: workflows.replan(
-            scenario,
-            check_out(out),
-            data=tuple(data),
-            vessel=vessel,
-            remaining_s=remaining,
-            interest=tuple(interest or ()),
-            seed=seed,
-            progress=tell,
-        ),
-        quiet,
-        json,
+        scenario,
+        out,
+        data=data,
+        vessel=vessel,
+        remaining_s=remaining,
+        interest=interest or (),
+        seed=seed,
     )

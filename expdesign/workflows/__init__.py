@@ -1,19 +1,34 @@
-"""The story of the package: from a scenario file to a folder of results, one function for each command.
+"""The story of the package: one function for each command of the command line.
 
-Each function reads its input, does the work and only then writes, so that a failure leaves no files. The pieces in
-between (`scored`, `designed`, `planned`) are for notebooks: value in, value out.
+Each function reads its input, does the work and only then writes, so that a failure leaves no files. For notebooks
+there are the steps that commands share (`scored`, `designed`, `planned`: values in, values out) and `notebook`, a
+planned trial as one value. A name is loaded when it is first used, so that a command waits only for what it needs.
 """
 
-from expdesign.workflows.after import estimate, export, measured, simulate
-from expdesign.workflows.design import designed, duration_problem
-from expdesign.workflows.diagnosed import diagnose
-from expdesign.workflows.indices import check_routes, indices
-from expdesign.workflows.mined import mine
-from expdesign.workflows.outcome import Outcome, Progress, TextTable
-from expdesign.workflows.replan import replan
-from expdesign.workflows.trial import durations, plan, planned, run, score, scored
-from expdesign.workflows.validated import validate_design
-from expdesign.workflows.whatif import whatif
+from typing import TYPE_CHECKING
+
+from expdesign.lazy import load_on_use
+
+if TYPE_CHECKING:
+    from expdesign.workflows.data.diagnose import diagnose
+    from expdesign.workflows.data.estimate import estimate
+    from expdesign.workflows.data.indices import indices
+    from expdesign.workflows.data.mine import mine
+    from expdesign.workflows.outcome import Outcome, Progress, TextTable
+    from expdesign.workflows.planning.check_routes import check_routes
+    from expdesign.workflows.planning.durations import durations
+    from expdesign.workflows.planning.export import export
+    from expdesign.workflows.planning.plan import plan
+    from expdesign.workflows.planning.run import run
+    from expdesign.workflows.planning.score import score
+    from expdesign.workflows.planning.whatif import whatif
+    from expdesign.workflows.steps.design_problem import designed, duration_problem
+    from expdesign.workflows.steps.measured import measured
+    from expdesign.workflows.steps.planned import plan_problem, planned
+    from expdesign.workflows.steps.scored import scored
+    from expdesign.workflows.trials.replan import replan
+    from expdesign.workflows.trials.simulate import simulate
+    from expdesign.workflows.trials.validate import validate_design
 
 __all__ = [
     "Outcome",
@@ -30,6 +45,7 @@ __all__ = [
     "measured",
     "mine",
     "plan",
+    "plan_problem",
     "planned",
     "replan",
     "run",
@@ -39,3 +55,29 @@ __all__ = [
     "validate_design",
     "whatif",
 ]
+
+if not TYPE_CHECKING:
+    __getattr__ = load_on_use(
+        __name__,
+        {
+            "data.diagnose": ("diagnose",),
+            "data.estimate": ("estimate",),
+            "data.indices": ("indices",),
+            "data.mine": ("mine",),
+            "outcome": ("Outcome", "Progress", "TextTable"),
+            "planning.check_routes": ("check_routes",),
+            "planning.durations": ("durations",),
+            "planning.export": ("export",),
+            "planning.plan": ("plan",),
+            "planning.run": ("run",),
+            "planning.score": ("score",),
+            "planning.whatif": ("whatif",),
+            "steps.design_problem": ("designed", "duration_problem"),
+            "steps.measured": ("measured",),
+            "steps.planned": ("plan_problem", "planned"),
+            "steps.scored": ("scored",),
+            "trials.replan": ("replan",),
+            "trials.simulate": ("simulate",),
+            "trials.validate": ("validate_design",),
+        },
+    )

@@ -14,9 +14,11 @@ from expdesign.export.report import ReportContent, report_html
 from expdesign.information import PrimitiveInformation
 from expdesign.plan.values import Plan
 from expdesign.scenario import Scenario, load_scenario
-from expdesign.workflows.design import designed
 from expdesign.workflows.outcome import Progress, silent, within
-from expdesign.workflows.trial import built_route, planned, ready, report_content
+from expdesign.workflows.steps.design_problem import designed
+from expdesign.workflows.steps.grown import ready
+from expdesign.workflows.steps.planned import planned
+from expdesign.workflows.steps.trial_files import built_route, report_content
 
 FRAME_HEIGHT_PX = 700
 

@@ -23,7 +23,7 @@ from expdesign.errors import NoPlan
 from expdesign.plan.control.capability import capability
 from expdesign.plan.solve import lattice_reference
 from expdesign.scenario import load_scenario
-from expdesign.workflows.trial import plan_problem
+from expdesign.workflows import plan_problem
 from main_job import SCENARIOS, baseline_s, main_job
 
 CELLS = 1.1

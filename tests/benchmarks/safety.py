@@ -30,7 +30,7 @@ from expdesign.plan.values import Promise
 from expdesign.scenario import load_scenario
 from expdesign.scenario.values import Scenario
 from expdesign.simulation import Environment, Variation
-from expdesign.workflows.trial import plan_problem
+from expdesign.workflows import plan_problem
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 WANDERING = 1.0, 300.0

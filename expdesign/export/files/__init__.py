@@ -1,29 +1,34 @@
 """Results as JSON, CSV and TOML files."""
 
-from expdesign.export.files.design_files import dictionary_json, durations_json
-from expdesign.export.files.dictionary_file import dictionary_files, growth_json
-from expdesign.export.files.estimate_tables import (
-    breach_sentences,
-    estimate_warnings,
-    fit_table,
-    limit_table,
-    motion_words,
-    parameter_table,
-    plus_minus,
-    unstable_warning,
-)
-from expdesign.export.files.estimates import (
-    estimate_json,
-    estimated_vessel,
-    fit_entries,
-    limit_entries,
-    parameter_entries,
-)
-from expdesign.export.files.known import Known, Purchase, replan_json
-from expdesign.export.files.plan_files import commands_csv, plan_json, track_csv
-from expdesign.export.files.record_file import record_csv
-from expdesign.export.files.text import finite, strict_json
-from expdesign.export.files.vessel_file import vessel_toml
+from typing import TYPE_CHECKING
+
+from expdesign.lazy import load_on_use
+
+if TYPE_CHECKING:
+    from expdesign.export.files.design_files import dictionary_json, durations_json
+    from expdesign.export.files.dictionary_file import dictionary_files, growth_json
+    from expdesign.export.files.estimate_tables import (
+        breach_sentences,
+        estimate_warnings,
+        fit_table,
+        limit_table,
+        motion_words,
+        parameter_table,
+        plus_minus,
+        unstable_warning,
+    )
+    from expdesign.export.files.estimates import (
+        estimate_json,
+        estimated_vessel,
+        fit_entries,
+        limit_entries,
+        parameter_entries,
+    )
+    from expdesign.export.files.known import Known, Purchase, replan_json
+    from expdesign.export.files.plan_files import commands_csv, plan_json, track_csv
+    from expdesign.export.files.record_file import record_csv
+    from expdesign.export.files.text import finite, strict_json
+    from expdesign.export.files.vessel_file import vessel_toml
 
 __all__ = [
     "Known",
@@ -54,3 +59,28 @@ __all__ = [
     "unstable_warning",
     "vessel_toml",
 ]
+
+if not TYPE_CHECKING:
+    __getattr__ = load_on_use(
+        __name__,
+        {
+            "design_files": ("dictionary_json", "durations_json"),
+            "dictionary_file": ("dictionary_files", "growth_json"),
+            "estimate_tables": (
+                "breach_sentences",
+                "estimate_warnings",
+                "fit_table",
+                "limit_table",
+                "motion_words",
+                "parameter_table",
+                "plus_minus",
+                "unstable_warning",
+            ),
+            "estimates": ("estimate_json", "estimated_vessel", "fit_entries", "limit_entries", "parameter_entries"),
+            "known": ("Known", "Purchase", "replan_json"),
+            "plan_files": ("commands_csv", "plan_json", "track_csv"),
+            "record_file": ("record_csv",),
+            "text": ("finite", "strict_json"),
+            "vessel_file": ("vessel_toml",),
+        },
+    )

@@ -11,7 +11,6 @@ from expdesign.errors import NoPlan
 from expdesign.scenario.charts.area_tables import AreaTable, BoundsTable, NoGoTable
 from expdesign.scenario.charts.geojson_zones import open_geojson
 from expdesign.scenario.charts.metres import Box, in_metres
-from expdesign.scenario.charts.s57_zones import open_cell
 from expdesign.scenario.charts.zones import OpenChart
 from expdesign.scenario.tables import Entry, check_table, read_toml, shown
 from expdesign.sea_area import LocalFrame, SeaArea, Zones, build_sea_area
@@ -67,6 +66,8 @@ def _open_chart(file: AreaTable, draught_m: float, given: Box | None, entry: Ent
     if chart.geojson is not None and chart.s57 is not None:
         raise entry.at("s57").error(f"is {shown(chart.s57)} beside geojson, expected one chart")
     if chart.s57 is not None:
+        from expdesign.scenario.charts.s57_zones import open_cell  # its reader takes a second to load
+
         return open_cell(file, draught_m=draught_m, entry=entry)
     if chart.geojson is None:
         raise entry.at("geojson").error("is missing, expected the path of a GeoJSON chart, or s57 with that of a cell")

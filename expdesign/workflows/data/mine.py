@@ -1,9 +1,8 @@
-"""Which recorded batches to estimate from: ranked by what they tell, and the best few."""
+"""`expdesign mine`: the recorded batches that are worth estimating from."""
 
 from __future__ import annotations
 
 import json
-import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -21,8 +20,9 @@ from expdesign.information.recorded import BatchInformation, recorded_informatio
 from expdesign.scenario import load_vessel
 from expdesign.signals import Batch, Record
 from expdesign.vessel import VesselModel
-from expdesign.workflows.after import measured
+from expdesign.workflows.command_text import command_text
 from expdesign.workflows.outcome import Outcome, Progress, TextTable, silent
+from expdesign.workflows.steps.measured import measured
 
 
 def mine(
@@ -67,7 +67,19 @@ def mine(
     progress("choosing among them", 0.6)
     subset = best_subset(batches, names, size=keep, mean_subtraction=mean)
     chosen = [batch for batch in record.batches if batch.name in subset.chosen]
-    command = _command(data, vessel, keep, piece_s, fixed, mean, velocity)
+    command = command_text(
+        "mine",
+        data,
+        {
+            "--vessel": vessel,
+            "--keep": keep,
+            "--piece": piece_s,
+            "--fixed": tuple(fixed),
+            "--mean": mean,
+            "--velocity": velocity,
+        },
+        usual={"--mean": "complete", "--velocity": "auto"},
+    )
     content = _content(subset, batches, names, unseen, mean=mean, command=command)
     files = {
         "mining.json": json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n",
@@ -195,20 +207,3 @@ def _table(subset: Subset, batches: Sequence[BatchInformation]) -> TextTable:
             for rank, (name, efficiency) in enumerate(rows, start=1)
         ),
     )
-
-
-def _command(
-    data: Sequence[Path],
-    vessel: Path,
-    keep: int,
-    piece_s: float | None,
-    fixed: Sequence[str],
-    mean: str,
-    velocity: str,
-) -> str:
-    words = ["expdesign", "mine", *map(str, data), "--vessel", str(vessel), "--keep", str(keep)]
-    words += ["--piece", f"{piece_s:g}"] if piece_s is not None else []
-    words += [part for name in fixed for part in ("--fixed", name)]
-    words += ["--mean", mean] if mean != "complete" else []
-    words += ["--velocity", velocity] if velocity != "auto" else []
-    return shlex.join(words)

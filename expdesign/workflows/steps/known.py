@@ -1,4 +1,4 @@
-"""What a trial has told so far, what the rest of it buys, and which of its manoeuvres buy it."""
+"""What the data so far show, what the rest of a trial adds, and which of its manoeuvres add it."""
 
 from __future__ import annotations
 

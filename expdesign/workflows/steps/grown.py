@@ -1,4 +1,4 @@
-"""Growing a scenario's dictionary, and what is told and written of it."""
+"""The dictionary of a scenario grown, and what is written and reported of it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from expdesign.export.files import dictionary_files, growth_json
 from expdesign.growing import GrowSettings, Growth, grow_dictionary
 from expdesign.information import PrimitiveInformation
 from expdesign.scenario import Scenario
-from expdesign.workflows.outcome import Progress, TextTable, silent
+from expdesign.workflows.outcome import Progress, TextTable, silent, within
+from expdesign.workflows.steps.scored import scored
 
 STEM = "dictionary-grown"
 
@@ -114,3 +115,12 @@ def growth_tables(growth: Growth | None) -> tuple[TextTable, ...]:
     header = ("round", "added", "d before", "log det", "D-efficiency", "excites", "settings")
     title = f"Manoeuvres added; one helps where d is above {growth.dimension}"
     return (TextTable(title=title, header=header, rows=rows),) if rows else ()
+
+
+def ready(
+    case: Scenario, *, grow: bool = False, seed: int, progress: Progress = silent
+) -> tuple[tuple[PrimitiveInformation, ...], Growth | None]:
+    """The scored dictionary, grown where that is wished."""
+    information = scored(case, progress=within(progress, 0.0, 0.2 if grow or case.design.grow else 1.0))
+    growth = grown(case, information, always=grow, seed=seed, progress=within(progress, 0.2, 1.0))
+    return (information if growth is None else growth.information), growth

@@ -1,11 +1,10 @@
-"""The rest of a trial: from where the ship is now, with what the data so far have told.
+"""`expdesign replan`: the rest of a trial, from the present position and with what the data so far show.
 
 The ship is taken to be stopped through the water at its present place before the rest begins.
 """
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -21,12 +20,15 @@ from expdesign.plan.values import Plan
 from expdesign.scenario import Scenario
 from expdesign.values import Array
 from expdesign.vessel import Vessel
-from expdesign.workflows.design import design_summary, designed
-from expdesign.workflows.grown import growth_summary
-from expdesign.workflows.known import data_parts, expected_std, in_recorded_depth, plan_part, purchases
+from expdesign.workflows.command_text import command_text
 from expdesign.workflows.outcome import Outcome, Progress, TextTable, silent, within
-from expdesign.workflows.present import PresentState, present_state, rest_of, weather_for_rest
-from expdesign.workflows.trial import built_route, plan_summary, planned, ready, report_content, trial_files
+from expdesign.workflows.steps.design_problem import designed
+from expdesign.workflows.steps.design_tables import design_summary
+from expdesign.workflows.steps.grown import growth_summary, ready
+from expdesign.workflows.steps.known import data_parts, expected_std, in_recorded_depth, plan_part, purchases
+from expdesign.workflows.steps.planned import plan_summary, planned
+from expdesign.workflows.steps.present import PresentState, present_state, rest_of, weather_for_rest
+from expdesign.workflows.steps.trial_files import built_route, report_content, trial_files
 
 VESSEL_FILE = "vessel-used.toml"
 
@@ -75,7 +77,17 @@ def replan(
         compared=efficiencies(design),
         route=route,
         known=known,
-        command=_command(scenario, data, vessel, remaining_s, interest, seed),
+        command=command_text(
+            "replan",
+            [scenario],
+            {
+                "--data": tuple(data),
+                "--vessel": vessel,
+                "--remaining": remaining_s,
+                "--interest": tuple(interest),
+                "--seed": seed,
+            },
+        ),
     )
     files = {
         **trial_files(case, growth, content, route),
@@ -133,21 +145,6 @@ def known_of(state: PresentState, case: Scenario, design: DurationDesign, plan: 
 
 def _stated(vessel: Vessel) -> dict[str, float]:
     return dict(zip(vessel.model.names, vessel.model.parameter_std.tolist(), strict=True))
-
-
-def _command(
-    scenario: Path,
-    data: Sequence[Path],
-    vessel: Path | None,
-    remaining_s: float | None,
-    interest: Sequence[str],
-    seed: int,
-) -> str:
-    words = ["expdesign", "replan", str(scenario), "--data", *map(str, data)]
-    words += ["--vessel", str(vessel)] if vessel else []
-    words += ["--remaining", f"{remaining_s:g}"] if remaining_s is not None else []
-    words += ["--interest", *interest] if interest else []
-    return shlex.join([*words, "--seed", str(seed)])
 
 
 def _summary(known: Known) -> dict[str, object]:

@@ -1,4 +1,4 @@
-"""Where a trial stands: the ship's place, the time left, and what the data so far have told of her."""
+"""The state of a trial that goes on: position, time left, and the ship as the data so far show her."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from expdesign.signals import Record
 from expdesign.simulation import Environment
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
-from expdesign.workflows.after import measured
-from expdesign.workflows.known import updated
 from expdesign.workflows.outcome import Progress, silent
+from expdesign.workflows.steps.known import updated
+from expdesign.workflows.steps.measured import measured
 
 PARTICULARS = ("length_m", "beam_m", "draught_m", "sample_time_s")
 

@@ -1,23 +1,22 @@
-"""Manoeuvring indices of a vessel, from its model and from measured runs; and checks of route files."""
+"""`expdesign indices`: manoeuvring indices of a vessel, from its model and from measured runs."""
 
 from __future__ import annotations
 
 import math
-import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
 from expdesign import __version__
-from expdesign.errors import FileError, InputError
+from expdesign.errors import InputError
 from expdesign.export import write_files
-from expdesign.export.formats.check import check_route_file
 from expdesign.export.indices_form import Held, IndicesContent, indices_html, indices_json, verdict_rows
 from expdesign.indices import StandardResults, ZigZag, measured_trial, standard_results
 from expdesign.indices.measured import Found
 from expdesign.scenario import load_vessel
 from expdesign.vessel import Vessel
-from expdesign.workflows.after import measured
+from expdesign.workflows.command_text import command_text
 from expdesign.workflows.outcome import Outcome, Progress, TextTable, silent
+from expdesign.workflows.steps.measured import measured
 
 HEADER = ("From", "Run", "Index", "Result", "", "Limit", "Rule", "Verdict")
 
@@ -54,7 +53,20 @@ def indices(
         simulated_why_not=why_not,
         measured=seen,
         notes=notes,
-        command=_command(data, vessel, speed_mps, scale, antenna_forward_m, held),
+        command=command_text(
+            "indices",
+            data,
+            {
+                "--vessel": vessel,
+                "--speed-mps": speed_mps,
+                "--scale": scale,
+                "--antenna-forward-m": antenna_forward_m,
+                "--depth-m": depth_m,
+                "--wind-mps": wind_mps,
+                "--sea-state": sea_state,
+            },
+            usual={"--scale": 1.0, "--antenna-forward-m": 0.0},
+        ),
         version=__version__,
         held=held,
     )
@@ -62,20 +74,6 @@ def indices(
     written = write_files(out or Path("runs") / f"{vessel.stem}-indices", files)
     progress("done", 1.0)
     return Outcome(files=written, summary=_summary(content), tables=_tables(content))
-
-
-def check_routes(files: Sequence[Path]) -> Outcome:
-    """Whether RTZ and GPX files are fit to be loaded.
-
-    Raises:
-        FileError: the first problem of the first file that has one, and how many more there are.
-    """
-    for path in files:
-        problems = check_route_file(path)
-        if problems:
-            more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
-            raise FileError(path, "", problems[0] + more)
-    return Outcome(files=(), summary={"files": len(files), "problems": 0})
 
 
 def _measured(
@@ -100,15 +98,6 @@ def _simulated(ship: Vessel, speed_mps: float | None, *, needed: bool) -> tuple[
         if needed:
             raise
         return None, str(error)
-
-
-def _command(
-    data: Sequence[Path], vessel: Path, speed_mps: float | None, scale: float, forward_m: float, held: Held
-) -> str:
-    options = [("--speed-mps", speed_mps, None), ("--scale", scale, 1.0), ("--antenna-forward-m", forward_m, 0.0)]
-    options += [(f"--{name.replace('_', '-')}", value, None) for name, value in vars(held).items()]
-    spelled = [part for option, value, usual in options if value != usual for part in (option, f"{value:g}")]
-    return shlex.join(["expdesign", "indices", *map(str, data), "--vessel", str(vessel), *spelled])
 
 
 def _summary(content: IndicesContent) -> dict[str, object]:

@@ -1,9 +1,8 @@
-"""Designs tried in simulated trials with a true ship."""
+"""`expdesign validate`: designs tested in simulated trials with a true ship."""
 
 from __future__ import annotations
 
 import os
-import shlex
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -19,9 +18,10 @@ from expdesign.information import estimated_parameters
 from expdesign.rehearsal import RANDOM, Rehearsal, equal_runs, validate
 from expdesign.scenario import load_scenario, load_vessel
 from expdesign.values import Array
-from expdesign.workflows.design import designed
+from expdesign.workflows.command_text import command_text
 from expdesign.workflows.outcome import Outcome, Progress, TextTable, silent, within
-from expdesign.workflows.trial import ready
+from expdesign.workflows.steps.design_problem import designed
+from expdesign.workflows.steps.grown import ready
 
 OPTIMISED, EQUAL = "optimised", "equal shares"
 INTEGRATORS = ("rk4", "euler")
@@ -82,7 +82,11 @@ def validate_design(
             for item, count in zip(information, design.repeats, strict=True)
             if count and not item.excitation_condition
         ),
-        command=_command(scenario, truth, trials, method, integrator, seed),
+        command=command_text(
+            "validate",
+            [scenario],
+            {"--truth": truth, "--trials": trials, "--method": method, "--integrator": integrator, "--seed": seed},
+        ),
         version=__version__,
     )
     files = write_files(
@@ -122,12 +126,6 @@ def _chunk_store(folder: Path) -> tuple[dict[str, Array], Callable[[str, Array],
         beside.replace(target)
 
     return done, keep, lambda: shutil.rmtree(folder, ignore_errors=True)
-
-
-def _command(scenario: Path, truth: Path | None, trials: int, method: str, integrator: str, seed: int) -> str:
-    words = ["expdesign", "validate", str(scenario), *(["--truth", str(truth)] if truth else [])]
-    options = {"--trials": str(trials), "--method": method, "--integrator": integrator, "--seed": str(seed)}
-    return shlex.join([*words, *(word for pair in options.items() for word in pair)])
 
 
 def _summary(content: ValidationContent) -> dict[str, object]:

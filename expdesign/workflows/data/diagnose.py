@@ -1,8 +1,7 @@
-"""From measured data to what the simulation gets wrong."""
+"""`expdesign diagnose`: what the simulation of measured data gets wrong."""
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -22,8 +21,9 @@ from expdesign.signals import Commands
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, Vessel, VesselModel, direct_terms, generalised_force
 from expdesign.vessel.structures import FORCE_SIGNALS, SHOAL
-from expdesign.workflows.after import measured
+from expdesign.workflows.command_text import command_text
 from expdesign.workflows.outcome import Outcome, Progress, TextTable, silent, within
+from expdesign.workflows.steps.measured import measured
 
 
 def diagnose(
@@ -55,7 +55,12 @@ def diagnose(
     proposals = _proposals(scenario, model_for(ship.model, record)) if scenario else ()
     found = diagnose_record(ship, record, seed=seed, proposals=proposals, progress=within(progress, 0.05, 0.9))
     progress("drawing the page", 0.9)
-    command = _command(data, vessel, scenario, velocity, seed)
+    command = command_text(
+        "diagnose",
+        data,
+        {"--vessel": vessel, "--scenario": scenario, "--velocity": velocity, "--seed": seed},
+        usual={"--velocity": "auto"},
+    )
     files = {
         "diagnosis.json": diagnosis_json(found),
         "diagnosis.html": diagnosis_html(found, command=command, version=__version__),
@@ -97,13 +102,6 @@ def as_inputs(commands: Commands, vessel: Vessel, model: VesselModel) -> Array:
             f"{', '.join(wanted)}; expected a scenario of the ship that the data are of"
         )
     return np.column_stack([table[name] for name in wanted])
-
-
-def _command(data: Sequence[Path], vessel: Path, scenario: Path | None, velocity: str, seed: int) -> str:
-    words = ["expdesign", "diagnose", *map(str, data), "--vessel", str(vessel)]
-    words += ["--scenario", str(scenario)] if scenario else []
-    words += ["--velocity", velocity] if velocity != "auto" else []
-    return shlex.join([*words, "--seed", str(seed)])
 
 
 def _summary(found: Diagnosis) -> dict[str, object]:

@@ -1,9 +1,8 @@
-"""A scenario and variants of it, designed side by side and, if wished, planned."""
+"""`expdesign whatif`: a scenario and variants of it, designed and optionally planned, side by side."""
 
 from __future__ import annotations
 
 import os
-import shlex
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,9 +20,11 @@ from expdesign.information import PrimitiveInformation, estimated_parameters
 from expdesign.information.expected import expected_covariance
 from expdesign.rehearsal import trial_parts
 from expdesign.scenario import Scenario, load_scenario, load_variant
-from expdesign.workflows.design import designed
+from expdesign.workflows.command_text import command_text
 from expdesign.workflows.outcome import Outcome, Progress, TextTable, silent
-from expdesign.workflows.trial import plan_summary, planned, ready
+from expdesign.workflows.steps.design_problem import designed
+from expdesign.workflows.steps.grown import ready
+from expdesign.workflows.steps.planned import plan_summary, planned
 
 WHOLE_RUNS = "repeats"
 
@@ -73,7 +74,7 @@ def whatif(
     content = WhatIfContent(
         cases=tuple(done[index] for index in range(len(cases))),
         planned=with_plan,
-        command=_command(scenario, variants, with_plan, seed),
+        command=command_text("whatif", [scenario, *variants], {"--plan": with_plan, "--seed": seed}),
         version=__version__,
     )
     if all(case.problem for case in content.cases):
@@ -152,11 +153,6 @@ def _described(
         covariance=covariance,
         plan=plan,
     )
-
-
-def _command(scenario: Path, variants: Sequence[Path], with_plan: bool, seed: int) -> str:
-    words = ["expdesign", "whatif", str(scenario), *map(str, variants), *(["--plan"] if with_plan else [])]
-    return shlex.join([*words, "--seed", str(seed)])
 
 
 def _summary(content: WhatIfContent) -> dict[str, object]:

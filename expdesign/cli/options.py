@@ -1,0 +1,64 @@
+"""Arguments and options that several commands share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from expdesign.cli.arguments import check_out, parse_seed
+
+
+def out_option(default: str) -> object:
+    """`--out`, checked; `default` says where results go without it."""
+    return typer.Option(
+        "--out", "-o", metavar="FOLDER", callback=check_out, help=f"Folder for the results. Default: {default}."
+    )
+
+
+Out = Annotated[Path | None, out_option("runs/<name of the scenario>")]
+OutBesidePlan = Annotated[Path | None, out_option("the folder of the plan")]
+OutByData = Annotated[Path | None, out_option("runs/<first data file>")]
+OutByVessel = Annotated[Path | None, out_option("runs/<vessel>-indices")]
+OutWhatIf = Annotated[Path | None, out_option("runs/<scenario>-whatif")]
+
+ScenarioFile = Annotated[
+    Path,
+    typer.Argument(
+        metavar="SCENARIO.toml", help="Names vessel, dictionary and area; see expdesign explain scenario for its keys."
+    ),
+]
+PlanFile = Annotated[
+    Path,
+    typer.Argument(metavar="PLAN.json", help="A plan made before; its track.csv and commands.csv must lie beside it."),
+]
+DataFiles = Annotated[
+    list[Path],
+    typer.Argument(metavar="DATA.csv ...", help="Measured runs; see expdesign explain data for their columns."),
+]
+Seed = Annotated[
+    int,
+    typer.Option("--seed", parser=parse_seed, metavar="N", help="Seed of all random numbers; same seed, same result."),
+]
+Jobs = Annotated[int, typer.Option("--jobs", metavar="N", help="Number of processes; 0 for one per core.")]
+Fixed = Annotated[
+    list[str] | None,
+    typer.Option("--fixed", metavar="NAME ...", help="Parameters kept at the vessel file's values."),
+]
+Velocity = Annotated[
+    str,
+    typer.Option(
+        metavar="HOW",
+        help="Source of u, v, r: measured; difference or smoothed, both from the pose; auto: measured where there are "
+        "such columns, else difference.",
+    ),
+]
+Mean = Annotated[
+    str,
+    typer.Option(
+        metavar="HOW",
+        help="Mean subtracted from the instruments, against constant disturbances: complete, batch or none. Use none "
+        "where an input never changes.",
+    ),
+]

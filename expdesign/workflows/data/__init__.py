@@ -1,0 +1,1 @@
+"""Commands on measured data; one file each."""

@@ -1,0 +1,121 @@
+"""`expdesign estimate`: parameters of a vessel from measured data."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from expdesign import __version__
+from expdesign.assessment import NO_TESTS, Assessment, Wish, assess
+from expdesign.errors import InputError
+from expdesign.export import (
+    estimate_json,
+    estimate_warnings,
+    estimated_vessel,
+    fit_entries,
+    fit_table,
+    limit_entries,
+    limit_table,
+    parameter_entries,
+    parameter_table,
+    write_files,
+)
+from expdesign.export.estimate_page import EstimateContent, estimate_html
+from expdesign.scenario import load_vessel
+from expdesign.workflows.command_text import command_text
+from expdesign.workflows.outcome import Outcome, Progress, TextTable, silent, within
+from expdesign.workflows.steps.measured import measured
+
+
+def estimate(
+    data: Sequence[Path],
+    out: Path | None,
+    *,
+    vessel: Path,
+    methods: Sequence[str] = (),
+    fixed: Sequence[str] = (),
+    velocity: str = "auto",
+    mean: str = "complete",
+    start: str = "auto",
+    motion: str = "continuous",
+    horizon_s: float | None = None,
+    constant: bool = False,
+    tests: Sequence[Path] = (),
+    progress: Progress = silent,
+) -> Outcome:
+    """Parameters of a vessel from measured data, into `out` or runs/<first data file>."""
+    if not data:
+        raise InputError("no data files are given, expected one or more CSV files")
+    for path in tests:
+        if path in data:
+            raise InputError(f"{path} is given for estimation and for testing, expected one of the two")
+    progress("reading the data", 0.02)
+    ship = load_vessel(vessel)
+    wish = Wish(
+        methods=tuple(methods),
+        fixed=tuple(fixed),
+        mean=mean,
+        start=start,
+        motion=motion,
+        horizon_s=horizon_s,
+        constant=constant,
+    )
+    record = measured(data, ship, velocity=velocity)
+    apart = measured(tests, ship, velocity=velocity) if tests else NO_TESTS
+    found = assess(ship, record, wish, tests=apart, progress=within(progress, 0.1, 0.8))
+    progress("drawing the report", 0.8)
+    command = command_text(
+        "estimate",
+        data,
+        {
+            "--vessel": vessel,
+            "--method": wish.methods,
+            "--fixed": wish.fixed,
+            "--test": tuple(tests),
+            "--velocity": velocity,
+            "--mean": wish.mean,
+            "--start": wish.start,
+            "--motion": wish.motion,
+            "--horizon": wish.horizon_s,
+            "--constant": wish.constant,
+        },
+        usual={"--velocity": "auto", "--mean": "complete", "--start": "auto", "--motion": "continuous"},
+    )
+    files = {
+        "estimate.json": estimate_json(found, ship),
+        "vessel-estimated.toml": estimated_vessel(found, ship, command=command),
+        "estimate.html": estimate_html(EstimateContent(vessel=ship, found=found, command=command, version=__version__)),
+    }
+    written = write_files(out or Path("runs") / data[0].stem, files)
+    progress("done", 1.0)
+    return Outcome(files=written, summary=_estimate_summary(found), tables=_estimate_tables(found))
+
+
+def _estimate_summary(found: Assessment) -> dict[str, object]:
+    batches = found.record.batches
+    return {
+        "runs": len(batches),
+        "samples": sum(len(batch) for batch in batches),
+        "runs_kept_apart": len(found.tests.batches),
+        "vessel_file_holds": found.best.method.name,
+        "parameters_of": found.motion,
+        "what_limits_the_fit": limit_entries(found),
+        "methods_left_out": list(found.left_out),
+        "methods": {
+            item.method.name: {
+                "parameters": parameter_entries(item),
+                "fit": fit_entries(item),
+                "warnings": len(estimate_warnings(found, item)),
+            }
+            for item in found.methods
+        },
+    }
+
+
+def _estimate_tables(found: Assessment) -> tuple[TextTable, ...]:
+    tables = (
+        ("Estimates, with standard deviations", parameter_table(found)),
+        ("Fit of the simulated output to the measured one, in per cent", fit_table(found)),
+        (f"What limits the fit of {found.best.method.name}", limit_table(found)),
+    )
+    return tuple(TextTable(title=title, header=header, rows=tuple(rows)) for title, (header, rows) in tables)

@@ -1,0 +1,31 @@
+"""`expdesign run`: score, durations, plan, verification, route files and report."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from expdesign.durations import efficiencies
+from expdesign.workflows.outcome import Outcome, Progress, silent, within
+from expdesign.workflows.steps.case import loaded, written
+from expdesign.workflows.steps.design_problem import designed
+from expdesign.workflows.steps.design_tables import design_summary
+from expdesign.workflows.steps.grown import growth_summary, ready
+from expdesign.workflows.steps.planned import check_plannable, plan_summary, planned
+from expdesign.workflows.steps.trial_files import built_route, report_content, trial_files
+
+
+def run(scenario: Path, out: Path | None, *, seed: int = 0, progress: Progress = silent) -> Outcome:
+    """The main job: score, durations, plan, verification, route files and report, into `out` or runs/<scenario>."""
+    case = loaded(scenario, progress)
+    check_plannable(case)
+    information, growth = ready(case, seed=seed, progress=within(progress, 0.02, 0.1))
+    design = designed(case, information, seed=seed, progress=within(progress, 0.1, 0.13))
+    compared = efficiencies(design)
+    plan = planned(case, information, design, seed=seed, progress=within(progress, 0.14, 0.85))
+    progress("writing routes, run cards and report", 0.85)
+    route = built_route(case, plan)
+    content = replace(report_content(case, information, design, plan, seed), compared=compared, route=route)
+    files = trial_files(case, growth, content, route)
+    summary = {**growth_summary(growth, case), **design_summary(design), **plan_summary(plan)}
+    return written(case, out, files, summary, progress)

@@ -1,0 +1,24 @@
+"""`expdesign score`: the information of every manoeuvre of a scenario."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from expdesign.dictionary.desired import deviating
+from expdesign.workflows.outcome import Outcome, Progress, silent, within
+from expdesign.workflows.steps.case import loaded, written
+from expdesign.workflows.steps.scored import parameters_of, score_files, scored
+
+
+def score(scenario: Path, out: Path | None, *, seed: int = 0, progress: Progress = silent) -> Outcome:
+    """Information of every primitive of a scenario's dictionary."""
+    case = loaded(scenario, progress)
+    information = scored(case, progress=within(progress, 0.05, 0.95))
+    summary = {
+        "primitives": len(information),
+        "parameters": len(parameters_of(case)),
+        "meet_excitation_condition": sum(item.excitation_condition for item in information),
+        "informative_alone": sum(item.log_det_alone is not None for item in information),
+        "stray_from_their_wish": [item.name for item in deviating([item.primitive for item in information])],
+    }
+    return written(case, out, score_files(case, information), summary, progress)

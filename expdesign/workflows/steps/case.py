@@ -1,0 +1,32 @@
+"""A scenario read, and what a command on it leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from expdesign.export import (
+    write_files,
+)
+from expdesign.scenario import Scenario, load_scenario
+from expdesign.workflows.outcome import Outcome, Progress, TextTable
+
+
+def loaded(scenario: Path, progress: Progress) -> Scenario:
+    """A scenario file."""
+    progress("reading the scenario", 0.0)
+    return load_scenario(scenario)
+
+
+def written(
+    case: Scenario,
+    out: Path | None,
+    files: Mapping[str, str | bytes],
+    summary: Mapping[str, object],
+    progress: Progress,
+    tables: tuple[TextTable, ...] = (),
+) -> Outcome:
+    """Files written into `out` or runs/<scenario>, and what is said of them."""
+    paths = write_files(out or Path("runs") / case.name, files)
+    progress("done", 1.0)
+    return Outcome(files=paths, summary={"scenario": case.name, **summary}, tables=tables)

@@ -1,0 +1,41 @@
+"""Measured data of a vessel."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from expdesign.estimation.regression import with_depth
+from expdesign.records import load_records
+from expdesign.signals import Record
+from expdesign.vessel import Vessel, column_name
+from expdesign.vessel.structures import FORCE_SIGNALS
+
+
+def measured(data: Sequence[Path], vessel: Vessel, *, velocity: str = "auto") -> Record:
+    """Measured data of a vessel: its own actuators' signals, or generalised forces where the first file has those.
+
+    A model in discrete form holds for one sample time, which the data must have; in continuous form any will do.
+    """
+    inputs, header = vessel.model.inputs, _header(data[0])
+    if not {column_name(name) for name in inputs} <= header and set(FORCE_SIGNALS) <= header:
+        inputs = FORCE_SIGNALS
+    record = load_records(
+        list(data),
+        vessel_inputs=inputs,
+        sample_time_s=vessel.sample_time_s if vessel.model.form == "discrete" else None,
+        velocity=velocity,
+        heading_std_rad=vessel.sensors.heading_rad or None,
+        outputs=vessel.model.outputs,
+    )
+    return with_depth(record, vessel.draught_m) if vessel.model.reads_depth else record
+
+
+def _header(path: Path) -> set[str]:
+    """Names in the first row; empty where the file cannot be read, of which the reader will complain."""
+    try:
+        with path.open(encoding="utf-8-sig") as file:
+            return {cell.strip(' "') for cell in re.split("[,;\t]", file.readline().strip())}
+    except (OSError, UnicodeDecodeError):
+        return set()

@@ -1,0 +1,105 @@
+"""The verified trial of a scenario."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from expdesign.durations import DurationDesign
+from expdesign.errors import InputError
+from expdesign.export import (
+    commands_csv,
+    plan_json,
+    track_csv,
+)
+from expdesign.information import PrimitiveInformation
+from expdesign.plan.problem import PlanProblem
+from expdesign.plan.solve import plan_trial
+from expdesign.plan.values import Plan, Promise
+from expdesign.scenario import Scenario
+from expdesign.workflows.outcome import Progress, silent
+
+
+def planned(
+    case: Scenario,
+    information: Sequence[PrimitiveInformation],
+    design: DurationDesign,
+    *,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Plan:
+    """The verified trial of a scenario."""
+    return plan_trial(plan_problem(case, information, design, seed=seed), progress=progress)
+
+
+def plan_problem(
+    case: Scenario, information: Sequence[PrimitiveInformation], design: DurationDesign, *, seed: int = 0
+) -> PlanProblem:
+    """What a scenario asks the planner for, with a dictionary and its durations.
+
+    Raises:
+        InputError: plans cannot be made for the vessel.
+    """
+    check_plannable(case)
+    return PlanProblem(
+        vessel=case.vessel,
+        area=case.area,
+        environment=case.environment,
+        settings=case.plan,
+        primitives=tuple(item.primitive for item in information),
+        design=design,
+        start=case.start,
+        goal=case.goal,
+        seed=seed,
+    )
+
+
+def check_plannable(case: Scenario) -> None:
+    """Raise InputError for a vessel that plans cannot be made for."""
+    if case.vessel.model.roll is not None:
+        raise InputError(
+            f"vessel {case.vessel.name!r} has a roll mode, [model.roll], which plans do not follow; expected a vessel "
+            "file without that table for planning, and the one with it as the truth of a simulation"
+        )
+
+
+def plan_files(case: Scenario, plan: Plan) -> dict[str, str | bytes]:
+    """The plan, its track and its commands."""
+    return {
+        "plan.json": plan_json(
+            plan,
+            scenario=case.name,
+            vessel=case.vessel,
+            environment=case.environment,
+            clearance_m=case.plan.clearance_m,
+        ),
+        "track.csv": track_csv(plan),
+        "commands.csv": commands_csv(plan),
+    }
+
+
+def plan_summary(plan: Plan) -> dict[str, object]:
+    """Key numbers of a plan, units in the names."""
+    return {
+        "verified": plan.verification.verified,
+        "informative_s": plan.seconds("primitive"),
+        "repositioning_s": plan.seconds("reposition"),
+        "repositioning_bound_s": plan.reposition_bound_s,
+        "distance_m": plan.trajectory.distance_m,
+        "least_clearance_m": plan.verification.clearance_min_m,
+        "leave_water_probability": plan.leave_water_probability,
+        **_promise_summary(plan.promise),
+        "design_efficiency_realised": plan.design_efficiency_realised,
+    }
+
+
+def _promise_summary(promise: Promise | None) -> dict[str, object]:
+    """What drawn trials came to besides leaving allowed water; nothing where none were sailed."""
+    if promise is None:
+        return {}
+    return {
+        "drawn_trials": promise.trials,
+        "aborted_share": promise.aborted,
+        **({"note_on_broken_off": promise.note} if promise.note else {}),
+        "extra_time_median_s": promise.extra_median_s,
+        "extra_time_95_s": promise.extra_most_s,
+    }

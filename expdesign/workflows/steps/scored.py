@@ -1,0 +1,37 @@
+"""The dictionary of a scenario, scored."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from expdesign.dictionary import build_dictionary
+from expdesign.export import (
+    dictionary_json,
+)
+from expdesign.information import PrimitiveInformation, estimated_parameters, score_primitives
+from expdesign.scenario import Scenario
+from expdesign.workflows.outcome import Progress, silent
+
+
+def scored(case: Scenario, *, progress: Progress = silent) -> tuple[PrimitiveInformation, ...]:
+    """Information of every primitive of a scenario."""
+    progress("simulating the dictionary", 0.0)
+    primitives = build_dictionary(case.vessel, case.dictionary)
+    progress("scoring the dictionary", 0.5)
+    return score_primitives(
+        case.vessel,
+        primitives,
+        environment=case.environment,
+        fixed_parameters=case.design.fixed_parameters,
+        mean_subtraction=case.design.mean_subtraction,
+    )
+
+
+def score_files(case: Scenario, information: Sequence[PrimitiveInformation]) -> dict[str, str | bytes]:
+    """`dictionary.json`."""
+    return {"dictionary.json": dictionary_json(information, parameters_of(case), vessel=case.vessel)}
+
+
+def parameters_of(case: Scenario) -> tuple[str, ...]:
+    """Parameters that a scenario estimates, in order."""
+    return estimated_parameters(case.vessel.model, case.design.fixed_parameters)

@@ -1,0 +1,73 @@
+"""Every file of a planned trial."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from expdesign import __version__
+from expdesign.durations import DurationDesign
+from expdesign.export import (
+    STANDARD,
+    Route,
+    build_route,
+    durations_json,
+    planned_track,
+    route_files,
+)
+from expdesign.export.cards import cards_html
+from expdesign.export.report import ReportContent, report_html
+from expdesign.growing import Growth
+from expdesign.information import PrimitiveInformation
+from expdesign.plan.values import Plan
+from expdesign.scenario import Scenario
+from expdesign.workflows.steps.grown import growth_files
+from expdesign.workflows.steps.planned import plan_files
+from expdesign.workflows.steps.scored import score_files
+
+
+def trial_files(case: Scenario, growth: Growth | None, content: ReportContent, route: Route) -> dict[str, str | bytes]:
+    """Every file of a planned trial, by name."""
+    content = replace(content, growth=growth)
+    return {
+        **score_files(case, content.information),
+        **growth_files(case, growth),
+        "durations.json": durations_json(content.design, compared=content.compared),
+        **plan_files(case, content.plan),
+        **route_files(route, STANDARD),
+        "report.html": report_html(content),
+        "cards.html": cards_html(content),
+    }
+
+
+def built_route(case: Scenario, plan: Plan) -> Route:
+    """The plan as waypoints, its legs measured against the track and the chart."""
+    track = planned_track(
+        plan,
+        scenario=case.name,
+        vessel=case.vessel,
+        environment=case.environment,
+        clearance_m=case.plan.clearance_m,
+    )
+    return build_route(track, safe_water=case.area.water)
+
+
+def report_content(
+    case: Scenario, information: tuple[PrimitiveInformation, ...], design: DurationDesign, plan: Plan, seed: int
+) -> ReportContent:
+    """What the report and the run cards are made from."""
+    return ReportContent(
+        scenario=case.name,
+        vessel=case.vessel,
+        environment=case.environment,
+        start=case.start,
+        goal=case.goal,
+        criterion=case.design.criterion,
+        fixed_parameters=case.design.fixed_parameters,
+        clearance_m=case.plan.clearance_m,
+        confidence=case.plan.confidence,
+        information=information,
+        design=design,
+        plan=plan,
+        command=f"expdesign run {case.path} --seed {seed}",
+        version=__version__,
+    )

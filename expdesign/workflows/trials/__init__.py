@@ -1,0 +1,1 @@
+"""Commands that run, test or continue a planned trial; one file each."""
