@@ -72,7 +72,8 @@ def export(
             "--format",
             "-f",
             metavar="F ...",
-            help="One or more of: rtz rtz-1.0 rtz-1.1 gpx kml geojson qgc ardupilot csv; see expdesign explain formats.",
+            help="One or more of: rtz rtz-1.0 rtz-1.1 gpx kml geojson qgc ardupilot csv; see "
+            "expdesign explain formats.",
         ),
     ],
     departure: Annotated[
