@@ -59,7 +59,12 @@ FLOORS = {
         ("sailing",),
         ("solve",),
     ),
-    "workflows": (("outcome", "command_text"), ("steps",), ("planning", "trials", "data"), ("notebook",)),
+    "workflows": (
+        ("outcome", "command_text"),
+        ("steps",),
+        ("planning", "trials", "data", "explanations"),
+        ("notebook",),
+    ),
 }
 """For the package and every room of rooms: what stands on what; neighbours on a floor do not know each other."""
 FLOOR_OF = {

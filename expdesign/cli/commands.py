@@ -1,6 +1,8 @@
 """All commands: importing the modules registers them, in the order in which `--help` lists them."""
 
-from expdesign.cli import planning, recorded, trials
+from expdesign.cli import planning, recorded, trials  # isort: split
+
+from expdesign.cli import explaining
 from expdesign.cli.app import app
 
-__all__ = ["app", "planning", "recorded", "trials"]
+__all__ = ["app", "explaining", "planning", "recorded", "trials"]

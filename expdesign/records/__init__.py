@@ -14,7 +14,8 @@ Known quantities in other units (`u_knots`, `n1_rpm`, `wind_angle_deg`) are conv
 are ignored and noted. Every error is a `FileError` with the rows concerned.
 """
 
+from expdesign.records.file import COLUMNS
 from expdesign.records.load import load_records
 from expdesign.records.pose import VELOCITY_METHODS, Fix, central_difference, last_fix, smoothed_velocity
 
-__all__ = ["VELOCITY_METHODS", "Fix", "central_difference", "last_fix", "load_records", "smoothed_velocity"]
+__all__ = ["COLUMNS", "VELOCITY_METHODS", "Fix", "central_difference", "last_fix", "load_records", "smoothed_velocity"]

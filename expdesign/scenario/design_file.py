@@ -23,35 +23,87 @@ class BudgetTable(Table):
 
     name: Text = Field(description="a name for reports, e.g. 'energy'")
     limit: NonNegative = Field(description="what there is for the whole informative time")
-    cost_per_s: dict[str, NonNegative] = Field(default={})
-    use: Literal["cubed_propeller_speed"] | None = None
+    cost_per_s: dict[str, NonNegative] = Field(default={}, description="the use per second of each primitive, by name")
+    use: Literal["cubed_propeller_speed"] | None = Field(
+        default=None,
+        description="the use computed instead of stated: the mean over a run of the sum of the propellers' speeds "
+        "cubed [rps3], which grows like shaft power",
+    )
 
 
 class DesignTable(Table):
     """`[design]`."""
 
     total_s: Positive = Field(description="the informative time to share out [s]")
-    criterion: Literal["D", "D_s", "A", "E", "V"] = "D"
-    mean_subtraction: Literal["none", "batch", "complete"] = "complete"
-    fixed_parameters: list[Text] = Field(default=[])
-    interest: list[Text] = Field(default=[])
-    relative_to: Literal["nominal", "parameter_std"] = "nominal"
-    parameter_units: dict[str, Positive] = Field(default={})
-    outcomes: list[Text] = Field(default=[])
-    outcome_units: dict[str, Positive] = Field(default={})
-    outcome_speed_mps: Positive | None = None
-    predictor: Literal["model", "augmented", "wind"] = "model"
-    robust: Literal["nominal", "average", "worst"] = "nominal"
-    prior_samples: Annotated[int, Field(ge=1, le=MOST_SAMPLES)] | None = None
-    prior: Literal["none", "parameter_std"] = "none"
-    prior_data: list[Text] = Field(default=[])
-    least_s: dict[str, NonNegative] = Field(default={})
-    most_s: dict[str, NonNegative] = Field(default={})
-    required: list[Text] = Field(default=[])
-    excluded: list[Text] = Field(default=[])
-    budgets: list[BudgetTable] = Field(default=[])
-    balance: Annotated[float, Field(ge=0, lt=1)] = 0.0
-    grow: GrowTable | None = None
+    criterion: Literal["D", "D_s", "A", "E", "V"] = Field(
+        default="D", description="the design criterion, see expdesign explain criteria"
+    )
+    mean_subtraction: Literal["none", "batch", "complete"] = Field(
+        default="complete",
+        description="the mean that the estimator will subtract from its instruments, against constant disturbances: of "
+        "each batch, of the complete data, or none",
+    )
+    fixed_parameters: list[Text] = Field(
+        default=[], description="the parameters that stay at the vessel file's values and are not estimated"
+    )
+    interest: list[Text] = Field(
+        default=[],
+        description="the parameters that criteria D_s, A and E are about, the others being unknown too; all if empty",
+    )
+    relative_to: Literal["nominal", "parameter_std"] = Field(
+        default="nominal",
+        description="the unit of parameter errors in criteria A and E: nominal value or prior standard deviation",
+    )
+    parameter_units: dict[str, Positive] = Field(
+        default={}, description="the unit of error of single parameters, e.g. {X_u = 0.01}, instead of relative_to"
+    )
+    outcomes: list[Text] = Field(
+        default=[],
+        description="the results of standard trials that criterion V predicts, see expdesign explain outcomes",
+    )
+    outcome_units: dict[str, Positive] = Field(
+        default={}, description="the unit of error of an outcome; its nominal size when not given"
+    )
+    outcome_speed_mps: Positive | None = Field(
+        default=None,
+        description="the approach speed of the predicted standard trials [m/s]; at 85 % of power when not given",
+    )
+    predictor: Literal["model", "augmented", "wind"] = Field(
+        default="model",
+        description="the terms that will be estimated: the model's; 'augmented' with those of an unknown current; "
+        "'wind' with those of current and measured wind; the last two go with criterion D_s",
+    )
+    robust: Literal["nominal", "average", "worst"] = Field(
+        default="nominal",
+        description="the models that the criterion counts: the nominal one, or the average or worst over models drawn "
+        "from [model.parameter_std]",
+    )
+    prior_samples: Annotated[int, Field(ge=1, le=MOST_SAMPLES)] | None = Field(
+        default=None, description="the number of models drawn where robust is not 'nominal'; 20 when not given"
+    )
+    prior: Literal["none", "parameter_std"] = Field(
+        default="none",
+        description="the knowledge that the trial adds to: none, or that of the vessel's [model.parameter_std]",
+    )
+    prior_data: list[Text] = Field(
+        default=[], description="the CSV files of earlier trials, whose information counts as known already"
+    )
+    least_s: dict[str, NonNegative] = Field(
+        default={}, description="the least time of a primitive [s], e.g. {acceleration = 120.0}"
+    )
+    most_s: dict[str, NonNegative] = Field(default={}, description="the most time of a primitive [s]")
+    required: list[Text] = Field(default=[], description="the primitives that get at least one run")
+    excluded: list[Text] = Field(default=[], description="the primitives that get none")
+    budgets: list[BudgetTable] = Field(
+        default=[], description="the tables [[design.budgets]] of what is used up; time may then stay unused"
+    )
+    balance: Annotated[float, Field(ge=0, lt=1)] = Field(
+        default=0.0,
+        description="the least share that each of surge, sway and yaw gets of the information it could have alone",
+    )
+    grow: GrowTable | None = Field(
+        default=None, description="a table [design.grow]: search for manoeuvres to add to the dictionary"
+    )
 
 
 def design_settings(table: DesignTable, vessel: Vessel, primitives: tuple[str, ...], entry: Entry) -> DesignSettings:

@@ -16,22 +16,48 @@ Pair = Annotated[list[Number], Field(min_length=2, max_length=2)]
 class LimitsTable(Table):
     """Velocities through calm water that additions keep to; what is not given, the dictionary's own."""
 
-    u_mps: Pair | None = None
-    v_mps: Pair | None = None
-    r_radps: Pair | None = None
+    u_mps: Pair | None = Field(
+        default=None, description="the lowest and highest surge speed [m/s]; the dictionary's range when not given"
+    )
+    v_mps: Pair | None = Field(
+        default=None, description="the lowest and highest sway speed [m/s]; the dictionary's range when not given"
+    )
+    r_radps: Pair | None = Field(
+        default=None, description="the lowest and highest yaw rate [rad/s]; the dictionary's range when not given"
+    )
 
 
 class GrowTable(Table):
-    """The whole table; what is not given stays as in `GrowSettings`."""
+    """`[design.grow]`."""
 
-    families: list[Text] | None = None
-    rounds: Annotated[int, Field(ge=1, le=200)] | None = None
-    tolerance: Positive | None = None
-    limits: LimitsTable = LimitsTable()
-    free_form: bool | None = None
-    run_s: Positive | None = None
-    pool: Annotated[int, Field(ge=8, le=65536)] | None = None
-    seed: Annotated[int, Field(ge=0)] | None = None
+    families: list[Text] = Field(
+        default=[], description="the manoeuvre families to search; all that the vessel can do if empty"
+    )
+    rounds: int = Field(default=GrowSettings.rounds, ge=1, le=200, description="the most manoeuvres to add")
+    tolerance: Positive = Field(
+        default=GrowSettings.tolerance,
+        description="the relative gain at which the search ends: when no candidate has a sensitivity "
+        "above (1 + tolerance) times the number of parameters",
+    )
+    limits: LimitsTable = Field(
+        default=LimitsTable(), description="the velocities through calm water that added manoeuvres keep to"
+    )
+    free_form: bool = Field(
+        default=GrowSettings.free_form, description="whether the commands of the best candidate are optimised, too"
+    )
+    run_s: Positive | None = Field(
+        default=GrowSettings.run_s,
+        description="the length of an added run [s]; the median of the present runs when not given",
+    )
+    pool: int = Field(
+        default=GrowSettings.pool,
+        ge=8,
+        le=65536,
+        description="the candidates of each family that the search begins with",
+    )
+    seed: Annotated[int, Field(ge=0)] | None = Field(
+        default=GrowSettings.seed, description="the seed of the search; that of the command when not given"
+    )
 
 
 def build_grow(table: GrowTable, entry: Entry) -> GrowSettings:
@@ -41,12 +67,12 @@ def build_grow(table: GrowTable, entry: Entry) -> GrowSettings:
         FileError: a family that there is not, or a limit whose low is not below its high.
     """
     known = [item.name for item in FAMILIES if item.name != "recorded"]
-    for number, name in enumerate(table.families or [], start=1):
+    for number, name in enumerate(table.families, start=1):
         if name not in known:
             raise entry.at("families").item(number).unknown(name, known)
     limits = {key: (pair[0], pair[1]) for key, pair in table.limits.model_dump(exclude_none=True).items()}
     for key, (low, high) in limits.items():
         if not low < high:
             raise entry.at("limits").at(key).error(f"is [{shown(low)}, {shown(high)}], expected low below high")
-    given = table.model_dump(exclude_none=True, exclude={"limits", "families"})
-    return GrowSettings(families=tuple(table.families or ()), limits=limits, **given)
+    given = table.model_dump(exclude={"limits", "families"})
+    return GrowSettings(families=tuple(table.families), limits=limits, **given)

@@ -28,41 +28,69 @@ POSITION_KEYS = ("lat_deg", "lon_deg", "north_m", "east_m")
 class ScenarioTable(Table):
     """`[scenario]`."""
 
-    name: Text | None = None
-    vessel: Text = Field(description="the path of a vessel file")
-    dictionary: Text = Field(description="the path of a dictionary file")
-    area: Text = Field(description="the path of an area file")
+    name: Text | None = Field(
+        default=None,
+        description="the name of the scenario and of its folder of results; the file's name when not given",
+    )
+    vessel: Text = Field(description="the path of a vessel file, from this file")
+    dictionary: Text = Field(description="the path of a dictionary file, from this file")
+    area: Text = Field(description="the path of an area file, from this file")
 
 
 class PoseTable(Table):
     """`[start]` or `[goal]`."""
 
-    lat_deg: Latitude | None = None
-    lon_deg: Longitude | None = None
-    north_m: Number | None = None
-    east_m: Number | None = None
+    lat_deg: Latitude | None = Field(default=None, description="the latitude [deg], WGS84, together with lon_deg")
+    lon_deg: Longitude | None = Field(default=None, description="the longitude [deg], WGS84, together with lat_deg")
+    north_m: Number | None = Field(
+        default=None,
+        description="the distance north of the area's centre [m], together with east_m, instead of lat_deg",
+    )
+    east_m: Number | None = Field(
+        default=None, description="the distance east of the area's centre [m], together with north_m"
+    )
     heading_deg: Degrees = Field(description="the heading [deg], clockwise from north")
 
 
 class PlanTable(Table):
-    """`[plan]`; what is not given stays as in `PlanSettings`."""
+    """`[plan]`: clearance, safety and repositioning legs."""
 
-    clearance_m: NonNegative | None = None
-    confidence: Annotated[float, Field(gt=0, lt=1)] | None = None
-    time_budget_s: Positive | None = None
-    transit_speed_mps: Positive | None = None
-    turning_radius_m: Positive | None = None
+    clearance_m: NonNegative = Field(
+        default=PlanSettings.clearance_m, description="the least distance of the hull from anything forbidden [m]"
+    )
+    confidence: float = Field(
+        default=PlanSettings.confidence,
+        gt=0,
+        lt=1,
+        description="the share of trials with drawn ships, currents and winds that must stay in allowed water",
+    )
+    time_budget_s: Positive = Field(
+        default=PlanSettings.time_budget_s,
+        description="the work that the planner may spend on other placements [s] of a usual computer; it is counted, "
+        "not timed, so that every computer finds the same plan",
+    )
+    transit_speed_mps: Positive | None = Field(
+        default=PlanSettings.transit_speed_mps,
+        description="the speed of repositioning legs through water [m/s]; when not given, nine tenths of what the "
+        "actuators allow",
+    )
+    turning_radius_m: Positive | None = Field(
+        default=PlanSettings.turning_radius_m,
+        description="the turning radius of repositioning legs [m]; when not given, what the vessel's model allows",
+    )
 
 
 class ScenarioFile(Table):
     """The whole file."""
 
+    topic = "scenario"
+
     scenario: ScenarioTable = Field(description="a table [scenario] with vessel, dictionary and area")
     design: DesignTable = Field(description="a table [design] with total_s")
     start: PoseTable = Field(description="a table [start] with a position and heading_deg")
     goal: PoseTable = Field(description="a table [goal] with a position and heading_deg")
-    environment: EnvironmentTable = EnvironmentTable()
-    plan: PlanTable = PlanTable()
+    environment: EnvironmentTable = Field(default=EnvironmentTable(), description="the current, wind and sea to expect")
+    plan: PlanTable = Field(default=PlanTable(), description="the clearance, safety and repositioning legs of the plan")
 
 
 def load_scenario(path: Path | str) -> Scenario:
@@ -92,7 +120,7 @@ def build_scenario(content: Mapping[str, Any], entry: Entry) -> Scenario:
         _check_position(place, entry.at(key))
     vessel = load_vessel(entry.at("scenario.vessel").file(file.scenario.vessel))
     dictionary = load_dictionary(entry.at("scenario.dictionary").file(file.scenario.dictionary))
-    plan = PlanSettings(**file.plan.model_dump(exclude_none=True))
+    plan = PlanSettings(**file.plan.model_dump())
     area = load_area(entry.at("scenario.area").file(file.scenario.area), draught_m=vessel.draught_m)
     poses = {key: _pose(place, area) for key, place in places.items()}
     for key, place in places.items():

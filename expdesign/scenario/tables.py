@@ -1,7 +1,7 @@
 """TOML files to checked tables; whatever is wrong becomes one `FileError`.
 
 A table is a pydantic model that refuses unknown keys, other types, not-a-numbers and infinities; whole numbers may
-stand for decimal ones. A field's description says what is expected when the key is missing.
+stand for decimal ones. A field's description says what the key means, in messages and in `expdesign explain`.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, TypeVar, get_args
+from typing import Annotated, Any, ClassVar, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic_core import ErrorDetails
@@ -28,7 +28,13 @@ Text = Annotated[str, Field(min_length=1)]
 
 
 class Table(BaseModel):
-    """Base of all file tables."""
+    """Base of all file tables.
+
+    Attributes:
+        topic: of `expdesign explain`, for tables that are read by themselves.
+    """
+
+    topic: ClassVar[str] = ""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
 
@@ -159,11 +165,17 @@ def _explain(model: type[Table], problem: ErrorDetails) -> tuple[str, str]:
     place, kind, found = problem["loc"], problem["type"], problem.get("input")
     key, limits = _dotted(place), problem.get("ctx", {})
     if kind == "extra_forbidden":
-        return key, f"is not a known key, {offer(str(place[-1]), _keys_at(model, place[:-1]))}"
+        return key, f"is not a known key, {offer(str(place[-1]), _keys_at(model, place[:-1]))}{see(model.topic)}"
+    meaning = _description(model, place)
     if kind == "missing":
-        return key, f"is missing{_description(model, place)}"
+        return key, f"is missing{f', expected {meaning}' if meaning else ''}{see(model.topic)}"
     text = f"is {shown(found)}, expected {_expected(kind, limits, found)}"
-    return key, text
+    return key, f"{text}: {meaning}{see(model.topic)}" if meaning else text
+
+
+def see(topic: str) -> str:
+    """Where a message sends the reader; nothing without a topic."""
+    return f" (see expdesign explain {topic})" if topic else ""
 
 
 def _expected(kind: str, limits: dict[str, Any], found: object) -> str:
@@ -233,11 +245,14 @@ def _keys_at(model: type[Table], place: Iterable[str | int]) -> tuple[str, ...]:
 
 
 def _description(model: type[Table], place: tuple[str | int, ...]) -> str:
-    table, name = _model_at(model, place[:-1]), str(place[-1])
-    field = table.model_fields.get(name) if table else None
-    if field is None or not field.description:
-        return ""
-    return f", expected {field.description}"
+    """The meaning of the key at a place, or of the nearest key around it."""
+    names = [step for step in place if isinstance(step, str)]
+    for depth in range(len(names), 0, -1):
+        table = _model_at(model, names[: depth - 1])
+        field = table.model_fields.get(names[depth - 1]) if table else None
+        if field is not None:
+            return field.description or ""
+    return ""
 
 
 def offer(name: str, known: tuple[str, ...]) -> str:

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from expdesign.workflows.data.estimate import estimate
     from expdesign.workflows.data.indices import indices
     from expdesign.workflows.data.mine import mine
+    from expdesign.workflows.explanations.explain import explain
     from expdesign.workflows.outcome import Outcome, Progress, TextTable
     from expdesign.workflows.planning.check_routes import check_routes
     from expdesign.workflows.planning.durations import durations
@@ -40,6 +41,7 @@ __all__ = [
     "duration_problem",
     "durations",
     "estimate",
+    "explain",
     "export",
     "indices",
     "measured",
@@ -64,6 +66,7 @@ if not TYPE_CHECKING:
             "data.estimate": ("estimate",),
             "data.indices": ("indices",),
             "data.mine": ("mine",),
+            "explanations.explain": ("explain",),
             "outcome": ("Outcome", "Progress", "TextTable"),
             "planning.check_routes": ("check_routes",),
             "planning.durations": ("durations",),

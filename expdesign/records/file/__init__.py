@@ -2,12 +2,13 @@
 
 from expdesign.records.file.choice import Inputs, mistyped
 from expdesign.records.file.clock import Clock, read_clock
-from expdesign.records.file.names import is_input
+from expdesign.records.file.names import COLUMNS, is_input
 from expdesign.records.file.ranges import check_ranges
 from expdesign.records.file.table import Table, read_table
 from expdesign.records.file.wind import check_wind, relative_wind
 
 __all__ = [
+    "COLUMNS",
     "Clock",
     "Inputs",
     "Table",

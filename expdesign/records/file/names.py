@@ -32,20 +32,51 @@ PLACE = {"deg": 1.0, "degrees": 1.0, "rad": 1.0 / DEGREE}
 CLOCK = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0}
 REVOLUTIONS = {"rps": 1.0, "hz": 1.0, **dict.fromkeys(("rpm", "1/min"), 1.0 / 60.0)}
 
-QUANTITIES: tuple[tuple[str, dict[str, float]], ...] = (
-    ("time", CLOCK),
-    ("u|v", SPEED),
-    ("r", YAW_RATE),
-    ("north|east", LENGTH),
-    ("lat|lon", PLACE),
-    ("heading", ANGLE),
-    ("wind_u|wind_v|wind_speed", SPEED),
-    ("wind_angle", ANGLE),
-    ("depth", LENGTH),
-    (r"n\d+", REVOLUTIONS),
-    (r"(?:a|rudder)\d+", ANGLE),
+
+@dataclass(frozen=True)
+class Quantity:
+    """Columns that are read.
+
+    Attributes:
+        pattern: of the part of a name before the unit.
+        units: those it may be given in, with the factor to the package's own unit, which is the first.
+        names: as the contract has them.
+        meaning: one line for the user.
+    """
+
+    pattern: str
+    units: dict[str, float]
+    names: str
+    meaning: str
+
+
+QUANTITIES = (
+    Quantity("time", CLOCK, "time_s", "time from any origin, in even steps"),
+    Quantity("u|v", SPEED, "u_mps, v_mps", "surge speed forward and sway speed to starboard, over ground"),
+    Quantity("r", YAW_RATE, "r_radps", "yaw rate, positive to starboard"),
+    Quantity("north|east", LENGTH, "north_m, east_m", "position in a local frame"),
+    Quantity("lat|lon", PLACE, "lat_deg, lon_deg", "position on the earth, WGS84, instead of north_m and east_m"),
+    Quantity("heading", ANGLE, "heading_rad", "heading, clockwise from north"),
+    Quantity(
+        "wind_u|wind_v|wind_speed",
+        SPEED,
+        "wind_u_mps, wind_v_mps, wind_speed_mps",
+        "the ship's velocity through the air: components forward and to starboard, or a vane's speed",
+    ),
+    Quantity(
+        "wind_angle", ANGLE, "wind_angle_rad", "direction that the wind comes from at a vane, clockwise from the bow"
+    ),
+    Quantity("depth", LENGTH, "depth_m", "depth of the water"),
+    Quantity(r"n\d+", REVOLUTIONS, "n1_rps, n2_rps", "commanded speed of propellers and thrusters"),
+    Quantity(r"(?:a|rudder)\d+", ANGLE, "a1_rad, rudder1_rad", "commanded angle of thrusters and rudders"),
 )
-"""Pattern of the stem -> units it may be given in; the first is the package's own."""
+"""Pattern of the stem -> units it may be given in."""
+COLUMNS = (
+    *QUANTITIES,
+    Quantity("", {}, "tau_x, tau_y, tau_psi", "generalised forces in the model's unit, instead of actuator signals"),
+    Quantity("", {}, "batch", "a change of its value starts a new batch"),
+)
+"""All columns that are read."""
 
 SYNONYMS = {
     "latitude": "lat",
@@ -98,7 +129,8 @@ def meaning(header: str, column: int) -> Source | Unitless | None:
     name = re.sub(r"[\s\[\]()]+", "_", header.lower()).strip("_")
     if name in PLAIN:
         return Source(column, header, name)
-    for pattern, units in QUANTITIES:
+    for quantity in QUANTITIES:
+        pattern, units = quantity.pattern, quantity.units
         found = re.fullmatch(rf"({pattern}|{_synonyms(pattern)})(?:_(.+))?", name)
         if not found:
             continue

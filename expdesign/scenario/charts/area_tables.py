@@ -21,15 +21,24 @@ class NameTable(Table):
 class ChartTable(Table):
     """`[chart]`: a GeoJSON file with the layers to use, or an S-57 cell."""
 
-    geojson: Text | None = None
-    s57: Text | None = None
-    land_layers: list[Text] = Field(default=["land"])
-    layer_property: Text = "layer"
-    depth_layers: dict[str, Number] | None = None
-    depth_property: Text | None = None
-    hazard_margin_m: Positive = 25.0
-    air_draught_m: Positive | None = None
-    notice: str = ""
+    geojson: Text | None = Field(default=None, description="the path of a GeoJSON chart, from this file")
+    s57: Text | None = Field(
+        default=None,
+        description="the path of an S-57 cell, *.000, instead of geojson; update files beside it are read, too",
+    )
+    land_layers: list[Text] = Field(default=["land"], description="the layers of the GeoJSON chart that are land")
+    layer_property: Text = Field(default="layer", description="the property that names the layer of a GeoJSON feature")
+    depth_layers: dict[str, Number] | None = Field(
+        default=None, description="the GeoJSON layers of water at least so deep [m], e.g. {seabed5m = 5.0}"
+    )
+    depth_property: Text | None = Field(
+        default=None, description="the property that holds the depth of a GeoJSON area [m], instead of depth_layers"
+    )
+    hazard_margin_m: Positive = Field(default=25.0, description="the distance kept from dangers in an S-57 cell [m]")
+    air_draught_m: Positive | None = Field(
+        default=None, description="the ship's height above water [m]; when not given, bridges and cables are closed"
+    )
+    notice: str = Field(default="", description="a notice of copyright for the report")
 
 
 class BoundsTable(Table):
@@ -44,8 +53,10 @@ class BoundsTable(Table):
 class DepthTable(Table):
     """`[depth]`: charted depth plus the tide must exceed the draught by what is kept under the keel."""
 
-    under_keel_m: NonNegative = 1.0
-    tide_m: Number = 0.0
+    under_keel_m: NonNegative = Field(default=1.0, description="the least depth under the keel [m]")
+    tide_m: Number = Field(
+        default=0.0, description="the height of tide above chart datum [m], one number for the trial"
+    )
 
 
 class NoGoTable(Table):
@@ -53,15 +64,19 @@ class NoGoTable(Table):
 
     name: Text = Field(description="a name for the zone")
     polygon: list[Annotated[list[Number], Field(min_length=2, max_length=2)]] = Field(
-        min_length=3, description="a list of [latitude, longitude]"
+        min_length=3, description="a list of corners [latitude, longitude] in degrees"
     )
 
 
 class AreaTable(Table):
     """The whole file."""
 
+    topic = "area"
+
     area: NameTable = Field(description="a table [area] with a name")
     chart: ChartTable = Field(description="a table [chart] with the chart file")
-    bounds: BoundsTable | None = None
-    depth: DepthTable = DepthTable()
-    no_go: list[NoGoTable] = Field(default=[])
+    bounds: BoundsTable | None = Field(
+        default=None, description="the table [bounds] of the sea area; the extent of the chart when not given"
+    )
+    depth: DepthTable = Field(default=DepthTable(), description="the depth that the ship needs besides her draught")
+    no_go: list[NoGoTable] = Field(default=[], description="the tables [[no_go]] of zones to keep out of")

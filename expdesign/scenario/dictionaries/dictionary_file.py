@@ -16,7 +16,7 @@ from expdesign.dictionary import FAMILIES
 from expdesign.dictionary.spec import Family, PrimitiveSpec, complete_settings
 from expdesign.errors import InputError
 from expdesign.scenario.dictionaries.recorded_file import load_recorded
-from expdesign.scenario.tables import Entry, Table, Text, check_table, read_toml, shown
+from expdesign.scenario.tables import Entry, Table, Text, check_table, read_toml, see, shown
 
 LARGEST_GRID = 10_000
 NAME = re.compile(r"\w([\w .+-]{0,78}[\w+-])?")
@@ -29,8 +29,23 @@ class NameTable(Table):
     name: Text = Field(description="a name for the dictionary")
 
 
+class PrimitiveTable(Table):
+    """What `[[primitives]]` has besides the settings of its family."""
+
+    family: Text = Field(description="the manoeuvre family, see expdesign explain families")
+    name: Text | None = Field(
+        default=None,
+        description="the name of the manoeuvre; the family's when not given, with -2, -3 ... for further entries",
+    )
+    file: Text | None = Field(
+        default=None, description="the path of a CSV of commands, for family 'recorded', which takes its length from it"
+    )
+
+
 class DictionaryTable(Table):
     """The whole file."""
+
+    topic = "dictionary"
 
     dictionary: NameTable = Field(description="a table [dictionary] with a name")
     primitives: list[dict[str, Any]] = Field(min_length=1, description="at least one table [[primitives]]")
@@ -73,7 +88,7 @@ def _family(row: Mapping[str, Any], families: Mapping[str, Family], entry: Entry
     name = row.get("family")
     if not isinstance(name, str):
         found = "is missing" if name is None else f"is {shown(name)}"
-        raise entry.error(f"{found}, expected one of {', '.join(families)}")
+        raise entry.error(f"{found}, expected one of {', '.join(families)}{see('families')}")
     if name not in families:
         raise entry.unknown(name, families)
     return families[name]
@@ -95,7 +110,7 @@ def _recorded(row: Mapping[str, Any], family: Family, stem: str, entry: Entry) -
     named = row.get("file")
     if not isinstance(named, str) or not named:
         found = "is missing" if named is None else f"is {shown(named)}"
-        raise entry.at("file").error(f"{found}, expected the path of a CSV of commands")
+        raise entry.at("file").error(f"{found}, expected {PrimitiveTable.model_fields['file'].description}")
     if "duration_s" in row:
         raise entry.at("duration_s").error("is given, but the file of a recorded primitive tells how long it lasts")
     commands, begins = load_recorded(entry.at("file").file(named))
@@ -109,7 +124,7 @@ def _recorded(row: Mapping[str, Any], family: Family, stem: str, entry: Entry) -
 
 
 def _grid(row: Mapping[str, Any], family: Family, stem: str, entry: Entry) -> Iterator[PrimitiveSpec]:
-    given = {name: value for name, value in row.items() if name not in ("family", "name")}
+    given = {name: value for name, value in row.items() if name not in PrimitiveTable.model_fields}
     axes = {name: _values(value, entry.at(name)) for name, value in given.items()}
     count = math.prod(len(values) for values in axes.values())
     if count > LARGEST_GRID:
@@ -120,7 +135,7 @@ def _grid(row: Mapping[str, Any], family: Family, stem: str, entry: Entry) -> It
         try:
             complete = complete_settings(family, settings)
         except InputError as error:
-            raise entry.error(str(error)) from None
+            raise entry.error(f"{error}{see(family.name)}") from None
         name = "-".join([stem, *(f"{_without_unit(name)}-{settings[name]:.12g}" for name in lists)])
         yield PrimitiveSpec(name=name, family=family.name, settings=complete)
 

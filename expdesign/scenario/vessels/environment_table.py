@@ -15,9 +15,15 @@ CURRENT_LIMIT_MPS = 15.0
 class FlowTable(Table):
     """How well a mean velocity is known and how it varies around the trial's mean."""
 
-    std_mps: NonNegative = 0.0
-    variation_std_mps: NonNegative = 0.0
-    correlation_s: NonNegative = 0.0
+    std_mps: NonNegative = Field(
+        default=0.0, description="the standard deviation of each component of a trial's mean [m/s]"
+    )
+    variation_std_mps: NonNegative = Field(
+        default=0.0, description="the standard deviation of the variation around that mean [m/s]"
+    )
+    correlation_s: NonNegative = Field(
+        default=0.0, description="the correlation time of the variation [s]; 0 for a new value at every sample"
+    )
 
     @property
     def variation(self) -> Variation:
@@ -28,23 +34,37 @@ class FlowTable(Table):
 class CurrentTable(FlowTable):
     """A velocity to which the water moves."""
 
-    north_mps: float = Field(description="the velocity to north [m/s]", ge=-CURRENT_LIMIT_MPS, le=CURRENT_LIMIT_MPS)
-    east_mps: float = Field(description="the velocity to east [m/s]", ge=-CURRENT_LIMIT_MPS, le=CURRENT_LIMIT_MPS)
+    north_mps: float = Field(
+        description="the velocity to north of the moving water [m/s]", ge=-CURRENT_LIMIT_MPS, le=CURRENT_LIMIT_MPS
+    )
+    east_mps: float = Field(
+        description="the velocity to east of the moving water [m/s]", ge=-CURRENT_LIMIT_MPS, le=CURRENT_LIMIT_MPS
+    )
 
 
 class WindTable(FlowTable):
     """A velocity to which the air moves."""
 
-    north_mps: float = Field(description="the velocity to north [m/s]", ge=-WIND_LIMIT_MPS, le=WIND_LIMIT_MPS)
-    east_mps: float = Field(description="the velocity to east [m/s]", ge=-WIND_LIMIT_MPS, le=WIND_LIMIT_MPS)
+    north_mps: float = Field(
+        description="the velocity to north of the moving air [m/s]", ge=-WIND_LIMIT_MPS, le=WIND_LIMIT_MPS
+    )
+    east_mps: float = Field(
+        description="the velocity to east of the moving air [m/s]", ge=-WIND_LIMIT_MPS, le=WIND_LIMIT_MPS
+    )
 
 
 class EnvironmentTable(Table):
     """`[environment]`."""
 
-    current_to: CurrentTable = CurrentTable(north_mps=0.0, east_mps=0.0)
-    wind_to: WindTable = WindTable(north_mps=0.0, east_mps=0.0)
-    sea_state: int | None = Field(default=None, ge=0, le=9, description="the WMO code of the sea, 0 to 9")
+    current_to: CurrentTable = Field(
+        default=CurrentTable(north_mps=0.0, east_mps=0.0), description="the current, by where the water moves to"
+    )
+    wind_to: WindTable = Field(
+        default=WindTable(north_mps=0.0, east_mps=0.0), description="the wind, by where the air moves to"
+    )
+    sea_state: int | None = Field(
+        default=None, ge=0, le=9, description="the WMO code of the sea state, for the report to judge"
+    )
 
 
 def build_environment(table: EnvironmentTable) -> Environment:

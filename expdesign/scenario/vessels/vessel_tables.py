@@ -28,9 +28,15 @@ class ParticularsTable(Table):
 class ActuatorTable(Table):
     """What every entry of `[[actuators]]` has."""
 
-    kind: str
-    forward_m: Number = 0.0
-    starboard_m: Number = 0.0
+    topic = "vessel"
+
+    kind: str = Field(description="the kind of actuator: azimuth, podded, tunnel, propeller, rudder or force")
+    forward_m: Number = Field(
+        default=0.0, description="the distance forward of amidships [m], at most the hull's length"
+    )
+    starboard_m: Number = Field(
+        default=0.0, description="the distance to starboard of the centre line [m], at most the beam"
+    )
 
 
 class PropellerTable(ActuatorTable):
@@ -38,22 +44,36 @@ class PropellerTable(ActuatorTable):
 
     speed_min_rps: Number = Field(description="the lowest propeller speed [rps], negative for astern")
     speed_max_rps: Number = Field(description="the highest propeller speed [rps]")
-    speed_rate_rps2: Positive | None = None
-    speed_lag_s: NonNegative = 0.0
-    speed_delay_s: NonNegative = 0.0
-    speed_deadband_rps: NonNegative = 0.0
+    speed_rate_rps2: Positive | None = Field(
+        default=None, description="the largest rate of the propeller speed [rps per second]; no limit when not given"
+    )
+    speed_lag_s: NonNegative = Field(
+        default=0.0, description="the time constant with which the propeller speed follows [s]"
+    )
+    speed_delay_s: NonNegative = Field(default=0.0, description="the dead time of the propeller speed [s]")
+    speed_deadband_rps: NonNegative = Field(
+        default=0.0, description="the size of commanded speeds below which nothing happens [rps]"
+    )
 
 
 class AzimuthTable(PropellerTable):
     """An azimuth thruster; without angle limits it turns freely."""
 
-    angle_min_rad: TwoTurns | None = None
-    angle_max_rad: TwoTurns | None = None
-    angle_rate_radps: Positive | None = None
-    angle_lag_s: NonNegative = 0.0
-    angle_delay_s: NonNegative = 0.0
-    angle_deadband_rad: NonNegative = 0.0
-    angle_offset_rad: HalfTurn = 0.0
+    angle_min_rad: TwoTurns | None = Field(
+        default=None, description="the lowest angle [rad], positive to starboard; it turns freely when not given"
+    )
+    angle_max_rad: TwoTurns | None = Field(default=None, description="the highest angle [rad]; free when not given")
+    angle_rate_radps: Positive | None = Field(
+        default=None, description="the largest rate of the angle [rad/s]; no limit when not given"
+    )
+    angle_lag_s: NonNegative = Field(default=0.0, description="the time constant with which the angle follows [s]")
+    angle_delay_s: NonNegative = Field(default=0.0, description="the dead time of the angle [s]")
+    angle_deadband_rad: NonNegative = Field(
+        default=0.0, description="the size of commanded angles below which nothing happens [rad]"
+    )
+    angle_offset_rad: HalfTurn = Field(
+        default=0.0, description="the misalignment [rad]: the true angle less the commanded one"
+    )
 
 
 class PoddedTable(AzimuthTable):
@@ -68,103 +88,165 @@ class RudderTable(ActuatorTable):
 
     angle_min_rad: HalfTurn = Field(description="the lowest rudder angle [rad]")
     angle_max_rad: HalfTurn = Field(description="the highest rudder angle [rad]")
-    angle_rate_radps: Positive | None = None
-    angle_lag_s: NonNegative = 0.0
-    angle_delay_s: NonNegative = 0.0
-    angle_deadband_rad: NonNegative = 0.0
-    angle_offset_rad: HalfTurn = 0.0
+    angle_rate_radps: Positive | None = Field(
+        default=None, description="the largest rate of the angle [rad/s]; no limit when not given"
+    )
+    angle_lag_s: NonNegative = Field(default=0.0, description="the time constant with which the angle follows [s]")
+    angle_delay_s: NonNegative = Field(default=0.0, description="the dead time of the angle [s]")
+    angle_deadband_rad: NonNegative = Field(
+        default=0.0, description="the size of commanded angles below which nothing happens [rad]"
+    )
+    angle_offset_rad: HalfTurn = Field(
+        default=0.0, description="the misalignment [rad]: the true angle less the commanded one"
+    )
 
 
 class ForceTable(ActuatorTable):
     """Generalised forces, in the model's own unit."""
 
-    x_min: Number = Field(description="the lowest tau_x")
+    x_min: Number = Field(description="the lowest tau_x, the surge force in the model's unit")
     x_max: Number = Field(description="the highest tau_x")
-    x_rate: Positive | None = None
-    x_lag_s: NonNegative = 0.0
-    x_delay_s: NonNegative = 0.0
-    x_deadband: NonNegative = 0.0
-    y_min: Number = Field(description="the lowest tau_y")
+    x_rate: Positive | None = Field(
+        default=None, description="the largest rate of tau_x [per second]; no limit when not given"
+    )
+    x_lag_s: NonNegative = Field(default=0.0, description="the time constant with which tau_x follows [s]")
+    x_delay_s: NonNegative = Field(default=0.0, description="the dead time of tau_x [s]")
+    x_deadband: NonNegative = Field(default=0.0, description="the size of tau_x below which nothing happens")
+    y_min: Number = Field(description="the lowest tau_y, the sway force in the model's unit")
     y_max: Number = Field(description="the highest tau_y")
-    y_rate: Positive | None = None
-    y_lag_s: NonNegative = 0.0
-    y_delay_s: NonNegative = 0.0
-    y_deadband: NonNegative = 0.0
-    psi_min: Number = Field(description="the lowest tau_psi")
+    y_rate: Positive | None = Field(
+        default=None, description="the largest rate of tau_y [per second]; no limit when not given"
+    )
+    y_lag_s: NonNegative = Field(default=0.0, description="the time constant with which tau_y follows [s]")
+    y_delay_s: NonNegative = Field(default=0.0, description="the dead time of tau_y [s]")
+    y_deadband: NonNegative = Field(default=0.0, description="the size of tau_y below which nothing happens")
+    psi_min: Number = Field(description="the lowest tau_psi, the yaw moment in the model's unit")
     psi_max: Number = Field(description="the highest tau_psi")
-    psi_rate: Positive | None = None
-    psi_lag_s: NonNegative = 0.0
-    psi_delay_s: NonNegative = 0.0
-    psi_deadband: NonNegative = 0.0
+    psi_rate: Positive | None = Field(
+        default=None, description="the largest rate of tau_psi [per second]; no limit when not given"
+    )
+    psi_lag_s: NonNegative = Field(default=0.0, description="the time constant with which tau_psi follows [s]")
+    psi_delay_s: NonNegative = Field(default=0.0, description="the dead time of tau_psi [s]")
+    psi_deadband: NonNegative = Field(default=0.0, description="the size of tau_psi below which nothing happens")
 
 
 class TermTable(Table):
     """One of `[[model.terms]]`."""
 
-    equation: Literal["u", "v", "r"] = Field(description="'u', 'v' or 'r'")
+    equation: Literal["u", "v", "r"] = Field(description="the equation: u (surge), v (sway) or r (yaw)")
     name: Text = Field(description="a parameter name")
-    expression: Text = Field(description="what the parameter multiplies, e.g. 'u*abs(u)'")
+    expression: Text = Field(
+        description="what the parameter multiplies, e.g. 'u*abs(u)': products, abs, sin, cos of u v r (through water), "
+        "u_q v_q (through air), h (draught over depth) and actuator signals such as n1, a1, rudder1, tau_x"
+    )
 
 
 class RollTable(Table):
     """`[model.roll]`: an oscillation in sway and yaw beside what the terms say."""
 
     period_s: Positive = Field(description="the period of roll [s]")
-    damping_ratio: NonNegative = Field(description="its damping ratio")
-    Y_phi: Number = Field(description="sway acceleration per unit of roll")
-    N_phi: Number = Field(description="yaw acceleration per unit of roll")
+    damping_ratio: NonNegative = Field(description="the damping ratio of roll")
+    Y_phi: Number = Field(description="the sway acceleration per unit of roll")
+    N_phi: Number = Field(description="the yaw acceleration per unit of roll")
 
 
 class ModelTable(Table):
     """`[model]`."""
 
-    structure: str = Field(description=f"one of {', '.join((*STRUCTURES, 'custom'))}")
-    form: Literal["discrete", "continuous"] = Field(description="'discrete' or 'continuous'")
+    structure: str = Field(description=f"the terms of the model, one of {', '.join((*STRUCTURES, 'custom'))}")
+    form: Literal["discrete", "continuous"] = Field(
+        description="the meaning of the parameters: 'discrete', of Euler's map at the sample time, or 'continuous', of "
+        "the continuous motion"
+    )
     parameters: dict[str, Number] = Field(description="a table [model.parameters] with a value for each parameter")
-    parameter_std: dict[str, NonNegative] = Field(default={})
-    terms: list[TermTable] = Field(default=[])
-    roll: RollTable | None = None
+    parameter_std: dict[str, NonNegative] = Field(
+        default={}, description="the standard deviation of each parameter; 0, for known, when not given"
+    )
+    terms: list[TermTable] = Field(default=[], description="the tables [[model.terms]] of structure 'custom'")
+    roll: RollTable | None = Field(
+        default=None, description="a table [model.roll]; simulations follow it, estimates and plans do not"
+    )
 
 
 class SensorsTable(Table):
     """`[sensors]`: standard deviations per sample, faults, and by sensor its place, delay and interval."""
 
-    position_m: NonNegative = 0.0
-    heading_rad: NonNegative = 0.0
-    velocity_mps: NonNegative = 0.0
-    yaw_rate_radps: NonNegative = 0.0
-    wind_mps: NonNegative = 0.0
-    wind_angle_rad: NonNegative = 0.0
-    heading_bias_rad: HalfTurn = 0.0
-    velocity_angle_rad: HalfTurn = 0.0
-    yaw_rate_scale: Positive = 1.0
-    wind_sensor: Literal["cartesian", "vane"] = "cartesian"
-    position_forward_m: Number = 0.0
-    position_starboard_m: Number = 0.0
-    position_delay_s: NonNegative = 0.0
-    position_interval_s: NonNegative = 0.0
-    heading_delay_s: NonNegative = 0.0
-    heading_interval_s: NonNegative = 0.0
-    velocity_forward_m: Number = 0.0
-    velocity_starboard_m: Number = 0.0
-    velocity_delay_s: NonNegative = 0.0
-    velocity_interval_s: NonNegative = 0.0
-    yaw_rate_delay_s: NonNegative = 0.0
-    yaw_rate_interval_s: NonNegative = 0.0
-    wind_forward_m: Number = 0.0
-    wind_starboard_m: Number = 0.0
-    wind_delay_s: NonNegative = 0.0
-    wind_interval_s: NonNegative = 0.0
+    position_m: NonNegative = Field(default=0.0, description="the standard deviation of positions [m]")
+    heading_rad: NonNegative = Field(default=0.0, description="the standard deviation of headings [rad]")
+    velocity_mps: NonNegative = Field(default=0.0, description="the standard deviation of surge and sway speed [m/s]")
+    yaw_rate_radps: NonNegative = Field(default=0.0, description="the standard deviation of yaw rate [rad/s]")
+    wind_mps: NonNegative = Field(
+        default=0.0, description="the standard deviation of wind speed, or of each component [m/s]"
+    )
+    wind_angle_rad: NonNegative = Field(default=0.0, description="the standard deviation of a vane's angle [rad]")
+    heading_bias_rad: HalfTurn = Field(default=0.0, description="the measured heading less the true one [rad]")
+    velocity_angle_rad: HalfTurn = Field(
+        default=0.0, description="the angle from the bow to the velocity sensor's forward axis [rad], clockwise"
+    )
+    yaw_rate_scale: Positive = Field(default=1.0, description="the measured yaw rate over the true one")
+    wind_sensor: Literal["cartesian", "vane"] = Field(
+        default="cartesian",
+        description="the kind of wind sensor: components of the relative wind, or its speed and angle",
+    )
+    position_forward_m: Number = Field(
+        default=0.0, description="the place of the sensor of the positions forward of amidships [m]"
+    )
+    position_starboard_m: Number = Field(
+        default=0.0, description="the place of the sensor of the positions to starboard of the centre line [m]"
+    )
+    position_delay_s: NonNegative = Field(default=0.0, description="the delay of the positions [s]")
+    position_interval_s: NonNegative = Field(
+        default=0.0,
+        description="the time between new readings of the positions [s], or 0 for every sample",
+    )
+    heading_delay_s: NonNegative = Field(default=0.0, description="the delay of the headings [s]")
+    heading_interval_s: NonNegative = Field(
+        default=0.0,
+        description="the time between new readings of the headings [s], or 0 for every sample",
+    )
+    velocity_forward_m: Number = Field(
+        default=0.0, description="the place of the sensor of surge and sway speed forward of amidships [m]"
+    )
+    velocity_starboard_m: Number = Field(
+        default=0.0, description="the place of the sensor of surge and sway speed to starboard of the centre line [m]"
+    )
+    velocity_delay_s: NonNegative = Field(default=0.0, description="the delay of surge and sway speed [s]")
+    velocity_interval_s: NonNegative = Field(
+        default=0.0,
+        description="the time between new readings of surge and sway speed [s], or 0 for every sample",
+    )
+    yaw_rate_delay_s: NonNegative = Field(default=0.0, description="the delay of the yaw rate [s]")
+    yaw_rate_interval_s: NonNegative = Field(
+        default=0.0,
+        description="the time between new readings of the yaw rate [s], or 0 for every sample",
+    )
+    wind_forward_m: Number = Field(
+        default=0.0, description="the place of the sensor of the wind forward of amidships [m]"
+    )
+    wind_starboard_m: Number = Field(
+        default=0.0, description="the place of the sensor of the wind to starboard of the centre line [m]"
+    )
+    wind_delay_s: NonNegative = Field(default=0.0, description="the delay of the wind [s]")
+    wind_interval_s: NonNegative = Field(
+        default=0.0,
+        description="the time between new readings of the wind [s], or 0 for every sample",
+    )
 
 
 class VesselTable(Table):
     """The whole file."""
 
+    topic = "vessel"
+
     vessel: ParticularsTable = Field(description="a table [vessel] with the particulars")
     actuators: list[dict[str, Any]] = Field(min_length=1, description="at least one table [[actuators]]")
     model: ModelTable = Field(description="a table [model]")
-    sensors: SensorsTable = SensorsTable()
-    environment: EnvironmentTable | None = None
+    sensors: SensorsTable = Field(
+        default=SensorsTable(), description="the noise and faults of the sensors; without the table they are exact"
+    )
+    environment: EnvironmentTable | None = Field(
+        default=None, description="the weather that simulations of this vessel meet and a diagnosis found"
+    )
 
 
 ACTUATOR_TABLES: dict[str, type[ActuatorTable]] = {

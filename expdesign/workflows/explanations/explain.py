@@ -1,0 +1,77 @@
+"""`expdesign explain`: a topic, a section of one, or a single name."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+from expdesign.errors import InputError, nearest
+from expdesign.workflows.explanations import files, plug_ins
+from expdesign.workflows.explanations.values import Explained, Section, Topic
+
+TOPICS: dict[str, tuple[str, Callable[[], Topic]]] = {
+    "scenario": ("keys of a scenario file: design, start, goal, environment, plan", files.scenario_topic),
+    "vessel": ("keys of a vessel file: particulars, actuators, model, sensors", files.vessel_topic),
+    "dictionary": ("keys of a dictionary file", files.dictionary_topic),
+    "families": ("manoeuvre families and their settings", plug_ins.families_topic),
+    "area": ("keys of an area file: chart, bounds, depth, no-go zones", files.area_topic),
+    "data": ("columns of measured data", plug_ins.data_topic),
+    "structures": ("built-in model structures and their parameters", plug_ins.structures_topic),
+    "criteria": ("design criteria", plug_ins.criteria_topic),
+    "outcomes": ("results of standard trials that a design can be made best for", plug_ins.outcomes_topic),
+    "methods": ("estimators", plug_ins.methods_topic),
+    "causes": ("causes that a diagnosis looks for", plug_ins.causes_topic),
+    "formats": ("route formats", plug_ins.formats_topic),
+}
+"""Topic -> one line about it, and what gives it."""
+
+
+def explain(subject: str = "") -> Topic:
+    """What a subject means.
+
+    Args:
+        subject: a topic; a table, a manoeuvre family or another section of one; or a name, such as design.total_s or
+            actuators[2].kind. Without it, the list of topics.
+
+    Raises:
+        InputError: nothing has that name; the message offers the nearest.
+    """
+    wanted = re.sub(r"\[\d*\]", "", subject)
+    if not wanted:
+        entries = tuple(Explained(name=name, meaning=line) for name, (line, _) in TOPICS.items())
+        text = "expdesign explain TOPIC shows one, expdesign explain NAME a single key, family or other name."
+        section = Section(name="topics", title="", entries=entries)
+        return Topic(name="topics", title="Topics", text=text, sections=(section,))
+    if wanted in TOPICS:
+        return TOPICS[wanted][1]()
+    known: list[str] = list(TOPICS)
+    found: dict[str, Section] = {}
+    for _, build in TOPICS.values():
+        topic = build()
+        for section in topic.sections:
+            names = [_plain(entry.name) for entry in section.entries]
+            known += [section.name, *names, *(name.rpartition(".")[2] for name in names)]
+            entries = tuple(_matching(section, wanted))
+            if entries:
+                found[f"{topic.title}: {section.title}"] = replace(section, entries=entries)
+    if not found:
+        near = nearest(wanted, known)
+        hint = f"did you mean {near!r}?" if near else f"expected a key, or one of {', '.join(TOPICS)}"
+        raise InputError(f"{subject!r} is not explained, {hint} (expdesign explain lists the topics)")
+    sections = tuple(replace(section, title=title.rstrip(": ")) for title, section in found.items())
+    return Topic(name=subject, title=subject, sections=sections)
+
+
+def _matching(section: Section, wanted: str) -> Iterator[Explained]:
+    """All of a section that is asked for by name, else entries of that name, below it or ending in it."""
+    for entry in section.entries:
+        names = [_plain(name) for name in entry.name.split(", ")]
+        if section.name == wanted or any(
+            f".{name}".endswith(f".{wanted}") or name.startswith(f"{wanted}.") for name in names
+        ):
+            yield entry
+
+
+def _plain(name: str) -> str:
+    return name.replace("[]", "")

@@ -1,0 +1,93 @@
+"""The keys of scenario, vessel, dictionary and area files, from the models that read them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import groupby
+
+from expdesign.scenario.charts.area_tables import AreaTable
+from expdesign.scenario.dictionaries.dictionary_file import DictionaryTable, PrimitiveTable
+from expdesign.scenario.keys import Key, keys_of
+from expdesign.scenario.scenario_file import ScenarioFile
+from expdesign.scenario.tables import Table
+from expdesign.scenario.vessels.vessel_tables import ACTUATOR_TABLES, ActuatorTable, VesselTable
+from expdesign.workflows.explanations.values import Explained, Section, Topic
+
+VARIANTS = (
+    "Paths are relative to the file they stand in. A variant for expdesign whatif is a file with only the keys that "
+    "differ. Positions are given by lat_deg and lon_deg, or by north_m and east_m."
+)
+VESSELS = (
+    "Forward, starboard and clockwise are positive, counted from amidships. What is left out is ideal: no lag, no "
+    "noise. Signals are numbered by kind in the order of the file: n1, a1 of the first thruster, rudder1 of the first "
+    "rudder."
+)
+
+
+def scenario_topic() -> Topic:
+    """Keys of a scenario file."""
+    return Topic(name="scenario", title="Scenario files", text=VARIANTS, sections=_by_table(ScenarioFile))
+
+
+def vessel_topic() -> Topic:
+    """Keys of a vessel file; those of actuators by kind."""
+    sections = [
+        _with_more(section, ActuatorTable) if section.name == "actuators" else section
+        for section in _by_table(VesselTable)
+    ]
+    kinds = [_kind(names, table) for table, names in _kinds().items()]
+    return Topic(name="vessel", title="Vessel files", text=VESSELS, sections=(*sections[:2], *kinds, *sections[2:]))
+
+
+def dictionary_topic() -> Topic:
+    """Keys of a dictionary file; the settings of families are a topic of their own."""
+    first, primitives = _by_table(DictionaryTable)
+    text = (
+        "An entry also gives the settings of its family: expdesign explain families. A list of values stands for one "
+        "manoeuvre each; several lists for every combination, at most 10 000."
+    )
+    return Topic(
+        name="dictionary", title="Dictionary files", text=text, sections=(first, _with_more(primitives, PrimitiveTable))
+    )
+
+
+def area_topic() -> Topic:
+    """Keys of an area file."""
+    text = "Allowed water lies inside the bounds, is deep enough, and is neither land, danger nor a no-go zone."
+    return Topic(name="area", title="Area files", text=text, sections=_by_table(AreaTable))
+
+
+def _with_more(section: Section, model: type[Table]) -> Section:
+    """A list of tables with the keys that all of them have."""
+    return replace(section, entries=(*section.entries, *_entries(keys_of(model, f"{section.name}[]."))))
+
+
+def _kinds() -> dict[type[Table], list[str]]:
+    """Kinds of actuators by the table that reads them."""
+    kinds: dict[type[Table], list[str]] = {}
+    for kind, table in ACTUATOR_TABLES.items():
+        kinds.setdefault(table, []).append(kind)
+    return kinds
+
+
+def _kind(names: Sequence[str], table: type[Table]) -> Section:
+    own = [key for key in keys_of(table, "actuators[].") if key.name.split(".")[-1] not in ActuatorTable.model_fields]
+    title = f"entries of [[actuators]] with kind = {' or '.join(repr(name) for name in names)}"
+    return Section(name=names[0], title=title, entries=_entries(own))
+
+
+def _by_table(model: type[Table]) -> tuple[Section, ...]:
+    """One section for each table at the top of a file."""
+    groups = groupby(keys_of(model), key=lambda key: key.name.split(".")[0].removesuffix("[]"))
+    sections = []
+    for name, group in groups:
+        first, *rest = group
+        sections.append(Section(name=name, title=f"[{name}] {first.meaning}", entries=_entries([first, *rest])))
+    return tuple(sections)
+
+
+def _entries(keys: Sequence[Key]) -> tuple[Explained, ...]:
+    return tuple(
+        Explained(name=key.name, meaning=key.meaning, default=key.default, allowed=key.allowed) for key in keys
+    )

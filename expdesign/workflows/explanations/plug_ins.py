@@ -1,0 +1,131 @@
+"""What can be chosen by name: families, causes, methods, criteria, formats, outcomes, structures, columns of data."""
+
+from __future__ import annotations
+
+import inspect
+import math
+
+from expdesign.workflows.explanations.values import Explained, Section, Topic
+
+
+def families_topic() -> Topic:
+    """Manoeuvre families with their settings."""
+    from expdesign.dictionary import FAMILIES, Family, Setting
+
+    def entry(family: Family, setting: Setting) -> Explained:
+        low, high = setting.low, setting.high
+        allowed = f"{low:g} to {high:g}" if math.isfinite(low) and math.isfinite(high) else "a number"
+        default = "required" if setting.default is None else f"{setting.default:g}"
+        return Explained(
+            name=f"{family.name}.{setting.name}", meaning=setting.meaning, default=default, allowed=allowed
+        )
+
+    sections = tuple(
+        Section(
+            name=family.name,
+            title=f"{family.name}: {family.summary}",
+            entries=tuple(entry(family, setting) for setting in family.settings),
+        )
+        for family in FAMILIES
+    )
+    text = "Units are in the names of the settings: s, m, mps (m/s), rad, radps (rad/s)."
+    return Topic(name="families", title="Manoeuvre families of dictionary files", text=text, sections=sections)
+
+
+def causes_topic() -> Topic:
+    """Causes that a diagnosis looks for; each is described where it is defined."""
+    from expdesign.diagnosis.causes import CAUSES
+
+    entries = []
+    for cause in CAUSES:
+        words = inspect.getdoc(inspect.getmodule(cause.candidates)) or ""
+        entries.append(Explained(name=cause.name, meaning=words.partition("\n\n")[0].replace("\n", " ").rstrip(".")))
+    return _list("causes", "Causes that expdesign diagnose can name", tuple(entries))
+
+
+def methods_topic() -> Topic:
+    """Estimators."""
+    from expdesign.estimation.methods import METHODS
+
+    text = (
+        "ls, least squares, suits quiet sensors and is biased by noise in the velocities. iv, instrumental variables "
+        "from a simulation, stays right with noisy velocities as long as nothing inside a modulus changes its sign. "
+        "oe, output error, makes the simulation error least, and is the most accurate where only sensors disturb. "
+        "'augmented' also estimates an unknown current; 'air' uses the measured wind; 'wind' does both."
+    )
+    entries = tuple(Explained(name=method.name, meaning=method.title) for method in METHODS)
+    return _list("methods", "Estimators of expdesign estimate and validate", entries, text)
+
+
+def criteria_topic() -> Topic:
+    """Design criteria."""
+    from expdesign.durations import CRITERIA
+
+    entries = tuple(Explained(name=item.name, meaning=f"makes least the {item.title}") for item in CRITERIA)
+    text = (
+        "D_s, A and E are about the parameters in design.interest; V is about design.outcomes. A, E and V weigh "
+        "equations against each other and need the sensors' noise in the vessel file."
+    )
+    return _list("criteria", "Design criteria, design.criterion", entries, text)
+
+
+def formats_topic() -> Topic:
+    """Route formats."""
+    from expdesign.export import FORMATS
+
+    entries = tuple(Explained(name=item.name, meaning=f"{item.summary}; writes {item.file_name}") for item in FORMATS)
+    return _list("formats", "Route formats of expdesign export", entries)
+
+
+def outcomes_topic() -> Topic:
+    """Results of standard trials that criterion V predicts."""
+    from expdesign.indices import OUTCOMES
+
+    entries = tuple(Explained(name=name, meaning=meaning) for name, meaning in OUTCOMES.items())
+    return _list("outcomes", "Results of standard trials, design.outcomes", entries)
+
+
+def structures_topic() -> Topic:
+    """Built-in model structures with their terms."""
+    from expdesign.vessel import STRUCTURES
+
+    sections = tuple(
+        Section(
+            name=name,
+            title=f"structure {name!r}",
+            entries=tuple(
+                Explained(name=term.name, meaning=f"multiplies {term.expression} in the equation of {term.equation}")
+                for term in terms
+            ),
+        )
+        for name, terms in STRUCTURES.items()
+    )
+    text = (
+        "Each parameter multiplies one expression in the equation of surge (u), sway (v) or yaw (r) acceleration; u_q "
+        "and v_q are velocities through air. 'custom' takes its terms from [[model.terms]]."
+    )
+    return Topic(name="structures", title="Model structures of vessel files", text=text, sections=sections)
+
+
+def data_topic() -> Topic:
+    """Columns of measured data."""
+    from expdesign.records import COLUMNS
+
+    entries = tuple(
+        Explained(
+            name=item.names,
+            meaning=item.meaning,
+            allowed=f"units {', '.join(item.units)}" if item.units else "",
+        )
+        for item in COLUMNS
+    )
+    text = (
+        "A CSV file with one header row; the unit is the end of a column's name. Needed are time, the inputs of the "
+        "vessel's model, and velocities or a pose to derive them from (--velocity). A gap of more than 1.5 sample "
+        "times starts a new batch. Remarkable data are reported; wrong data are refused with their rows."
+    )
+    return _list("data", "Columns of measured data", entries, text)
+
+
+def _list(name: str, title: str, entries: tuple[Explained, ...], text: str = "") -> Topic:
+    return Topic(name=name, title=title, text=text, sections=(Section(name=name, title="", entries=entries),))
