@@ -71,9 +71,7 @@ def test_the_readmes_commands_for_indices_and_routes_run_as_they_stand(
     assert main(shlex.split(line)) == 0
     kinds = [run["kind"] for run in json.loads((tmp_path / "runs/ship-indices/indices.json").read_text())["measured"]]
     assert kinds == ["zig-zag", "turning circle"]
-    assert all(f"`{name}`" in readme for name in ("rtz-1.0", "rtz-1.1"))
     assert main(["export", "plan.json", "--format", "rtz", "rtz-1.0", "rtz-1.1", "--quiet"]) == 0
-    assert "expdesign check-route FILE.rtz ..." in readme
     assert main(["check-route", *map(str, tmp_path.glob("*.rtz"))]) == 0
 
 

@@ -83,7 +83,7 @@ def _by_table(model: type[Table]) -> tuple[Section, ...]:
     sections = []
     for name, group in groups:
         first, *rest = group
-        sections.append(Section(name=name, title=f"[{name}] {first.meaning}", entries=_entries([first, *rest])))
+        sections.append(Section(name=name, title=f"[{name}]", entries=_entries([first, *rest])))
     return tuple(sections)
 
 

@@ -1,0 +1,67 @@
+"""Runs a benchmark and records what it prints in the README beside it.
+
+``python tests/benchmarks/record.py planner [ARGUMENT ...]``: the section `planner` is replaced by the benchmark's
+description, the command, the machine, and the output. A path that exists is recorded as FOLDER. Nothing is recorded of
+a benchmark that fails.
+"""
+
+from __future__ import annotations
+
+import ast
+import itertools
+import os
+import platform
+import re
+import subprocess
+import sys
+from datetime import date
+from importlib.metadata import version
+from pathlib import Path
+
+HERE = Path(__file__).parent
+README = HERE / "README.md"
+
+
+def measured(script: Path, arguments: list[str]) -> str:
+    """What the benchmark prints; shown while it runs."""
+    lines = []
+    with subprocess.Popen([sys.executable, script, *arguments], stdout=subprocess.PIPE, text=True) as process:
+        for line in process.stdout or ():
+            print(line, end="", flush=True)
+            lines.append(line)
+    if process.returncode:
+        raise SystemExit(f"{script.name} ended with status {process.returncode}; nothing is recorded")
+    return "".join(lines)
+
+
+def section(name: str, script: Path, arguments: list[str], output: str) -> str:
+    """Heading, description, command, machine and output in Markdown."""
+    summary = (ast.get_docstring(ast.parse(script.read_text("utf-8"))) or "").split("\n\n")[0].replace("\n", " ")
+    shown = ["FOLDER" if Path(item).exists() else item for item in arguments]
+    command = " ".join(["python", f"tests/benchmarks/{name}.py", *shown])
+    machine = f"{os.cpu_count()} cores, Python {platform.python_version()}, NumPy {version('numpy')}"
+    return f"## {name}\n\n{summary}\n\n`{command}` on {date.today()}, {machine}:\n\n{in_markdown(output)}\n"
+
+
+def in_markdown(output: str) -> str:
+    """Tables as they are, other text as preformatted blocks."""
+    blocks = itertools.groupby(output.rstrip().splitlines(), key=lambda line: line.startswith("|"))
+    texts = ((table, "\n".join(lines).strip("\n")) for table, lines in blocks)
+    return "\n\n".join(text if table else f"```text\n{text}\n```" for table, text in texts if text)
+
+
+def recorded(readme: str, name: str, text: str) -> str:
+    """The README with one section replaced, or added in alphabetical order."""
+    head, *sections = re.split(r"^(?=## )", readme, flags=re.MULTILINE)
+    kept = {part.split("\n", 1)[0]: part.rstrip() + "\n" for part in sections}
+    kept[f"## {name}"] = text
+    return "\n".join([head.rstrip() + "\n", *(kept[title] for title in sorted(kept))])
+
+
+if __name__ == "__main__":
+    if len(sys.argv) < 2:
+        raise SystemExit(__doc__)
+    chosen, options = sys.argv[1].removesuffix(".py"), sys.argv[2:]
+    source = HERE / f"{chosen}.py"
+    new = section(chosen, source, options, measured(source, options))
+    README.write_text(recorded(README.read_text("utf-8"), chosen, new), "utf-8")
