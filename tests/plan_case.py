@@ -11,7 +11,7 @@ import shapely
 from expdesign.dictionary import Primitive, PrimitiveSpec, build_primitive, complete_settings, family
 from expdesign.plan import PlanSettings
 from expdesign.plan.chart.clearance_grid import clearance_field
-from expdesign.plan.chart.goal_distance import build_goal_ways
+from expdesign.plan.chart.goal_distance import build_goal_distance
 from expdesign.plan.control.capability import capability
 from expdesign.plan.legs import LegTask, LegWater
 from expdesign.plan.local_planner import SearchSpace, local_planner
@@ -93,7 +93,7 @@ def space_of(sea: LegWater, run: Primitive, goal: np.ndarray) -> SearchSpace:
         footprints=(footprint(run, room, length_m=vessel.length_m, beam_m=vessel.beam_m),),
         frame=sea.area.frame,
         field=sea.field,
-        goal_distance=build_goal_ways(sea.narrowest_ways, sea.field, goal[:2]),
+        goal_distance=build_goal_distance(sea.narrowest_graph, sea.field, goal[:2]),
         goal=goal,
         planner=local_planner(sea, (run,)),
         hull_m=vessel.length_m,

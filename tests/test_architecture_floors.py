@@ -48,6 +48,7 @@ FLOORS = {
         ("diagnose",),
     ),
     "plan": (
+        ("tuning",),
         ("values", "work_budget"),
         ("verify", "chart", "control", "runs"),
         ("problem", "timeline"),
@@ -231,7 +232,7 @@ def test_the_scan_sees_the_whole_package() -> None:
         ("vessel/terms.py", "eval('1')", "calls eval"),
         ("vessel/terms.py", "import builtins\nbuiltins.exec('1')", "calls exec"),
         ("vessel/terms.py", "import importlib\nimportlib.import_module('expdesign.cli')", "calls import_module"),
-        ("plan/verify/checks.py", "from expdesign.plan.chart import Ways", "verify imports chart"),
+        ("plan/verify/checks.py", "from expdesign.plan.chart import VisibilityGraph", "verify imports chart"),
         ("plan/legs/agile.py", "from expdesign.plan.search import place_runs", "legs imports search"),
         ("plan/attic/old.py", "", "plan/attic has no floor"),
         ("helpers.py", "", "helpers has no floor"),

@@ -10,8 +10,8 @@ import pytest
 import shapely
 
 from expdesign.plan import PlanSettings
-from expdesign.plan.bounds.displacement import Carry, Headway, carry, exit_motion
-from expdesign.plan.bounds.repositioning import _grown, joint_losses, reposition_bound_s, time_to_sail_s
+from expdesign.plan.bounds.displacement import Displacement, Headway, displacement_of, exit_motion
+from expdesign.plan.bounds.repositioning import _grown, least_losses, reposition_bound_s, time_to_sail_s
 from expdesign.plan.control.acceleration_limits import LegEnd, SpeedChanges, least_loss, leg_end
 from expdesign.plan.control.capability import capability
 from expdesign.plan.legs import LegTask
@@ -37,12 +37,12 @@ def steady(speed_mps: float, rate_mps2: float, top_mps: float) -> LegEnd:
     return LegEnd(slowest_mps=speed_mps, fastest_mps=speed_mps, inputs=None, changes=changes)
 
 
-def to_sail(water, carries, repeats, ends=ENDS, margin_m=5.0) -> float:
-    return time_to_sail_s(area(water), margin_m, carries, repeats, ends, STILL, 0.5)
+def to_sail(water, displacements, repeats, ends=ENDS, margin_m=5.0) -> float:
+    return time_to_sail_s(area(water), margin_m, displacements, repeats, ends, STILL, 0.5)
 
 
 def test_open_water_leaves_the_straight_line_less_the_chords():
-    run = Carry(chord_s=30.0, path_s=80.0, stray_m=20.0)
+    run = Displacement(chord_s=30.0, path_s=80.0, deviation_m=20.0)
     assert to_sail(OPEN, {"run": run}, {"run": 3}) == pytest.approx(400 - 90, abs=1e-6)
     assert to_sail(OPEN, {}, {}) == pytest.approx(400, abs=1e-6)
 
@@ -55,7 +55,7 @@ def test_round_a_wall_the_way_is_the_taut_string():
 
 def test_a_run_whose_chord_crosses_the_wall_may_not_be_counted_by_its_chord():
     # a run round the wall: 20 m from side to side, but 700 m of path, 300 m from the chord
-    around = Carry(chord_s=20.0, path_s=700.0, stray_m=300.0)
+    around = Displacement(chord_s=20.0, path_s=700.0, deviation_m=300.0)
     string = to_sail(OPEN.difference(WALL), {}, {})
     found = to_sail(OPEN.difference(WALL), {"run": around}, {"run": 1})
     assert found == pytest.approx(max(string - 700, 400 - 20), abs=30)
@@ -64,18 +64,18 @@ def test_a_run_whose_chord_crosses_the_wall_may_not_be_counted_by_its_chord():
 
 def test_a_straight_run_carries_its_length_and_does_not_stray():
     run, speed = primitive(ship()), 1.3
-    found = carry(ship(), run, CALM, Headway(speed_mps=speed, current_to=np.zeros(2)))
+    found = displacement_of(ship(), run, CALM, Headway(speed_mps=speed, current_to=np.zeros(2)))
     length = np.hypot(*(run.trajectory.pose[-1] - run.trajectory.pose[0])[:2])
     assert found.chord_s == pytest.approx(length / speed)
     assert found.chord_s == pytest.approx(found.path_s)
-    assert found.stray_m < 0.01 * length
+    assert found.deviation_m < 0.01 * length
 
 
 @pytest.mark.parametrize("speed", [1.3, 0.6])  # faster than the run, and slower
 def test_what_a_run_is_credited_with_in_a_current_is_the_most_over_all_headings(speed):
     run, current = primitive(ship()), np.array([0.3, 0.4])
     headway = Headway(speed_mps=speed, current_to=current)
-    found = carry(ship(), run, Environment(current_to=current), headway)
+    found = displacement_of(ship(), run, Environment(current_to=current), headway)
     heading = np.linspace(-np.pi, np.pi, 3601)
     track = run.trajectory.pose[:, :2]
     length = np.hypot(*(track[-1] - track[0]))
@@ -100,7 +100,9 @@ def test_no_point_of_a_drifting_runs_chord_is_farther_from_its_path_than_told():
     arc = np.column_stack([40 * np.sin(turn), 40 * (1 - np.cos(turn)), turn])
     bent = replace(run, trajectory=replace(run.trajectory, pose=arc))
     for current in (np.zeros(2), np.array([0.2, 0.0])):
-        told = carry(ship(), bent, Environment(current_to=current), Headway(speed_mps=1.3, current_to=current)).stray_m
+        told = displacement_of(
+            ship(), bent, Environment(current_to=current), Headway(speed_mps=1.3, current_to=current)
+        ).deviation_m
         for heading in np.linspace(-np.pi, np.pi, 37):
             c, s = np.cos(heading), np.sin(heading)
             track = arc[:, :2] @ np.array([[c, s], [-s, c]]) + current * run.trajectory.time_s[:, None]
@@ -127,7 +129,7 @@ WEATHERS = {
 def test_no_heading_carries_a_run_that_feels_the_air_farther_than_told(weather):
     vessel, environment = windy(), WEATHERS[weather]
     run, headway = primitive(vessel), Headway(speed_mps=1.3, current_to=environment.current_to)
-    told = carry(vessel, run, environment, headway)
+    told = displacement_of(vessel, run, environment, headway)
     slowest, fastest, turning = exit_motion(vessel, run, environment)
     chords = []
     for heading in np.random.default_rng(4).uniform(-np.pi, np.pi, 60):
@@ -138,7 +140,7 @@ def test_no_heading_carries_a_run_that_feels_the_air_farther_than_told(weather):
         chords.append(headway.seconds(places[-1] - places[0]))
         assert headway.seconds(np.diff(places, axis=0)).sum() <= told.path_s
         chord = places[0] + np.linspace(0, 1, 100)[:, None] * (places[-1] - places[0])
-        assert shapely.distance(shapely.points(chord), shapely.linestrings(places)).max() <= told.stray_m
+        assert shapely.distance(shapely.points(chord), shapely.linestrings(places)).max() <= told.deviation_m
         last = through_water(environment, np.r_[track.pose[-1], track.velocity[-1]])
         assert slowest <= np.hypot(*last[:2]) <= fastest
         assert abs(last[2]) <= turning
@@ -148,9 +150,9 @@ def test_no_heading_carries_a_run_that_feels_the_air_farther_than_told(weather):
 def test_air_that_moves_with_the_water_is_calm():
     current, run = np.array([0.3, 0.4]), primitive(windy())
     drifting, headway = Environment(current_to=current, wind_to=current), Headway(speed_mps=1.3, current_to=current)
-    blind = carry(ship(), run, Environment(current_to=current), headway)
-    told = carry(windy(), run, drifting, headway)
-    assert (told.chord_s, told.path_s, told.stray_m) == (blind.chord_s, blind.path_s, blind.stray_m)
+    blind = displacement_of(ship(), run, Environment(current_to=current), headway)
+    told = displacement_of(windy(), run, drifting, headway)
+    assert (told.chord_s, told.path_s, told.deviation_m) == (blind.chord_s, blind.path_s, blind.deviation_m)
 
 
 @pytest.mark.parametrize("wind", [np.array([4.0, 0.0]), np.array([-3.0, 2.0])])
@@ -211,10 +213,10 @@ def test_a_planted_plan_costs_no_less_than_the_bound(seed):
             here = track[-1]
     lakes = shapely.buffer(shapely.points(rng.uniform(-400, 400, (3, 2))), 60.0)
     water = shapely.union_all([*(shapely.buffer(way, margin + 0.5) for way in waters), *lakes])
-    carries = {name: carry(ship(), run, sea, headway) for name, run in runs.items()}
-    bound = time_to_sail_s(area(water), margin, carries, repeats, (np.zeros(2), here), headway, 0.5)
+    displacements = {name: displacement_of(ship(), run, sea, headway) for name, run in runs.items()}
+    bound = time_to_sail_s(area(water), margin, displacements, repeats, (np.zeros(2), here), headway, 0.5)
     assert bound <= spent + 1e-6
-    none = {name: Carry(chord_s=0.0, path_s=0.0, stray_m=0.0) for name in runs}
+    none = {name: Displacement(chord_s=0.0, path_s=0.0, deviation_m=0.0) for name in runs}
     assert bound <= time_to_sail_s(area(water), margin, none, repeats, (np.zeros(2), here), headway, 0.5)
 
 
@@ -245,14 +247,14 @@ def test_the_losses_counted_are_those_of_the_best_order(counts):
         losses[0, order[0]] + sum(losses[a + 1, b] for a, b in pairwise(order)) + losses[order[-1] + 1, -1]
         for order in permutations(runs.tolist())
     ]
-    assert joint_losses(losses, counts) == pytest.approx(min(totals))
+    assert least_losses(losses, counts) == pytest.approx(min(totals))
 
 
 def test_where_orders_are_too_many_the_losses_counted_are_less():
     losses = np.random.default_rng(0).uniform(0, 5, (21, 21))
     order = [0, *np.random.default_rng(1).permutation(20).tolist()]
     some = losses[0, order[1]] + sum(losses[a + 1, b] for a, b in pairwise(order[1:])) + losses[order[-1] + 1, -1]
-    assert 0 <= joint_losses(losses, [1] * 20) <= some
+    assert 0 <= least_losses(losses, [1] * 20) <= some
 
 
 def test_changing_speed_loses_what_constant_acceleration_loses():

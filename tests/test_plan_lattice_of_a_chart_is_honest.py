@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import shapely
 
-from expdesign.plan.chart.goal_distance import build_goal_ways
+from expdesign.plan.chart.goal_distance import build_goal_distance
 from expdesign.plan.local_planner import SearchSpace, local_planner
 from expdesign.plan.runs import Footprint
 from expdesign.plan.search.lattice import search_lattice
@@ -34,7 +34,7 @@ def space(water: shapely.Geometry, goal, *runs: Footprint) -> SearchSpace:
         footprints=runs,
         frame=legs.area.frame,
         field=legs.field,
-        goal_distance=build_goal_ways(legs.narrowest_ways, legs.field, np.array(goal[:2])),
+        goal_distance=build_goal_distance(legs.narrowest_graph, legs.field, np.array(goal[:2])),
         goal=np.array(goal, dtype=float),
         planner=local_planner(legs),
         hull_m=30.0,

@@ -1,34 +1,55 @@
-"""What planning begins with: the water that legs share, the runs with the room they need, transitions between them."""
+"""What planning begins with: the water that legs share, the runs with the room they need, optimised transitions."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
 
 from expdesign.errors import NoPlan
-from expdesign.plan.chart import ClearanceField, build_goal_ways, clearance_field, narrowest_passage
+from expdesign.plan.chart import ClearanceField, build_goal_distance, clearance_field, narrowest_passage
 from expdesign.plan.control import capability
 from expdesign.plan.legs import LegWater
-from expdesign.plan.local_planner import LocalPlanner, SearchSpace, TransitionTrials, pairs_of
+from expdesign.plan.local_planner import LocalPlanner, SearchSpace, TransitionTrials, local_planner, pairs_of
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.runs import Footprint, dispersion_m, footprint
 from expdesign.plan.search import path_exceeds_displacement, place_runs
+from expdesign.plan.tuning import PLAN
 from expdesign.plan.values import Progress
 from expdesign.plan.work_budget import WorkBudget
 from expdesign.vessel.hull import covering_discs
 
-TRIAL_WIDTH = 100
-"""Partial plans kept while transitions are tried."""
-TRANSITIONS_S = 30.0
-"""Work budget of trying transitions, after which the rule for the time of legs has to do."""
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PlanRoom:
+    """What a plan is made in.
+
+    Attributes:
+        water: that legs keep to.
+        space: that runs are placed in.
+    """
+
+    water: LegWater
+    space: SearchSpace
+
+
+def plan_room(problem: PlanProblem, water: LegWater, progress: Progress) -> PlanRoom:
+    """Water and search space of the first plan, with the transitions optimised that good plans use.
+
+    Raises:
+        NoPlan: no path leads from start to goal, or the ship cannot leave its start or reach its goal.
+    """
+    planner = local_planner(water, problem.used)
+    planner.check_ends(problem.start, problem.goal, water)
+    space = search_space(problem, water, planner)
+    return PlanRoom(water=water, space=_with_transitions(problem, water, space, progress))
 
 
 def leg_water(problem: PlanProblem) -> LegWater:
-    """Who sails, in what, where: what all legs of the problem share."""
+    """Vessel, weather and water that all legs of the problem share."""
     ship = capability(problem.vessel, problem.settings, current_mps=float(np.hypot(*problem.environment.current_to)))
-    # a ship that stands the turns of the runs stands them on legs
+    # the lateral acceleration that runs reach is accepted on legs
     turns = [item.trajectory.velocity[:, 0] * item.trajectory.velocity[:, 2] for item in problem.used]
     lateral = max([ship.lateral_mps2, *(float(np.abs(turn).max()) for turn in turns)])
     return LegWater(
@@ -49,7 +70,7 @@ def search_space(problem: PlanProblem, water: LegWater, planner: LocalPlanner) -
     """
     grid = water.field
     margin = water.leg_margin_m + grid.cell_m / 2
-    goal_distance = build_goal_ways(water.narrowest_ways, grid, problem.goal[:2])
+    goal_distance = build_goal_distance(water.narrowest_graph, grid, problem.goal[:2])
     if goal_distance is None or not water.candidate_paths(problem.start[:2], problem.goal[:2]):
         raise NoPlan(_no_path(problem, grid, margin))
     return SearchSpace(
@@ -65,21 +86,21 @@ def search_space(problem: PlanProblem, water: LegWater, planner: LocalPlanner) -
     )
 
 
-def with_transitions(problem: PlanProblem, water: LegWater, space: SearchSpace, progress: Progress) -> SearchSpace:
-    """The space with the transitions tried that its best plans would use."""
+def _with_transitions(problem: PlanProblem, water: LegWater, space: SearchSpace, progress: Progress) -> SearchSpace:
+    """The space with the transitions optimised that its best plans would use."""
     counts, planner = [problem.repeats[item.name] for item in space.footprints], space.planner
     trials = TransitionTrials(
         water=water,
         primitives={item.name: item for item in problem.used},
         start=problem.start,
         made_good=path_exceeds_displacement(space, counts, problem.start),
-        budget=WorkBudget(most_s=TRANSITIONS_S),
+        budget=WorkBudget(most_s=PLAN.transitions_s),
     )
     for number in range(planner.transition_trials):
         progress("trying transitions between runs", 0.01 * (number + 1))
         try:
-            placements = place_runs(space, counts, start=problem.start, width=TRIAL_WIDTH, orders=0)
-        except NoPlan:  # the search proper keeps more, and says what is impossible
+            placements = place_runs(space, counts, start=problem.start, width=PLAN.transition_beam, orders=0)
+        except NoPlan:  # the main search keeps more, and says what is impossible
             break
         pairs = pairs_of(placements)
         if all(pair in space.tried for pair in pairs):
@@ -93,7 +114,7 @@ def with_transitions(problem: PlanProblem, water: LegWater, space: SearchSpace, 
 def _footprints(problem: PlanProblem, grid: ClearanceField) -> tuple[Footprint, ...]:
     """The runs with the room they need: the clearance asked for, or the dispersion of drawn runs where that is more.
 
-    The chance of leaving that room is shared out evenly over all runs, so that together they keep the confidence.
+    The probability of leaving that room is shared evenly among all runs, so that together they keep the confidence.
     """
     vessel, used = problem.vessel, problem.repeats
     centres, disc_m = covering_discs(vessel.length_m, vessel.beam_m)
@@ -113,7 +134,7 @@ def _no_path(problem: PlanProblem, grid: ClearanceField, needed_m: float) -> str
         return "the goal cannot be reached from the start: forbidden water lies between them on every path"
     widest, place = narrowest_passage(grid, problem.start[:2], problem.goal[:2])
     lat, lon = problem.area.frame.to_degrees(place)
-    if widest <= grid.error_m or widest > needed_m:  # too little for the grid to tell, or lost in simplifying the shore
+    if widest <= grid.error_m or widest > needed_m:  # below the grid's resolution, or lost in simplifying the shore
         return (
             f"the goal cannot be reached from the start in a chart grid of {grid.cell_m:.3g} m and by a simplified "
             f"shore: if there is a path, also near {lat:.5f}, {lon:.5f}, give the area smaller [bounds]"

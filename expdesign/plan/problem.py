@@ -20,7 +20,7 @@ class PlanProblem:
     """A trial to be planned.
 
     Attributes:
-        vessel, area, environment, settings: who, where, in what, and with which wishes.
+        vessel, area, environment, settings: who, where, in what weather, with which settings.
         primitives: of the dictionary, in the design's order.
         design: gives the number of runs of each.
         start, goal: (3,) poses; the ship starts and ends at rest through the water.

@@ -1,4 +1,4 @@
-"""Sailing a trial run by run; where a leg or a run fails, the rest is placed anew."""
+"""Sailing a trial run by run; where a leg or a run fails, the remaining runs are placed again."""
 
 from __future__ import annotations
 
@@ -8,35 +8,18 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from expdesign.errors import NoPlan
+from expdesign.plan.assembly import PlanRoom
 from expdesign.plan.legs import LegTask, LegWater, last_state, nearest_turns
 from expdesign.plan.local_planner import LocalPlanner, SearchSpace
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.search import place_runs
 from expdesign.plan.timeline import Timeline
+from expdesign.plan.tuning import PLAN
 from expdesign.plan.values import Placement, Progress, SailedTrial
 from expdesign.plan.work_budget import WorkBudget
 from expdesign.values import Array
 
 GOAL = "goal"
-TRY_S = 2.0
-"""Least cost of a failed placement [s]. Work is counted, so that every machine finds the same plan."""
-LEG_S = 40.0
-"""Work budget of one leg."""
-LAST_RESORT = 5.0
-"""Time budgets by the clock after which a search that is stuck ends whatever the count."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class PlanRoom:
-    """What a plan is made in.
-
-    Attributes:
-        water: that legs keep to.
-        space: that runs are placed in.
-    """
-
-    water: LegWater
-    space: SearchSpace
 
 
 def sail_all(
@@ -52,7 +35,7 @@ def sail_all(
         budget: counts what legs cost.
 
     Raises:
-        NoPlan: there is no place for a run, or none was found with all the tries; says what stood in the way.
+        NoPlan: there is no place for a run, or none was found within the budget; the message says what failed.
     """
     voyage = _Voyage(problem=problem, water=room.water, stated=stated, planner=room.space.planner, budget=budget)
     space, left, stuck = room.space, problem.repeats, ""
@@ -89,16 +72,16 @@ def _placed(space: SearchSpace, left: dict[str, int], line: Timeline, stuck: str
 
 
 class _Failures:
-    """Placements that failed, against the time budget."""
+    """Failed placements, counted against the time budget."""
 
     def __init__(self, budget_s: float) -> None:
-        self._budget_s, self._deadline = budget_s, time.monotonic() + LAST_RESORT * budget_s
+        self._budget_s, self._deadline = budget_s, time.monotonic() + PLAN.clock_budgets * budget_s
         self._tries, self._lost_s = 0, 0.0
 
     def count(self, cost_s: float, stuck: str) -> None:
         """Count one failure, and raise NoPlan where it was one too many."""
         self._tries += 1
-        self._lost_s += max(TRY_S, cost_s)
+        self._lost_s += max(PLAN.failure_s, cost_s)
         if self._lost_s > self._budget_s or time.monotonic() > self._deadline:
             raise NoPlan(
                 f"no plan within plan.time_budget_s = {self._budget_s:g}, {self._tries} places were tried: {stuck}"
@@ -133,7 +116,7 @@ class _Voyage:
         return self.line.joined(sample_time_s=vessel.sample_time_s, names=vessel.model.inputs)
 
     def sail_run(self, placement: Placement) -> str:
-        """Sail to a placement and do its run; what stands in the way, or "" when both were done."""
+        """Sail to a placement and do its run; "" on success, else what failed."""
         problem, water, line = self.problem, self.water, self.line
         primitive = next(item for item in problem.used if item.name == placement.primitive)
         entry = problem.under_way(placement.pose, primitive.entry_velocity)
@@ -153,7 +136,7 @@ class _Voyage:
         return ""
 
     def sail_home(self) -> bool:
-        """Sail the last leg; whether there is one."""
+        """Sail the last leg; False where none is found."""
         leg = self._leg(self.problem.at_rest(self.problem.goal), self._rest)
         if leg is not None:
             self.line.sail("reposition", GOAL, leg, self.water.sail(self.line.state, leg, self.line.given))
@@ -170,7 +153,7 @@ class _Voyage:
         water, line = self.water, self.line
         start, wait = line.state, line.begin_inputs[None]
         late_start = not line.stretches and not water.prompt
-        if late_start:  # what lagging actuators deliver before the first sample depends on what stood before it
+        if late_start:  # what lagging actuators deliver before the first sample depends on the commands before it
             start = last_state(water.sail(start, wait, wait))
         task = LegTask(
             start=start,
@@ -179,7 +162,7 @@ class _Voyage:
             end_inputs=end_inputs,
             seed=self.problem.seed + len(line.stretches) + 1,
             before=water.remembered(line.given),
-            budget=WorkBudget(most_s=LEG_S),
+            budget=WorkBudget(most_s=PLAN.leg_s),
         )
         leg = self.planner.leg(task, water)
         self.budget.spent_s += task.budget.spent_s

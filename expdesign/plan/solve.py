@@ -1,4 +1,4 @@
-"""The planner: place the runs, sail them, verify the plan, try it with drawn ships; with more room where those fail."""
+"""The planner: place the runs, sail them, verify the plan, estimate its risk; replan with more room if that fails."""
 
 from __future__ import annotations
 
@@ -7,26 +7,25 @@ from dataclasses import replace
 import numpy as np
 
 from expdesign.errors import NoPlan
-from expdesign.plan.assembly import leg_water, search_space, with_transitions
+from expdesign.plan.assembly import PlanRoom, leg_water, plan_room, search_space
 from expdesign.plan.bounds import reposition_bound_s
 from expdesign.plan.legs import LegWater
 from expdesign.plan.local_planner import local_planner
-from expdesign.plan.monte_carlo import Trials, broken_promise, leaves_too_often, promised, trials_for, worst_leg
+from expdesign.plan.monte_carlo import (
+    Trials,
+    estimate_risk,
+    failed_chance_constraint,
+    trials_needed,
+    violates_chance_constraint,
+    worst_leg,
+)
 from expdesign.plan.problem import PlanProblem
-from expdesign.plan.sailing import PlanRoom, sail_all
+from expdesign.plan.sailing import sail_all
 from expdesign.plan.search import LatticePlan, build_lattice, search_lattice
-from expdesign.plan.values import Leg, Plan, Progress, Promise, SailedTrial, Verification
+from expdesign.plan.tuning import PLAN
+from expdesign.plan.values import Leg, Plan, Progress, RiskEstimate, SailedTrial, Verification
 from expdesign.plan.verify import realised_efficiencies, verify_plan
 from expdesign.plan.work_budget import WorkBudget
-
-TRIALS_STREAM = 1
-"""Random stream of the drawn trials, apart from other draws of the same seed."""
-REPLANS = 2
-"""Plans made anew before giving up, each with more room where trials of the one before leave the water."""
-WIDER = 1.4
-"""Factor on a run's room then; legs get the same share of a hull length more clearance."""
-REPLAN_BUDGETS = 2.0
-"""Time budgets of counted work within which a plan made anew must be expected to end."""
 
 
 def plan_trial(problem: PlanProblem, *, progress: Progress = lambda what, share: None) -> Plan:
@@ -36,21 +35,24 @@ def plan_trial(problem: PlanProblem, *, progress: Progress = lambda what, share:
         NoPlan: no path, no room, or no dynamically feasible leg; the message names what and where.
     """
     progress("measuring the water", 0.0)
-    stated = leg_water(problem)
-    room, budget = _room(problem, stated, progress), WorkBudget(most_s=REPLAN_BUDGETS * problem.settings.time_budget_s)
-    for attempt in range(REPLANS + 1):
+    water, confidence = leg_water(problem), problem.settings.confidence
+    room = plan_room(problem, water, progress)
+    budget = WorkBudget(most_s=PLAN.replan_budgets * problem.settings.time_budget_s)
+    for attempt in range(PLAN.replans + 1):
         before_s = budget.spent_s
-        sailed = sail_all(problem, room, progress, stated=stated, budget=budget)
+        sailed = sail_all(problem, room, progress, stated=water, budget=budget)
         progress("verifying", 0.85)
-        verification = _verified(problem, stated, sailed)
+        verification = _verified(problem, water, sailed)
         progress("sailing drawn trials", 0.9)
-        promise, trials = _drawn_trials(problem, stated, sailed, attempt=attempt)
-        broken = broken_promise(promise, trials, sailed.legs, problem.area, confidence=problem.settings.confidence)
-        if not broken:
-            return _finished(problem, stated, sailed, verification=verification, promise=promise)
+        # random streams independent of planning and of earlier attempts
+        rng = np.random.default_rng((problem.seed, PLAN.trials_stream, attempt))
+        risk, trials = estimate_risk(water, sailed, rng=rng, draws=trials_needed(confidence))
+        failed = failed_chance_constraint(risk, trials, sailed.legs, problem.area, confidence=confidence)
+        if not failed:
+            return _plan(problem, water, sailed, verification=verification, risk=risk)
         budget.sailed(int(trials.samples.max(axis=1).sum()))
-        _check_worth_replanning(problem, promise, broken, budget, attempt=attempt, before_s=before_s)
-        room = _wider(problem, room, trials, sailed.legs, broken)
+        _check_worth_replanning(problem, risk, failed, budget, attempt=attempt, before_s=before_s)
+        room = _wider(problem, room, trials, sailed.legs, failed)
         progress = _replanning(progress)
     raise AssertionError("the last plan is returned or refused")
 
@@ -68,14 +70,6 @@ def lattice_reference(problem: PlanProblem, *, spacing_m: float, suboptimality: 
     counts = [problem.repeats[item.name] for item in space.footprints]
     lattice = build_lattice(space, counts, problem.start, spacing_m=spacing_m)
     return search_lattice(lattice, suboptimality=suboptimality)
-
-
-def _room(problem: PlanProblem, water: LegWater, progress: Progress) -> PlanRoom:
-    """The water and the search space of the first plan."""
-    planner = local_planner(water, problem.used)
-    planner.check_ends(problem.start, problem.goal, water)
-    space = search_space(problem, water, planner)
-    return PlanRoom(water=water, space=with_transitions(problem, water, space, progress))
 
 
 def _verified(problem: PlanProblem, water: LegWater, sailed: SailedTrial) -> Verification:
@@ -97,27 +91,19 @@ def _verified(problem: PlanProblem, water: LegWater, sailed: SailedTrial) -> Ver
     return verification
 
 
-def _drawn_trials(
-    problem: PlanProblem, water: LegWater, sailed: SailedTrial, *, attempt: int
-) -> tuple[Promise, Trials]:
-    """Outcomes of drawn trials. Uses random streams independent of planning and of earlier attempts."""
-    rng = np.random.default_rng((problem.seed, TRIALS_STREAM, attempt))
-    return promised(water, sailed, rng=rng, draws=trials_for(problem.settings.confidence))
-
-
 def _check_worth_replanning(
-    problem: PlanProblem, promise: Promise, broken: str, budget: WorkBudget, *, attempt: int, before_s: float
+    problem: PlanProblem, risk: RiskEstimate, failed: str, budget: WorkBudget, *, attempt: int, before_s: float
 ) -> None:
-    """Raise NoPlan where more room would not help, or where there is no budget left to try."""
-    leaving = leaves_too_often(promise, problem.settings.confidence)
+    """Raise NoPlan where more room would not help, or where no budget is left to try."""
+    leaving = violates_chance_constraint(risk, problem.settings.confidence)
     expected_s = budget.spent_s + (budget.spent_s - before_s)
-    if attempt == REPLANS or not leaving or expected_s > budget.most_s:
+    if attempt == PLAN.replans or not leaving or expected_s > budget.most_s:
         more = "; more plan.clearance_m helps" if leaving else ""
-        raise NoPlan(f"the plan found does not keep its promise: {broken}{more}")
+        raise NoPlan(f"the plan found is too risky: {failed}{more}")
 
 
-def _wider(problem: PlanProblem, room: PlanRoom, trials: Trials, legs: tuple[Leg, ...], broken: str) -> PlanRoom:
-    """More room where trials leave the water most: for that run, or for all legs.
+def _wider(problem: PlanProblem, room: PlanRoom, trials: Trials, legs: tuple[Leg, ...], failed: str) -> PlanRoom:
+    """More room where most trials leave the water: for that run, or for all legs.
 
     Raises:
         NoPlan: with more room there is no path at all.
@@ -125,43 +111,30 @@ def _wider(problem: PlanProblem, room: PlanRoom, trials: Trials, legs: tuple[Leg
     worst, space = legs[worst_leg(trials)], room.space
     if worst.kind == "primitive":
         widened = tuple(
-            replace(run, room_m=WIDER * run.room_m) if run.name == worst.name else run for run in space.footprints
+            replace(run, room_m=PLAN.widening * run.room_m) if run.name == worst.name else run
+            for run in space.footprints
         )
         return replace(room, space=replace(space, footprints=widened))
-    water = replace(room.water, clearance_m=room.water.clearance_m + (WIDER - 1.0) * problem.vessel.length_m)
+    clearance_m = room.water.clearance_m + (PLAN.widening - 1.0) * problem.vessel.length_m
+    water = replace(room.water, clearance_m=clearance_m)
     try:
         found = search_space(problem, water, space.planner)
     except NoPlan:
-        raise NoPlan(f"{broken}; and there is no path to the goal with more clearance") from None
+        raise NoPlan(f"{failed}; and there is no path to the goal with more clearance") from None
     return PlanRoom(water=water, space=replace(found, footprints=space.footprints, tried=space.tried))
 
 
 def _replanning(progress: Progress) -> Progress:
-    """Progress of a plan made anew: most of the work is done, however much of it is to be done again."""
+    """Progress of a replan: most of the work is done, however much of it is to be repeated."""
     return lambda what, share: progress(f"with more room: {what}", max(share, 0.9))
 
 
-def _finished(
-    problem: PlanProblem, water: LegWater, sailed: SailedTrial, *, verification: Verification, promise: Promise
+def _plan(
+    problem: PlanProblem, water: LegWater, sailed: SailedTrial, *, verification: Verification, risk: RiskEstimate
 ) -> Plan:
+    """The plan with its bound and its efficiencies."""
     placed, realised = realised_efficiencies(problem.vessel, problem.design, problem.environment, sailed)
-    return Plan(
-        area=problem.area,
-        commands=sailed.commands,
-        trajectory=sailed.trajectory,
-        legs=sailed.legs,
-        reposition_bound_s=_reposition_bound_s(problem, water),
-        leave_water_probability=promise.left,
-        leave_water_by_leg=tuple(leg.left for leg in promise.legs),
-        design_efficiency_placed=placed,
-        design_efficiency_realised=realised,
-        verification=verification,
-        promise=promise,
-    )
-
-
-def _reposition_bound_s(problem: PlanProblem, water: LegWater) -> float:
-    return reposition_bound_s(
+    bound_s = reposition_bound_s(
         problem.vessel,
         problem.area,
         problem.environment,
@@ -171,4 +144,17 @@ def _reposition_bound_s(problem: PlanProblem, water: LegWater) -> float:
         ends=(problem.start, problem.goal),
         transit_mps=water.ship.transit_speed_mps,
         yaw_rate_radps=water.ship.spot_rate_radps + water.ship.yaw_rate_radps,
+    )
+    return Plan(
+        area=problem.area,
+        commands=sailed.commands,
+        trajectory=sailed.trajectory,
+        legs=sailed.legs,
+        reposition_bound_s=bound_s,
+        leave_water_probability=risk.left,
+        leave_water_by_leg=tuple(leg.left for leg in risk.legs),
+        design_efficiency_placed=placed,
+        design_efficiency_realised=realised,
+        verification=verification,
+        risk=risk,
     )

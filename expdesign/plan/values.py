@@ -7,27 +7,26 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from expdesign.plan.tuning import PLAN
 from expdesign.sea_area import SeaArea
 from expdesign.signals import Commands, Trajectory
 from expdesign.values import Array, seal
 
 Progress = Callable[[str, float], None]
-"""Told what is done, and the share of the work that is."""
-MANY = 0.2
-"""Share of drawn trials broken off from which on that is told first."""
+"""Called with what is being done, and the share of the work that is done."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class PlanSettings:
-    """Wishes for the plan.
+    """Settings of the plan.
 
     Attributes:
         clearance_m: least distance from the hull to anything forbidden [m].
         confidence: share of drawn trials that must stay in allowed water from start to goal, between 0 and 1.
-        time_budget_s: buys tries of other places when a leg or a run fails, one for every two seconds, fewer where legs
-            cost more, by work that is counted, so that a slow machine finds the same plan as a fast one; by the clock a
-            search that is stuck ends after five times as long [s]. A plan made anew because drawn trials left the water
-            has it again, if the work counted so far lets expect that it ends within twice the budget.
+        time_budget_s: for tries of other places where a leg or a run fails: one for every two seconds, fewer where legs
+            cost more [s]. Work is counted, so that a slow machine finds the same plan as a fast one; by the clock a
+            search that is stuck ends after five times the budget. A replan, because drawn trials left the water, has
+            the budget again if the work counted so far suggests that it ends within twice the budget.
         transit_speed_mps: speed of repositioning legs, or None for nine tenths of what the actuators allow.
         turning_radius_m: of repositioning legs, or None for what the vessel model allows.
     """
@@ -105,34 +104,36 @@ class LegOutcome:
     """What drawn trials did on one leg.
 
     Attributes:
-        left, aborted: shares of all trials in which the hull left allowed water here, or the ship gave up here to begin
-            the run that follows.
-        rounds: times that a ship went round for the run that follows, on average over those that sailed the leg.
-        median_s, most_s: time it took, in the middle and in 95 % of them [s].
+        left, aborted: shares of all trials in which the hull left allowed water here, or which ended here because the run
+            that follows could not be begun.
+        go_arounds: mean number of go-arounds for the run that follows, over the ships that sailed the leg.
+        median_s, most_s: median and 95th percentile of the time it took [s].
         position_m: distance from the planned start within which a run begins.
     """
 
     left: float
     aborted: float
-    rounds: float
+    go_arounds: float
     median_s: float
     most_s: float
     position_m: float
 
 
 @dataclass(frozen=True, kw_only=True)
-class Promise:
-    """What whole trials of drawn ships in drawn weather came to, sailed as `plan.monte_carlo.procedure` says.
+class RiskEstimate:
+    """Monte Carlo estimate of a plan's risk: whole trials of drawn ships in drawn weather.
+
+    They are sailed by the procedure of `plan.monte_carlo.procedure`.
 
     Attributes:
         trials: how many.
-        left: share in which the hull left allowed water, on a run or on the way to one.
+        left: share in which the hull left allowed water, on a run or on a leg.
         left_most: the share is below this with 95 % confidence (Clopper and Pearson 1934).
-        aborted: share broken off in allowed water because a run could not be begun within tolerance.
-        reasons: one sentence for each leg on which trials were broken off, most first.
-        extra_median_s, extra_most_s: time beyond the plan's, in the middle and in 95 % of the trials that came to the
-            goal [s]; nan when none did.
-        rounds: most times that a ship goes round for one run.
+        aborted: share aborted in allowed water because a run could not be begun within tolerance.
+        reasons: one sentence for each leg on which trials were aborted, most first.
+        extra_median_s, extra_most_s: median and 95th percentile of the time beyond the plan's, over the trials that
+            reached the goal [s]; nan when none did.
+        go_arounds: largest number of go-arounds for one run.
         heading_rad, speed_mps, yaw_rate_radps: tolerances within which runs begin, besides the position's of each leg.
         legs: what happened on each.
     """
@@ -144,7 +145,7 @@ class Promise:
     reasons: tuple[str, ...]
     extra_median_s: float
     extra_most_s: float
-    rounds: int
+    go_arounds: int
     heading_rad: float
     speed_mps: float
     yaw_rate_radps: float
@@ -158,12 +159,12 @@ class Promise:
 
     @property
     def note(self) -> str:
-        """What to hear first of a plan of which many drawn trials are broken off; "" where they are few."""
-        if self.aborted <= MANY:
+        """Warning about a plan of which many drawn trials are aborted; "" where they are few."""
+        if self.aborted <= PLAN.many_aborted:
             return ""
         return (
-            f"{self.aborted:.1%} of {self.trials} drawn trials, about {10 * self.aborted:.0f} in 10, had to be broken "
-            f"off as a run could not be begun or the goal not come to, most of them {self.reasons[0]}"
+            f"{self.aborted:.1%} of {self.trials} drawn trials, about {10 * self.aborted:.0f} in 10, were aborted "
+            f"because a run could not be begun or the goal not reached, most of them {self.reasons[0]}"
         )
 
 
@@ -179,13 +180,13 @@ class Plan:
         reposition_bound_s: no plan with these runs, and legs no faster through water than transit speed, repositions in
             less time [s]; proved but for what `expdesign.plan.bounds.repositioning` says it looks for among draws.
         leave_water_probability: chance that the hull leaves allowed water in the trial as it is sailed, by
-            `promise`, or None if not computed.
+            `risk`, or None if not computed.
         leave_water_by_leg: the same for each leg, or () if not computed.
         design_efficiency_realised: efficiency of the whole trajectory's information, by the design's criterion, against
             the optimal design's in the time asked for; None where the track alone cannot tell.
         verification: what the independent check found.
         design_efficiency_placed: as realised, of the runs alone, with the headings in wind and the entries they got.
-        promise: what drawn trials of the plan came to; None if not computed.
+        risk: what drawn trials of the plan came to; None if not computed.
     """
 
     area: SeaArea
@@ -198,7 +199,7 @@ class Plan:
     verification: Verification
     leave_water_by_leg: tuple[float | None, ...] = ()
     design_efficiency_placed: float | None = None
-    promise: Promise | None = None
+    risk: RiskEstimate | None = None
 
     @property
     def sailed(self) -> SailedTrial:

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import math
 
-SAMPLE_S = 2e-4
-"""What one iteration of the optimiser costs for each sample of a leg, on a machine of 2020 [s]."""
-STEP_S = 2.5e-3
-"""What one sample of some hundred drawn ships costs there [s]."""
+from expdesign.plan.tuning import PLAN
 
 
 class WorkBudget:
@@ -29,8 +26,8 @@ class WorkBudget:
 
     def optimised(self, iterations: int, samples: int) -> None:
         """Count iterations of the optimiser on a leg of some samples."""
-        self.spent_s += SAMPLE_S * iterations * samples
+        self.spent_s += PLAN.iteration_s * iterations * samples
 
     def sailed(self, samples: int) -> None:
         """Count samples of drawn trials."""
-        self.spent_s += STEP_S * samples
+        self.spent_s += PLAN.sample_s * samples

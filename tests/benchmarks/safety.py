@@ -25,8 +25,8 @@ from expdesign.plan import Plan
 from expdesign.plan.assembly import leg_water
 from expdesign.plan.legs.water import LegWater
 from expdesign.plan.monte_carlo import procedure as run_up
-from expdesign.plan.monte_carlo.risk import promised, upper_limit
-from expdesign.plan.values import Promise
+from expdesign.plan.monte_carlo.risk import estimate_risk, upper_limit
+from expdesign.plan.values import RiskEstimate
 from expdesign.scenario import load_scenario
 from expdesign.scenario.values import Scenario
 from expdesign.simulation import Environment, Variation
@@ -65,12 +65,12 @@ def unbroken() -> Iterator[None]:
         run_up.FARTHEST_OFF = farthest
 
 
-def sailed(water: LegWater, plan: Plan, *, draws: int, breaks: bool, rng: np.random.Generator) -> Promise:
+def sailed(water: LegWater, plan: Plan, *, draws: int, breaks: bool, rng: np.random.Generator) -> RiskEstimate:
     """Drawn trials of a plan."""
     if breaks:
-        return promised(water, plan.sailed, draws=draws, rng=rng)[0]
+        return estimate_risk(water, plan.sailed, draws=draws, rng=rng)[0]
     with unbroken():
-        return promised(water, plan.sailed, draws=draws, rng=rng)[0]
+        return estimate_risk(water, plan.sailed, draws=draws, rng=rng)[0]
 
 
 def water_of(case: Scenario, plan: Plan) -> LegWater:
@@ -79,7 +79,7 @@ def water_of(case: Scenario, plan: Plan) -> LegWater:
     return leg_water(plan_problem(case, information, workflows.designed(case, information)))
 
 
-def row(name: str, kind: str, found: Promise, planned_s: float) -> str:
+def row(name: str, kind: str, found: RiskEstimate, planned_s: float) -> str:
     """A line of the table."""
     count = round(found.left * found.trials)
     return (
@@ -104,7 +104,7 @@ def report(path: str, draws: int) -> list[str]:
         for leg, sails in zip(plan.legs, found.legs, strict=True):
             print(
                 f"    {leg.kind:10s} {leg.name:28s} left {sails.left:6.2%} broken off {sails.aborted:6.2%} "
-                f"rounds {sails.rounds:4.2f} takes {sails.median_s:7.1f} s, {sails.most_s:7.1f} s in 95 %",
+                f"rounds {sails.go_arounds:4.2f} takes {sails.median_s:7.1f} s, {sails.most_s:7.1f} s in 95 %",
                 flush=True,
             )
     return rows

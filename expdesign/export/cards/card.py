@@ -151,18 +151,16 @@ def _approach(content: ReportContent, first: int) -> list[tuple[str, str]]:
 
 def _within(plan: Plan, first: int) -> list[tuple[str, str]]:
     """Start tolerances of the run that begins at a sample; none without Monte Carlo trials."""
-    promise = plan.promise
-    if promise is None:
+    risk = plan.risk
+    if risk is None:
         return []
-    off_m = next(item.position_m for leg, item in zip(plan.legs, promise.legs, strict=True) if leg.first == first)
-    heading, rate = (
-        words.significant(math.degrees(value), 2) for value in (promise.heading_rad, promise.yaw_rate_radps)
-    )
+    off_m = next(item.position_m for leg, item in zip(plan.legs, risk.legs, strict=True) if leg.first == first)
+    heading, rate = (words.significant(math.degrees(value), 2) for value in (risk.heading_rad, risk.yaw_rate_radps))
     return [
         (
             "Start tolerance",
             f"{words.distance(off_m)}; {heading}{words.NB}\N{DEGREE SIGN}; "
-            f"{words.number(promise.speed_mps)}{words.NB}m/s; {rate}{words.NB}\N{DEGREE SIGN}/s; else go-around",
+            f"{words.number(risk.speed_mps)}{words.NB}m/s; {rate}{words.NB}\N{DEGREE SIGN}/s; else go-around",
         )
     ]
 

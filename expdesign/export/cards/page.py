@@ -34,7 +34,7 @@ def cards_html(content: ReportContent) -> str:
         chart=overview,
         agenda=tables.agenda(content),
         procedure=procedure_sentences(content.plan),
-        day=day_sentence(content.plan.promise, content.plan.commands.duration_s),
+        day=day_sentence(content.plan.risk, content.plan.commands.duration_s),
         total=words.duration(content.plan.commands.duration_s),
         current=words.current(content.environment.current_to, content.environment.current_std_mps),
         wind=words.wind(content.environment.wind_to, content.environment.wind_std_mps),

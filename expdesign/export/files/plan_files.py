@@ -13,7 +13,7 @@ import numpy as np
 from expdesign.conventions import POSE_COLUMNS, VELOCITY_COLUMNS
 from expdesign.export.files.text import csv_text, finite, named, sample_seconds, strict_json
 from expdesign.export.routes import build_fence, require_verified
-from expdesign.plan.values import Leg, Plan, Promise
+from expdesign.plan.values import Leg, Plan, RiskEstimate
 from expdesign.simulation.environment import Environment
 from expdesign.values import Array
 from expdesign.vessel import Variation, Vessel, column_name
@@ -68,7 +68,7 @@ def plan_json(plan: Plan, *, scenario: str, vessel: Vessel, environment: Environ
             "clearance_required_m": clearance_m,
             "fence": _fence_entry(plan, vessel, clearance_m),
             "leave_water_probability": plan.leave_water_probability,
-            "drawn_trials": _promise_entry(plan.promise),
+            "drawn_trials": _risk_entry(plan.risk),
             "design_efficiency_placed": plan.design_efficiency_placed,
             "design_efficiency_realised": plan.design_efficiency_realised,
             "verified": check.verified,
@@ -94,39 +94,39 @@ def _fence_entry(plan: Plan, vessel: Vessel, clearance_m: float) -> dict[str, An
     return None if fence is None else {"inside": fence.inside, "outside": fence.outside}
 
 
-def _promise_entry(promise: Promise | None) -> dict[str, Any] | None:
+def _risk_entry(risk: RiskEstimate | None) -> dict[str, Any] | None:
     """Results of the Monte Carlo trials: shares of all trials, times in addition to the plan."""
-    if promise is None:
+    if risk is None:
         return None
     return {
-        "trials": promise.trials,
-        "leave_water_share": promise.left,
-        "leave_water_standard_error": promise.error,
-        "leave_water_upper_95": promise.left_most,
-        "aborted_share": promise.aborted,
-        "aborted_where": list(promise.reasons),
-        "note_on_broken_off": promise.note or None,
-        "extra_time_median_s": finite(promise.extra_median_s),
-        "extra_time_95_s": finite(promise.extra_most_s),
-        "goes_round_at_most": promise.rounds,
+        "trials": risk.trials,
+        "leave_water_share": risk.left,
+        "leave_water_standard_error": risk.error,
+        "leave_water_upper_95": risk.left_most,
+        "aborted_share": risk.aborted,
+        "aborted_where": list(risk.reasons),
+        "note_on_broken_off": risk.note or None,
+        "extra_time_median_s": finite(risk.extra_median_s),
+        "extra_time_95_s": finite(risk.extra_most_s),
+        "goes_round_at_most": risk.go_arounds,
         "run_begins_within": {
-            "heading_rad": promise.heading_rad,
-            "velocity_mps": promise.speed_mps,
-            "yaw_rate_radps": promise.yaw_rate_radps,
+            "heading_rad": risk.heading_rad,
+            "velocity_mps": risk.speed_mps,
+            "yaw_rate_radps": risk.yaw_rate_radps,
         },
     }
 
 
 def _sailed_entry(plan: Plan, index: int) -> dict[str, float | None]:
     """Results of the Monte Carlo trials on a leg."""
-    if plan.promise is None:
+    if plan.risk is None:
         return {"leave_water_probability": dict(enumerate(plan.leave_water_by_leg)).get(index)}
-    leg = plan.promise.legs[index]
+    leg = plan.risk.legs[index]
     return {
         "leave_water_probability": leg.left,
         "begins_within_m": leg.position_m,
         "aborted_share": leg.aborted,
-        "goes_round_mean": leg.rounds,
+        "goes_round_mean": leg.go_arounds,
         "sailed_median_s": leg.median_s,
         "sailed_95_s": leg.most_s,
     }

@@ -11,7 +11,7 @@ from expdesign.export import words
 from expdesign.export.report.content import ReportContent
 from expdesign.export.report.procedure import aborted_words, extra_words, left_words
 from expdesign.indices import Condition, Conditions, admissibility
-from expdesign.plan.values import Promise
+from expdesign.plan.values import RiskEstimate
 from expdesign.sea_area import SeaArea
 from expdesign.values import Array
 
@@ -49,27 +49,27 @@ def checks(content: ReportContent) -> list[Check]:
             passed=None,
         ),
     ]
-    return rows if plan.promise is None else [*rows, *_promise_checks(plan.promise, 1.0 - content.confidence)]
+    return rows if plan.risk is None else [*rows, *_risk_checks(plan.risk, 1.0 - content.confidence)]
 
 
-def _promise_checks(promise: Promise, allowed: float) -> list[Check]:
+def _risk_checks(risk: RiskEstimate, allowed: float) -> list[Check]:
     """Results of the Monte Carlo trials."""
     return [
         Check(
             what="Probability that the hull leaves allowed water during the trial",
-            found=left_words(promise),
+            found=left_words(risk),
             required=f"at most {words.percent(allowed)}",
-            passed=promise.left <= allowed + 1e-12,
+            passed=risk.left <= allowed + 1e-12,
         ),
         Check(
             what="Trials aborted because a run could not start within its tolerances",
-            found=aborted_words(promise),
+            found=aborted_words(risk),
             required="",
             passed=None,
         ),
         Check(
             what="Time in addition to the plan, for returning to the start of each run",
-            found=extra_words(promise),
+            found=extra_words(risk),
             required="",
             passed=None,
         ),

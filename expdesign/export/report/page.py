@@ -125,7 +125,7 @@ def summary(content: ReportContent) -> list[str]:
         f"The trial takes {words.duration(total)} and {words.distance(plan.trajectory.distance_m)} from start to goal: "
         f"{words.duration(plan.seconds('primitive'))} in {words.counted(runs, 'informative run')}, and "
         f"{words.duration(plan.seconds('reposition'))} of repositioning{bound if plan.reposition_bound_s > 0 else ''}.",
-        *([day] if (day := day_sentence(plan.promise, total)) else []),
+        *([day] if (day := day_sentence(plan.risk, total)) else []),
         verdict,
         *depths,
         _design_sentence(content),

@@ -19,8 +19,8 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from expdesign.dictionary import Primitive
-from expdesign.plan.bounds.displacement import Carry, Headway
-from expdesign.plan.chart import Ways, build_ways, sight_lines, simplified
+from expdesign.plan.bounds.displacement import Displacement, Headway
+from expdesign.plan.chart import VisibilityGraph, build_visibility_graph, sight_lines, simplified
 from expdesign.values import Array
 from expdesign.vessel import Vessel
 
@@ -51,21 +51,21 @@ QUAD_SEGS = 32
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class GoalTimes:
-    """Least times to the goal in a water.
+    """Least times to the goal.
 
     Attributes:
-        ways: of the water.
+        graph: of the water.
         headway: of legs.
         nodes, seconds: (n, 2) corners, the goal last, and the least time from each.
     """
 
-    ways: Ways
+    graph: VisibilityGraph
     headway: Headway
     nodes: Array
     seconds: Array
 
     def at(self, points: Array) -> Array:
-        """(k,) least time from points (k, 2), infinite where no way leads to the goal or a point is ashore."""
+        """(k,) least time from points (k, 2), infinite where no path leads to the goal or a point is ashore."""
         parts = [self._at(points[first : first + CHUNK]) for first in range(0, len(points), CHUNK)]
         return np.concatenate([np.zeros(0), *parts])
 
@@ -78,21 +78,21 @@ class GoalTimes:
             left, node = left[leads], node[leads]
             if not len(left):
                 break
-            seen = shapely.covers(self.ways.water, sight_lines(points[left], self.nodes[node]))
+            seen = shapely.covers(self.graph.water, sight_lines(points[left], self.nodes[node]))
             found[left[seen]] = total[left[seen], node[seen]]
             left = left[~seen]
         return found
 
 
-def goal_times(ways: Ways, goal: Array, headway: Headway) -> GoalTimes:
+def goal_times(graph: VisibilityGraph, goal: Array, headway: Headway) -> GoalTimes:
     """Least times to a goal (2,) inside the water."""
-    nodes, n = np.concatenate([ways.corners, goal[None]]), len(ways.corners)
-    rows, columns = ways.lengths.nonzero()
-    seen = ways.sees(goal, nodes[:n])
+    nodes, n = np.concatenate([graph.corners, goal[None]]), len(graph.corners)
+    rows, columns = graph.lengths.nonzero()
+    seen = graph.sees(goal, nodes[:n])
     tail, head = np.r_[rows, columns, seen], np.r_[columns, rows, np.full(len(seen), n)]
     cost = headway.seconds(nodes[head] - nodes[tail]) + 1e-12
     backwards = coo_matrix((cost, (head, tail)), shape=(n + 1, n + 1)).tocsr()
-    return GoalTimes(ways=ways, headway=headway, nodes=nodes, seconds=dijkstra(backwards, indices=n))
+    return GoalTimes(graph=graph, headway=headway, nodes=nodes, seconds=dijkstra(backwards, indices=n))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -208,7 +208,7 @@ class Saving:
         track, farther_m = self.track, self._spread_m(self.track.reach_m, level)
         cells = _round_corners(track, cells, self.times.nodes[:-1], farther_m)
         cells = cells[has_room(track, cells, grown(self.water, farther_m))]
-        inner = grown(self.times.ways.water, -self._spread_m(track.ends_m, level))
+        inner = grown(self.times.graph.water, -self._spread_m(track.ends_m, level))
         shapely.prepare(inner)
         return cells[~shapely.covers(inner, sight_lines(*track.ends(cells)))] if len(cells) else cells
 
@@ -216,7 +216,7 @@ class Saving:
         """(n,) what is saved in the middle of cells, infinite where that cannot be told yet, and the looks it took."""
         ends, known = self.track.ends(cells), np.full(len(cells), True)
         if level < LEVELS:  # the water is grown by less than a cell: a straight line need not lead to its middle
-            inner = grown(self.times.ways.water, -self._spread_m(self.track.ends_m, level))
+            inner = grown(self.times.graph.water, -self._spread_m(self.track.ends_m, level))
             shapely.prepare(inner)
             known = np.all([shapely.contains_xy(inner, end[:, 1], end[:, 0]) for end in ends], axis=0)
         before_s, after_s = (self.times.at(end[known]) for end in ends)
@@ -228,7 +228,7 @@ class Saving:
 
 def time_saved_s(
     runs: Sequence[Primitive],
-    carries: Mapping[str, Carry],
+    displacements: Mapping[str, Displacement],
     repeats: Mapping[str, int],
     water: shapely.Geometry,
     ends: tuple[Array, Array],
@@ -243,7 +243,7 @@ def time_saved_s(
 
     Args:
         runs: that go the same way through water wherever they are.
-        carries: what each of them can contribute anyway.
+        displacements: what each of them can contribute anyway.
         repeats: how often; where much is to be gained is looked first.
         water: where amidships may be, and whatever else is half the beam from the hull's sides.
         ends: start and goal, (2,) or (3,).
@@ -254,17 +254,19 @@ def time_saved_s(
     tracks = {run.name: track_of(run, vessel, headway.current_to) for run in runs}
     start, goal = (end[:2] for end in ends)
     times = grown_times(tuple(tracks.values()), water, goal, headway, vessel)
-    if times is None or not shapely.covers(times.ways.water, shapely.Point(start[::-1])):
+    if times is None or not shapely.covers(times.graph.water, shapely.Point(start[::-1])):
         return None
     whole_s = float(times.at(start[None])[0])
-    at_best_s = whole_s - sum(repeats[name] * carries[name].chord_s for name in tracks)
+    at_best_s = whole_s - sum(repeats[name] * displacements[name].chord_s for name in tracks)
     if not np.isfinite(whole_s) or at_best_s < known_s + WORTH * whole_s:
         return None
     most, looks = {}, MOST_LOOKS
-    for name in sorted(tracks, key=lambda name: repeats[name] * (carries[name].chord_s - carries[name].path_s)):
+    for name in sorted(
+        tracks, key=lambda name: repeats[name] * (displacements[name].chord_s - displacements[name].path_s)
+    ):
         saving = Saving(track=tracks[name], times=times, water=water, cell_m=CELL * vessel.length_m)
-        found_s, looks = saving.most_s(carries[name].chord_s, looks)
-        most[name] = min(carries[name].path_s, found_s)
+        found_s, looks = saving.most_s(displacements[name].chord_s, looks)
+        most[name] = min(displacements[name].path_s, found_s)
     return whole_s, most
 
 
@@ -279,8 +281,8 @@ def grown_times(
     if HEADINGS * (east - west) * (north - south) / cell_m**2 > MOST_CELLS:
         return None
     smallest_m = spread_m(cell_m, max((track.ends_m for track in tracks), default=0.0), LEVELS)
-    ways = build_ways(simplified(grown(water, smallest_m), grow=True, tolerance_m=vessel.length_m / 40))
-    return goal_times(ways, goal, headway) if shapely.covers(ways.water, shapely.Point(goal[::-1])) else None
+    graph = build_visibility_graph(simplified(grown(water, smallest_m), grow=True, tolerance_m=vessel.length_m / 40))
+    return goal_times(graph, goal, headway) if shapely.covers(graph.water, shapely.Point(goal[::-1])) else None
 
 
 def spread_m(cell_m: float, reach_m: float, level: int) -> float:

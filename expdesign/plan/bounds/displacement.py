@@ -24,18 +24,18 @@ SPARE = 1.02
 
 
 @dataclass(frozen=True, kw_only=True)
-class Carry:
+class Displacement:
     """What a run can contribute to the way, at the heading that suits it best.
 
     Attributes:
         chord_s: time that a leg needs from its start to its end [s].
         path_s: the same along its path [s].
-        stray_m: no point of the chord is farther than this from the path [m].
+        deviation_m: no point of the chord is farther than this from the path [m].
     """
 
     chord_s: float
     path_s: float
-    stray_m: float
+    deviation_m: float
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -75,19 +75,21 @@ class Headway:
         return np.asarray(lasting_s - slowness * behind)
 
 
-def carry(vessel: Vessel, primitive: Primitive, environment: Environment, headway: Headway) -> Carry:
+def displacement_of(vessel: Vessel, primitive: Primitive, environment: Environment, headway: Headway) -> Displacement:
     """How far a run carries the ship at most, and how far it bends."""
     track = primitive.trajectory.pose[:, :2]
     if differs_by_heading(vessel, environment):
         tracks = np.moveaxis(_in_weather(vessel, primitive, environment)[..., :2], 1, 0)
-        return _carry_in_weather(list(tracks), headway)
+        return _displacement_in_weather(list(tracks), headway)
     steps = np.hypot(*np.diff(track, axis=0).T)
     chord = float(np.hypot(*(track[-1] - track[0])))
     drift_m, lasting_s = headway.current_mps * primitive.duration_s, primitive.duration_s
-    return Carry(
+    return Displacement(
         chord_s=float(headway.most_s(np.array(chord), lasting_s)),
         path_s=float(headway.most_s(steps, lasting_s / len(steps)).sum()),
-        stray_m=min(_stray_m(track) + drift_m, _stray_adrift_m(track, drift_m)) if drift_m else _stray_m(track),
+        deviation_m=min(_deviation_m(track) + drift_m, _deviation_adrift_m(track, drift_m))
+        if drift_m
+        else _deviation_m(track),
     )
 
 
@@ -101,16 +103,18 @@ def exit_motion(vessel: Vessel, primitive: Primitive, environment: Environment) 
     return float(speeds.min()) / SPARE, float(speeds.max()) * SPARE, float(np.abs(last[:, 5]).max()) * SPARE
 
 
-def _carry_in_weather(tracks: list[Array], headway: Headway) -> Carry:
+def _displacement_in_weather(tracks: list[Array], headway: Headway) -> Displacement:
     """The same from tracks (k, 2) over ground at headings all round."""
     chords = [float(headway.seconds(track[-1] - track[0])) for track in tracks]
     paths = [float(headway.seconds(np.diff(track, axis=0)).sum()) for track in tracks]
-    return Carry(
-        chord_s=SPARE * max(chords), path_s=SPARE * max(paths), stray_m=SPARE * max(_stray_m(track) for track in tracks)
+    return Displacement(
+        chord_s=SPARE * max(chords),
+        path_s=SPARE * max(paths),
+        deviation_m=SPARE * max(_deviation_m(track) for track in tracks),
     )
 
 
-def _stray_adrift_m(track: Array, drift_m: float) -> float:
+def _deviation_adrift_m(track: Array, drift_m: float) -> float:
     """Bound on what a chord's points are away from a track (k, 2) through water that drifts any way by so much.
 
     The current carries the chord's point at a share of it as far as it carries the ship in that share of the time;
@@ -143,7 +147,7 @@ def _in_weather(vessel: Vessel, primitive: Primitive, environment: Environment) 
     )
 
 
-def _stray_m(track: Array) -> float:
+def _deviation_m(track: Array) -> float:
     """Largest distance of the chord's points from a track (k, 2)."""
     points = track[0] + np.linspace(0, 1, 201)[:, None] * (track[-1] - track[0])
     apart = shapely.distance(shapely.points(points), shapely.linestrings(track))

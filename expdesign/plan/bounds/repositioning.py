@@ -39,8 +39,8 @@ from scipy.optimize import linear_sum_assignment
 from expdesign.dictionary import Primitive
 from expdesign.plan.bounds.branch_and_bound import time_saved_s
 from expdesign.plan.bounds.cheapest_orders import cheapest_orders, place_values
-from expdesign.plan.bounds.displacement import Carry, Headway, carry, differs_by_heading, exit_motion
-from expdesign.plan.chart import build_ways, simplified
+from expdesign.plan.bounds.displacement import Displacement, Headway, differs_by_heading, displacement_of, exit_motion
+from expdesign.plan.chart import build_visibility_graph, simplified
 from expdesign.plan.control import LegEnd, least_loss, leg_end
 from expdesign.plan.legs import BEYOND_ENDS, leg_speed_mps
 from expdesign.sea_area import SeaArea
@@ -81,24 +81,26 @@ def reposition_bound_s(
     turns = [*(abs(float(entry[2])) for entry in entries), *(turn for _, _, turn in exits)]
     yaw_rate_radps = max([yaw_rate_radps, *(BEYOND_ENDS * turn for turn in turns)])
     headway = Headway(speed_mps=speed_mps, current_to=environment.current_to)
-    carries = {item.name: carry(vessel, item, environment, headway) for item in runs}
+    displacements = {item.name: displacement_of(vessel, item, environment, headway) for item in runs}
     counts = {item.name: repeats[item.name] for item in runs}
-    way_s = time_to_sail_s(area, clearance_m + vessel.beam_m / 2, carries, counts, ends, headway, vessel.length_m / 30)
+    way_s = time_to_sail_s(
+        area, clearance_m + vessel.beam_m / 2, displacements, counts, ends, headway, vessel.length_m / 30
+    )
     if not differs_by_heading(vessel, environment):
         water = area.safe_water(clearance_m + vessel.beam_m / 2)
-        found = time_saved_s(runs, carries, counts, water, ends, headway, vessel, known_s=way_s)
+        found = time_saved_s(runs, displacements, counts, water, ends, headway, vessel, known_s=way_s)
         if found is not None:
             way_s = max(way_s, found[0] - sum(counts[name] * most_s for name, most_s in found[1].items()))
     firsts, lasts = _leg_ends(vessel, environment, runs, exits, speed_mps, yaw_rate_radps)
     losses = np.array([[least_loss(first, last, vessel) for last in lasts] for first in firsts])
-    lost_m, least_s = (joint_losses(losses[..., k], list(counts.values())) for k in (0, 1))
+    lost_m, least_s = (least_losses(losses[..., k], list(counts.values())) for k in (0, 1))
     return float(max(0.0, least_s, way_s + lost_m / (speed_mps + headway.current_mps)))
 
 
 def time_to_sail_s(
     area: SeaArea,
     margin_m: float,
-    carries: Mapping[str, Carry],
+    displacements: Mapping[str, Displacement],
     repeats: Mapping[str, int],
     ends: tuple[Array, Array],
     headway: Headway,
@@ -107,14 +109,19 @@ def time_to_sail_s(
     """Time that legs cannot do without [s]; negative where runs can carry the ship farther than it has to go."""
     water, best = area.safe_water(margin_m), -np.inf
     start, goal = (end[:2] for end in ends)
-    for grown_m in sorted({0.0, *(item.stray_m for item in carries.values())}):
+    for grown_m in sorted({0.0, *(item.deviation_m for item in displacements.values())}):
         carried = sum(
-            count * (carries[name].chord_s if carries[name].stray_m <= grown_m else carries[name].path_s)
+            count
+            * (
+                displacements[name].chord_s
+                if displacements[name].deviation_m <= grown_m
+                else displacements[name].path_s
+            )
             for name, count in repeats.items()
         )
         more = _grown(water, grown_m) if grown_m else water
         simple = simplified(more, grow=True, tolerance_m=tolerance_m + 0.002 * grown_m)
-        way_s = build_ways(simple).least(start, goal, headway.seconds)
+        way_s = build_visibility_graph(simple).least_cost(start, goal, headway.seconds)
         if not np.isfinite(way_s):  # the ends lie outside the water that a plan needs: there is none to be bounded
             continue
         # an end outside the water is joined to it by a line that the true way need not follow
@@ -154,7 +161,7 @@ def _leg_ends(
     return [rest, *firsts], [*(end(item.entry_velocity, item.commands.values[0]) for item in runs), rest]
 
 
-def joint_losses(losses: Array, counts: Sequence[int]) -> float:
+def least_losses(losses: Array, counts: Sequence[int]) -> float:
     """What legs lose at least together, over all orders of the runs, or over all assignments where those are many.
 
     Args:

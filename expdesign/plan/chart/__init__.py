@@ -1,20 +1,33 @@
 """The chart for the planner: clearance grid, visibility graph, distance to the goal."""
 
 from expdesign.plan.chart.clearance_grid import ClearanceField, clearance_field, narrowest_passage
-from expdesign.plan.chart.goal_distance import GoalWays, build_goal_ways, first_bends, ways_to
-from expdesign.plan.chart.visibility_graph import Ways, build_ways, polyline_length, sight_lines, simplified
+from expdesign.plan.chart.goal_distance import (
+    GoalDistance,
+    build_goal_distance,
+    first_bends,
+    path_over,
+    shortest_path_tree,
+)
+from expdesign.plan.chart.visibility_graph import (
+    VisibilityGraph,
+    build_visibility_graph,
+    polyline_length,
+    sight_lines,
+    simplified,
+)
 
 __all__ = [
     "ClearanceField",
-    "GoalWays",
-    "Ways",
-    "build_goal_ways",
-    "build_ways",
+    "GoalDistance",
+    "VisibilityGraph",
+    "build_goal_distance",
+    "build_visibility_graph",
     "clearance_field",
     "first_bends",
     "narrowest_passage",
+    "path_over",
     "polyline_length",
+    "shortest_path_tree",
     "sight_lines",
     "simplified",
-    "ways_to",
 ]

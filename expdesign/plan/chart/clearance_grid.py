@@ -1,4 +1,4 @@
-"""The grid over the allowed water: distance to danger, and the widest way through."""
+"""The clearance grid: distance to forbidden water, and the widest passage between two places."""
 
 from __future__ import annotations
 
@@ -10,11 +10,9 @@ from scipy.ndimage import distance_transform_edt, label
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
+from expdesign.plan.chart.tuning import CHART
 from expdesign.sea_area import SeaArea
 from expdesign.values import Array, seal
-
-FINEST_CELLS = 3_000_000
-ROUTING_CELLS = 400_000
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -64,14 +62,14 @@ class ClearanceField:
 
 
 def clearance_field(area: SeaArea, *, resolution_m: float) -> ClearanceField:
-    """Rasterise the allowed water and measure how far each cell is from anything forbidden.
+    """Clearance of every cell of a grid over the allowed water, by an exact distance transform.
 
     Args:
         area: allowed water.
-        resolution_m: wished spacing; coarser when the area would need more than `FINEST_CELLS`.
+        resolution_m: desired spacing; coarser where the area would need more than `Tuning.grid_cells`.
     """
     west, south, east, north = area.water.bounds
-    cell = max(resolution_m, float(np.sqrt((east - west) * (north - south) / FINEST_CELLS)))
+    cell = max(resolution_m, float(np.sqrt((east - west) * (north - south) / CHART.grid_cells)))
     norths = np.arange(south - cell, north + 2 * cell, cell)
     easts = np.arange(west - cell, east + 2 * cell, cell)
     shapely.prepare(area.water)
@@ -87,7 +85,7 @@ def clearance_field(area: SeaArea, *, resolution_m: float) -> ClearanceField:
 
 
 def narrowest_passage(field: ClearanceField, start: Array, goal: Array) -> tuple[float, Array]:
-    """The largest clearance with which start (2,) and goal (2,) are connected, and where the way is that narrow.
+    """The largest clearance with which start (2,) and goal (2,) are connected, and where the passage is that narrow.
 
     Returns:
         Clearance [m] (zero when they are not connected at all), and the (2,) north/east place.
@@ -101,13 +99,13 @@ def narrowest_passage(field: ClearanceField, start: Array, goal: Array) -> tuple
         low, high = (middle, high) if regions[a] == regions[b] else (low, middle)
     regions, _ = label(field.clearance_m >= high, structure=eight)
     apart = sum(distance_transform_edt(regions != regions[end]) if regions[end] else 0.0 * regions for end in (a, b))
-    way = _way(field, start, goal, low - field.cell_m)
-    return low, way[int(np.argmin(apart[field.index(way)]))]
+    path = _path(field, start, goal, low - field.cell_m)
+    return low, path[int(np.argmin(apart[field.index(path)]))]
 
 
-def _way(fine: ClearanceField, start: Array, goal: Array, clearance_m: float) -> Array:
-    """(k, 2) centres of a shortest eight-neighbour way through cells with a clearance; one row where there is none."""
-    field = fine.thinned(ROUTING_CELLS)
+def _path(fine: ClearanceField, start: Array, goal: Array, clearance_m: float) -> Array:
+    """(k, 2) centres of a shortest eight-neighbour path through cells with a clearance; one row where there is none."""
+    field = fine.thinned(CHART.routing_cells)
     free = field.clearance_m >= clearance_m
     free[field.index(goal)] = True
     numbers = np.arange(free.size).reshape(free.shape)

@@ -1,6 +1,6 @@
-"""Shortest ways through polygons: exact, by a visibility graph of the corners that a taut string can bend round.
+"""Exact shortest paths through polygons, by the visibility graph of the corners at which such paths can bend.
 
-Independent of any grid, so turning the chart turns the ways with it.
+Independent of any grid: turning the chart turns the paths with it.
 
 Source: T. Lozano-Perez and M. A. Wesley, An algorithm for planning collision-free paths among polyhedral obstacles,
 Communications of the ACM 22 (1979), 560-570.
@@ -16,25 +16,19 @@ import shapely
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
+from expdesign.plan.chart.tuning import CHART
 from expdesign.sea_area import as_multipolygon
 from expdesign.values import Array
 
-MOST_CORNERS = 700
-"""Corners of a simplified water; more would make the graph slow."""
-MOST_AT_ALL, COARSE = 2500, 16.0
-"""Corners accepted once the tolerance is so many times what was asked for."""
-SLIT_M = 1e-3
-"""A string may touch the shore: the water is grown by this before lines of sight are tested."""
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Ways:
-    """Water, and which of its corners see each other.
+class VisibilityGraph:
+    """Water, and the lengths between its corners that are in sight of each other.
 
     Attributes:
-        water: polygons (east, north), grown by `SLIT_M`.
+        water: polygons (east, north), grown by `Tuning.slit_m`.
         corners: (n, 2) north/east of the corners that stick out into the water.
-        lengths: (n, n) sparse distances between corners that see each other.
+        lengths: (n, n) sparse distances between corners in sight of each other.
     """
 
     water: shapely.MultiPolygon
@@ -42,33 +36,32 @@ class Ways:
     lengths: csr_matrix
 
     def shortest(self, start: Array, end: Array) -> Array | None:
-        """(k, 2) the taut string between two points (2,), or None when the water does not join them.
+        """(k, 2) the shortest path between two points (2,), or None where the water does not connect them.
 
-        Points outside the water are joined to its nearest point by a straight line.
+        Points outside the water are connected to its nearest point by a straight line.
         """
-        nodes, distance, before = self._least(start, end, lambda step: np.hypot(*step.T))
+        nodes, distance, before = self._least_costs(start, end, lambda step: np.hypot(*step.T))
         n = len(self.corners)
         if not np.isfinite(distance[n + 1]):
             return None
         chain = [n + 1]
         while chain[-1] != n:
             chain.append(int(before[chain[-1]]))
-        way = np.array([start, *nodes[chain[::-1]], end])
-        moved = np.r_[True, np.hypot(*np.diff(way, axis=0).T) > 1e-9]
-        return way[moved]
+        path = np.array([start, *nodes[chain[::-1]], end])
+        return path[np.r_[True, np.hypot(*np.diff(path, axis=0).T) > 1e-9]]
 
-    def least(self, start: Array, end: Array, cost: Callable[[Array], Array]) -> float:
-        """Least cost of the ways between two points (2,), infinite when there is none.
+    def least_cost(self, start: Array, end: Array, cost: Callable[[Array], Array]) -> float:
+        """Least cost of a path between two points (2,), infinite where there is none.
 
-        Exact for costs of straight steps (k, 2) that grow with their length and obey the triangle inequality, in one
-        direction perhaps more than in the other: the best ways then bend at corners only. For points outside the water
-        it is that from its nearest points.
+        Exact for costs of straight steps (k, 2) that grow with the step's length and obey the triangle inequality, even
+        if they depend on direction: the best path then bends at corners only. For points outside the water it is the
+        cost between its nearest points.
         """
-        _, least, _ = self._least(start, end, cost)
+        _, least, _ = self._least_costs(start, end, cost)
         return float(least[len(self.corners) + 1])
 
-    def _least(self, start: Array, end: Array, cost: Callable[[Array], Array]) -> tuple[Array, Array, np.ndarray]:
-        """Corners and the nearest points to both ends, least costs from the start to all, and the node before each."""
+    def _least_costs(self, start: Array, end: Array, cost: Callable[[Array], Array]) -> tuple[Array, Array, np.ndarray]:
+        """Corners and the points nearest to both ends, least costs from the start to all, and the node before each."""
         inside = [self.nearest(point) for point in (start, end)]
         nodes = np.concatenate([self.corners, inside])
         n = len(self.corners)
@@ -87,7 +80,7 @@ class Ways:
         return nodes, least, before
 
     def nearest(self, point: Array) -> Array:
-        """The point itself (2,), or the nearest one in the water."""
+        """The point (2,) itself if it lies in the water, else the nearest one that does."""
         here = shapely.Point(point[1], point[0])
         if shapely.covers(self.water, here):
             return point
@@ -95,43 +88,42 @@ class Ways:
         return np.array([there[1], there[0]])
 
     def sees(self, point: Array, nodes: Array) -> np.ndarray:
-        """Indices of the nodes in a straight line of sight from a point."""
+        """Indices of the nodes in sight of a point."""
         lines = sight_lines(np.broadcast_to(point, nodes.shape), nodes)
         apart = np.hypot(*(nodes - point).T) > 0
         return np.flatnonzero(shapely.covers(self.water, lines) | ~apart)
 
 
-def build_ways(water: shapely.Geometry) -> Ways:
+def build_visibility_graph(water: shapely.Geometry) -> VisibilityGraph:
     """The visibility graph of a water polygon with at most some hundreds of corners."""
     corners, before, after = _corners(as_multipolygon(water))
-    grown = as_multipolygon(shapely.buffer(as_multipolygon(water), SLIT_M, join_style="mitre"))
+    grown = as_multipolygon(shapely.buffer(as_multipolygon(water), CHART.slit_m, join_style="mitre"))
     shapely.prepare(grown)  # stays prepared for all later lines of sight
     tail, head = np.triu_indices(len(corners), 1)
-    taut = _tangent(corners[tail], corners[head], before[head], after[head])
-    taut &= _tangent(corners[head], corners[tail], before[tail], after[tail])
-    tail, head = tail[taut], head[taut]
+    tangent = _tangent(corners[tail], corners[head], before[head], after[head])
+    tangent &= _tangent(corners[head], corners[tail], before[tail], after[tail])
+    tail, head = tail[tangent], head[tangent]
     seen = shapely.covers(grown, sight_lines(corners[tail], corners[head])) if len(tail) else np.zeros(0, dtype=bool)
     tail, head = tail[seen], head[seen]
     away = np.hypot(*(corners[tail] - corners[head]).T)
     lengths = coo_matrix((away, (tail, head)), shape=(len(corners), len(corners))).tocsr()
-    return Ways(water=grown, corners=corners, lengths=lengths)
+    return VisibilityGraph(water=grown, corners=corners, lengths=lengths)
 
 
 def simplified(water: shapely.MultiPolygon, *, grow: bool, tolerance_m: float) -> shapely.MultiPolygon:
-    """Water with at most `MOST_CORNERS` corners that contains the given one (`grow`), or lies inside it.
-
-    Water that shrinks loses its narrow ways: from `COARSE` times the first tolerance on, `MOST_AT_ALL` corners will do.
+    """Water with at most `Tuning.corners` corners that contains the given water (`grow`), or lies inside it.
 
     Args:
         water: polygons.
-        grow: which.
-        tolerance_m: of the first try; doubled until few enough corners are left.
+        grow: whether the result contains the water; else it lies inside.
+        tolerance_m: at first; doubled until few enough corners are left.
     """
-    coarse_m = np.inf if grow else COARSE * tolerance_m
+    coarse_m = np.inf if grow else CHART.coarse * tolerance_m
     while True:
         moved = shapely.buffer(water, tolerance_m if grow else -tolerance_m)
         simple = as_multipolygon(shapely.make_valid(shapely.simplify(moved, 0.98 * tolerance_m)))
-        if len(_corners(simple)[0]) <= (MOST_AT_ALL if tolerance_m >= coarse_m else MOST_CORNERS):
+        most = CHART.corners_coarse if tolerance_m >= coarse_m else CHART.corners
+        if len(_corners(simple)[0]) <= most:
             return simple
         tolerance_m *= 2.0
 

@@ -54,12 +54,12 @@ class HelmController:
         Ships that hardly move keep the reference's heading. So do those that are to go astern, as after a crash stop:
         their helm does not lead them anywhere.
         """
-        wanted, through = demand.reference, demand.through
+        desired, through = demand.reference, demand.through
         speed = np.hypot(*through.T)
         moves = speed > 0.05 * self.transit_speed_mps
-        ahead = np.cos(wanted[:, 2]) * through[:, 0] + np.sin(wanted[:, 2]) * through[:, 1]
+        ahead = np.cos(desired[:, 2]) * through[:, 0] + np.sin(desired[:, 2]) * through[:, 1]
         astern = moves & (demand.reference_through[:, 0] < 0.0)
-        pointing = np.where(moves & ~astern, np.arctan2(through[:, 1], through[:, 0]), wanted[:, 2])
+        pointing = np.where(moves & ~astern, np.arctan2(through[:, 1], through[:, 0]), desired[:, 2])
         return np.where(astern, np.minimum(ahead, 0.0), speed), pointing
 
     @property
@@ -84,11 +84,11 @@ class HelmController:
         motion = tuple(np.broadcast_to(column, given.shape[:2]) for column in moving.T)
         predicted = self.vessel.model.accelerations(motion, motion[:2], tuple(np.moveaxis(given, -1, 0)))[0]
         gains = np.maximum.accumulate(np.broadcast_to(predicted, given.shape[:2]), axis=0)
-        wanted = (speed - moving[:, 0]) / self._pace_s - unexplained
-        above = np.clip((gains < wanted).sum(axis=0), 1, len(ORDERS) - 1)
+        desired = (speed - moving[:, 0]) / self._pace_s - unexplained
+        above = np.clip((gains < desired).sum(axis=0), 1, len(ORDERS) - 1)
         ships = np.arange(len(angle))
         low, high = gains[above - 1, ships], gains[above, ships]
-        share = np.clip((wanted - low) / np.maximum(high - low, 1e-12), 0.0, 1.0)
+        share = np.clip((desired - low) / np.maximum(high - low, 1e-12), 0.0, 1.0)
         return np.asarray(ORDERS[above - 1] + share * (ORDERS[above] - ORDERS[above - 1]))
 
     @cached_property

@@ -58,10 +58,10 @@ class Reference:
 
     def _behind_m(self, sample: Array, states: Array) -> Array:
         """(n,) how far ships (n, 6) are behind the reference at samples (n,), along its course [m]."""
-        wanted = self.at(sample)
-        along = over_ground(wanted)
+        desired = self.at(sample)
+        along = over_ground(desired)
         speed = np.hypot(*along.T) + 1e-9
-        return np.asarray(((wanted[:, :2] - states[:, :2]) * along).sum(axis=1) / speed)
+        return np.asarray(((desired[:, :2] - states[:, :2]) * along).sum(axis=1) / speed)
 
 
 def over_ground(states: Array) -> Array:
@@ -96,7 +96,7 @@ class Helmsman:
 
     def commands(
         self,
-        wanted: Array,
+        desired: Array,
         states: Array,
         before: Array,
         *,
@@ -104,19 +104,19 @@ class Helmsman:
         near: Array | None = None,
         delivered: Array | None = None,
     ) -> Array:
-        """(n, m) commands that bring states (n, 6) towards wanted ones (n, 6).
+        """(n, m) commands that bring states (n, 6) towards desired ones (n, 6).
 
         Args:
-            wanted, states: pose and velocity over ground.
+            desired, states: pose and velocity over ground.
             before: (n, m) commands standing, from which rates count.
             unexplained: (n, 3) estimated acceleration that the model does not explain; None for none.
             near: (n, m) commands to whose angles azimuths keep; None for those standing.
             delivered: (n, m) what the actuators deliver; None where they deliver what is commanded.
         """
         demand = Demand(
-            reference=wanted,
-            reference_through=self._in_body(wanted),
-            through=self._velocity_through_water(wanted, states),
+            reference=desired,
+            reference_through=self._in_body(desired),
+            through=self._velocity_through_water(desired, states),
             states=states,
             moving=self._in_body(states),
             unexplained=(0.0 if unexplained is None else unexplained) - self._turning_current(states),
@@ -160,12 +160,12 @@ class Helmsman:
         share = min(1.0, self.vessel.sample_time_s / (CONTROL.learning * self.answer_s))
         return np.asarray(estimate + share * ((new - old) / self.vessel.sample_time_s - known - estimate))
 
-    def _velocity_through_water(self, wanted: Array, states: Array) -> Array:
+    def _velocity_through_water(self, desired: Array, states: Array) -> Array:
         """(n, 2) desired velocity through water to north and east: the reference's, and some towards it."""
-        back = (wanted[:, :2] - states[:, :2]) / (CONTROL.track_lead * self.answer_s)
+        back = (desired[:, :2] - states[:, :2]) / (CONTROL.track_lead * self.answer_s)
         most = CONTROL.catch_up * self.ship.transit_speed_mps
         back *= np.minimum(1.0, most / np.maximum(np.hypot(*back.T), 1e-12))[:, None]
-        steady = over_ground(wanted) - self.environment.current_to
+        steady = over_ground(desired) - self.environment.current_to
         fastest, speed = self.ship.transit_speed_mps, np.hypot(*steady.T)
         limit = np.where(speed > 1.001 * fastest, 1.02 * speed, fastest)
         through = steady + back

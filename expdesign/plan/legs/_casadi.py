@@ -94,7 +94,7 @@ class LegProblem:
         seal(self, path="j 3", room_port_m="j", room_starboard_m="j", circle="3")
 
 
-def solve_joint(problem: LegProblem) -> tuple[float, Array] | None:
+def solve_transition(problem: LegProblem) -> tuple[float, Array] | None:
     """Time of the leg that gains most by its `wish`, on whole samples, and its end pose (3,); None if none is found."""
     sample_s, duration_s = problem.vessel.sample_time_s, problem.duration_s
     nodes, block = _size(problem, duration_s)

@@ -14,7 +14,7 @@ import numpy as np
 from expdesign.conventions import whole_turns, wrap_angle
 from expdesign.plan.chart import polyline_length
 from expdesign.plan.control import AgileShip, Helmsman, Reference
-from expdesign.plan.legs._casadi import LegProblem, solve_joint, solve_leg
+from expdesign.plan.legs._casadi import LegProblem, solve_leg, solve_transition
 from expdesign.plan.legs.problem import hull_discs, leg_problem
 from expdesign.plan.legs.water import LegTask, LegWater, acceptable, last_state, nearest_turns
 from expdesign.values import Array
@@ -221,7 +221,7 @@ def free_leg(task: LegTask, water: LegWater, ship: AgileShip, wish: Array) -> tu
         replace(problem, wish=wish, node_s=problem.duration_s / MOST_NODES)
         for problem in _problems(task, water, ship, line)
     )
-    found = [answer for problem in problems if (answer := solve_joint(problem)) is not None]
+    found = [answer for problem in problems if (answer := solve_transition(problem)) is not None]
     return min(found, key=lambda answer: answer[0] - float(wish @ answer[1][:2]), default=None)
 
 

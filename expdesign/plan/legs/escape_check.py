@@ -23,7 +23,7 @@ MOST_LOOKED_AT = 6000
 """Arcs looked at."""
 
 
-def gets_away(pose: Array, water: LegWater, *, backwards: bool = False) -> bool:
+def escapes(pose: Array, water: LegWater, *, backwards: bool = False) -> bool:
     """Whether arcs of the ship's turning radius and straights lead from a pose (3,) out of its surroundings.
 
     Found by looking at places nearest to open water first; where the grid of places is too coarse to find a way that
@@ -78,7 +78,7 @@ def check_ends(start: Array, goal: Array, water: LegWater) -> None:
         water: as of the plan.
     """
     for name, pose, backwards, to in (("start", start, False, "from"), ("goal", goal, True, "to")):
-        if not gets_away(pose, water, backwards=backwards):
+        if not escapes(pose, water, backwards=backwards):
             lat, lon = water.area.frame.to_degrees(pose[:2])
             raise NoPlan(
                 f"no way was found {to} the {name}, near {lat:.5f}, {lon:.5f} and heading "

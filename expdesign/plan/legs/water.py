@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 
 from expdesign.conventions import whole_turns
-from expdesign.plan.chart import ClearanceField, Ways, build_ways, polyline_length, simplified
+from expdesign.plan.chart import ClearanceField, VisibilityGraph, build_visibility_graph, polyline_length, simplified
 from expdesign.plan.control import Capability, arc_spare_m
 from expdesign.plan.work_budget import WorkBudget
 from expdesign.sea_area import ARC_SEGMENTS, SeaArea
@@ -93,16 +93,16 @@ class LegWater:
         return safe
 
     @cached_property
-    def ways(self) -> tuple[Ways, ...]:
-        """Shortest ways for amidships of a hull that points along them, from wide to narrow."""
+    def visibility_graphs(self) -> tuple[VisibilityGraph, ...]:
+        """For the centre lines of hulls that point along their path, from wide to narrow margins."""
         spares, tolerance_m = self.ship.path_spares_m(self.vessel), self.vessel.length_m / 60
         waters = [self.area.safe_water(self.clearance_m + spare) for spare in spares]
-        return tuple(build_ways(simplified(water, grow=False, tolerance_m=tolerance_m)) for water in waters)
+        return tuple(build_visibility_graph(simplified(water, grow=False, tolerance_m=tolerance_m)) for water in waters)
 
     @property
-    def narrowest_ways(self) -> Ways:
-        """Ways in all the water that centre lines may use."""
-        return self.ways[-1]
+    def narrowest_graph(self) -> VisibilityGraph:
+        """Of all the water that centre lines may use."""
+        return self.visibility_graphs[-1]
 
     @property
     def straight_margin_m(self) -> float:
@@ -120,15 +120,15 @@ class LegWater:
         return self.clearance_m + arc_spare_m(self.ship, self.vessel)
 
     def candidate_paths(self, start: Array, end: Array) -> list[Array]:
-        """Ways (k, 2) between two points, shortest first, of like ones the one farther from the shore.
+        """Paths (k, 2) between two points, shortest first; of similar lengths the one farther from the shore first.
 
-        A straight one where a hull may go straight; none where there is none.
+        Only the straight line where a hull may go straight; none where the points are not connected.
         """
         straight = np.stack([start, end])
         if shapely.contains_properly(self._open, shapely.LineString(straight[:, ::-1])):
             return [straight]
-        found = [way for ways in self.ways if (way := ways.shortest(start, end)) is not None]
-        return sorted(found, key=lambda way: np.ceil(polyline_length(way) / (2 * self.vessel.length_m)))
+        paths = [path for graph in self.visibility_graphs if (path := graph.shortest(start, end)) is not None]
+        return sorted(paths, key=lambda path: np.ceil(polyline_length(path) / (2 * self.vessel.length_m)))
 
     @cached_property
     def _open(self) -> shapely.MultiPolygon:
@@ -137,7 +137,7 @@ class LegWater:
         return water
 
     def parted(self, start: Array, end: Array) -> bool:
-        """Whether forbidden water lies between two positions (2,) on every way of a hull, however small."""
+        """Whether no path of a hull, however small, connects two positions (2,)."""
         ends = shapely.points(np.stack([start[1::-1], end[1::-1]]))
         return not any(shapely.contains(part, ends).all() for part in self.safe.geoms)
 

@@ -98,7 +98,7 @@ def path_points(space: SearchSpace, pose: Array, stretches: Array) -> tuple[Arra
         pose: (3,) where the path begins.
         stretches: hull lengths along it; the whole path is always among them.
     """
-    path = space.goal_distance.way(pose[:2])
+    path = space.goal_distance.path(pose[:2])
     steps = np.hypot(*np.diff(path, axis=0).T)
     path, steps = path[np.r_[True, steps > 1e-6]], steps[steps > 1e-6]
     if not len(steps):

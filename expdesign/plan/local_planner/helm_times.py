@@ -88,7 +88,7 @@ class HelmTimes:
         return self.run_up_m if entry_mps > LOCAL.stopped_share * self.speed_mps else self.steady_m / 2
 
     def _table(self, exit_mps: float, entry_mps: float) -> tuple[Array, Array]:
-        """Ways and times of legs with higher and higher speeds."""
+        """Lengths and times of legs with higher and higher peak speeds."""
         first, last = (float(np.clip(speed, 0.0, self.speed_mps)) for speed in (exit_mps, entry_mps))
         runs = last > LOCAL.stopped_share * self.speed_mps
         before_s = self.answer_s if first else 0.0  # from rest the table has it

@@ -14,7 +14,7 @@ import numpy as np
 
 from expdesign.conventions import wrap_angle
 from expdesign.dictionary import Primitive
-from expdesign.plan.chart import ClearanceField, GoalWays
+from expdesign.plan.chart import ClearanceField, GoalDistance
 from expdesign.plan.control import Capability
 from expdesign.plan.legs import LegTask, LegWater
 from expdesign.plan.runs import Footprint
@@ -63,7 +63,7 @@ class SearchSpace:
     footprints: tuple[Footprint, ...]
     frame: LocalFrame
     field: ClearanceField
-    goal_distance: GoalWays
+    goal_distance: GoalDistance
     goal: Array
     planner: LocalPlanner
     hull_m: float
@@ -138,7 +138,7 @@ class PartialPlans:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Successors:
-    """Ways to continue partial plans by one run, one per row.
+    """Continuations of partial plans by one leg and one run, one per row.
 
     Attributes:
         parent: (n,) index of the partial plan.
@@ -225,7 +225,7 @@ class LocalPlanner(Protocol):
         """The space with the transitions of these pairs tried."""
 
     def successors(self, space: SearchSpace, plans: PartialPlans, q: int) -> list[Successors]:
-        """Ways to begin run q after each partial plan."""
+        """Placements of run q after each partial plan."""
 
     def leg_s(self, space: SearchSpace, ends: LegEnds, froms: Array, tos: Array, bends: Array) -> Array:
         """(n,) time of legs between poses (n or 1, 3) along a path with bends (b, 2) [s]."""

@@ -68,7 +68,7 @@ def _runs(space: SearchSpace, pair: Pair) -> tuple[Footprint | None, Footprint |
 def _desired(space: SearchSpace, pair: Pair, start: Array) -> tuple[float, float]:
     """Course that both runs make good, and the turn between them, from the heading before."""
     before, after = _runs(space, pair)
-    path = np.diff(space.goal_distance.way(start[:2]), axis=0)
+    path = np.diff(space.goal_distance.path(start[:2]), axis=0)
     begins, ends = (float(np.arctan2(step[1], step[0])) for step in (path[0], path[-1]))
     course = before.course_from_end_rad if before else begins - float(start[2])
     turn = course - after.course_rad if after else course + float(space.goal[2]) - ends

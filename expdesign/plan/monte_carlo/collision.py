@@ -18,7 +18,7 @@ CHUNK = 20_000
 
 
 @dataclass(frozen=True, kw_only=True)
-class HullWatch:
+class CollisionCheck:
     """Looks whether hulls stay in allowed water.
 
     Attributes:

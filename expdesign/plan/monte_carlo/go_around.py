@@ -1,4 +1,4 @@
-"""Ways round of ships that sail arcs: to the beginning of a run-up from wherever they are.
+"""Go-around paths of ships that sail arcs: from wherever they are to the beginning of a run-up.
 
 The shortest Dubins curve where the water has room for it; else one through places from which such curves lead on.
 """
@@ -27,7 +27,7 @@ CURVES, ONWARD = 3, 6
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Rounds:
+class GoAroundPaths:
     """All ways to a pose.
 
     Attributes:

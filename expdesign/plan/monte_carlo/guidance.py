@@ -12,9 +12,17 @@ import numpy as np
 
 from expdesign.plan.control import CONTROL, Helmsman, Reference
 from expdesign.plan.legs import LegWater, nearest_turns
-from expdesign.plan.monte_carlo.go_around import Rounds
-from expdesign.plan.monte_carlo.procedure import AFTER, MISSED, ROUNDS, Tolerances, planned_stretch, run_up, under_way
-from expdesign.plan.monte_carlo.return_paths import Convoy, WaysTo, build_ways_to
+from expdesign.plan.monte_carlo.go_around import GoAroundPaths
+from expdesign.plan.monte_carlo.procedure import (
+    ABORT_CAUSES,
+    AFTER,
+    MOST_GO_AROUNDS,
+    Tolerances,
+    planned_stretch,
+    run_up,
+    under_way,
+)
+from expdesign.plan.monte_carlo.return_paths import PathFollowers, ReturnPaths, build_return_paths
 from expdesign.plan.runs import Fleet
 from expdesign.values import Array
 
@@ -45,18 +53,18 @@ class Approach:
     Attributes:
         poses: (t, n, 3) at every sample; ships that had begun or given up stay where they were.
         begun: (n,) in place; the others among those that sailed gave up.
-        rounds: (n,) times gone round.
+        go_arounds: (n,) times gone round.
         samples: (n,) that it took.
-        missed: (n,) number in `MISSED` of what those that gave up could not keep.
-        felt: (n, 3) acceleration that each helmsman's model does not explain, as he believes in the end.
+        abort_cause: (n,) number in `ABORT_CAUSES` of what those that gave up could not keep.
+        unexplained: (n, 3) acceleration that each helmsman's model does not explain, as he believes in the end.
     """
 
     poses: Array
     begun: np.ndarray
-    rounds: np.ndarray
+    go_arounds: np.ndarray
     samples: np.ndarray
-    missed: np.ndarray
-    felt: Array
+    abort_cause: np.ndarray
+    unexplained: Array
 
 
 class Pilot:
@@ -86,41 +94,41 @@ class Pilot:
         after_m = 0.0 if last else max(AFTER * helm.vessel.length_m, within.position_m)
         n, planned, runs_up = len(sailing), planned_stretch(helm, track, after_m), run_up(helm, water, track, after_m)
         self._helm, self._water, self._inputs, self._last = helm, water, inputs, last
-        self._wanted, self._moves, self._within = track[-1], under_way(helm, track[-1]), within
+        self._desired, self._moves, self._within = track[-1], under_way(helm, track[-1]), within
         self._reference = Reference(states=np.concatenate([planned.states, runs_up.states]))
         self._first, self._arrival = len(planned.states), len(planned.states) + runs_up.arrival
         length_m = float(np.hypot(*(runs_up.states[0] - track[-1])[:2]))
         reach_m = np.clip(length_m / 5, self._within.position_m / 2, helm.vessel.length_m)
-        self._convoy = Convoy(helm, runs_up.states[0], n, reach_m=float(reach_m))
+        self._convoy = PathFollowers(helm, runs_up.states[0], n, reach_m=float(reach_m))
         self.doing = np.where(sailing, ON_STRETCH, OUT)
         self._sample, self._end, self._most = np.zeros(n), np.full(n, planned.arrival), np.full(n, self._first - 1)
-        self.rounds, self.samples = np.zeros(n, dtype=int), np.zeros(n, dtype=int)
-        self._missed = np.full(n, MISSED.index("time"))
+        self.go_arounds, self.samples = np.zeros(n, dtype=int), np.zeros(n, dtype=int)
+        self._abort_cause = np.full(n, ABORT_CAUSES.index("time"))
         self._spent, self._limit = np.zeros(n), np.full(n, self._allowed(len(track)))
 
-    def sail(self, fleet: Fleet, felt: Array) -> Approach:
-        """Until every ship has begun or given up, with the accelerations felt so far (n, 3)."""
+    def sail(self, fleet: Fleet, unexplained: Array) -> Approach:
+        """Until every ship has begun or given up, with the accelerations unexplained so far (n, 3)."""
         poses = [fleet.states[:, :3]]
         self._rejoin(fleet.states)
         while (moving := self._looked(fleet)).any():
-            before, wanted = fleet.states, self._next(fleet.states)
+            before, desired = fleet.states, self._next(fleet.states)
             near = self._near(fleet.given)
             told = self._helm.commands(
-                wanted, before, fleet.given, unexplained=felt, near=near, delivered=fleet.delivered
+                desired, before, fleet.given, unexplained=unexplained, near=near, delivered=fleet.delivered
             )
             fleet.advance(told, moving)
-            learnt = self._helm.unexplained(felt, before, fleet.states, fleet.delivered)
-            felt = np.where(moving[:, None], learnt, felt)
+            learnt = self._helm.unexplained(unexplained, before, fleet.states, fleet.delivered)
+            unexplained = np.where(moving[:, None], learnt, unexplained)
             self.samples += moving
             self._spent += moving
             poses.append(fleet.states[:, :3])
         return Approach(
             poses=np.array(poses),
             begun=self.doing == BEGUN,
-            rounds=self.rounds,
+            go_arounds=self.go_arounds,
             samples=self.samples,
-            missed=self._missed,
-            felt=felt,
+            abort_cause=self._abort_cause,
+            unexplained=unexplained,
         )
 
     def _looked(self, fleet: Fleet) -> np.ndarray:
@@ -130,19 +138,19 @@ class Pilot:
         on = self.doing == ON_STRETCH
         passed, good = self._at_start(states)
         self.doing[on & passed & good] = BEGUN
-        worst = 0 if self._last else self._within.used(states, self._wanted).argmax(axis=1)
-        self._missed = np.where(on & passed, worst, np.where(late, MISSED.index("time"), self._missed))
+        worst = 0 if self._last else self._within.used(states, self._desired).argmax(axis=1)
+        self._abort_cause = np.where(on & passed, worst, np.where(late, ABORT_CAUSES.index("time"), self._abort_cause))
         self.doing[(self.doing == ON_WAY) & late] = ABORTED
         self._run_up((self.doing == ON_WAY) & self._convoy.arrived(states))
-        self._go_round(on & (self.doing == ON_STRETCH) & (passed | late), states)
+        self._go_around(on & (self.doing == ON_STRETCH) & (passed | late), states)
         return np.asarray(self.doing < BEGUN)
 
     def _at_start(self, states: Array) -> tuple[np.ndarray, np.ndarray]:
         """(n,) whether a ship is as near to the start as it will come this time, and whether it may begin then."""
-        shares, at_end = self._within.used(states, self._wanted), self._sample >= self._end
+        shares, at_end = self._within.used(states, self._desired), self._sample >= self._end
         used = shares.max(axis=1)
         if self._last:
-            there = np.hypot(*(states[:, :2] - self._wanted[:2]).T) <= ARRIVED * self._helm.vessel.length_m
+            there = np.hypot(*(states[:, :2] - self._desired[:2]).T) <= ARRIVED * self._helm.vessel.length_m
             waits = self._helm.ship.keeps_station & (self._spent <= self._limit - self._spare / 2)
             return at_end & (there | ~waits), there
         if not self._moves:
@@ -168,7 +176,7 @@ class Pilot:
         if len(some):
             clear = np.array([self._tree.holds(self._way_back(states[ship, :2])) for ship in some])
             strayed[some] = ~clear | ((off_m[some] > good_m) & (not self._last))
-            self._go_round(strayed, states)
+            self._go_around(strayed, states)
 
     def _way_back(self, place: Array) -> Array:
         """(k, 2) about how a ship at a place comes back to the leg, while the leg goes on abeam of her."""
@@ -179,18 +187,18 @@ class Pilot:
         left = np.maximum(0.0, 1.0 - thinned * helm.vessel.sample_time_s / back_s)
         return np.asarray((track[thinned] + left[:, None] * off)[: int((left > 0.0).sum()) + 1])
 
-    def _go_round(self, ships: np.ndarray, states: Array) -> None:
+    def _go_around(self, ships: np.ndarray, states: Array) -> None:
         """Set ships off to the run-up; those that went round often enough, or have no way, give up."""
         self.doing[ships] = ABORTED
-        some = np.flatnonzero(ships & (self.rounds < ROUNDS))
+        some = np.flatnonzero(ships & (self.go_arounds < MOST_GO_AROUNDS))
         if not len(some):
             return
-        self.rounds[some] += 1
+        self.go_arounds[some] += 1
         sideways = self._helm.ship.keeps_station
         ways = self._tree.find(states[some, :2]) if sideways else [self._arcs.find(x) for x in states[some, :3]]
         for ship, way in zip(some.tolist(), ways, strict=True):
             if way is None:
-                self._missed[ship] = MISSED.index("no way round")
+                self._abort_cause[ship] = ABORT_CAUSES.index("no way round")
             else:
                 self.doing[ship] = ON_WAY
                 self._convoy.set_off(ship, way)
@@ -199,9 +207,9 @@ class Pilot:
         self._limit[some] = self._allowed(self._convoy.length_m[some] / sample_m)
 
     @cached_property
-    def _arcs(self) -> Rounds:
+    def _arcs(self) -> GoAroundPaths:
         helm = self._helm
-        return Rounds(
+        return GoAroundPaths(
             goal=self._convoy.goal[:3],
             radius_m=helm.ship.turning_radius_m,
             spacing_m=helm.vessel.length_m,
@@ -209,8 +217,8 @@ class Pilot:
         )
 
     @cached_property
-    def _tree(self) -> WaysTo:
-        return build_ways_to(self._water.narrowest_ways, self._convoy.goal[:2])
+    def _tree(self) -> ReturnPaths:
+        return build_return_paths(self._water.narrowest_graph, self._convoy.goal[:2])
 
     def _near(self, given: Array) -> Array:
         """(n, m) commands to whose angles azimuths keep: those of the run for ships that come to it under way."""
@@ -218,27 +226,27 @@ class Pilot:
         return np.where((self._moves & (self.doing == ON_STRETCH))[:, None], ready, given)
 
     def _next(self, states: Array) -> Array:
-        """(n, 6) what is wanted of each ship over the next sample; references move on."""
+        """(n, 6) what is desired of each ship over the next sample; references move on."""
         on = self.doing == ON_STRETCH
-        wanted = np.zeros((len(on), 6))
+        desired = np.zeros((len(on), 6))
         if (self.doing == ON_WAY).any():
-            wanted = self._convoy.wanted(states)
+            desired = self._convoy.desired(states)
         if not on.any():
-            return wanted
+            return desired
         pace = self._reference.abreast(self._sample, states, step_m=self._least_step_m)
         self._sample = np.where(on, np.minimum(self._sample + pace, self._most), self._sample)
         soon = np.minimum(self._sample + self._helm.answer_s / self._helm.vessel.sample_time_s, self._most)
         now = self._reference.at(self._sample)
         now[:, 3:] = self._reference.at(soon)[:, 3:]  # a ship answers late: her speed is asked for beforehand
         now[:, :2] = np.where(self._steadies()[:, None], states[:, :2], now[:, :2])
-        return np.where(on[:, None], now, wanted)
+        return np.where(on[:, None], now, desired)
 
     def _steadies(self) -> np.ndarray:
         """(n,) whether a ship that an unknown current sets aside no longer points into it, to begin as planned."""
         helm = self._helm
         if self._last or helm.ship.keeps_station or not self._moves:
             return np.zeros(len(self._sample), dtype=bool)
-        sample_m = float(np.hypot(*self._wanted[3:5])) * helm.vessel.sample_time_s
+        sample_m = float(np.hypot(*self._desired[3:5])) * helm.vessel.sample_time_s
         return np.asarray(self._end - self._sample <= STEADY * helm.vessel.length_m / sample_m)
 
     @property

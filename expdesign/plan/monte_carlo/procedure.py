@@ -6,7 +6,7 @@ The procedure that a plan's promise rests on, the same in run cards, report and 
 2. After it she rejoins the planned leg from where she is, in a straight line of sight, and follows it, steered.
 3. At the planned start of the next run she begins it if position, heading, speed and yaw rate are within `Tolerances`.
 4. Otherwise she goes round: the shortest way in safe water to the beginning of a run-up, and up to the start once more,
-   steady on the planned heading and speed; `ROUNDS` times at most. Then the trial is broken off.
+   steady on the planned heading and speed; `MOST_GO_AROUNDS` times at most. Then the trial is broken off.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from expdesign.plan.control import CONTROL, Helmsman, over_ground
 from expdesign.plan.legs import LegWater
 from expdesign.values import Array, seal
 
-ROUNDS = 4
+MOST_GO_AROUNDS = 4
 """Times that a ship goes round for one run before the trial is broken off."""
 OFF_PLACE, OFF_HEADING_RAD, OFF_SPEED, OFF_YAW_RATE = 0.2, float(np.radians(3.0)), 0.1, 0.1
 """Tolerances: in hull lengths; [rad]; in transit speeds; in the largest yaw rate on legs."""
@@ -34,7 +34,7 @@ REST = 0.05
 """Speed over ground in transit speeds, and yaw rate in the largest, up to which a run begins from a standstill."""
 
 
-MISSED = ("position", "heading", "speed", "yaw rate", "time", "no way round")
+ABORT_CAUSES = ("position", "heading", "speed", "yaw rate", "time", "no way round")
 """What can keep a ship from beginning a run: a tolerance, that she does not come there in time, or no way round."""
 
 
@@ -52,15 +52,15 @@ class Tolerances:
     speed_mps: float
     yaw_rate_radps: float
 
-    def used(self, states: Array, wanted: Array) -> Array:
-        """(n, 4) shares of the tolerances that states (n, 6) use up, by a wanted one (6,); up to 1 each is in place."""
-        apart = over_ground(states) - over_ground(wanted[None])
+    def used(self, states: Array, desired: Array) -> Array:
+        """(n, 4) shares of the tolerances that states (n, 6) use up, by a desired one (6,); up to 1 is in place."""
+        apart = over_ground(states) - over_ground(desired[None])
         return np.column_stack(
             [
-                np.hypot(*(states[:, :2] - wanted[:2]).T) / self.position_m,
-                np.abs(wrap_angle(states[:, 2] - wanted[2])) / self.heading_rad,
+                np.hypot(*(states[:, :2] - desired[:2]).T) / self.position_m,
+                np.abs(wrap_angle(states[:, 2] - desired[2])) / self.heading_rad,
                 np.hypot(*apart.T) / self.speed_mps,
-                np.abs(states[:, 5] - wanted[5]) / self.yaw_rate_radps,
+                np.abs(states[:, 5] - desired[5]) / self.yaw_rate_radps,
             ]
         )
 
@@ -109,20 +109,20 @@ def run_up(helm: Helmsman, water: LegWater, leg: Array, after_m: float) -> Stret
     Straight, or as the run begins; where no such stretch keeps its clearance, the last of the planned leg itself. A
     run that begins at rest needs none if the ship can go sideways: she comes to a stop on the spot.
     """
-    wanted, sample_s = leg[-1], helm.vessel.sample_time_s
-    moves = under_way(helm, wanted)
+    desired, sample_s = leg[-1], helm.vessel.sample_time_s
+    moves = under_way(helm, desired)
     if not moves and helm.ship.keeps_station:
-        return Stretch(states=np.stack([wanted, wanted]), arrival=1)
-    samples = helm.ship.run_up_s(helm.vessel, float(np.hypot(*wanted[3:5]))) / sample_s
+        return Stretch(states=np.stack([desired, desired]), arrival=1)
+    samples = helm.ship.run_up_s(helm.vessel, float(np.hypot(*desired[3:5]))) / sample_s
     for share in SHORTER:
         count = max(2, round(share * samples))
-        before = steady_states(helm, wanted, np.arange(-count, 0)) if moves else slowing(helm, wanted, count)
-        if water.holds(np.concatenate([before, wanted[None]])[:, :3]):
+        before = steady_states(helm, desired, np.arange(-count, 0)) if moves else slowing(helm, desired, count)
+        if water.holds(np.concatenate([before, desired[None]])[:, :3]):
             break
     else:
         before = leg[max(0, len(leg) - 1 - round(samples)) : -1]
-    more = steady_states(helm, wanted, np.arange(1, _after(helm, wanted, after_m) + 1))
-    return Stretch(states=np.concatenate([before, wanted[None], more]), arrival=len(before))
+    more = steady_states(helm, desired, np.arange(1, _after(helm, desired, after_m) + 1))
+    return Stretch(states=np.concatenate([before, desired[None], more]), arrival=len(before))
 
 
 def under_way(helm: Helmsman, state: Array) -> bool:
@@ -149,7 +149,7 @@ def steady_states(helm: Helmsman, state: Array, samples: np.ndarray) -> Array:
     return states
 
 
-def slowing(helm: Helmsman, wanted: Array, count: int) -> Array:
+def slowing(helm: Helmsman, desired: Array, count: int) -> Array:
     """(count, 6) states on the way to a stop, straight ahead, gently."""
     ship, sample_s = helm.ship, helm.vessel.sample_time_s
     time_s = sample_s * np.arange(count, 0, -1)
@@ -157,8 +157,8 @@ def slowing(helm: Helmsman, wanted: Array, count: int) -> Array:
     brake = ship.braking_mps2(cruise)
     slowed = np.minimum(time_s, cruise / brake)
     distance = brake * slowed**2 / 2 + cruise * (time_s - slowed)
-    states: Array = np.tile(wanted, (count, 1))
-    states[:, :2] -= distance[:, None] * [np.cos(wanted[2]), np.sin(wanted[2])]
+    states: Array = np.tile(desired, (count, 1))
+    states[:, :2] -= distance[:, None] * [np.cos(desired[2]), np.sin(desired[2])]
     states[:, 3] += brake * slowed
     return states
 

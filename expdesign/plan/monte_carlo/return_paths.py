@@ -1,7 +1,7 @@
-"""Ways of many ships to one place: the shortest in safe water, and how they are followed.
+"""Return paths of many ships to one place, the shortest in safe water, and how ships follow them.
 
-The ways are those of planned legs, taut strings round the corners of the water that centre lines may use. A ship that
-has strayed out of that water goes straight back into it first.
+They are the visibility-graph paths of planned legs, in the water that centre lines may use. A ship outside that water
+goes straight back into it first.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ import numpy as np
 import shapely
 
 from expdesign.conventions import wrap_angle
-from expdesign.plan.chart import Ways, first_bends, ways_to
+from expdesign.plan.chart import VisibilityGraph, first_bends, path_over, shortest_path_tree
 from expdesign.plan.control import CONTROL, Helmsman
 from expdesign.values import Array
 
 NEAR = 2.0
-"""Hull lengths from the place within which a ship that can go sideways turns to the heading wanted there."""
+"""Hull lengths from the place within which a ship that can go sideways turns to the heading desired there."""
 TURNED_OFF = 0.25
 """Least speed, in transit speeds, at bends and while the bow points elsewhere."""
 BRAKING = 0.5
@@ -25,7 +25,7 @@ BRAKING = 0.5
 CRAB = 0.5
 """Speed sideways and astern, in transit speeds."""
 TURNED_RAD = 0.15
-"""Difference from the heading wanted at the place within which a ship has come to it, if she hardly turns any more."""
+"""Difference from the heading desired at the place within which a ship has come to it, if she hardly turns any more."""
 PURSUED = 1.5
 """Hull lengths ahead on its way at which a ship with a helm aims."""
 REACH = 0.4
@@ -33,51 +33,47 @@ REACH = 0.4
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class WaysTo:
-    """All shortest ways to a place.
+class ReturnPaths:
+    """All shortest paths to a place.
 
     Attributes:
-        ways: of the water.
+        graph: of the water.
         place: (2,).
-        nodes, distance, following: the tree of ways by `ways_to`.
+        nodes, distance, next_node: by `shortest_path_tree`.
     """
 
-    ways: Ways
+    graph: VisibilityGraph
     place: Array
     nodes: Array
     distance: Array
-    following: np.ndarray
+    next_node: np.ndarray
 
     def find(self, points: Array) -> list[Array | None]:
-        """A way (k, 2) from each point (n, 2), its own place first, or None where there is none."""
-        inside = np.array([self.ways.nearest(point) for point in points]).reshape(-1, 2)
+        """A path (k, 2) from each point (n, 2), the point itself first, or None where there is none."""
+        inside = np.array([self.graph.nearest(point) for point in points]).reshape(-1, 2)
         reached = np.flatnonzero(np.isfinite(self.distance))
-        length, first = first_bends(self.ways, inside, self.nodes[reached], self.distance[reached])
+        length, first = first_bends(self.graph, inside, self.nodes[reached], self.distance[reached])
         found: list[Array | None] = []
         for point, start, away, node in zip(points, inside, length, reached[first], strict=True):
             found.append(self._chain(point, start, int(node)) if np.isfinite(away) else None)
         return found
 
     def _chain(self, point: Array, start: Array, node: int) -> Array:
-        chain = [point, start, self.nodes[node]]
-        while (after := int(self.following[node])) != node:
-            node = after
-            chain.append(self.nodes[node])
-        way = np.array([*chain, self.place])
-        return way[np.r_[True, np.hypot(*np.diff(way, axis=0).T) > 1e-6]]
+        path = np.array([point, start, *path_over(node, self.nodes, self.next_node), self.place])
+        return path[np.r_[True, np.hypot(*np.diff(path, axis=0).T) > 1e-6]]
 
-    def holds(self, way: Array) -> bool:
-        """Whether a way (k, 2) stays in the water."""
-        return bool(shapely.covers(self.ways.water, shapely.LineString(way[:, ::-1])))
+    def holds(self, path: Array) -> bool:
+        """Whether a path (k, 2) stays in the water."""
+        return bool(shapely.covers(self.graph.water, shapely.LineString(path[:, ::-1])))
 
 
-def build_ways_to(ways: Ways, place: Array) -> WaysTo:
-    """The tree of ways to a place (2,)."""
-    nodes, distance, following = ways_to(ways, place)
-    return WaysTo(ways=ways, place=place, nodes=nodes, distance=distance, following=following)
+def build_return_paths(graph: VisibilityGraph, place: Array) -> ReturnPaths:
+    """The tree of shortest paths to a place (2,)."""
+    nodes, distance, next_node = shortest_path_tree(graph, place)
+    return ReturnPaths(graph=graph, place=place, nodes=nodes, distance=distance, next_node=next_node)
 
 
-class Convoy:
+class PathFollowers:
     """n ships, each with a way of its own to one state.
 
     Attributes:
@@ -115,7 +111,7 @@ class Convoy:
         self.length_m[ship] = length.sum()
 
     def arrived(self, states: Array) -> np.ndarray:
-        """(n,) ships that have come to the place and, if they can turn there, point as wanted."""
+        """(n,) ships that have come to the place and, if they can turn there, point as desired."""
         helm = self._helm
         there = np.hypot(*(states[:, :2] - self.goal[:2]).T) < self._reach_m
         turned = np.abs(wrap_angle(states[:, 2] - self.goal[2])) < TURNED_RAD
@@ -126,7 +122,7 @@ class Convoy:
         on_last = self._left[np.arange(len(states)), self._next] <= 0.0
         return np.asarray(there | (on_last & ((states[:, :2] - self.goal[:2]) @ ahead > 0.0)))
 
-    def wanted(self, states: Array) -> Array:
+    def desired(self, states: Array) -> Array:
         """(n, 6) where each ship should be and how it should move now: on its way, at a speed that it can lose."""
         helm, everyone = self._helm, np.arange(len(states))
         length, fastest = helm.vessel.length_m, helm.ship.transit_speed_mps

@@ -3,7 +3,7 @@
 It comes from whole trials (`expdesign.plan.monte_carlo.trials`): runs open loop from the states that ships really have,
 legs and ways back to run-ups steered, the hull against the chart at every step. Trials broken off because a run could
 not be begun are counted apart: they end in allowed water, but not at the goal. A plan is accepted when its share, with
-the share's standard error on top, is within what is promised, and when most trials come to the goal.
+the share's standard error on top, is within what is estimate_risk, and when most trials come to the goal.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ import numpy as np
 from scipy.stats import beta
 
 from expdesign.plan.legs import LegWater
-from expdesign.plan.monte_carlo.procedure import MISSED, ROUNDS
+from expdesign.plan.monte_carlo.procedure import ABORT_CAUSES, MOST_GO_AROUNDS
 from expdesign.plan.monte_carlo.trials import Trials, sail_trials
-from expdesign.plan.values import Leg, LegOutcome, Promise, SailedTrial
+from expdesign.plan.values import Leg, LegOutcome, RiskEstimate, SailedTrial
 from expdesign.sea_area import SeaArea
 from expdesign.signals import Trajectory
 from expdesign.values import Array
@@ -29,18 +29,18 @@ MOST = 0.95
 HALF = 0.5
 """Share of trials broken off from which on it is no plan."""
 WHY = tuple(
-    {"time": "not there in time", "no way round": "no way round"}.get(x, f"{x} out of tolerance") for x in MISSED
+    {"time": "not there in time", "no way round": "no way round"}.get(x, f"{x} out of tolerance") for x in ABORT_CAUSES
 )
 """What kept ships from beginning a run, in words, by number."""
 
 
-def promised(
+def estimate_risk(
     water: LegWater,
     sailed: SailedTrial,
     *,
     rng: np.random.Generator,
     draws: int = TRIALS,
-) -> tuple[Promise, Trials]:
+) -> tuple[RiskEstimate, Trials]:
     """Sail drawn trials of a plan and tell what happened to them.
 
     The shares' standard errors are sqrt(p (1 - p) / draws).
@@ -50,7 +50,7 @@ def promised(
     within, sample_s = trials.within[0], commands.sample_time_s
     gone, done = int(trials.left.any(axis=0).sum()), trials.completed
     extra = (trials.samples.sum(axis=0)[done] - len(commands)) * sample_s
-    found = Promise(
+    found = RiskEstimate(
         trials=draws,
         left=gone / draws,
         left_most=upper_limit(gone, draws),
@@ -58,7 +58,7 @@ def promised(
         reasons=_reasons(legs, trials, trajectory, water.area),
         extra_median_s=float(np.median(extra)) if len(extra) else float("nan"),
         extra_most_s=float(np.quantile(extra, MOST)) if len(extra) else float("nan"),
-        rounds=ROUNDS,
+        go_arounds=MOST_GO_AROUNDS,
         heading_rad=within.heading_rad,
         speed_mps=within.speed_mps,
         yaw_rate_radps=within.yaw_rate_radps,
@@ -67,7 +67,7 @@ def promised(
     return found, trials
 
 
-def trials_for(confidence: float) -> int:
+def trials_needed(confidence: float) -> int:
     """How many trials tell a share of 1 - confidence from none."""
     return int(np.clip(np.ceil(SEEN / max(1.0 - confidence, 1e-9)), TRIALS, MOST_TRIALS))
 
@@ -80,9 +80,11 @@ def upper_limit(count: int, trials: int, *, confidence: float = MOST) -> float:
     return 1.0 if count >= trials else float(beta.ppf(confidence, count + 1, trials - count))
 
 
-def broken_promise(found: Promise, trials: Trials, legs: Sequence[Leg], area: SeaArea, *, confidence: float) -> str:
+def failed_chance_constraint(
+    found: RiskEstimate, trials: Trials, legs: Sequence[Leg], area: SeaArea, *, confidence: float
+) -> str:
     """What is wrong with a plan, with the leg and the place where it is worst; "" when it keeps its promise."""
-    if leaves_too_often(found, confidence):
+    if violates_chance_constraint(found, confidence):
         worst = worst_leg(trials)
         lat, lon = area.frame.to_degrees(np.nanmedian(trials.place[worst], axis=0))
         return (
@@ -93,7 +95,7 @@ def broken_promise(found: Promise, trials: Trials, legs: Sequence[Leg], area: Se
     return "" if found.aborted < HALF else f"{found.note}; wider water or a vessel known better helps"
 
 
-def leaves_too_often(found: Promise, confidence: float) -> bool:
+def violates_chance_constraint(found: RiskEstimate, confidence: float) -> bool:
     """Whether more trials leave allowed water than a confidence allows, or so many that they may well do."""
     return found.left > 0.0 and found.left + found.error > 1.0 - confidence + 1e-12
 
@@ -118,7 +120,7 @@ def _reasons(legs: Sequence[Leg], trials: Trials, trajectory: Trajectory, area: 
     for index in np.argsort(-trials.aborted.mean(axis=1), kind="stable").tolist():
         aborted = trials.aborted[index]
         if aborted.any():
-            causes = Counter(trials.missed[index][aborted].tolist())
+            causes = Counter(trials.abort_cause[index][aborted].tolist())
             told = ", ".join(f"{WHY[cause]} {count / len(aborted):.1%}" for cause, count in causes.most_common())
             lat, lon = area.frame.to_degrees(trajectory.pose[legs[index].last, :2])
             rows.append(f"{described(legs, index)} {aborted.mean():.1%} near {lat:.5f}, {lon:.5f} ({told})")
@@ -132,7 +134,7 @@ def _leg_outcome(trials: Trials, index: int, sample_s: float) -> LegOutcome:
         position_m=trials.within[index].position_m,
         left=float(trials.left[index].mean()),
         aborted=float(trials.aborted[index].mean()),
-        rounds=float(trials.rounds[index][sailed].mean()) if sailed.any() else 0.0,
+        go_arounds=float(trials.go_arounds[index][sailed].mean()) if sailed.any() else 0.0,
         median_s=float(np.median(times)),
         most_s=float(np.quantile(times, MOST)),
     )

@@ -13,7 +13,7 @@ import numpy as np
 
 from expdesign.plan.control import Helmsman
 from expdesign.plan.legs import LegWater
-from expdesign.plan.monte_carlo.collision import HullWatch
+from expdesign.plan.monte_carlo.collision import CollisionCheck
 from expdesign.plan.monte_carlo.guidance import Pilot, open_loop
 from expdesign.plan.monte_carlo.procedure import Tolerances, tolerances
 from expdesign.plan.runs import Fleet, draw_truths
@@ -31,20 +31,20 @@ class Trials:
     Attributes:
         left: (legs, n) whether the hull left allowed water on a leg.
         aborted: (legs, n) whether the ship gave up on a leg.
-        rounds: (legs, n) times gone round on a leg.
+        go_arounds: (legs, n) times gone round on a leg.
         samples: (legs, n) that legs took.
         used: (legs, n) largest share of a tolerance used up where a run began; nan where none did.
-        missed: (legs, n) number in `MISSED` of what kept ships that gave up from beginning.
+        abort_cause: (legs, n) number in `ABORT_CAUSES` of what kept ships that gave up from beginning.
         place: (legs, n, 2) where hulls left allowed water; nan where they did not.
         within: in place at the beginning of each leg.
     """
 
     left: np.ndarray
     aborted: np.ndarray
-    rounds: np.ndarray
+    go_arounds: np.ndarray
     samples: np.ndarray
     used: Array
-    missed: np.ndarray
+    abort_cause: np.ndarray
     place: Array
     within: tuple[Tolerances, ...]
 
@@ -73,11 +73,11 @@ def sail_trials(
     helm = Helmsman(vessel=vessel, environment=water.environment, ship=water.ship)
     truths = draw_truths(vessel, water.environment, draws, rng)
     fleet = Fleet(vessel, water.environment, truths, state=track[0], standing=np.zeros(len(vessel.limits)), rng=rng)
-    watch, within = HullWatch(area=water.area, vessel=vessel), start_tolerances(water, sailed)
-    sailing, felt = np.ones(draws, dtype=bool), np.zeros((draws, 3))
+    watch, within = CollisionCheck(area=water.area, vessel=vessel), start_tolerances(water, sailed)
+    sailing, unexplained = np.ones(draws, dtype=bool), np.zeros((draws, 3))
     shape = (len(legs), draws)
     left, aborted = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
-    rounds, samples, missed = (np.zeros(shape, dtype=int) for _ in range(3))
+    go_arounds, samples, abort_cause = (np.zeros(shape, dtype=int) for _ in range(3))
     used, place = np.full(shape, np.nan), np.full((*shape, 2), np.nan)
     for index, leg in enumerate(legs):
         values = commands.values[leg.first : leg.last]
@@ -95,15 +95,22 @@ def sail_trials(
                 inputs=values[-1],
                 last=index == len(legs) - 1,
             )
-            found = pilot.sail(fleet, felt)
-            felt, poses, begun = found.felt, found.poses, found.begun
-            rounds[index], samples[index], missed[index] = found.rounds, found.samples, found.missed
+            found = pilot.sail(fleet, unexplained)
+            unexplained, poses, begun = found.unexplained, found.poses, found.begun
+            go_arounds[index], samples[index], abort_cause[index] = found.go_arounds, found.samples, found.abort_cause
         place[index] = np.where(fleet.lost[:, None] & sailing[:, None], poses[-1, :, :2], watch.leaves(poses))
         left[index] = sailing & ~np.isnan(place[index, :, 0])
         aborted[index] = sailing & ~begun & ~left[index]
         sailing = sailing & begun & ~left[index]
     return Trials(
-        left=left, aborted=aborted, rounds=rounds, samples=samples, used=used, missed=missed, place=place, within=within
+        left=left,
+        aborted=aborted,
+        go_arounds=go_arounds,
+        samples=samples,
+        used=used,
+        abort_cause=abort_cause,
+        place=place,
+        within=within,
     )
 
 

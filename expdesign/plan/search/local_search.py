@@ -91,7 +91,7 @@ class _Legs:
     def measured(self, runs: np.ndarray, poses: Array) -> Chain:
         """A chain with the shortest ways for its legs."""
         froms, tos = self._ends(runs, poses)
-        ways = [self.space.goal_distance.ways.shortest(a[:2], b[:2]) for a, b in zip(froms, tos, strict=True)]
+        ways = [self.space.goal_distance.graph.shortest(a[:2], b[:2]) for a, b in zip(froms, tos, strict=True)]
         bends = tuple(np.zeros((0, 2)) if way is None else way[1:-1] for way in ways)
         legs_s = [
             self._tried_s(runs, k, froms[k], tos[k])
@@ -151,7 +151,7 @@ class _Legs:
         lines = sight_lines(
             np.vstack([before, run_ends(self.space, runs, poses)[:, :2]]), np.vstack([poses[:, :2], after])
         )
-        seen = shapely.covers(self.space.goal_distance.ways.water, lines).all()
+        seen = shapely.covers(self.space.goal_distance.graph.water, lines).all()
         return bool(seen and runs_clear(self.space, runs, poses).all())
 
     def _blocks(self, chain: Chain, i: int, j: int) -> Array:

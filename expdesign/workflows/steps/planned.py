@@ -14,7 +14,7 @@ from expdesign.export import (
 from expdesign.information import PrimitiveInformation
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import plan_trial
-from expdesign.plan.values import Plan, Promise
+from expdesign.plan.values import Plan, RiskEstimate
 from expdesign.scenario import Scenario
 from expdesign.workflows.outcome import Progress, silent
 
@@ -87,19 +87,19 @@ def plan_summary(plan: Plan) -> dict[str, object]:
         "distance_m": plan.trajectory.distance_m,
         "least_clearance_m": plan.verification.clearance_min_m,
         "leave_water_probability": plan.leave_water_probability,
-        **_promise_summary(plan.promise),
+        **_risk_summary(plan.risk),
         "design_efficiency_realised": plan.design_efficiency_realised,
     }
 
 
-def _promise_summary(promise: Promise | None) -> dict[str, object]:
+def _risk_summary(risk: RiskEstimate | None) -> dict[str, object]:
     """What drawn trials came to besides leaving allowed water; nothing where none were sailed."""
-    if promise is None:
+    if risk is None:
         return {}
     return {
-        "drawn_trials": promise.trials,
-        "aborted_share": promise.aborted,
-        **({"note_on_broken_off": promise.note} if promise.note else {}),
-        "extra_time_median_s": promise.extra_median_s,
-        "extra_time_95_s": promise.extra_most_s,
+        "drawn_trials": risk.trials,
+        "aborted_share": risk.aborted,
+        **({"note_on_broken_off": risk.note} if risk.note else {}),
+        "extra_time_median_s": risk.extra_median_s,
+        "extra_time_95_s": risk.extra_most_s,
     }

@@ -1,4 +1,4 @@
-"""Ways by the visibility graph against closed forms, and in turned, mirrored and shifted charts."""
+"""Visibility-graph paths against closed forms, and in turned, mirrored and shifted charts."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import pytest
 import shapely
 
 from expdesign.plan.chart.clearance_grid import clearance_field
-from expdesign.plan.chart.goal_distance import build_goal_ways
-from expdesign.plan.chart.visibility_graph import build_ways, polyline_length, simplified
+from expdesign.plan.chart.goal_distance import build_goal_distance
+from expdesign.plan.chart.visibility_graph import build_visibility_graph, polyline_length, simplified
 from plan_case import area, leg_water
 
 OPEN = shapely.box(-500, -500, 500, 500)
@@ -34,27 +34,27 @@ def turned_point(point, angle):
 
 
 def shortest_m(water: shapely.Geometry, start: np.ndarray, end: np.ndarray) -> float:
-    """Length of the shortest way."""
-    way = build_ways(water).shortest(start, end)
-    assert way is not None
-    return polyline_length(way)
+    """Length of the shortest path."""
+    path = build_visibility_graph(water).shortest(start, end)
+    assert path is not None
+    return polyline_length(path)
 
 
-def test_in_open_water_the_way_is_straight():
-    way = build_ways(OPEN).shortest(np.array([-400.0, -300.0]), np.array([400.0, 300.0]))
-    assert len(way) == 2
-    assert polyline_length(way) == pytest.approx(1000.0)
+def test_in_open_water_the_shortest_path_is_straight():
+    path = build_visibility_graph(OPEN).shortest(np.array([-400.0, -300.0]), np.array([400.0, 300.0]))
+    assert len(path) == 2
+    assert polyline_length(path) == pytest.approx(1000.0)
 
 
-def test_round_a_wall_the_way_bends_at_both_corners():
-    way = build_ways(OPEN.difference(WALL)).shortest(np.array([0.0, -200.0]), np.array([0.0, 200.0]))
-    assert polyline_length(way) == pytest.approx(2 * np.hypot(300, 190) + 20, abs=1e-2)
-    np.testing.assert_allclose(way[1:3], [[300, -10], [300, 10]], atol=1e-2)
+def test_round_a_wall_the_shortest_path_bends_at_both_corners():
+    path = build_visibility_graph(OPEN.difference(WALL)).shortest(np.array([0.0, -200.0]), np.array([0.0, 200.0]))
+    assert polyline_length(path) == pytest.approx(2 * np.hypot(300, 190) + 20, abs=1e-2)
+    np.testing.assert_allclose(path[1:3], [[300, -10], [300, 10]], atol=1e-2)
 
 
-def test_a_closed_wall_leaves_no_way():
+def test_a_closed_wall_leaves_no_path():
     water = OPEN.difference(shapely.box(-10, -600, 10, 600))
-    assert build_ways(water).shortest(np.array([0.0, -200.0]), np.array([0.0, 200.0])) is None
+    assert build_visibility_graph(water).shortest(np.array([0.0, -200.0]), np.array([0.0, 200.0])) is None
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -81,14 +81,14 @@ def test_simplified_water_holds_or_is_held(seed):
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_the_table_of_distances_agrees_with_the_ways_and_the_ways_with_the_table(seed):
+def test_tabulated_distances_and_their_paths_agree_with_the_visibility_graph(seed):
     water = rocks(seed)
     field = clearance_field(area(water), resolution_m=4.0)
-    ways, goal = build_ways(water), np.array([440.0, 460.0])
-    table = build_goal_ways(ways, field, goal)
+    graph, goal = build_visibility_graph(water), np.array([440.0, 460.0])
+    table = build_goal_distance(graph, field, goal)
     points = np.random.default_rng(seed).uniform(-450, 450, (60, 2))
     points = points[field.at(points) > 3 * field.cell_m]
-    exact = np.array([polyline_length(ways.shortest(point, goal)) for point in points])
+    exact = np.array([polyline_length(graph.shortest(point, goal)) for point in points])
     np.testing.assert_allclose(table.to_goal(points), exact, atol=3 * table.field.cell_m)
-    lengths = [polyline_length(table.way(point)) for point in points]
+    lengths = [polyline_length(table.path(point)) for point in points]
     np.testing.assert_allclose(lengths, exact, atol=3 * table.field.cell_m)

@@ -45,7 +45,7 @@ def test_no_plan_takes_less_than_its_way_at_full_speed(space):
     ends = ChainEnds(start=START, exit_mps=0.0, last=-1)
     found = polished(space, [0, 0, 0], POSES, ends)
     froms, tos = np.vstack([START, run_ends(space, np.zeros(3, dtype=int), found)]), np.vstack([found, space.goal])
-    ways = [space.goal_distance.ways.shortest(a[:2], b[:2]) for a, b in zip(froms, tos, strict=True)]
+    ways = [space.goal_distance.graph.shortest(a[:2], b[:2]) for a, b in zip(froms, tos, strict=True)]
     way_m = sum(polyline_length(way) for way in ways)
     assert measured_s(space, [0, 0, 0], found, ends) >= way_m / space.planner.times.speed_mps
 

@@ -9,7 +9,7 @@ import shapely
 from expdesign.errors import NoPlan
 from expdesign.plan.control.capability import capability
 from expdesign.plan.control.tracking import Helmsman
-from expdesign.plan.monte_carlo.collision import HullWatch
+from expdesign.plan.monte_carlo.collision import CollisionCheck
 from expdesign.plan.monte_carlo.guidance import open_loop
 from expdesign.plan.runs.dispersion import dispersion_m, draw_truths
 from expdesign.plan.runs.ensemble import Fleet
@@ -86,7 +86,7 @@ def leave(vessel, water, environment=CALM, draws=400):
     fleet = Fleet(vessel, environment, truths, state=state, standing=standing, rng=rng)
     helm = Helmsman(vessel=vessel, environment=environment, ship=capability(vessel, PlanSettings()))
     poses = open_loop(helm, fleet, run.commands.values, np.ones(draws, dtype=bool))
-    watch = HullWatch(area=area(water), vessel=vessel)
+    watch = CollisionCheck(area=area(water), vessel=vessel)
     return float((fleet.lost | ~np.isnan(watch.leaves(poses)[:, 0])).mean())
 
 

@@ -1,4 +1,4 @@
-"""Ways round of ships that sail arcs: shortest where there is room, never tighter than the ship turns, never ashore."""
+"""Go-around paths of ships that sail arcs: shortest where there is room, turns no tighter than sailed, never ashore."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import shapely
 
 from expdesign.plan.chart.visibility_graph import polyline_length
 from expdesign.plan.legs._ompl import dubins_curve
-from expdesign.plan.monte_carlo.go_around import Rounds
+from expdesign.plan.monte_carlo.go_around import GoAroundPaths
 
 RADIUS, SPACING = 40.0, 5.0
 GOAL = np.array([0.0, 0.0, 0.7])
@@ -16,8 +16,8 @@ ISLES = [shapely.Point(120 * np.cos(k), 120 * np.sin(k)).buffer(35) for k in (0.
 SEA = shapely.box(-500, -500, 500, 500).difference(shapely.union_all(ISLES))
 
 
-def rounds(water: shapely.Geometry, goal: np.ndarray = GOAL) -> Rounds:
-    return Rounds(
+def go_arounds(water: shapely.Geometry, goal: np.ndarray = GOAL) -> GoAroundPaths:
+    return GoAroundPaths(
         goal=goal,
         radius_m=RADIUS,
         spacing_m=SPACING,
@@ -33,14 +33,14 @@ def poses(count: int) -> np.ndarray:
 
 
 def test_in_open_water_the_way_is_the_shortest_curve():
-    sea = rounds(shapely.box(-2000, -2000, 2000, 2000))
+    sea = go_arounds(shapely.box(-2000, -2000, 2000, 2000))
     for pose in poses(20):
         shortest = dubins_curve(pose, GOAL, radius_m=RADIUS, spacing_m=SPACING)
         np.testing.assert_allclose(sea.find(pose), shortest[:, :2])
 
 
 def test_among_isles_ways_stay_in_the_water_join_the_ends_and_turn_no_tighter_than_the_ship():
-    direct, around, straits = 0, 0, rounds(SEA)
+    direct, around, straits = 0, 0, go_arounds(SEA)
     for pose in poses(60):
         way = straits.find(pose)
         shortest = dubins_curve(pose, GOAL, radius_m=RADIUS, spacing_m=SPACING)[:, :2]
@@ -61,8 +61,8 @@ def test_among_isles_ways_stay_in_the_water_join_the_ends_and_turn_no_tighter_th
 def test_ways_turn_with_the_water():
     turn = 1.1
     c, s = np.cos(turn), np.sin(turn)
-    turned = rounds(shapely.affinity.rotate(SEA, -np.degrees(turn), origin=(0, 0)), np.add(GOAL, (0, 0, turn)))
-    straits = rounds(SEA)
+    turned = go_arounds(shapely.affinity.rotate(SEA, -np.degrees(turn), origin=(0, 0)), np.add(GOAL, (0, 0, turn)))
+    straits = go_arounds(SEA)
     for pose in poses(12):
         way, other = straits.find(pose), turned.find(np.r_[np.array([[c, -s], [s, c]]) @ pose[:2], pose[2] + turn])
         assert (way is None) == (other is None)
@@ -72,4 +72,4 @@ def test_ways_turn_with_the_water():
 
 def test_out_of_a_closed_pool_there_is_no_way():
     pool = SEA.union(shapely.box(-900, -900, -700, -700))
-    assert rounds(pool).find(np.array([-800.0, -800.0, 0.0])) is None
+    assert go_arounds(pool).find(np.array([-800.0, -800.0, 0.0])) is None

@@ -9,8 +9,8 @@ import pytest
 import shapely
 
 from expdesign.plan.bounds.branch_and_bound import GoalTimes, goal_times, grown_times, time_saved_s, track_of
-from expdesign.plan.bounds.displacement import Headway, carry
-from expdesign.plan.chart.visibility_graph import build_ways
+from expdesign.plan.bounds.displacement import Headway, displacement_of
+from expdesign.plan.chart.visibility_graph import build_visibility_graph
 from expdesign.simulation import Environment
 from plan_case import primitive, random_path, ship
 
@@ -34,27 +34,27 @@ def half_turn(name: str = "half turn"):
     return bent_run(name, turn, 25 * np.pi / 120)
 
 
-def carries(runs, headway):
+def displacements(runs, headway):
     sea = Environment(current_to=headway.current_to)
-    return {run.name: carry(ship(), run, sea, headway) for run in runs}
+    return {run.name: displacement_of(ship(), run, sea, headway) for run in runs}
 
 
 def looked_for(runs, water, ends, headway=STILL):
     counts = {run.name: 1 for run in runs}
-    return time_saved_s(runs, carries(runs, headway), counts, water, ends, headway, ship())
+    return time_saved_s(runs, displacements(runs, headway), counts, water, ends, headway, ship())
 
 
 def test_times_to_the_goal_are_those_of_the_fastest_ways():
     rng = np.random.default_rng(0)
     rocks = shapely.union_all(shapely.buffer(shapely.points(rng.uniform(-150, 150, (6, 2))), 30.0, quad_segs=3))
     water = shapely.box(-200, -200, 200, 200).difference(rocks)
-    ways, goal = build_ways(water), np.array([-190.0, 190.0])
+    ways, goal = build_visibility_graph(water), np.array([-190.0, 190.0])
     for current in (np.zeros(2), np.array([0.3, -0.4])):
         headway = Headway(speed_mps=SPEED, current_to=current)
         times: GoalTimes = goal_times(ways, goal, headway)
         points = rng.uniform(-195, 195, (40, 2))
         points = points[shapely.contains_xy(water, points[:, 1], points[:, 0])]
-        expected = [ways.least(point, goal, headway.seconds) for point in points]
+        expected = [ways.least_cost(point, goal, headway.seconds) for point in points]
         np.testing.assert_allclose(times.at(points), expected, atol=1e-6)
     assert np.isinf(times.at(np.array([[1000.0, 0.0]]))).all()
 
@@ -97,7 +97,7 @@ def test_no_placement_drawn_saves_more_than_told(seed):
         for low in (-300, 150)
     )
     whole_s, told = looked_for([run], water, (start, goal), headway)
-    assert whole_s <= build_ways(water).least(start, goal, headway.seconds)
+    assert whole_s <= build_visibility_graph(water).least_cost(start, goal, headway.seconds)
     times = grown_times([track_of(run, ship(), headway.current_to)], water, goal, headway, ship())
     pose, when = run.trajectory.pose, run.trajectory.time_s
     arm = (ship().length_m - ship().beam_m) / 2
@@ -143,6 +143,6 @@ def test_a_planted_plan_costs_no_less_than_the_way_less_what_its_runs_save(seed)
         here = track[-1]
     water = shapely.union_all([shapely.buffer(shapely.LineString(line[:, ::-1]), 3.0) for line in lines])
     used = [run for run in runs if counts[run.name]]
-    found = time_saved_s(used, carries(used, headway), counts, water, (np.zeros(2), here), headway, ship())
+    found = time_saved_s(used, displacements(used, headway), counts, water, (np.zeros(2), here), headway, ship())
     assert found is not None
     assert found[0] - sum(counts[name] * most_s for name, most_s in found[1].items()) <= spent + 1e-6

@@ -1,6 +1,6 @@
-"""A plan whose drawn trials leave the water is made anew with more room, or refused with the place where they leave.
+"""Where too many drawn trials leave the water, the planner replans with more room, or names the place in its refusal.
 
-The strait is as wide as the ship needs where she points along it. In a current that she does not know she has to point
+The strait is as wide as the ship needs where she points along it. In an unknown current she has to point
 aside to go straight, and her bow comes nearer to the rocks than a plan can tell.
 """
 
@@ -45,16 +45,16 @@ def problem(*gaps: tuple[float, float]) -> PlanProblem:
 
 @pytest.fixture
 def attempts(monkeypatch):
-    """What drawn trials came to, attempt after attempt; a plan is told by its track."""
+    """Risk estimates, attempt after attempt; a plan is represented by its track."""
     found = []
 
-    def noted(promise, *others, **known):
-        found.append(promise)
-        return kept(promise, *others, **known)
+    def noted(risk, *others, **known):
+        found.append(risk)
+        return checked(risk, *others, **known)
 
-    kept = solve.broken_promise
-    monkeypatch.setattr(solve, "broken_promise", noted)
-    monkeypatch.setattr(solve, "_finished", lambda problem, water, sailed, **rest: sailed.trajectory)
+    checked = solve.failed_chance_constraint
+    monkeypatch.setattr(solve, "failed_chance_constraint", noted)
+    monkeypatch.setattr(solve, "_plan", lambda problem, water, sailed, **rest: sailed.trajectory)
     return found
 
 
@@ -63,7 +63,7 @@ def crossing_m(track) -> float:
     return float(np.interp(STRAIT_M, track.pose[:, 0], track.pose[:, 1]))
 
 
-def test_a_wider_way_is_taken_where_too_many_trials_leave_the_direct_one(attempts):
+def test_a_wider_passage_is_taken_where_too_many_trials_leave_the_direct_one(attempts):
     track = plan_trial(problem((0.0, GAP_M), (ASIDE_M, 45.0)))
     first, *_, last = attempts
     assert first.left > 0.05
@@ -72,7 +72,7 @@ def test_a_wider_way_is_taken_where_too_many_trials_leave_the_direct_one(attempt
     assert abs(crossing_m(track) - ASIDE_M) < 45.0
 
 
-def test_with_known_weather_the_direct_way_keeps_its_promise(attempts):
+def test_with_known_weather_the_direct_passage_meets_the_chance_constraint(attempts):
     calm = problem((0.0, GAP_M), (ASIDE_M, 45.0))
     certain = replace(calm.vessel.model, parameter_std=np.zeros(len(calm.vessel.model.names)))
     track = plan_trial(replace(calm, environment=Environment(), vessel=replace(calm.vessel, model=certain)))
@@ -80,7 +80,7 @@ def test_with_known_weather_the_direct_way_keeps_its_promise(attempts):
     assert abs(crossing_m(track)) < GAP_M
 
 
-def test_without_one_the_refusal_names_the_share_the_leg_and_the_place(attempts):
+def test_without_a_wider_passage_the_refusal_names_the_share_the_leg_and_the_place(attempts):
     with pytest.raises(NoPlan) as caught:
         plan_trial(problem((0.0, GAP_M)))
     text = str(caught.value)

@@ -13,7 +13,7 @@ from expdesign.plan import PlanSettings
 from expdesign.plan.chart.clearance_grid import clearance_field
 from expdesign.plan.control.capability import capability
 from expdesign.plan.legs import LegWater
-from expdesign.plan.legs.escape_check import check_ends, gets_away
+from expdesign.plan.legs.escape_check import check_ends, escapes
 from expdesign.plan.local_planner import local_planner
 from expdesign.simulation import CALM
 from helm_case import catamaran
@@ -46,15 +46,15 @@ def slip(half_m: float) -> LegWater:
 def test_out_of_a_slip_there_is_only_the_way_to_its_mouth(backwards):
     narrow, inside = slip(0.6 * RADIUS), np.array([-2 * RADIUS, 0.0, 0.0])
     out = np.add(inside, (0, 0, np.pi * backwards))  # a way towards a place comes from where its stern points
-    assert gets_away(out, narrow, backwards=backwards)
-    assert not gets_away(np.add(out, (0, 0, np.pi)), narrow, backwards=backwards)
+    assert escapes(out, narrow, backwards=backwards)
+    assert not escapes(np.add(out, (0, 0, np.pi)), narrow, backwards=backwards)
 
 
 def test_a_slip_wider_than_a_turn_of_half_a_circle_lets_ships_turn():
     least = RADIUS + np.hypot(RADIUS + VESSEL.beam_m / 2, VESSEL.length_m / 2) - RADIUS + CLEARANCE
     into = np.array([-2.5 * RADIUS, 0.0, np.pi])
-    assert not gets_away(into, slip(0.9 * RADIUS))
-    assert gets_away(np.add(into, (0, -RADIUS, 0)), slip(least + 0.3 * RADIUS))
+    assert not escapes(into, slip(0.9 * RADIUS))
+    assert escapes(np.add(into, (0, -RADIUS, 0)), slip(least + 0.3 * RADIUS))
 
 
 def test_answers_do_not_depend_on_where_north_is():
@@ -62,8 +62,8 @@ def test_answers_do_not_depend_on_where_north_is():
     for turn in np.linspace(0.3, 6.0, 5):
         turned = water(shapely.affinity.rotate(bay.area.water, -np.degrees(turn), origin=(0, 0)))
         place = -2 * RADIUS * np.array([np.cos(turn), np.sin(turn)])
-        assert gets_away(np.r_[place, turn], turned)
-        assert not gets_away(np.r_[place, turn + np.pi], turned)
+        assert escapes(np.r_[place, turn], turned)
+        assert not escapes(np.r_[place, turn + np.pi], turned)
 
 
 def test_the_message_names_the_end_and_its_place_and_agile_ships_are_not_asked():

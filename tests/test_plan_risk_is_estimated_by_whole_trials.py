@@ -14,10 +14,10 @@ import shapely
 from expdesign import workflows
 from expdesign.plan.control.tracking import Helmsman
 from expdesign.plan.legs import LegTask
-from expdesign.plan.monte_carlo.collision import HullWatch
+from expdesign.plan.monte_carlo.collision import CollisionCheck
 from expdesign.plan.monte_carlo.guidance import ARRIVED, Pilot
-from expdesign.plan.monte_carlo.procedure import ROUNDS, tolerances
-from expdesign.plan.monte_carlo.risk import broken_promise, promised
+from expdesign.plan.monte_carlo.procedure import MOST_GO_AROUNDS, tolerances
+from expdesign.plan.monte_carlo.risk import estimate_risk, failed_chance_constraint
 from expdesign.plan.monte_carlo.trials import Trials, sail_trials
 from expdesign.plan.runs.dispersion import Truths, draw_truths
 from expdesign.plan.runs.ensemble import Fleet
@@ -63,7 +63,7 @@ def sailing(basin=OPEN, environment=None, *, certain=False, draws=30, seed=0):
 def test_ships_that_are_as_planned_come_to_the_goal_without_going_round():
     _, trials = sailing(certain=True, draws=3)
     assert trials.completed.all()
-    assert not trials.rounds.any()
+    assert not trials.go_arounds.any()
     runs = [leg.kind == "primitive" for leg in planned().legs]
     assert (trials.used[runs] < 1.0).all()
 
@@ -75,7 +75,7 @@ def test_every_trial_ends_in_one_way_and_runs_begin_within_tolerance():
     np.testing.assert_array_equal(ends, 1)
     begun = ~np.isnan(trials.used)
     assert (trials.used[begun] <= 1.0).all()
-    assert trials.rounds.max() <= ROUNDS
+    assert trials.go_arounds.max() <= MOST_GO_AROUNDS
     over = np.cumsum(trials.left | trials.aborted, axis=0)[:-1] > 0
     assert not trials.samples[1:][over].any()  # nothing is sailed after the end
 
@@ -83,8 +83,8 @@ def test_every_trial_ends_in_one_way_and_runs_begin_within_tolerance():
 def test_a_strange_current_makes_ships_go_round_and_costs_time():
     calm = leg_water(OPEN, clearance_m=5.0)
     windy = replace(calm, environment=Environment(current_std_mps=0.5))
-    few, many = (promised(water, planned(), rng=np.random.default_rng(1), draws=30)[0] for water in (calm, windy))
-    assert sum(leg.rounds for leg in many.legs) > sum(leg.rounds for leg in few.legs)
+    few, many = (estimate_risk(water, planned(), rng=np.random.default_rng(1), draws=30)[0] for water in (calm, windy))
+    assert sum(leg.go_arounds for leg in many.legs) > sum(leg.go_arounds for leg in few.legs)
     assert many.extra_median_s > few.extra_median_s
 
 
@@ -112,9 +112,9 @@ def test_a_ship_whose_way_back_to_a_long_leg_passes_by_an_island_goes_round_it()
         last=True,
     )
     found = pilot.sail(fleet, np.zeros((2, 3)))
-    np.testing.assert_array_equal(found.rounds, [0, 1])
+    np.testing.assert_array_equal(found.go_arounds, [0, 1])
     assert found.begun.all()
-    assert np.isnan(HullWatch(area=water.area, vessel=water.vessel).leaves(found.poses)).all()
+    assert np.isnan(CollisionCheck(area=water.area, vessel=water.vessel).leaves(found.poses)).all()
 
 
 def test_water_that_ends_on_a_run_is_left_there_and_the_message_says_where():
@@ -124,15 +124,15 @@ def test_water_that_ends_on_a_run_is_left_there_and_the_message_says_where():
     assert trials.left[0].all()
     assert not trials.samples[1:].any()
     assert (np.abs(trials.place[0, :, 0] - reach) < water.vessel.length_m).all()
-    promise, trials = promised(water, planned(), rng=np.random.default_rng(0), draws=20)
-    told = broken_promise(promise, trials, legs, water.area, confidence=0.95)
+    risk, trials = estimate_risk(water, planned(), rng=np.random.default_rng(0), draws=20)
+    message = failed_chance_constraint(risk, trials, legs, water.area, confidence=0.95)
     lat, lon = water.area.frame.to_degrees(np.nanmedian(trials.place[0], axis=0))
-    assert "in run 1, 'go'" in told
-    assert f"{lat:.5f}, {lon:.5f}" in told
-    assert promise.left == 1.0
+    assert "in run 1, 'go'" in message
+    assert f"{lat:.5f}, {lon:.5f}" in message
+    assert risk.left == 1.0
 
 
-def test_a_promise_is_kept_or_broken_by_the_share_alone():
+def test_the_chance_constraint_holds_or_fails_by_the_share_alone():
     legs = (Leg(kind="reposition", name="a", first=0, last=1), Leg(kind="primitive", name="a", first=1, last=2))
     left = np.zeros((2, 100), dtype=bool)
     left[0, :5] = True
@@ -140,36 +140,36 @@ def test_a_promise_is_kept_or_broken_by_the_share_alone():
     trials = Trials(
         left=left,
         aborted=np.zeros_like(left),
-        rounds=blank,
+        go_arounds=blank,
         samples=blank,
         used=np.zeros((2, 100)),
-        missed=blank,
+        abort_cause=blank,
         place=np.where(left[..., None], np.full(2, 10.0), np.nan),
         within=(tolerances(leg_water(OPEN)),) * 2,
     )
-    promise = replace(sailed_promise(), left=0.05, trials=100)
-    assert promise.error == pytest.approx(np.sqrt(0.05 * 0.95 / 100))
+    risk = replace(sailed_risk(), left=0.05, trials=100)
+    assert risk.error == pytest.approx(np.sqrt(0.05 * 0.95 / 100))
     sea = leg_water(OPEN).area
-    kept, broken = 1.0 - 0.05 - 1.01 * promise.error, 1.0 - 0.05 - 0.99 * promise.error
-    assert broken_promise(promise, trials, legs, sea, confidence=kept) == ""
-    assert "on the way to run 1" in broken_promise(promise, trials, legs, sea, confidence=broken)
-    none = replace(promise, left=0.0)
-    assert broken_promise(none, trials, legs, sea, confidence=0.9999) == ""
+    kept, broken = 1.0 - 0.05 - 1.01 * risk.error, 1.0 - 0.05 - 0.99 * risk.error
+    assert failed_chance_constraint(risk, trials, legs, sea, confidence=kept) == ""
+    assert "on the way to run 1" in failed_chance_constraint(risk, trials, legs, sea, confidence=broken)
+    none = replace(risk, left=0.0)
+    assert failed_chance_constraint(none, trials, legs, sea, confidence=0.9999) == ""
 
 
-def test_many_trials_broken_off_are_told_first_and_most_of_them_are_no_plan():
-    few, many, most = (replace(sailed_promise(), left=0.0, aborted=x, reasons=("in run 7",)) for x in (0.2, 0.27, 0.5))
+def test_many_aborted_trials_give_a_warning_and_most_of_them_no_plan():
+    few, many, most = (replace(sailed_risk(), left=0.0, aborted=x, reasons=("in run 7",)) for x in (0.2, 0.27, 0.5))
     assert few.note == ""
     assert "about 3 in 10" in many.note
     assert many.note.endswith("in run 7")
     sailed, sea = Trials(**dict.fromkeys(Trials.__dataclass_fields__, np.zeros(1))), leg_water(OPEN).area
-    assert broken_promise(many, sailed, (), sea, confidence=0.95) == ""
-    told = broken_promise(most, sailed, (), sea, confidence=0.95)
-    assert "run 7" in told
-    assert "clearance" not in told  # more of it would not help
+    assert failed_chance_constraint(many, sailed, (), sea, confidence=0.95) == ""
+    message = failed_chance_constraint(most, sailed, (), sea, confidence=0.95)
+    assert "run 7" in message
+    assert "clearance" not in message  # more of it would not help
 
 
-def test_ships_have_come_to_the_goal_only_where_they_are_there():
+def test_ships_reach_the_goal_only_if_they_are_there():
     whole, legs = planned().states, planned().legs
     water = replace(leg_water(OPEN, clearance_m=5.0), environment=Environment(current_std_mps=0.5))
     ships = 20
@@ -195,13 +195,13 @@ def test_ships_have_come_to_the_goal_only_where_they_are_there():
 
 
 @cache
-def sailed_promise():
+def sailed_risk():
     water = leg_water(OPEN, clearance_m=5.0)
-    return promised(water, planned(), rng=np.random.default_rng(0), draws=4)[0]
+    return estimate_risk(water, planned(), rng=np.random.default_rng(0), draws=4)[0]
 
 
 @pytest.mark.slow
-def test_the_promise_of_a_real_plan_holds_in_other_draws_and_without_breaks_it_need_not(monkeypatch):
+def test_the_risk_of_a_real_plan_holds_in_other_draws_and_without_breaks_it_need_not(monkeypatch):
     monkeypatch.syspath_prepend(str(ROOT / "tests" / "benchmarks"))
     import safety
 

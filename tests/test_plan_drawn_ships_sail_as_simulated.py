@@ -11,9 +11,9 @@ import shapely
 from expdesign.plan.chart.visibility_graph import polyline_length
 from expdesign.plan.control.capability import capability
 from expdesign.plan.control.tracking import Helmsman
-from expdesign.plan.monte_carlo.collision import HullWatch
+from expdesign.plan.monte_carlo.collision import CollisionCheck
 from expdesign.plan.monte_carlo.procedure import steady_states
-from expdesign.plan.monte_carlo.return_paths import build_ways_to
+from expdesign.plan.monte_carlo.return_paths import build_return_paths
 from expdesign.plan.monte_carlo.risk import upper_limit
 from expdesign.plan.runs.ensemble import Fleet, Truths
 from expdesign.plan.values import PlanSettings
@@ -114,11 +114,11 @@ def test_ways_of_many_ships_are_as_short_as_each_ships_own():
     basin = shapely.box(-400, -400, 400, 400).difference(shapely.box(-100, -250, 100, 250))
     water = leg_water(basin)
     place, rng = np.array([20.0, 300.0]), np.random.default_rng(3)
-    tree = build_ways_to(water.narrowest_ways, place)
+    tree = build_return_paths(water.narrowest_graph, place)
     points = rng.uniform(-330, 330, (40, 2))
     points = points[(np.abs(points[:, 1]) > 140) | (np.abs(points[:, 0]) > 290)]
     for point, way in zip(points, tree.find(points), strict=True):
-        shortest = water.narrowest_ways.shortest(point, place)
+        shortest = water.narrowest_graph.shortest(point, place)
         assert polyline_length(way) == pytest.approx(polyline_length(shortest), abs=1e-6)
         np.testing.assert_allclose(way[[0, -1]], [point, place])
 
@@ -130,7 +130,7 @@ def test_hulls_leave_where_their_clearance_ends():
         np.cumsum(rng.normal(0, [1.0, 1.0, 0.1], (60, 3)), axis=0) + np.r_[rng.uniform(-150, 150, 2), 0.0]
         for _ in range(60)
     ]
-    watch = HullWatch(area=sea, vessel=vessel)
+    watch = CollisionCheck(area=sea, vessel=vessel)
     left = ~np.isnan(watch.leaves(np.stack(tracks, axis=1))[:, 0])
     for track, gone in zip(tracks, left, strict=True):
         motion = Trajectory(sample_time_s=1.0, pose=track, velocity=np.zeros_like(track))
@@ -155,11 +155,11 @@ def test_a_helmsman_brings_a_ship_with_a_rudder_to_a_course_and_holds_its_speed(
     unlike[1] *= 1.1  # a ship that is not the nominal one
     drawn = Truths(parameters=unlike, current_to=other.current_to, wind_to=other.wind_to)
     fleet = Fleet(vessel, CALM, drawn, state=start, standing=standing, rng=np.random.default_rng(0))
-    felt = np.zeros((2, 3))
+    unexplained = np.zeros((2, 3))
     for _ in range(800):
         before = fleet.states
         wanted = np.column_stack([before[:, :2], np.full(2, 0.6), np.full(2, 6.0), np.zeros((2, 2))])
-        fleet.advance(helm.commands(wanted, before, fleet.given, unexplained=felt), np.ones(2, dtype=bool))
-        felt = helm.unexplained(felt, before, fleet.states, fleet.delivered)
+        fleet.advance(helm.commands(wanted, before, fleet.given, unexplained=unexplained), np.ones(2, dtype=bool))
+        unexplained = helm.unexplained(unexplained, before, fleet.states, fleet.delivered)
     np.testing.assert_allclose(fleet.states[:, 2], 0.6, atol=0.01)
     np.testing.assert_allclose(fleet.states[:, 3], 6.0, atol=0.05)

@@ -1,0 +1,35 @@
+"""The numbers of this room that are chosen, not derived."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tuning:
+    """Clearance grid, visibility graph and distance to the goal.
+
+    Attributes:
+        grid_cells: of the clearance grid at most; a larger area gets a coarser grid.
+        routing_cells: of the grid on which the narrowest passage is located.
+        corners: of a simplified water at most; more would make the graph slow.
+        corners_coarse, coarse: corners accepted once the tolerance is so many times the one asked for: water that
+            shrinks further loses its narrow passages.
+        slit_m: growth of the water before lines of sight are tested, as a path may touch the shore.
+        table_cells: of the table of distances to the goal.
+        table_chunk: cells of that table processed at a time.
+        first_corners: of shortest path length that are tested for sight first; the others only where none is seen.
+    """
+
+    grid_cells: int = 3_000_000
+    routing_cells: int = 400_000
+    corners: int = 700
+    corners_coarse: int = 2500
+    coarse: float = 16.0
+    slit_m: float = 1e-3
+    table_cells: int = 60_000
+    table_chunk: int = 4000
+    first_corners: int = 20
+
+
+CHART = Tuning()

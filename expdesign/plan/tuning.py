@@ -1,0 +1,42 @@
+"""The numbers of the planner's own modules that are chosen, not derived."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tuning:
+    """Work budgets, replanning and warnings.
+
+    Attributes:
+        trials_stream: random stream of the drawn trials, apart from other draws of the same seed.
+        replans: plans made after the first one, each with more room where drawn trials of the one before left the
+            water.
+        widening: factor on a run's room then; legs get the same share of a hull length more clearance.
+        replan_budgets: time budgets of counted work within which a replan must be expected to end.
+        transition_beam: partial plans kept in the searches that choose the transitions to optimise.
+        transitions_s: work budget of optimising transitions; the others keep the rule for leg times [s].
+        failure_s: least cost of a failed placement [s].
+        leg_s: work budget of one leg [s].
+        clock_budgets: time budgets by the clock after which a search that is stuck ends, whatever its counted work.
+        iteration_s: one iteration of the optimiser for each sample of a leg, on a machine of 2020 [s].
+        sample_s: one sample of some hundred drawn ships there [s].
+        many_aborted: share of drawn trials aborted above which a warning leads the report.
+    """
+
+    trials_stream: int = 1
+    replans: int = 2
+    widening: float = 1.4
+    replan_budgets: float = 2.0
+    transition_beam: int = 100
+    transitions_s: float = 30.0
+    failure_s: float = 2.0
+    leg_s: float = 40.0
+    clock_budgets: float = 5.0
+    iteration_s: float = 2e-4
+    sample_s: float = 2.5e-3
+    many_aborted: float = 0.2
+
+
+PLAN = Tuning()
