@@ -104,8 +104,8 @@ class LegOutcome:
     """What drawn trials did on one leg.
 
     Attributes:
-        left, aborted: shares of all trials in which the hull left allowed water here, or which ended here because the run
-            that follows could not be begun.
+        left, aborted: shares of all trials in which the hull left allowed water here, or which were aborted here,
+            before the run that follows.
         go_arounds: mean number of go-arounds for the run that follows, over the ships that sailed the leg.
         median_s, most_s: median and 95th percentile of the time it took [s].
         position_m: distance from the planned start within which a run begins.
