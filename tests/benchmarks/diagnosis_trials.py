@@ -324,7 +324,7 @@ def tried(part: str, number: int, seed: int, only: str | None = None) -> dict[st
         return row | {"crash": f"{type(error).__name__}: {error}", "findings": [], "oracle": float("nan")}
     row["findings"] = [
         {
-            "cause": item.cause, "gain": item.gain, "low": item.gain_interval[0], "worth": item.worth,
+            "cause": item.cause, "gain": item.gain, "low": item.gain_interval[0],
             "same": item.not_distinguishable_from, "estimates": [(e.name, e.value, e.std) for e in item.estimates],
         }
         for item in found.findings
