@@ -13,7 +13,7 @@ ROOT = Path(expdesign.__file__).parent
 
 FLOORS = {
     "": (
-        ("errors", "interruptions", "lazy"),
+        ("errors", "interruptions", "lazy", "progress"),
         ("conventions", "values"),
         ("signals", "sea_area"),
         ("vessel",),

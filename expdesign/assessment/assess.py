@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from expdesign.assessment.limits import Limits, what_limits
@@ -17,10 +17,10 @@ from expdesign.estimation.regression import AIR, MEANS, PREDICTORS
 from expdesign.estimation.replay import Integration
 from expdesign.estimation.solve import Weighting
 from expdesign.estimation.values import Estimate
+from expdesign.progress import Progress, silent
 from expdesign.signals import Record
 from expdesign.vessel import Vessel
 
-Progress = Callable[[str, float], None]
 AUTO = "auto"
 CONTINUOUS, EULER = "continuous", "euler"
 MOTIONS = (CONTINUOUS, EULER)
@@ -88,7 +88,7 @@ def assess(
     wish: Wish | None = None,
     *,
     tests: Record = NO_TESTS,
-    progress: Progress = lambda what, share: None,
+    progress: Progress = silent,
 ) -> Assessment:
     """Estimate by every method and simulate every run with every estimate.
 
@@ -100,7 +100,7 @@ def assess(
         record: what the estimates come from.
         wish: methods and what is held fixed.
         tests: runs that are simulated but not used.
-        progress: called with the current activity and the share done.
+        progress: of the assessment.
 
     Raises:
         InputError: the data lack what a method needs, or a name is unknown.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,10 +27,10 @@ from expdesign.diagnosis.select import Selection, Step, eliminate_backward, only
 from expdesign.diagnosis.values import Diagnosis, Finding
 from expdesign.diagnosis.vessel_file import extend, extended_model
 from expdesign.errors import Diverged
+from expdesign.progress import Progress, silent, within
 from expdesign.signals import Record
 from expdesign.vessel import Vessel
 
-Progress = Callable[[str, float], None]
 SELECTED, VALIDATED = 0.65, 0.92
 """Shares of the work after forward selection and after backward elimination."""
 
@@ -41,7 +41,7 @@ def diagnose(
     *,
     seed: int = 0,
     proposals: Sequence[Proposal] = (),
-    progress: Progress = lambda what, share: None,
+    progress: Progress = silent,
 ) -> Diagnosis:
     """Show what the simulation gets wrong, name the causes, extend the model, measure the gain.
 
@@ -50,7 +50,7 @@ def diagnose(
         record: measured data; velocities over ground, inputs, perhaps pose, wind and depth.
         seed: of the draws behind adjusted p-values and gain intervals.
         proposals: manoeuvres that may distinguish causes; standard ones when empty.
-        progress: is called with what is being done and the share done.
+        progress: of the diagnosis.
 
     Raises:
         NotInformative: the data cannot support a diagnosis; the message says what is missing.
@@ -107,22 +107,16 @@ class _Selected:
 
 def _select(ship: ExtendedModel, windows: Windows, seed: int, progress: Progress) -> _Selected:
     rng = np.random.default_rng(seed)
-    found = select_forward(
-        ship, windows, initial_states(windows), rng, lambda what, share: progress(what, 0.05 + 0.6 * share)
-    )
+    found = select_forward(ship, windows, initial_states(windows), rng, within(progress, 0.05, SELECTED))
 
     def cross_validated(found: Selection) -> list[HeldOut]:
-        return _cross_validated(
-            found, ship, windows, lambda share: progress("measuring the gain on held-out runs", share)
-        )
+        return _cross_validated(found, ship, windows, within(progress, SELECTED, VALIDATED))
 
     kept, held = eliminate_backward(found, windows, cross_validated, seed)
     return _Selected(found=found, kept=kept, held=held)
 
 
-def _cross_validated(
-    found: Selection, ship: ExtendedModel, windows: Windows, progress: Callable[[float], None]
-) -> list[HeldOut]:
+def _cross_validated(found: Selection, ship: ExtendedModel, windows: Windows, progress: Progress) -> list[HeldOut]:
     """Of the model in use with its uncertain parameters fitted, then after every step.
 
     The gain of uncertain parameters within their standard deviations is no merit of a cause. But if the first cause is
@@ -130,12 +124,11 @@ def _cross_validated(
     """
     fitted = bool(found.first.keys) and not any(only_nuisance(step, found) for step in found.steps[:1])
     fits: list[Fit | None] = [found.first if fitted else None, *(step.chosen.fit for step in found.steps)]
-    part = (VALIDATED - SELECTED) / len(fits)
     results = []
     for number, item in enumerate(fits):
-        low = SELECTED + number * part
         model = ship if item is None else item.ship
-        results.append(cross_validate(item, model, windows, lambda share, low=low: progress(low + part * share)))  # type: ignore[misc]
+        part = within(progress, number / len(fits), (number + 1) / len(fits))
+        results.append(cross_validate(item, model, windows, part))
     return results
 
 
@@ -165,7 +158,7 @@ def _discriminating(step: Step, proposals: Sequence[Proposal], windows: Windows)
 def _notes_on_selection(chosen: _Selected, ship: ExtendedModel, windows: Windows, seed: int) -> tuple[str, ...]:
     notes = [*notes_on_rejected(chosen.found, chosen.kept, unit_name(windows))]
     if chosen.kept.first.keys:
-        unfitted = cross_validate(None, ship, windows, lambda share: None)
+        unfitted = cross_validate(None, ship, windows, silent)
         notes += note_on_nuisance(unfitted, chosen.held[0], seed)
     return (*notes, *note_on_unconverged(chosen.held), *note_on_random_current(chosen.kept.last.noise))
 

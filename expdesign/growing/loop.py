@@ -9,9 +9,8 @@ J. Kiefer and J. Wolfowitz, Canad. J. Math. 12 (1960), 363-366.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -23,15 +22,14 @@ from expdesign.growing.search import Measure, best_of, pool_of, refined, violati
 from expdesign.growing.space import FamilySpace, family_spaces
 from expdesign.growing.values import GrowRound, GrowSettings, Growth
 from expdesign.information import PrimitiveInformation, check_informative, estimated_parameters, score_primitives
+from expdesign.progress import Progress, silent, within
 from expdesign.simulation import CALM, Environment
 from expdesign.values import Array
 from expdesign.vessel import Vessel
 
-Progress = Callable[[str, float], None]
 OUTPUT_KEYS = ("u_mps", "v_mps", "r_radps")
 ROUNDING = 1e-6
 """Share of a range by which freely optimised commands may pass a limit."""
-SEARCHING = "searching for manoeuvres that add"
 
 
 def grow_dictionary(
@@ -42,7 +40,7 @@ def grow_dictionary(
     environment: Environment = CALM,
     fixed_parameters: Sequence[str] = (),
     mean_subtraction: str = "complete",
-    progress: Progress = lambda what, share: None,
+    progress: Progress = silent,
 ) -> Growth:
     """Add the most telling manoeuvres of the families to a scored dictionary, one by one, for the D criterion.
 
@@ -51,7 +49,7 @@ def grow_dictionary(
         information: the present dictionary, scored with the same environment, fixed parameters and mean subtraction.
         settings: what to search, and how far.
         environment, fixed_parameters, mean_subtraction: as in `score_primitives`.
-        progress: told what is being done, and the share done.
+        progress: of the search.
 
     Raises:
         NotInformative: the present dictionary cannot tell all parameters apart.
@@ -73,13 +71,14 @@ def grow_dictionary(
     grown, specs, rounds = list(information), list[PrimitiveSpec](), list[GrowRound]()
     first = best = optimum(grown, mean_subtraction)
     while True:
-        tell = _within(progress, len(rounds), settings.rounds)
-        archives = refined(archives, best.inverse, measure, rng, partial(tell, SEARCHING))
+        number, last = len(rounds), settings.rounds + 1
+        part = within(progress, number / last, (number + 1) / last)
+        archives = refined(archives, best.inverse, measure, rng, part)
         spec, found = best_of(archives, best.inverse)
         left = found
         if spec is None or len(rounds) == settings.rounds:
             break
-        item, spec = _addition(case, best, spec, settings, tell)
+        item, spec = _addition(case, best, spec, settings, part)
         left = sensitivity(best, item, mean_subtraction)
         if left <= best.dimension * (1 + settings.tolerance):
             break
@@ -113,13 +112,13 @@ def grow_dictionary(
 
 
 def _addition(
-    case: _Case, best: Optimum, spec: PrimitiveSpec, settings: GrowSettings, tell: Progress
+    case: _Case, best: Optimum, spec: PrimitiveSpec, settings: GrowSettings, progress: Progress
 ) -> tuple[PrimitiveInformation, PrimitiveSpec]:
     """The candidate found, or freely optimised commands that began as its own and are worth more."""
     item = case.scored(spec)
     if not settings.free_form:
         return item, spec
-    tell("optimising its commands", 0.9)
+    progress("optimising its commands", 0.9)
     free = _free_form(case, best, item)
     if free is None:
         return item, spec
@@ -219,7 +218,3 @@ def _unused(number: int, kind: str, grown: Sequence[PrimitiveInformation]) -> st
     while name in taken:
         name += "-again"
     return name
-
-
-def _within(progress: Progress, done: int, rounds: int) -> Progress:
-    return lambda what, share: progress(what, (done + share) / (rounds + 1))

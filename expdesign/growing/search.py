@@ -7,7 +7,7 @@ larger sensitivity than it reports. It is not a bound over the whole of the fami
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +17,7 @@ from expdesign.dictionary import PrimitiveSpec
 from expdesign.dictionary.batch import excite_many
 from expdesign.growing.space import FamilySpace
 from expdesign.information.many import bordered_runs
+from expdesign.progress import Progress, silent
 from expdesign.simulation import Environment
 from expdesign.values import Array
 from expdesign.vessel import Vessel
@@ -128,12 +129,12 @@ def refined(
     inverse: Array,
     measure: Measure,
     rng: np.random.Generator,
-    progress: Callable[[float], None] = lambda share: None,
+    progress: Progress = silent,
 ) -> tuple[Archive, ...]:
     """The archives with local steps from each family's best candidates for a design with B^-1 (d, d)."""
     spaces, grown = [archive.space for archive in archives], tuple(archives)
     for generation, stride in enumerate(STRIDES):
-        progress(generation / len(STRIDES))
+        progress("searching for runs that add more information", generation / len(STRIDES))
         points = [_steps(archive, inverse, stride, rng) for archive in grown]
         more = _measured(spaces, points, measure)
         grown = tuple(archive.with_more(other) for archive, other in zip(grown, more, strict=True))

@@ -9,6 +9,7 @@ import numpy as np
 
 from expdesign.errors import NoAnswer
 from expdesign.indices import outcomes
+from expdesign.progress import Progress, silent
 from expdesign.simulation.helm import steady_ahead
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
@@ -44,7 +45,7 @@ def outcome_gradients(
     *,
     speed_mps: float | None = None,
     side: str = "starboard",
-    progress: Callable[[float], None] = lambda share: None,
+    progress: Progress = silent,
 ) -> OutcomeGradients:
     """Slopes of named outcomes with named parameters, at the nominal model.
 
@@ -54,7 +55,7 @@ def outcome_gradients(
         parameters: p names.
         speed_mps: approach speed, the same whatever the parameters; that of the nominal model when not given.
         side: of the first turn.
-        progress: told the share done.
+        progress: of the simulations.
 
     Raises:
         InputError: the vessel cannot run a trial, or a name is not an outcome.
@@ -70,7 +71,7 @@ def outcome_gradients(
     base = found(theta)
     slopes, sizes = [], []
     for number, name in enumerate(parameters):
-        progress(number / len(parameters))
+        progress("simulating standard trials with other parameters", number / len(parameters))
         index = vessel.model.names.index(name)
         sizes.append(abs(float(theta[index])) or float(np.median(np.abs(theta[theta != 0]))))
         slopes.append(_slopes(found, theta, index, sizes[-1]))

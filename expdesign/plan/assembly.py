@@ -16,8 +16,8 @@ from expdesign.plan.problem import PlanProblem
 from expdesign.plan.runs import Footprint, dispersion_m, footprint
 from expdesign.plan.search import path_exceeds_displacement, place_runs
 from expdesign.plan.tuning import PLAN
-from expdesign.plan.values import Progress
 from expdesign.plan.work_budget import WorkBudget
+from expdesign.progress import Progress
 from expdesign.vessel.hull import covering_discs
 
 

@@ -15,8 +15,9 @@ from expdesign.plan.problem import PlanProblem
 from expdesign.plan.search import place_runs
 from expdesign.plan.timeline import Timeline
 from expdesign.plan.tuning import PLAN
-from expdesign.plan.values import Placement, Progress, SailedTrial
+from expdesign.plan.values import Placement, SailedTrial
 from expdesign.plan.work_budget import WorkBudget
+from expdesign.progress import Progress
 from expdesign.values import Array
 
 GOAL = "goal"
@@ -30,7 +31,7 @@ def sail_all(
     Args:
         problem: the trial.
         room: that legs and runs are planned in.
-        progress: called with the share that is sailed.
+        progress: of the sailing.
         stated: the water that runs keep to, with the clearance asked for.
         budget: counts what legs cost.
 

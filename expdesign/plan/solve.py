@@ -23,12 +23,13 @@ from expdesign.plan.problem import PlanProblem
 from expdesign.plan.sailing import sail_all
 from expdesign.plan.search import LatticePlan, build_lattice, search_lattice
 from expdesign.plan.tuning import PLAN
-from expdesign.plan.values import Leg, Plan, Progress, RiskEstimate, SailedTrial, Verification
+from expdesign.plan.values import Leg, Plan, RiskEstimate, SailedTrial, Verification
 from expdesign.plan.verify import realised_efficiencies, verify_plan
 from expdesign.plan.work_budget import WorkBudget
+from expdesign.progress import Progress, silent
 
 
-def plan_trial(problem: PlanProblem, *, progress: Progress = lambda what, share: None) -> Plan:
+def plan_trial(problem: PlanProblem, *, progress: Progress = silent) -> Plan:
     """One continuous, verified trial from start to goal with every run the design asks for.
 
     Raises:
@@ -126,7 +127,7 @@ def _wider(problem: PlanProblem, room: PlanRoom, trials: Trials, legs: tuple[Leg
 
 def _replanning(progress: Progress) -> Progress:
     """Progress of a replan: most of the work is done, however much of it is to be repeated."""
-    return lambda what, share: progress(f"with more room: {what}", max(share, 0.9))
+    return lambda activity, share: progress(f"with more room: {activity}", max(share, 0.9))
 
 
 def _plan(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,9 +10,6 @@ from expdesign.plan.tuning import PLAN
 from expdesign.sea_area import SeaArea
 from expdesign.signals import Commands, Trajectory
 from expdesign.values import Array, seal
-
-Progress = Callable[[str, float], None]
-"""Called with what is being done, and the share of the work that is done."""
 
 
 @dataclass(frozen=True, kw_only=True)

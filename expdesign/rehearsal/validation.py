@@ -27,13 +27,13 @@ from expdesign.estimation.methods import Settings, estimate
 from expdesign.estimation.solve import Weighting
 from expdesign.information.expected import TrialPart, expected_covariance
 from expdesign.information.moments import HEADINGS
+from expdesign.progress import Progress, silent
 from expdesign.signals import Batch, Record
 from expdesign.simulation import CALM, Environment, simulate_ensemble
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
 
-Progress = Callable[[str, float], None]
 CHUNK = 20
 """Trials of one chunk."""
 RANDOM = "random"
@@ -148,7 +148,7 @@ def validate(
     jobs: int = 1,
     done: Mapping[str, Array] | None = None,
     keep: Callable[[str, Array], None] = lambda key, rows: None,
-    progress: Progress = lambda what, share: None,
+    progress: Progress = silent,
 ) -> tuple[Validated, ...]:
     """Every design of a rehearsal, tried.
 
@@ -157,7 +157,7 @@ def validate(
         jobs: processes; a `joblib.parallel_config` around the call chooses another backend.
         done: rows of chunks from an earlier, interrupted call with the same rehearsal.
         keep: told each chunk's rows as soon as they are there.
-        progress: told the share of the trials done.
+        progress: of the trials.
 
     Raises:
         NoAnswer: no trial of a design gives an estimate.

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from expdesign.workflows.data.indices import indices
     from expdesign.workflows.data.mine import mine
     from expdesign.workflows.explanations.explain import explain
-    from expdesign.workflows.outcome import Outcome, Progress, TextTable
+    from expdesign.workflows.outcome import Outcome, TextTable
     from expdesign.workflows.planning.check_routes import check_routes
     from expdesign.workflows.planning.durations import durations
     from expdesign.workflows.planning.export import export
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Outcome",
-    "Progress",
     "TextTable",
     "check_routes",
     "designed",
@@ -67,7 +66,7 @@ if not TYPE_CHECKING:
             "data.indices": ("indices",),
             "data.mine": ("mine",),
             "explanations.explain": ("explain",),
-            "outcome": ("Outcome", "Progress", "TextTable"),
+            "outcome": ("Outcome", "TextTable"),
             "planning.check_routes": ("check_routes",),
             "planning.durations": ("durations",),
             "planning.export": ("export",),

@@ -13,8 +13,8 @@ from expdesign.export.cards import cards_html
 from expdesign.export.report import ReportContent, report_html
 from expdesign.information import PrimitiveInformation
 from expdesign.plan.values import Plan
+from expdesign.progress import Progress, silent, within
 from expdesign.scenario import Scenario, load_scenario
-from expdesign.workflows.outcome import Progress, silent, within
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.grown import ready
 from expdesign.workflows.steps.planned import planned
@@ -79,7 +79,7 @@ def plan_for(scenario: Scenario | Path | str, *, seed: int = 0, progress: Progre
     Args:
         scenario: a scenario, or its file.
         seed: of all chance.
-        progress: called with what is being done and the share that is done.
+        progress: of the plan.
 
     Raises:
         InputError: something in the files is wrong.

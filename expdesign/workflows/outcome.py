@@ -2,21 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-
-Progress = Callable[[str, float], None]
-"""(what is being done, share of the command done from 0 to 1)."""
-
-
-def silent(what: str, share: float) -> None:
-    """Progress that nobody looks at."""
-
-
-def within(progress: Progress, low: float, high: float) -> Progress:
-    """Progress of a step that takes a command's share from `low` to `high`."""
-    return lambda what, share: progress(what, low + (high - low) * share)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,7 +8,6 @@ searched on a grid (the width of a dead band, the time of a change, the directio
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +21,7 @@ from expdesign.diagnosis.fit.gauss_newton import fit
 from expdesign.diagnosis.fit.tuning import TUNING
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import simulate_from_measured
+from expdesign.progress import Progress
 from expdesign.values import Array
 
 
@@ -56,16 +56,14 @@ def validation_units(windows: Windows) -> Array:
     return windows.batch if len(np.unique(windows.batch)) >= 3 else np.arange(len(windows.batch), dtype=float)
 
 
-def cross_validate(
-    found: Fit | None, ship: ExtendedModel, windows: Windows, progress: Callable[[float], None]
-) -> HeldOut:
+def cross_validate(found: Fit | None, ship: ExtendedModel, windows: Windows, progress: Progress) -> HeldOut:
     """Errors of a model whose effects are fitted to the other units.
 
     Args:
         found: its fit to all units; None for a model that is not fitted.
         ship: the model.
         windows: all data.
-        progress: is called with the share done.
+        progress: of this cross-validation.
     """
     unit = validation_units(windows)
     names = np.unique(unit)
@@ -74,7 +72,7 @@ def cross_validate(
     error = np.zeros((len(names), len(columns)))
     deviation, unconverged = np.zeros_like(error), 0
     for number, fold in enumerate(folds):
-        progress(number / len(folds))
+        progress("measuring the gain on held-out runs", number / len(folds))
         test = np.isin(unit, fold)
         model = ship if found is None or test.all() else _fitted(found, windows, ~test)
         if model is None:

@@ -14,8 +14,9 @@ from expdesign.diagnosis.select.fitted_candidate import FittedCandidate
 from expdesign.diagnosis.select.profile_likelihood import profile_estimate
 from expdesign.diagnosis.select.score_tests import ScoreTest
 from expdesign.diagnosis.select.selection import Selection, Step, redundant_step, without_step
-from expdesign.diagnosis.select.selection_round import Progress, same_effects_as_any, selection_round
+from expdesign.diagnosis.select.selection_round import same_effects_as_any, selection_round
 from expdesign.diagnosis.select.tuning import TUNING
+from expdesign.progress import Progress, within
 from expdesign.values import Array
 
 
@@ -38,7 +39,8 @@ def select_forward(
         rounds += 1
         share = 1.0 - 0.7**rounds
         progress(f"testing causes, round {rounds}", share)
-        search = _Search(windows=windows, rejected=tuple(rejected), rng=rng, progress=_part(progress, share))
+        part = within(progress, share, share + 0.2 * (1.0 - share))
+        search = _Search(windows=windows, rejected=tuple(rejected), rng=rng, progress=part)
         step, tests = search.round(base)
         if step is None and exchanges < TUNING.most_exchanges:
             exchanges += 1
@@ -144,14 +146,9 @@ def _monotonic(progress: Progress) -> Progress:
     """Progress that never goes back, although rounds may look at something again."""
     most = 0.0
 
-    def report(what: str, share: float) -> None:
+    def report(activity: str, share: float) -> None:
         nonlocal most
         most = max(most, share)
-        progress(what, most)
+        progress(activity, most)
 
     return report
-
-
-def _part(progress: Progress, share: float) -> Progress:
-    """Progress of a round that begins when a share of the selection is done."""
-    return lambda what, part: progress(what, share + 0.2 * part * (1 - share))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -22,9 +21,7 @@ from expdesign.diagnosis.select.selection import Step, wald_p_value
 from expdesign.diagnosis.select.short_windows import fit_short_windows, start_in_short_windows
 from expdesign.diagnosis.select.starting_point import StartingPoint, starting_point
 from expdesign.diagnosis.select.tuning import TUNING
-
-Progress = Callable[[str, float], None]
-"""Is called with what is being done and the share of it done."""
+from expdesign.progress import Progress
 
 
 def selection_round(

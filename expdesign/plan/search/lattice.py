@@ -15,7 +15,7 @@ admissible; layers, heuristic and bound derived here. Reduced costs: D. B. Johns
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import cast
 
@@ -24,6 +24,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from expdesign.errors import InputError, NoPlan
+from expdesign.progress import Progress, silent
 from expdesign.values import Array
 
 Counters = tuple[int, ...]
@@ -91,7 +92,7 @@ def search_lattice(
     problem: LatticeProblem,
     *,
     suboptimality: float = 0.0,
-    progress: Callable[[str, float], None] = lambda what, share: None,
+    progress: Progress = silent,
 ) -> LatticePlan:
     """The cheapest plan, or one proved to cost at most (1 + suboptimality) times the cheapest.
 
@@ -219,7 +220,7 @@ class _Layers:
     graphs: list[csr_array]
     limit: float
 
-    def search(self, width: int | None, progress: Callable[[str, float], None]) -> _Found:
+    def search(self, width: int | None, progress: Progress) -> _Found:
         """Layer by layer; at most `width` of them for each number of runs, the most promising."""
         total, expansions = sum(self.problem.counts), 0
         done: dict[Counters, _Layer] = {}

@@ -16,13 +16,14 @@ from expdesign.estimation.regression import model_for
 from expdesign.export import write_files
 from expdesign.export.diagnosis_page import diagnosis_html, diagnosis_json, diagnosis_tables, extended_vessel
 from expdesign.export.diagnosis_page.results import accuracy_entry, finding_entry
+from expdesign.progress import Progress, silent, within
 from expdesign.scenario import load_scenario, load_vessel
 from expdesign.signals import Commands
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, Vessel, VesselModel, direct_terms, generalised_force
 from expdesign.vessel.structures import FORCE_SIGNALS, SHOAL
 from expdesign.workflows.command_text import command_text
-from expdesign.workflows.outcome import Outcome, Progress, TextTable, silent, within
+from expdesign.workflows.outcome import Outcome, TextTable
 from expdesign.workflows.steps.measured import measured
 
 
@@ -45,7 +46,7 @@ def diagnose(
         scenario: whose dictionary is searched for manoeuvres that tell causes apart; standard ones without.
         velocity: where velocities come from, as in `estimate`.
         seed: of all chance.
-        progress: told what is done.
+        progress: of the command.
     """
     if not data:
         raise InputError("no data files are given, expected one or more CSV files")

@@ -21,9 +21,10 @@ from expdesign.export import (
     write_files,
 )
 from expdesign.export.estimate_page import EstimateContent, estimate_html
+from expdesign.progress import Progress, silent, within
 from expdesign.scenario import load_vessel
 from expdesign.workflows.command_text import command_text
-from expdesign.workflows.outcome import Outcome, Progress, TextTable, silent, within
+from expdesign.workflows.outcome import Outcome, TextTable
 from expdesign.workflows.steps.measured import measured
 
 

@@ -12,10 +12,11 @@ from expdesign.export import write_files
 from expdesign.export.indices_form import Held, IndicesContent, indices_html, indices_json, verdict_rows
 from expdesign.indices import StandardResults, ZigZag, measured_trial, standard_results
 from expdesign.indices.measured import Found
+from expdesign.progress import Progress, silent
 from expdesign.scenario import load_vessel
 from expdesign.vessel import Vessel
 from expdesign.workflows.command_text import command_text
-from expdesign.workflows.outcome import Outcome, Progress, TextTable, silent
+from expdesign.workflows.outcome import Outcome, TextTable
 from expdesign.workflows.steps.measured import measured
 
 HEADER = ("From", "Run", "Index", "Result", "", "Limit", "Rule", "Verdict")

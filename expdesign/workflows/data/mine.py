@@ -17,11 +17,12 @@ from expdesign.export import write_files
 from expdesign.export.files import record_csv
 from expdesign.information import estimated_parameters
 from expdesign.information.recorded import BatchInformation, recorded_information
+from expdesign.progress import Progress, silent
 from expdesign.scenario import load_vessel
 from expdesign.signals import Batch, Record
 from expdesign.vessel import VesselModel
 from expdesign.workflows.command_text import command_text
-from expdesign.workflows.outcome import Outcome, Progress, TextTable, silent
+from expdesign.workflows.outcome import Outcome, TextTable
 from expdesign.workflows.steps.measured import measured
 
 
@@ -48,7 +49,7 @@ def mine(
         fixed: parameters that count as known.
         mean: mean subtraction of the estimator that will follow.
         velocity: where velocities come from, as in `estimate`.
-        progress: told what is done.
+        progress: of the command.
 
     Raises:
         InputError: arguments or files that are wrong.

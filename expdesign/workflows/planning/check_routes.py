@@ -7,7 +7,8 @@ from pathlib import Path
 
 from expdesign.errors import FileError
 from expdesign.export.formats.check import check_route_file
-from expdesign.workflows.outcome import Outcome, Progress, silent
+from expdesign.progress import Progress, silent
+from expdesign.workflows.outcome import Outcome
 
 
 def check_routes(files: Sequence[Path], *, progress: Progress = silent) -> Outcome:

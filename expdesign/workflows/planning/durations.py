@@ -8,7 +8,8 @@ from expdesign.durations import efficiencies
 from expdesign.export import (
     durations_json,
 )
-from expdesign.workflows.outcome import Outcome, Progress, silent, within
+from expdesign.progress import Progress, silent, within
+from expdesign.workflows.outcome import Outcome
 from expdesign.workflows.steps.case import loaded, written
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.design_tables import design_summary, design_tables

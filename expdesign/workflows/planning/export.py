@@ -15,7 +15,8 @@ from expdesign.export import (
     write_files,
 )
 from expdesign.export.routes import read_plan
-from expdesign.workflows.outcome import Outcome, Progress, silent
+from expdesign.progress import Progress, silent
+from expdesign.workflows.outcome import Outcome
 
 
 def export(

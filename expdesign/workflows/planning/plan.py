@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from expdesign.durations import with_repeats
+from expdesign.progress import Progress, silent, within
 from expdesign.scenario import load_repeats
-from expdesign.workflows.outcome import Outcome, Progress, silent, within
+from expdesign.workflows.outcome import Outcome
 from expdesign.workflows.steps.case import loaded, written
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.grown import ready

@@ -6,7 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from expdesign.durations import efficiencies
-from expdesign.workflows.outcome import Outcome, Progress, silent, within
+from expdesign.progress import Progress, silent, within
+from expdesign.workflows.outcome import Outcome
 from expdesign.workflows.steps.case import loaded, written
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.design_tables import design_summary

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from expdesign.dictionary.desired import deviating
-from expdesign.workflows.outcome import Outcome, Progress, silent, within
+from expdesign.progress import Progress, silent, within
+from expdesign.workflows.outcome import Outcome
 from expdesign.workflows.steps.case import loaded, written
 from expdesign.workflows.steps.scored import parameters_of, score_files, scored
 

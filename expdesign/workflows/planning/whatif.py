@@ -18,10 +18,11 @@ from expdesign.export.whatif_page import Case, WhatIfContent, explanations, what
 from expdesign.export.whatif_page.page import table_header, table_row
 from expdesign.information import PrimitiveInformation, estimated_parameters
 from expdesign.information.expected import expected_covariance
+from expdesign.progress import Progress, silent
 from expdesign.rehearsal import trial_parts
 from expdesign.scenario import Scenario, load_scenario, load_variant
 from expdesign.workflows.command_text import command_text
-from expdesign.workflows.outcome import Outcome, Progress, TextTable, silent
+from expdesign.workflows.outcome import Outcome, TextTable
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.grown import ready
 from expdesign.workflows.steps.planned import plan_summary, planned
@@ -52,7 +53,7 @@ def whatif(
         jobs: processes; 0 for one per core.
         scheduler: address of a Dask scheduler whose workers carry the work instead.
         seed: of everything drawn.
-        progress: told the share of the cases done.
+        progress: of the cases.
     """
     if not variants:
         raise InputError("no variant files are given, expected one or more")

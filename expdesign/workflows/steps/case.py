@@ -8,8 +8,9 @@ from pathlib import Path
 from expdesign.export import (
     write_files,
 )
+from expdesign.progress import Progress
 from expdesign.scenario import Scenario, load_scenario
-from expdesign.workflows.outcome import Outcome, Progress, TextTable
+from expdesign.workflows.outcome import Outcome, TextTable
 
 
 def loaded(scenario: Path, progress: Progress) -> Scenario:

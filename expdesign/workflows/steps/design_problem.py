@@ -22,10 +22,10 @@ from expdesign.information.augmented import score_augmented
 from expdesign.information.outcome_gradients import outcome_gradients
 from expdesign.information.prior import equation_noise, score_prior, stated_information
 from expdesign.information.recorded import pooled, recorded_information
+from expdesign.progress import Progress, silent, within
 from expdesign.scenario import Scenario
 from expdesign.scenario.values import BudgetWish
 from expdesign.values import Array
-from expdesign.workflows.outcome import Progress, silent, within
 from expdesign.workflows.steps.measured import measured
 
 
@@ -59,7 +59,7 @@ def duration_problem(
         stated_std: prior standard deviations by parameter that design.prior means, where the vessel's own already
             count the prior data; None for the vessel's own.
         seed: of the models drawn from the prior.
-        progress: told about long work.
+        progress: of the step.
 
     Raises:
         InputError, UnknownName: wishes that do not go together with the vessel or the data.
@@ -136,7 +136,7 @@ def _aim(case: Scenario, parameters: tuple[str, ...], interest: tuple[str, ...],
             wish.outcomes,
             own,
             speed_mps=wish.outcome_speed_mps,
-            progress=lambda share: progress("simulating standard trials with other parameters", share),
+            progress=progress,
         )
         units = np.array(
             [wish.outcome_units.get(name, abs(value)) for name, value in zip(found.names, found.values, strict=True)]

@@ -8,8 +8,9 @@ from dataclasses import replace
 from expdesign.export.files import dictionary_files, growth_json
 from expdesign.growing import GrowSettings, Growth, grow_dictionary
 from expdesign.information import PrimitiveInformation
+from expdesign.progress import Progress, silent, within
 from expdesign.scenario import Scenario
-from expdesign.workflows.outcome import Progress, TextTable, silent, within
+from expdesign.workflows.outcome import TextTable
 from expdesign.workflows.steps.scored import scored
 
 STEM = "dictionary-grown"
@@ -30,7 +31,7 @@ def grown(
         information: of its dictionary.
         always: grow it by the usual settings also without that key.
         seed: of all chance, unless the key has its own.
-        progress: told about the search.
+        progress: of the search.
     """
     settings = case.design.grow or (GrowSettings() if always else None)
     if settings is None:

@@ -15,12 +15,12 @@ from expdesign.estimation.values import Estimate
 from expdesign.export.files import Purchase
 from expdesign.information.expected import TrialPart, expected_covariance
 from expdesign.plan.values import Plan
+from expdesign.progress import Progress
 from expdesign.signals import Commands, Record
 from expdesign.simulation import Environment
 from expdesign.values import Array
 from expdesign.vessel import Vessel
 from expdesign.vessel.structures import SHOAL
-from expdesign.workflows.outcome import Progress
 
 MATTERS = 1.05
 """Runs without which a standard deviation would be larger by this factor are worth naming."""
@@ -39,7 +39,7 @@ def updated(
         record: the data, draught over depth among its inputs where the model reads depth.
         fixed: parameters that are not to be estimated.
         prior_counts: whether the vessel's standard deviations are knowledge to be combined with the estimate.
-        progress: told what is done.
+        progress: of the estimation.
 
     Returns:
         Vessel, where its parameters come from, and notes.

@@ -15,8 +15,8 @@ from expdesign.information import PrimitiveInformation
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import plan_trial
 from expdesign.plan.values import Plan, RiskEstimate
+from expdesign.progress import Progress, silent
 from expdesign.scenario import Scenario
-from expdesign.workflows.outcome import Progress, silent
 
 
 def planned(

@@ -13,6 +13,7 @@ from expdesign.dictionary import build_primitive
 from expdesign.dictionary.spec import PrimitiveSpec
 from expdesign.errors import Diverged, FileError, InputError, NoAnswer, UnknownName, Unreachable
 from expdesign.information import estimated_parameters
+from expdesign.progress import Progress, silent
 from expdesign.records import Fix, last_fix
 from expdesign.scenario import Scenario, load_scenario, load_vessel
 from expdesign.scenario.berth import berth_problem
@@ -20,7 +21,6 @@ from expdesign.signals import Record
 from expdesign.simulation import Environment
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
-from expdesign.workflows.outcome import Progress, silent
 from expdesign.workflows.steps.known import updated
 from expdesign.workflows.steps.measured import measured
 

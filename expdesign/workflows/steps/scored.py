@@ -9,8 +9,8 @@ from expdesign.export import (
     dictionary_json,
 )
 from expdesign.information import PrimitiveInformation, estimated_parameters, score_primitives
+from expdesign.progress import Progress, silent
 from expdesign.scenario import Scenario
-from expdesign.workflows.outcome import Progress, silent
 
 
 def scored(case: Scenario, *, progress: Progress = silent) -> tuple[PrimitiveInformation, ...]:

@@ -17,11 +17,12 @@ from expdesign.export import vessel_toml, write_files
 from expdesign.export.files import Known, replan_json
 from expdesign.information import estimated_parameters
 from expdesign.plan.values import Plan
+from expdesign.progress import Progress, silent, within
 from expdesign.scenario import Scenario
 from expdesign.values import Array
 from expdesign.vessel import Vessel
 from expdesign.workflows.command_text import command_text
-from expdesign.workflows.outcome import Outcome, Progress, TextTable, silent, within
+from expdesign.workflows.outcome import Outcome, TextTable
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.design_tables import design_summary
 from expdesign.workflows.steps.grown import growth_summary, ready
@@ -54,7 +55,7 @@ def replan(
         remaining_s: informative time left; the scenario's less the time of the data when None.
         interest: parameters that the rest is to be best for, by criterion D_s; the scenario's criterion when empty.
         seed: of all chance.
-        progress: told what is done.
+        progress: of the command.
 
     Raises:
         InputError: something in the files is wrong, the ship is not in safe water, or no time is left.

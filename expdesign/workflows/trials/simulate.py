@@ -15,11 +15,12 @@ from expdesign.export import (
     write_files,
 )
 from expdesign.export.routes import read_plan
+from expdesign.progress import Progress, silent
 from expdesign.scenario import load_vessel
 from expdesign.signals import Commands
 from expdesign.simulation import Environment, WeatherSeries, draw_environment, draw_weather, measure
 from expdesign.simulation import simulate as simulate_run
-from expdesign.workflows.outcome import Outcome, Progress, silent
+from expdesign.workflows.outcome import Outcome
 
 
 def simulate(

@@ -15,11 +15,12 @@ from expdesign.errors import InputError
 from expdesign.export import vessel_toml, write_files
 from expdesign.export.validation_page import ValidationContent, judgements, validation_html, validation_json
 from expdesign.information import estimated_parameters
+from expdesign.progress import Progress, silent, within
 from expdesign.rehearsal import RANDOM, Rehearsal, equal_runs, validate
 from expdesign.scenario import load_scenario, load_vessel
 from expdesign.values import Array
 from expdesign.workflows.command_text import command_text
-from expdesign.workflows.outcome import Outcome, Progress, TextTable, silent, within
+from expdesign.workflows.outcome import Outcome, TextTable
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.grown import ready
 
