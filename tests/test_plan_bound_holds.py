@@ -47,7 +47,7 @@ def test_open_water_leaves_the_straight_line_less_the_chords():
     assert to_sail(OPEN, {}, {}) == pytest.approx(400, abs=1e-6)
 
 
-def test_round_a_wall_the_way_is_the_taut_string():
+def test_round_a_wall_the_path_is_the_shortest_one():
     detour = 2 * np.hypot(305, 195) + 2 * 5 + 10  # at most: corners rounded at 5 m are cut off
     found = to_sail(OPEN.difference(WALL), {}, {})
     assert 0.99 * detour < found <= detour
@@ -62,7 +62,7 @@ def test_a_run_whose_chord_crosses_the_wall_may_not_be_counted_by_its_chord():
     assert found <= string - 20
 
 
-def test_a_straight_run_carries_its_length_and_does_not_stray():
+def test_a_straight_run_makes_good_its_length_and_does_not_deviate():
     run, speed = primitive(ship()), 1.3
     found = displacement_of(ship(), run, CALM, Headway(speed_mps=speed, current_to=np.zeros(2)))
     length = np.hypot(*(run.trajectory.pose[-1] - run.trajectory.pose[0])[:2])
@@ -84,7 +84,7 @@ def test_what_a_run_is_credited_with_in_a_current_is_the_most_over_all_headings(
     assert found.path_s >= found.chord_s - 1e-9
 
 
-def test_the_least_time_in_a_current_makes_good_the_way_and_obeys_the_triangle_inequality():
+def test_the_least_time_in_a_current_makes_good_the_step_and_obeys_the_triangle_inequality():
     rng = np.random.default_rng(0)
     ground, more = rng.normal(size=(2, 500, 2))
     for current in rng.uniform(-0.6, 0.6, (5, 2)):
@@ -94,7 +94,7 @@ def test_the_least_time_in_a_current_makes_good_the_way_and_obeys_the_triangle_i
         assert (headway.seconds(ground + more) <= seconds + headway.seconds(more) + 1e-12).all()
 
 
-def test_no_point_of_a_drifting_runs_chord_is_farther_from_its_path_than_told():
+def test_no_point_of_a_drifting_runs_chord_exceeds_its_deviation():
     run = primitive(ship())
     turn = np.radians(120.0) * np.linspace(0, 1, len(run.trajectory))
     arc = np.column_stack([40 * np.sin(turn), 40 * (1 - np.cos(turn)), turn])
@@ -126,7 +126,7 @@ WEATHERS = {
 
 
 @pytest.mark.parametrize("weather", WEATHERS)
-def test_no_heading_carries_a_run_that_feels_the_air_farther_than_told(weather):
+def test_no_heading_displaces_a_run_in_wind_by_more_than_the_bound(weather):
     vessel, environment = windy(), WEATHERS[weather]
     run, headway = primitive(vessel), Headway(speed_mps=1.3, current_to=environment.current_to)
     told = displacement_of(vessel, run, environment, headway)
@@ -221,7 +221,7 @@ def test_a_planted_plan_costs_no_less_than_the_bound(seed):
 
 
 @pytest.mark.parametrize("along", [1.0, -1.0])
-def test_with_and_against_a_current_the_bound_is_the_way_by_the_speed_over_ground(along):
+def test_with_and_against_a_current_the_bound_is_the_distance_by_the_speed_over_ground(along):
     current = np.array([0.0, 0.2 * along])
     bound_s = reposition_bound_s(
         ship(),
@@ -268,7 +268,7 @@ def test_changing_speed_loses_what_constant_acceleration_loses():
         assert lost == pytest.approx(change_s * (1 - (first + last) / 2), abs=3 * step_s)
 
 
-def test_no_change_of_speed_drawn_is_faster_than_told():
+def test_no_random_change_of_speed_is_faster_than_the_limit():
     vessel, rng = ship(), np.random.default_rng(1)
     told = leg_end(vessel, CALM, 0.0, None, top_mps=1.36, yaw_rate_radps=0.3).changes
     speed, way, n = 1.36 * np.sqrt(rng.uniform(1e-6, 1, 200_000)), rng.uniform(-np.pi, np.pi, 200_000), 200_000
@@ -284,7 +284,7 @@ def test_no_change_of_speed_drawn_is_faster_than_told():
     assert ahead <= told.faster_mps2[-1, 0] <= 1.11 * ahead
 
 
-def test_simulated_ships_whose_commands_move_at_their_rates_stay_between_the_speeds_told():
+def test_simulated_ships_with_rate_limited_commands_stay_between_the_speed_bounds():
     vessel, rng = ship(), np.random.default_rng(2)
     rates = np.array([limit.rate for limit in vessel.limits])
     for standing, speed in ((np.array([8.0, 0.0, 8.0, 0.0]), 0.8), (np.array([-3.0, 1.5, 2.0, -0.5]), 0.3)):
@@ -304,7 +304,7 @@ def test_simulated_ships_whose_commands_move_at_their_rates_stay_between_the_spe
             assert (sailed[known] >= least[::10][known] - 1e-6).all()
 
 
-def test_ships_with_stopped_engines_gather_way_no_faster_than_told_whatever_the_angles_they_stand_at():
+def test_ships_with_stopped_engines_accelerate_no_faster_than_the_limit_at_any_angles():
     vessel, rng = ship(), np.random.default_rng(3)
     rates = np.array([limit.rate for limit in vessel.limits])
     stopped = np.array([0.0, np.nan, 0.0, np.nan])

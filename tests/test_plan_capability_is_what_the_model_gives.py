@@ -36,7 +36,7 @@ def test_turns_can_be_held_and_are_no_tighter_than_asked():
         (PlanSettings(), 2.0, "current of 2 m/s"),
     ],
 )
-def test_wishes_beyond_the_ship_are_refused_with_both_numbers(settings, current, words):
+def test_settings_beyond_the_ship_are_refused_with_both_numbers(settings, current, words):
     with pytest.raises(NoPlan, match=words):
         capability(load_vessel(VESSELS / "model-ship.toml"), settings, current_mps=current)
 

@@ -110,7 +110,7 @@ def test_steady_motion_keeps_its_velocity_through_the_current_and_leads_through_
     np.testing.assert_allclose(np.diff(states[::2, :2], axis=0), simpson, atol=1e-7)
 
 
-def test_ways_of_many_ships_are_as_short_as_each_ships_own():
+def test_return_paths_of_many_ships_are_as_short_as_each_ships_own():
     basin = shapely.box(-400, -400, 400, 400).difference(shapely.box(-100, -250, 100, 250))
     water = leg_water(basin)
     place, rng = np.array([20.0, 300.0]), np.random.default_rng(3)
@@ -123,7 +123,7 @@ def test_ways_of_many_ships_are_as_short_as_each_ships_own():
         np.testing.assert_allclose(way[[0, -1]], [point, place])
 
 
-def test_hulls_leave_where_their_clearance_ends():
+def test_hulls_exit_where_their_clearance_ends():
     coast = shapely.box(-200, -200, 200, 200).difference(shapely.Point(30, 40).buffer(25))
     sea, vessel, rng = area(coast), ship(), np.random.default_rng(4)
     tracks = [
@@ -131,7 +131,7 @@ def test_hulls_leave_where_their_clearance_ends():
         for _ in range(60)
     ]
     watch = CollisionCheck(area=sea, vessel=vessel)
-    left = ~np.isnan(watch.leaves(np.stack(tracks, axis=1))[:, 0])
+    left = ~np.isnan(watch.exits(np.stack(tracks, axis=1))[:, 0])
     for track, gone in zip(tracks, left, strict=True):
         motion = Trajectory(sample_time_s=1.0, pose=track, velocity=np.zeros_like(track))
         assert gone == (hull_clearance(sea, motion, vessel.hull_b).min() <= 0.0)

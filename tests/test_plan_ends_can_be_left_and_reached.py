@@ -43,7 +43,7 @@ def slip(half_m: float) -> LegWater:
 
 
 @pytest.mark.parametrize("backwards", [False, True])
-def test_out_of_a_slip_there_is_only_the_way_to_its_mouth(backwards):
+def test_a_slip_can_only_be_left_through_its_mouth(backwards):
     narrow, inside = slip(0.6 * RADIUS), np.array([-2 * RADIUS, 0.0, 0.0])
     out = np.add(inside, (0, 0, np.pi * backwards))  # a way towards a place comes from where its stern points
     assert escapes(out, narrow, backwards=backwards)

@@ -43,7 +43,7 @@ def settled_s(vessel: Vessel, *, allowed_for: bool) -> np.ndarray:
     return vessel.sample_time_s * (SAMPLES - np.argmax(far[::-1], axis=0))
 
 
-def test_ships_with_slow_actuators_come_to_rest_sooner_when_these_are_told_more_than_is_wanted():
+def test_ships_with_slow_actuators_come_to_rest_sooner_when_commanded_more_than_desired():
     prompt = ship()
     slow = [replace(item, responses=(LATE,) * len(item.limits)) for item in prompt.actuators]
     late = replace(prompt, model=replace(prompt.model, actuators=tuple(slow)))
@@ -55,7 +55,7 @@ def test_ships_with_slow_actuators_come_to_rest_sooner_when_these_are_told_more_
     assert allowed_s.mean() < ideal_s.mean() + swing_s / 2 < ignored_s.mean()
 
 
-def test_what_actuators_without_lag_are_told_does_not_depend_on_what_they_give():
+def test_commands_of_actuators_without_lag_do_not_depend_on_what_they_deliver():
     vessel = ship()
     helm = Helmsman(vessel=vessel, environment=CALM, ship=capability(vessel, PlanSettings()))
     rng = np.random.default_rng(1)
@@ -65,7 +65,7 @@ def test_what_actuators_without_lag_are_told_does_not_depend_on_what_they_give()
     )
 
 
-def test_a_ship_with_a_helm_that_is_wanted_astern_does_not_turn_round():
+def test_a_helm_steered_ship_that_is_to_go_astern_does_not_turn_round():
     vessel = coaster()
     helm = Helmsman(vessel=vessel, environment=CALM, ship=open_water(vessel).ship)
     astern = np.array([0.0, 0.0, 0.0, -2.0, 0.0, 0.0])

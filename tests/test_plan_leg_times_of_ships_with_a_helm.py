@@ -42,7 +42,7 @@ def test_lengths_do_not_change_when_poses_are_moved_turned_mirrored_or_sailed_ba
         np.testing.assert_allclose(dubins_m(*other, radius_m=1.3), found, rtol=1e-6, atol=1e-6)
 
 
-def test_a_longer_leg_takes_longer_and_never_less_than_its_way_at_transit_speed():
+def test_a_longer_leg_takes_longer_and_never_less_than_its_length_at_transit_speed():
     times = rule()
     for exit_mps, entry_mps in ((0.0, 5.0), (4.8, 5.0), (1.4, 0.0), (2.4, 5.0)):
         shortest_m = max(times._table(exit_mps, entry_mps)[0][0], 0.0 if entry_mps else times.at_rest_m)
@@ -56,7 +56,7 @@ def test_a_longer_leg_takes_longer_and_never_less_than_its_way_at_transit_speed(
         assert times.seconds(0.9 * shortest_m, exit_mps, entry_mps) > seconds[0]
 
 
-def test_going_on_as_before_loses_hardly_anything_and_a_start_what_gathering_way_loses():
+def test_keeping_the_speed_loses_hardly_anything_and_a_start_what_accelerating_loses():
     times = rule()
     assert times.lost_s(6.0, 6.0, made_good=True) < 5.0
     ways = times.speeding_up

@@ -62,7 +62,7 @@ def test_a_walled_in_vessel_has_no_leg():
         (np.array([0.0, 0.0, 0.0, 0.8, 0.3, -0.05]), at_rest(300, -200, -2.0)),
     ],
 )
-def test_commands_take_the_vessel_to_the_wanted_state_within_limits_and_rates(start, end):
+def test_commands_take_the_vessel_to_the_desired_state_within_limits_and_rates(start, end):
     water = leg_water(OPEN)
     begin = np.array([5.0, 0.3, -2.0, 0.1])
     values = find_leg(task(start, end, begin), water)

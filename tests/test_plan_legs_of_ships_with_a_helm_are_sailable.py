@@ -75,7 +75,7 @@ def test_the_commands_sailed_with_a_tenth_of_the_step_arrive(ship, case):
 
 
 @BOTH
-def test_limits_and_rates_hold_from_the_commands_standing_before_to_those_wanted_after(ship, case):
+def test_limits_and_rates_hold_from_the_commands_before_to_those_after(ship, case):
     water, task, values = sailed(ship, case)
     steps = np.diff(np.vstack([task.start_inputs, values]), axis=0)
     for index, limit in enumerate(water.vessel.limits):

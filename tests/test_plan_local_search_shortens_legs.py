@@ -30,7 +30,7 @@ def space():
     return placed_in(shapely.box(-600, -600, 600, 600).difference(ISLAND), np.array([0.0, 400.0, 0.0]))
 
 
-def test_legs_take_less_time_and_runs_and_ways_stay_in_the_water(space):
+def test_legs_take_less_time_and_runs_and_paths_stay_in_the_water(space):
     ends = ChainEnds(start=START, exit_mps=0.0, last=-1)
     found = polished(space, [0, 0, 0], POSES, ends)
     assert measured_s(space, [0, 0, 0], found, ends) < measured_s(space, [0, 0, 0], POSES, ends) - 5.0
@@ -41,7 +41,7 @@ def test_legs_take_less_time_and_runs_and_ways_stay_in_the_water(space):
     )
 
 
-def test_no_plan_takes_less_than_its_way_at_full_speed(space):
+def test_no_plan_takes_less_than_its_path_at_full_speed(space):
     ends = ChainEnds(start=START, exit_mps=0.0, last=-1)
     found = polished(space, [0, 0, 0], POSES, ends)
     froms, tos = np.vstack([START, run_ends(space, np.zeros(3, dtype=int), found)]), np.vstack([found, space.goal])

@@ -15,10 +15,11 @@ from expdesign import workflows
 from expdesign.plan.control.tracking import Helmsman
 from expdesign.plan.legs import LegTask
 from expdesign.plan.monte_carlo.collision import CollisionCheck
-from expdesign.plan.monte_carlo.guidance import ARRIVED, Pilot
-from expdesign.plan.monte_carlo.procedure import MOST_GO_AROUNDS, tolerances
+from expdesign.plan.monte_carlo.guidance import Guidance
+from expdesign.plan.monte_carlo.procedure import tolerances
 from expdesign.plan.monte_carlo.risk import estimate_risk, failed_chance_constraint
 from expdesign.plan.monte_carlo.trials import Trials, sail_trials
+from expdesign.plan.monte_carlo.tuning import MONTE_CARLO
 from expdesign.plan.runs.dispersion import Truths, draw_truths
 from expdesign.plan.runs.ensemble import Fleet
 from expdesign.plan.timeline import Timeline
@@ -60,7 +61,7 @@ def sailing(basin=OPEN, environment=None, *, certain=False, draws=30, seed=0):
     return water, sail_trials(water, planned(), draws=draws, rng=rng)
 
 
-def test_ships_that_are_as_planned_come_to_the_goal_without_going_round():
+def test_nominal_ships_reach_the_goal_without_go_arounds():
     _, trials = sailing(certain=True, draws=3)
     assert trials.completed.all()
     assert not trials.go_arounds.any()
@@ -68,19 +69,19 @@ def test_ships_that_are_as_planned_come_to_the_goal_without_going_round():
     assert (trials.used[runs] < 1.0).all()
 
 
-def test_every_trial_ends_in_one_way_and_runs_begin_within_tolerance():
+def test_every_trial_has_one_outcome_and_runs_begin_within_tolerance():
     weather = Environment(current_std_mps=0.25)
     _, trials = sailing(environment=weather, draws=30)
     ends = trials.left.sum(axis=0) + trials.aborted.sum(axis=0) + trials.completed
     np.testing.assert_array_equal(ends, 1)
     begun = ~np.isnan(trials.used)
     assert (trials.used[begun] <= 1.0).all()
-    assert trials.go_arounds.max() <= MOST_GO_AROUNDS
+    assert trials.go_arounds.max() <= MONTE_CARLO.go_arounds
     over = np.cumsum(trials.left | trials.aborted, axis=0)[:-1] > 0
     assert not trials.samples[1:][over].any()  # nothing is sailed after the end
 
 
-def test_a_strange_current_makes_ships_go_round_and_costs_time():
+def test_an_unknown_current_causes_go_arounds_and_costs_time():
     calm = leg_water(OPEN, clearance_m=5.0)
     windy = replace(calm, environment=Environment(current_std_mps=0.5))
     few, many = (estimate_risk(water, planned(), rng=np.random.default_rng(1), draws=30)[0] for water in (calm, windy))
@@ -88,7 +89,7 @@ def test_a_strange_current_makes_ships_go_round_and_costs_time():
     assert many.extra_median_s > few.extra_median_s
 
 
-def test_a_ship_whose_way_back_to_a_long_leg_passes_by_an_island_goes_round_it():
+def test_a_ship_whose_return_to_a_long_leg_is_blocked_by_an_island_goes_around_it():
     rocks = shapely.box(25, 80, 45, 130)
     water = leg_water(shapely.box(-200, -200, 300, 700).difference(rocks), clearance_m=5.0)
     task = LegTask(
@@ -102,7 +103,7 @@ def test_a_ship_whose_way_back_to_a_long_leg_passes_by_an_island_goes_round_it()
     )
     fleet = Fleet(water.vessel, CALM, certain, state=task.start, standing=np.zeros(4), rng=np.random.default_rng(0))
     fleet.states[:, 1] = [3.0, 65.0]  # both see the beginning of the leg
-    pilot = Pilot(
+    guidance = Guidance(
         helm,
         water,
         np.hstack([track.pose, track.velocity]),
@@ -111,10 +112,10 @@ def test_a_ship_whose_way_back_to_a_long_leg_passes_by_an_island_goes_round_it()
         inputs=np.zeros(4),
         last=True,
     )
-    found = pilot.sail(fleet, np.zeros((2, 3)))
+    found = guidance.sail(fleet, np.zeros((2, 3)))
     np.testing.assert_array_equal(found.go_arounds, [0, 1])
     assert found.begun.all()
-    assert np.isnan(CollisionCheck(area=water.area, vessel=water.vessel).leaves(found.poses)).all()
+    assert np.isnan(CollisionCheck(area=water.area, vessel=water.vessel).exits(found.poses)).all()
 
 
 def test_water_that_ends_on_a_run_is_left_there_and_the_message_says_where():
@@ -178,7 +179,7 @@ def test_ships_reach_the_goal_only_if_they_are_there():
     rng = np.random.default_rng(0)
     truths = draw_truths(water.vessel, water.environment, ships, rng)
     fleet = Fleet(water.vessel, water.environment, truths, state=last[0], standing=np.zeros(4), rng=rng)
-    pilot = Pilot(
+    guidance = Guidance(
         helm,
         water,
         last,
@@ -187,11 +188,11 @@ def test_ships_reach_the_goal_only_if_they_are_there():
         inputs=np.zeros(4),
         last=True,
     )
-    found = pilot.sail(fleet, np.zeros((ships, 3)))
+    found = guidance.sail(fleet, np.zeros((ships, 3)))
     off_m = np.hypot(*(found.poses[-1, :, :2] - last[-1, :2]).T)
     assert 0 < found.begun.sum() < ships  # some currents are faster than the ship
-    assert off_m[found.begun].max() <= ARRIVED * water.vessel.length_m
-    assert off_m[~found.begun].min() > ARRIVED * water.vessel.length_m
+    assert off_m[found.begun].max() <= MONTE_CARLO.arrived_hulls * water.vessel.length_m
+    assert off_m[~found.begun].min() > MONTE_CARLO.arrived_hulls * water.vessel.length_m
 
 
 @cache

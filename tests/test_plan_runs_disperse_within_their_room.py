@@ -32,7 +32,7 @@ def stray(vessel, environment=CALM, confidence=0.9, seed=0, draws=400):
     )
 
 
-def test_nothing_uncertain_nothing_strays():
+def test_without_uncertainty_there_is_no_dispersion():
     assert stray(certain(ship())).max() < 1e-6
 
 
@@ -41,7 +41,7 @@ def test_a_known_mean_current_is_no_uncertainty():
     assert stray(certain(ship()), steady).max() < 1e-6
 
 
-def test_an_uncertain_current_strays_like_its_rayleigh_quantile():
+def test_an_uncertain_current_disperses_runs_like_its_rayleigh_quantile():
     # the water carries the ship bodily: distance after t is t x |drawn current|, a Rayleigh variable
     vessel = certain(ship())
     spread = Environment(current_std_mps=0.05)
@@ -54,7 +54,7 @@ def test_an_uncertain_current_strays_like_its_rayleigh_quantile():
     assert exact * 0.85 - 4 * error < end < exact + 4 * error
 
 
-def test_a_current_that_never_changes_while_it_varies_strays_like_an_uncertain_one():
+def test_a_variation_of_infinite_memory_disperses_runs_like_an_uncertain_mean():
     # a process that forgets nothing is a mean drawn once: the same current, known in another way
     vessel = certain(ship())
     held = Environment(current_variation=Variation(std_mps=0.05, correlation_s=1e9))
@@ -87,16 +87,16 @@ def leave(vessel, water, environment=CALM, draws=400):
     helm = Helmsman(vessel=vessel, environment=environment, ship=capability(vessel, PlanSettings()))
     poses = open_loop(helm, fleet, run.commands.values, np.ones(draws, dtype=bool))
     watch = CollisionCheck(area=area(water), vessel=vessel)
-    return float((fleet.lost | ~np.isnan(watch.leaves(poses)[:, 0])).mean())
+    return float((fleet.lost | ~np.isnan(watch.exits(poses)[:, 0])).mean())
 
 
-def test_a_certain_ship_leaves_never_or_always():
+def test_a_certain_ship_always_or_never_leaves_the_water():
     vessel = certain(ship())
     assert leave(vessel, shapely.box(-100, -100, 100, 200)) == 0.0
     assert leave(vessel, shapely.box(-100, -100, 100, 30)) == 1.0
 
 
-def test_half_of_the_currents_carry_the_ship_over_a_line_at_its_side():
+def test_half_of_the_currents_push_the_ship_over_a_line_at_its_side():
     # the hull grazes the line with no current: it crosses when the drawn east current is to the east
     vessel = certain(ship())
     draws = 1000
@@ -110,6 +110,6 @@ def test_a_thin_wall_across_the_course_is_not_stepped_over(north_m):
     assert leave(certain(ship()), basin) == 1.0
 
 
-def test_more_confidence_than_draws_can_tell_is_refused():
+def test_more_confidence_than_the_draws_resolve_is_refused():
     with pytest.raises(NoPlan, match="too high to be estimated"):
         stray(ship(), confidence=0.99999, draws=None)

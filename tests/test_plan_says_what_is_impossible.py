@@ -47,7 +47,7 @@ def test_water_too_small_for_a_run_names_the_run_its_length_and_where_the_search
     assert text.endswith("with 2 runs to go")
 
 
-def test_a_way_too_narrow_names_its_width_its_place_and_the_wish():
+def test_too_narrow_a_passage_names_its_width_its_place_and_the_setting():
     wall = shapely.box(-10, -1000, 10, 300).union(shapely.box(-10, 330, 10, 1000))
     text = refusal(WIDE.difference(wall))
     widest = float(re.search(r"leaves ([\d.]+) m on each side", text)[1])
@@ -56,7 +56,7 @@ def test_a_way_too_narrow_names_its_width_its_place_and_the_wish():
     assert "plan.clearance_m = 20" in text
 
 
-def test_a_goal_on_another_lake_is_told_from_a_narrow_way():
+def test_a_goal_on_another_lake_is_distinguished_from_a_narrow_passage():
     text = refusal(WIDE.difference(shapely.box(-10, -1000, 10, 1000)))
     assert "forbidden water lies between them on every way" in text
 

@@ -191,6 +191,6 @@ def test_a_ship_that_is_unstable_on_course_still_has_turns():
     assert found.turns[-1].radius_m < able(ship).turns[-1].radius_m
 
 
-def test_a_vessel_that_forces_steer_every_way_needs_no_helm():
+def test_a_vessel_with_forces_in_every_direction_needs_no_helm():
     assert not needs_helm(tug())
     assert not needs_helm(load_vessel(VESSELS / "model-ship.toml"))

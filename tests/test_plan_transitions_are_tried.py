@@ -35,7 +35,7 @@ def test_each_pair_of_runs_counts_once_and_so_do_both_ends():
     assert pairs_of(places[:1], "c") == [("c", "a"), ("a", "")]
 
 
-def test_a_transition_that_was_tried_is_sailed_as_told_and_loses_no_more_than_others(water, space):
+def test_a_tried_transition_is_sailed_as_optimised_and_loses_no_more_than_others(water, space):
     go = primitive(water.vessel)
     known = tried(space, water, {"go": go})
     again = tried(known, water, {})  # nothing is tried twice

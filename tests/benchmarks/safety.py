@@ -24,7 +24,8 @@ from expdesign import workflows
 from expdesign.plan import Plan
 from expdesign.plan.assembly import leg_water
 from expdesign.plan.legs.water import LegWater
-from expdesign.plan.monte_carlo import procedure as run_up
+from expdesign.plan.monte_carlo import trials
+from expdesign.plan.monte_carlo.procedure import Tolerances
 from expdesign.plan.monte_carlo.risk import estimate_risk, upper_limit
 from expdesign.plan.values import RiskEstimate
 from expdesign.scenario import load_scenario
@@ -36,7 +37,7 @@ SCENARIOS = Path(__file__).parents[2] / "scenarios"
 WANDERING = 1.0, 300.0
 """How much current and wind wander, in the standard deviations with which their means are known, and how slowly [s]."""
 AT_ALL = 1e6
-"""What all tolerances are set to so that every ship begins at once, in the units of each."""
+"""Value of all tolerances with which every ship begins at once, in the units of each."""
 
 
 def wandering(forecast: Environment) -> Environment:
@@ -51,18 +52,14 @@ def wandering(forecast: Environment) -> Environment:
 
 @contextmanager
 def unbroken() -> Iterator[None]:
-    """Tolerances so wide that no ship ever goes round."""
-    kept = {name: getattr(run_up, name) for name in ("OFF_HEADING_RAD", "OFF_SPEED", "OFF_YAW_RATE", "OFF_PLACE")}
-    farthest = run_up.FARTHEST_OFF
-    for name in kept:
-        setattr(run_up, name, AT_ALL)
-    run_up.FARTHEST_OFF = AT_ALL
+    """Tolerances so wide that no ship ever goes around."""
+    kept = trials.tolerances
+    wide = Tolerances(position_m=AT_ALL, heading_rad=AT_ALL, speed_mps=AT_ALL, yaw_rate_radps=AT_ALL)
+    trials.tolerances = lambda water, spare_m: wide
     try:
         yield
     finally:
-        for name, value in kept.items():
-            setattr(run_up, name, value)
-        run_up.FARTHEST_OFF = farthest
+        trials.tolerances = kept
 
 
 def sailed(water: LegWater, plan: Plan, *, draws: int, breaks: bool, rng: np.random.Generator) -> RiskEstimate:
@@ -74,7 +71,7 @@ def sailed(water: LegWater, plan: Plan, *, draws: int, breaks: bool, rng: np.ran
 
 
 def water_of(case: Scenario, plan: Plan) -> LegWater:
-    """Who sails the plan, in what, where."""
+    """Vessel, weather and water of the plan."""
     information = workflows.scored(case)
     return leg_water(plan_problem(case, information, workflows.designed(case, information)))
 
@@ -103,8 +100,8 @@ def report(path: str, draws: int) -> list[str]:
         print(rows[-1], *found.reasons, sep="\n  ", flush=True)
         for leg, sails in zip(plan.legs, found.legs, strict=True):
             print(
-                f"    {leg.kind:10s} {leg.name:28s} left {sails.left:6.2%} broken off {sails.aborted:6.2%} "
-                f"rounds {sails.go_arounds:4.2f} takes {sails.median_s:7.1f} s, {sails.most_s:7.1f} s in 95 %",
+                f"    {leg.kind:10s} {leg.name:28s} left {sails.left:6.2%} aborted {sails.aborted:6.2%} "
+                f"go-arounds {sails.go_arounds:4.2f} takes {sails.median_s:7.1f} s, {sails.most_s:7.1f} s in 95 %",
                 flush=True,
             )
     return rows

@@ -1,4 +1,4 @@
-"""Whole trials of drawn ships in drawn weather: the chance that one leaves allowed water."""
+"""Monte Carlo trials of drawn ships in drawn weather: the probability that one leaves allowed water."""
 
 from expdesign.plan.monte_carlo.risk import (
     estimate_risk,

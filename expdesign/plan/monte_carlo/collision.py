@@ -1,4 +1,4 @@
-"""Hulls against the chart at every step, of many ships: nothing of the planner's grids and margins is used."""
+"""Collision check of many hulls with the chart at every step, without the planner's grids and margins."""
 
 from __future__ import annotations
 
@@ -8,18 +8,16 @@ from functools import cached_property
 import numpy as np
 import shapely
 
+from expdesign.plan.monte_carlo.tuning import MONTE_CARLO
 from expdesign.sea_area import SeaArea
 from expdesign.values import Array
 from expdesign.vessel import Vessel
 from expdesign.vessel.hull import hull_outlines
 
-CHUNK = 20_000
-"""Hulls looked at at a time."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class CollisionCheck:
-    """Looks whether hulls stay in allowed water.
+    """Whether hulls stay in allowed water.
 
     Attributes:
         area: the chart.
@@ -29,13 +27,13 @@ class CollisionCheck:
     area: SeaArea
     vessel: Vessel
 
-    def leaves(self, poses: Array) -> Array:
-        """(n, 2) where the hull, or what it sweeps from one sample to the next, first reaches outside; nan where never.
+    def exits(self, poses: Array) -> Array:
+        """(n, 2) where the hull, or what it sweeps between samples, first leaves the water; nan where never.
 
-        Places at least a hull's radius from anything forbidden, at both samples, are not looked at more closely.
+        Steps between positions at least a hull's radius from anything forbidden are skipped.
 
         Args:
-            poses: (k, n, 3) sample by sample; ships that stay where they are are not looked at.
+            poses: (k, n, 3) sample by sample; ships that do not move are skipped.
         """
         far = shapely.contains_xy(self._deep, poses[..., 1], poses[..., 0])  # (k, n)
         moved = np.hypot(*np.moveaxis(np.diff(poses[..., :2], axis=0), -1, 0))
@@ -43,8 +41,11 @@ class CollisionCheck:
         close = ((moved > 0) | turned) & ~(far[:-1] & far[1:] & (moved < self._radius / 2))
         steps, ships = np.nonzero(close)
         place: Array = np.full((poses.shape[1], 2), np.nan)
-        for first in range(0, len(steps), CHUNK):
-            step, ship = steps[first : first + CHUNK], ships[first : first + CHUNK]
+        for first in range(0, len(steps), MONTE_CARLO.collision_chunk):
+            step, ship = (
+                steps[first : first + MONTE_CARLO.collision_chunk],
+                ships[first : first + MONTE_CARLO.collision_chunk],
+            )
             corners = [hull_outlines(poses[step + later, ship], self.vessel.hull_b) for later in (0, 1)]
             spans = shapely.convex_hull(shapely.multipoints(np.concatenate(corners, axis=1)))
             outside = ~shapely.contains_properly(self._water, spans)
@@ -60,7 +61,7 @@ class CollisionCheck:
 
     @cached_property
     def _deep(self) -> shapely.Geometry:
-        """Where a hull's middle is so far from the shore that no heading reaches it, nor a step between such places.
+        """Water in which the hull clears the shore at any heading, also in a step between two positions in it.
 
         From the middle of a step of half a radius a corner is sqrt(1.05**2 - 0.25**2) > 1 radii away.
         """

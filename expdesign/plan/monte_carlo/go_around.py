@@ -1,6 +1,7 @@
 """Go-around paths of ships that sail arcs: from wherever they are to the beginning of a run-up.
 
-The shortest Dubins curve where the water has room for it; else one through places from which such curves lead on.
+The shortest Dubins curve where the water has room for it; else a chain of such curves over a fixed set of poses round
+the run-up, a roadmap that all ships share.
 """
 
 from __future__ import annotations
@@ -14,27 +15,19 @@ import numpy as np
 
 from expdesign.plan.chart import polyline_length
 from expdesign.plan.legs import dubins_curve
+from expdesign.plan.monte_carlo.tuning import MONTE_CARLO
 from expdesign.values import Array
-
-RINGS = (2.0, 4.0, 7.0, 11.0)
-"""Distances of places looked at from the goal, in turning radii."""
-BEARINGS, COURSES = 12, 8
-"""Bearings and courses of places on each."""
-TRIES = 60
-"""Places tried for each ship, from those that promise the shortest way on."""
-CURVES, ONWARD = 3, 6
-"""Curves in a way on from a place at most, and places tried for its next."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class GoAroundPaths:
-    """All ways to a pose.
+    """Paths to a pose.
 
     Attributes:
-        goal: (3,) place and course.
+        goal: (3,) position and course.
         radius_m: of the ship's turns.
-        spacing_m: between points of ways.
-        holds: whether a way (k, 2) stays in the water.
+        spacing_m: between points of paths.
+        holds: whether a path (k, 2) stays in the water.
     """
 
     goal: Array
@@ -43,44 +36,45 @@ class GoAroundPaths:
     holds: Callable[[Array], bool]
 
     def find(self, pose: Array) -> Array | None:
-        """A way (k, 2) from a pose (3,), or None where none was found."""
-        direct = self._curve(pose, self.goal)
-        return direct if self.holds(direct) else self._through(pose, self._known, TRIES)
+        """A path (k, 2) from a pose (3,), or None where none was found."""
+        direct = self._direct(pose)
+        return self._through(pose, self._roadmap, MONTE_CARLO.first_tries) if direct is None else direct
 
-    def _through(self, pose: Array, known: _Known, tries: int) -> Array | None:
-        """A way through a place from which a way on is known, of some that promise the shortest, or None."""
-        first_m = np.hypot(*(known.places[:, :2] - pose[:2]).T)
-        for index in np.argsort(first_m + known.left_m, kind="stable")[:tries].tolist():
-            first = self._curve(pose, known.places[index])
+    def _through(self, pose: Array, roadmap: _Roadmap, tries: int) -> Array | None:
+        """A path through one of the nodes that look shortest, or None."""
+        first_m = np.hypot(*(roadmap.nodes[:, :2] - pose[:2]).T)
+        for index in np.argsort(first_m + roadmap.left_m, kind="stable")[:tries].tolist():
+            first = self._curve(pose, roadmap.nodes[index])
             if self.holds(first):
-                return np.concatenate([first, known.ways[index][1:]])
+                return np.concatenate([first, roadmap.paths[index][1:]])
         return None
+
+    def _direct(self, pose: Array) -> Array | None:
+        path = self._curve(pose, self.goal)
+        return path if self.holds(path) else None
 
     def _curve(self, start: Array, end: Array) -> Array:
         return dubins_curve(start, end, radius_m=self.radius_m, spacing_m=self.spacing_m)[:, :2]
 
     @cached_property
-    def _known(self) -> _Known:
-        """Places from which ways to the goal are known: those of one curve first, then through these."""
-        places = [place for place in self._around() if self.holds(np.stack([place[:2], place[:2] + 1e-3]))]
+    def _roadmap(self) -> _Roadmap:
+        """Nodes with a known path to the goal: those one curve away first, then those that reach one of these."""
+        nodes = [node for node in self._nodes() if self.holds(np.stack([node[:2], node[:2] + 1e-3]))]
         found: list[tuple[Array, Array]] = []
-        known = _known(found)
-        for _ in range(CURVES):
-            through = [
-                (place, self._through(place, known, ONWARD) if found else self._direct(place)) for place in places
+        roadmap = _Roadmap.of(found)
+        for _ in range(MONTE_CARLO.curves):
+            paths = [
+                self._through(node, roadmap, MONTE_CARLO.next_tries) if found else self._direct(node) for node in nodes
             ]
-            places = [place for place, way in through if way is None]
-            found += [(place, way) for place, way in through if way is not None]
-            known = _known(found)
-        return known
+            found += [(node, path) for node, path in zip(nodes, paths, strict=True) if path is not None]
+            nodes = [node for node, path in zip(nodes, paths, strict=True) if path is None]
+            roadmap = _Roadmap.of(found)
+        return roadmap
 
-    def _direct(self, place: Array) -> Array | None:
-        way = self._curve(place, self.goal)
-        return way if self.holds(way) else None
-
-    def _around(self) -> list[Array]:
+    def _nodes(self) -> list[Array]:
         """(3,) poses all round the goal."""
-        bearings, courses = (2 * np.pi * np.arange(count) / count for count in (BEARINGS, COURSES))
+        counts = MONTE_CARLO.node_bearings, MONTE_CARLO.node_courses
+        bearings, courses = (2 * np.pi * np.arange(count) / count for count in counts)
         north, east, heading = self.goal
         return [
             np.array(
@@ -90,22 +84,23 @@ class GoAroundPaths:
                     heading + course,
                 ]
             )
-            for ring, bearing, course in product(RINGS, bearings, courses)
+            for ring, bearing, course in product(MONTE_CARLO.nodes_radii, bearings, courses)
         ]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _Known:
-    """Places (k, 3) and the ways on from each."""
+class _Roadmap:
+    """Nodes (k, 3), the path from each to the goal, and its length [m]."""
 
-    places: Array
-    ways: tuple[Array, ...]
+    nodes: Array
+    paths: tuple[Array, ...]
     left_m: Array
 
-
-def _known(found: list[tuple[Array, Array]]) -> _Known:
-    return _Known(
-        places=np.array([place for place, _ in found]).reshape(-1, 3),
-        ways=tuple(way for _, way in found),
-        left_m=np.array([polyline_length(way) for _, way in found]),
-    )
+    @classmethod
+    def of(cls, found: list[tuple[Array, Array]]) -> _Roadmap:
+        """From pairs of a node and its path."""
+        return cls(
+            nodes=np.array([node for node, _ in found]).reshape(-1, 3),
+            paths=tuple(path for _, path in found),
+            left_m=np.array([polyline_length(path) for _, path in found]),
+        )

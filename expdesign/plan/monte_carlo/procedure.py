@@ -1,12 +1,13 @@
-"""How a ship comes to the beginning of a run: run-ups on the planned heading, and when she is in place.
+"""How a ship reaches the start of a run: run-ups on the planned heading, and tolerances of the start.
 
-The procedure that a plan's promise rests on, the same in run cards, report and drawn trials:
+The procedure behind a plan's risk estimate, the same in run cards, report and drawn trials:
 
-1. Each run is sailed open loop from the state the ship really has.
-2. After it she rejoins the planned leg from where she is, in a straight line of sight, and follows it, steered.
-3. At the planned start of the next run she begins it if position, heading, speed and yaw rate are within `Tolerances`.
-4. Otherwise she goes round: the shortest way in safe water to the beginning of a run-up, and up to the start once more,
-   steady on the planned heading and speed; `MOST_GO_AROUNDS` times at most. Then the trial is broken off.
+1. Each run is sailed open loop from the ship's true state.
+2. After it the ship rejoins the planned leg from where it is and follows it in closed loop.
+3. At the planned start of the next run it begins the run if position, heading, speed and yaw rate are within
+   `Tolerances`.
+4. Otherwise it goes around: by the shortest path in safe water to the beginning of a run-up, then up to the start
+   again, steady on the planned heading and speed; `Tuning.go_arounds` times at most. Then the trial is aborted.
 """
 
 from __future__ import annotations
@@ -18,24 +19,11 @@ import numpy as np
 from expdesign.conventions import wrap_angle
 from expdesign.plan.control import CONTROL, Helmsman, over_ground
 from expdesign.plan.legs import LegWater
+from expdesign.plan.monte_carlo.tuning import MONTE_CARLO
 from expdesign.values import Array, seal
 
-MOST_GO_AROUNDS = 4
-"""Times that a ship goes round for one run before the trial is broken off."""
-OFF_PLACE, OFF_HEADING_RAD, OFF_SPEED, OFF_YAW_RATE = 0.2, float(np.radians(3.0)), 0.1, 0.1
-"""Tolerances: in hull lengths; [rad]; in transit speeds; in the largest yaw rate on legs."""
-ROOM_SHARE, FARTHEST_OFF = 0.25, 1.0
-"""Share of the room besides the clearance that the position of a run's start may take up; hull lengths at most."""
-SHORTER = (1.0, 0.75, 0.5, 0.35, 0.25)
-"""Shares of a run-up tried where a whole one has no room."""
-AFTER = 1.0
-"""Hull lengths past the start that a reference goes on steadily."""
-REST = 0.05
-"""Speed over ground in transit speeds, and yaw rate in the largest, up to which a run begins from a standstill."""
-
-
-ABORT_CAUSES = ("position", "heading", "speed", "yaw rate", "time", "no way round")
-"""What can keep a ship from beginning a run: a tolerance, that she does not come there in time, or no way round."""
+ABORT_CAUSES = ("position", "heading", "speed", "yaw rate", "time", "no go-around path")
+"""What can keep a ship from beginning a run: a tolerance, the time, or that no go-around path is found."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,17 +54,23 @@ class Tolerances:
 
 
 def tolerances(water: LegWater, spare_m: float = 0.0) -> Tolerances:
-    """Of a run, by the vessel's length and its speeds on legs, and by the room there is besides the clearance.
+    """Of a run, by the vessel's length and its speeds on legs, and by the room beyond the clearance.
 
-    Information does not depend on where a run begins. So where there is room, a ship need not come back to a place
-    only to begin there: a share of the room may be used up, at most a hull length.
+    Information does not depend on where a run begins. So where there is room, the position may use a share of it, at
+    most a hull length.
     """
     ship, length_m = water.ship, water.vessel.length_m
     return Tolerances(
-        position_m=float(np.clip(ROOM_SHARE * spare_m, OFF_PLACE * length_m, FARTHEST_OFF * length_m)),
-        heading_rad=OFF_HEADING_RAD,
-        speed_mps=OFF_SPEED * ship.transit_speed_mps,
-        yaw_rate_radps=OFF_YAW_RATE * ship.turn_rate_radps,
+        position_m=float(
+            np.clip(
+                MONTE_CARLO.position_room * spare_m,
+                MONTE_CARLO.position_hulls * length_m,
+                MONTE_CARLO.position_most_hulls * length_m,
+            )
+        ),
+        heading_rad=MONTE_CARLO.heading_rad,
+        speed_mps=MONTE_CARLO.speed_share * ship.transit_speed_mps,
+        yaw_rate_radps=MONTE_CARLO.yaw_rate_share * ship.turn_rate_radps,
     )
 
 
@@ -97,24 +91,24 @@ class Stretch:
 
 
 def planned_stretch(helm: Helmsman, track: Array, after_m: float) -> Stretch:
-    """A planned leg (k + 1, 6), which goes on steadily past its end where a run begins there under way."""
+    """A planned leg (k + 1, 6), continued steadily past its end where a run begins there under way."""
     after = _after(helm, track[-1], after_m)
     more = steady_states(helm, track[-1], np.arange(1, after + 1))
     return Stretch(states=np.concatenate([track, more]), arrival=len(track) - 1)
 
 
 def run_up(helm: Helmsman, water: LegWater, leg: Array, after_m: float) -> Stretch:
-    """The run-up to the end of a planned leg (k + 1, 6), and so far past it [m].
+    """The run-up to the end of a planned leg (k + 1, 6), continued so far past it [m].
 
-    Straight, or as the run begins; where no such stretch keeps its clearance, the last of the planned leg itself. A
-    run that begins at rest needs none if the ship can go sideways: she comes to a stop on the spot.
+    Steady as the run begins; where no such stretch keeps its clearance, the last part of the planned leg itself. A run
+    that begins at rest needs none if the ship keeps station: it stops on the spot.
     """
     desired, sample_s = leg[-1], helm.vessel.sample_time_s
     moves = under_way(helm, desired)
     if not moves and helm.ship.keeps_station:
         return Stretch(states=np.stack([desired, desired]), arrival=1)
     samples = helm.ship.run_up_s(helm.vessel, float(np.hypot(*desired[3:5]))) / sample_s
-    for share in SHORTER:
+    for share in MONTE_CARLO.run_up_shares:
         count = max(2, round(share * samples))
         before = steady_states(helm, desired, np.arange(-count, 0)) if moves else slowing(helm, desired, count)
         if water.holds(np.concatenate([before, desired[None]])[:, :3]):
@@ -126,9 +120,9 @@ def run_up(helm: Helmsman, water: LegWater, leg: Array, after_m: float) -> Stret
 
 
 def under_way(helm: Helmsman, state: Array) -> bool:
-    """Whether a state (6,) is more than a ship that keeps her place over ground."""
-    ship = helm.ship
-    return bool(np.hypot(*state[3:5]) > REST * ship.transit_speed_mps or abs(state[5]) > REST * ship.turn_rate_radps)
+    """Whether a ship at a state (6,) moves over ground."""
+    ship, rest = helm.ship, MONTE_CARLO.rest_share
+    return bool(np.hypot(*state[3:5]) > rest * ship.transit_speed_mps or abs(state[5]) > rest * ship.turn_rate_radps)
 
 
 def steady_states(helm: Helmsman, state: Array, samples: np.ndarray) -> Array:
@@ -150,7 +144,7 @@ def steady_states(helm: Helmsman, state: Array, samples: np.ndarray) -> Array:
 
 
 def slowing(helm: Helmsman, desired: Array, count: int) -> Array:
-    """(count, 6) states on the way to a stop, straight ahead, gently."""
+    """(count, 6) states of a gentle stop straight ahead."""
     ship, sample_s = helm.ship, helm.vessel.sample_time_s
     time_s = sample_s * np.arange(count, 0, -1)
     cruise = ship.transit_speed_mps / 2

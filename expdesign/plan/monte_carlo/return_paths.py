@@ -14,22 +14,8 @@ import shapely
 from expdesign.conventions import wrap_angle
 from expdesign.plan.chart import VisibilityGraph, first_bends, path_over, shortest_path_tree
 from expdesign.plan.control import CONTROL, Helmsman
+from expdesign.plan.monte_carlo.tuning import MONTE_CARLO
 from expdesign.values import Array
-
-NEAR = 2.0
-"""Hull lengths from the place within which a ship that can go sideways turns to the heading desired there."""
-TURNED_OFF = 0.25
-"""Least speed, in transit speeds, at bends and while the bow points elsewhere."""
-BRAKING = 0.5
-"""Share of the mean acceleration between rest and transit speed that is used for slowing down."""
-CRAB = 0.5
-"""Speed sideways and astern, in transit speeds."""
-TURNED_RAD = 0.15
-"""Difference from the heading desired at the place within which a ship has come to it, if she hardly turns any more."""
-PURSUED = 1.5
-"""Hull lengths ahead on its way at which a ship with a helm aims."""
-REACH = 0.4
-"""Hull lengths from a bend at which a ship has come to it."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -74,48 +60,50 @@ def build_return_paths(graph: VisibilityGraph, place: Array) -> ReturnPaths:
 
 
 class PathFollowers:
-    """n ships, each with a way of its own to one state.
+    """n ships, each on a path of its own to one state.
 
     Attributes:
-        goal: (6,) where all ways lead.
-        length_m: (n,) of the ways as they were found.
+        goal: (6,) where all paths lead.
+        length_m: (n,) of the paths at their start.
     """
 
     def __init__(self, helm: Helmsman, goal: Array, ships: int, *, reach_m: float) -> None:
-        """No ship has a way yet; a ship within `reach_m` of the goal has arrived."""
+        """No ship has a path yet; a ship within `reach_m` of the goal has arrived."""
         self._helm, self.goal = helm, goal
-        self._way: Array = np.tile(goal[:2], (ships, 2, 1))
+        self._path: Array = np.tile(goal[:2], (ships, 2, 1))
         self._left: Array = np.zeros((ships, 2))
         self._bend: Array = np.full((ships, 2), helm.ship.transit_speed_mps)
         self._next = np.ones(ships, dtype=int)
         self._reach_m = reach_m
         self.length_m: Array = np.zeros(ships)
 
-    def set_off(self, ship: int, way: Array) -> None:
-        """Give a ship a way (k, 2) that begins where she is."""
-        room = len(way) - self._way.shape[1]
+    def start(self, ship: int, path: Array) -> None:
+        """Give a ship a path (k, 2) that begins where it is."""
+        room = len(path) - self._path.shape[1]
         if room > 0:
-            self._way = np.concatenate([self._way, np.repeat(self._way[:, -1:], room, axis=1)], axis=1)
+            self._path = np.concatenate([self._path, np.repeat(self._path[:, -1:], room, axis=1)], axis=1)
             self._left = np.pad(self._left, ((0, 0), (0, room)))
             self._bend = np.pad(self._bend, ((0, 0), (0, room)), mode="edge")
-        count, fastest = len(way), self._helm.ship.transit_speed_mps
-        steps = np.diff(way, axis=0)
-        self._way[ship], self._left[ship], self._next[ship] = self.goal[:2], 0.0, min(1, count - 1)
-        self._way[ship, :count] = way
+        count, fastest = len(path), self._helm.ship.transit_speed_mps
+        steps = np.diff(path, axis=0)
+        self._path[ship], self._left[ship], self._next[ship] = self.goal[:2], 0.0, min(1, count - 1)
+        self._path[ship, :count] = path
         length = np.hypot(*steps.T)
         self._left[ship, :count] = np.r_[np.cumsum(length[::-1])[::-1], 0.0]
-        self._bend[ship] = TURNED_OFF * fastest if self._helm.ship.keeps_station else fastest
+        self._bend[ship] = MONTE_CARLO.bend_speed * fastest if self._helm.ship.keeps_station else fastest
         if count > 2:
             turn = np.abs(wrap_angle(np.diff(np.arctan2(steps[:, 1], steps[:, 0]))))
-            self._bend[ship, 1 : count - 1] = fastest * np.maximum(TURNED_OFF, np.cos(np.minimum(turn, np.pi / 2)))
+            self._bend[ship, 1 : count - 1] = fastest * np.maximum(
+                MONTE_CARLO.bend_speed, np.cos(np.minimum(turn, np.pi / 2))
+            )
         self.length_m[ship] = length.sum()
 
     def arrived(self, states: Array) -> np.ndarray:
-        """(n,) ships that have come to the place and, if they can turn there, point as desired."""
+        """(n,) ships that have arrived and, if they keep station, are on the desired heading."""
         helm = self._helm
         there = np.hypot(*(states[:, :2] - self.goal[:2]).T) < self._reach_m
-        turned = np.abs(wrap_angle(states[:, 2] - self.goal[2])) < TURNED_RAD
-        turned &= np.abs(states[:, 5]) < TURNED_RAD / (2.0 * helm.answer_s)
+        turned = np.abs(wrap_angle(states[:, 2] - self.goal[2])) < MONTE_CARLO.turned_rad
+        turned &= np.abs(states[:, 5]) < MONTE_CARLO.turned_rad / (2.0 * helm.answer_s)
         if helm.ship.keeps_station:
             return np.asarray(there & turned)
         ahead = np.stack([np.cos(self.goal[2]), np.sin(self.goal[2])])
@@ -123,29 +111,34 @@ class PathFollowers:
         return np.asarray(there | (on_last & ((states[:, :2] - self.goal[:2]) @ ahead > 0.0)))
 
     def desired(self, states: Array) -> Array:
-        """(n, 6) where each ship should be and how it should move now: on its way, at a speed that it can lose."""
+        """(n, 6) desired state of each ship: towards its path, at a speed from which it can slow down in time."""
         helm, everyone = self._helm, np.arange(len(states))
         length, fastest = helm.vessel.length_m, helm.ship.transit_speed_mps
         last = (self._left <= 0.0).argmax(axis=1)
-        ahead = np.hypot(*(self._way[everyone, self._next] - states[:, :2]).T)
-        there, before = self._way[everyone, self._next], self._way[everyone, self._next - 1]
+        ahead = np.hypot(*(self._path[everyone, self._next] - states[:, :2]).T)
+        there, before = self._path[everyone, self._next], self._path[everyone, self._next - 1]
         passed = ((there - states[:, :2]) * (there - before)).sum(axis=1) <= 0.0
-        self._next = np.where(((ahead < REACH * length) | passed) & (self._next < last), self._next + 1, self._next)
-        there, before = self._way[everyone, self._next], self._way[everyone, self._next - 1]
+        self._next = np.where(
+            ((ahead < MONTE_CARLO.bend_hulls * length) | passed) & (self._next < last), self._next + 1, self._next
+        )
+        there, before = self._path[everyone, self._next], self._path[everyone, self._next - 1]
         offset = there - states[:, :2]
         ahead = np.hypot(*offset.T)
         left = ahead + self._left[everyone, self._next]
-        brake = BRAKING * helm.ship.acceleration_mps2
-        speed = np.sqrt(self._bend[everyone, self._next] ** 2 + 2 * brake * np.maximum(ahead - REACH * length, 0.0))
-        near = left < NEAR * length
+        brake = MONTE_CARLO.braking * helm.ship.acceleration_mps2
+        braked_m = np.maximum(ahead - MONTE_CARLO.bend_hulls * length, 0.0)
+        speed = np.sqrt(self._bend[everyone, self._next] ** 2 + 2 * brake * braked_m)
+        near = left < MONTE_CARLO.turn_hulls * length
         lengthways = np.cos(np.arctan2(offset[:, 1], offset[:, 0]) - self.goal[2])
-        slow = np.minimum(fastest * np.maximum(lengthways, CRAB), left / (CONTROL.track_lead * helm.answer_s))
+        slow = np.minimum(
+            fastest * np.maximum(lengthways, MONTE_CARLO.sideways_speed), left / (CONTROL.track_lead * helm.answer_s)
+        )
         speed = np.minimum(np.minimum(speed, fastest), np.where(near & helm.ship.keeps_station, slow, np.inf))
         leg = there - before
         leg = leg / np.maximum(np.hypot(*leg.T), 1e-9)[:, None]
         across = offset - (offset * leg).sum(axis=1)[:, None] * leg
-        look = length if helm.ship.keeps_station else PURSUED * length
-        pursued = leg * look + across  # a point ahead on the way
+        look = length if helm.ship.keeps_station else MONTE_CARLO.look_ahead_hulls * length
+        pursued = leg * look + across  # a point ahead on the path
         if helm.ship.keeps_station:
             pursued = np.where((near | (ahead < look))[:, None], offset, pursued)
         course = pursued / np.maximum(np.hypot(*pursued.T), 1e-9)[:, None]
@@ -154,7 +147,10 @@ class PathFollowers:
         heading = np.where(near & helm.ship.keeps_station, self.goal[2], pointing)
         off = np.cos(np.minimum(np.abs(wrap_angle(heading - states[:, 2])), np.pi / 2))
         ground = (
-            course * (speed * np.where(near | (not helm.ship.keeps_station), 1.0, np.maximum(off, TURNED_OFF)))[:, None]
+            course
+            * (speed * np.where(near | (not helm.ship.keeps_station), 1.0, np.maximum(off, MONTE_CARLO.bend_speed)))[
+                :, None
+            ]
         )
         c, s = np.cos(heading), np.sin(heading)
         return np.column_stack(

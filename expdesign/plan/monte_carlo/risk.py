@@ -1,9 +1,8 @@
-"""The promise of a plan: the chance that the hull leaves allowed water in the trial as it is sailed, and where.
+"""The risk of a plan: the probability that the hull leaves allowed water, where, and whether it is acceptable.
 
-It comes from whole trials (`expdesign.plan.monte_carlo.trials`): runs open loop from the states that ships really have,
-legs and ways back to run-ups steered, the hull against the chart at every step. Trials broken off because a run could
-not be begun are counted apart: they end in allowed water, but not at the goal. A plan is accepted when its share, with
-the share's standard error on top, is within what is estimate_risk, and when most trials come to the goal.
+It is estimated by whole trials (`expdesign.plan.monte_carlo.trials`). Trials aborted because a run could not be begun
+count apart: they end in allowed water, but not at the goal. The chance constraint holds where the share that leaves
+allowed water plus its standard error is at most 1 - confidence. Besides, most trials must reach the goal.
 """
 
 from __future__ import annotations
@@ -15,23 +14,19 @@ import numpy as np
 from scipy.stats import beta
 
 from expdesign.plan.legs import LegWater
-from expdesign.plan.monte_carlo.procedure import ABORT_CAUSES, MOST_GO_AROUNDS
+from expdesign.plan.monte_carlo.procedure import ABORT_CAUSES
 from expdesign.plan.monte_carlo.trials import Trials, sail_trials
+from expdesign.plan.monte_carlo.tuning import MONTE_CARLO
 from expdesign.plan.values import Leg, LegOutcome, RiskEstimate, SailedTrial
 from expdesign.sea_area import SeaArea
 from expdesign.signals import Trajectory
 from expdesign.values import Array
 
-TRIALS, MOST_TRIALS, SEEN = 500, 2000, 2.0
-"""Of a plan that is being made: at least, at most, and so many that this number may leave allowed water."""
-MOST = 0.95
-"""Share of trials that `most` is about, and confidence of the upper limit."""
-HALF = 0.5
-"""Share of trials broken off from which on it is no plan."""
-WHY = tuple(
-    {"time": "not there in time", "no way round": "no way round"}.get(x, f"{x} out of tolerance") for x in ABORT_CAUSES
+REASONS = tuple(
+    {"time": "not there in time", "no go-around path": "no go-around path"}.get(cause, f"{cause} out of tolerance")
+    for cause in ABORT_CAUSES
 )
-"""What kept ships from beginning a run, in words, by number."""
+"""Causes of aborted trials, in words."""
 
 
 def estimate_risk(
@@ -39,9 +34,9 @@ def estimate_risk(
     sailed: SailedTrial,
     *,
     rng: np.random.Generator,
-    draws: int = TRIALS,
+    draws: int = MONTE_CARLO.trials,
 ) -> tuple[RiskEstimate, Trials]:
-    """Sail drawn trials of a plan and tell what happened to them.
+    """Estimate the risk of a plan by drawn trials.
 
     The shares' standard errors are sqrt(p (1 - p) / draws).
     """
@@ -57,8 +52,8 @@ def estimate_risk(
         aborted=float(trials.aborted.any(axis=0).mean()),
         reasons=_reasons(legs, trials, trajectory, water.area),
         extra_median_s=float(np.median(extra)) if len(extra) else float("nan"),
-        extra_most_s=float(np.quantile(extra, MOST)) if len(extra) else float("nan"),
-        go_arounds=MOST_GO_AROUNDS,
+        extra_most_s=float(np.quantile(extra, MONTE_CARLO.upper_share)) if len(extra) else float("nan"),
+        go_arounds=MONTE_CARLO.go_arounds,
         heading_rad=within.heading_rad,
         speed_mps=within.speed_mps,
         yaw_rate_radps=within.yaw_rate_radps,
@@ -68,12 +63,13 @@ def estimate_risk(
 
 
 def trials_needed(confidence: float) -> int:
-    """How many trials tell a share of 1 - confidence from none."""
-    return int(np.clip(np.ceil(SEEN / max(1.0 - confidence, 1e-9)), TRIALS, MOST_TRIALS))
+    """How many trials distinguish a share of 1 - confidence from none."""
+    needed = np.ceil(MONTE_CARLO.expected_cases / max(1.0 - confidence, 1e-9))
+    return int(np.clip(needed, MONTE_CARLO.trials, MONTE_CARLO.most_trials))
 
 
-def upper_limit(count: int, trials: int, *, confidence: float = MOST) -> float:
-    """The share that would show `count` cases or fewer among trials with a chance of only 1 - confidence.
+def upper_limit(count: int, trials: int, *, confidence: float = MONTE_CARLO.upper_share) -> float:
+    """Upper confidence limit of a probability of which `count` cases were seen among trials.
 
     Source: C. J. Clopper and E. S. Pearson, Biometrika 26 (1934), 404-413.
     """
@@ -83,7 +79,7 @@ def upper_limit(count: int, trials: int, *, confidence: float = MOST) -> float:
 def failed_chance_constraint(
     found: RiskEstimate, trials: Trials, legs: Sequence[Leg], area: SeaArea, *, confidence: float
 ) -> str:
-    """What is wrong with a plan, with the leg and the place where it is worst; "" when it keeps its promise."""
+    """Why a plan is too risky, with the worst leg and place; "" where it is acceptable."""
     if violates_chance_constraint(found, confidence):
         worst = worst_leg(trials)
         lat, lon = area.frame.to_degrees(np.nanmedian(trials.place[worst], axis=0))
@@ -92,11 +88,15 @@ def failed_chance_constraint(
             f"more than plan.confidence = {confidence:g} allows, most of them ({trials.left[worst].mean():.1%}) "
             f"{described(legs, worst)} near {lat:.5f}, {lon:.5f}"
         )
-    return "" if found.aborted < HALF else f"{found.note}; wider water or a vessel known better helps"
+    return (
+        ""
+        if found.aborted < MONTE_CARLO.no_plan_aborted
+        else f"{found.note}; wider water or a vessel known better helps"
+    )
 
 
 def violates_chance_constraint(found: RiskEstimate, confidence: float) -> bool:
-    """Whether more trials leave allowed water than a confidence allows, or so many that they may well do."""
+    """Whether the share that leaves allowed water, plus its standard error, exceeds 1 - confidence."""
     return found.left > 0.0 and found.left + found.error > 1.0 - confidence + 1e-12
 
 
@@ -106,7 +106,7 @@ def worst_leg(trials: Trials) -> int:
 
 
 def described(legs: Sequence[Leg], index: int) -> str:
-    """In a run or on a leg, which one, counted as on the run cards."""
+    """Which run or leg, numbered as on the run cards."""
     number = sum(leg.kind == "primitive" for leg in legs[: index + 1])
     leg = legs[index]
     if leg.kind == "primitive":
@@ -115,15 +115,15 @@ def described(legs: Sequence[Leg], index: int) -> str:
 
 
 def _reasons(legs: Sequence[Leg], trials: Trials, trajectory: Trajectory, area: SeaArea) -> tuple[str, ...]:
-    """Where trials were broken off, and why; most first."""
+    """Where trials were aborted, and why; most first."""
     rows = []
     for index in np.argsort(-trials.aborted.mean(axis=1), kind="stable").tolist():
         aborted = trials.aborted[index]
         if aborted.any():
             causes = Counter(trials.abort_cause[index][aborted].tolist())
-            told = ", ".join(f"{WHY[cause]} {count / len(aborted):.1%}" for cause, count in causes.most_common())
+            why = ", ".join(f"{REASONS[cause]} {count / len(aborted):.1%}" for cause, count in causes.most_common())
             lat, lon = area.frame.to_degrees(trajectory.pose[legs[index].last, :2])
-            rows.append(f"{described(legs, index)} {aborted.mean():.1%} near {lat:.5f}, {lon:.5f} ({told})")
+            rows.append(f"{described(legs, index)} {aborted.mean():.1%} near {lat:.5f}, {lon:.5f} ({why})")
     return tuple(rows)
 
 
@@ -136,5 +136,5 @@ def _leg_outcome(trials: Trials, index: int, sample_s: float) -> LegOutcome:
         aborted=float(trials.aborted[index].mean()),
         go_arounds=float(trials.go_arounds[index][sailed].mean()) if sailed.any() else 0.0,
         median_s=float(np.median(times)),
-        most_s=float(np.quantile(times, MOST)),
+        most_s=float(np.quantile(times, MONTE_CARLO.upper_share)),
     )

@@ -1,8 +1,7 @@
-"""Whole trials of drawn ships in drawn weather, sailed as the plan says they are sailed.
+"""Whole trials of drawn ships in drawn weather, by the procedure of `expdesign.plan.monte_carlo.procedure`.
 
-The procedure is that of `expdesign.plan.monte_carlo.procedure`: legs steered from wherever a run has ended, runs open
-loop from the state the ship really has, a way round to the run-up where she is not in place. One draw is one trial: the
-same parameters, mean current and mean wind throughout; current and wind vary round these as the forecast says.
+One draw is one trial: the same parameters, mean current and mean wind throughout; current and wind vary round these as
+the forecast says.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ import numpy as np
 from expdesign.plan.control import Helmsman
 from expdesign.plan.legs import LegWater
 from expdesign.plan.monte_carlo.collision import CollisionCheck
-from expdesign.plan.monte_carlo.guidance import Pilot, open_loop
+from expdesign.plan.monte_carlo.guidance import Guidance, open_loop
 from expdesign.plan.monte_carlo.procedure import Tolerances, tolerances
 from expdesign.plan.runs import Fleet, draw_truths
 from expdesign.plan.values import SailedTrial
@@ -24,19 +23,19 @@ from expdesign.values import Array
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Trials:
-    """What happened to n trials, leg by leg.
+    """Outcomes of n trials, leg by leg.
 
-    A trial ends where the hull leaves allowed water or where the ship gives up to begin a run.
+    A trial ends where the hull leaves allowed water, or aborted where a run cannot be begun.
 
     Attributes:
         left: (legs, n) whether the hull left allowed water on a leg.
-        aborted: (legs, n) whether the ship gave up on a leg.
-        go_arounds: (legs, n) times gone round on a leg.
+        aborted: (legs, n) whether the trial was aborted on a leg.
+        go_arounds: (legs, n) on a leg.
         samples: (legs, n) that legs took.
         used: (legs, n) largest share of a tolerance used up where a run began; nan where none did.
-        abort_cause: (legs, n) number in `ABORT_CAUSES` of what kept ships that gave up from beginning.
+        abort_cause: (legs, n) index in `ABORT_CAUSES`, for aborted trials.
         place: (legs, n, 2) where hulls left allowed water; nan where they did not.
-        within: in place at the beginning of each leg.
+        within: start tolerances of each leg.
     """
 
     left: np.ndarray
@@ -50,7 +49,7 @@ class Trials:
 
     @property
     def completed(self) -> np.ndarray:
-        """(n,) trials that came to the goal."""
+        """(n,) trials that reached the goal."""
         return np.asarray(~(self.left | self.aborted).any(axis=0))
 
 
@@ -64,16 +63,16 @@ def sail_trials(
     """Sail drawn trials of a plan.
 
     Args:
-        water: who sails, in which forecast and area, and where ways may lead.
+        water: vessel, forecast, area, and the water that paths keep to.
         sailed: the plan.
         draws: number of trials.
-        rng: all chance.
+        rng: of all draws.
     """
     vessel, track, legs, commands = water.vessel, sailed.states, sailed.legs, sailed.commands
     helm = Helmsman(vessel=vessel, environment=water.environment, ship=water.ship)
     truths = draw_truths(vessel, water.environment, draws, rng)
     fleet = Fleet(vessel, water.environment, truths, state=track[0], standing=np.zeros(len(vessel.limits)), rng=rng)
-    watch, within = CollisionCheck(area=water.area, vessel=vessel), start_tolerances(water, sailed)
+    collisions, within = CollisionCheck(area=water.area, vessel=vessel), start_tolerances(water, sailed)
     sailing, unexplained = np.ones(draws, dtype=bool), np.zeros((draws, 3))
     shape = (len(legs), draws)
     left, aborted = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
@@ -86,7 +85,7 @@ def sail_trials(
             poses, begun = open_loop(helm, fleet, values, sailing), sailing & ~fleet.lost
             samples[index] = np.where(sailing, len(values), 0)
         else:
-            pilot = Pilot(
+            guidance = Guidance(
                 helm,
                 water,
                 track[leg.first : leg.last + 1],
@@ -95,10 +94,10 @@ def sail_trials(
                 inputs=values[-1],
                 last=index == len(legs) - 1,
             )
-            found = pilot.sail(fleet, unexplained)
+            found = guidance.sail(fleet, unexplained)
             unexplained, poses, begun = found.unexplained, found.poses, found.begun
             go_arounds[index], samples[index], abort_cause[index] = found.go_arounds, found.samples, found.abort_cause
-        place[index] = np.where(fleet.lost[:, None] & sailing[:, None], poses[-1, :, :2], watch.leaves(poses))
+        place[index] = np.where(fleet.lost[:, None] & sailing[:, None], poses[-1, :, :2], collisions.exits(poses))
         left[index] = sailing & ~np.isnan(place[index, :, 0])
         aborted[index] = sailing & ~begun & ~left[index]
         sailing = sailing & begun & ~left[index]
@@ -115,7 +114,7 @@ def sail_trials(
 
 
 def start_tolerances(water: LegWater, sailed: SailedTrial) -> tuple[Tolerances, ...]:
-    """Within which each leg begins; for runs by the room that the hull has round all of the planned run."""
+    """Start tolerances of each leg; for runs by the room of the hull over all of the planned run."""
     clearance = hull_clearance(water.area, sailed.trajectory, water.vessel.hull_b)
     spare = [float(clearance[leg.first : leg.last + 1].min()) - water.clearance_m for leg in sailed.legs]
     runs = [leg.kind == "primitive" for leg in sailed.legs]
