@@ -81,6 +81,12 @@ def random_world(rng: np.random.Generator, shape, runs, counts, *, blocks: int, 
     return World(free, tuple(runs), tuple(counts), (0, 0, 0), (shape[0] - 1, shape[1] - 1, 0), **costs)
 
 
+def as_matrix(entries, size: int) -> csr_array:
+    """(size, size) matrix of (row, column, cost)."""
+    rows, columns, costs = np.array(entries, dtype=float).reshape(-1, 3).T
+    return csr_array((costs, (rows.astype(int), columns.astype(int))), shape=(size, size))
+
+
 def as_problem(world: World) -> LatticeProblem:
     """The same for the package's search."""
     rows, columns = world.free.shape
@@ -88,19 +94,17 @@ def as_problem(world: World) -> LatticeProblem:
     def number(pose):
         return (pose[0] * columns + pose[1]) * 4 + pose[2]
 
-    entries, ends = [], -np.ones((len(world.runs), rows * columns * 4), dtype=int)
+    entries, runs = [], [[] for _ in world.runs]
     for i, j, k in np.ndindex(rows, columns, 4):
         if world.free[i, j]:
             entries += [(number((i, j, k)), number(pose), cost) for cost, pose in world.moves(i, j, k)]
             for q in range(len(world.runs)):
-                end = world.after_run(q, i, j, k)
-                ends[q, number((i, j, k))] = -1 if end is None else number(end)
-    a, b, cost = zip(*entries, strict=True)
+                if (end := world.after_run(q, i, j, k)) is not None:
+                    runs[q].append((number((i, j, k)), number(end), 0.0))
     size = rows * columns * 4
     return LatticeProblem(
-        moves=csr_array((np.array(cost), (np.array(a), np.array(b))), shape=(size, size)),
-        ends=ends,
-        run_costs=np.zeros(ends.shape),
+        moves=as_matrix(entries, size),
+        runs=tuple(as_matrix(run, size) for run in runs),
         counts=world.counts,
         start=number(world.start),
         goal=number(world.goal),

@@ -18,7 +18,7 @@ def test_cost_equals_exhaustive_search(seed, costs):
     least, _ = dijkstra_plain(world)
     problem = as_problem(world)
     if np.isinf(least):
-        with pytest.raises(NoPlan, match="no way from start to goal"):
+        with pytest.raises(NoPlan, match="no path from start to goal"):
             search_lattice(problem)
         return
     plan = search_lattice(problem)
@@ -50,6 +50,19 @@ def test_never_costlier_than_the_weighted_heuristic(seed):
         assert search_lattice(as_problem(world)).cost <= cost + 1e-9
 
 
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("most_states", [0, 1000, 5000])
+def test_a_search_that_ends_early_still_proves_a_bound(seed, most_states):
+    world = random_world(np.random.default_rng(seed), (10, 12), RUNS, (2, 1, 2), blocks=4, **COSTS[2])
+    least, _ = dijkstra_plain(world)
+    problem = as_problem(world)
+    if np.isinf(least):
+        return
+    plan = search_lattice(problem, most_states=most_states)
+    assert plan.lower_bound <= least + 1e-9 <= plan.cost + 2e-9
+    assert cost_of(world, problem, plan.steps) == pytest.approx(plan.cost, abs=1e-9)
+
+
 def test_runs_that_lead_to_the_goal_cost_nothing():
     world = World(np.ones((8, 3), dtype=bool), (Run(2, 0, 0, 0),), (3,), (0, 1, 0), (6, 1, 0))
     plan = search_lattice(as_problem(world))
@@ -79,7 +92,7 @@ def test_mirrored_worlds_cost_the_same():
 def test_moves_that_pay_are_refused():
     moves = csr_array((np.array([-1.0]), (np.array([0]), np.array([1]))), shape=(2, 2))
     with pytest.raises(InputError, match="cheapest move costs -1, expected 0 or more"):
-        LatticeProblem(moves=moves, ends=np.zeros((0, 2)), run_costs=np.zeros((0, 2)), counts=(), start=0, goal=1)
+        LatticeProblem(moves=moves, runs=(), counts=(), start=0, goal=1)
 
 
 def test_progress_is_told_and_grows():

@@ -1,18 +1,22 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
 
+from expdesign.errors import NoPlan
 from expdesign.plan.chart.goal_distance import build_goal_distance
-from expdesign.plan.local_planner import SearchSpace, local_planner
+from expdesign.plan.local_planner import LegEnds, SearchSpace, local_planner
 from expdesign.plan.runs import Footprint
 from expdesign.plan.search.lattice import search_lattice
-from expdesign.plan.search.lattice_moves import build_lattice
+from expdesign.plan.search.lattice_moves import Departure, Lattice, build_lattice, placements_of
+from expdesign.plan.search.lattice_search import LatticeSearch
 from plan_case import leg_water
 
 SPACING_M = 60.0
 
 
-def stamp(name: str, displacement, *, room_m: float = 20.0) -> Footprint:
+def run(name: str, displacement, *, room_m: float = 20.0) -> Footprint:
     """A run along its own chord."""
     chord = np.linspace(0, 1, 8)[:, None] * np.array(displacement[:2])
     return Footprint(
@@ -44,75 +48,130 @@ def space(water: shapely.Geometry, goal, *runs: Footprint) -> SearchSpace:
 
 
 def solve(case: SearchSpace, counts, start):
-    problem = build_lattice(case, counts, np.array(start, dtype=float), spacing_m=SPACING_M)
-    return problem, search_lattice(problem)
+    lattice = Lattice(space=case, spacing_m=SPACING_M)
+    problem = build_lattice(lattice, counts, Departure(pose=np.array(start, dtype=float)))
+    return lattice, problem, search_lattice(problem)
 
 
-def lattice_origin(case: SearchSpace) -> np.ndarray:
-    return case.field.origin + 8 * SPACING_M
+def cost(case: SearchSpace, counts, start) -> float:
+    return solve(case, counts, start)[2].cost
+
+
+def leg_s(case: SearchSpace, to, *, exit_mps: float, entry_mps: float) -> float:
+    """Time of a leg in open water from the origin, heading north, by the local planner's rule."""
+    ends = LegEnds(before=-1, after=-1, exit_mps=exit_mps, entry_mps=entry_mps)
+    return float(case.planner.leg_s(case, ends, np.zeros((1, 3)), np.array([to], dtype=float), np.zeros((0, 2)))[0])
+
+
+def between(lattice: Lattice, problem):
+    """Tails and heads (n, 3) of the moves between lattice poses, and their costs."""
+    moves = problem.moves[: lattice.size, : lattice.size].tocoo()
+    return (*(lattice.poses(poses) for poses in moves.coords), moves.data)
 
 
 OPEN = shapely.box(-1000, -1000, 1500, 1500)
 
 
-def test_a_straight_way_takes_its_length_at_transit_speed():
-    probe = space(OPEN, (0, 0, 0))
-    here = lattice_origin(probe)
-    case = space(OPEN, (here[0] + 900, here[1], 0))
-    _, plan = solve(case, (), (*here, 0.0))
-    assert plan.cost == pytest.approx(900 / case.ship.transit_speed_mps, rel=1e-6)
-    assert plan.lower_bound == pytest.approx(plan.cost, rel=1e-6)
+def origin(case: SearchSpace) -> np.ndarray:
+    return case.field.origin + 8 * SPACING_M
 
 
-def test_a_run_on_the_way_saves_its_displacement():
-    probe = space(OPEN, (0, 0, 0))
-    here = lattice_origin(probe)
-    case = space(OPEN, (here[0] + 900, here[1], 0), stamp("ahead", (240, 0, 0)))
-    _, plan = solve(case, (2,), (*here, 0.0))
-    assert plan.cost == pytest.approx((900 - 480) / case.ship.transit_speed_mps, rel=1e-6)
+def test_what_is_farther_takes_longer_by_its_length_at_transit_speed():
+    here = origin(space(OPEN, (0, 0, 0)))
+    near, far = (space(OPEN, (here[0] + away, here[1], 0)) for away in (600, 900))
+    assert cost(far, (), (*here, 0.0)) - cost(near, (), (*here, 0.0)) == pytest.approx(
+        300 / far.ship.transit_speed_mps, rel=1e-6
+    )
 
 
-def test_every_way_is_as_long_as_the_distance_or_longer_and_turns_have_the_ships_radius():
-    case = space(OPEN, (700, 800, 2.0), stamp("aside", (100, 130, 0.7)))
+def test_a_run_on_the_way_costs_only_the_leg_after_it():
+    here = origin(space(OPEN, (0, 0, 0)))
+    cases = [space(OPEN, (here[0] + away, here[1], 0), run("ahead", (240, 0, 0))) for away in (600, 900)]
+    one, two = (cost(case, (runs,), (*here, 0.0)) for runs, case in enumerate(cases, start=1))
+    after_s = leg_s(cases[0], (60, 0, 0), exit_mps=1.0, entry_mps=cases[0].ship.transit_speed_mps)
+    assert two - one == pytest.approx(after_s, rel=1e-6)
+
+
+def test_moves_are_straights_arcs_of_the_ships_radius_and_turns_on_the_spot_in_the_time_they_take():
+    case = space(OPEN, (700, 800, 2.0))
+    lattice, problem, _ = solve(case, (), (-300.0, -200.0, -1.0))
+    tails, heads, seconds = between(lattice, problem)
+    assert lattice.headings == 8
+    apart_m, sailed_m = np.hypot(*(heads - tails)[:, :2].T), seconds * case.ship.transit_speed_mps
+    turn = np.abs((heads - tails)[:, 2] + np.pi) % (2 * np.pi) - np.pi
+    spot, straight = apart_m == 0, turn == 0
+    arc = ~spot & ~straight
+    np.testing.assert_allclose(sailed_m[straight], apart_m[straight])
+    np.testing.assert_allclose(np.abs(turn[arc]), np.pi / 2)
+    side_m, radius_m = apart_m[arc] / np.sqrt(2), case.ship.turning_radius_m
+    np.testing.assert_allclose(sailed_m[arc], 2 * (side_m - radius_m) + radius_m * np.pi / 2)
+    for angle in np.arange(1, 5) * np.pi / 4:
+        alike = spot & np.isclose(np.abs(turn), angle)
+        assert alike.any()
+        np.testing.assert_allclose(seconds[alike], leg_s(case, (0, 0, angle), exit_mps=0.0, entry_mps=0.0))
+
+
+def test_no_way_is_shorter_than_the_distance_less_what_runs_make_good():
+    case = space(OPEN, (700, 800, 2.0), run("aside", (100, 130, 0.7)))
     start = np.array([-300.0, -200.0, -1.0])
-    _, plan = solve(case, (3,), start)
-    carried = 3 * np.hypot(100, 130)
-    assert plan.cost >= (np.hypot(*(case.goal - start)[:2]) - carried) / case.ship.transit_speed_mps
-    problem = build_lattice(case, (3,), start, spacing_m=10.0)
-    side = case.ship.turning_radius_m  # a lattice finer than the turning radius could not be sailed
-    rows, columns = (int((size - 1) * case.field.cell_m / side) + 1 for size in case.field.clearance_m.shape)
-    assert problem.start == 4 * rows * columns
-    between = problem.moves[: problem.start, : problem.start].tocoo()
-    cells = np.stack([np.divmod(pose // 4, columns) for pose in between.coords]).astype(float)
-    apart_m = side * np.hypot(*(cells[1] - cells[0]))
-    turns = between.coords[0] % 4 != between.coords[1] % 4
-    sailed_m = between.data * case.ship.transit_speed_mps
-    np.testing.assert_allclose(apart_m[turns], side * np.sqrt(2))
-    np.testing.assert_allclose(sailed_m[turns], side * np.pi / 2)
-    np.testing.assert_allclose(sailed_m[~turns], apart_m[~turns])
+    made_good_m = 3 * np.hypot(100, 130)
+    least_m = np.hypot(*(case.goal - start)[:2]) - made_good_m
+    assert cost(case, (3,), start) >= least_m / case.ship.transit_speed_mps
+
+
+def test_a_current_helps_and_hinders():
+    still, swept = space(OPEN, (700, 800, 2.0)), space(OPEN, (700, 800, 2.0))
+    swept = replace(swept, current_to=np.array([0.4, 0.0]))
+    costs = []
+    for case in (still, swept):
+        lattice, problem, _ = solve(case, (), (-300.0, -200.0, -1.0))
+        tails, heads, seconds = between(lattice, problem)
+        steps = np.round((heads - tails) / SPACING_M).astype(int)
+        straight = (heads - tails)[:, 2] == 0
+        costs.append({tuple(step): s for step, s in zip(steps[straight, :2].tolist(), seconds[straight], strict=True)})
+    v = still.ship.transit_speed_mps
+    assert costs[1][1, 0] == pytest.approx(SPACING_M / (v + 0.4))
+    assert costs[1][-1, 0] == pytest.approx(SPACING_M / (v - 0.4))
+    assert costs[1][0, 1] == pytest.approx(SPACING_M / np.sqrt(v**2 - 0.4**2))
+    assert costs[0][1, 0] == pytest.approx(SPACING_M / v)
 
 
 def test_runs_begin_only_where_their_discs_have_room():
     water = OPEN.difference(shapely.box(-200, 200, 500, 500))
-    case = space(water, (900, 900, 0), stamp("ahead", (240, 0, 0), room_m=80.0))
-    start = np.array([-500.0, -500.0, 0.0])
-    _, plan = solve(case, (2,), start)
-    columns = int(np.floor((case.field.clearance_m.shape[1] - 1) * case.field.cell_m / SPACING_M)) + 1
-    begun = [pose for pose, q in plan.steps if q == 0]
+    case = space(water, (900, 900, 0), run("ahead", (240, 0, 0), room_m=80.0))
+    lattice, _, plan = solve(case, (2,), np.array([-500.0, -500.0, 0.0]))
+    begun = [placement.pose for placement in placements_of(lattice, plan.steps)]
     assert len(begun) == 2
     for pose in begun:
-        cell, heading = np.array(divmod(pose // 4, columns)), (pose % 4) * np.pi / 2
-        begin = case.field.origin + SPACING_M * cell
-        end = begin + 240 * np.array([np.cos(heading), np.sin(heading)])
-        path = shapely.LineString([begin[::-1], end[::-1]])
+        end = pose[:2] + 240 * np.array([np.cos(pose[2]), np.sin(pose[2])])
+        path = shapely.LineString([pose[1::-1], end[::-1]])
         assert shapely.distance(path, shapely.boundary(water)) >= 80.0 - case.field.error_m
+
+
+def test_no_run_begins_again_where_one_has_failed_and_legs_after_get_longer():
+    case = space(OPEN, (700, 800, 2.0), run("ahead", (240, 0, 0)))
+    start = np.array([-300.0, -200.0, -1.0])
+    first = LatticeSearch(spacing_m=SPACING_M).place(case, (2,), start=start)
+    refusing = case.refusing("ahead", first.runs[1])
+    second = LatticeSearch(spacing_m=SPACING_M).place(refusing, (2,), start=start)
+    poses = np.array([placement.pose for placement in second.runs])
+    assert not refusing.is_refused(poses).any()
+    assert second.lattice.cost_s >= first.lattice.lower_bound_s
+    ends = poses[0, :2] + 240 * np.array([np.cos(poses[0, 2]), np.sin(poses[0, 2])])
+    assert np.hypot(*(poses[1, :2] - ends)) >= (1.5 + 0.5) * case.hull_m - 1e-9
+
+
+def test_a_lattice_without_a_plan_says_which_and_what_may_help():
+    case = space(shapely.box(-400, -400, 400, 400), (200, 200, 0), run("ahead", (240, 0, 0), room_m=500.0))
+    with pytest.raises(NoPlan, match=r"^no room for 'ahead' on a lattice of 60 m; a plan.lattice_spacing_m smaller"):
+        LatticeSearch(spacing_m=60.0).place(case, (1,), start=np.zeros(3))
 
 
 def test_mirrored_water_and_runs_cost_the_same():
     water = OPEN.difference(shapely.box(-200, 200, 500, 500))
-    case = space(water, (900, 900, 0.5), stamp("aside", (100, 130, 0.7)))
+    case = space(water, (900, 900, 0.5), run("aside", (100, 130, 0.7)))
     flipped = shapely.transform(water, lambda points: points * (-1, 1))
-    mirror = space(flipped, (900, -900, -0.5), stamp("aside", (100, -130, -0.7)))
-    costs = [solve(one, (2,), start)[1].cost for one, start in ((case, (-500, -500, 0.2)), (mirror, (-500, 500, -0.2)))]
+    mirror = space(flipped, (900, -900, -0.5), run("aside", (100, -130, -0.7)))
+    costs = [cost(one, (2,), start) for one, start in ((case, (-500, -500, 0.2)), (mirror, (-500, 500, -0.2)))]
     # the lattices begin at opposite sides, so they lie up to a cell apart
     assert costs[0] == pytest.approx(costs[1], abs=2 * SPACING_M / case.ship.transit_speed_mps)

@@ -59,8 +59,9 @@ def test_transitions_are_left_to_the_rule_when_there_is_nothing_left_to_spend(wa
     assert found.tried == space.tried
 
 
+@pytest.mark.parametrize("planner", ["beam", "lattice"])
 @pytest.mark.parametrize(("leg_s", "tries"), [(0.0, 11), (8.0, 3)])  # 2 s each at least: 11 x 2, or 3 x 8, pass 20
-def test_a_search_that_is_stuck_ends_when_its_budget_is_worked_off_not_when_a_clock_says_so(monkeypatch, leg_s, tries):
+def test_a_search_that_is_stuck_ends_when_its_budget_is_worked_off_not_by_a_clock(monkeypatch, planner, leg_s, tries):
     def nowhere(planner, asked: LegTask, water) -> None:
         asked.budget.spent_s += leg_s
 
@@ -71,7 +72,7 @@ def test_a_search_that_is_stuck_ends_when_its_budget_is_worked_off_not_when_a_cl
         vessel=vessel,
         area=area(shapely.box(-300, -300, 300, 300)),
         environment=CALM,
-        settings=PlanSettings(clearance_m=1.0, time_budget_s=20.0),
+        settings=PlanSettings(clearance_m=1.0, time_budget_s=20.0, planner=planner),
         primitives=(go,),
         design=SimpleNamespace(problem=SimpleNamespace(names=(go.name,)), repeats=(1,)),
         start=np.zeros(3),

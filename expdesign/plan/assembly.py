@@ -14,7 +14,7 @@ from expdesign.plan.legs import LegWater
 from expdesign.plan.local_planner import LocalPlanner, SearchSpace, TransitionTrials, local_planner, pairs_of
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.runs import Footprint, dispersion_m, footprint
-from expdesign.plan.search import path_exceeds_displacement, place_runs
+from expdesign.plan.search import path_exceeds_displacement, place_runs, placement_search
 from expdesign.plan.tuning import PLAN
 from expdesign.plan.work_budget import WorkBudget
 from expdesign.progress import Progress
@@ -35,7 +35,7 @@ class PlanRoom:
 
 
 def plan_room(problem: PlanProblem, water: LegWater, progress: Progress) -> PlanRoom:
-    """Water and search space of the first plan, with the transitions optimised that good plans use.
+    """Water and search space of the first plan, with the transitions optimised that the search uses.
 
     Raises:
         NoPlan: no path leads from start to goal, or the ship cannot leave its start or reach its goal.
@@ -43,7 +43,9 @@ def plan_room(problem: PlanProblem, water: LegWater, progress: Progress) -> Plan
     planner = local_planner(water, problem.used)
     planner.check_ends(problem.start, problem.goal, water)
     space = search_space(problem, water, planner)
-    return PlanRoom(water=water, space=_with_transitions(problem, water, space, progress))
+    if placement_search(problem.settings).tries_transitions:
+        space = _with_transitions(problem, water, space, progress)
+    return PlanRoom(water=water, space=space)
 
 
 def leg_water(problem: PlanProblem) -> LegWater:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -12,10 +12,10 @@ from expdesign.plan.assembly import PlanRoom
 from expdesign.plan.legs import LegTask, LegWater, last_state, nearest_turns
 from expdesign.plan.local_planner import LocalPlanner, SearchSpace
 from expdesign.plan.problem import PlanProblem
-from expdesign.plan.search import place_runs
+from expdesign.plan.search import PlacementSearch, placement_search
 from expdesign.plan.timeline import Timeline
 from expdesign.plan.tuning import PLAN
-from expdesign.plan.values import Placement, SailedTrial
+from expdesign.plan.values import Placement, Placements, SailedTrial
 from expdesign.plan.work_budget import WorkBudget
 from expdesign.progress import Progress
 from expdesign.values import Array
@@ -39,11 +39,13 @@ def sail_all(
         NoPlan: there is no place for a run, or none was found within the budget; the message says what failed.
     """
     voyage = _Voyage(problem=problem, water=room.water, stated=stated, planner=room.space.planner, budget=budget)
-    space, left, stuck = room.space, problem.repeats, ""
-    failures, spent_s = _Failures(problem.settings.time_budget_s), budget.spent_s
+    space, left, stuck, proof = room.space, problem.repeats, "", None
+    search, failures = placement_search(problem.settings), _Failures(problem.settings.time_budget_s)
     while True:
         progress("placing runs", _share(problem, left))
-        for placement in _placed(space, left, voyage.line, stuck):
+        placed = _placed(search, space, left, voyage.line, stuck)
+        proof, spent_s = proof or placed.lattice, budget.spent_s
+        for placement in placed.runs:
             spent_s = budget.spent_s
             if stuck := voyage.sail_run(placement):
                 space = space.refusing(voyage.line.last, placement)
@@ -52,11 +54,11 @@ def sail_all(
             progress(f"sailing {placement.primitive}", _share(problem, left))
         else:
             if voyage.sail_home():
-                return voyage.sailed
+                return replace(voyage.sailed, lattice=proof and replace(proof, refused=failures.tries))
             undone = voyage.undo_run()
             space, stuck = space.refusing(voyage.line.last, undone), "no leg leads from the last run to the goal"
             left[undone.primitive] += 1
-        failures.count(budget.spent_s - spent_s, stuck)
+        failures.count(placed.work_s + budget.spent_s - spent_s, stuck)
 
 
 def _share(problem: PlanProblem, left: dict[str, int]) -> float:
@@ -64,10 +66,12 @@ def _share(problem: PlanProblem, left: dict[str, int]) -> float:
     return 0.05 + 0.8 * (total - sum(left.values())) / max(total, 1)
 
 
-def _placed(space: SearchSpace, left: dict[str, int], line: Timeline, stuck: str) -> tuple[Placement, ...]:
+def _placed(
+    search: PlacementSearch, space: SearchSpace, left: dict[str, int], line: Timeline, stuck: str
+) -> Placements:
     counts = [left[item.name] for item in space.footprints]
     try:
-        return place_runs(space, counts, start=line.state[:3], exit_mps=float(line.state[3]), last=line.last)
+        return search.place(space, counts, start=line.state[:3], exit_mps=float(line.state[3]), last=line.last)
     except NoPlan as error:
         raise NoPlan(f"{error}; before that, {stuck}" if stuck else str(error)) from None
 
@@ -77,15 +81,15 @@ class _Failures:
 
     def __init__(self, budget_s: float) -> None:
         self._budget_s, self._deadline = budget_s, time.monotonic() + PLAN.clock_budgets * budget_s
-        self._tries, self._lost_s = 0, 0.0
+        self.tries, self._lost_s = 0, 0.0
 
     def count(self, cost_s: float, stuck: str) -> None:
         """Count one failure, and raise NoPlan where it was one too many."""
-        self._tries += 1
+        self.tries += 1
         self._lost_s += max(PLAN.failure_s, cost_s)
         if self._lost_s > self._budget_s or time.monotonic() > self._deadline:
             raise NoPlan(
-                f"no plan within plan.time_budget_s = {self._budget_s:g}, {self._tries} places were tried: {stuck}"
+                f"no plan within plan.time_budget_s = {self._budget_s:g}, {self.tries} places were tried: {stuck}"
             )
 
 

@@ -10,7 +10,6 @@ from expdesign.errors import NoPlan
 from expdesign.plan.assembly import PlanRoom, leg_water, plan_room, search_space
 from expdesign.plan.bounds import reposition_bound_s
 from expdesign.plan.legs import LegWater
-from expdesign.plan.local_planner import local_planner
 from expdesign.plan.monte_carlo import (
     Trials,
     estimate_risk,
@@ -21,7 +20,6 @@ from expdesign.plan.monte_carlo import (
 )
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.sailing import sail_all
-from expdesign.plan.search import LatticePlan, build_lattice, search_lattice
 from expdesign.plan.tuning import PLAN
 from expdesign.plan.values import Leg, Plan, RiskEstimate, SailedTrial, Verification
 from expdesign.plan.verify import realised_efficiencies, verify_plan
@@ -56,21 +54,6 @@ def plan_trial(problem: PlanProblem, *, progress: Progress = silent) -> Plan:
         room = _wider(problem, room, trials, sailed.legs, failed)
         progress = _replanning(progress)
     raise AssertionError("the last plan is returned or refused")
-
-
-def lattice_reference(problem: PlanProblem, *, spacing_m: float, suboptimality: float = 0.02) -> LatticePlan:
-    """The same runs on a state lattice, for comparison: its costs are seconds of repositioning at transit speed.
-
-    Changes of speed and the current are left out there, which favours the lattice.
-
-    Raises:
-        NoPlan: the lattice is too coarse for the water, or there is no path.
-    """
-    water = leg_water(problem)
-    space = search_space(problem, water, local_planner(water, problem.used))
-    counts = [problem.repeats[item.name] for item in space.footprints]
-    lattice = build_lattice(space, counts, problem.start, spacing_m=spacing_m)
-    return search_lattice(lattice, suboptimality=suboptimality)
 
 
 def _verified(problem: PlanProblem, water: LegWater, sailed: SailedTrial) -> Verification:
@@ -158,4 +141,5 @@ def _plan(
         design_efficiency_realised=realised,
         verification=verification,
         risk=risk,
+        lattice=sailed.lattice,
     )

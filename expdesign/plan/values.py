@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -10,6 +11,8 @@ from expdesign.plan.tuning import PLAN
 from expdesign.sea_area import SeaArea
 from expdesign.signals import Commands, Trajectory
 from expdesign.values import Array, seal
+
+PlannerName = Literal["beam", "lattice"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,6 +28,8 @@ class PlanSettings:
             the budget again if the work counted so far suggests that it ends within twice the budget.
         transit_speed_mps: speed of repositioning legs, or None for nine tenths of what the actuators allow.
         turning_radius_m: of repositioning legs, or None for what the vessel model allows.
+        planner: name of the search that orders and places the runs, see `expdesign.plan.search.placement_search`.
+        lattice_spacing_m: distance between the cells of the lattice planner, or None for one that suits the ship.
     """
 
     clearance_m: float = 20.0
@@ -32,6 +37,8 @@ class PlanSettings:
     time_budget_s: float = 60.0
     transit_speed_mps: float | None = None
     turning_radius_m: float | None = None
+    planner: PlannerName = "beam"
+    lattice_spacing_m: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,6 +58,33 @@ class Leg:
     last: int
 
 
+@dataclass(frozen=True, kw_only=True)
+class LatticeProof:
+    """How good the placements of the lattice planner are among all plans on the same lattice.
+
+    Costs are seconds of repositioning by the rule of the lattice. The bound says nothing of plans whose runs begin at
+    other places or headings.
+
+    Attributes:
+        spacing_m: between cells.
+        headings: of a cell.
+        cost_s: of the plan found for the whole trial.
+        lower_bound_s: no plan on the lattice costs less.
+        refused: places of it that legs or runs could not be sailed at, so that the rest was placed anew from there.
+    """
+
+    spacing_m: float
+    headings: int
+    cost_s: float
+    lower_bound_s: float
+    refused: int = 0
+
+    @property
+    def gap(self) -> float:
+        """How far the plan may be from the best on the lattice, relative to its cost."""
+        return 1.0 - self.lower_bound_s / self.cost_s if self.cost_s > 0 else 0.0
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SailedTrial:
     """A trial as planned: commands, the motion they give, and the legs in it.
@@ -59,11 +93,13 @@ class SailedTrial:
         commands: (k, m) actuator commands from start to goal.
         trajectory: k + 1 samples.
         legs: in time order, without gaps.
+        lattice: proof of the lattice planner, or None for other planners.
     """
 
     commands: Commands
     trajectory: Trajectory
     legs: tuple[Leg, ...]
+    lattice: LatticeProof | None = None
 
     @property
     def states(self) -> Array:
@@ -183,6 +219,7 @@ class Plan:
         verification: what the independent check found.
         design_efficiency_placed: as realised, of the runs alone, with the headings in wind and the entries they got.
         risk: what drawn trials of the plan came to; None if not computed.
+        lattice: proof of the lattice planner, or None for other planners.
     """
 
     area: SeaArea
@@ -196,11 +233,12 @@ class Plan:
     leave_water_by_leg: tuple[float | None, ...] = ()
     design_efficiency_placed: float | None = None
     risk: RiskEstimate | None = None
+    lattice: LatticeProof | None = None
 
     @property
     def sailed(self) -> SailedTrial:
         """Commands, motion and legs."""
-        return SailedTrial(commands=self.commands, trajectory=self.trajectory, legs=self.legs)
+        return SailedTrial(commands=self.commands, trajectory=self.trajectory, legs=self.legs, lattice=self.lattice)
 
     @property
     def sample_leg(self) -> np.ndarray:
@@ -229,3 +267,18 @@ class Placement:
 
     def __post_init__(self) -> None:
         seal(self, pose="3")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Placements:
+    """What a search for places finds.
+
+    Attributes:
+        runs: where each begins, in the order in which they are to be done.
+        work_s: work counted for the search, if it counts any [s].
+        lattice: proof of the lattice planner.
+    """
+
+    runs: tuple[Placement, ...]
+    work_s: float = 0.0
+    lattice: LatticeProof | None = None

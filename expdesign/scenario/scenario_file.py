@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from expdesign.plan.values import PlanSettings
+from expdesign.plan.values import PlannerName, PlanSettings
 from expdesign.scenario.berth import berth_problem
 from expdesign.scenario.charts import Latitude, Longitude, load_area
 from expdesign.scenario.design_file import DesignTable, design_settings
@@ -77,6 +77,16 @@ class PlanTable(Table):
     turning_radius_m: Positive | None = Field(
         default=PlanSettings.turning_radius_m,
         description="the turning radius of repositioning legs [m]; when not given, what the vessel's model allows",
+    )
+    planner: PlannerName = Field(
+        default=PlanSettings.planner,
+        description="the search that orders and places the runs: 'beam' at any place and heading; 'lattice' on a state "
+        "lattice, with a proof of how good the plan is among all on that lattice",
+    )
+    lattice_spacing_m: Positive | None = Field(
+        default=PlanSettings.lattice_spacing_m,
+        description="the distance between cells of the lattice planner [m]; when not given, a little more than the "
+        "turning radius, more in large waters and less where that is too coarse",
     )
 
 

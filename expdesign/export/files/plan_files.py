@@ -13,7 +13,7 @@ import numpy as np
 from expdesign.conventions import POSE_COLUMNS, VELOCITY_COLUMNS
 from expdesign.export.files.text import csv_text, finite, named, sample_seconds, strict_json
 from expdesign.export.routes import build_fence, require_verified
-from expdesign.plan.values import Leg, Plan, RiskEstimate
+from expdesign.plan.values import LatticeProof, Leg, Plan, RiskEstimate
 from expdesign.simulation.environment import Environment
 from expdesign.values import Array
 from expdesign.vessel import Variation, Vessel, column_name
@@ -23,6 +23,11 @@ FRAME_SENTENCE = (
     "latitude and longitude are WGS84; heading_rad is clockwise from north_m"
 )
 
+LATTICE_SENTENCE = (
+    "cost_s is the repositioning time of the first placement of all runs by the rule of the lattice; no placement on "
+    "this lattice costs less than lower_bound_s, but one off the lattice may; places_refused could not be sailed, and "
+    "the runs left were placed anew"
+)
 
 METRE_DECIMALS, MOTION_DECIMALS, DEGREE_DECIMALS = 6, 9, 9
 
@@ -64,6 +69,7 @@ def plan_json(plan: Plan, *, scenario: str, vessel: Vessel, environment: Environ
             "informative_s": plan.seconds("primitive"),
             "reposition_s": plan.seconds("reposition"),
             "reposition_bound_s": plan.reposition_bound_s,
+            **({} if plan.lattice is None else {"lattice": _lattice_entry(plan.lattice)}),
             "clearance_min_m": check.clearance_min_m,
             "clearance_required_m": clearance_m,
             "fence": _fence_entry(plan, vessel, clearance_m),
@@ -80,6 +86,19 @@ def plan_json(plan: Plan, *, scenario: str, vessel: Vessel, environment: Environ
             },
         }
     )
+
+
+def _lattice_entry(proof: LatticeProof) -> dict[str, Any]:
+    """The proof of the lattice planner, and what it is a proof of."""
+    return {
+        "spacing_m": proof.spacing_m,
+        "headings": proof.headings,
+        "cost_s": proof.cost_s,
+        "lower_bound_s": proof.lower_bound_s,
+        "gap": proof.gap,
+        "places_refused": proof.refused,
+        "meaning": LATTICE_SENTENCE,
+    }
 
 
 def _fence_entry(plan: Plan, vessel: Vessel, clearance_m: float) -> dict[str, Any] | None:

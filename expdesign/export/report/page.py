@@ -21,6 +21,7 @@ from expdesign.export.report.parameters import Expected, equation_sentence, expe
 from expdesign.export.report.procedure import day_sentence, procedure_sentences
 from expdesign.export.report.progress import known_rows, known_sentences
 from expdesign.export.report.trust import chain
+from expdesign.plan.values import LatticeProof
 
 SUBTRACTION = {
     "none": "no mean is subtracted from the instruments",
@@ -125,10 +126,28 @@ def summary(content: ReportContent) -> list[str]:
         f"The trial takes {words.duration(total)} and {words.distance(plan.trajectory.distance_m)} from start to goal: "
         f"{words.duration(plan.seconds('primitive'))} in {words.counted(runs, 'informative run')}, and "
         f"{words.duration(plan.seconds('reposition'))} of repositioning{bound if plan.reposition_bound_s > 0 else ''}.",
+        *lattice_sentences(plan.lattice),
         *([day] if (day := day_sentence(plan.risk, total)) else []),
         verdict,
         *depths,
         _design_sentence(content),
+    ]
+
+
+def lattice_sentences(proof: LatticeProof | None) -> list[str]:
+    """How good the placement is among all on its lattice; nothing for other planners."""
+    if proof is None:
+        return []
+    refused = (
+        f" {words.counted(proof.refused, 'place')} could not be sailed; the runs left were placed anew from there."
+        if proof.refused
+        else ""
+    )
+    return [
+        f"The runs are placed on a lattice of {words.distance(proof.spacing_m)} and {proof.headings} headings. By the "
+        f"rule of the lattice their repositioning takes {words.duration(proof.cost_s)}; no placement on this lattice "
+        f"takes less than {words.duration(proof.lower_bound_s)} (gap {words.percent(proof.gap)}). Places between the "
+        f"lattice's may take less.{refused}"
     ]
 
 

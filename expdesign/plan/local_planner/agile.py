@@ -21,7 +21,7 @@ from expdesign.plan.local_planner.agile_times import (
     transition_losses_s,
     transitions,
 )
-from expdesign.plan.local_planner.arcs import moved, on_paths, path_points
+from expdesign.plan.local_planner.arcs import between, moved, on_paths, path_points
 from expdesign.plan.local_planner.protocol import (
     LegEnds,
     Pair,
@@ -109,6 +109,10 @@ class AgilePlanner:
             angles = froms[..., 2] - course, tos[..., 2] - course, turn
             leg_s = rule.seconds(np.hypot(*step.T), *angles, *speeds) + more_s
         return leg_s
+
+    def leg_path(self, space: SearchSpace, before: int, start: Array, end: Array) -> Array:
+        """(k, 2) places on the straight line."""
+        return between(start, end, space.field.cell_m)
 
     def to_goal_s(self, space: SearchSpace, plans: PartialPlans) -> Array:
         """(b,) time of the path to the goal and of the turns at its ends [s]."""

@@ -118,6 +118,12 @@ def arc_end(pose: Array, turn: Array, straight: Array, radius: float) -> Array:
     return moved(pose, np.stack([forward, starboard, turn], axis=1))
 
 
+def between(start: Array, end: Array, spacing_m: float) -> Array:
+    """(k, 2) places on the straight line between two poses (3,)."""
+    count = int(np.ceil(np.hypot(*(end - start)[:2]) / spacing_m)) + 1
+    return np.linspace(start[:2], end[:2], count + 1)
+
+
 def moved(pose: Array, step: Array) -> Array:
     """(n, 3) poses moved ahead [m], to starboard [m] and turned [rad]."""
     c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])

@@ -10,8 +10,8 @@ import numpy as np
 from expdesign.conventions import wrap_angle
 from expdesign.plan.chart import polyline_length
 from expdesign.plan.control import DubinsShip
-from expdesign.plan.legs import LegTask, LegWater, curved_leg
-from expdesign.plan.local_planner.arcs import Departures, arc_successors, moved, path_successors
+from expdesign.plan.legs import LegTask, LegWater, curved_leg, dubins_curve
+from expdesign.plan.local_planner.arcs import Departures, arc_successors, between, moved, path_successors
 from expdesign.plan.local_planner.dubins_length import dubins_m
 from expdesign.plan.local_planner.protocol import (
     LegEnds,
@@ -71,6 +71,12 @@ class DubinsPlanner:
         helped_m = (tos[:, :2] - froms[:, :2]) @ space.current_to / self.ship.transit_speed_mps
         sail_s = np.maximum(length_m - helped_m, 0.0) / self.ship.transit_speed_mps
         return np.asarray(sail_s + self._change_s(np.array(ends.exit_mps), ends.entry_mps))
+
+    def leg_path(self, space: SearchSpace, before: int, start: Array, end: Array) -> Array:
+        """(k, 2) places along the Dubins curve and the run-up."""
+        run_up = moved(end[None], np.array([[-space.hull_m, 0.0, 0.0]]))[0]
+        curve = dubins_curve(start, run_up, radius_m=self.ship.turning_radius_m, spacing_m=space.field.cell_m)
+        return np.concatenate([curve[:, :2], between(run_up, end, space.field.cell_m)])
 
     def to_goal_s(self, space: SearchSpace, plans: PartialPlans) -> Array:
         """(b,) time of the path to the goal and of the turns at its ends [s]."""

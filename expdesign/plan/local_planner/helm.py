@@ -11,8 +11,8 @@ import numpy as np
 from expdesign.dictionary import Primitive
 from expdesign.plan.chart import polyline_length
 from expdesign.plan.control import HelmShip
-from expdesign.plan.legs import LegTask, LegWater, check_ends, displaced, helm_leg, last_state, recover
-from expdesign.plan.local_planner.arcs import Departures, arc_successors, moved, path_successors
+from expdesign.plan.legs import LegTask, LegWater, check_ends, displaced, dubins_curve, helm_leg, last_state, recover
+from expdesign.plan.local_planner.arcs import Departures, arc_successors, between, moved, path_successors
 from expdesign.plan.local_planner.helm_times import HelmTimes, helm_times
 from expdesign.plan.local_planner.protocol import (
     LegEnds,
@@ -95,6 +95,14 @@ class HelmPlanner:
         ahead, behind = bends[0] - froms[:, :2], tos[:, :2] - bends[-1]
         length_m = np.hypot(*ahead.T) + polyline_length(bends) + np.hypot(*behind.T)
         return np.maximum(leg_s, self.times.seconds(length_m, *speeds))
+
+    def leg_path(self, space: SearchSpace, before: int, start: Array, end: Array) -> Array:
+        """(k, 2) places along the recovery, the Dubins curve and the run-up."""
+        recovered = moved(start[None], self._recovery(space, before)[None, :3])[0]
+        run_up = moved(end[None], np.array([[-self.times.run_up_m, 0.0, 0.0]]))[0]
+        spacing_m = space.field.cell_m
+        curve = dubins_curve(recovered, run_up, radius_m=self.times.radius_m, spacing_m=spacing_m)
+        return np.concatenate([between(start, recovered, spacing_m), curve[:, :2], between(run_up, end, spacing_m)])
 
     def to_goal_s(self, space: SearchSpace, plans: PartialPlans) -> Array:
         """(b,) time of the last leg to a stop [s]."""

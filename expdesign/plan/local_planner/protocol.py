@@ -230,6 +230,9 @@ class LocalPlanner(Protocol):
     def leg_s(self, space: SearchSpace, ends: LegEnds, froms: Array, tos: Array, bends: Array) -> Array:
         """(n,) time of legs between poses (n or 1, 3) along a path with bends (b, 2) [s]."""
 
+    def leg_path(self, space: SearchSpace, before: int, start: Array, end: Array) -> Array:
+        """(k, 2) places along a leg in open water between poses (3,), after a run, or after the start (-1)."""
+
     def to_goal_s(self, space: SearchSpace, plans: PartialPlans) -> Array:
         """(b,) estimated time of the last leg [s]."""
 

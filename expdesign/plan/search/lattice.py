@@ -2,12 +2,13 @@
 
 A state is a pose of the lattice and how often each run was used. Counters only grow, so states with the same counters
 form a layer: a shortest-path problem over poses, entered by runs from the layers before. Layers are solved one after
-the other in order of how many runs they hold, each by Dijkstra's method on costs reduced by a heuristic, which makes it
-A* started at all entries at once, cut off where no better plan can follow.
+the other in order of how many runs they hold, each by Dijkstra's method on costs reduced by a heuristic. That is A*
+started at all entries at once, cut off where no better plan can follow.
 
 The heuristic is the exact cost to the goal when the number of runs left counts but not of which kind: obstacles are in
 it, it never overestimates, and it is consistent. A narrow search, which keeps only the most promising layers, comes
-first; the full search then need only look where something better could be.
+first; the full search then need only look where something better could be. Its work is limited: where it ends early,
+what it has not looked at still gives a lower bound.
 
 Source: F. Ljungberg, doctoral thesis, Linköping University, (8.3)-(8.12), which uses A* with a heuristic that is not
 admissible; layers, heuristic and bound derived here. Reduced costs: D. B. Johnson, J. ACM 24 (1977), 1-13.
@@ -30,6 +31,7 @@ from expdesign.values import Array
 Counters = tuple[int, ...]
 NARROW = 1
 """Layers kept per number of runs in the search that comes before the full one."""
+NO_PATH = "the lattice holds no path from start to goal that has room for every run"
 TINY = 1e-9
 """Share of a cost that is rounding."""
 
@@ -40,25 +42,25 @@ class LatticeProblem:
 
     Attributes:
         moves: (n, n) sparse matrix, entry (a, b) the cost, 0 or more, of the basic move from pose a to pose b.
-        ends: (q, n) pose in which run q ends when it begins at a pose, -1 where it has no room.
-        run_costs: (q, n) cost of what a run needs beyond itself, 0 or more; ignored where it has no room.
+        runs: one (n, n) sparse matrix for each run, entry (a, b) the cost, 0 or more, besides the run itself, of a run
+            that begins at pose a and of the way from its end to pose b.
         counts: how often each run is wanted.
         start, goal: poses.
     """
 
     moves: csr_array
-    ends: np.ndarray
-    run_costs: Array
+    runs: tuple[csr_array, ...]
     counts: Counters
     start: int
     goal: int
 
     def __post_init__(self) -> None:
-        n = self.moves.shape[0]
-        if self.ends.shape != self.run_costs.shape or self.ends.shape != (len(self.counts), n):
-            raise InputError(f"ends {self.ends.shape} and costs {self.run_costs.shape} do not fit {n} poses")
-        if self.moves.nnz and not self.moves.data.min() >= 0:
-            raise InputError(f"the cheapest move costs {self.moves.data.min():g}, expected 0 or more")
+        if len(self.runs) != len(self.counts) or any(run.shape != self.moves.shape for run in self.runs):
+            shapes = " ".join(str(run.shape) for run in self.runs)
+            raise InputError(f"runs {shapes} do not fit moves {self.moves.shape} and {len(self.counts)} counts")
+        least = min((float(edges.data.min()) for edges in (self.moves, *self.runs) if edges.nnz), default=0.0)
+        if not least >= 0:
+            raise InputError(f"the cheapest move costs {least:g}, expected 0 or more")
 
     @property
     def states(self) -> int:
@@ -92,34 +94,53 @@ def search_lattice(
     problem: LatticeProblem,
     *,
     suboptimality: float = 0.0,
+    most_states: float = np.inf,
     progress: Progress = silent,
 ) -> LatticePlan:
     """The cheapest plan, or one proved to cost at most (1 + suboptimality) times the cheapest.
 
+    Where the work ends first, the plan of the narrow search and the bound proved by then.
+
     Args:
         problem: what is wanted.
         suboptimality: 0 for the optimum; more lets the search leave out what could save only so little.
+        most_states: states after which the full search ends; it finishes the layer it is at.
         progress: told the share of layers done.
 
     Raises:
-        NoPlan: the goal cannot be reached with the runs asked for.
+        NoPlan: the goal cannot be reached with the runs asked for, or no plan was found within the states allowed.
     """
-    to_go = _costs_to_go(problem)
+    edges = tuple(_Edges.of(run) for run in problem.runs)
+    to_go = _costs_to_go(problem, edges)
     relaxed = float(to_go[-1][problem.start])
     if not np.isfinite(relaxed):
-        raise NoPlan("the lattice holds no way from start to goal that has room for every run")
+        raise NoPlan(NO_PATH)
     graphs = [_reduced(problem.moves, heuristic) for heuristic in to_go]
-    best = _Layers(problem, to_go, graphs, np.inf).search(NARROW, progress)
-    quantum, expansions = _quantum(problem), best.expansions
+    best = _Layers(problem, edges, to_go, graphs, np.inf).search(NARROW, np.inf, progress)
+    quantum, expansions, unseen = _quantum(problem), best.expansions, np.inf
     limit = _worth_looking(best.cost, suboptimality, quantum)
     if limit >= relaxed:
-        found = _Layers(problem, to_go, graphs, limit).search(None, progress)
-        expansions += found.expansions
+        found = _Layers(problem, edges, to_go, graphs, limit).search(None, most_states, progress)
+        expansions, unseen = expansions + found.expansions, found.unseen
         best = found if found.cost < best.cost else best
     if not np.isfinite(best.cost):
-        raise NoPlan("the lattice holds no way from start to goal that has room for every run")
-    bound = min(best.cost, max(_next_multiple(limit, quantum), relaxed))
+        raise NoPlan(NO_PATH if unseen == np.inf else f"no plan among the first {expansions} states of the lattice")
+    bound = min(best.cost, max(min(_next_multiple(limit, quantum), unseen), relaxed))
     return LatticePlan(cost=best.cost, lower_bound=bound, expansions=expansions, steps=best.steps)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Edges:
+    """Entries of a sparse matrix, by row."""
+
+    tails: np.ndarray
+    heads: np.ndarray
+    costs: Array
+
+    @classmethod
+    def of(cls, matrix: csr_array) -> _Edges:
+        tails = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr))
+        return cls(tails=tails, heads=matrix.indices, costs=matrix.data)
 
 
 def _worth_looking(cost: float, suboptimality: float, quantum: float) -> float:
@@ -134,8 +155,7 @@ def _next_multiple(limit: float, quantum: float) -> float:
 
 def _quantum(problem: LatticeProblem) -> float:
     """A cost of which every cost is a whole multiple, or 0: two plans then differ by nothing or at least by that."""
-    used = problem.run_costs[problem.ends >= 0]
-    costs = np.unique(np.concatenate([problem.moves.data, used]))
+    costs = np.unique(np.concatenate([problem.moves.data, *(run.data for run in problem.runs)]))
     costs = costs[costs > 0]
     if not len(costs):
         return 0.0
@@ -144,7 +164,7 @@ def _quantum(problem: LatticeProblem) -> float:
     return smallest if np.abs(whole - np.rint(whole)).max() < TINY else 0.0
 
 
-def _costs_to_go(problem: LatticeProblem) -> list[Array]:
+def _costs_to_go(problem: LatticeProblem, edges: tuple[_Edges, ...]) -> list[Array]:
     """[m] -> (n,) least cost from every pose to the goal with m runs of whatever kind in between."""
     back = csr_array(problem.moves.T)
     goal = np.full(back.shape[0], np.inf)
@@ -154,22 +174,17 @@ def _costs_to_go(problem: LatticeProblem) -> list[Array]:
     for _ in range(sum(problem.counts)):
         after = np.full(back.shape[0], np.inf)
         for q in wanted:
-            after = np.minimum(after, _before(layers[-1], problem.ends[q]) + problem.run_costs[q])
+            np.minimum.at(after, edges[q].tails, edges[q].costs + layers[-1][edges[q].heads])
         layers.append(_settled(back, after)[0])
     return layers
 
 
-def _before(costs: Array, ends: np.ndarray) -> Array:
-    """(n,) cost at the end of a run that begins at each pose."""
-    return np.where(ends >= 0, costs[ends], np.inf)
-
-
 def _reduced(moves: csr_array, heuristic: Array) -> csr_array:
     """Costs plus the heuristic's growth along them; moves from or to where no goal can be reached are left out."""
-    rows = np.repeat(np.arange(moves.shape[0]), np.diff(moves.indptr))
-    useful = np.isfinite(heuristic[rows]) & np.isfinite(heuristic[moves.indices])
-    rows, columns = rows[useful], moves.indices[useful]
-    costs = moves.data[useful] + heuristic[columns] - heuristic[rows]
+    edges = _Edges.of(moves)
+    useful = np.isfinite(heuristic[edges.tails]) & np.isfinite(heuristic[edges.heads])
+    rows, columns = edges.tails[useful], edges.heads[useful]
+    costs = edges.costs[useful] + heuristic[columns] - heuristic[rows]
     return csr_array((np.maximum(costs, 0.0), (rows, columns)), shape=moves.shape)
 
 
@@ -179,15 +194,15 @@ def _settled(graph: csr_array, entry: Array, limit: float = np.inf) -> tuple[Arr
     Entries of zero are edges here: SciPy's graph routines keep what a sparse matrix stores.
     """
     n = graph.shape[0]
-    doors = np.flatnonzero(np.isfinite(entry) & (entry <= limit))
-    if not len(doors):
+    open_poses = np.flatnonzero(np.isfinite(entry) & (entry <= limit))
+    if not len(open_poses):
         return np.full(n, np.inf), np.full(n, -1)
-    lowest = float(entry[doors].min())
+    lowest = float(entry[open_poses].min())
     extended = csr_array(
         (
-            np.concatenate([graph.data, entry[doors] - lowest]),
-            np.concatenate([graph.indices, doors.astype(graph.indices.dtype)]),
-            np.append(graph.indptr, graph.nnz + len(doors)),
+            np.concatenate([graph.data, entry[open_poses] - lowest]),
+            np.concatenate([graph.indices, open_poses.astype(graph.indices.dtype)]),
+            np.append(graph.indptr, graph.nnz + len(open_poses)),
         ),
         shape=(n + 1, n + 1),
     )
@@ -206,9 +221,12 @@ class _Layer:
 
 @dataclass(frozen=True, kw_only=True)
 class _Found:
+    """The best plan of one search; no plan through states that it did not look at costs less than `unseen`."""
+
     cost: float
     expansions: int
     steps: tuple[tuple[int, int], ...]
+    unseen: float = np.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,11 +234,12 @@ class _Layers:
     """One search: layers by counters, values are cost so far plus cost to go."""
 
     problem: LatticeProblem
+    edges: tuple[_Edges, ...]
     to_go: list[Array]
     graphs: list[csr_array]
     limit: float
 
-    def search(self, width: int | None, progress: Progress) -> _Found:
+    def search(self, width: int | None, most_states: float, progress: Progress) -> _Found:
         """Layer by layer; at most `width` of them for each number of runs, the most promising."""
         total, expansions = sum(self.problem.counts), 0
         done: dict[Counters, _Layer] = {}
@@ -229,7 +248,12 @@ class _Layers:
             progress("searching the lattice", runs / (total + 1))
             kept = sorted(wave, key=lambda counters: float(wave[counters].min()))[:width]
             following: dict[Counters, Array] = {}
-            for counters in kept:
+            for number, counters in enumerate(kept):
+                if expansions > most_states:
+                    unseen = [*(wave[left] for left in kept[number:]), *following.values()]
+                    return _Found(
+                        cost=np.inf, expansions=expansions, steps=(), unseen=min(float(part.min()) for part in unseen)
+                    )
                 layer = self._layer(wave[counters], total - runs)
                 done[counters] = layer
                 expansions += len(layer.poses)
@@ -254,15 +278,13 @@ class _Layers:
 
     def _entries(self, counters: Counters, layer: _Layer, left: int) -> Iterator[tuple[Counters, Array]]:
         """What each run that is still wanted leads to."""
-        costs = layer.values - self.to_go[left][layer.poses]
+        costs = np.full(self.problem.moves.shape[0], np.inf)
+        costs[layer.poses] = layer.values - self.to_go[left][layer.poses]
         for q, (used, wanted) in enumerate(zip(counters, self.problem.counts, strict=True)):
             if used == wanted:
                 continue
-            ends = self.problem.ends[q, layer.poses]
-            room = ends >= 0
-            entry = np.full(self.problem.moves.shape[0], np.inf)
-            reached = costs[room] + self.problem.run_costs[q, layer.poses[room]] + self.to_go[left - 1][ends[room]]
-            np.minimum.at(entry, ends[room], reached)
+            edges, entry = self.edges[q], np.full(len(costs), np.inf)
+            np.minimum.at(entry, edges.heads, costs[edges.tails] + edges.costs + self.to_go[left - 1][edges.heads])
             if entry.min() <= self.limit:
                 yield (*counters[:q], used + 1, *counters[q + 1 :]), entry
 
@@ -292,11 +314,13 @@ class _Layers:
             layer = done.get(earlier)
             if layer is None:
                 continue
-            rows = np.flatnonzero(self.problem.ends[q, layer.poses] == pose)
-            if not len(rows):
+            edges = self.edges[q]
+            arriving = np.flatnonzero((edges.heads == pose) & np.isin(edges.tails, layer.poses))
+            if not len(arriving):
                 continue
-            costs = layer.values[rows] - self.to_go[left + 1][layer.poses[rows]]
-            reached = costs + self.problem.run_costs[q, layer.poses[rows]] + self.to_go[left][pose]
+            tails = edges.tails[arriving]
+            values = layer.values[np.searchsorted(layer.poses, tails)]
+            reached = values - self.to_go[left + 1][tails] + edges.costs[arriving] + self.to_go[left][pose]
             nearest = int(reached.argmin())
-            found = min(found, (float(reached[nearest]), int(layer.poses[rows[nearest]]), q, earlier))
+            found = min(found, (float(reached[nearest]), int(tails[nearest]), q, earlier))
         return found[1], found[2], found[3]

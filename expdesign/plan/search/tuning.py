@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class Tuning:
-    """Beam search and local search.
+    """Beam search, local search and lattice search.
 
     Attributes:
         beam_width: partial plans kept.
@@ -18,6 +18,15 @@ class Tuning:
         sweeps: over all blocks of runs at most.
         same: hull lengths and radians by which a leg may differ from a transition that was tried.
         least_gain_s: for which a block is moved.
+        lattice_radii: default distance between cells of the lattice, in turning radii.
+        lattice_poses: poses that the default keeps below where the water is large.
+        lattice_finer: factors on the default distance that are tried where the lattice holds no plan.
+        lattice_suboptimality: plans that could save no more than this share are left out.
+        lattice_states: after which the search ends with the bound proved by then.
+        lattice_state_s: counted work for each state [s].
+        lattice_nearby: cells to each side, at least, within which legs lead from and to the lattice.
+        lattice_points: places looked at along a move.
+        lattice_least_speed: over ground against a current, in transit speeds.
     """
 
     beam_width: int = 400
@@ -30,6 +39,15 @@ class Tuning:
     sweeps: int = 20
     same: float = 1e-3
     least_gain_s: float = 0.05
+    lattice_radii: float = 1.1
+    lattice_poses: int = 60_000
+    lattice_finer: tuple[float, ...] = (1.0, 0.7, 0.5)
+    lattice_suboptimality: float = 0.02
+    lattice_states: float = 1e7
+    lattice_state_s: float = 1e-6
+    lattice_nearby: int = 2
+    lattice_points: int = 8
+    lattice_least_speed: float = 0.1
 
 
 SEARCH = Tuning()

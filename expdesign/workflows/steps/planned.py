@@ -14,7 +14,7 @@ from expdesign.export import (
 from expdesign.information import PrimitiveInformation
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import plan_trial
-from expdesign.plan.values import Plan, RiskEstimate
+from expdesign.plan.values import LatticeProof, Plan, RiskEstimate
 from expdesign.progress import Progress, silent
 from expdesign.scenario import Scenario
 
@@ -84,11 +84,25 @@ def plan_summary(plan: Plan) -> dict[str, object]:
         "informative_s": plan.seconds("primitive"),
         "repositioning_s": plan.seconds("reposition"),
         "repositioning_bound_s": plan.reposition_bound_s,
+        **_lattice_summary(plan.lattice),
         "distance_m": plan.trajectory.distance_m,
         "least_clearance_m": plan.verification.clearance_min_m,
         "leave_water_probability": plan.leave_water_probability,
         **_risk_summary(plan.risk),
         "design_efficiency_realised": plan.design_efficiency_realised,
+    }
+
+
+def _lattice_summary(proof: LatticeProof | None) -> dict[str, object]:
+    """The lattice plan and its bound; nothing for other planners."""
+    if proof is None:
+        return {}
+    return {
+        "lattice_spacing_m": proof.spacing_m,
+        "lattice_cost_s": proof.cost_s,
+        "lattice_bound_s": proof.lower_bound_s,
+        "lattice_gap": proof.gap,
+        "lattice_places_refused": proof.refused,
     }
 
 

@@ -1,0 +1,157 @@
+"""The lattice planner as users meet it: the harbour scenario through its files, and both planners on a small trial."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+
+from expdesign import workflows
+from expdesign.cli import main
+from outside_check import columns
+
+SCENARIOS = Path(__file__).parents[1] / "scenarios"
+SMALL = """
+[scenario]
+name = "small"
+vessel = "{folder}/vessels/tender-20m.toml"
+dictionary = "dictionary.toml"
+area = "{folder}/areas/bay.toml"
+[design]
+total_s = 120.0
+criterion = "D"
+mean_subtraction = "none"
+least_s = {{zigzag = 60.0, sway-zigzag = 60.0}}
+[start]
+north_m = -100.0
+east_m = -450.0
+heading_deg = 60.0
+[goal]
+north_m = 0.0
+east_m = -150.0
+heading_deg = 0.0
+[plan]
+planner = "{planner}"
+"""
+ZIGZAGS = """
+[dictionary]
+name = "two"
+[[primitives]]
+name = "zigzag"
+family = "zigzag"
+duration_s = 60.0
+period_s = 30.0
+speed_mps = 1.2
+sway_mps = 0.15
+yaw_rate_radps = 0.05
+[[primitives]]
+name = "sway-zigzag"
+family = "sway_zigzag"
+duration_s = 60.0
+period_s = 30.0
+speed_mps = 0.6
+sway_mps = 0.3
+"""
+
+
+def small(folder: Path, planner: str) -> Path:
+    """A scenario with two runs."""
+    (folder / "dictionary.toml").write_text(ZIGZAGS, "utf-8")
+    path = folder / f"{planner}.toml"
+    path.write_text(SMALL.format(folder=SCENARIOS, planner=planner), "utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def harbour(tmp_path_factory):
+    """Summary and folder of the harbour scenario."""
+    folder = tmp_path_factory.mktemp("harbour")
+    return workflows.plan(SCENARIOS / "harbour.toml", folder, seed=1).summary, folder
+
+
+def plan_of(folder: Path):
+    return json.loads((folder / "plan.json").read_text())
+
+
+def runs_of(plan) -> Counter[str]:
+    return Counter(leg["name"] for leg in plan["legs"] if leg["kind"] == "primitive")
+
+
+def test_every_zigzag_is_run_three_times_on_a_verified_round_trip(harbour):
+    _, folder = harbour
+    plan, track = plan_of(folder), columns(folder / "track.csv")
+    assert plan["verified"] is True
+    assert runs_of(plan) == {"zigzag-flat": 3, "zigzag-steep": 3, "zigzag-sway": 3}
+    ends = np.array([[track[name][k] for name in ("north_m", "east_m", "heading_rad")] for k in (0, -1)])
+    np.testing.assert_allclose(ends[1, :2], ends[0, :2], atol=0.1)
+    assert np.cos(ends[1, 2] - ends[0, 2]) == pytest.approx(1.0, abs=1e-4)
+    assert track["north_m"].min() < 300.0 < track["north_m"].max()  # out between the moles and back
+
+
+def test_the_hull_stays_in_water_that_is_deep_enough(harbour):
+    _, folder = harbour
+    chart = json.loads((SCENARIOS / "areas" / "harbour.geojson").read_text())
+    layers = {feature["properties"]["layer"] for feature in chart["features"]}
+    deep, rest = (
+        shapely.union_all([shapely.geometry.shape(item["geometry"]) for item in chart["features"] if of(item)])
+        for of in (
+            lambda item: item["properties"]["layer"] in ("depth5m", "depth10m"),
+            lambda item: item["properties"]["layer"] == "land",
+        )
+    )
+    track = columns(folder / "track.csv")
+    places = shapely.points(track["lon_deg"], track["lat_deg"])
+    assert layers == {"land", "depth2m", "depth5m", "depth10m"}
+    assert shapely.contains(deep, places).all()
+    assert not shapely.intersects(rest, places).any()
+
+
+def test_the_proof_is_written_with_the_plan(harbour):
+    summary, folder = harbour
+    proof = plan_of(folder)["lattice"]
+    assert 0.0 < proof["lower_bound_s"] <= proof["cost_s"]
+    assert proof["gap"] == pytest.approx(1 - proof["lower_bound_s"] / proof["cost_s"])
+    assert proof["gap"] <= 0.02
+    assert proof["headings"] == 8
+    assert summary["lattice_gap"] == proof["gap"]
+    assert summary["lattice_bound_s"] == proof["lower_bound_s"]
+
+
+def test_the_sailed_plan_takes_about_as_long_as_the_lattice_says(harbour):
+    _, folder = harbour
+    plan = plan_of(folder)
+    assert plan["lattice"]["places_refused"] == 0
+    assert plan["reposition_s"] == pytest.approx(plan["lattice"]["cost_s"], rel=0.15)
+
+
+@pytest.mark.parametrize("planner", ["beam", "lattice"])
+def test_both_planners_give_verified_plans_of_the_same_runs(planner, tmp_path):
+    workflows.plan(small(tmp_path, planner), tmp_path / "out")
+    plan = plan_of(tmp_path / "out")
+    assert plan["verified"] is True
+    assert runs_of(plan) == {"zigzag": 1, "sway-zigzag": 1}
+    assert ("lattice" in plan) == (planner == "lattice")
+    assert plan["reposition_s"] >= plan["reposition_bound_s"]
+
+
+def test_a_planner_that_does_not_exist_is_refused_with_those_that_do(tmp_path, capsys):
+    assert main(["plan", str(small(tmp_path, "astar")), "--out", str(tmp_path / "out"), "--quiet"]) == 2
+    message = capsys.readouterr().err.strip()
+    assert "\n" not in message
+    assert "plan.planner" in message
+    assert "'astar', expected 'beam' or 'lattice'" in message
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_lattice_too_coarse_ends_in_one_line(tmp_path, capsys):
+    path = small(tmp_path, "lattice")
+    path.write_text(path.read_text("utf-8") + "lattice_spacing_m = 3000.0\n", "utf-8")
+    assert main(["plan", str(path), "--out", str(tmp_path / "out"), "--quiet"]) == 3
+    message = capsys.readouterr().err.strip()
+    assert "\n" not in message
+    assert "on a lattice of 3000 m" in message
+    assert "a plan.lattice_spacing_m smaller may help" in message
