@@ -1,4 +1,4 @@
-"""The cheapest order of things of which there are several alike, by what is left and what was last."""
+"""The cheapest order of runs with repetitions, by dynamic programming over the remaining counts and the last run."""
 
 from __future__ import annotations
 
@@ -6,22 +6,20 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from expdesign.plan.bounds.tuning import BOUNDS
 from expdesign.values import Array
-
-MOST_COUNTS = 20_000
-"""Combinations of what may be left for which it is worked out."""
 
 
 def cheapest_orders(pairs: Array, home: Array, counts: Sequence[int]) -> Array | None:
-    """(combinations, q) least cost of all orders of what is left, by what was last; None where there are too many.
+    """(combinations, q) least cost over all orders of the remaining runs, by the last run; None for too many.
 
     Args:
         pairs: (q, q) cost from one to the next.
         home: (q,) cost after the last.
-        counts: how many of each there are.
+        counts: of each run.
     """
     sizes = np.array(counts) + 1
-    if np.prod(sizes.astype(float)) > MOST_COUNTS:
+    if np.prod(sizes.astype(float)) > BOUNDS.order_states:
         return None
     base = place_values(counts)
     table = np.zeros((int(np.prod(sizes)), len(home)))
@@ -33,5 +31,5 @@ def cheapest_orders(pairs: Array, home: Array, counts: Sequence[int]) -> Array |
 
 
 def place_values(counts: Sequence[int]) -> np.ndarray:
-    """(q,) what one of each adds to the number of a combination."""
+    """(q,) what one of each run adds to the index of a combination."""
     return np.asarray(np.r_[1, np.cumprod(np.array(counts) + 1)[:-1]].astype(int))

@@ -1,6 +1,6 @@
-"""What runs can contribute to the way at most, against the fastest leg: the part of the bound that they take off.
+"""Displacement of runs in seconds of the fastest leg: what they can save of the path to the goal at most.
 
-Where wind makes a difference runs are simulated at headings all round, with a margin for those in between.
+Where wind makes a difference, runs are simulated at headings all round, with a margin for those in between.
 """
 
 from __future__ import annotations
@@ -11,21 +11,17 @@ import numpy as np
 import shapely
 
 from expdesign.dictionary import Primitive
+from expdesign.plan.bounds.tuning import BOUNDS
 from expdesign.plan.control import over_ground
 from expdesign.plan.runs import run_at_headings
 from expdesign.simulation import Environment
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
 
-HEADINGS = 72
-"""Headings at which runs are simulated where wind makes a difference."""
-SPARE = 1.02
-"""What headings between these may give more."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Displacement:
-    """What a run can contribute to the way, at the heading that suits it best.
+    """What a run can contribute to the path at its best heading.
 
     Attributes:
         chord_s: time that a leg needs from its start to its end [s].
@@ -65,7 +61,7 @@ class Headway:
         return np.asarray((np.sqrt(along**2 + spare * (ground**2).sum(axis=-1)) - along) / spare)
 
     def most_s(self, water_m: Array, lasting_s: Array | float) -> Array:
-        """(...,) that of what moves by a length through water in a time, at the heading for which it is most [s].
+        """(...,) least time of the displacement by a length through water in a time, at its worst heading [s].
 
         A leg of time t makes good d when p.d <= t for all slownesses p with V |p| + c.p = 1. Of l through water and
         c T that is at most |p| l + (1 - V |p|) T, so the ends 1 / (V + c) and 1 / (V - c) of |p| decide.
@@ -76,7 +72,7 @@ class Headway:
 
 
 def displacement_of(vessel: Vessel, primitive: Primitive, environment: Environment, headway: Headway) -> Displacement:
-    """How far a run carries the ship at most, and how far it bends."""
+    """Largest displacement of a run, and how far its path deviates from its chord."""
     track = primitive.trajectory.pose[:, :2]
     if differs_by_heading(vessel, environment):
         tracks = np.moveaxis(_in_weather(vessel, primitive, environment)[..., :2], 1, 0)
@@ -100,7 +96,11 @@ def exit_motion(vessel: Vessel, primitive: Primitive, environment: Environment) 
         return speed, speed, abs(float(primitive.exit_velocity[2]))
     last = _in_weather(vessel, primitive, environment)[-1]
     speeds = np.hypot(*(over_ground(last) - environment.current_to).T)
-    return float(speeds.min()) / SPARE, float(speeds.max()) * SPARE, float(np.abs(last[:, 5]).max()) * SPARE
+    return (
+        float(speeds.min()) / BOUNDS.wind_margin,
+        float(speeds.max()) * BOUNDS.wind_margin,
+        float(np.abs(last[:, 5]).max()) * BOUNDS.wind_margin,
+    )
 
 
 def _displacement_in_weather(tracks: list[Array], headway: Headway) -> Displacement:
@@ -108,17 +108,16 @@ def _displacement_in_weather(tracks: list[Array], headway: Headway) -> Displacem
     chords = [float(headway.seconds(track[-1] - track[0])) for track in tracks]
     paths = [float(headway.seconds(np.diff(track, axis=0)).sum()) for track in tracks]
     return Displacement(
-        chord_s=SPARE * max(chords),
-        path_s=SPARE * max(paths),
-        deviation_m=SPARE * max(_deviation_m(track) for track in tracks),
+        chord_s=BOUNDS.wind_margin * max(chords),
+        path_s=BOUNDS.wind_margin * max(paths),
+        deviation_m=BOUNDS.wind_margin * max(_deviation_m(track) for track in tracks),
     )
 
 
 def _deviation_adrift_m(track: Array, drift_m: float) -> float:
-    """Bound on what a chord's points are away from a track (k, 2) through water that drifts any way by so much.
+    """Bound on the distance of a chord's points from a track (k, 2) through water that drifts in any direction.
 
-    The current carries the chord's point at a share of it as far as it carries the ship in that share of the time;
-    between points and samples at other shares lies the drift in the time between.
+    At equal shares of the chord and of the time, both have drifted equally; otherwise by the drift in the time between.
     """
     share, when = np.linspace(0.0, 1.0, 201), np.linspace(0.0, 1.0, len(track))
     points = track[0] + share[:, None] * (track[-1] - track[0])
@@ -128,10 +127,10 @@ def _deviation_adrift_m(track: Array, drift_m: float) -> float:
 
 
 def differs_by_heading(vessel: Vessel, environment: Environment) -> bool:
-    """Whether air moves over the water, and the model feels it: runs of the dictionary are made where it does not."""
+    """Whether wind relative to the water acts on the model: the dictionary's runs are simulated without."""
     used = zip(vessel.model.expressions, vessel.model.parameters, strict=True)
-    feels = any(value and {"u_q", "v_q"} & set(expression.signals) for expression, value in used)
-    return feels and bool((environment.wind_to - environment.current_to).any())
+    in_air = any(value and {"u_q", "v_q"} & set(expression.signals) for expression, value in used)
+    return in_air and bool((environment.wind_to - environment.current_to).any())
 
 
 def _in_weather(vessel: Vessel, primitive: Primitive, environment: Environment) -> Array:
@@ -139,11 +138,11 @@ def _in_weather(vessel: Vessel, primitive: Primitive, environment: Environment) 
     return run_at_headings(
         vessel,
         primitive,
-        np.arange(HEADINGS) * 2 * np.pi / HEADINGS,
+        np.arange(BOUNDS.wind_headings) * 2 * np.pi / BOUNDS.wind_headings,
         entering=environment.current_to,
-        current_to=np.tile(environment.current_to, (HEADINGS, 1)),
-        wind_to=np.tile(environment.wind_to, (HEADINGS, 1)),
-        parameters=np.tile(vessel.model.parameters, (HEADINGS, 1)),
+        current_to=np.tile(environment.current_to, (BOUNDS.wind_headings, 1)),
+        wind_to=np.tile(environment.wind_to, (BOUNDS.wind_headings, 1)),
+        parameters=np.tile(vessel.model.parameters, (BOUNDS.wind_headings, 1)),
     )
 
 

@@ -5,23 +5,23 @@ faster than a stated rate, or 2 % beyond those at their ends; each run is sailed
 the forecast's means; the ship starts and ends at rest with its engines stopped, rudders and thrusters at any angle.
 
 In a steady current the least time of a leg along a straight line is that of Zermelo's navigation problem. It grows with
-the length and obeys the triangle inequality, so the fastest way round the islands bends at their corners only and a
+the length and obeys the triangle inequality, so the fastest path round the islands bends at their corners only and a
 visibility graph finds it. Let W be where amidships may be. A run whose chord stays within d of its path has its chord
-inside W grown by d, so the legs together with the chords of such runs, and with the paths of all others, lead from
-start to goal through that water: the time of the fastest way is no more than that of the legs, and what legs would
-need for those chords and paths at the headings that suit them best. This is so whatever d is; the best d counts.
+inside W grown by d. So the legs, the chords of such runs and the paths of all others lead from start to goal through
+that water. The time of the fastest path is therefore at most the time of the legs plus the time that legs would need
+for those chords and paths at their best headings. This holds for every d; the best d counts.
 
-On small charts what each run can save of the way is looked for in all places where its hull has room, too
+On small charts the most that each run can save is also bounded over all places where its hull has room
 (`expdesign.plan.bounds.branch_and_bound`): the least time to the goal falls by no more than that in a run, and in a leg
-by no more than it takes.
+by no more than the leg takes.
 
 Speeds and commands at the ends of legs cost time besides: a leg that begins or ends slower than the fastest leg loses
-distance while it changes speed, and actuators move no faster than their rates. Which leg joins which runs is left to
-the plan; the cheapest order counts.
+distance while it changes speed, and actuators move no faster than their rates. The order of the runs is free; the
+cheapest order counts.
 
-All of this is proved but for two things, which are looked for and given a margin: the largest accelerations, among
-drawn motions and commands (`expdesign.plan.control.acceleration_limits`), and, where wind makes a difference, how far
-runs go and how fast they end, at headings all round (`expdesign.plan.bounds.displacement`).
+All of this is proved but for two quantities, which are estimated and given a margin: the largest accelerations, over
+random motions and commands (`expdesign.plan.control.acceleration_limits`), and, where wind makes a difference, the
+displacement and the end speed of runs, over headings all round (`expdesign.plan.bounds.displacement`).
 
 Source: E. Zermelo, Über das Navigationsproblem bei ruhender oder veränderlicher Windverteilung, ZAMM 11 (1931),
 114-124.
@@ -40,6 +40,7 @@ from expdesign.dictionary import Primitive
 from expdesign.plan.bounds.branch_and_bound import time_saved_s
 from expdesign.plan.bounds.cheapest_orders import cheapest_orders, place_values
 from expdesign.plan.bounds.displacement import Displacement, Headway, differs_by_heading, displacement_of, exit_motion
+from expdesign.plan.bounds.tuning import BOUNDS
 from expdesign.plan.chart import build_visibility_graph, simplified
 from expdesign.plan.control import LegEnd, least_loss, leg_end
 from expdesign.plan.legs import BEYOND_ENDS, leg_speed_mps
@@ -47,9 +48,6 @@ from expdesign.sea_area import SeaArea
 from expdesign.simulation import Environment
 from expdesign.values import Array
 from expdesign.vessel import Vessel
-
-QUAD_SEGS = 32
-"""Chords to a quarter circle round grown water."""
 
 
 def reposition_bound_s(
@@ -67,7 +65,7 @@ def reposition_bound_s(
     """Least repositioning time of any plan of the class that the module describes [s].
 
     Args:
-        vessel, area, environment: who, where, in what.
+        vessel, area, environment: as planned.
         clearance_m: distance of the hull from anything forbidden.
         primitives, repeats: the runs.
         ends: start and goal, (3,) or (2,).
@@ -83,18 +81,18 @@ def reposition_bound_s(
     headway = Headway(speed_mps=speed_mps, current_to=environment.current_to)
     displacements = {item.name: displacement_of(vessel, item, environment, headway) for item in runs}
     counts = {item.name: repeats[item.name] for item in runs}
-    way_s = time_to_sail_s(
+    path_s = time_to_sail_s(
         area, clearance_m + vessel.beam_m / 2, displacements, counts, ends, headway, vessel.length_m / 30
     )
     if not differs_by_heading(vessel, environment):
         water = area.safe_water(clearance_m + vessel.beam_m / 2)
-        found = time_saved_s(runs, displacements, counts, water, ends, headway, vessel, known_s=way_s)
+        found = time_saved_s(runs, displacements, counts, water, ends, headway, vessel, known_s=path_s)
         if found is not None:
-            way_s = max(way_s, found[0] - sum(counts[name] * most_s for name, most_s in found[1].items()))
+            path_s = max(path_s, found[0] - sum(counts[name] * most_s for name, most_s in found[1].items()))
     firsts, lasts = _leg_ends(vessel, environment, runs, exits, speed_mps, yaw_rate_radps)
     losses = np.array([[least_loss(first, last, vessel) for last in lasts] for first in firsts])
     lost_m, least_s = (least_losses(losses[..., k], list(counts.values())) for k in (0, 1))
-    return float(max(0.0, least_s, way_s + lost_m / (speed_mps + headway.current_mps)))
+    return float(max(0.0, least_s, path_s + lost_m / (speed_mps + headway.current_mps)))
 
 
 def time_to_sail_s(
@@ -106,11 +104,11 @@ def time_to_sail_s(
     headway: Headway,
     tolerance_m: float,
 ) -> float:
-    """Time that legs cannot do without [s]; negative where runs can carry the ship farther than it has to go."""
+    """Least time of all legs together [s]; negative where runs can displace the ship farther than it has to go."""
     water, best = area.safe_water(margin_m), -np.inf
     start, goal = (end[:2] for end in ends)
     for grown_m in sorted({0.0, *(item.deviation_m for item in displacements.values())}):
-        carried = sum(
+        displaced_s = sum(
             count
             * (
                 displacements[name].chord_s
@@ -121,18 +119,20 @@ def time_to_sail_s(
         )
         more = _grown(water, grown_m) if grown_m else water
         simple = simplified(more, grow=True, tolerance_m=tolerance_m + 0.002 * grown_m)
-        way_s = build_visibility_graph(simple).least_cost(start, goal, headway.seconds)
-        if not np.isfinite(way_s):  # the ends lie outside the water that a plan needs: there is none to be bounded
+        path_s = build_visibility_graph(simple).least_cost(start, goal, headway.seconds)
+        if not np.isfinite(path_s):  # the ends are not connected: there is no plan to bound
             continue
-        # an end outside the water is joined to it by a line that the true way need not follow
+        # an end outside the water is connected to it by a line that the true path need not follow
         straight_s = float(headway.seconds(goal - start))
-        best = max(best, (way_s if _holds_ends(simple, ends) else straight_s) - carried)
+        best = max(best, (path_s if _holds_ends(simple, ends) else straight_s) - displaced_s)
     return float(best) if np.isfinite(best) else 0.0
 
 
 def _grown(water: shapely.Geometry, distance_m: float) -> shapely.Geometry:
-    """No less than the water within a distance: arcs are drawn by chords, whose middles are nearer than their ends."""
-    return shapely.buffer(water, distance_m / np.cos(np.pi / (4 * QUAD_SEGS)) + 1e-6, quad_segs=QUAD_SEGS)
+    """A superset of the water grown by a distance: the chords of arcs are nearer than their ends."""
+    return shapely.buffer(
+        water, distance_m / np.cos(np.pi / (4 * BOUNDS.quad_segments)) + 1e-6, quad_segs=BOUNDS.quad_segments
+    )
 
 
 def _holds_ends(water: shapely.Geometry, ends: tuple[Array, Array]) -> bool:
@@ -162,7 +162,7 @@ def _leg_ends(
 
 
 def least_losses(losses: Array, counts: Sequence[int]) -> float:
-    """What legs lose at least together, over all orders of the runs, or over all assignments where those are many.
+    """Least loss of all legs together, over all orders of the runs, or over all assignments where those are many.
 
     Args:
         losses: (q + 1, q + 1) of a leg; rows by the run before, the start first, columns by the run after, the goal
