@@ -176,6 +176,17 @@ def test_every_import_goes_down_or_stays_in_its_room() -> None:
     assert violations(ROOT) == []
 
 
+def test_verification_imports_nothing_of_the_planner_but_its_values() -> None:
+    imports = [
+        tuple(module.split(".")[1:3])
+        for path in (ROOT / "plan" / "verify").glob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for module in imported_modules(node, path, ROOT)
+        if module.startswith("expdesign.plan.")
+    ]
+    assert set(imports) == {("plan", "values"), ("plan", "verify")}
+
+
 def test_no_room_is_crowded() -> None:
     rooms = {folder for path in ROOT.rglob("*.py") if (folder := path.parent) != ROOT}
     modules = {room: [path.stem for path in room.glob("*.py") if path.stem != "__init__"] for room in rooms}

@@ -1,4 +1,4 @@
-"""Runs as the planner places them: footprint of the hull, dispersion of drawn ships."""
+"""Runs as the planner places them: footprint of the swept hull, dispersion of drawn ships."""
 
 from expdesign.plan.runs.dispersion import dispersion_m, draw_truths, run_at_headings
 from expdesign.plan.runs.ensemble import Fleet

@@ -1,4 +1,4 @@
-"""How far a run may stray from its footprint when the vessel is not quite the nominal one."""
+"""Dispersion of a run about its nominal track, for vessels and weather drawn from their uncertainty."""
 
 from __future__ import annotations
 
@@ -7,13 +7,12 @@ import numpy as np
 from expdesign.dictionary import Primitive
 from expdesign.errors import NoPlan
 from expdesign.plan.runs.ensemble import Truths
+from expdesign.plan.runs.tuning import RUNS
 from expdesign.simulation import Environment, Variation, draw_environment, simulate_many
 from expdesign.simulation.environment import vary
 from expdesign.values import Array
 from expdesign.vessel import Vessel
 from expdesign.vessel.hull import disc_points
-
-FEWEST_DRAWS, MOST_DRAWS = 200, 2000
 
 
 def draw_truths(vessel: Vessel, environment: Environment, draws: int, rng: np.random.Generator) -> Truths:
@@ -44,23 +43,24 @@ def dispersion_m(
     """(k + 1,) radius round the nominal disc centres that a share `confidence` of drawn runs keeps to all the time.
 
     Each draw has its own vessel, weather and heading, begins at the entry velocity and runs open loop. The radius
-    grows with time like the draws' root mean square distance, scaled so that the wished share stays inside throughout.
+    grows with time like the draws' root mean square distance, scaled so that the desired share stays inside throughout.
 
     Args:
         vessel, primitive, environment: the nominal run and what is uncertain about it.
         centres_m: (c,) forward positions of the discs that cover the hull.
         confidence: between 0 and 1.
         rng: draws.
-        draws: how many; by default two beyond the wished share, within `FEWEST_DRAWS` and `MOST_DRAWS`.
+        draws: how many; by default by `Tuning`.
 
     Raises:
         NoPlan: so many drawn vessels are unstable that the share cannot be met, or it is too high to be estimated.
     """
-    draws = draws or int(np.clip(np.ceil(2.0 / (1.0 - confidence)), FEWEST_DRAWS, MOST_DRAWS))
+    needed = np.ceil(RUNS.expected_outside / (1.0 - confidence))
+    draws = draws or int(np.clip(needed, RUNS.fewest_draws, RUNS.most_draws))
     if draws * (1.0 - confidence) < 1.0:
         raise NoPlan(
             f"plan.confidence is too high to be estimated: each run would have to keep to its room in {confidence:.6g} "
-            f"of all cases, which {draws} drawn vessels cannot tell"
+            f"of all cases, which {draws} drawn vessels cannot resolve"
         )
     truths, samples = draw_truths(vessel, environment, draws, rng), len(primitive.commands)
     heading = rng.uniform(-np.pi, np.pi, draws)
@@ -96,10 +96,10 @@ def run_at_headings(
     """(k + 1, n, 6) states over ground of a run that begins at the origin at headings (n,).
 
     Args:
-        vessel, primitive: who sails what.
+        vessel, primitive: ship and run.
         heading: of each ship [rad].
         entering: (2,) current through which all begin with the entry velocity [m/s].
-        current_to, wind_to: (n, 2) or (k, n, 2) in which they sail on [m/s].
+        current_to, wind_to: (n, 2) or (k, n, 2) during the run [m/s].
         parameters: (n, p) of each ship.
     """
     c, s = np.cos(heading), np.sin(heading)
@@ -119,7 +119,7 @@ def run_at_headings(
 def _varying(
     vessel: Vessel, variation: Variation, shape: tuple[int, int, int], rng: np.random.Generator
 ) -> Array | float:
-    """(k, n, 2) what a current or a wind does round its mean; nothing where it is steady."""
+    """(k, n, 2) variation of a current or a wind about its mean; 0 where it is steady."""
     if variation.std_mps == 0.0:
         return 0.0
     return vary(variation, rng.standard_normal(shape), sample_time_s=vessel.sample_time_s)

@@ -1,7 +1,7 @@
-"""Drawn ships in drawn weather, moved on sample by sample under commands of their own.
+"""Drawn ships in drawn weather, simulated sample by sample under commands of their own.
 
 Each ship has parameters of its own, a current and a wind that keep their drawn means or vary round them, and actuators
-that deliver as the vessel's file says. Ships that are told to wait keep everything but the weather.
+that deliver as the vessel's file says. For ships that wait, only the weather goes on.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from expdesign.vessel import Vessel
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Truths:
-    """What is true of n ships.
+    """True parameters and mean weather of n ships.
 
     Attributes:
         parameters: (n, p) in the model's own form.
@@ -37,14 +37,14 @@ class Truths:
 
 
 class Fleet:
-    """n ships at sea.
+    """n ships and their states.
 
     Attributes:
-        vessel: which all of them are taken for.
+        vessel: the nominal one.
         states: (n, 6) pose in the n-frame and velocity over ground in the b-frame.
         given: (n, m) commands standing.
         delivered: (n, m) what the actuators gave over the last sample, on average.
-        lost: (n,) ships whose motion has left all bounds; they stay where they were.
+        lost: (n,) ships whose motion diverged; they stay where they were.
     """
 
     def __init__(
@@ -62,9 +62,9 @@ class Fleet:
         Args:
             vessel: structure, actuators, sample time.
             environment: how current and wind vary.
-            truths: what is true of each ship.
+            truths: of each ship.
             state, standing: at the beginning.
-            rng: the weather's chance.
+            rng: of the weather.
         """
         runs = len(truths.parameters)
         self.vessel, self._rng = vessel, rng

@@ -1,4 +1,4 @@
-"""Independent verification of a plan; imports no other room of the planner."""
+"""Independent verification of a plan; imports nothing of the planner but its values."""
 
 from expdesign.plan.verify.checks import hull_clearance, verify_plan
 from expdesign.plan.verify.efficiency import realised_efficiencies

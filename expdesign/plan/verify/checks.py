@@ -1,4 +1,4 @@
-"""Independent verification: from the chart, the vessel, the commands and the track, not from how the plan was made.
+"""Independent verification from the chart, the vessel, the commands and the track alone.
 
 It shares the equations of motion and the hull's outline with the planner, but none of its grids, margins or paths.
 """
@@ -23,11 +23,11 @@ from expdesign.vessel import NUMPY, Vessel
 from expdesign.vessel.hull import hull_polygons
 
 FINE_SUBSTEPS = 10 * SUBSTEPS
-"""Integrator steps per sample of the re-simulation: a tenth of those that plans are made with."""
+"""Integrator steps per sample of the re-simulation: ten times as many as in planning."""
 ENTRY_TOLERANCE = 0.02
 """Largest deviation of a run's entry velocity, relative to the vessel's speed in the plan."""
 SPEED_TOLERANCE = 0.03
-"""By how much legs may pass the speed stated for them, or that of their faster end: plans keep it at some samples."""
+"""Share by which legs may exceed their stated speed, or that of their faster end: plans limit it at some samples."""
 
 
 def verify_plan(
@@ -51,7 +51,7 @@ def verify_plan(
         vessel, environment: the nominal model and the forecast's means.
         area: allowed water.
         sailed: the plan.
-        clearance_m: promised distance from hull to forbidden water.
+        clearance_m: required distance from hull to forbidden water.
         transit_mps: stated speed of legs through water.
         primitives: the dictionary by name.
         repeats: how often each is to be run.
@@ -76,7 +76,7 @@ def verify_plan(
         *_end_problems(vessel, environment, again, start, goal, "re-simulated "),
         *_if(
             bool(clearance[worst] < clearance_m - 1e-6),
-            f"the hull is {clearance[worst]:.2f} m from forbidden water, promised {clearance_m:g} m, "
+            f"the hull is {clearance[worst]:.2f} m from forbidden water, required {clearance_m:g} m, "
             f"at {worst * commands.sample_time_s:.0f} s, {_place(area, trajectory.pose[worst])}",
         ),
         *_if(excess > 1e-6, f"{excess_signal} by {excess:.2g} of its range"),
@@ -155,7 +155,7 @@ def _motion_problems(vessel: Vessel, trajectory: Trajectory, again: Trajectory) 
 def _end_problems(
     vessel: Vessel, environment: Environment, trajectory: Trajectory, start: Array, goal: Array, which: str = ""
 ) -> list[str]:
-    """How the plan's ends differ from start and goal, at rest through the water."""
+    """Deviations of the plan's ends from start and goal, at rest through the water."""
     problems = []
     fastest = np.hypot(*trajectory.velocity[:, :2].T).max(), np.abs(trajectory.velocity[:, 2]).max()
     slow, steady = ENTRY_TOLERANCE * np.array(fastest) + 1e-9
@@ -188,11 +188,11 @@ def _limit_excess(vessel: Vessel, commands: Commands) -> tuple[float, str]:
 
 
 def _engine_problems(vessel: Vessel, commands: Commands) -> list[str]:
-    """Engines and forces that are not stopped at the goal; that they are at the start is in their rates."""
-    told = zip(commands.names, vessel.limits, vessel.angles, commands.values[-1], strict=True)
+    """Engines and forces that are not stopped at the goal; the start is covered by their rates."""
+    last_values = zip(commands.names, vessel.limits, vessel.angles, commands.values[-1], strict=True)
     return [
-        f"{name} is told {last:.3g} at the goal, where it is to have stopped"
-        for name, limit, turns, last in told
+        f"{name} is commanded {last:.3g} at the goal, expected 0"
+        for name, limit, turns, last in last_values
         if not turns and abs(last) > 1e-6 * max(abs(limit.low), abs(limit.high))
     ]
 
@@ -207,7 +207,7 @@ def _repeat_problems(legs: Sequence[Leg], repeats: Mapping[str, int]) -> list[st
 
 
 def _legs_problems(commands: Commands, legs: Sequence[Leg], primitives: Mapping[str, Primitive]) -> list[str]:
-    """Legs that do not make up the plan, or runs that are none of the dictionary's."""
+    """Gaps between legs, and runs that the dictionary does not have."""
     problems = []
     if [0, *(leg.last for leg in legs)] != [*(leg.first for leg in legs), len(commands)]:
         problems.append("the legs do not follow each other without gaps from the first sample to the last")
@@ -223,7 +223,7 @@ def _legs_problems(commands: Commands, legs: Sequence[Leg], primitives: Mapping[
 def _run_problems(
     vessel: Vessel, commands: Commands, legs: Sequence[Leg], primitives: Mapping[str, Primitive]
 ) -> list[str]:
-    """Runs whose commands are not the dictionary's, but for whole turns of angles without limits."""
+    """Runs whose commands differ from the dictionary's, except by whole turns of angles without limits."""
     unlimited = [not np.isfinite([limit.low, limit.high]).any() for limit in vessel.limits]
     turning = [name.startswith("a") and free for name, free in zip(commands.names, unlimited, strict=True)]
     problems = []
