@@ -158,7 +158,7 @@ def test_two_findings_of_one_cause_have_a_picture_each(clean):
     page = diagnosis_html(found, command="made up", version="0")
     assert "X_u: u" in page
     assert "Y_v: v" in page
-    assert page.index("What the model lacks") < page.index('id="finding1"')
+    assert page.index("Missing acceleration") < page.index('id="finding1"')
 
 
 def test_data_too_short_for_the_residuals_are_told_so(clean):

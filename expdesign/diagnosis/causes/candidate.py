@@ -1,4 +1,4 @@
-"""What a cause of the catalogue is: a name, ways in which it may act, and words for it."""
+"""A cause of the catalogue: its name, its candidates and its explanation."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Cause:
 
     Attributes:
         name: in the vocabulary of diagnosis.json.
-        candidates: the ways in which it may act in a situation; none when the data cannot show it.
+        candidates: for a situation; none if the data cannot show the cause.
         explain: one or two sentences for a person, from the estimates and the model they are of.
     """
 

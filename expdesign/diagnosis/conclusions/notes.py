@@ -1,4 +1,4 @@
-"""Notes of a diagnosis: what was not measured, what was not tested, what was left out."""
+"""Notes of a diagnosis: quantities not measured, causes not tested or left out."""
 
 from __future__ import annotations
 
@@ -69,15 +69,15 @@ def notes_on_rejected(found: Selection, kept: Selection, unit: str) -> tuple[str
     names = {id(step.chosen.candidate) for step in kept.steps}
     return tuple(
         f"The data show a sign of {missing_effect(step.chosen.candidate.cause)} (p = {step.p_value:.1g}). It is not "
-        f"a finding, because it does not surely improve the simulation of {unit} held out of the fit, or because its "
-        "size may be zero."
+        f"a finding, because its gain on {unit} held out of the fit is not significant, or because its size may be "
+        "zero."
         for step in found.steps
         if id(step.chosen.candidate) not in names
     )
 
 
 def note_on_nuisance(unfitted: HeldOut, fitted: HeldOut, seed: int) -> tuple[str, ...]:
-    """What uncertain parameters gain by themselves; no cause is credited with it.
+    """Gain from uncertain parameters alone, which belongs to no cause.
 
     Args:
         unfitted: errors of the model in use.
@@ -94,11 +94,11 @@ def note_on_nuisance(unfitted: HeldOut, fitted: HeldOut, seed: int) -> tuple[str
 
 
 def note_on_unconverged(held: Sequence[HeldOut]) -> tuple[str, ...]:
-    """Gains that are not wholly measured on held-out data."""
+    """Gains that are measured only partly on held-out data."""
     folds = sum(item.unconverged for item in held)
     if not folds:
         return ()
     return (
         f"{folds} fits of the cross-validation did not improve on the fit to all runs. They used its estimates, so "
-        "part of the gains is measured on runs that these estimates have seen.",
+        "part of the gains is measured on runs that were used in the fit.",
     )

@@ -12,18 +12,18 @@ from expdesign.diagnosis.fit import validation_units
 from expdesign.diagnosis.values import ErrorReduction, Finding
 
 DIVERGED_FIT = -300.0
-"""Fit [%] below which the simulation has diverged from the ship and the number means nothing."""
+"""Fit [%] below which the simulation has diverged from the ship; the number then has no meaning."""
 MISSING_EFFECTS = {
-    "parameters": "the right values of some parameters",
+    "parameters": "the correct values of some parameters",
     "current": "a current",
     "wind": "wind",
-    "thrust_gain": "the right size of thrust",
+    "thrust_gain": "the correct thrust gain",
     "thrust_advance_loss": "the loss of thrust with speed",
     "thruster_asymmetry": "an asymmetry of thrust",
     "actuator_lag": "the lag of the actuators",
     "actuator_delay": "the dead time of the actuators",
     "actuator_deadband": "the dead band of the actuators",
-    "load_change": "the right inertia",
+    "load_change": "the correct inertia",
     "heading_bias": "the misalignment of a sensor",
     "lever_arm": "the distance of a sensor from amidships",
     "sensor_delay": "the delay of a sensor",
@@ -62,7 +62,7 @@ def manoeuvre(name: str) -> str:
 
 
 def benefit(item: Finding) -> str:
-    """What adding it does to the output that it surely helps most, e.g. "cuts the sway error by 52 % (45 to 60 %)"."""
+    """Effect of adding it on the output with the most certain gain, e.g. "cuts the sway error by 52 % (45 to 60 %)"."""
     known = [reduction for reduction in item.error_reductions if np.isfinite(reduction.share)]
     if not known:
         return f"gains {item.gain:.1f} points of fit"
@@ -89,7 +89,7 @@ def verdict(findings: Sequence[Finding], before: Accuracy, unit: str = "runs") -
         unit: what gains are measured on.
     """
     if not findings:
-        return f"Nothing is wrong that this data can show: {accuracy_in_words(before)}."
+        return f"These data show no error of the model: {accuracy_in_words(before)}."
     parts = [f"The simulation lacks {listed([missing_effect(item.cause) for item in findings])}"]
     parts += [_benefits(findings, unit), *_invisible(findings)]
     parts += [_open_question(item) for item in findings if item.not_distinguishable_from]

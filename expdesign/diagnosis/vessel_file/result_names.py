@@ -10,12 +10,12 @@ from expdesign.vessel import VesselModel, column_name
 
 def stated_values(keys: Iterable[str], ship: ExtendedModel) -> str:
     """What the vessel file states of these effects, as a sentence to go on with; empty where it states nothing."""
-    told = []
+    stated = []
     for key in keys:
         if key in ship.stated:
             name, factor, offset, _ = public_name(key, ship)
-            told.append(f"{name} {offset + factor * ship.stated[key]:.3g}")
-    return f" The vessel file states {', '.join(told)}." if told else ""
+            stated.append(f"{name} {offset + factor * ship.stated[key]:.3g}")
+    return f" The vessel file states {', '.join(stated)}." if stated else ""
 
 
 def public_name(key: str, ship: ExtendedModel) -> tuple[str, float, float, str]:

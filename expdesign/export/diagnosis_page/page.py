@@ -9,7 +9,6 @@ from expdesign.diagnosis.accuracy import mean_residual
 from expdesign.diagnosis.conclusions import (
     DIVERGED_FIT,
     accuracy_in_words,
-    benefit,
     has_diverged,
     manoeuvre,
     missing_effect,
@@ -26,14 +25,15 @@ from expdesign.export.diagnosis_page.figures import (
     window_figure,
 )
 from expdesign.export.diagnosis_page.suspects import has_sign, is_force
-from expdesign.export.diagnosis_page.wording import titled, worded
+from expdesign.export.diagnosis_page.wording import cause_title, estimate_words
 from expdesign.export.files import plus_minus
 from expdesign.export.pages import page_templates
 from expdesign.export.pages.figures import report_style
 
 SHOWN = 4
 """Stretches of data drawn."""
-UNTOLD = "\N{EN DASH}"
+NO_NUMBER = "\N{EN DASH}"
+SMALLEST_P_VALUE = 1e-12
 
 
 def diagnosis_html(found: Diagnosis, *, command: str, version: str) -> str:
@@ -54,8 +54,8 @@ def diagnosis_html(found: Diagnosis, *, command: str, version: str) -> str:
         before=accuracy_in_words(found.before),
         astray=has_diverged(found.before) or has_diverged(found.after),
         outputs=", ".join(found.before.outputs),
-        whole=_on_the_whole(found),
-        tested=[(titled(cause), p_value) for cause, p_value in found.screened],
+        whole=_mean_missing(found),
+        tested=[(cause_title(cause), p_value) for cause, p_value in found.screened],
         accuracy=_accuracy(found),
         data=_data(found),
         figures=figures,
@@ -64,19 +64,19 @@ def diagnosis_html(found: Diagnosis, *, command: str, version: str) -> str:
     )
 
 
-def _on_the_whole(found: Diagnosis) -> list[str]:
-    """Mean of what the model lacks, e.g. "u 10.2 +- 0.7 mm/s2"."""
-    told = []
+def _mean_missing(found: Diagnosis) -> list[str]:
+    """Mean acceleration that the model lacks, e.g. "u 10.2 +- 0.7 mm/s2"."""
+    means = []
     for output in found.residuals.outputs:
         label, factor = ACCELERATION_AXES[output]
         name, _, unit = label.partition(" ")
         mean, std = mean_residual(found.residuals, output)
-        told.append(f"{name} {plus_minus(factor * mean, factor * std)} {unit.strip('[]')}".replace("-", words.MINUS))
-    return told
+        means.append(f"{name} {plus_minus(factor * mean, factor * std)} {unit.strip('[]')}".replace("-", words.MINUS))
+    return means
 
 
 def drawn(found: Diagnosis) -> list[int]:
-    """Windows to draw: where the model in use is most wrong."""
+    """Windows to draw: those with the largest errors of the model in use."""
     error = np.nan_to_num(found.windows.measured - found.simulated_before)[..., :3]
     scale = np.maximum(np.nanstd(found.windows.measured[..., :3], axis=(0, 1)), 1e-12)
     size = np.clip((error / scale) ** 2, 0, 1e6).sum(axis=(1, 2))
@@ -97,7 +97,7 @@ def _accuracy(found: Diagnosis) -> list[tuple[str, ...]]:
         cells = [f"{name} [{unit}]"]
         for item in (found.before, found.after):
             if not float(item.fit[index]) >= DIVERGED_FIT:
-                cells += [_fit(float(item.fit[index])), UNTOLD, UNTOLD]
+                cells += [_fit(float(item.fit[index])), NO_NUMBER, NO_NUMBER]
                 continue
             cells += [
                 _fit(float(item.fit[index])),
@@ -116,40 +116,36 @@ def _finding(item: Finding, found: Diagnosis) -> dict[str, object]:
     ]
     return {
         "cause": item.cause,
-        "title": titled(item.cause),
+        "title": cause_title(item.cause),
         "explanation": item.explanation,
         "estimates": [
-            (worded(one.name, item.cause), plus_minus(one.value, one.std).replace("-", words.MINUS), one.unit)
+            (estimate_words(one.name, item.cause), plus_minus(one.value, one.std).replace("-", words.MINUS), one.unit)
             for one in item.estimates
         ],
-        "chance": _chance(item.p_value),
+        "p_value": _p_value(item.p_value),
         "gain": words.number(item.gain, 1),
         "interval": f"{words.number(low, 1)} to {words.number(high, 1)}",
         "fits": rows,
         "signed": has_sign(item),
         "force": is_force(found, item),
-        "worth": benefit(item),
-        "falls": [_fall(fall) for fall in item.error_reductions if np.isfinite(fall.share)],
-        "rivals": [missing_effect(name) for name in item.not_distinguishable_from],
-        "telling": None if item.would_tell_apart is None else manoeuvre(item.would_tell_apart),
+        "reductions": [_reduction(reduction) for reduction in item.error_reductions if np.isfinite(reduction.share)],
+        "alternatives": [missing_effect(name) for name in item.not_distinguishable_from],
+        "distinguishing": None if item.would_tell_apart is None else manoeuvre(item.would_tell_apart),
     }
 
 
-def _fall(item: ErrorReduction) -> str:
+def _reduction(item: ErrorReduction) -> str:
     shares = (words.number(100 * value, 0) for value in (item.share, item.low, item.high))
     return "{} {}{nb}% ({} to {}{nb}%)".format(item.output, *shares, nb=words.NB)
 
 
 def _fit(value: float) -> str:
-    return "lost" if not value >= DIVERGED_FIT else f"{words.number(value, 1)}{words.NB}%"
+    return "diverged" if not value >= DIVERGED_FIT else f"{words.number(value, 1)}{words.NB}%"
 
 
-def _chance(p_value: float) -> str:
-    if p_value < 1e-12:
-        return "less than one in a million million"
-    if p_value < 1e-6:
-        return "less than one in a million"
-    return f"about 1 in {round(1 / p_value)}" if p_value < 0.5 else "large"
+def _p_value(p_value: float) -> str:
+    """Two digits; very small ones depend on the shape of the noise, so only a bound is given."""
+    return f"< {SMALLEST_P_VALUE:g}" if p_value < SMALLEST_P_VALUE else f"{p_value:.2g}"
 
 
 def _data(found: Diagnosis) -> str:

@@ -12,11 +12,11 @@ from expdesign.export.files import plus_minus, strict_json, vessel_toml
 from expdesign.values import Array
 
 SMALL = 1e-99
-"""Chances below are told as such: floating point has no smaller ones to tell apart."""
+"""p-values below are printed as this bound: they are beyond floating-point accuracy."""
 
 
 def diagnosis_json(found: Diagnosis) -> str:
-    """The whole diagnosis; what is not a number is null."""
+    """The whole diagnosis; numbers that are not finite are null."""
     return strict_json(
         {
             "baseline": accuracy_entry(found.before),
@@ -31,7 +31,7 @@ def diagnosis_json(found: Diagnosis) -> str:
 
 
 def _residuals(found: Residuals) -> dict[str, Any]:
-    """Per output the chance that what the model lacks within seconds depends as much on a variable by chance."""
+    """Per output and variable: p-value of the test that the missing acceleration does not depend on the variable."""
     return {
         "stretch_s": found.stretch_s,
         "p_values": {
@@ -64,8 +64,11 @@ def finding_entry(item: Finding, outputs: Sequence[str]) -> dict[str, Any]:
         "fit_before": _named(outputs, item.fit_before),
         "fit_after": _named(outputs, item.fit_after),
         "error_falls_by": {
-            fall.output: {"share": _finite(fall.share), "interval": [_finite(fall.low), _finite(fall.high)]}
-            for fall in item.error_reductions
+            reduction.output: {
+                "share": _finite(reduction.share),
+                "interval": [_finite(reduction.low), _finite(reduction.high)],
+            }
+            for reduction in item.error_reductions
         },
         "gain": _finite(item.gain),
         "gain_interval": [_finite(value) for value in item.gain_interval],
@@ -76,7 +79,7 @@ def finding_entry(item: Finding, outputs: Sequence[str]) -> dict[str, Any]:
 
 
 def diagnosis_tables(found: Diagnosis) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Header and rows: one finding each."""
+    """Header, and one row per finding."""
     rows: list[tuple[str, ...]] = [
         (
             item.cause,
@@ -87,11 +90,11 @@ def diagnosis_tables(found: Diagnosis) -> tuple[tuple[str, ...], list[tuple[str,
         )
         for item in found.findings
     ]
-    return ("cause", "estimate", "p", "gain of fit [points]", "cannot be told from"), rows
+    return ("cause", "estimate", "p", "gain of fit [points]", "not distinguishable from"), rows
 
 
 def extended_vessel(found: Diagnosis, *, command: str) -> str:
-    """The vessel file with everything found."""
+    """The vessel file with all findings."""
     comments = [f"Extended by a diagnosis: {found.verdict}", *(item.explanation for item in found.findings)]
     return vessel_toml(found.extended, comments=[*comments, *found.notes, f"Made by: {command}"])
 

@@ -16,7 +16,7 @@ SHARE, COUNT = 0.75, 40
 
 
 def between(widths: Array, levels: Array) -> list[float]:
-    """Widths moved to the middle between the levels around them, as no data tell more."""
+    """Widths moved to the middle between adjacent command levels, which the data cannot resolve further."""
     place = np.clip(np.searchsorted(levels, widths, side="right"), 1, len(levels) - 1)
     return sorted(set(((levels[place - 1] + levels[place]) / 2).tolist()))
 
@@ -43,7 +43,7 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
 
 def _explain(values: Values, _ship: ExtendedModel) -> str:
     key, value, std = first(values)
-    return f"The ship does not answer {key.split(':')[1]} commands smaller than {rounded(value, std)}: a dead band."
+    return f"Commands of {key.split(':')[1]} smaller than {rounded(value, std)} have no effect: a dead band."
 
 
 ACTUATOR_DEADBAND = Cause(name="actuator_deadband", candidates=_candidates, explain=_explain)

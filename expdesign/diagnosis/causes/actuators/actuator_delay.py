@@ -15,8 +15,8 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
 def _explain(values: Values, _ship: ExtendedModel) -> str:
     key, value, std = first(values)
     return (
-        f"The error comes in bursts of fixed length after each change of command: {key.split(':')[1]} inputs act "
-        f"{rounded(value, std)} s late."
+        f"The error occurs for a fixed time after each change of command. The dead time of {key.split(':')[1]} inputs "
+        f"is {rounded(value, std)} s."
     )
 
 

@@ -42,8 +42,8 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
 def _explain(values: Values, _ship: ExtendedModel) -> str:
     key, value, std = first(values)
     return (
-        f"The error follows every change of command and dies out: {key.split(':')[1]} inputs lag behind their commands "
-        f"with a time constant of {rounded(value, std)} s."
+        f"The error occurs after each change of command and decays. {key.split(':')[1].capitalize()} inputs lag behind "
+        f"their commands with a time constant of {rounded(value, std)} s."
     )
 
 

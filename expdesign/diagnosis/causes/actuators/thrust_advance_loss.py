@@ -18,8 +18,10 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
 
 def _explain(values: Values, _ship: ExtendedModel) -> str:
     key, value, std = first(values)
-    way = "falls" if value < 0 else "grows"
-    return f"The thrust error {way} with surge speed times thrust: {key.split(':')[1]} is off by {rounded(value, std)}."
+    return (
+        f"Thrust depends on the surge speed in another way than in the model. Change of {key.split(':')[1]}: "
+        f"{rounded(value, std)}."
+    )
 
 
 THRUST_ADVANCE_LOSS = Cause(name="thrust_advance_loss", candidates=_candidates, explain=_explain)

@@ -20,10 +20,10 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
 
 def _explain(values: Values, _ship: ExtendedModel) -> str:
     _, value, std = first(values)
-    way = "stronger" if value > 0 else "weaker"
+    relation = "larger" if value > 0 else "smaller"
     return (
-        f"Thrust is {rounded(100 * abs(value), 100 * std)} % {way} than the model says, by one factor in all "
-        f"directions, while damping is right."
+        f"Thrust is {rounded(100 * abs(value), 100 * std)} % {relation} than in the model, by the same factor in all "
+        "directions. The damping is correct."
     )
 
 

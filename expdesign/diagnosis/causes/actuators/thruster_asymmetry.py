@@ -28,14 +28,14 @@ def _explain(values: Values, ship: ExtendedModel) -> str:
     if key == "asymmetry" and not turns_by_force(ship.model):
         turn = "starboard" if value > 0 else "port"
         return (
-            f"Thrust turns the ship to {turn} at zero angle: the yaw rate accelerates by {rounded(value, std)} "
+            f"Thrust turns the ship to {turn} at zero angle. The yaw acceleration is {rounded(value, std)} "
             f"rad/s\N{SUPERSCRIPT TWO} per {ahead_force_text(ship.model)}, as if thrust acted to {side} of the centre "
             "line."
         )
     if key == "asymmetry":
         return (
-            f"A yaw moment in proportion to the ahead thrust: {rounded(value, std)} per unit of thrust, as if the "
-            f"thrust acted that far to {side}. The ship turns at zero angle."
+            f"A yaw moment is proportional to the ahead thrust: {rounded(abs(value), std)} m, as if thrust acted at "
+            f"this distance to {side} of the centre line. The ship turns at zero angle."
         )
     size = rounded(math.degrees(value), math.degrees(std))
     return f"The angle of {key.split(':')[1]} is off by {size} degrees: the ship turns when it is commanded straight."

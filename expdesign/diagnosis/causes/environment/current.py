@@ -1,4 +1,4 @@
-"""A steady current: the ship moves with water that moves."""
+"""A steady current."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def _explain(values: Values, _ship: ExtendedModel) -> str:
     (north, _), (east, _) = values["current:north"], values["current:east"]
     toward = math.degrees(math.atan2(east, north)) % 360
     return (
-        f"The error turns with the heading in the earth's frame, as if the water moved: a steady current of "
+        f"The error depends on the heading as in moving water. It corresponds to a steady current of "
         f"{math.hypot(north, east):.2f} m/s towards {toward:.0f} degrees "
         f"(north {rounded(*values['current:north'])}, east {rounded(*values['current:east'])} m/s)."
     )

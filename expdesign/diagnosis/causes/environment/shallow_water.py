@@ -24,9 +24,9 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
 
 def _explain(values: Values, _ship: ExtendedModel) -> str:
     half = ", ".join(
-        f"{key.split(':')[1]} is {rounded(50 * value, 50 * std)} % larger" for key, (value, std) in values.items()
+        f"{key.split(':')[1]} by {rounded(50 * value, 50 * std)} %" for key, (value, std) in values.items()
     )
-    return f"The ship moves otherwise where the water is shallow: where it is twice as deep as the draught, {half}."
+    return f"The motion depends on the water depth. A depth of twice the draught increases {half}."
 
 
 SHALLOW_WATER = Cause(name="shallow_water", candidates=_candidates, explain=_explain)

@@ -11,8 +11,8 @@ from expdesign.diagnosis.causes.hull import absent_terms
 from expdesign.diagnosis.causes.words import listed, rounded
 from expdesign.diagnosis.model import ExtendedModel, own_air_terms
 
-TAKEN_MPS, WAYS, FINER = 10.0, 8, 7
-"""Of a wind that is not measured: its speed, directions looked in, and steps between them."""
+ASSUMED_MPS, SECTORS, FINER = 10.0, 8, 7
+"""Of a wind that is not measured: assumed speed, number of directions tried, and steps within each sector."""
 SPEEDS_MPS = (3.0, 8.0)
 DIRECTIONS = ((1.0, 0.0), (0.7, 0.7), (0.0, 1.0), (-0.7, 0.7), (-1.0, 0.0), (-0.7, -0.7), (0.0, -1.0), (0.7, -0.7))
 
@@ -42,23 +42,23 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
 
 
 def _of_unknown_wind(situation: Situation, terms: list[str]) -> list[Candidate]:
-    """Air drag in the mean wind that the vessel's file states, or in one whose direction is looked for.
+    """Air drag in the mean wind that the vessel file states, or in one of unknown direction.
 
-    Drag goes with the square of the wind, so data without wind tell its direction, and the coefficients only for a
-    speed that is taken.
+    Drag grows with the square of the wind speed. Data without measured wind therefore determine its direction, and
+    the drag coefficients for an assumed speed.
     """
     free = {f"term:{name}": 0.0 for name in terms}
     if situation.has("wind:north") or situation.has("wind:east"):
         return [Candidate(cause="wind", free=free)]
     if situation.has("wind:toward"):
         return []
-    turns = 2 * math.pi * np.arange(WAYS) / WAYS
-    around = np.linspace(-1, 1, FINER) * math.pi / WAYS
+    turns = 2 * math.pi * np.arange(SECTORS) / SECTORS
+    around = np.linspace(-1, 1, FINER) * math.pi / SECTORS
     return [
         Candidate(
             cause="wind",
             free=free,
-            fixed={"wind:speed": TAKEN_MPS, "wind:toward": float(turn)},
+            fixed={"wind:speed": ASSUMED_MPS, "wind:toward": float(turn)},
             grid=("wind:toward", tuple((turn + around).tolist())),
         )
         for turn in turns
@@ -70,15 +70,13 @@ def _explain(values: Values, _ship: ExtendedModel) -> str:
         toward, std = (math.degrees(number) for number in values["wind:toward"])
         drag = {key: pair for key, pair in values.items() if key != "wind:toward"}
         return (
-            f"The error turns with the heading as air drag does in a steady wind towards "
-            f"{rounded(toward % 360, std)} degrees. No wind is measured: its speed is taken to be {TAKEN_MPS:g} m/s, "
-            f"and the drag ({listed(drag)}) is that which such a wind needs."
+            f"The error depends on the heading like air drag in a steady wind towards {rounded(toward % 360, std)} "
+            f"degrees. No wind is measured, so its speed is assumed to be {ASSUMED_MPS:g} m/s. The drag coefficients "
+            f"({listed(drag)}) hold for this speed."
         )
     if "wind:north" in values:
-        return f"Air drag as of a mean wind blowing to {listed(values, ' m/s')} explains the error."
-    return (
-        f"The error grows with the wind over the deck: the hull has air drag that the model lacks ({listed(values)})."
-    )
+        return f"Air drag in a mean wind blowing to {listed(values, ' m/s')} explains the error."
+    return f"The error grows with the relative wind. The model lacks air drag of the hull ({listed(values)})."
 
 
 WIND = Cause(name="wind", candidates=_candidates, explain=_explain)

@@ -1,4 +1,4 @@
-"""Parameters right before a time and wrong after it."""
+"""A change of parameters during the trial."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from expdesign.diagnosis.model import ExtendedModel
 COUNT = 12
 FINER = 6
 EDGE = 0.06
-"""Share of the data at either end in which no change is looked for: it would be no change."""
+"""Share of the data at either end in which no change is tested."""
 
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
@@ -20,7 +20,7 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     end = float(situation.windows.time_s.max())
     times = np.linspace(0.0, end, COUNT + 2)[1:-1]
     outputs = situation.ship.model.outputs
-    what = ["change:gain", "change:damping", *(f"change:damping_{name}" for name in outputs)]
+    effects = ["change:gain", "change:damping", *(f"change:damping_{name}" for name in outputs)]
     spacing = end / (COUNT + 1)
     return tuple(
         Candidate(
@@ -35,7 +35,7 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
             ),
         )
         for time in times
-        for key in what
+        for key in effects
     )
 
 
@@ -43,7 +43,7 @@ def _explain(values: Values, _ship: ExtendedModel) -> str:
     time, std = values["change:time"]
     rest = {key: pair for key, pair in values.items() if key != "change:time"}
     words = ", ".join(f"{key.split(':')[1]} by {rounded(100 * v, 100 * s)} %" for key, (v, s) in rest.items())
-    return f"The model holds until {rounded(time, std)} s of the data and not after: {words}."
+    return f"The model is correct until {rounded(time, std)} s. After that the data show changes: {words}."
 
 
 CHANGE_POINT = Cause(name="change_point", candidates=_candidates, explain=_explain)

@@ -1,4 +1,4 @@
-"""A ship heavier or lighter than the model: slower to react, same steady speeds."""
+"""Inertia that differs from the model's: other accelerations, the same steady speeds."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def _explain(values: Values, _ship: ExtendedModel) -> str:
     parts = ", ".join(
         f"{WORDS[key[-1]]} by {rounded(100 * value, 100 * std)} %" for key, (value, std) in values.items()
     )
-    return f"Damping and thrust are both off by one factor: the inertia differs from the model's, in {parts}."
+    return f"Damping and thrust are wrong by the same factor, so the inertia differs from the model's: {parts}."
 
 
 LOAD_CHANGE = Cause(name="load_change", candidates=_candidates, explain=_explain)

@@ -25,7 +25,7 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
 
 def _explain(values: Values, _ship: ExtendedModel) -> str:
     ((key, (value, std)),) = values.items()
-    return f"The error follows a regressor that the model does not have: the term {key[5:]}, {rounded(value, std)}."
+    return f"The error is correlated with a regressor that the model lacks: the term {key[5:]} = {rounded(value, std)}."
 
 
 MISSING_TERM = Cause(name="missing_term", candidates=_candidates, explain=_explain)

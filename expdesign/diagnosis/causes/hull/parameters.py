@@ -1,4 +1,4 @@
-"""Right structure, wrong values: parameters off by more than their stated standard deviations."""
+"""Parameter values that are wrong by more than their stated standard deviations."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from expdesign.diagnosis.model import ExtendedModel, asymmetry_terms, own_advanc
 
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
-    """Single ones, all of an equation, all; but singly none whose change has a physical name in the catalogue."""
+    """Single parameters, all of an equation, and all; not those alone whose change is another cause."""
     model = situation.ship.model
     named = {*own_advance_terms(model), *own_air_terms(model), *asymmetry_terms(model)}
     groups: list[tuple[str, ...]] = [(f"theta:{name}",) for name in model.names if name not in named]
@@ -20,7 +20,7 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
 
 def _explain(values: Values, _ship: ExtendedModel) -> str:
     changes = ", ".join(f"{key[6:]} by {rounded(value, std)}" for key, (value, std) in values.items())
-    return f"The structure fits, its numbers do not: the data want parameters changed ({changes})."
+    return f"The model structure explains the data with other parameter values. Changes: {changes}."
 
 
 PARAMETERS = Cause(name="parameters", candidates=_candidates, explain=_explain)

@@ -33,8 +33,8 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
 def _explain(values: Values, _ship: ExtendedModel) -> str:
     period, std = values["roll:period"]
     return (
-        f"Sway or yaw oscillate with a period of {rounded(period, std)} s, as a rolling ship makes them. Roll is not "
-        "measured: compare the period with that of the ship, for waves or a steering loop may oscillate alike."
+        f"Sway or yaw oscillates with a period of {rounded(period, std)} s, as roll can cause. Roll is not measured. "
+        "Compare the period with the ship's roll period: waves or a steering loop can cause the same oscillation."
     )
 
 

@@ -17,8 +17,8 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
 def _explain(values: Values, _ship: ExtendedModel) -> str:
     _, value, std = first(values)
     return (
-        f"The yaw rate sensor shows {rounded(100 * (1 + value), 100 * std)} % of the yaw rate that the heading and the "
-        f"ship's motion show: its scale is wrong."
+        f"The yaw rate sensor has a scale error. It shows {rounded(100 * (1 + value), 100 * std)} % of the yaw rate "
+        "that heading and motion show."
     )
 
 

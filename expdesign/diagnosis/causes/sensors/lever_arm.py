@@ -23,8 +23,8 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
 def _explain(values: Values, ship: ExtendedModel) -> str:
     sensor = "the antenna of the positions" if "u" in ship.derived else "the velocity sensor"
     return (
-        f"Measured velocities contain yaw rate times a length: {sensor} is not where the model counts from, but "
-        f"{listed(values, ' m')} of it."
+        f"Measured velocities contain the yaw rate times a lever arm. Position of {sensor} relative to the origin of "
+        f"the model: {listed(values, ' m')}."
     )
 
 

@@ -35,8 +35,8 @@ def _explain(values: Values, _ship: ExtendedModel) -> str:
         for key, (value, std) in values.items()
     )
     if any(value < 0 for value, _ in values.values()):
-        return f"Signals are not of one time: {parts}. No sensor is early: what it is set against is late, or filtered."
-    return f"One signal trails the others: {parts}."
+        return f"Signals are not synchronous: {parts}. An early signal means that the others are late or filtered."
+    return f"Signals are not synchronous: {parts}."
 
 
 SENSOR_DELAY = Cause(name="sensor_delay", candidates=_candidates, explain=_explain)
