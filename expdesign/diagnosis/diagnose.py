@@ -43,7 +43,7 @@ def diagnose(
     proposals: Sequence[Proposal] = (),
     progress: Progress = silent,
 ) -> Diagnosis:
-    """Show what the simulation gets wrong, name the causes, extend the model, measure the gain.
+    """Find the causes of the simulation error, extend the model by them, and measure the gain.
 
     Args:
         vessel: the model in use; parameters with a standard deviation are re-estimated within it, others are known.
@@ -119,8 +119,8 @@ def _select(ship: ExtendedModel, windows: Windows, seed: int, progress: Progress
 def _cross_validated(found: Selection, ship: ExtendedModel, windows: Windows, progress: Progress) -> list[HeldOut]:
     """Of the model in use with its uncertain parameters fitted, then after every step.
 
-    The gain of uncertain parameters within their standard deviations is no merit of a cause. But if the first cause is
-    that they are beyond these, their gain is its merit, and the model in use is not fitted.
+    The gain of uncertain parameters within their standard deviations is not attributed to a cause. If the first cause
+    is that they exceed these, it gets their gain, and the model in use is not fitted.
     """
     fitted = bool(found.first.keys) and not any(only_nuisance(step, found) for step in found.steps[:1])
     fits: list[Fit | None] = [found.first if fitted else None, *(step.chosen.fit for step in found.steps)]

@@ -1,4 +1,4 @@
-"""The manoeuvre that tells two explanations apart: where the two extended models disagree most, per minute."""
+"""The manoeuvre that distinguishes two explanations: the extended models disagree most in it, per minute."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from expdesign.vessel import NUMPY, stem
 
 HEADINGS = (0.0, np.pi / 2, np.pi, 3 * np.pi / 2)
 ROUNDS = 2
-"""Simulations after which the heading is known well enough: it depends a little on what acts by heading."""
+"""Simulations until the heading is accurate enough; it depends on current and wind, which depend on it."""
 PROPOSED = 240
 """Samples of a standard proposal."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Proposal:
-    """A manoeuvre that might tell causes apart.
+    """A manoeuvre that may distinguish causes.
 
     Attributes:
         name: of the primitive.
@@ -79,7 +79,7 @@ def _shown(ship: ExtendedModel, windows: Windows, proposal: Proposal) -> Array |
 
 
 def _turning(ship: ExtendedModel, windows: Windows, proposal: Proposal, wind: Array | None) -> Windows:
-    """The same with the heading as the ship turns: what is fixed in the n-frame comes from all sides in a circle."""
+    """The same windows with the simulated heading, so that current and wind act from the right side."""
     for _ in range(ROUNDS):
         heading_change = _sailed(ship, windows, proposal).heading_change
         heading = np.array(HEADINGS)[:, None] + heading_change
@@ -93,7 +93,7 @@ def _air(wind: Array | None, heading: Array) -> Array:
 
 
 def _windows(proposal: Proposal, like: Windows, wind: Array | None) -> Windows:
-    """A window per heading, which does not change yet, in the mean wind."""
+    """A window per initial heading, held constant, in the mean wind."""
     substeps = max(1, int(np.ceil(proposal.sample_time_s / like.step_s - 1e-9)))
     inputs = np.repeat(proposal.inputs, substeps, axis=0)
     count, w = len(inputs), len(HEADINGS)
@@ -118,7 +118,7 @@ def _windows(proposal: Proposal, like: Windows, wind: Array | None) -> Windows:
 
 
 def standard_proposals(like: Windows, inputs: tuple[str, ...], sample_time_s: float) -> tuple[Proposal, ...]:
-    """Manoeuvres of the standard families within the inputs that the data use, each of as many compared samples."""
+    """Manoeuvres of the standard families within the range of the recorded inputs, with equal numbers of samples."""
     rows = np.concatenate(like.batch_inputs)
     middle, low, high = np.median(rows, axis=0), np.quantile(rows, 0.05, axis=0), np.quantile(rows, 0.95, axis=0)
     velocity = np.nanmedian(like.measured[..., :3].reshape(-1, 3), axis=0)

@@ -1,4 +1,4 @@
-"""What a diagnosis says."""
+"""Results of a diagnosis."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Estimate:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ErrorReduction:
-    """The share by which the simulated error of one output falls on batches that were not used to estimate.
+    """The share by which the simulated error of one output falls on held-out batches.
 
     Attributes:
         output: u, v or r.
@@ -39,20 +39,20 @@ class ErrorReduction:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Finding:
-    """One thing that the simulation gets wrong.
+    """One cause of the simulation error.
 
     Attributes:
         cause: name in the catalogue.
         estimates: its numbers.
-        p_value: corrected for all causes tried.
-        fit_before, fit_after: (n,) simulated fit [%] of batches that were not used to estimate, without and with it.
-        falls: of the error, per output.
+        p_value: corrected for multiple tests.
+        fit_before, fit_after: (n,) simulated fit [%] of held-out batches, without and with it.
+        error_reductions: per output.
         gain: mean over outputs of the difference; gain_interval: 95 %, bootstrap over batches.
         not_distinguishable_from: causes that explain the data as well.
-        would_tell_apart: the manoeuvre for which they and this cause disagree most per minute, or None.
+        would_tell_apart: the manoeuvre that distinguishes them best, per minute, or None.
         explanation: a sentence or two.
         likelihood_gain: twice the log likelihood gained.
-        keys: effects of the extended model that the estimates are of, in their order.
+        keys: effects of the extended model, in the order of the estimates.
     """
 
     cause: str
@@ -72,7 +72,7 @@ class Finding:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Diagnosis:
-    """Everything found.
+    """Findings, and the simulations that they rest on.
 
     Attributes:
         vessel: the model in use.
@@ -80,13 +80,13 @@ class Diagnosis:
         record: the data.
         windows: the data as compared.
         before, after: accuracy of both on all batches, in sample.
-        findings: by gain, which is against the model with everything that was found before.
+        findings: in the order of the selection; each gain is relative to the model with the earlier ones.
         verdict: one sentence.
         simulated_before, simulated_after: (w, s, 4) channels beside `windows.measured`.
-        errors: per finding, (w, s, 4) error of the model with everything that was found before.
+        errors: per finding, (w, s, 4) error of the model with the earlier findings.
         residuals: of the model in use.
         step_residuals: per finding, of the same model as in `errors`.
-        notes: what was left out, and what could not be tested.
+        notes: quantities not measured, causes left out or not tested.
         screened: (cause, smallest adjusted p-value) of the round that found nothing more.
     """
 

@@ -1,4 +1,4 @@
-"""How well the model simulates the data, what it gets wrong within seconds, and whether the inputs excite it."""
+"""Accuracy of the simulation, one-step residuals, and excitation by the inputs."""
 
 from expdesign.diagnosis.accuracy.excitation import check_excitation, constant_inputs
 from expdesign.diagnosis.accuracy.residuals import Dependence, Residuals, dependence, mean_residual, one_step_residuals

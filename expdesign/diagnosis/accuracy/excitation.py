@@ -1,4 +1,4 @@
-"""Whether data can support a diagnosis at all, and if not, what is missing."""
+"""Whether data are sufficient for a diagnosis."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def constant_inputs(ship: ExtendedModel, windows: Windows) -> tuple[str, ...]:
 
 
 def _check_answer(ship: ExtendedModel, windows: Windows) -> None:
-    """Inputs that hardly change leave a steady run: the motion they make by the model drowns in the noise."""
+    """Refuse inputs whose simulated effect on the motion is smaller than the noise."""
     held = tuple(np.broadcast_to(rows.mean(axis=0), rows.shape) for rows in windows.batch_inputs)
     moved, steady = (
         simulate_from_measured(ship, data).predicted[..., :3] for data in (windows, replace(windows, batch_inputs=held))
@@ -78,7 +78,7 @@ def _check_answer(ship: ExtendedModel, windows: Windows) -> None:
 
 
 def _noise(measured: Array) -> Array:
-    """(n,) standard deviation of white noise in (w, s, n), from second differences; motion at the sample time adds."""
+    """(n,) standard deviation of white noise in (w, s, n), from second differences, which include some motion."""
     second = np.diff(measured, 2, axis=1)
     seen = np.isfinite(second)
     mean = np.where(seen, second, 0.0) ** 2

@@ -1,8 +1,8 @@
-"""What a model gets wrong within seconds, beside everything that it could depend on.
+"""One-step residuals of a model, and the variables that they may depend on.
 
 Each stretch of a few samples is simulated from its own measured state. The rate at which measured and simulated
-velocity then part is the acceleration that the model lacks there: a one-step residual, over as many samples as noise
-in the measurements asks for. No cause is assumed.
+velocity diverge is the acceleration that the model lacks: a one-step residual, taken over several samples because of
+the measurement noise. No cause is assumed.
 """
 
 from __future__ import annotations
@@ -89,10 +89,10 @@ def _variables(ship: ExtendedModel, short: Windows) -> dict[str, Array]:
 
 
 def dependence(found: Residuals, output: str, name: str) -> Dependence:
-    """How the residual of an output goes with a variable: runs one by one, others in groups of equal numbers.
+    """Dependence of an output's residual on a variable: by run, or in groups of equal numbers of stretches.
 
-    Residuals count as an autoregression of first order within each run, so that what lasts does not pass for a drift.
-    Too few of them tell nothing: no groups, and nan.
+    Residuals are modelled as a first-order autoregression within each run, so that their correlation does not count as
+    a dependence. Too few stretches give no groups and nan.
     """
     x, y = found.variables[name], found.acceleration[:, found.outputs.index(output)]
     if not found.sufficient:
@@ -123,10 +123,10 @@ def mean_residual(found: Residuals, output: str) -> tuple[float, float]:
 
 
 def _covariance(rest: Array, share: Array, run: Array) -> tuple[Array, float]:
-    """(b, b) of the groups' means, and how many independent stretches theirs are effective_count.
+    """(b, b) of the groups' means, and the effective number of independent stretches.
 
     Args:
-        rest: (k,) what is left over.
+        rest: (k,) residuals less the mean of their group.
         share: (k, b) weights of stretches in the means.
         run: (k,) of each stretch.
     """
@@ -136,7 +136,7 @@ def _covariance(rest: Array, share: Array, run: Array) -> tuple[Array, float]:
     alike = float((rest[1:] * rest[:-1])[together].sum()) / max(float(rest @ rest), TINY)
     alike = min(
         max(alike + b * (1 + 3 * alike) / k, 0.0), TUNING.largest_autocorrelation
-    )  # means of groups take likeness away
+    )  # subtracting group means reduces the correlation
     covariance = share.T @ share
     for lag in range(1, k):
         if alike**lag < TUNING.smallest_autocorrelation:
@@ -156,7 +156,7 @@ def _group_numbers(x: Array, *, by_value: bool) -> Array:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Residuals:
-    """Stretches, each with what the model lacks there and where that was.
+    """Missing acceleration of every stretch, and the variables there.
 
     Attributes:
         outputs: of the model.
@@ -173,5 +173,5 @@ class Residuals:
 
     @property
     def sufficient(self) -> bool:
-        """Whether there are stretches enough for a test."""
+        """Whether there are enough stretches for a test."""
         return len(self.acceleration) >= TUNING.fewest_stretches

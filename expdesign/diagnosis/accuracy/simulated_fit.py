@@ -1,4 +1,4 @@
-"""How well a model simulates the measured inputs: fit, error, bias, and growth with the horizon."""
+"""Accuracy of a simulation with the measured inputs: fit, error, bias, and growth of the error with the horizon."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def squared_sums(error: Array, measured: Array) -> tuple[Array, Array]:
 
 
 def clipped(error: Array, measured: Array) -> Array:
-    """Errors (w, s, n) no larger than `Tuning.largest_error` standard deviations of what is measured."""
+    """Errors (w, s, n) no larger than `Tuning.largest_error` standard deviations of the measurements."""
     size = channel_std(measured)
     most = np.where(size > 0, TUNING.largest_error * size, np.inf)
     return np.asarray(np.clip(error, -most, most))
@@ -79,7 +79,7 @@ def _growth(ship: ExtendedModel, record: Record, columns: list[int]) -> tuple[Ar
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Accuracy:
-    """How well a model simulates: per output over all batches, each from its first state.
+    """Accuracy per output over all batches, each simulated from its first state.
 
     Attributes:
         outputs: u, v, r, those that the model has.

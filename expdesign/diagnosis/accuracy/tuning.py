@@ -12,7 +12,7 @@ class Tuning:
     Attributes:
         horizons_s: times after a start at which the growth of the error is measured [s].
         largest_error: errors beyond so many standard deviations of the measurements count as that large; the simulation
-            has diverged, and the size of its error means nothing.
+            has diverged, and the size of its error has no meaning.
         stretch_samples: of a stretch of the residual analysis.
         fewest_measured: samples of a stretch that must be measured.
         groups: of stretches with similar values of a variable.

@@ -1,4 +1,4 @@
-"""Measured batches as a diagnosis reads them: windows, what is measured in them, and noise."""
+"""Measured batches for a diagnosis: windows, measured channels and noise."""
 
 from expdesign.diagnosis.data.measured_channels import derived_outputs, has_heading, missing_wind_share
 from expdesign.diagnosis.data.noise import (

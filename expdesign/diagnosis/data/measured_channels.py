@@ -1,4 +1,4 @@
-"""What a record measures, and which velocities are derived from its pose."""
+"""Channels that a record measures, and velocities derived from its pose."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ def air_velocity(batch: Batch) -> Array | None:
 
 
 def missing_wind_share(record: Record) -> float:
-    """Share of the samples at which wind that is measured otherwise is not."""
+    """Share of missing samples in runs that measure the wind."""
     airs = [air for batch in record.batches if (air := air_velocity(batch)) is not None]
     seen = np.concatenate([np.isfinite(air).all(axis=1) for air in airs]) if airs else np.ones(1, dtype=bool)
     return float(1.0 - seen.mean())
 
 
 def derived_outputs(record: Record) -> tuple[str, ...]:
-    """Those of u, v, r that come from the pose in every batch, as these say or as central differences show."""
+    """Those of u, v, r that come from the pose in every batch, as the batches state or as central differences show."""
     found = [{*batch.derived, *_differences(batch)} for batch in record.batches]
     return tuple(name for name in OUTPUTS if all(name in names for names in found))
 

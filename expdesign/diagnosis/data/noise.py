@@ -1,4 +1,4 @@
-"""How much measured channels vary."""
+"""Noise of the measured channels and of the simulation error."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ NO_FEEDBACK = np.array([1.0, 0.0])
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Noise:
-    """Colour and size of the remainder.
+    """Spectrum and size of the remainder.
 
     Attributes:
         filters: (4, p + 1) whitening filters, the first tap one.
         std: (4,) of the whitened remainder; infinite for channels that are not measured.
-        wander_mps: standard deviation of the wandering current [m/s].
+        wander_mps: standard deviation of the varying current [m/s].
         wander_time_s: its correlation time [s].
     """
 
@@ -37,7 +37,7 @@ class Noise:
 
 
 def white_noise(std: Array) -> Noise:
-    """Nothing known of colour yet."""
+    """White noise: the first guess."""
     return Noise(filters=np.ones((4, 1)), std=std)
 
 
@@ -54,7 +54,7 @@ def whitened(values: Array, noise: Noise) -> Array:
 
 
 def _filtered(values: Array, taps: Array) -> Array:
-    """Filtered along the last axis; nan where a tap falls on a nan, not ever after as in a recursion."""
+    """Filtered along the last axis; nan only where a tap falls on a nan."""
     missing = ~np.isfinite(values)
     if not missing.any():
         return np.asarray(lfilter(taps, NO_FEEDBACK, values, axis=-1))
@@ -121,7 +121,7 @@ def linear_basis(steps: int, step_s: float, spacing_s: float) -> Array:
 
 
 def channel_std(values: Array) -> Array:
-    """(n,) standard deviation of each channel of (w, s, n) over what is measured; 0 where nothing is."""
+    """(n,) standard deviation of each channel of (w, s, n) over the measured samples; 0 where there are none."""
     seen = np.isfinite(values)
     count = np.maximum(seen.sum(axis=(0, 1)), 1)
     mean = np.where(seen, values, 0.0).sum(axis=(0, 1)) / count

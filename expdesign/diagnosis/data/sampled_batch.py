@@ -1,4 +1,4 @@
-"""One measured batch on the grids of comparison and of integration."""
+"""One measured batch on the comparison grid and the integration grid."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from expdesign.vessel import VesselModel
 
 
 def averaging_half_width(rows_per_step: int) -> int:
-    """How many samples on either side of an instant of comparison are averaged with it."""
+    """Number of samples averaged on either side of a comparison instant."""
     return rows_per_step // 2
 
 
@@ -41,10 +41,11 @@ class SampledBatch:
             self.depth = self._between(self._centred(depth))
 
     def measured(self, derived: tuple[str, ...]) -> Array:
-        """(s, 4) channels; the heading tells nothing more where the yaw rate is derived from it.
+        """(s, 4) channels; the heading adds no information where the yaw rate is derived from it.
 
-        What comes from the pose is compared as central differences, however it was smoothed: smoothing leaves an error
-        whose colour no short filter undoes. Means over too few samples, at the ends, are left out.
+        Velocities from the pose are compared as central differences, whatever their smoothing: a smoother leaves an
+            error
+        that no short filter whitens. Means over too few samples, at the ends, are left out.
         """
         velocity, rate = self.batch.velocity.copy(), np.full(len(self.batch), np.nan)
         if self.batch.pose is not None and len(self.batch) > 2:
@@ -79,7 +80,7 @@ class SampledBatch:
         return np.asarray(exact[:: self.merged][: self.samples])
 
     def _between(self, values: Array) -> Array:
-        """Straight lines between the instants of comparison."""
+        """Linear interpolation between the comparison instants."""
         if self.between == 1:
             return values
         following = np.concatenate([values[1:], values[-1:]])
@@ -91,7 +92,7 @@ class SampledBatch:
 
 
 def wind_held_over_gaps(air: Array, heading: Array) -> Array:
-    """(k, 2) wind in the b-frame with the last one seen, in the n-frame, where it is not measured."""
+    """(k, 2) wind in the b-frame ; gaps hold the last measured value in the n-frame."""
     step_numbers = _last_seen(np.asarray(np.isfinite(air).all(axis=1)))
     turned = heading - heading[step_numbers]
     c, s, held = np.cos(turned), np.sin(turned), air[step_numbers]
@@ -99,11 +100,11 @@ def wind_held_over_gaps(air: Array, heading: Array) -> Array:
 
 
 def _last_seen(seen: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """(k,) place of the last sample seen at every one; of the first seen before that."""
+    """(k,) index of the last measured sample at every sample; before the first one, that of the first."""
     step_numbers = np.maximum.accumulate(np.where(seen, np.arange(len(seen)), -1))
     return np.asarray(np.where(step_numbers < 0, np.argmax(seen), step_numbers))
 
 
 def midpoints(values: Array) -> Array:
-    """Values in the middle of every step from those at its ends: what acts on average while inputs are held."""
+    """Values in the middle of every step, from those at its ends."""
     return np.concatenate([(values[:-1] + values[1:]) / 2, values[-1:]])

@@ -1,9 +1,9 @@
 """Measured batches cut into windows that are simulated side by side, each from a free initial state.
 
-Data sampled much faster than the ship moves are averaged over several samples first, and so are the forces that drive
-the simulation beside them: the mean of a linear motion is the motion that the mean force makes. Data sampled too
-coarsely for an integrator get steps in between, with inputs held. Windows are as long as a batch unless the model is
-unstable, so that slow disturbances show as what they are.
+Data sampled much faster than the ship moves are first averaged over several samples. The forces of the simulation are
+averaged in the same way, because the mean of a linear motion is its response to the mean force. Data sampled too
+coarsely for the integrator get steps in between, with inputs held. Windows are as long as a batch unless the model is
+unstable, so that slow disturbances remain visible.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from expdesign.vessel import VesselModel
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Windows:
-    """Windows of equal shape; shorter ones are filled up and their measurements are nan there.
+    """Windows of equal shape; shorter ones are padded, with nan as measurements.
 
     Attributes:
         step_s: integrator step [s].
@@ -39,9 +39,9 @@ class Windows:
         measured: (w, s, 4) channels u, v, r, and the rate of the measured heading where r is a measurement of its own;
             nan where not measured.
         heading: (w, k) measured heading in the middle of integrator steps, continuous; zero where there is none.
-        wind: (w, k, 2) likewise the wind in the b-frame from measured relative wind, the last one seen where a sample
-            lacks it, nan in batches without.
-        depth_m: (w, k), the last one seen where a sample lacks it, inf in batches without.
+        wind: (w, k, 2) likewise the wind in the b-frame from measured relative wind, the last measured one where a
+            sample lacks it, nan in batches without.
+        depth_m: (w, k), the last measured one where a sample lacks it, inf in batches without.
         time_s: (w, k) time since the first batch began, batches laid end to end.
         has_heading, has_wind, has_depth: whether these are measured.
         derived: those of u, v, r that come from the pose.
@@ -83,7 +83,7 @@ class Windows:
 
     @cached_property
     def step_numbers(self) -> NDArray[np.int64]:
-        """(w, k) integrator steps of each window in its batch, the last one repeated where the window is filled up."""
+        """(w, k) integrator steps of each window in its batch, the last one repeated in the padding."""
         ends = np.array([len(rows) // self.rows_per_step for rows in self.batch_inputs])[self.batch.astype(int)]
         return np.asarray(np.minimum(self.first[:, None] + np.arange(self.steps), ends[:, None] - 1).astype(int))
 
@@ -104,7 +104,7 @@ class Windows:
         return Windows(**parts, **others)
 
     def cut_shorter(self, samples: int) -> Windows:
-        """The same data in windows of fewer samples, the last of each filled up."""
+        """The same data in windows of fewer samples, the last of each padded."""
         s, between = self.measured.shape[1], self.steps_per_sample
         size = -(-s // -(-s // samples))
         parts: dict[str, list[Array]] = {name: [] for name in ROWS}

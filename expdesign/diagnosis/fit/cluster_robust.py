@@ -1,9 +1,8 @@
 """Cluster-robust standard errors: the scatter of scores from run to run.
 
-A fit's covariance assumes noise of one spectrum and size. Runs differ by more: other weather, other loading, a model
-that is slightly wrong in another way in each of them. The scatter of the runs' scores measures that, whatever the
-reason, but it is a poor estimate with few runs. So each standard error is the larger of the two, where there are enough
-runs.
+A fit's covariance assumes noise of one spectrum and size. Real runs also differ in weather, loading and model error.
+The scatter of the runs' scores measures these differences, but it is a poor estimate with few runs. So each standard
+error is the larger of the two, where there are enough runs.
 
 Source: K.-Y. Liang and S. L. Zeger, Biometrika 73 (1986), 13-22; A. C. Cameron and D. L. Miller, Journal of Human
 Resources 50 (2015), 317-372, for the number of clusters.

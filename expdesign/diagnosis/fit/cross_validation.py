@@ -1,9 +1,9 @@
 """Cross-validation: how well a model simulates data that it was not fitted to, with intervals by the bootstrap.
 
-What is held out together is a unit: a batch, or a window where there are fewer than three batches. Effects are fitted
-without the units that they are judged on. Where such a fit finds no better point than the fit to all units, the effects
-of the latter are kept and have seen all units; `unconverged` counts these folds. The choice of causes, and what is
-searched on a grid (the width of a dead band, the time of a change, the direction of the wind), used all units.
+Data are held out in units: batches, or windows where there are fewer than three batches. Effects are fitted without the
+units that they are evaluated on. Where such a fit does not improve on the fit to all units, the effects of the latter
+are kept; `unconverged` counts these folds. The selection of causes and the grid searches (width of a dead band, time of
+a change, direction of the wind) used all units.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class HeldOut:
     Attributes:
         squared_error: (b, n) sum per unit and output; nan for units whose fold could not be fitted.
         squared_deviation: (b, n) of the measurements from their mean, likewise.
-        unconverged: folds whose effects have seen all units, because their own fit found no better point.
+        unconverged: folds that kept the effects fitted to all units.
     """
 
     squared_error: Array
@@ -90,7 +90,7 @@ def cross_validate(found: Fit | None, ship: ExtendedModel, windows: Windows, pro
 def _fitted(found: Fit, windows: Windows, train: NDArray[np.bool_]) -> ExtendedModel | None:
     """The model with its effects fitted to some windows, or None where that is impossible.
 
-    The effects stay where no step from the fit to all windows costs less on these.
+    The effects stay if no step from the fit to all windows reduces the cost on these.
     """
     options = FitOptions(
         noise=found.noise,

@@ -29,8 +29,8 @@ class Fit:
         cost: weighted squared error at the end, while fitting.
         linear, sensitivities: at the end.
         precision: (c,) of the effects' priors.
-        step: (c,) to the best of the linear model.
-        converged: a further step would hardly lower the cost.
+        step: (c,) to the optimum of the linear model.
+        converged: a further step would not lower the cost noticeably.
     """
 
     ship: ExtendedModel
@@ -63,16 +63,16 @@ class Fit:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FitOptions:
-    """How a fit begins and ends.
+    """Options of a fit.
 
     Attributes:
-        noise: first guess; estimated from white noise without one.
+        noise: first guess; white noise by default.
         ar_order: of the noise's autoregressions, or None to choose it.
         steps: Gauss-Newton steps, at most.
         warm_start: linearised motion of a similar ship over the same windows; faster, with the same result.
-        fixed_weights: judge a step with the weights of initial states and random current where it began. They depend on
-            the effects, but a step of weighted least squares ignores that, and may raise the cost with weights of its
-            own. Fits that are compared with each other must be judged with their own weights.
+        fixed_weights: evaluate a step with the weights of initial states and random current at its start. The weights
+            depend on the effects, which a step of weighted least squares ignores, so a step may raise the cost with
+            updated weights. Fits that are compared with each other need updated weights.
     """
 
     noise: Noise | None = None
@@ -106,7 +106,7 @@ def values_of(ship: ExtendedModel, keys: tuple[str, ...]) -> Array:
 
 
 def profile_cost(found: Fit, noise: Noise) -> float:
-    """Twice the negative log likelihood under some noise, every effect at its best in the linear model."""
+    """Twice the negative log likelihood under some noise, minimised over the effects of the linear model."""
     m = information(found.sensitivities, noise)
     now = values_of(found.ship, found.keys)
     score = m.s - found.precision * now

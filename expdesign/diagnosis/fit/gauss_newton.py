@@ -1,4 +1,4 @@
-"""Gauss-Newton fits of effects and uncertain parameters to all windows, the noise estimated along with them."""
+"""Gauss-Newton fits of effects, uncertain parameters and noise to all windows."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from expdesign.values import Array
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Problem:
-    """What stays the same from step to step."""
+    """The parts of a fit that all steps share."""
 
     windows: Windows
     keys: tuple[str, ...]
@@ -42,7 +42,7 @@ class _Point:
 def fit(
     ship: ExtendedModel, windows: Windows, free: tuple[str, ...], *, starts: Array, options: FitOptions | None = None
 ) -> Fit:
-    """Gauss-Newton with steps halved until they cost less; the noise is estimated at the start, early and at the end.
+    """Gauss-Newton with step halving; the noise is estimated at the start, after the first steps and at the end.
 
     Args:
         ship: where to start; its effects not in `free` stay, except uncertain parameters.
@@ -52,7 +52,7 @@ def fit(
         options: how to begin and when to end.
 
     Raises:
-        FloatingPointError: the ship cannot be simulated where the fit would start.
+        FloatingPointError: the simulation diverges at the start of the fit.
     """
     options = FitOptions() if options is None else options
     keys = (*free, *(key for key in uncertain_keys(ship) if key not in free))
@@ -77,7 +77,7 @@ def fit(
 
 
 def _linearised(problem: _Problem, ship: ExtendedModel, starts: Array, motion: Motion) -> _Point | None:
-    """None where the motion diverges, or its sensitivities grow beyond all bounds."""
+    """None where the motion or its sensitivities diverge."""
     if motion.diverged:
         return None
     linear = linearise(motion)
@@ -117,12 +117,12 @@ def _noise(problem: _Problem, point: _Point | Fit, guess: Noise | None) -> Noise
 
 
 def _with_noise_refitted(problem: _Problem, found: Fit) -> Fit:
-    """The same effects under the noise of their own remainder; converged if they were."""
+    """The same effects with the noise estimated again from their remainder."""
     return replace(_weighted(problem, found, _noise(problem, found, found.noise)), converged=found.converged)
 
 
 def _line_search(problem: _Problem, best: Fit) -> Fit | None:
-    """The fit after a step, halved until it costs little more at most; None where no share of it does."""
+    """The fit after a step, halved until the cost rises no more than allowed; None if no share of it achieves that."""
     held = problem.options.fixed_weights
     limit = best.cost + TUNING.allowed_rise
     start_step = _resized(_start_step(best), best.ship.states)

@@ -1,6 +1,6 @@
 """Gram matrices of whitened sensitivities, with initial states projected out and the random current integrated out.
 
-They are small enough for everything that is asked of a fit: steps, covariances, score tests, likelihoods.
+These small matrices suffice for steps, covariances, score tests and likelihoods.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class GramMatrices:
 
 
 def gram_matrices(found: Sensitivities, noise: Noise) -> GramMatrices:
-    """Whiten, leave out what is not measured, project the initial states out."""
+    """Whiten, leave out samples that are not measured, project the initial states out."""
     e, S, seen = _whitened_starts(found, found.error, noise)
     w = len(e)
     X = (whitened(found.values, noise) * seen).reshape(len(found.values), w, e.shape[1])
@@ -48,7 +48,7 @@ def gram_matrices(found: Sensitivities, noise: Noise) -> GramMatrices:
 
 
 def _whitened_starts(found: Sensitivities, error: Array, noise: Noise) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """(w, rows) whitened error, (w, rows, 3) sensitivities to initial velocities, and (w, s, 4) what is measured.
+    """(w, rows) whitened error, (w, rows, 3) sensitivities to initial velocities, and (w, s, 4) whether it is measured.
 
     The first two are zero where nothing is measured.
     """

@@ -43,7 +43,7 @@ class Sensitivities:
 
     @property
     def unbounded(self) -> bool:
-        """The linearised motion is so unstable that its numbers mean nothing."""
+        """The linearised motion has diverged."""
         sizes = (float(np.abs(item).max(initial=0.0)) for item in (self.values, self.starts))
         return not all(size < TUNING.largest_sensitivity for size in sizes)
 

@@ -21,7 +21,7 @@ from expdesign.values import Array
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Prior:
-    """What is known of the estimated effects beforehand.
+    """Prior knowledge of the estimated effects.
 
     Attributes:
         precision: (c,) of the Gaussian priors around zero change; zero for effects without a prior.
@@ -33,7 +33,7 @@ class Prior:
 
 
 def estimate_noise(found: Sensitivities, prior: Prior, noise: Noise | None, *, ar_order: int | None) -> Noise:
-    """Noise of what remains after the best linear answer.
+    """Noise of the remainder after the best linear response.
 
     Args:
         found: sensitivities and error.
@@ -71,11 +71,11 @@ def _estimate_random_current(grams: GramMatrices, found: Sensitivities, noise: N
 
 
 def _remainder(grams: GramMatrices, found: Sensitivities, noise: Noise, prior: Prior) -> Array:
-    """(w, s, 4) error less the best linear answer of effects and initial states, and less a likely random current.
+    """(w, s, 4) error less the best linear response and less a draw of the random current.
 
-    The likeliest current would take noise with it and leave too little. A current drawn from its posterior does not
-    (stochastic EM: G. Celeux and J. Diebolt, Computational Statistics Quarterly 2 (1985), 73-82). The draw uses the
-    same random numbers every time, so that fits of candidates differ by what they explain and not by chance.
+    The most likely current would absorb some of the noise. A current drawn from its posterior does not (stochastic EM:
+    G. Celeux and J. Diebolt, Computational Statistics Quarterly 2 (1985), 73-82). The draw uses the same random numbers
+    every time, so that fits of candidates differ by what they explain and not by chance.
     """
     m = marginalised(grams, found, noise)
     c = found.numbers

@@ -1,4 +1,4 @@
-"""Steps of a fit: straight in the products of parameters and factors, and within physical bounds."""
+"""Steps of a fit: linear in the products of parameters and factors, and within physical bounds."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ LITTLE = 1e-6
 def after_step(ship: ExtendedModel, keys: Sequence[str], step: Array) -> dict[str, float]:
     """Effects after a Gauss-Newton step.
 
-    Data show only the product of a gain and the uncertain parameters of thrust, so the two lie in a narrow, bent
-    valley. The products therefore make the straight step, the gain makes its own, and the parameters follow from both.
+    Data determine only the product of a gain and the uncertain thrust parameters, so the cost has a narrow curved
+    valley. The products and the gain therefore take linear steps, and the parameters follow from both.
     """
     change = dict(zip(keys, step.tolist(), strict=True))
     after = within_bounds(ship, {key: ship.get(key) + size for key, size in change.items()})

@@ -12,9 +12,9 @@ class Tuning:
     Attributes:
         steps: Gauss-Newton steps of a fit, at most.
         converged_below: a fit has converged when the next step would lower the cost by less than this.
-        allowed_rise: a step may raise the cost by this, because the noise that it is measured with is an estimate.
-        halvings: of a step that costs more.
-        first_noise_passes: alternations between numbers and noise where nothing is known of the noise.
+        allowed_rise: a step may raise the cost by this, because the noise is an estimate.
+        halvings: of a step that raises the cost.
+        first_noise_passes: alternations between effects and noise without a first guess of the noise.
         current_stds_mps: standard deviations of the random current that are tried [m/s].
         current_times_s: correlation times of the random current that are tried [s].
         knot_spacing_s: of the random current, at least [s].

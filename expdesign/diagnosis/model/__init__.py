@@ -1,4 +1,4 @@
-"""The simulation model with effects added to it: its terms, the terms that it may gain, its groups of inputs."""
+"""The simulation model with effects added to it: its terms, the term library and the groups of inputs."""
 
 from expdesign.diagnosis.model.extended_model import ANGLE_STEMS, ROLL, ExtendedModel, mean_wind
 from expdesign.diagnosis.model.input_groups import RESPONSES, group_columns, input_groups, values_by_group

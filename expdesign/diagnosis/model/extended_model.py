@@ -1,28 +1,25 @@
-"""A simulation model with effects added to it: every cause of the catalogue is a few named numbers, zero for "absent".
+"""A simulation model with effects added to it; each cause of the catalogue has a few effects, zero without it.
 
 Effects, by key:
 
-    theta:NAME            change of a model parameter
-    term:NAME             coefficient of a library term that the model lacks
-    current:north/east    steady current [m/s]
-    wind:north/east       mean wind where none is measured [m/s]; wind:speed [m/s] and wind:toward [rad] likewise
-    gain, gain:propeller  thrust too strong by this share; all terms of inputs, or those without a rudder
-    asymmetry             yaw moment per unit of ahead force: the thrust's line of action passes this far to port [m]
-    offset:GROUP          added to the angles of a group of inputs [rad]
-    lag:GROUP, delay:GROUP, deadband:GROUP    of a group of inputs [s], [s], [unit of the input]
-    inertia:u/v/r         inertia too small by this share
-    shallow:damping, shallow:inertia          growth per unit of draught over depth
-    roll:sway, roll:yaw   acceleration per unit of roll; roll:period [s] and roll:damping say which (`vessel.roll`)
-    change:time           [s]; change:gain, change:damping, change:damping_u/v/r act after it
-    heading_bias [rad], lever:forward/starboard [m], gyro (share), late:u/v/r/psi/position [s]   (sensors)
+    theta:NAME            change of a model parameter term:NAME             coefficient of a library term that the model
+    lacks current:north/east    steady current [m/s] wind:north/east       mean wind where none is measured [m/s];
+    wind:speed [m/s] and wind:toward [rad] likewise gain, gain:propeller  thrust too strong by this share; all terms of
+    inputs, or those without a rudder asymmetry             yaw moment per unit of ahead force: the thrust's line of
+    action passes this far to port [m] offset:GROUP          added to the angles of a group of inputs [rad] lag:GROUP,
+    delay:GROUP, deadband:GROUP    of a group of inputs [s], [s], [unit of the input] inertia:u/v/r         inertia too
+    small by this share shallow:damping, shallow:inertia          growth per unit of draught over depth roll:sway,
+    roll:yaw   acceleration per unit of roll; roll:period [s] and roll:damping are of the mode (`vessel.roll`)
+    change:time           [s]; change:gain, change:damping, change:damping_u/v/r act after it heading_bias [rad],
+    lever:forward/starboard [m], gyro (share), late:u/v/r/psi/position [s]   (sensors)
 
-Measured sway is v + u sin(heading_bias): velocities that come from the pose are turned so by a compass that shows too
-little, others by a sensor whose axes lie anticlockwise of the ship's. The lever is that of the position's antenna or of
-the velocity sensor likewise.
+Measured sway is v + u sin(heading_bias). For velocities from the pose, a positive bias is a compass that shows too
+little; for measured ones, a sensor whose axes lie anticlockwise of the ship's. The lever is that of the position
+antenna or of the velocity sensor likewise.
 
 A GROUP is the stem of input names ("n", "a", "rudder", "tau_x", ...), one input, or "all".
 
-What a vessel file states is where the search for a better value begins; every test is of the difference.
+The search begins at the values that the vessel file states; every test is of the difference.
 """
 
 from __future__ import annotations
@@ -50,7 +47,7 @@ class ExtendedModel:
         draught_m: of the ship [m].
         derived: those of u, v, r that the data derive from the pose, by its sensors.
         shoalest: largest draught over depth in the data, 0 where no depth is known.
-        effects: key -> value; what is left out is zero.
+        effects: key -> value; others are zero.
         stated: effects as the vessel file states them.
     """
 
@@ -80,7 +77,7 @@ class ExtendedModel:
         return replace(self, effects=others | {key: value for key, value in self.stated.items() if key in keys})
 
     def has_found(self, prefix: str) -> bool:
-        """Some effect whose key begins so is not as the vessel file has it."""
+        """Whether an effect whose key begins so differs from the vessel file."""
         return any(key.startswith(prefix) and value != self.stated.get(key) for key, value in self.effects.items())
 
     def get(self, key: str) -> float:

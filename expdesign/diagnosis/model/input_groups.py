@@ -26,7 +26,7 @@ def input_groups(inputs: tuple[str, ...]) -> list[str]:
 
 
 def values_by_group(values: Mapping[str, float], inputs: tuple[str, ...]) -> dict[str, float]:
-    """Values of single inputs, zero where left out, said of stems where these share one; zeros are not said."""
+    """Nonzero values of single inputs, by stem where all inputs of a stem have the same."""
     left, found = list(inputs), dict[str, float]()
     several = len({stem(name) for name in inputs}) > 1
     for group in input_groups(inputs)[several:]:

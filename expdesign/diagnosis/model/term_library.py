@@ -1,4 +1,4 @@
-"""Terms that may be added to a model, and which of its own terms are of the air or an advance loss."""
+"""Terms that may be added to a model, and its own terms of air drag and advance loss."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MORE_TERMS = (
 )
 """Second-order modulus terms that manoeuvring models often have beside the built-in ones."""
 ADVANCE_LOSS = ("X_kappa", "X_un", "X_unn")
-"""Terms by which thrust falls with the speed of advance."""
+"""Terms of the thrust loss with advance speed."""
 AIR = ("W_abs_u_u", "W_abs_v_v", "W_uv")
 """Library terms of the air."""
 
@@ -52,8 +52,8 @@ def term_library(model: VesselModel) -> Mapping[str, Term]:
 def _advance(model: VesselModel) -> tuple[Term, ...]:
     """Advance loss of propellers that drive the model by their speeds, not through tau_x.
 
-    Thrust rho n^2 D^4 K_T(J) with K_T linear in J = u / (n D) has a term in u |n|; a wake that slows with the thrust
-    makes it u n |n| rather.
+    Thrust rho n^2 D^4 K_T(J) with K_T linear in J = u / (n D) has a term in u |n|; if the wake slows with
+    the thrust, it is u n |n|.
 
     Source: A. F. Molland, S. R. Turnock, D. A. Hudson, Ship Resistance and Propulsion (2011), ch. 12, for K_T(J).
     """
@@ -69,7 +69,7 @@ def _advance(model: VesselModel) -> tuple[Term, ...]:
 
 
 def own_advance_terms(model: VesselModel) -> list[str]:
-    """Names of the model's terms that are an advance loss, whatever they are called."""
+    """Names of the model's terms that are an advance loss."""
     rng = np.random.default_rng(0)
     names = (*MOTION_SIGNALS, *dict.fromkeys((*FORCE_SIGNALS, *model.inputs)))
     table = {name: rng.standard_normal(12) for name in names}
@@ -85,7 +85,7 @@ def own_advance_terms(model: VesselModel) -> list[str]:
 
 
 def own_air_terms(model: VesselModel) -> list[str]:
-    """Names of the model's terms that read the air."""
+    """Names of the model's terms that read the relative wind."""
     return [
         term.name
         for term, expression in zip(model.terms, model.expressions, strict=True)
@@ -94,7 +94,7 @@ def own_air_terms(model: VesselModel) -> list[str]:
 
 
 def _readable(term: Term, model: VesselModel) -> bool:
-    """Generalised forces mean something only to models that are driven through them."""
+    """Whether the model is driven by the generalised forces that a term reads."""
     through_force = any(set(expression.signals) & set(FORCE_SIGNALS) for expression in model.expressions)
     return through_force or not any(name in term.expression for name in FORCE_SIGNALS)
 

@@ -1,4 +1,4 @@
-"""The terms of an extended model, each with everything that scales it, and what kind of term it is."""
+"""The terms of an extended model, with their factors and kinds."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ AIR_SIGNALS = frozenset({"u_q", "v_q"})
 
 @dataclass(frozen=True, kw_only=True)
 class ScaledTerm:
-    """One term of the extended model with everything that scales it.
+    """One term of the extended model with its factors.
 
     Attributes:
         equation: u, v or r.
         evaluate: its regressor.
         factor: its parameter with all factors, as an acceleration.
         after: change of the factor after the change point.
-        coriolis, damping, reads_air, reads_turn: what kind of term it is.
+        coriolis, damping, reads_air, reads_turn: its kind.
     """
 
     equation: str
@@ -75,7 +75,7 @@ def own_terms(model: VesselModel, effects: Effects) -> list[ScaledTerm]:
 
 
 def term_factors(model: VesselModel, effects: Effects) -> dict[str, float]:
-    """What gains and inertia multiply every parameter of the model by, all the time."""
+    """Factors of gains and inertia on every parameter of the model."""
     result = {}
     for kind in _term_kinds(model):
         result[kind.name] = 1.0 if kind.coriolis else 1.0 / (1 + effects.get(f"inertia:{kind.equation}", 0.0))
@@ -112,7 +112,7 @@ def _parsed(text: str, known: tuple[str, ...]) -> Expression:
 
 @dataclass(frozen=True, kw_only=True)
 class TermKind:
-    """What kind of term it is."""
+    """Kind of a term."""
 
     name: str
     equation: str

@@ -1,4 +1,4 @@
-"""What acts on an extended model from outside: inputs, water, air, depth and time."""
+"""Exogenous inputs of an extended model: actuators, water, air, depth and time."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ RISE = "rise "
 
 
 class ExogenousInputs(dict[str, Array]):
-    """What acts on the ship at the integrator steps (w, k): inputs and forces by signal name, and besides.
+    """Exogenous signals at the integrator steps (w, k): inputs and forces by name, and others.
 
     `u_c v_c` water and `u_w v_w` air, their velocity in the b-frame [m/s], where they move;
     `h`, draught over depth, and `after`, one after a change of the ship, where the model reads such things.
-    Values are means over each step; signals that move within steps also have a rise, `rise NAME`, from the beginning
-    of each step to its end, by which a force counts when it acts.
+    Values are means over each step; signals that change within steps also have a rise, `rise NAME`, from the beginning
+    of each step to its end.
     """
 
     def at(self, step: int) -> ExogenousInputs:
@@ -30,7 +30,7 @@ class ExogenousInputs(dict[str, Array]):
         return ExogenousInputs({name: values[:, step] for name, values in self.items()})
 
     def at_fraction(self, share: float) -> ExogenousInputs:
-        """At a place within the steps, from -0.5 at their beginning to 0.5 at their end."""
+        """Values within the steps, from -0.5 at their beginning to 0.5 at their end."""
         rises = [name for name in self if name.startswith(RISE)]
         if not rises:
             return self
@@ -43,7 +43,7 @@ class ExogenousInputs(dict[str, Array]):
 
 
 def exogenous_inputs(ship: ExtendedModel, windows: Windows) -> ExogenousInputs:
-    """Everything outside the ship, with the inputs as its actuators follow them."""
+    """The exogenous signals, with the inputs as delivered by the actuators."""
     model, shape = ship.model, windows.heading.shape
     names = (*dict.fromkeys((*model.inputs, *FORCE_SIGNALS)),)
     followed = delivered_inputs(ship, windows)
@@ -65,10 +65,10 @@ def exogenous_inputs(ship: ExtendedModel, windows: Windows) -> ExogenousInputs:
 
 
 def _acting(model: VesselModel, rows: Array, finer: int, rows_per_step: int) -> Array:
-    """(k, m) inputs and forces, each its mean over the finer steps that it is known at, and (k, m) their rises.
+    """(k, m) inputs and forces, as means over integrator steps, and (k, m) their rises.
 
-    A straight line of that mean and rise has the mean and the first moment that the signal has within the step. Where
-    what is measured is averaged over samples, so is the signal: the motion that it drives is then the mean motion.
+    A straight line with this mean and rise has the mean and the first moment of the signal within the step. Where
+    measurements are averaged over samples, so is the signal, because the mean force drives the mean motion.
     """
     table = dict(zip(model.inputs, rows.T, strict=True))
     forces = generalised_force(model.actuators, table, NUMPY)
@@ -81,7 +81,7 @@ def _acting(model: VesselModel, rows: Array, finer: int, rows_per_step: int) -> 
 
 
 def _averaged(values: Array, finer: int, rows_per_step: int) -> Array:
-    """Means over the samples that are averaged around every instant."""
+    """Means over the samples around every instant."""
     half, apart = averaging_half_width(rows_per_step), finer // rows_per_step
     if not half:
         return values
@@ -99,5 +99,5 @@ def _wind(ship: ExtendedModel, windows: Windows) -> tuple[Array, Array]:
 
 
 def true_heading(ship: ExtendedModel, windows: Windows) -> Array:
-    """(w, k) heading, that of a wrong compass put right: where velocities come from the pose, the compass is wrong."""
+    """(w, k) heading, corrected for the compass error where velocities come from the pose."""
     return windows.heading + ship.get("heading_bias") if "u" in ship.derived else windows.heading

@@ -17,7 +17,7 @@ from expdesign.values import Array
 def runge_kutta_step(
     ship: ExtendedModel, x: tuple[Array, ...], exogenous: ExogenousInputs, h: float
 ) -> tuple[tuple[Array, ...], Array]:
-    """The state one step on, and the heading gained; roll that is quick beside the step is followed in parts of it."""
+    """The state after one step, and the change of heading; fast roll is integrated in parts of the step."""
     turn = 0.0 if ship.roll is None else 2 * math.pi * h / ship.roll.period_s
     parts = min(max(1, math.ceil(turn / TUNING.roll_angle_rad)), TUNING.most_roll_parts)
     heading_gain: Array | float = 0.0
@@ -31,7 +31,7 @@ def runge_kutta_step(
 def _rk4_part(
     ship: ExtendedModel, x: tuple[Array, ...], exogenous: Sequence[ExogenousInputs], h: float
 ) -> tuple[tuple[Array, ...], Array]:
-    """With surroundings at the beginning, in the middle and at the end."""
+    """With exogenous signals at the beginning, in the middle and at the end."""
     begin, middle, end = exogenous
 
     def ahead(slope: tuple[Array, ...], share: float) -> tuple[Array, ...]:

@@ -1,7 +1,7 @@
-"""Simulation of all windows at once, and how small causes move it.
+"""Linearised motion of all windows, and its responses to small disturbances.
 
-The response to a small cause is that of the linearised motion to the change of acceleration that the cause makes along
-the simulated path; all causes share one linearisation, so hundreds of them cost little more than one simulation.
+The response to a disturbance is that of the linearised motion to its change of acceleration along the simulated path.
+All disturbances share one linearisation, so hundreds of them cost little more than one simulation.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from expdesign.diagnosis.motion.sensors import sensor_outputs, simpson_mean
 from expdesign.values import Array
 
 INNER, OUTER = {"theta", "term", "gain", "inertia", "asymmetry"}, {"lever", "gyro"}
-"""Kinds of effects that change neither surroundings nor sensors, and those that change sensors alone."""
+"""Kinds of effects that change neither exogenous signals nor sensors, and those that change sensors alone."""
 
 
 def linearise(motion: Motion) -> LinearisedMotion:
@@ -34,11 +34,11 @@ def linearise(motion: Motion) -> LinearisedMotion:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Disturbance:
-    """A small cause along a path.
+    """A small disturbance along a path.
 
     Attributes:
-        force: (w, k - 1, n) change of the rates per unit of the cause, or None.
-        sensor: (w, s, 4) change of what sensors show by themselves, or None.
+        force: (w, k - 1, n) change of the rates per unit of the disturbance, or None.
+        sensor: (w, s, 4) direct change of the sensor outputs, or None.
     """
 
     force: Array | None
@@ -46,7 +46,7 @@ class Disturbance:
 
 
 def disturbance_of(linear: LinearisedMotion, changed: ExtendedModel, per: float) -> Disturbance:
-    """What a change of effects does along the path, divided by `per`."""
+    """The disturbance by a change of effects along the path, divided by `per`."""
     motion = linear.motion
     kinds = {key.split(":")[0] for key in _differing(motion.ship, changed)}
     sensor = force = np.zeros(1)
@@ -74,9 +74,9 @@ def _differing(one: ExtendedModel, other: ExtendedModel) -> set[str]:
 
 
 def responses(linear: LinearisedMotion, disturbances: Sequence[Disturbance]) -> Array:
-    """(c, w, s, 4) how the shown channels answer each push, from undisturbed initial states.
+    """(c, w, s, 4) responses of the channels to each disturbance, from undisturbed initial states.
 
-    Answers of an unstable motion may grow beyond what numbers hold.
+    Responses of an unstable motion may overflow.
     """
     motion = linear.motion
     n = motion.ship.states
@@ -104,7 +104,7 @@ def responses(linear: LinearisedMotion, disturbances: Sequence[Disturbance]) -> 
 
 
 def start_responses(linear: LinearisedMotion) -> Array:
-    """(3, w, s, 4) answers to unit initial velocities of every window; roll begins at rest."""
+    """(3, w, s, 4) responses to unit initial velocities of every window; roll begins at rest."""
     motion = linear.motion
     w, k, n = motion.states.shape
     x = np.broadcast_to(np.eye(n)[:, :3], (w, n, 3)).copy()

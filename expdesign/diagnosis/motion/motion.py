@@ -19,12 +19,12 @@ class Motion:
     """A simulation of all windows.
 
     Attributes:
-        ship: what was simulated.
-        windows: the data it is set against.
-        around: inputs and surroundings.
+        ship: the simulated model.
+        windows: the data it is compared with.
+        around: exogenous signals.
         states: (w, k, n) at integrator steps.
         turned: (w, k) heading since the start [rad].
-        shown: (w, s, 4) what the sensors would show.
+        shown: (w, s, 4) sensor outputs.
     """
 
     ship: ExtendedModel
@@ -36,12 +36,12 @@ class Motion:
 
     @property
     def error(self) -> Array:
-        """(w, s, 4) measured less simulated, nan where nothing is measured."""
+        """(w, s, 4) measured less simulated, nan where not measured."""
         return np.asarray(self.windows.measured - self.predicted)
 
     @property
     def diverged(self) -> bool:
-        """A speed is out of all reason."""
+        """Whether a speed exceeds `Tuning.largest_speed`."""
         return not bool(np.abs(self.states).max() < TUNING.largest_speed)
 
 
@@ -50,10 +50,10 @@ class LinearisedMotion:
     """The linearised motion along a simulation.
 
     Attributes:
-        motion: where.
+        motion: the simulation.
         onward: (w, k - 1, n, n) transition over each step.
         driven: (w, k - 1, n, n) effect of a constant acceleration over each step.
-        slopes: (w, k, n) rates along the path, of both ends of every step with its inputs, stacked (2, w, k - 1, n).
+        slopes: (w, k, n) rates along the path at both ends of every step with its inputs, stacked (2, w, k - 1, n).
     """
 
     motion: Motion

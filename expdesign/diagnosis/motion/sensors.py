@@ -1,4 +1,4 @@
-"""What the sensors of an extended model would show of its motion."""
+"""Sensor outputs of an extended model."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from expdesign.values import Array
 
 
 def sensor_outputs(ship: ExtendedModel, states: Array, windows: Windows, heading_change: Array | None = None) -> Array:
-    """(w, s, 4) channels that the sensors would show.
+    """(w, s, 4) sensor outputs.
 
     Args:
         ship: its sensors.
         states: (w, k, n) at integrator steps.
-        windows: what is measured, and when.
+        windows: measured channels and times.
         turned: (w, k) heading since the start; integrated from the yaw rate when None.
     """
     u, v, r = np.moveaxis(states[:, :: windows.steps_per_sample, :3], -1, 0)
@@ -47,7 +47,7 @@ def sensor_outputs(ship: ExtendedModel, states: Array, windows: Windows, heading
 
 
 def ship_velocities(ship: ExtendedModel, predicted: Array) -> Array:
-    """(w, 3) velocities of the ship where its sensors, but for what is late, show these (w, 3)."""
+    """(w, 3) velocities of the ship for sensor outputs (w, 3), without delays."""
     u, v, r = predicted.T
     r = r / (1 + ship.get("gyro"))
     u, v = _rotated(u, v, -ship.get("heading_bias"))
@@ -61,22 +61,22 @@ def _rotated(u: Array, v: Array, angle: Array | float) -> tuple[Array, Array]:
 
 
 LATE = {"u": ("u", "position"), "v": ("v", "position"), "r": ("r",), "psi_rate": ("psi",)}
-"""Delays that shift a channel; that of a yaw rate from the heading is the heading's."""
+"""Delays that shift a channel; a yaw rate from the heading has the heading's."""
 
 
 def heading_differences(heading_change: Array, otherwise: Array, windows: Windows) -> Array:
-    """Central differences (w, s) of a heading; at the ends what is given."""
+    """Central differences (w, s) of a heading; at the ends the given values."""
     result = otherwise.copy()
     result[:, 1:-1] = (heading_change[:, 2:] - heading_change[:, :-2]) / (2 * windows.sample_s)
     return result
 
 
 def simpson_mean(values: Array, finer: int = 1) -> Array:
-    """What central differences see of a velocity (..., w, s): its mean over two samples, by Simpson's rule.
+    """Central differences that belong to a velocity (..., w, s): its mean over two samples, by Simpson's rule.
 
     Args:
         values: at instants of comparison.
-        finer: samples that differences were taken of from one of these instants to the next.
+        finer: samples of the differences between two of these instants.
     """
     result = values.copy()
     bend = values[..., :-2] - 2 * values[..., 1:-1] + values[..., 2:]
@@ -85,9 +85,9 @@ def simpson_mean(values: Array, finer: int = 1) -> Array:
 
 
 def simpson_mean_of_track(u: Array, v: Array, heading: Array, finer: int = 1) -> tuple[Array, Array]:
-    """What central differences of positions see: the mean velocity over two samples, along the axes of the middle one.
+    """Central differences of positions: the mean velocity over two samples, along the axes of the middle one.
 
-    The ship turns meanwhile, so that the mean of u and v along their own axes would be another one.
+    The ship turns meanwhile, so this differs from the mean of u and v.
     """
     c, s = np.cos(heading), np.sin(heading)
     north, east = simpson_mean(u * c - v * s, finer), simpson_mean(u * s + v * c, finer)
@@ -95,7 +95,7 @@ def simpson_mean_of_track(u: Array, v: Array, heading: Array, finer: int = 1) ->
 
 
 def _shifted(values: Array, samples: float) -> Array:
-    """Late by a number of samples, straight in between; the first value before the window begins."""
+    """Delayed by a number of samples, with linear interpolation; before the window, its first value."""
     place = np.clip(np.arange(values.shape[1]) - samples, 0, values.shape[1] - 1)
     low = np.floor(place).astype(int)
     share = place - low

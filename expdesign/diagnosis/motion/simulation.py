@@ -24,7 +24,7 @@ def simulate_windows(
         ship: model and effects.
         windows: w windows.
         start: (w, n) initial states.
-        near: linearised motion of a ship alike, which makes it quicker and no different.
+        near: linearised motion of a similar ship; it speeds up the simulation and does not change it.
     """
     exogenous = exogenous_inputs(ship, windows)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -62,10 +62,11 @@ def _step_by_step(ship: ExtendedModel, windows: Windows, exogenous: ExogenousInp
 def _newton_over_all_steps(
     ship: ExtendedModel, windows: Windows, exogenous: ExogenousInputs, start: Array, warm_start: LinearisedMotion
 ) -> Array | None:
-    """(w, k, n) by Newton's method for all steps as one system of equations, or None when that does not settle soon.
+    """(w, k, n) by Newton's method for all steps as one system of equations, or None without convergence.
 
-    Every step is made at once from where the last round left it; what they miss each other by is handed on by the
-    transition matrices of the motion nearby. It ends where the steps join, which is what they do step by step.
+    Each iteration computes all steps from the last states and propagates the gaps between them by the transition
+    matrices of the similar motion (multiple shooting). At convergence the gaps vanish, and the result is the stepwise
+    one.
 
     Source: P. Bellen and M. Zennaro, Journal of Computational and Applied Mathematics 25 (1989), 341-350.
     """
@@ -92,7 +93,7 @@ def _newton_over_all_steps(
 
 
 def _propagated(transition: Array, first: Array, missed: Array) -> Array:
-    """(w, k, n) what gaps (w, k - 1, n) between steps and at the start amount to."""
+    """(w, k, n) changes of the states by gaps (w, k - 1, n) between steps and at the start."""
     change = np.empty((missed.shape[1] + 1, *first.shape, 1))
     change[0, ..., 0] = first
     gaps, matrices = np.moveaxis(missed, 1, 0)[..., None], np.ascontiguousarray(np.moveaxis(transition, 1, 0))
@@ -102,7 +103,7 @@ def _propagated(transition: Array, first: Array, missed: Array) -> Array:
 
 
 def initial_states(windows: Windows, states: int = 3) -> Array:
-    """(w, n) state at the beginning of every window: a straight line through its first samples, undisturbed roll."""
+    """(w, n) state at the beginning of every window: a straight line through its first samples, without roll."""
     count = min(TUNING.start_samples, windows.measured.shape[1])
     time = np.arange(count, dtype=float)
     result = np.zeros((len(windows.measured), states))
@@ -117,7 +118,7 @@ def initial_states(windows: Windows, states: int = 3) -> Array:
 
 
 def simulate_from_measured(ship: ExtendedModel, windows: Windows, warm_start: LinearisedMotion | None = None) -> Motion:
-    """Every window from its own first measured state; a linearised motion nearby makes it quicker."""
+    """Every window from its first measured state; the linearised motion of a similar ship speeds it up."""
     start = initial_states(windows, ship.states)
     start[:, :3] = ship_velocities(ship, start[:, :3])
     for axis, name in enumerate(OUTPUTS):

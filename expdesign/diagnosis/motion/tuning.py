@@ -17,8 +17,8 @@ class Tuning:
         roll_angle_rad: of a roll oscillation in one part of an integrator step, at most.
         most_roll_parts: parts of an integrator step for roll.
         newton_rounds: of a simulation of all steps at once.
-        newton_divergence: growth of the correction at which it is given up.
-        newton_refresh: correction above which the transition matrices are computed again.
+        newton_divergence: growth of the correction that counts as divergence.
+        newton_refresh: correction above which the transition matrices are updated.
         newton_tolerance: correction below which it has converged.
         start_samples: samples that measured initial states are estimated from.
         fewest_windows: into which data are cut.

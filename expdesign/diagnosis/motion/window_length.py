@@ -1,4 +1,4 @@
-"""Windows as long as the model is stable: an error in an initial state must not grow out of proportion in them."""
+"""Window lengths for unstable models: errors of initial states must not grow too much in a window."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def stable_windows(ship: ExtendedModel, record: Record) -> Windows:
 
 
 def _stable_time(ship: ExtendedModel, windows: Windows) -> float:
-    """Time within which no error of an initial velocity, in measured standard deviations, grows too much [s]."""
+    """Time until an error of an initial velocity, in measured standard deviations, grows too much [s]."""
     motion = simulate_from_measured(ship, windows)
     if motion.diverged:
         return windows.steps * windows.step_s / 2

@@ -54,9 +54,9 @@ def only_nuisance(step: Step, found: Selection) -> bool:
 def _moved_last(
     found: Selection, improves: Sequence[bool], windows: Windows, reordered: list[Candidate]
 ) -> Selection | None:
-    """A cause without gain put after those that have one, once each; None where there is no such cause.
+    """The steps with a cause without gain moved last, once for each such cause; None where there is none.
 
-    The fault of one sensor may seem to gain nothing while another fault of the same sensor is unknown.
+    The fault of a sensor may show no gain as long as another fault of the same sensor is not in the model.
     """
     steps = list(found.steps)
     for index, step in enumerate(steps):
@@ -79,11 +79,11 @@ def before_first_without_gain(found: Selection, improves: Sequence[bool]) -> Sel
 def improves_held_out(found: Selection, held: Sequence[HeldOut], seed: int) -> list[bool]:
     """Which causes improve the simulation of held-out data.
 
-    The test of the first cause is more sensitive than any simulated fit. So the first cause stays, unless it makes the
-    simulation worse, or may cost more than a little and makes some output worse on average. (No model of a real ship is
-    exact, so something is always significant. Currents that vary make the intervals of few runs wide.) Later causes
-    need a gain: once a large error is explained, small differences between model and ship become significant. A small
-    gain counts if its interval excludes zero. Uncertain parameters are estimated anyway; as a cause they need no gain.
+    The test of the first cause is more sensitive than a simulated fit. So the first cause stays, unless it makes the
+    simulation worse, or some output is worse on average and the interval allows a larger loss. (Varying currents make
+    the intervals of few runs wide.) Later causes need a gain, because no model of a real ship is exact: once a large
+    error is explained, small differences between model and ship become significant. A small gain counts if its
+    interval excludes zero. Uncertain parameters are estimated in any case, so as a cause they need no gain.
     """
     gains = [held_out_gain(one, other, seed) for one, other in pairwise(held)]
     return [

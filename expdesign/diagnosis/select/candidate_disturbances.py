@@ -1,4 +1,4 @@
-"""What a candidate changes along a simulated path, per unit of each of its effects."""
+"""Disturbances of a candidate along a simulated path, per unit of each of its effects."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from expdesign.values import Array
 def candidate_disturbances(
     linear: LinearisedMotion, candidate: Candidate
 ) -> Iterator[tuple[object, Callable[[], Disturbance]]]:
-    """(tag, how to compute it) of every disturbance of a candidate; candidates share those of the same tag."""
+    """(tag, function) of every disturbance of a candidate; candidates share those with the same tag."""
     ship = linear.motion.ship
     fixed = tuple(sorted(candidate.fixed.items()))
     if "roll:period" in candidate.fixed:

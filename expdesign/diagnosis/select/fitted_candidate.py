@@ -1,4 +1,4 @@
-"""Candidates fitted beside everything that was found before, and their likelihood gains."""
+"""Candidates fitted together with the findings so far, and their likelihood gains."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from expdesign.diagnosis.select.tuning import TUNING
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FittedCandidate:
-    """A candidate fitted beside everything that was found before.
+    """A candidate fitted together with the findings so far.
 
     Attributes:
-        candidate: which.
+        candidate: the candidate.
         fit: of all windows.
         likelihood_gain: likelihood ratio statistic against the fit without it.
         penalised_gain: the same less the price of its effects.
         keys: its own estimated effects.
         profiled: the effect that a grid or a profile likelihood found, with its standard error.
-        multiplicity: factor of its p-value, for all that was tried.
+        multiplicity: factor of its p-value for multiple tests.
     """
 
     candidate: Candidate
@@ -39,7 +39,7 @@ class FittedCandidate:
 
     @property
     def p_value(self) -> float:
-        """Of the likelihood ratio test, adjusted for all that was tried."""
+        """Of the likelihood ratio test, adjusted for multiple tests."""
         return min(1.0, self.multiplicity * float(chi2.sf(max(self.likelihood_gain, 0.0), max(1, len(self.keys)))))
 
     def with_gain(self, likelihood_gain: float) -> FittedCandidate:
@@ -51,13 +51,13 @@ class FittedCandidate:
 def fit_candidate(
     base: Fit, windows: Windows, point: StartingPoint, *, far: bool = False, steps: int = FitOptions().steps
 ) -> FittedCandidate | None:
-    """Fit a candidate together with everything found before; None where it cannot be fitted.
+    """Fit a candidate together with the findings so far; None if that fails.
 
     Args:
         base: the fit without it.
         windows: data.
-        point: where to begin.
-        far: the effect is large; begin in windows of middle length.
+        point: starting point.
+        far: the effect is large, so begin in windows of middle length.
         steps: Gauss-Newton steps.
     """
     try:

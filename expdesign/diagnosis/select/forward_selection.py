@@ -1,4 +1,4 @@
-"""Forward selection: add the cause that explains most, until chance would explain as much."""
+"""Forward selection: add the best cause until none is significant."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ def select_forward(
 ) -> Selection:
     """Add causes until nothing significant is left, and take out those that later ones make redundant.
 
-    A cause that only stood in for another becomes redundant once that one is found. The selection then returns to the
-    step where it was added and continues without it, so that nothing found later depends on it. Many parameters at once
-    explain nearly anything. So before such a block is added, causes with fewer effects are tried one after the other.
-    When nothing more is found, every cause is compared once more with what would replace it beside the others.
+    A cause that approximated another one becomes redundant once that one is found. The selection then returns to the
+    step where it was added and continues without it, so that no later finding depends on it. Many parameters at once
+    explain nearly any data. So before such a block is added, causes with fewer effects are tried one after the other.
+    At the end, every cause is compared once more with its best replacement beside the others.
     """
     progress = _monotonic(progress)
     base = first = fit_nuisance(ship, windows, starts)
@@ -63,7 +63,7 @@ def select_forward(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Search:
-    """What the rounds of one stage of the selection share."""
+    """The arguments that all rounds of a stage share."""
 
     windows: Windows
     rejected: tuple[Candidate, ...]
@@ -78,7 +78,7 @@ class _Search:
 def fit_nuisance(ship: ExtendedModel, windows: Windows, starts: Array) -> Fit:
     """The model in use at the likeliest values of its uncertain parameters, with the noise estimated there.
 
-    Far from there the remainder is a poor guide to the noise, and every cause that lets the fit continue looks true.
+    Far from there the remainder overestimates the noise, and any cause that lets the fit continue seems significant.
     """
     found = fit(ship, windows, (), starts=starts, options=FitOptions(steps=TUNING.nuisance_steps))
     if not found.keys:
@@ -143,7 +143,7 @@ def _with_joint_profiles(steps: list[Step]) -> list[Step]:
 
 
 def _monotonic(progress: Progress) -> Progress:
-    """Progress that never goes back, although rounds may look at something again."""
+    """Progress that never decreases, although rounds repeat work."""
     most = 0.0
 
     def report(activity: str, share: float) -> None:

@@ -1,8 +1,8 @@
 """Profile likelihood of effects whose likelihood has corners or plateaus: widths of dead bands, times of changes.
 
-Between two sizes of command that occur in the data, every width of a dead band explains them equally well. A time of
-change is known as precisely as the ship's motion shows it. So the estimate is the middle of all values that are nearly
-as likely as the best one, and its standard error is half their range. All other effects are at their best for each.
+All widths of a dead band between two recorded command levels explain the data equally well, and so do nearby times of a
+change. So the estimate is the middle of all values that are nearly as likely as the best one, and its standard error is
+half their range. All other effects are optimised for each value.
 
 Source: D. R. Cox and D. Oakes, Analysis of Survival Data (1984), section 3.3, for intervals from profiles.
 """
@@ -67,7 +67,7 @@ def profile_estimate(found: Fit, key: str, std: float) -> tuple[Fit, float]:
 
 
 def _cost(found: Fit, key: str, value: float) -> float:
-    """Twice the negative log likelihood at a value, all other effects at their best in the linear model."""
+    """Twice the negative log likelihood at a value, minimised over all other effects of the linear model."""
     ship = found.ship.with_effects({key: value})
     motion = simulate_windows(ship, found.linear.motion.windows, found.starts, warm_start=found.linear)
     if motion.diverged:

@@ -1,10 +1,10 @@
 """Score tests of every candidate at once, with p-values adjusted for their number.
 
-A score is the inner product of the whitened error with a candidate's sensitivity, after parameters, random current and
-initial states have explained what they can. If nothing is wrong, all scores together are Gaussian with a known
-covariance. Draws from that distribution show how small the smallest p-value gets by chance, however similar candidates
-are. Every cause of the catalogue gets the same share of false alarms, so a cause with one candidate does not pay for
-another that is tried at many times and places.
+A score is the inner product of the whitened error with a candidate's sensitivity, after projecting out parameters,
+random current and initial states. If the model is correct, all scores together are Gaussian with a known covariance.
+Draws from that distribution give the distribution of the smallest p-value, including the correlation of candidates.
+Every cause of the catalogue gets the same share of false alarms, so a cause with one candidate is not penalised for
+another with many.
 
 Sources: C. R. Rao (1948) for the score test; P. H. Westfall and S. S. Young, Resampling-Based Multiple Testing (1993);
 C. R. Genovese, K. Roeder and L. Wasserman, Biometrika 93 (2006), 509-524, for shares of the level.
@@ -32,11 +32,11 @@ class ScoreTest:
     """A candidate with its test.
 
     Attributes:
-        candidate: which.
-        statistic: chi-squared with `candidate.size` degrees of freedom when nothing is wrong.
+        candidate: the candidate.
+        statistic: chi-squared with `candidate.size` degrees of freedom if the model is correct.
         p_value: of this candidate alone.
         step: (size,) the linear estimate of its free effects; for finite ones the share of the first guess.
-        multiplicity: factor of its p-value, for all that was tried.
+        multiplicity: factor of its p-value for multiple tests.
     """
 
     candidate: Candidate
@@ -47,7 +47,7 @@ class ScoreTest:
 
     @property
     def adjusted(self) -> float:
-        """The p-value adjusted for all that was tried."""
+        """The p-value adjusted for multiple tests."""
         return min(1.0, self.p_value * self.multiplicity)
 
 
@@ -78,7 +78,7 @@ def score_tests(
         block = scores.A[np.ix_(index, index)] / np.outer(size, size)
         values, vectors = np.linalg.eigh(block)
         if values[0] < TUNING.least_own_share or not np.isfinite(block).all():
-            continue  # the data cannot tell it from what the model already has
+            continue  # indistinguishable from the effects that the model already has
         root = vectors / np.sqrt(values)
         z = root.T @ (scores.s[index] / size)
         statistic = float(z @ z)
@@ -122,7 +122,7 @@ def _effective_tests(
     A: Array, roots: list[tuple[Array, Array]], causes: Sequence[str], rng: np.random.Generator
 ) -> list[float]:
     """Factor of every p-value, for the candidates of its cause and for the number of causes."""
-    size = np.sqrt(np.maximum(np.diag(A), 1e-300))  # sizes may span more digits than numbers have
+    size = np.sqrt(np.maximum(np.diag(A), 1e-300))  # sizes may span more digits than floating-point numbers
     values, vectors = np.linalg.eigh((A + A.T) / 2 / np.outer(size, size))
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     drawn = rng.standard_normal((TUNING.draws, len(A))) @ root.T * size

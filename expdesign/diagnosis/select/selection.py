@@ -1,4 +1,4 @@
-"""What the selection has found so far, and how a step is taken out of it again."""
+"""The selected causes, and how one is removed again."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ class Step:
     """One step of forward selection.
 
     Attributes:
-        chosen: what was added.
-        p_value: adjusted for everything that was tried.
+        chosen: the added candidate.
+        p_value: adjusted for multiple tests.
         alternatives: candidates of other causes that explain the data as well, best first.
         before: the fit without it.
         tests: all score tests of the round.

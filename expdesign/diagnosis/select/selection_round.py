@@ -36,7 +36,7 @@ def selection_round(
     """Test and fit the candidates, and choose the best; None where none is significant.
 
     Args:
-        base: the fit of everything found before.
+        base: the fit of the findings so far.
         windows: data.
         rejected: candidates that are not tried again.
         rng: of the null distribution.
@@ -52,7 +52,7 @@ def selection_round(
 
 
 def same_effects_as_any(candidate: Candidate, others: list[Candidate]) -> bool:
-    """Whether some other candidate has the same cause and effects, whatever its first guess."""
+    """Whether another candidate has the same cause and effects, with any first guess."""
     return any(candidate.cause == other.cause and set(candidate.free) == set(other.free) for other in others)
 
 
@@ -100,7 +100,7 @@ def _alternatives(chosen: FittedCandidate, fitted: list[FittedCandidate]) -> tup
 def _significant(base: Fit, windows: Windows, rough: list[FittedCandidate]) -> list[FittedCandidate]:
     """The best candidates, fitted to convergence and significant by a Wald test.
 
-    Some candidates converge to zero because the data call for more than they can give. Then the next best are fitted.
+    A candidate may converge to zero in the nonlinear fit. Then the next best are fitted.
     """
     while rough:
         most = max(item.likelihood_gain for item in rough)
@@ -116,7 +116,7 @@ def _significant(base: Fit, windows: Windows, rough: list[FittedCandidate]) -> l
 
 
 def _starting_points(base: Fit, windows: Windows, tests: tuple[ScoreTest, ...]) -> tuple[list[StartingPoint], bool]:
-    """What to fit, and whether the best candidate is a large effect; then short windows give the starting points."""
+    """Starting points, and whether the best candidate is a large effect; then they come from short windows."""
     shortlist = [*_shortlist(tests), *_hidden_by_random_current(base, tests)]
     short_fit = fit_short_windows(base, windows)
     short_tests = None if short_fit is None else score_tests(short_fit, [item.candidate for item in tests])
@@ -140,7 +140,7 @@ def _explained_share(tests: tuple[ScoreTest, ...], base: Fit) -> float:
 
 
 def _hidden_by_random_current(base: Fit, tests: tuple[ScoreTest, ...]) -> list[ScoreTest]:
-    """A steady current that a large random current may have absorbed: few runs cannot tell the two apart."""
+    """A steady current that a large random current may have absorbed; few runs cannot distinguish the two."""
     if base.noise.current_std_mps < TUNING.large_current_mps:
         return []
     listed = {id(item.candidate) for item in _shortlist(tests)}

@@ -1,4 +1,4 @@
-"""Fits in short windows: they guide large effects, where a long simulation is too far off to say why."""
+"""Fits in short windows, as starting points of large effects: long simulations are then too far from the data."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from expdesign.diagnosis.select.tuning import TUNING
 from expdesign.values import Array
 
 FROM_NOTHING = FitOptions(steps=TUNING.short_steps, ar_order=0)
-"""White noise, and nothing known of it."""
+"""White noise of unknown size."""
 
 
 def fit_short_windows(base: Fit, windows: Windows) -> Fit | None:
-    """The same model in short windows with white noise: imprecise for small effects, a good guide to large ones.
+    """The same model fitted in short windows with white noise: imprecise, but a good start for large effects.
 
     None where windows are short anyway, or where the model cannot be fitted in them.
     """

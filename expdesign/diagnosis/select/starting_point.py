@@ -1,4 +1,4 @@
-"""Where the fit of a candidate begins: first guesses, and a grid search where the likelihood has corners."""
+"""Starting points of fits: first guesses, and a grid search where the likelihood has corners."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from expdesign.diagnosis.select.tuning import TUNING
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StartingPoint:
-    """Where the fit of a candidate begins.
+    """Starting point of the fit of a candidate.
 
     Attributes:
         test: of the candidate.

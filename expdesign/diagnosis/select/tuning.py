@@ -24,18 +24,18 @@ class Tuning:
         equivalent_within: an alternative that trails by less is not distinguishable. A wrong cause that truly trails by
             d comes out ahead by more than this with a probability below Phi(-sqrt(equivalent_within)).
         first_steps: Gauss-Newton steps of every candidate.
-        leading_share: candidates that then gain less than this share of the most are given up.
+        leading_share: candidates that then gain less than this share of the best are dropped.
         nuisance_steps: Gauss-Newton steps of the fit before anything is tested, at most.
         large_share: share of the remainder above which an effect counts as large and is fitted in short windows too.
-        certain: best candidates that are fitted in long windows whatever short windows say.
+        certain: best candidates that are always fitted in long windows.
         short_s, middle_s: length of short windows, and of those between short and long ones [s].
         fewest_samples: of a short window.
         short_steps: Gauss-Newton steps in short windows.
-        least_gain_share: candidates that gain less than this share of the most in short windows are not fitted in long
+        least_gain_share: candidates that gain less than this share of the best in short windows are not fitted in long
             ones.
         large_current_mps: standard deviation of the random current above which a steady current is fitted too.
         most_findings: causes, at most.
-        most_rejected: causes that are taken out again, at most.
+        most_rejected: causes that are removed again, at most.
         most_exchanges: of a cause for another that gains more beside the rest, at most.
         refined_grid: values of the second grid search.
         profile_points, profile_rounds: values per round of a profile likelihood, and rounds, at most.

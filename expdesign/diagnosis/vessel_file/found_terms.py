@@ -1,4 +1,4 @@
-"""The model of a vessel file with everything found in it: its terms, their parameters, and how well these are known.
+"""The model of a vessel file with the findings: its terms, their parameters and standard deviations.
 
 An effect that scales a term ends up in its parameter, and the effect's standard error beside that of the parameter as
 if the two were independent. What is added becomes a term of its own.
@@ -21,7 +21,7 @@ from expdesign.vessel.expressions import Expression
 TURN = re.compile(r"\btau_psi\b")
 FORCES = {"u": "X", "v": "Y", "r": "N"}
 VISIBLE = 1e-4
-"""Relative error of a written dependence on depth from which on it is told."""
+"""Relative error of a written dependence on depth above which a note states it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +36,7 @@ class Row:
 def found_model(
     model: VesselModel, ship: ExtendedModel, std: Mapping[str, float]
 ) -> tuple[VesselModel, tuple[str, ...]]:
-    """The model with everything in `ship`, and what a reader must know of it, one sentence each.
+    """The model with the effects of `ship`, and notes on it, one sentence each.
 
     Args:
         model: of the vessel file.
@@ -66,7 +66,7 @@ def found_model(
 
 
 def _own(model: VesselModel, ship: ExtendedModel, std: Mapping[str, float]) -> list[Row]:
-    """The model's own terms, each with everything that scales it."""
+    """The model's own terms with their factors."""
     rows = []
     for term, expression, value, known in zip(
         model.terms, model.expressions, model.parameters.tolist(), model.parameter_std.tolist(), strict=True

@@ -38,7 +38,7 @@ def extended_model(vessel: Vessel, record: Record) -> ExtendedModel:
 
 
 def _answering(model: VesselModel) -> dict[str, float]:
-    """What a file says of how actuators answer."""
+    """Actuator responses of a vessel file."""
     rows = [row for actuator in model.actuators for row in zip(actuator.signals, actuator.responses, strict=True)]
     return {
         f"{kind}:{group}": value
@@ -48,17 +48,17 @@ def _answering(model: VesselModel) -> dict[str, float]:
 
 
 def _flowing(weather: Environment) -> dict[str, float]:
-    """What a file says of current and wind, which needs a heading to act in."""
+    """Current and wind of a vessel file; they act only with a heading."""
     flows = {"current": weather.current_to, "wind": weather.wind_to}
     return {
-        f"{name}:{way}": float(part)
+        f"{name}:{axis}": float(part)
         for name, flow in flows.items()
-        for way, part in zip(("north", "east"), flow, strict=True)
+        for axis, part in zip(("north", "east"), flow, strict=True)
     }
 
 
 def _sensed(sensors: Sensors, derived: tuple[str, ...]) -> dict[str, float]:
-    """What a file says of the sensors that the data come from."""
+    """Sensor errors of a vessel file, of the sensors that the data come from."""
     from_pose = "u" in derived
     place = sensors.position if from_pose else sensors.velocity
     velocity_s = 0.0 if from_pose else sensors.velocity.delay_s

@@ -31,11 +31,11 @@ POWER = re.compile(rf" \+ ([-+.e\d]+)((?:\*{SHOAL})+)")
 def in_shallow_water(
     model: VesselModel, growth: Mapping[str, float], *, reach: float, known: VesselModel
 ) -> tuple[VesselModel, float]:
-    """The model with more dependence on depth, and the largest relative error of the factors that say it.
+    """The model with more dependence on depth, and the largest relative error of its factors.
 
     Args:
         model: with the terms that were found.
-        growth: "damping" and "inertia" per unit of draught over depth; what is left out is zero.
+        growth: "damping" and "inertia" per unit of draught over depth; zero by default.
         reach: largest draught over depth in the data.
         known: the model diagnosed, without the terms that were found; only its own terms are damping that grows.
     """
