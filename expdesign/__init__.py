@@ -1,6 +1,6 @@
 """Experiment design for manoeuvring trials of ships.
 
-From a vessel model, a dictionary of manoeuvres, a chart and a wish for the trial's length: how informative each
+From a vessel model, a dictionary of manoeuvres, a chart and the time for the trial: how informative each
 manoeuvre is, how long to run each, and one trajectory from start to goal that runs them all in allowed water.
 
     from pathlib import Path

@@ -88,7 +88,7 @@ def test_helm_that_the_actuators_cannot_give_is_refused_with_file_and_key():
 
 
 @pytest.mark.parametrize("kind", [item for item in FAMILIES if item.reference is not None], ids=lambda kind: kind.name)
-def test_wished_velocities_are_refused_for_direct_models_with_file_and_key(kind, tmp_path: Path):
+def test_desired_velocities_are_refused_for_direct_models_with_file_and_key(kind, tmp_path: Path):
     path = tmp_path / "wishes.toml"
     needed = {item.name: 1.0 for item in kind.settings if item.default is None} | {"duration_s": 30.0}
     given = {**needed, **({"period_s": 10.0} if "period_s" in needed else {})}

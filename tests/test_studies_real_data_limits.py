@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from expdesign.assessment import Wish, assess, check_run, sentence, what_limits
+from expdesign.assessment import EstimateOptions, assess, check_run, sentence, what_limits
 from expdesign.assessment.limits import AHEAD_S, Limits
 from expdesign.assessment.runs import RunCheck
 from expdesign.estimation.methods import estimate
@@ -127,7 +127,7 @@ def test_without_misfit_prediction_ahead_is_exact() -> None:
 def test_a_tanker_is_unstable_on_her_course_and_stable_in_large_turns() -> None:
     """KVLCC2 is known not to keep her course: about it, in 10/1 zig-zags, errors grow, far from it they die away."""
     used, tests = outside_record(TANK.folder, TANK.used), outside_record(TANK.folder, ("zigzag_10_01", "zigzag_30_05"))
-    found = assess(vessel_of(TANK), used, Wish(methods=("ls",)), tests=tests)
+    found = assess(vessel_of(TANK), used, EstimateOptions(methods=("ls",)), tests=tests)
     limits = {run.batch.name: item for item, run in zip(found.limits, found.best.runs, strict=True)}
     assert limits["zigzag_10_01.csv"].unstable
     assert limits["zigzag_30_05.csv"].growth < 0.1
@@ -144,7 +144,7 @@ def test_a_tanker_is_unstable_on_her_course_and_stable_in_large_turns() -> None:
 def test_on_the_pond_instruments_in_the_measured_wind_give_a_stable_model() -> None:
     """Simulated in calm air instruments do not follow a ship that drifts in the wind, and every run diverged."""
     used, tests = outside_record(POND.folder, POND.used), outside_record(POND.folder, POND.tests)
-    found = assess(vessel_of(POND), used, Wish(methods=("iv-air", "ls-air")), tests=tests)
+    found = assess(vessel_of(POND), used, EstimateOptions(methods=("iv-air", "ls-air")), tests=tests)
     instruments, squares = found.methods
     assert instruments.stable
     ahead = [

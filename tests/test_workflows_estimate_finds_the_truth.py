@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from expdesign import workflows
-from expdesign.assessment import Wish, assess, check_run
+from expdesign.assessment import EstimateOptions, assess, check_run
 from expdesign.assessment.assess import preferred
 from expdesign.assessment.residuals import autocorrelation
 from expdesign.records import load_records
@@ -260,7 +260,7 @@ def test_an_unstable_estimate_does_not_get_into_the_vessel_file(trial: Path) -> 
     """Of two estimates by instruments the first is spoilt: the second is chosen, and least squares where both are."""
     ship = load_vessel(MODEL_SHIP)
     record = load_records(trial.parent / "one.csv", vessel_inputs=ship.model.inputs)
-    good = assess(ship, record, Wish(methods=("ls", "iv"))).methods
+    good = assess(ship, record, EstimateOptions(methods=("ls", "iv"))).methods
     spoilt = replace(good[1], runs=(replace(good[1].runs[0], simulated=None, problem="diverges"),))
     assert preferred(good) == 1
     assert preferred((good[0], spoilt, good[1])) == 2

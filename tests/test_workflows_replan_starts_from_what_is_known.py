@@ -137,7 +137,7 @@ def test_what_the_data_cannot_tell_stays_as_it_was_and_is_told(tmp_path):
     header = ",".join((*NAMES, "n1_rps", "a1_rad", "n2_rps", "a2_rad"))
     np.savetxt(tmp_path / "ahead.csv", table, delimiter=",", header=header, comments="")
     state = present_state(STORY, [tmp_path / "ahead.csv"])
-    assert any("cannot tell" in note and "N_mu" in note for note in state.notes)
+    assert any("cannot determine" in note and "N_mu" in note for note in state.notes)
     now = dict(zip(state.ship.model.names, state.ship.model.parameters.tolist(), strict=True))
     std = dict(zip(state.ship.model.names, state.ship.model.parameter_std.tolist(), strict=True))
     before = dict(zip(SHIP.model.names, SHIP.model.parameters.tolist(), strict=True))

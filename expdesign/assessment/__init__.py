@@ -1,6 +1,6 @@
 """Assessment: estimates are validated on their estimation runs and on test runs."""
 
-from expdesign.assessment.assess import NO_TESTS, Wish, assess, default_methods
+from expdesign.assessment.assess import NO_TESTS, EstimateOptions, assess, default_methods
 from expdesign.assessment.limits import Limits, sentence, what_limits
 from expdesign.assessment.residuals import OneStep, one_step
 from expdesign.assessment.runs import RunCheck, check_run
@@ -11,10 +11,10 @@ __all__ = [
     "Assessed",
     "Assessment",
     "Current",
+    "EstimateOptions",
     "Limits",
     "OneStep",
     "RunCheck",
-    "Wish",
     "assess",
     "check_run",
     "default_methods",

@@ -29,7 +29,7 @@ USES_WIND = {item.name: item.wind for item in PREDICTORS}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Wish:
+class EstimateOptions:
     """Options of an estimation.
 
     Attributes:
@@ -85,7 +85,7 @@ def default_methods(vessel: Vessel, record: Record) -> tuple[str, ...]:
 def assess(
     vessel: Vessel,
     record: Record,
-    wish: Wish | None = None,
+    options: EstimateOptions | None = None,
     *,
     tests: Record = NO_TESTS,
     progress: Progress = silent,
@@ -98,7 +98,7 @@ def assess(
     Args:
         vessel: structure, start values and sensors.
         record: what the estimates come from.
-        wish: methods and what is held fixed.
+        options: methods and what is held fixed.
         tests: runs that are simulated but not used.
         progress: of the assessment.
 
@@ -107,15 +107,15 @@ def assess(
         NotInformative: parameters that the data cannot separate; the message names them.
         Diverged: no stable model to make instruments with.
     """
-    wish = wish or Wish()
-    named = tuple(method_named(name) for name in dict.fromkeys(wish.methods))
+    options = options or EstimateOptions()
+    named = tuple(method_named(name) for name in dict.fromkeys(options.methods))
     chosen = named or tuple(method_named(name) for name in default_methods(vessel, record))
     done: list[Assessed] = []
     left_out: list[str] = []
     for index, method in enumerate(chosen):
         progress(f"estimating by {method.title}", index / len(chosen))
         try:
-            done.append(_assessed(vessel, record, tests, method, wish))
+            done.append(_assessed(vessel, record, tests, method, options))
         except (InputError, NoAnswer) as error:
             spare = USES_WIND[method.predictor] or isinstance(error, Diverged)
             if named or not spare or (method is chosen[-1] and not done):
@@ -129,10 +129,10 @@ def assess(
         methods=tuple(done),
         left_out=tuple(left_out),
         chosen=chosen_one,
-        mean=wish.mean,
-        fixed=wish.fixed,
-        motion=wish.motion,
-        limits=limits_of(done[chosen_one], wish.integration),
+        mean=options.mean,
+        fixed=options.fixed,
+        motion=options.motion,
+        limits=limits_of(done[chosen_one], options.integration),
     )
 
 
@@ -161,12 +161,12 @@ def _prefixed(error: InputError | NoAnswer, method: Method) -> InputError | NoAn
     return error
 
 
-def _assessed(vessel: Vessel, record: Record, tests: Record, method: Method, wish: Wish) -> Assessed:
-    found, start = _estimated(vessel, record, method, wish)
+def _assessed(vessel: Vessel, record: Record, tests: Record, method: Method, options: EstimateOptions) -> Assessed:
+    found, start = _estimated(vessel, record, method, options)
     wind = USES_WIND[method.predictor]
     model = found.model(vessel.model)
     runs = [
-        check_run(model, batch, use=use, wind=wind, integration=wish.integration)
+        check_run(model, batch, use=use, wind=wind, integration=options.integration)
         for use, part in ((ESTIMATION, record), (TEST, tests))
         for batch in part.batches
     ]
@@ -177,7 +177,7 @@ def _assessed(vessel: Vessel, record: Record, tests: Record, method: Method, wis
         start=start,
         model=model,
         runs=tuple(runs),
-        one_step=one_step(record, vessel.model, found, fixed=wish.fixed, quadrature=wish.quadrature),
+        one_step=one_step(record, vessel.model, found, fixed=options.fixed, quadrature=options.quadrature),
         breaches=breaches,
         current=_current(found, vessel),
     )
@@ -190,27 +190,27 @@ def _current(found: Estimate, vessel: Vessel) -> Current | None:
     return Current(to_mps=to_mps, std_mps=covariance.diagonal() ** 0.5)
 
 
-def _estimated(vessel: Vessel, record: Record, method: Method, wish: Wish) -> tuple[Estimate, str]:
+def _estimated(vessel: Vessel, record: Record, method: Method, options: EstimateOptions) -> tuple[Estimate, str]:
     """The estimate, and what its first instruments came from: the vessel's values, or least squares where they fail."""
 
     def attempt(start: str) -> Estimate:
-        weighting = Weighting(mean=wish.mean)
+        weighting = Weighting(mean=options.mean)
         settings = Settings(
-            fixed=wish.fixed,
+            fixed=options.fixed,
             weighting=weighting,
             start=start,
-            integration=wish.integration,
-            quadrature=wish.quadrature,
-            horizon_s=wish.horizon_s,
-            constant=wish.constant,
+            integration=options.integration,
+            quadrature=options.quadrature,
+            horizon_s=options.horizon_s,
+            constant=options.constant,
         )
         return estimate(record, vessel.model, method=method.name, settings=settings)
 
     nominal, ls = STARTS
     if not method.name.startswith(INSTRUMENTAL):
         return attempt(nominal), ""
-    if wish.start != AUTO:
-        return attempt(wish.start), wish.start
+    if options.start != AUTO:
+        return attempt(options.start), options.start
     if not vessel.model.parameters.any():
         return _noted(attempt(ls), "the parameters of the vessel file are all zero"), ls
     try:

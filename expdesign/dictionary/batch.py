@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from expdesign.dictionary.build import family, follow, wished_commands, wished_velocities
+from expdesign.dictionary.build import desired_commands, desired_velocities, family, follow
 from expdesign.dictionary.spec import PrimitiveSpec
 from expdesign.dictionary.trim import STEADY, lost
 from expdesign.errors import InputError, NoAnswer
@@ -47,13 +47,13 @@ def excite_many(vessel: Vessel, specs: Sequence[PrimitiveSpec]) -> ExcitedRuns:
     possible, velocity = np.zeros(len(specs)), np.zeros((len(specs), 3))
     entry = np.zeros((len(specs), len(vessel.limits)))
     commands = np.zeros((len(specs), samples, len(vessel.limits)))
-    wished: dict[int, Array] = {}
+    desired: dict[int, Array] = {}
     for index, spec in enumerate(specs):
         try:
             if family(spec.family).reference is not None:
-                wished[index] = wished_velocities(vessel, spec)
+                desired[index] = desired_velocities(vessel, spec)
                 continue
-            found = wished_commands(vessel, spec)
+            found = desired_commands(vessel, spec)
         except (InputError, NoAnswer):
             continue
         if len(found.commands) == samples:
@@ -63,9 +63,9 @@ def excite_many(vessel: Vessel, specs: Sequence[PrimitiveSpec]) -> ExcitedRuns:
     commands[ordered] = within_limits(
         vessel.actuators, commands[ordered], sample_time_s=vessel.sample_time_s, before=entry[ordered]
     )
-    if wished:
-        rows = np.array(list(wished))
-        references = np.array(list(wished.values()))
+    if desired:
+        rows = np.array(list(desired))
+        references = np.array(list(desired.values()))
         before, followed = follow(vessel, references)
         possible[rows] = lost(vessel, references[:, 0], before) <= STEADY
         velocity[rows], entry[rows], commands[rows] = references[:, 0], before, followed

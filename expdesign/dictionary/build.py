@@ -1,4 +1,4 @@
-"""From a request to a primitive: wished velocities or commands, kept within limits, and the simulated answer."""
+"""From a request to a primitive: desired velocities or commands, kept within limits, and the simulated response."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def build_primitive(vessel: Vessel, spec: PrimitiveSpec) -> Primitive:
     """One primitive: commands of its family, or by the inverse nominal model, within limits and rates, then simulated.
 
     The simulated motion is what counts from here on; where limits or unmodelled directions keep the vessel from the
-    wished velocities it differs from them.
+    desired velocities it differs from them.
 
     Raises:
         InputError: the run is shorter than two samples, or the family asks for what the vessel cannot do; the message
@@ -77,19 +77,19 @@ def excitation(vessel: Vessel, spec: PrimitiveSpec) -> Excitation:
         length_s = spec.settings["duration_s"]
         raise InputError(f"duration_s is {length_s:g}, expected at least two samples of {vessel.sample_time_s:g} s")
     if kind.orders is not None:
-        wished = wished_commands(vessel, spec)
+        desired = desired_commands(vessel, spec)
         values = within_limits(
-            vessel.actuators, wished.commands, sample_time_s=vessel.sample_time_s, before=wished.inputs
+            vessel.actuators, desired.commands, sample_time_s=vessel.sample_time_s, before=desired.inputs
         )
-        return Excitation(velocity=wished.velocity, inputs=wished.inputs, commands=values)
-    velocities = wished_velocities(vessel, spec)
+        return Excitation(velocity=desired.velocity, inputs=desired.inputs, commands=values)
+    velocities = desired_velocities(vessel, spec)
     inputs, values = follow(vessel, velocities)
     if lost(vessel, velocities[0], inputs) > STEADY:
         raise Unreachable(_not_held(vessel, velocities[0]))
     return Excitation(velocity=velocities[0], inputs=inputs, commands=values)
 
 
-def wished_commands(vessel: Vessel, spec: PrimitiveSpec) -> Excitation:
+def desired_commands(vessel: Vessel, spec: PrimitiveSpec) -> Excitation:
     """What a family with orders asks for, before limits and rates.
 
     Raises:
@@ -100,8 +100,8 @@ def wished_commands(vessel: Vessel, spec: PrimitiveSpec) -> Excitation:
     return orders(vessel, spec)
 
 
-def wished_velocities(vessel: Vessel, spec: PrimitiveSpec) -> Array:
-    """(k + 1, 3) what a family with a reference wishes for.
+def desired_velocities(vessel: Vessel, spec: PrimitiveSpec) -> Array:
+    """(k + 1, 3) desired velocities of a family with a reference.
 
     Raises:
         InputError: its settings make no sense together.
@@ -109,22 +109,22 @@ def wished_velocities(vessel: Vessel, spec: PrimitiveSpec) -> Array:
     reference = family(spec.family).reference
     assert reference is not None
     count = round(spec.settings["duration_s"] / vessel.sample_time_s)
-    wished = reference(spec.settings, np.arange(count + 1, dtype=float) * vessel.sample_time_s)
-    if not np.isfinite(wished).all():
+    desired = reference(spec.settings, np.arange(count + 1, dtype=float) * vessel.sample_time_s)
+    if not np.isfinite(desired).all():
         raise InputError("its settings give velocities that are not numbers")
-    return wished
+    return desired
 
 
-def follow(vessel: Vessel, wished: Array) -> tuple[Array, Array]:
-    """Entry commands (..., m) and commands (..., k, m) for wished velocities (..., k + 1, 3), by the inverse model.
+def follow(vessel: Vessel, desired: Array) -> tuple[Array, Array]:
+    """Entry commands (..., m) and commands (..., k, m) for desired velocities (..., k + 1, 3), by the inverse model.
 
     Raises:
         InputError: the model reads its actuators directly.
     """
-    slopes = np.diff(wished, axis=-2) / vessel.sample_time_s
-    middles = (wished[..., :-1, :] + wished[..., 1:, :]) / 2
+    slopes = np.diff(desired, axis=-2) / vessel.sample_time_s
+    middles = (desired[..., :-1, :] + desired[..., 1:, :]) / 2
     force = required_force(vessel.model, middles, slopes)
-    entry = _ready(vessel, trim(vessel, wished[..., 0, :]), force)
+    entry = _ready(vessel, trim(vessel, desired[..., 0, :]), force)
     return entry, allocate(vessel.actuators, force, sample_time_s=vessel.sample_time_s, before=entry)
 
 

@@ -42,7 +42,7 @@ class Setting:
 
 
 Reference = Callable[[Mapping[str, float], Array], Array]
-"""(settings, time_s (k,)) -> (k, 3) wished u, v, r through water; the row at time 0 is the entry velocity."""
+"""(settings, time_s (k,)) -> (k, 3) desired u, v, r through water; the row at time 0 is the entry velocity."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,12 +66,12 @@ class PrimitiveSpec:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Excitation:
-    """Commands wished for, and the steady state they start from.
+    """Desired commands, and the steady state they start from.
 
     Attributes:
         velocity: (3,) u, v, r through water at the start.
         inputs: (m,) commands that hold it.
-        commands: (k, m) wished commands; the builder keeps them within limits and rates.
+        commands: (k, m) desired commands; the builder keeps them within limits and rates.
     """
 
     velocity: Array
@@ -84,13 +84,13 @@ Orders = Callable[[Vessel, PrimitiveSpec], Excitation]
 
 @dataclass(frozen=True, kw_only=True)
 class Family:
-    """A kind of manoeuvre, by the velocities it wishes for or by the commands it gives; one of the two.
+    """A kind of manoeuvre, by its desired velocities or its commands; one of the two.
 
     Attributes:
         name: as in dictionary files.
         summary: one line for the user.
         settings: its parameters; each family also has `duration_s`.
-        reference: the velocities it wishes for; the builder turns them into commands within the actuators' limits.
+        reference: its desired velocities; the builder turns them into commands within the actuators' limits.
         orders: the commands it gives. Any vessel can follow them, also one with propeller and rudder whose model does
             not see generalised forces.
         closed_loop: whether its commands depend on the simulated motion, so that each must be simulated by itself.

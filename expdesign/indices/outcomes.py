@@ -169,7 +169,7 @@ def outcomes(
         speed_mps: approach speed, or None for the speed at 85 % of the engines' power *of these parameters*; give it
             when parameters vary, so that the trial stays the same.
         parameters: (p,) other parameter values, or None for the vessel's.
-        names: keys of `OUTCOMES`, in the order wished; only the trials they need are run.
+        names: keys of `OUTCOMES`, in the order of the result; only the trials they need are run.
         side: of the first turn.
         thrusters: "stern" or "all".
 

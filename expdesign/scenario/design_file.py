@@ -12,7 +12,7 @@ from pydantic import Field
 from expdesign.indices import OUTCOMES
 from expdesign.scenario.grow_table import GrowTable, build_grow
 from expdesign.scenario.tables import Entry, NonNegative, Positive, Table, Text, shown
-from expdesign.scenario.values import BudgetWish, DesignSettings
+from expdesign.scenario.values import BudgetSettings, DesignSettings
 from expdesign.vessel import Vessel
 
 MOST_SAMPLES = 500
@@ -107,7 +107,7 @@ class DesignTable(Table):
 
 
 def design_settings(table: DesignTable, vessel: Vessel, primitives: tuple[str, ...], entry: Entry) -> DesignSettings:
-    """Checked wishes.
+    """Checked settings.
 
     Args:
         table: of the file.
@@ -121,8 +121,8 @@ def design_settings(table: DesignTable, vessel: Vessel, primitives: tuple[str, .
     names = vessel.model.names
     _check_fixed(table, names, entry)
     if table.total_s < vessel.sample_time_s:
-        wish = f"at least the vessel's sample_time_s = {vessel.sample_time_s:g}"
-        raise entry.at("total_s").error(f"is {shown(table.total_s)}, expected {wish}")
+        least = f"at least the vessel's sample_time_s = {vessel.sample_time_s:g}"
+        raise entry.at("total_s").error(f"is {shown(table.total_s)}, expected {least}")
     estimated = tuple(name for name in names if name not in table.fixed_parameters)
     _check_list(table.interest, estimated, entry.at("interest"))
     _check_keys(table.parameter_units, estimated, entry.at("parameter_units"))
@@ -202,18 +202,18 @@ def _check_together(table: DesignTable, vessel: Vessel, entry: Entry) -> None:
             raise entry.at("excluded").error(f"names {name!r}, which design.required names too")
 
 
-def _budgets(tables: list[BudgetTable], primitives: tuple[str, ...], entry: Entry) -> tuple[BudgetWish, ...]:
+def _budgets(tables: list[BudgetTable], primitives: tuple[str, ...], entry: Entry) -> tuple[BudgetSettings, ...]:
     for index, table in enumerate(tables, start=1):
         if table.name in [other.name for other in tables[: index - 1]]:
             raise entry.item(index).at("name").error(f"is {table.name!r} again, expected a name not used before")
     return tuple(_budget(table, primitives, entry.item(index)) for index, table in enumerate(tables, start=1))
 
 
-def _budget(table: BudgetTable, primitives: tuple[str, ...], entry: Entry) -> BudgetWish:
+def _budget(table: BudgetTable, primitives: tuple[str, ...], entry: Entry) -> BudgetSettings:
     _check_keys(table.cost_per_s, primitives, entry.at("cost_per_s"))
     if bool(table.cost_per_s) == bool(table.use):
         raise entry.error("needs either cost_per_s by primitive or use = 'cubed_propeller_speed'")
-    return BudgetWish(name=table.name, limit=table.limit, cost_per_s=dict(table.cost_per_s), use=table.use)
+    return BudgetSettings(name=table.name, limit=table.limit, cost_per_s=dict(table.cost_per_s), use=table.use)
 
 
 def _files(given: list[str], entry: Entry) -> tuple[Path, ...]:

@@ -61,7 +61,7 @@ class GrowTable(Table):
 
 
 def build_grow(table: GrowTable, entry: Entry) -> GrowSettings:
-    """The wishes of a checked table.
+    """The settings of a checked table.
 
     Raises:
         FileError: a family that there is not, or a limit whose low is not below its high.

@@ -1,4 +1,4 @@
-"""Scenario files: vessel, dictionary, area, start, goal and wishes."""
+"""Scenario files: vessel, dictionary, area, start, goal and settings."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ from expdesign.vessel import Vessel
 
 
 @dataclass(frozen=True, kw_only=True)
-class BudgetWish:
+class BudgetSettings:
     """Something that is used up.
 
     Attributes:
@@ -35,7 +35,7 @@ class BudgetWish:
 
 @dataclass(frozen=True, kw_only=True)
 class DesignSettings:
-    """Wishes for the durations.
+    """Settings of the design.
 
     Attributes:
         total_s: informative time to share out [s].
@@ -77,7 +77,7 @@ class DesignSettings:
     most_s: Mapping[str, float] = field(default_factory=dict)
     required: tuple[str, ...] = ()
     excluded: tuple[str, ...] = ()
-    budgets: tuple[BudgetWish, ...] = ()
+    budgets: tuple[BudgetSettings, ...] = ()
     balance: float = 0.0
     grow: GrowSettings | None = None
 

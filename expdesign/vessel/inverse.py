@@ -120,7 +120,7 @@ def allocate(
     before: Array | None = None,
     near: Array | None = None,
 ) -> Array:
-    """Commands (..., k, m) for wished generalised forces (..., k, 3): smallest thrusts, then limits and rates.
+    """Commands (..., k, m) for desired generalised forces (..., k, 3): smallest thrusts, then limits and rates.
 
     An azimuth turns the shorter way, reversing its propeller where that is nearer and gives as much; near zero thrust
     it keeps its angle. A saturated thruster is not relieved by the others. Rudders stay amidships.
@@ -132,17 +132,17 @@ def allocate(
         before: (..., m) commands standing before the first row, from which rates count; None for no rate limit there.
         near: (..., m) commands to whose angles azimuths keep as near as they can; None for those of the row before.
     """
-    wished = force @ _inverse_force_matrix(actuators).T  # (..., k, c)
+    desired = force @ _inverse_force_matrix(actuators).T  # (..., k, c)
     bounds = _bounds(actuators, sample_time_s)
     rows, last = [], before
-    for row in np.moveaxis(wished, -2, 0):
-        last = _reached(bounds, _wished_commands(actuators, row, last if near is None else near), last)
+    for row in np.moveaxis(desired, -2, 0):
+        last = _reached(bounds, _desired_commands(actuators, row, last if near is None else near), last)
         rows.append(last)
     return np.stack(rows, axis=-2)
 
 
 def within_limits(actuators: tuple[Actuator, ...], values: Array, *, sample_time_s: float, before: Array) -> Array:
-    """Wished commands (..., k, m) as near as limits and rates let them come, from those standing before (..., m)."""
+    """The commands (..., k, m) nearest to the desired ones within limits and rates, after commands (..., m)."""
     bounds = _bounds(actuators, sample_time_s)
     rows, last = [], before
     for row in np.moveaxis(values, -2, 0):
@@ -158,16 +158,16 @@ def _bounds(actuators: tuple[Actuator, ...], sample_time_s: float) -> tuple[Arra
     return low, high, rate * sample_time_s
 
 
-def _reached(bounds: tuple[Array, Array, Array], wish: Array, last: Array | None) -> Array:
-    """Commands (..., m) nearest to a wish within limits, and within a sample's change from the last ones."""
+def _reached(bounds: tuple[Array, Array, Array], desired: Array, last: Array | None) -> Array:
+    """Commands (..., m) nearest to the desired ones within limits, and within a sample's change from the last ones."""
     low, high, reach = bounds
-    inside = np.minimum(np.maximum(wish, low), high)
+    inside = np.minimum(np.maximum(desired, low), high)
     if last is None:
         return np.asarray(inside)
     return np.asarray(np.minimum(np.maximum(inside, last - reach), last + reach))
 
 
-def _wished_commands(actuators: tuple[Actuator, ...], row: Array, last: Array | None) -> Array:
+def _desired_commands(actuators: tuple[Actuator, ...], row: Array, last: Array | None) -> Array:
     """Commands (..., m) that give thrusts (..., c), by the shortest turn of azimuths; limits of speeds come later."""
     parts: list[Array] = []
     taken, place = 0, 0
@@ -194,18 +194,18 @@ def _polar(ahead: Array, side: Array, reference: Array, actuator: Actuator) -> l
     """Propeller speed and angle that come closest to a thrust within limits, by the shortest turn."""
     speeds, angles = actuator.limits
     halves, turns = WAYS_ROUND if math.isfinite(angles.high - angles.low) else HALVES
-    wish, bearing = np.hypot(ahead, side), np.arctan2(side, ahead)
+    desired, bearing = np.hypot(ahead, side), np.arctan2(side, ahead)
     base = bearing[..., None] + halves  # (..., 6 or 2)
     whole = np.round((reference[..., None] - base) / (2 * math.pi))
     base = base + 2 * math.pi * (whole + turns)
     angle = np.minimum(np.maximum(base, angles.low), angles.high)
     along = np.cos(angle - bearing[..., None])
-    speed = np.minimum(np.maximum(wish[..., None] * along, speeds.low), speeds.high)
-    missed = np.hypot(wish[..., None] - speed * along, speed * np.sin(angle - bearing[..., None]))
-    short = np.round(missed / np.maximum(wish[..., None], 1e-9), 9)
+    speed = np.minimum(np.maximum(desired[..., None] * along, speeds.low), speeds.high)
+    missed = np.hypot(desired[..., None] - speed * along, speed * np.sin(angle - bearing[..., None]))
+    short = np.round(missed / np.maximum(desired[..., None], 1e-9), 9)
     turn = np.where(short <= short.min(axis=-1, keepdims=True), np.abs(angle - reference[..., None]), np.inf)
     best = np.argmin(turn, axis=-1)[..., None]
-    still = wish < 1e-9
+    still = desired < 1e-9
     return [
         np.where(still, 0.0, np.take_along_axis(speed, best, -1)[..., 0]),
         np.where(still, reference, np.take_along_axis(angle, best, -1)[..., 0]),

@@ -28,7 +28,7 @@ class Trial:
     """A planned and verified trial.
 
     Attributes:
-        content: all that the report tells, as values.
+        content: the values of the report.
         route: waypoints.
     """
 
@@ -37,7 +37,7 @@ class Trial:
 
     @property
     def information(self) -> tuple[PrimitiveInformation, ...]:
-        """What every primitive tells."""
+        """Information of every primitive."""
         return self.content.information
 
     @property

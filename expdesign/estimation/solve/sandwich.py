@@ -78,7 +78,7 @@ class _Terms:
     Attributes:
         part: the part.
         when: where its rows stand.
-        zeta, n: (t, n, p) and (t, n) instruments and residuals, made white if wished.
+        zeta, n: (t, n, p) and (t, n) instruments and residuals, perhaps whitened.
     """
 
     part: Part

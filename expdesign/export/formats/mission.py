@@ -43,10 +43,10 @@ def mission(route: Route) -> list[MissionItem]:
     items: list[MissionItem] = []
     ordered = -1.0
     for number, waypoint in enumerate(route.waypoints):
-        wished = round(max(waypoint.speed_mps, SLOWEST_MPS), 3)
-        if number and wished != ordered:
-            ordered = wished
-            items.append(MissionItem(DO_CHANGE_SPEED, MISSION, (GROUND_SPEED, wished, THROTTLE_UNCHANGED, 0.0)))
+        desired = round(max(waypoint.speed_mps, SLOWEST_MPS), 3)
+        if number and desired != ordered:
+            ordered = desired
+            items.append(MissionItem(DO_CHANGE_SPEED, MISSION, (GROUND_SPEED, desired, THROTTLE_UNCHANGED, 0.0)))
         hold = (round(waypoint.stay_s, 3), 0.0, 0.0, 0.0)
         items.append(MissionItem(NAV_WAYPOINT, GLOBAL_RELATIVE_ALT, hold, waypoint.lat_deg, waypoint.lon_deg))
     return items

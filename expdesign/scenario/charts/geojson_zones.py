@@ -13,7 +13,7 @@ from expdesign.scenario.charts.area_tables import AreaTable, ChartTable
 from expdesign.scenario.charts.chart import Chart, read_layers
 from expdesign.scenario.charts.geojson import LAYER_OF_BARE_POLYGONS, Feature, read_features
 from expdesign.scenario.charts.metres import Box, around, in_metres
-from expdesign.scenario.charts.zones import ChartZones, OpenChart, wish_text
+from expdesign.scenario.charts.zones import ChartZones, OpenChart, rule_text
 from expdesign.scenario.tables import LARGEST, Entry, shown
 from expdesign.sea_area import LocalFrame
 
@@ -115,17 +115,17 @@ def _deep_water(
     file: AreaTable, depths: Mapping[str, float], draught_m: float, entry: Entry
 ) -> tuple[list[str] | None, str]:
     """The layers that are deep enough, or None when depth is not checked, and the sentence that says so."""
-    needed_m, wish = wish_text(file.depth, draught_m)
+    needed_m, rule = rule_text(file.depth, draught_m)
     if not depths:
         return None, "Depth is not checked: no depth layers are named, all water outside land counts as deep enough."
     deep = sorted((name for name in depths if depths[name] >= needed_m), key=lambda name: depths[name])
     key = file.chart.depth_property
     if not deep:
         deepest = max(depths, key=lambda name: depths[name])
-        found = f"no layer is as deep as {wish}, the deepest is {deepest!r} with {depths[deepest]:g} m"
+        found = f"no layer is as deep as {rule}, the deepest is {deepest!r} with {depths[deepest]:g} m"
         raise NoPlan(str(entry.at("depth_property" if key else "depth_layers").error(found)))
     where = f"where {key} is" if key else f"in the layers {', '.join(deep)}:"
-    return deep, f"Allowed water lies {where} at least {depths[deep[0]]:g} m{'' if key else ' deep'} for {wish}."
+    return deep, f"Allowed water lies {where} at least {depths[deep[0]]:g} m{'' if key else ' deep'} for {rule}."
 
 
 def _deep_union(

@@ -17,7 +17,7 @@ from expdesign.errors import NoPlan
 from expdesign.scenario.charts.area_tables import AreaTable
 from expdesign.scenario.charts.metres import Box, around, in_metres
 from expdesign.scenario.charts.s57 import BUOYS, DANGERS, DEPTHS, OVERHEAD, SOLID, Cell, Feature57, read_cell
-from expdesign.scenario.charts.zones import ChartZones, OpenChart, wish_text
+from expdesign.scenario.charts.zones import ChartZones, OpenChart, rule_text
 from expdesign.scenario.tables import Entry
 from expdesign.sea_area import LocalFrame
 
@@ -47,17 +47,17 @@ def open_cell(file: AreaTable, *, draught_m: float, entry: Entry) -> OpenChart:
         raise entry.at(name).error("stands beside s57, expected it with geojson only: a cell knows its own layers")
     path = entry.at("s57").file(file.chart.s57 or "")
     cell = read_cell(path)
-    needed_m, wish = wish_text(file.depth, draught_m)
+    needed_m, rule = rule_text(file.depth, draught_m)
     rules = CellRules(needed_m=needed_m, margin_m=file.chart.hazard_margin_m, air_draught_m=file.chart.air_draught_m)
 
     def zones(box: Box, frame: LocalFrame) -> ChartZones:
         found = cell_zones(cell, rules, box, frame)
         if found.deep is None or found.deep.is_empty:
             deepest = max((depth for depth, _ in found.depths), default=float("nan"))
-            raise NoPlan(str(entry.at("s57").error(f"no charted depth reaches {wish}, the deepest is {deepest:g} m")))
+            raise NoPlan(str(entry.at("s57").error(f"no charted depth reaches {rule}, the deepest is {deepest:g} m")))
         return replace(
             found,
-            depth_rule=f"Allowed water lies in charted areas at least {needed_m:g} m deep: {wish}.",
+            depth_rule=f"Allowed water lies in charted areas at least {needed_m:g} m deep: {rule}.",
             notes=tuple(f"{path.name}: {note}" for note in (*cell.notes, *found.notes)),
         )
 

@@ -49,7 +49,7 @@ class OpenChart:
     zones: Callable[[Box, LocalFrame], ChartZones]
 
 
-def wish_text(depth: DepthTable, draught_m: float) -> tuple[float, str]:
+def rule_text(depth: DepthTable, draught_m: float) -> tuple[float, str]:
     """The charted depth that is needed, and the sum that says why."""
     needed_m = draught_m + depth.under_keel_m - depth.tide_m
     tide = f" - {depth.tide_m:g} m tide" if depth.tide_m else ""

@@ -43,7 +43,7 @@ def diagnose(
         data: CSV files.
         out: folder, or None.
         vessel: the model in use.
-        scenario: whose dictionary is searched for manoeuvres that tell causes apart; standard ones without.
+        scenario: whose dictionary is searched for manoeuvres that distinguish causes; standard ones by default.
         velocity: where velocities come from, as in `estimate`.
         seed: of all chance.
         progress: of the command.

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from expdesign import __version__
-from expdesign.assessment import NO_TESTS, Assessment, Wish, assess
+from expdesign.assessment import NO_TESTS, Assessment, EstimateOptions, assess
 from expdesign.errors import InputError
 from expdesign.export import (
     estimate_json,
@@ -52,7 +52,7 @@ def estimate(
             raise InputError(f"{path} is given for estimation and for testing, expected one of the two")
     progress("reading the data", 0.02)
     ship = load_vessel(vessel)
-    wish = Wish(
+    options = EstimateOptions(
         methods=tuple(methods),
         fixed=tuple(fixed),
         mean=mean,
@@ -63,22 +63,22 @@ def estimate(
     )
     record = measured(data, ship, velocity=velocity)
     apart = measured(tests, ship, velocity=velocity) if tests else NO_TESTS
-    found = assess(ship, record, wish, tests=apart, progress=within(progress, 0.1, 0.8))
+    found = assess(ship, record, options, tests=apart, progress=within(progress, 0.1, 0.8))
     progress("drawing the report", 0.8)
     command = command_text(
         "estimate",
         data,
         {
             "--vessel": vessel,
-            "--method": wish.methods,
-            "--fixed": wish.fixed,
+            "--method": options.methods,
+            "--fixed": options.fixed,
             "--test": tuple(tests),
             "--velocity": velocity,
-            "--mean": wish.mean,
-            "--start": wish.start,
-            "--motion": wish.motion,
-            "--horizon": wish.horizon_s,
-            "--constant": wish.constant,
+            "--mean": options.mean,
+            "--start": options.start,
+            "--motion": options.motion,
+            "--horizon": options.horizon_s,
+            "--constant": options.constant,
         },
         usual={"--velocity": "auto", "--mean": "complete", "--start": "auto", "--motion": "continuous"},
     )

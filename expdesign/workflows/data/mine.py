@@ -38,17 +38,17 @@ def mine(
     velocity: str = "auto",
     progress: Progress = silent,
 ) -> Outcome:
-    """The `keep` batches that tell most together, into `out` or runs/<first data file>.
+    """The `keep` batches with the most information together, into `out` or runs/<first data file>.
 
     Args:
-        data: CSV files; each is a batch, and so is what follows a gap.
+        data: CSV files; a gap starts a new batch.
         out: folder, or None.
         vessel: nominal model, which simulates the instruments.
         keep: how many batches to choose.
         piece_s: cut batches into pieces of about this length [s].
-        fixed: parameters that count as known.
+        fixed: parameters held at the vessel's values.
         mean: mean subtraction of the estimator that will follow.
-        velocity: where velocities come from, as in `estimate`.
+        velocity: source of the velocities, as in `estimate`.
         progress: of the command.
 
     Raises:
@@ -61,7 +61,7 @@ def mine(
     ship = load_vessel(vessel)
     record = in_pieces(measured(data, ship, velocity=velocity), piece_s)
     windy = all(batch.wind is not None for batch in record.batches)
-    names, unseen = _told_of(ship.model, fixed, windy=windy)
+    names, unseen = _parameters(ship.model, fixed, windy=windy)
     progress("simulating the runs", 0.2)
     batches = recorded_information(record, ship.model, names, predictor="basic-wind" if windy else "basic")
     _need_every_parameter(batches, names)
@@ -122,8 +122,8 @@ def _piece(batch: Batch, span: slice) -> Batch:
     return replace(batch, name=name, first_row=batch.first_row and batch.first_row + span.start, **cut)
 
 
-def _told_of(model: VesselModel, fixed: Sequence[str], *, windy: bool) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Parameters to estimate, and those that data without measured wind can tell nothing of."""
+def _parameters(model: VesselModel, fixed: Sequence[str], *, windy: bool) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Parameters to estimate, and those that data without measured wind cannot determine."""
     wanted = estimated_parameters(model, fixed)
     of_air = {
         term.name
@@ -138,12 +138,12 @@ def _told_of(model: VesselModel, fixed: Sequence[str], *, windy: bool) -> tuple[
 
 
 def _need_every_parameter(batches: Sequence[BatchInformation], names: Sequence[str]) -> None:
-    """A parameter whose regressor or instrument is zero throughout, by name."""
+    """Refuse parameters whose regressor or instrument is always zero."""
     size = np.max([np.abs(np.diag(batch.X)) for batch in batches], axis=0)
     blind = tuple(name for name, value in zip(names, size, strict=True) if not value > 0)
     if blind:
         raise NotInformative(
-            f"no batch tells anything of {', '.join(blind)}; hold with --fixed what is known", parameters=blind
+            f"no batch has information about {', '.join(blind)}; hold known parameters with --fixed", parameters=blind
         )
 
 
@@ -187,15 +187,15 @@ def _content(
 
 
 def _summary(content: Mapping[str, object]) -> dict[str, object]:
-    told = ("chosen", "efficiency", "efficiency_bound", "all_subsets_tried", "counts", "not_told_without_wind")
-    return {name: content[name] for name in told}
+    shown = ("chosen", "efficiency", "efficiency_bound", "all_subsets_tried", "counts", "not_told_without_wind")
+    return {name: content[name] for name in shown}
 
 
 def _table(subset: Subset, batches: Sequence[BatchInformation]) -> TextTable:
     of = {batch.name: batch for batch in batches}
     rows = zip(subset.names, subset.first, strict=True)
     return TextTable(
-        title="Batches in the order in which each adds most, with the information of all up to there",
+        title="Batches in the order in which each adds most, with the cumulative information",
         header=("rank", "batch", "seconds", "information", "chosen"),
         rows=tuple(
             (

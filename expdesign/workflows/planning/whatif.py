@@ -43,7 +43,7 @@ def whatif(
 ) -> Outcome:
     """The scenario and its variants side by side, into `out` or runs/<scenario>-whatif.
 
-    Every file is read before anything is computed. A variant without an answer is told as such beside the others.
+    Every file is read before anything is computed. A variant without an answer is listed as such beside the others.
 
     Args:
         scenario: the scenario file.
@@ -110,7 +110,7 @@ def _workers(scheduler: str | None, jobs: int) -> Iterator[None]:
 
 
 def _case(index: int, case: Scenario, changes: tuple[str, ...], with_plan: bool, seed: int) -> tuple[int, Case]:
-    """One case computed; nobody to interrupt or to tell, as it may run in another process."""
+    """One case, computed without progress, because it may run in another process."""
     try:
         information, _ = ready(case, seed=seed)
         design = designed(case, information, seed=seed)
@@ -157,7 +157,7 @@ def _described(
 
 
 def _summary(content: WhatIfContent) -> dict[str, object]:
-    told = dict(explanations(content))
+    differences = dict(explanations(content))
     return {
         "cases": {
             case.name: {
@@ -165,7 +165,7 @@ def _summary(content: WhatIfContent) -> dict[str, object]:
                 "informative_s": case.informative_s,
                 "accuracy": None if (against := content.against(case)) is None else against.accuracy,
                 "same_accuracy_s": None if against is None else against.same_accuracy_s,
-                "differences": list(told.get(case.name, ())),
+                "differences": list(differences.get(case.name, ())),
             }
             for case in content.cases
         }
@@ -174,8 +174,8 @@ def _summary(content: WhatIfContent) -> dict[str, object]:
 
 def _tables(content: WhatIfContent) -> tuple[TextTable, ...]:
     rows = tuple(table_row(content, case) for case in content.cases)
-    told = tuple((name, sentence) for name, sentences in explanations(content) for sentence in sentences)
+    differences = tuple((name, sentence) for name, sentences in explanations(content) for sentence in sentences)
     return (
         TextTable(title="Side by side", header=table_header(content), rows=rows),
-        TextTable(title="Differences", header=("Case", "What differs"), rows=told),
+        TextTable(title="Differences", header=("Case", "What differs"), rows=differences),
     )

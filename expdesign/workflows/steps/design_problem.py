@@ -24,7 +24,7 @@ from expdesign.information.prior import equation_noise, score_prior, stated_info
 from expdesign.information.recorded import pooled, recorded_information
 from expdesign.progress import Progress, silent, within
 from expdesign.scenario import Scenario
-from expdesign.scenario.values import BudgetWish
+from expdesign.scenario.values import BudgetSettings
 from expdesign.values import Array
 from expdesign.workflows.steps.measured import measured
 
@@ -62,50 +62,50 @@ def duration_problem(
         progress: of the step.
 
     Raises:
-        InputError, UnknownName: wishes that do not go together with the vessel or the data.
+        InputError, UnknownName: settings that do not fit the vessel or the data.
         NoAnswer, NotInformative: no sharing meets them.
     """
-    wish, vessel = case.design, case.vessel
-    parameters = estimated_parameters(vessel.model, wish.fixed_parameters)
+    settings, vessel = case.design, case.vessel
+    parameters = estimated_parameters(vessel.model, settings.fixed_parameters)
     equation = {term.name: term.equation for term in vessel.model.terms}
-    equations, interest = tuple(equation[name] for name in parameters), wish.interest
+    equations, interest = tuple(equation[name] for name in parameters), settings.interest
     nuisance: tuple[str, ...] = ()
     primitives = [item.primitive for item in information]
-    if wish.predictor != "model":
+    if settings.predictor != "model":
         progress("simulating disturbances with the dictionary", 0.0)
         wide = score_augmented(
             vessel,
             primitives,
-            predictor=wish.predictor,
+            predictor=settings.predictor,
             environment=case.environment,
-            fixed_parameters=wish.fixed_parameters,
-            mean_subtraction=wish.mean_subtraction,
+            fixed_parameters=settings.fixed_parameters,
+            mean_subtraction=settings.mean_subtraction,
         )
         information, parameters, equations = wide.information, wide.parameters, wide.equations
         nuisance = tuple(name for name in wide.parameters if name not in wide.interest)
-        interest = _still_estimated(interest or wide.interest, wide.interest, wish.predictor)
+        interest = _still_estimated(interest or wide.interest, wide.interest, settings.predictor)
     sampled: Sequence[Sequence[PrimitiveInformation]] = ()
-    if wish.robust != "nominal":
-        progress(f"simulating the dictionary with {wish.prior_samples} models of the prior", 0.1)
+    if settings.robust != "nominal":
+        progress(f"simulating the dictionary with {settings.prior_samples} models of the prior", 0.1)
         sampled, _ = score_prior(
             vessel,
             primitives,
-            samples=wish.prior_samples,
+            samples=settings.prior_samples,
             rng=np.random.default_rng(seed),
             environment=case.environment,
-            fixed_parameters=wish.fixed_parameters,
-            mean_subtraction=wish.mean_subtraction,
+            fixed_parameters=settings.fixed_parameters,
+            mean_subtraction=settings.mean_subtraction,
         )
     return build_durations(
         information,
         parameters,
-        total_s=wish.total_s,
-        mean_subtraction=wish.mean_subtraction,
+        total_s=settings.total_s,
+        mean_subtraction=settings.mean_subtraction,
         aim=_aim(case, parameters, interest, progress=within(progress, 0.4, 0.9)),
         constraints=_constraints(case, primitives),
         prior=_prior(case, parameters, stated_std),
         sampled=sampled,
-        robust=wish.robust,
+        robust=settings.robust,
         equations=equations,
         nuisance=nuisance,
     )
@@ -122,24 +122,27 @@ def _still_estimated(interest: tuple[str, ...], estimated: tuple[str, ...], pred
 
 
 def _aim(case: Scenario, parameters: tuple[str, ...], interest: tuple[str, ...], *, progress: Progress) -> Aim:
-    wish, model = case.design, case.vessel.model
-    size = np.abs(model.parameters) if wish.relative_to == "nominal" else model.parameter_std
+    settings, model = case.design, case.vessel.model
+    size = np.abs(model.parameters) if settings.relative_to == "nominal" else model.parameter_std
     nominal = dict(zip(model.names, size.tolist(), strict=True))
     own = [name for name in parameters if name in nominal]
     noise = dict(zip(own, equation_noise(case.vessel, own).tolist(), strict=True))
     names: tuple[str, ...] = ()
     gradients = np.zeros((0, 0))
-    if wish.outcomes:
+    if settings.outcomes:
         progress("simulating standard trials with other parameters", 0.0)
         found = outcome_gradients(
             case.vessel,
-            wish.outcomes,
+            settings.outcomes,
             own,
-            speed_mps=wish.outcome_speed_mps,
+            speed_mps=settings.outcome_speed_mps,
             progress=progress,
         )
         units = np.array(
-            [wish.outcome_units.get(name, abs(value)) for name, value in zip(found.names, found.values, strict=True)]
+            [
+                settings.outcome_units.get(name, abs(value))
+                for name, value in zip(found.names, found.values, strict=True)
+            ]
         )
         if not (units > 0).all():
             raise InputError(f"design.outcome_units needs a unit for {found.names[int(np.argmin(units))]}, which is 0")
@@ -147,9 +150,9 @@ def _aim(case: Scenario, parameters: tuple[str, ...], interest: tuple[str, ...],
         gradients = np.zeros((len(names), len(parameters)))
         gradients[:, [parameters.index(name) for name in own]] = found.gradients / units[:, None]
     return Aim(
-        criterion=wish.criterion,
+        criterion=settings.criterion,
         interest=interest,
-        unit=np.array([wish.parameter_units.get(name, nominal.get(name, 0.0)) for name in parameters]),
+        unit=np.array([settings.parameter_units.get(name, nominal.get(name, 0.0)) for name in parameters]),
         noise=np.array([noise.get(name, 0.0) for name in parameters]),
         outcomes=names,
         gradients=gradients,
@@ -157,20 +160,20 @@ def _aim(case: Scenario, parameters: tuple[str, ...], interest: tuple[str, ...],
 
 
 def _constraints(case: Scenario, primitives: Sequence[Primitive]) -> Constraints:
-    wish = case.design
+    settings = case.design
     return Constraints(
-        least_s=wish.least_s,
-        most_s=wish.most_s,
-        required=wish.required,
-        excluded=wish.excluded,
-        budgets=tuple(_budget(item, primitives) for item in wish.budgets),
-        balance=wish.balance,
+        least_s=settings.least_s,
+        most_s=settings.most_s,
+        required=settings.required,
+        excluded=settings.excluded,
+        budgets=tuple(_budget(item, primitives) for item in settings.budgets),
+        balance=settings.balance,
     )
 
 
-def _budget(wish: BudgetWish, primitives: Sequence[Primitive]) -> Budget:
-    cost = wish.cost_per_s or {item.name: cubed_propeller_speed(item) for item in primitives}
-    return Budget(name=wish.name, cost_per_s=cost, limit=wish.limit)
+def _budget(settings: BudgetSettings, primitives: Sequence[Primitive]) -> Budget:
+    cost = settings.cost_per_s or {item.name: cubed_propeller_speed(item) for item in primitives}
+    return Budget(name=settings.name, cost_per_s=cost, limit=settings.limit)
 
 
 def cubed_propeller_speed(primitive: Primitive) -> float:
@@ -190,11 +193,11 @@ def cubed_propeller_speed(primitive: Primitive) -> float:
 
 def _prior(case: Scenario, parameters: tuple[str, ...], stated: Mapping[str, float] | None) -> Array | None:
     """What is known before, per sample of the informative time; None when that is nothing."""
-    wish, model = case.design, case.vessel.model
-    means = len(model.outputs) if wish.mean_subtraction == MEAN_SUBTRACTIONS[-1] else 0
-    dimension, samples = len(parameters) + means, wish.total_s / case.vessel.sample_time_s
+    settings, model = case.design, case.vessel.model
+    means = len(model.outputs) if settings.mean_subtraction == MEAN_SUBTRACTIONS[-1] else 0
+    dimension, samples = len(parameters) + means, settings.total_s / case.vessel.sample_time_s
     prior = np.zeros((dimension, dimension))
-    if wish.prior == "parameter_std":
+    if settings.prior == "parameter_std":
         std = dict(zip(model.names, model.parameter_std.tolist(), strict=True)) if stated is None else stated
         own = [name for name in parameters if name in std]
         known = np.zeros(len(parameters))
@@ -202,8 +205,8 @@ def _prior(case: Scenario, parameters: tuple[str, ...], stated: Mapping[str, flo
         index = [parameters.index(name) for name in own]
         known[index], noise[index] = [std[name] for name in own], equation_noise(case.vessel, own)
         prior += stated_information(known, noise, dimension=dimension, samples=samples)
-    if wish.prior_data:
-        record = measured(wish.prior_data, case.vessel)
+    if settings.prior_data:
+        record = measured(settings.prior_data, case.vessel)
         batches = recorded_information(
             record,
             model,
@@ -211,6 +214,6 @@ def _prior(case: Scenario, parameters: tuple[str, ...], stated: Mapping[str, flo
             predictor="basic-wind" if all(batch.wind is not None for batch in record.batches) else "basic",
             regressors="simulated",
         )
-        matrix, rows = pooled(batches, wish.mean_subtraction)
+        matrix, rows = pooled(batches, settings.mean_subtraction)
         prior += matrix * rows * record.batches[0].sample_time_s / case.vessel.sample_time_s / samples
     return prior if prior.any() else None

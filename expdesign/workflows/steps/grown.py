@@ -24,7 +24,7 @@ def grown(
     seed: int = 0,
     progress: Progress = silent,
 ) -> Growth | None:
-    """The scored dictionary with additions as the scenario wishes; None where it wishes none.
+    """The scored dictionary with additions as the scenario sets; None without [design.grow].
 
     Args:
         case: the scenario; its key design.grow says how.
@@ -64,17 +64,17 @@ def growth_files(case: Scenario, growth: Growth | None) -> dict[str, str | bytes
 
 def growth_note(case: Scenario) -> dict[str, object]:
     """What of the table [design] the search for additions does not count, where there is any."""
-    wish = case.design
-    told = {
-        f"criterion {wish.criterion}": wish.criterion != "D",
-        f"predictor {wish.predictor}": wish.predictor != "model",
-        f"robust {wish.robust}": wish.robust != "nominal",
-        "prior": wish.prior != "none" or bool(wish.prior_data),
-        "times": bool(wish.least_s or wish.most_s or wish.required or wish.excluded),
-        "budgets": bool(wish.budgets),
-        "balance": bool(wish.balance),
+    settings = case.design
+    limits = {
+        f"criterion {settings.criterion}": settings.criterion != "D",
+        f"predictor {settings.predictor}": settings.predictor != "model",
+        f"robust {settings.robust}": settings.robust != "nominal",
+        "prior": settings.prior != "none" or bool(settings.prior_data),
+        "times": bool(settings.least_s or settings.most_s or settings.required or settings.excluded),
+        "budgets": bool(settings.budgets),
+        "balance": bool(settings.balance),
     }
-    asked = [name for name, is_asked in told.items() if is_asked]
+    asked = [name for name, is_asked in limits.items() if is_asked]
     if not asked:
         return {}
     return {
@@ -121,7 +121,7 @@ def growth_tables(growth: Growth | None) -> tuple[TextTable, ...]:
 def ready(
     case: Scenario, *, grow: bool = False, seed: int, progress: Progress = silent
 ) -> tuple[tuple[PrimitiveInformation, ...], Growth | None]:
-    """The scored dictionary, grown where that is wished."""
+    """The scored dictionary, grown if the scenario or the command says so."""
     information = scored(case, progress=within(progress, 0.0, 0.2 if grow or case.design.grow else 1.0))
     growth = grown(case, information, always=grow, seed=seed, progress=within(progress, 0.2, 1.0))
     return (information if growth is None else growth.information), growth

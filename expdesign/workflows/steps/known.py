@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from expdesign.assessment import Assessed, Wish, assess
+from expdesign.assessment import Assessed, EstimateOptions, assess
 from expdesign.durations import DurationDesign
 from expdesign.errors import Diverged, NoAnswer, NotInformative
 from expdesign.estimation.regression import in_depth
@@ -23,7 +23,7 @@ from expdesign.vessel import Vessel
 from expdesign.vessel.structures import SHOAL
 
 MATTERS = 1.05
-"""Runs without which a standard deviation would be larger by this factor are worth naming."""
+"""Runs are named for a parameter if its standard deviation without them is larger by this factor."""
 
 
 def updated(
@@ -31,14 +31,14 @@ def updated(
 ) -> tuple[Vessel, str, tuple[str, ...]]:
     """The vessel with parameters estimated from the data so far, by the method that an assessment prefers.
 
-    Parameters that these data cannot tell stay at the vessel's values, and all of them do where no estimate gives a
-    model that can simulate the data; both is told.
+    Parameters that these data cannot determine stay at the vessel's values. All of them do if no estimate gives a model
+    that can simulate the data. Notes say so.
 
     Args:
         vessel: as known before.
         record: the data, draught over depth among its inputs where the model reads depth.
         fixed: parameters that are not to be estimated.
-        prior_counts: whether the vessel's standard deviations are knowledge to be combined with the estimate.
+        prior_counts: whether to combine the estimate with the vessel's values by their standard deviations.
         progress: of the estimation.
 
     Returns:
@@ -47,7 +47,7 @@ def updated(
     held: tuple[str, ...] = ()
     while len(held) + len(fixed) < len(vessel.model.names):
         try:
-            found = assess(vessel, record, Wish(fixed=(*fixed, *held)), progress=progress)
+            found = assess(vessel, record, EstimateOptions(fixed=(*fixed, *held)), progress=progress)
         except NotInformative as error:
             more = tuple(name for name in error.parameters if name not in (*fixed, *held))
             if not more:
@@ -58,46 +58,47 @@ def updated(
             return _unchanged(vessel, str(error))
         if not found.best.stable:
             return _unchanged(vessel, next(run.problem for run in found.best.runs if run.problem))
-        told = found.best.estimate
-        ship = combined(vessel, told, prior_counts=prior_counts)
-        notes = [f"The data so far cannot tell {', '.join(held)}: kept at the values known before."] if held else []
+        ship = combined(vessel, found.best.estimate, prior_counts=prior_counts)
+        notes = (
+            [f"The data so far cannot determine {', '.join(held)}. The values known before are kept."] if held else []
+        )
         notes.append(_fit_note(found.best))
         how = ", combined with what was known before" if prior_counts else ""
         return ship, f"estimated from the data so far by {found.best.method.title}{how}", tuple(notes)
-    return _unchanged(vessel, "they tell of no parameter by itself")
+    return _unchanged(vessel, "they determine no parameter")
 
 
 def _fit_note(item: Assessed) -> str:
     rows = np.array([run.fit_percent for run in item.runs])
     fits = [(name, column[np.isfinite(column)]) for name, column in zip(item.runs[0].outputs, rows.T, strict=True)]
-    told = ", ".join(f"{name} {fit.mean():.0f} %" if len(fit) else f"{name} steady" for name, fit in fits)
-    return f"With it the simulation fits the data so far with {told}; expdesign diagnose names what a model lacks."
+    shares = ", ".join(f"{name} {fit.mean():.0f} %" if len(fit) else f"{name} steady" for name, fit in fits)
+    return f"With it the simulation fits the data so far by {shares}. expdesign diagnose finds causes of misfit."
 
 
 def _unchanged(vessel: Vessel, why: str) -> tuple[Vessel, str, tuple[str, ...]]:
     return vessel, "as known before the trial", (f"The data so far give no estimate to plan with: {why}.",)
 
 
-def combined(vessel: Vessel, told: Estimate, *, prior_counts: bool) -> Vessel:
-    """The vessel with an estimate; with its own values, weighted by their standard deviations, where these count.
+def combined(vessel: Vessel, estimate: Estimate, *, prior_counts: bool) -> Vessel:
+    """The vessel with an estimate, perhaps combined with its own values by their standard deviations.
 
     Args:
         vessel: as known before; the standard deviations of parameters that were not estimated stay.
-        told: the estimate.
-        prior_counts: whether to weight in the values known before, where a standard deviation is stated.
+        estimate: from the data.
+        prior_counts: whether to combine it with values that have a stated standard deviation.
     """
     model = vessel.model
     before = dict(zip(model.names, zip(model.parameters, model.parameter_std, strict=True), strict=True))
-    values, covariance = told.values, told.covariance
-    index = [place for place, name in enumerate(told.names) if before[name][1] > 0]
+    values, covariance = estimate.values, estimate.covariance
+    index = [place for place, name in enumerate(estimate.names) if before[name][1] > 0]
     if prior_counts and index:
-        stated = np.array([before[told.names[place]] for place in index])
+        stated = np.array([before[estimate.names[place]] for place in index])
         gain = np.linalg.solve(covariance[np.ix_(index, index)] + np.diag(stated[:, 1] ** 2), covariance[index]).T
         values = values + gain @ (stated[:, 0] - values[index])
         covariance = covariance - gain @ covariance[index]
-    std = dict(zip(told.names, np.sqrt(np.maximum(np.diag(covariance), 0.0)).tolist(), strict=True))
+    std = dict(zip(estimate.names, np.sqrt(np.maximum(np.diag(covariance), 0.0)).tolist(), strict=True))
     known = [std.get(name, own) for name, own in zip(model.names, model.parameter_std.tolist(), strict=True)]
-    assigned = model.with_parameters(dict(zip(told.names, values.tolist(), strict=True)))
+    assigned = model.with_parameters(dict(zip(estimate.names, values.tolist(), strict=True)))
     return replace(vessel, model=replace(assigned, parameter_std=np.array(known)))
 
 
@@ -119,7 +120,7 @@ def data_parts(record: Record, vessel: Vessel) -> tuple[TrialPart, ...]:
 
 
 def in_recorded_depth(vessel: Vessel) -> Vessel:
-    """The vessel in the depth that data tell, beside its inputs, where its model reads depth; others as they are."""
+    """The vessel with the recorded depth as one more input if its model reads depth; else unchanged."""
     return replace(vessel, model=in_depth(vessel.model)) if vessel.model.reads_depth else vessel
 
 
@@ -140,21 +141,21 @@ def expected_std(
     environment: Environment,
     mean_subtraction: str,
 ) -> Array:
-    """(p,) standard deviations that estimates from a trial have by theory; nan for what it does not tell."""
-    told = list(parameters)
+    """(p,) theoretical standard deviations of estimates from a trial; nan for parameters that it does not determine."""
+    determined = list(parameters)
     found: Mapping[str, float] = {}
-    while told:
+    while determined:
         try:
             covariance = expected_covariance(
-                vessel, parts, told, environment=environment, mean_subtraction=mean_subtraction
+                vessel, parts, determined, environment=environment, mean_subtraction=mean_subtraction
             )
         except NotInformative as error:
-            rest = [name for name in told if name not in error.parameters]
-            told = rest if len(rest) < len(told) else []
+            rest = [name for name in determined if name not in error.parameters]
+            determined = rest if len(rest) < len(determined) else []
             continue
         except NoAnswer:
             break
-        found = dict(zip(told, np.sqrt(np.maximum(np.diag(covariance), 0.0)).tolist(), strict=True))
+        found = dict(zip(determined, np.sqrt(np.maximum(np.diag(covariance), 0.0)).tolist(), strict=True))
         break
     return np.array([found.get(name, np.nan) for name in parameters])
 

@@ -180,24 +180,24 @@ def rest_of(state: PresentState, *, interest: Sequence[str] = ()) -> tuple[Scena
         NoAnswer: it can do none.
         InputError: it cannot do one that is required.
     """
-    first, wish = state.first, state.first.design
+    first, settings = state.first, state.first.design
     weather, _ = weather_for_rest(first.environment, state.ship.environment)
     if interest:
-        known = estimated_parameters(state.ship.model, wish.fixed_parameters)
+        known = estimated_parameters(state.ship.model, settings.fixed_parameters)
         for name in interest:
             if name not in known:
                 raise UnknownName("parameter after --interest", name, known=known)
-        wish = replace(wish, criterion="D_s", interest=tuple(dict.fromkeys(interest)))
-    kept, notes = _possible(state.ship, first.dictionary, needed={*wish.required, *wish.least_s})
+        settings = replace(settings, criterion="D_s", interest=tuple(dict.fromkeys(interest)))
+    kept, notes = _possible(state.ship, first.dictionary, needed={*settings.required, *settings.least_s})
     names = {spec.name for spec in kept}
-    if wish.least_s or wish.most_s or wish.required or wish.budgets:
+    if settings.least_s or settings.most_s or settings.required or settings.budgets:
         notes = (*notes, "Limits of the scenario's [design] on times, runs and budgets are taken to be about the rest.")
     design = replace(
-        wish,
+        settings,
         total_s=state.left_s,
-        prior_data=(*wish.prior_data, *state.data),
-        most_s={name: value for name, value in wish.most_s.items() if name in names},
-        excluded=tuple(name for name in wish.excluded if name in names),
+        prior_data=(*settings.prior_data, *state.data),
+        most_s={name: value for name, value in settings.most_s.items() if name in names},
+        excluded=tuple(name for name in settings.excluded if name in names),
     )
     case = replace(first, vessel=state.ship, dictionary=kept, design=design, start=state.pose, environment=weather)
     return case, notes

@@ -118,7 +118,7 @@ def known_of(state: PresentState, case: Scenario, design: DurationDesign, plan: 
     sailing = in_recorded_depth(ship)
     weather, words = weather_for_rest(state.first.environment, ship.environment)
 
-    def told(*parts: object) -> Array:
+    def deviations(*parts: object) -> Array:
         return expected_std(sailing, parts, names, environment=weather, mean_subtraction=subtraction)  # type: ignore[arg-type]
 
     values = {item: dict(zip(item.names, item.parameters.tolist(), strict=True)) for item in (first.model, ship.model)}
@@ -138,8 +138,8 @@ def known_of(state: PresentState, case: Scenario, design: DurationDesign, plan: 
         before=np.array([values[first.model].get(name, np.nan) for name in names]),
         now=np.array([values[ship.model][name] for name in names]),
         stated=np.array([_stated(first).get(name, 0.0) for name in names]),
-        so_far=told(*so_far),
-        after=told(*so_far, rest),
+        so_far=deviations(*so_far),
+        after=deviations(*so_far, rest),
         purchases=purchases(design, names),
     )
 

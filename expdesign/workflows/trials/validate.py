@@ -95,7 +95,7 @@ def validate_design(
     )
     forget()
     progress("done", 1.0)
-    return Outcome(files=files, summary=_summary(content), tables=(_told(content), _table(content)))
+    return Outcome(files=files, summary=_summary(content), tables=(_comparison(content), _table(content)))
 
 
 def _identity(rehearsal: Rehearsal) -> tuple[object, ...]:
@@ -138,7 +138,7 @@ def _summary(content: ValidationContent) -> dict[str, object]:
     }
 
 
-def _told(content: ValidationContent) -> TextTable:
+def _comparison(content: ValidationContent) -> TextTable:
     return TextTable(
         title="What the trials show", header=("",), rows=tuple((sentence,) for sentence in judgements(content))
     )

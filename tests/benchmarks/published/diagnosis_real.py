@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from expdesign.assessment import Wish, assess
+from expdesign.assessment import EstimateOptions, assess
 from expdesign.diagnosis import Diagnosis, diagnose
 from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.motion.simulation import simulate_from_measured
@@ -118,7 +118,7 @@ def fitted_vessel(case: Case, record: Record, *, wind: bool) -> Vessel:
     )
     ship = replace(ship, model=still, sample_time_s=PACE_S)
     return replace(
-        ship, model=assess(ship, record, Wish(methods=("ls-air" if wind else "ls",), mean="none")).best.model
+        ship, model=assess(ship, record, EstimateOptions(methods=("ls-air" if wind else "ls",), mean="none")).best.model
     )
 
 

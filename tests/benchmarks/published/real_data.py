@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 from scipy.signal import savgol_filter
 
-from expdesign.assessment import Wish, assess, sentence
+from expdesign.assessment import EstimateOptions, assess, sentence
 from expdesign.assessment.limits import AHEAD_S
 from expdesign.conventions import OUTPUTS
 from expdesign.errors import InputError, NoAnswer
@@ -118,9 +118,9 @@ def studied(case: Case, data: Path) -> Iterator[str]:
     )
     for name, horizon_s in case.methods:
         title = name if horizon_s is None else f"{name}, horizon {horizon_s:g} s"
-        wish = Wish(methods=(name,), mean=case.mean, horizon_s=horizon_s)
+        options = EstimateOptions(methods=(name,), mean=case.mean, horizon_s=horizon_s)
         try:
-            found = assess(ship, used, wish, tests=tests)
+            found = assess(ship, used, options, tests=tests)
         except NoAnswer as error:
             yield f"\n{case.folder}, {title}: no answer: {error}"
             continue
