@@ -132,6 +132,10 @@ def test_the_extended_model_keeps_the_ship_nearer_to_its_plan_and_nothing_more_i
 def test_the_report_says_where_the_trial_stands(story):
     folder, *_ = story
     page = (folder / "second/report.html").read_text(encoding="utf-8")
-    for words in ("What is known, and what the rest of the trial adds", "assumes that the ship then stops", f"<b>{MISSING}</b> (new)"):
+    for words in (
+        "What is known, and what the rest of the trial adds",
+        "assumes that the ship then stops",
+        f"<b>{MISSING}</b> (new)",
+    ):
         assert words in page
     assert "expdesign replan" in page

@@ -36,7 +36,7 @@ class Asked:
 
     Attributes:
         workflow: name in `expdesign.workflows`.
-        arguments, options: what it is called with, besides progress.
+        arguments, options: of the function, without progress.
     """
 
     workflow: str
@@ -51,7 +51,7 @@ def ask(workflow: str, *arguments: object, **options: object) -> Asked:
 
 
 def command(name: str) -> Callable[[Callable[..., Asked]], Callable[..., Asked]]:
-    """Register a function as the command `name`, with the options --quiet and --json besides its own."""
+    """Register a function as the command `name`, with its own options, --quiet and --json."""
 
     def register(asking: Callable[..., Asked]) -> Callable[..., Asked]:
         @wraps(asking)

@@ -24,7 +24,7 @@ def explain(
     ] = "",
     json: Json = False,
 ) -> None:
-    """Explain the keys of files and whatever can be chosen by name. Without a topic: list the topics.
+    """Explain the keys of files and all names that can be chosen. Without a topic: list the topics.
 
     Example: expdesign explain scenario
     """

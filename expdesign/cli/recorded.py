@@ -94,7 +94,7 @@ def diagnose(
         typer.Option(
             "--vessel",
             metavar="VESSEL.toml",
-            help="The simulation model in use; its parameter_std says how far parameters may be off.",
+            help="The simulation model in use; parameter_std is the uncertainty of its parameters.",
         ),
     ],
     scenario: Annotated[

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from expdesign.workflows import Outcome, TextTable
 
 UNITS = {"s": "s", "m": "m", "mps": "m/s", "radps": "rad/s", "rad": "rad", "deg": "°", "kn": "kn", "rps": "1/s"}
-"""Last part of a name -> unit as people write it."""
+"""Last part of a name -> printed unit."""
 LONGEST = 200
 """Characters of a value beside its name; longer ones are left to the tables."""
 
@@ -30,8 +30,8 @@ def print_summary(outcome: Outcome) -> None:
     """Key numbers as a table, then the files and the page to open."""
     console = Console(highlight=False, markup=False, soft_wrap=True)
     table = Table(show_header=False, box=None, padding=(0, 3, 0, 0))
-    told = {key: value for key, value in outcome.summary.items() if not outcome.tables or _brief(value)}
-    for row in _rows(told):
+    shown = {key: value for key, value in outcome.summary.items() if not outcome.tables or _brief(value)}
+    for row in _rows(shown):
         table.add_row(*row)
     if table.row_count:
         console.print(table)
@@ -45,7 +45,7 @@ def print_summary(outcome: Outcome) -> None:
 
 
 def _brief(value: object) -> bool:
-    """Whether a value is worth a line where tables tell the rest."""
+    """Whether a value gets a line beside tables."""
     return not isinstance(value, Mapping) and value != [] and len(_text(value)) < LONGEST
 
 

@@ -19,7 +19,7 @@ def simulate(
     ],
     until: Annotated[
         float | None,
-        typer.Option("--until", metavar="S", help="End the data after S seconds, as if the trial were broken off."),
+        typer.Option("--until", metavar="S", help="End the data after S seconds, as if the trial were aborted."),
     ] = None,
     out: OutBesidePlan = None,
     seed: Seed = 0,

@@ -1,1 +1,1 @@
-"""Estimation: parameters from measured data, with their uncertainty and what the data cannot tell."""
+"""Estimation: parameters from measured data, their uncertainty, and the parameters that data cannot determine."""

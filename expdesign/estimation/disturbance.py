@@ -26,7 +26,7 @@ def mean_current(estimate: Estimate, *, heading_std_rad: float = 0.0) -> tuple[A
         heading_std_rad: of white Gaussian heading noise, to correct for.
 
     Raises:
-        InputError: the estimate lacks what is needed.
+        InputError: the estimate has no disturbance parameters.
     """
     names = (*estimate.names, *estimate.nuisance_names)
     lacking = [name for name in (DAMPING, *COLUMNS) if name not in names]

@@ -1,4 +1,4 @@
-"""The experiment condition: whatever stands inside a modulus keeps its sign and stays clear of zero by the worst noise.
+"""The excitation condition: values inside a modulus keep their sign and exceed the worst noise.
 
 Then moduli are signs, the noise enters the equations as in a polynomial model, and zero-mean instruments remove what it
 leaves. The check goes sample by sample and says which ones break the condition.
@@ -122,7 +122,7 @@ def check_excitation(
 
 
 Modulus = tuple[Polynomial, tuple[str, ...], bool]
-"""What stands inside, the parameters concerned, and whether the wind has to be beaten."""
+"""Value inside the modulus, its parameters, and whether the margin includes the wind."""
 
 
 def _moduli(model: VesselModel, wind_measured: bool) -> list[Modulus]:

@@ -1,11 +1,11 @@
-"""What actuators deliver of their commands: dead band, dead time, first-order lag and misalignment, in this order.
+"""Actuator responses: dead band, dead time, first-order lag and misalignment, in this order.
 
-Commands are held between samples, so the lag has a closed form: `sample_map` states it once, linear in what is
-delivered and in the commands, for arrays and for symbols. `deliver` applies it to commands that are known beforehand,
-`ActuatorState` sample by sample to commands that follow the motion. Equations of motion see the mean of what is
-delivered over each integrator step. A signal with the ideal response passes through unchanged, to the last bit.
+Commands are held between samples, so the lag has a closed form: `sample_map` states it once, linear in the delivered
+value and in the commands, for arrays and for symbols. `deliver` applies it to commands that are known beforehand,
+`ActuatorState` sample by sample to commands that follow the motion. The mean delivered value over each integrator step
+acts in the equations of motion. A signal with the ideal response passes through unchanged, to the last bit.
 
-Before the first sample `standing` commands have stood for long; without them the first ones have.
+Before the first sample, the `standing` commands are held for long; the first ones by default.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from expdesign.vessel import IDEAL, Response, Vessel
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SampleMap:
-    """One signal over one sample, linear in what it starts from and in the commands that arrive.
+    """One signal over one sample, linear in its initial value and in the commands that arrive.
 
     With x the value delivered at the sample, less the misalignment, and with the command given `lateness` + 1 samples
     ago, c_early, and the one given `lateness` samples ago, c_late, both after the dead band:
@@ -51,7 +51,7 @@ class SampleMap:
 
 
 def sample_map(response: Response, *, sample_time_s: float, substeps: int = 1) -> SampleMap:
-    """How a signal with this response goes through one sample, for arrays and for symbols alike.
+    """The map of a signal with this response over one sample, for arrays and for symbols.
 
     Args:
         response: of the signal.
@@ -85,7 +85,7 @@ def _towards(value: Array, target: Array, lag_s: float, time_s: float) -> tuple[
 
 
 def past_deadband(commands: Any, deadband: float) -> Any:
-    """Commands that have an effect; zero for the others."""
+    """Commands outside the dead band; zero for the others."""
     return np.where(np.abs(commands) < deadband, 0.0, commands) if deadband > 0 else commands
 
 
@@ -97,7 +97,7 @@ def deliver(
     substeps: int = 1,
     standing: Array | None = None,
 ) -> Array:
-    """What equations of motion see: the mean over each integrator step of what is delivered.
+    """The mean delivered value over each integrator step, which acts in the equations of motion.
 
     Args:
         responses: one for each signal.
@@ -126,7 +126,7 @@ def deliver(
 def delivered_at_samples(
     responses: Sequence[Response], commands: Array, *, sample_time_s: float, standing: Array | None = None
 ) -> Array:
-    """(k + 1, m) what is delivered as each sample begins, before its command acts, and at the end of the last one."""
+    """(k + 1, m) delivered values at the start of each sample, before its command acts, and at the end."""
     first = commands[0] if standing is None else standing
     result = np.concatenate([first[None], commands])
     for column, response in enumerate(responses):
@@ -157,13 +157,13 @@ def _signals(through: SampleMap, command: Array, before: Any) -> tuple[Array, Ar
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ActuatorState:
-    """Where the actuators of n ships stand as a sample begins: `deliver` for commands that are not known beforehand.
+    """Actuators of n ships at the start of a sample: `deliver` for commands that are not known beforehand.
 
     Attributes:
-        maps: (m) how each signal goes through a sample; None where its response is ideal.
+        maps: (m) map of each signal over a sample; None where its response is ideal.
         substeps: integrator steps per sample.
-        values: (m, n) what is delivered, less the misalignment.
-        past: for each signal (lateness + 1, n) commands past the dead band that have not come through, oldest first.
+        values: (m, n) delivered values, less the misalignment.
+        past: for each signal (lateness + 1, n) commands outside the dead band that do not act yet, oldest first.
     """
 
     maps: tuple[SampleMap | None, ...]
@@ -175,7 +175,7 @@ class ActuatorState:
     def standing(
         cls, responses: Sequence[Response], commands: Array, *, sample_time_s: float, substeps: int
     ) -> ActuatorState:
-        """After commands (m, n) that have stood for long."""
+        """After commands (m, n) held for long."""
         maps = tuple(
             None if response == IDEAL else sample_map(response, sample_time_s=sample_time_s, substeps=substeps)
             for response in responses
@@ -210,7 +210,7 @@ class ActuatorState:
         return ActuatorState(maps=self.maps, substeps=self.substeps, values=values, past=tuple(pasts))
 
     def _driving(self, row: int, command: Array) -> Array:
-        """(3, n) what a signal starts from, and the commands that act early and late in the sample."""
+        """(3, n) initial value of a signal, and the commands that act early and late in the sample."""
         on_their_way = np.concatenate([self.past[row], _effective(self.maps[row], command)[None]])
         return np.concatenate([self.values[row][None], on_their_way[:2]])
 

@@ -1,4 +1,4 @@
-"""Many simulated trials at once, with everything that disturbs a real one: for Monte Carlo studies.
+"""Many simulated trials at once, with current, wind and sensor noise: for Monte Carlo studies.
 
 Every run has its own current and wind, varying around a mean of its own in the n-frame, its own sensor noise, and
 commands and parameters of its own where given. Arrays are (samples, runs, ...). Noise is drawn a stretch of samples at
@@ -40,8 +40,7 @@ class Ensemble:
         sample_time_s: time between samples [s].
         input_names: actuator signals.
         inputs: (k, n, m) commands; n is 1 when all runs share them.
-        pose, velocity: (k, n, 3) what happened: n-frame pose, b-frame velocity over ground. Runs whose speeds leave
-            what numbers can hold end in nan.
+        pose, velocity: (k, n, 3) true n-frame pose and b-frame velocity over ground. Runs that diverge end in nan.
         measured_pose, measured_velocity: (k, n, 3) with sensor noise.
         measured_wind: (k, n, 2) relative wind (u_q, v_q) with sensor noise.
     """
@@ -65,7 +64,7 @@ class Ensemble:
         return int(self.velocity.shape[1])
 
     def batch(self, run: int) -> Batch:
-        """What was measured in one run."""
+        """Measurements of one run."""
         return Batch(
             name=f"run {run}",
             sample_time_s=self.sample_time_s,
@@ -99,7 +98,7 @@ def simulate_ensemble(
         inputs: (k, runs, m) commands in the model's order, or (k, m) for all runs alike.
         runs: number of runs.
         environment: forecast; every run draws its own means around it and its own variation.
-        rng: all chance.
+        rng: source of all random numbers.
         pose, velocity: start, (3,) or (runs, 3).
         parameters: (runs, p) in the model's own form, or None for the model's.
         standing: (m,) commands that stood before the first sample; None for those of the first sample.
@@ -148,7 +147,7 @@ def _sailed(
     marching: Callable[[Array, Array], Iterator[Array]],
     draw: Callable[[Array], Iterator[tuple[slice, Array]]],
 ) -> tuple[Array, Array]:
-    """States (k, 6, n) at the samples and what the sensors measure of them (k, 8, n).
+    """States (k, 6, n) at the samples and their measurements (k, 8, n).
 
     Sensors without delay measure each stretch as it is simulated, delayed ones after the last sample.
     """

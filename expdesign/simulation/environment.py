@@ -1,4 +1,4 @@
-"""Current and wind as a trial meets them: drawn around the forecast, steady or varying from sample to sample."""
+"""Current and wind of a trial: drawn around the forecast, steady or varying from sample to sample."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class WeatherSeries:
 
 
 def draw_environment(forecast: Environment, rng: np.random.Generator) -> Environment:
-    """One trial's mean current and wind, drawn around the forecast; they vary as it says."""
+    """One trial's mean current and wind, drawn around the forecast; with its variation."""
     return Environment(
         current_to=forecast.current_to + forecast.current_std_mps * rng.standard_normal(2),
         wind_to=forecast.wind_to + forecast.wind_std_mps * rng.standard_normal(2),
@@ -51,7 +51,7 @@ def draw_environment(forecast: Environment, rng: np.random.Generator) -> Environ
 def draw_weather(
     environment: Environment, samples: int, *, sample_time_s: float, rng: np.random.Generator
 ) -> WeatherSeries:
-    """What happens sample by sample around an environment's means."""
+    """Current and wind at every sample around an environment's means."""
     current, wind = (
         mean + vary(variation, rng.standard_normal((samples, 2)), sample_time_s=sample_time_s)
         for mean, variation in (

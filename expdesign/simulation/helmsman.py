@@ -24,7 +24,7 @@ from expdesign.vessel import SCALAR, Vessel
 
 Trial = tuple[Commands, Trajectory]
 LONGEST = 300.0
-"""Ship lengths at approach speed after which a trial that has not come to its end is given up."""
+"""Ship lengths at approach speed after which an unfinished trial ends."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,7 +14,7 @@ from expdesign.values import Array
 from expdesign.vessel import NUMPY, Mounting, Sensors, Vessel, column_name
 
 ROWS = ("north", "east", "heading", "u", "v", "r", "wind_u", "wind_v")
-"""What is measured, in order; a vane's noise on speed and angle takes the places of wind_u and wind_v."""
+"""Measured channels, in order; a vane's noise on speed and angle takes the places of wind_u and wind_v."""
 OWNERS = {"position": (0, 1), "heading": (2,), "velocity": (3, 4), "yaw_rate": (5,), "wind": (6, 7)}
 """Sensor -> its rows."""
 

@@ -18,7 +18,7 @@ from expdesign.vessel import Vessel
 
 SIDES = {"starboard": 1, "port": -1}
 MANY = 10_000
-"""Orders of a zig-zag that goes on until its time is up."""
+"""Orders of a zig-zag that is limited by its time alone."""
 
 
 AT_SERVICE_SPEED = Conduct()
@@ -72,7 +72,7 @@ def zigzag(
 
     Raises:
         InputError: helm, speed or side that the vessel cannot do.
-        NoAnswer: the heading does not come round.
+        NoAnswer: the heading does not reach the required change.
     """
     approach, sign, angle = _steered(vessel, helm_rad, side, conduct)
     if not heading_rad > 0 or executes < 2:

@@ -29,13 +29,13 @@ KINDS: dict[str, tuple[str, ...]] = {
     "force": ("tau_x", "tau_y", "tau_psi"),
     "depth": ("h",),
 }
-"""Kind of actuator -> stems of its signals; all but `force` carry the actuator's number, e.g. n2, a2, rudder1.
+"""Kind of actuator -> stems of its signals; all but `force` end in the actuator's number, e.g. n2, a2, rudder1.
 
 `depth` stands in no vessel file: it is how recorded depth reaches the terms that read it, beside the recorded inputs.
 """
 
 UNITS = {"n": "rps", "a": "rad", "rudder": "rad"}
-"""Signal stem -> unit in column names; generalised forces carry none."""
+"""Signal stem -> unit in column names; generalised forces have none."""
 
 QUANTITIES = {
     "n": ("speed", "_rps", "_rps2"),
@@ -109,7 +109,7 @@ class Response:
 
 
 IDEAL = Response()
-"""The command is delivered at once and as it is."""
+"""The command is delivered unchanged and at once."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -54,7 +54,7 @@ class Environment:
         wind_to: (2,) mean wind, velocity to north/east [m/s].
         wind_std_mps: standard deviation with which the trial's mean of each component is known [m/s].
         current_variation, wind_variation: what happens around the trial's mean from sample to sample.
-        sea_state: WMO code 0 (calm) to 9 (phenomenal) of table 3700, or None when not given; it is told beside the
+        sea_state: WMO code 0 (calm) to 9 (phenomenal) of table 3700, or None when not given; it is stated beside the
             limits on trials and moves no ship here.
     """
 

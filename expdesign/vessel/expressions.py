@@ -33,7 +33,7 @@ SCALAR = Operators(abs, math.sin, math.cos)
 FUNCTIONS = ("abs", "sin", "cos")
 
 DEEPEST = 50
-"""Operations inside one another; a term of a ship model has a handful."""
+"""Nested operations; a term of a ship model has a handful."""
 
 Signals = Mapping[str, Any]
 Evaluate = Callable[[Signals, Operators], Any]

@@ -185,7 +185,7 @@ def _desired_commands(actuators: tuple[Actuator, ...], row: Array, last: Array |
 
 
 WAYS_ROUND = np.array([(half, turns) for half in (0.0, math.pi) for turns in (-1.0, 0.0, 1.0)]).T
-"""Thrust ahead or reversed, and whole turns from the nearest: (2, 6)."""
+"""Thrust ahead or reversed, and whole turns around the nearest angle: (2, 6)."""
 HALVES = np.array([(half, 0.0) for half in (0.0, math.pi)]).T
 """The same where no limit keeps an angle from the nearest turn: (2, 2)."""
 

@@ -4,8 +4,8 @@
     dv/dt = Y(u, v, r, ...) + Y_phi phi                a_y = Y(u, v, r, ...) + u r
     dr/dt = N(u, v, r, ...) + N_phi phi
 
-Y and N are the model's terms. Roll is counted in the side acceleration a_y [m/s^2] that would hold it for long, as
-data without roll cannot tell its angle; with the angle phi_0 that 1 m/s^2 holds, Y_phi / phi_0 is per radian. At rest
+Y and N are the model's terms. Roll is counted in the side acceleration a_y [m/s^2] that would hold it for long, as data
+without roll do not determine its angle; with the angle phi_0 that 1 m/s^2 holds, Y_phi / phi_0 is per radian. At rest
 and on a straight course roll is zero.
 
 Source: K. Son and K. Nomoto, Journal of the Society of Naval Architects of Japan 150 (1981), 232-244; T. Perez and
@@ -49,7 +49,7 @@ class Roll:
         Args:
             plain: d/dt of (u, v, r) by the model's terms.
             turning: u r [m/s2], of the motion over ground.
-            roll: roll and its rate; neither for a calculation that does not carry them.
+            roll: roll and its rate; neither for a calculation without roll.
 
         Raises:
             InputError: there are none.

@@ -9,16 +9,16 @@ from expdesign.errors import InputError, UnknownName
 
 WIND_SENSORS = ("cartesian", "vane")
 SENSORS = ("position", "heading", "velocity", "yaw_rate", "wind")
-"""What is measured; each has a `Mounting`."""
+"""Measured quantities; each has a `Mounting`."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Mounting:
-    """Where a sensor sits, how late it tells, and how often it reads anew.
+    """Place, delay and sampling interval of a sensor.
 
     Attributes:
         forward_m, starboard_m: place in the b-frame [m]; means something to position, velocity and wind.
-        delay_s: what is told at a time is what was so this long before [s].
+        delay_s: age of its readings [s].
         interval_s: time between new readings [s]; in between the last one is repeated, noise and all. Not above the
             sample time, every sample is new.
     """
@@ -84,4 +84,4 @@ class Sensors:
 
 
 EXACT = Sensors()
-"""They tell the truth."""
+"""Sensors without error."""

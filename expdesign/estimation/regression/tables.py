@@ -46,19 +46,19 @@ def model_for(model: VesselModel, record: Record) -> VesselModel:
 
 
 def with_depth(record: Record, draught_m: float) -> Record:
-    """The record with draught over depth as one more input, 0 where a batch has no depth, which is told."""
+    """The record with draught over depth as one more input, 0 where a batch has no depth, with a note."""
     batches = []
     for batch in record.batches:
         shoal = np.zeros(len(batch)) if batch.depth_m is None else draught_m / batch.depth_m
         inputs = np.column_stack([batch.inputs, shoal])
         batches.append(replace(batch, inputs=inputs, input_names=(*batch.input_names, SHOAL)))
     missing = [batch.name for batch in record.batches if batch.depth_m is None]
-    told = [f"{', '.join(missing)}: depth_m is not measured, deep water is assumed."]
-    return replace(record, batches=tuple(batches), notes=(*record.notes, *(told if missing else [])))
+    notes = [f"{', '.join(missing)}: depth_m is not measured, deep water is assumed."]
+    return replace(record, batches=tuple(batches), notes=(*record.notes, *(notes if missing else [])))
 
 
 def in_depth(model: VesselModel) -> VesselModel:
-    """The model with draught over depth as one more input, as records and commands have it that tell the depth."""
+    """The model with draught over depth as one more input, as in records and commands with depth."""
     if SHOAL in model.inputs:
         return model
     return replace(model, actuators=(*model.actuators, Actuator(kind="depth", number=1, limits=(Limit(),))))

@@ -46,7 +46,7 @@ class Compiled:
     """Stretches made ready to be simulated with any values.
 
     Attributes:
-        stretches: what is simulated.
+        stretches: the simulated stretches.
         run: (starts, drives, values) -> states after each sample.
         slopes: (states, drives, values) -> derivatives of the next state by state and by values.
     """
@@ -58,7 +58,7 @@ class Compiled:
     def states(self, values: Array, start: Array) -> Array:
         """(L, W, n) velocities from start velocities (W, n) and values (W, p + n): parameters, then accelerations.
 
-        A constant acceleration [unit of the output per second] stands for whatever steady force acts beside the model.
+        A constant acceleration [unit of the output per second] stands for steady forces outside the model.
         """
         (length, count, m), n = self.stretches.drive.shape, start.shape[1]
         if length == 1:

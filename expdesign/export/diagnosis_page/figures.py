@@ -1,4 +1,4 @@
-"""Measured against simulated before and after, growth of the error, and errors against what is suspected."""
+"""Figures of a diagnosis: measured and simulated velocities, error growth, and errors against variables."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from expdesign.vessel import column_name
 BINS, FEWEST = 16, 15
 """Groups of samples, at most, and samples of each, at least."""
 MOST_SPREADS = 3.0
-"""Errors beyond so many standard deviations of what is measured are not drawn: the simulation is lost."""
+"""Errors beyond so many standard deviations of the measurements are not drawn: the simulation has diverged."""
 VISIBLE = 0.01
-"""Chance of colouring any panel where nothing depends on anything."""
+"""Probability that any panel is coloured if nothing depends on anything."""
 ACCELERATION_AXES = {
     "u": ("u [mm/s\N{SUPERSCRIPT TWO}]", 1000.0),
     "v": ("v [mm/s\N{SUPERSCRIPT TWO}]", 1000.0),
@@ -87,11 +87,11 @@ def growth_figure(found: Diagnosis) -> str:
 
 
 def suspect_figure(found: Diagnosis, index: int, key: str) -> str:
-    """The error without a finding, or what the model then lacks, against the variable that it should depend on."""
+    """The error without a finding, or the missing acceleration, against the variable that it should depend on."""
     outputs, item = found.before.outputs, found.findings[index]
     if is_force(found, item):
         values, label = suspected_force(found, item, found.step_residuals[index].variables)
-        what, axis, rows = "lacking", ACCELERATION_AXES, np.moveaxis(found.step_residuals[index].acceleration, 1, 0)
+        what, axis, rows = "missing", ACCELERATION_AXES, np.moveaxis(found.step_residuals[index].acceleration, 1, 0)
     else:
         values, label = suspected(found, item)
         what, axis = "error of", AXES
@@ -127,7 +127,7 @@ def _scatter(axes: Axes, x: Array, y: Array, *, signed: bool) -> None:
 
 
 def residual_figures(found: Diagnosis) -> list[tuple[bool, str]]:
-    """Pictures of what the model lacks against every variable, clearest first, and whether it surely depends on it."""
+    """Figures of the missing acceleration against every variable, clearest first, and its significance."""
     residuals = found.residuals
     if not residuals.sufficient:
         return []

@@ -1,4 +1,4 @@
-"""The variable that the error of a simulation should depend on if a cause acts: what its picture is drawn against."""
+"""The variable that the simulation error depends on if a cause acts, for its figure."""
 
 from __future__ import annotations
 
@@ -28,22 +28,22 @@ RATES = {
 FORCES = ("term", "theta", "gain", "asymmetry", "deadband", "offset", "shallow")
 """Kinds of effects that are forces."""
 SHOWN_BY = {"late:psi": "r", "late:position": "u", "heading_bias": "u", "gyro": "r", "lever": "r"}
-"""Effect, or kind of effect, of a sensor -> the velocity by which it shows."""
+"""Effect, or kind of effect, of a sensor -> the velocity that it depends on."""
 
 
 def is_force(found: Diagnosis, item: Finding) -> bool:
-    """It accelerates the ship by what acts at the moment, so that it shows in what the model lacks within seconds."""
+    """Whether the cause is a force without delay, which is visible in the missing acceleration."""
     kind = item.keys[0].partition(":")[0]
     return kind in FORCES and (item.cause != "wind" or found.windows.has_wind)
 
 
 def has_sign(item: Finding) -> bool:
-    """The error is of one sign where the variable is; otherwise it grows there one way or the other."""
+    """Whether the error changes its sign with the variable; otherwise only its size grows."""
     return not item.keys[0].startswith(("lag:", "delay:", "roll:", "change:"))
 
 
 def suspected_force(found: Diagnosis, item: Finding, at: Mapping[str, Array]) -> tuple[Array, str]:
-    """What a force should depend on, and its label.
+    """The variable that a force depends on, and its label.
 
     Args:
         found: the diagnosis.
@@ -51,7 +51,7 @@ def suspected_force(found: Diagnosis, item: Finding, at: Mapping[str, Array]) ->
         at: (k,) variables of `Residuals` by name.
     """
     ship = extended_model(found.vessel, found.record)
-    kind, _, rest = _telling(found, item).partition(":")
+    kind, _, rest = _most_significant(found, item).partition(":")
     if item.cause == "wind":
         return np.hypot(at["u_q"], at["v_q"]), "wind over deck [m/s]"
     if kind == "shallow":
@@ -69,7 +69,7 @@ def suspected_force(found: Diagnosis, item: Finding, at: Mapping[str, Array]) ->
 
 
 def signals(ship: ExtendedModel, at: Mapping[str, Array]) -> dict[str, Array]:
-    """(k,) signals that terms read; of what is not measured nothing is known."""
+    """(k,) signals that terms read; nan where not measured."""
     nothing = np.full(at["time"].shape, np.nan)
     forces = generalised_force(ship.model.actuators, at, NUMPY)
     shoal = ship.draught_m / at["depth"] if "depth" in at else np.zeros_like(nothing)
@@ -79,7 +79,7 @@ def signals(ship: ExtendedModel, at: Mapping[str, Array]) -> dict[str, Array]:
 
 
 def suspected(found: Diagnosis, item: Finding) -> tuple[Array, str]:
-    """(w, s) values at the compared samples of what an error should depend on, and their label."""
+    """(w, s) values of the variable that an error depends on, at the compared samples, and their label."""
     key = item.keys[0]
     kind, _, rest = key.partition(":")
     if kind in ("lag", "delay"):
@@ -92,8 +92,8 @@ def suspected(found: Diagnosis, item: Finding) -> tuple[Array, str]:
     return _heading(found) if kind == "current" or item.cause == "wind" else _time(found)
 
 
-def _telling(found: Diagnosis, item: Finding) -> str:
-    """Of several numbers of a finding the one that stands out most from its standard error, if they are parameters."""
+def _most_significant(found: Diagnosis, item: Finding) -> str:
+    """The estimate with the largest change in standard errors, among parameters; else the first."""
     model = found.vessel.model
     known = dict(zip(model.names, model.parameters.tolist(), strict=True))
     sizes = [abs(one.value - known.get(one.name, 0.0)) / one.std if one.std > 0 else 0.0 for one in item.estimates]

@@ -1,6 +1,6 @@
 """Mission file of ArduPilot's ground stations, `QGC WPL 110`: twelve fields with tabs between them, item 0 is home.
 
-It carries neither names nor a fence; for the fence take the QGroundControl plan.
+It has neither names nor a fence; for the fence take the QGroundControl plan.
 
 Source: MAVLink developer guide, file formats, plain-text missions.
 """

@@ -36,7 +36,7 @@ def degrees(angle_deg: float) -> str:
 
 
 def xml_text(text: str) -> str:
-    """Text without the characters that XML 1.0 cannot carry; each becomes a replacement sign."""
+    """Text without the characters that XML 1.0 does not allow; each becomes a replacement sign."""
     return "".join(sign if _in_xml(ord(sign)) else "\N{REPLACEMENT CHARACTER}" for sign in text)
 
 

@@ -1,6 +1,6 @@
 """GPX 1.1 route with the extensions that OpenCPN reads: planned speeds in knots, arrival radius in nautical miles.
 
-Source: GPX 1.1 schema (Topografix 2004); OpenCPN's extensions as its route files carry them. A planned speed belongs
+Source: GPX 1.1 schema (Topografix 2004); OpenCPN's extensions as in its route files. A planned speed belongs
 to the chord that ends at its point.
 """
 

@@ -32,7 +32,7 @@ SUBTRACTION = {
 
 
 MORE_THAN_OPTIMAL = (
-    " (more than 100 % because the legs between the runs add time, and motions that no manoeuvre of the dictionary has)"
+    " (more than 100 % because the legs between the runs add time and motions that no manoeuvre of the dictionary has)"
 )
 UNKNOWN_DEPTH = "No depths were checked: the chart shows only land. Check the whole track against the official chart."
 
@@ -82,7 +82,7 @@ def report_html(content: ReportContent) -> str:
         percent=words.percent,
         equation=equation_sentence(content),
         less=any(row.less for row in rows),
-        told=tables.excitation_sentence(content),
+        excitation=tables.excitation_sentence(content),
     )
 
 

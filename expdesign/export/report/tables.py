@@ -146,7 +146,7 @@ def excitation_sentence(content: ReportContent) -> str:
         )
     where = f"only in {words.counted(len(held), 'manoeuvre')}" if held else "in no manoeuvre"
     return (
-        f"The excitation condition holds {where}. In the others noisy velocities bias the terms with an absolute "
+        f"The excitation condition holds {where}. Elsewhere noisy velocities bias the terms with an absolute "
         "value, also with instrumental variables. Output error avoids this bias if sensor noise is the only "
         "disturbance."
     )

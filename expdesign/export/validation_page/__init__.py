@@ -1,4 +1,4 @@
-"""What designs were worth in simulated trials: JSON and a page."""
+"""Results of the validation of designs in simulated trials: JSON and a page."""
 
 from expdesign.export.validation_page.content import ValidationContent, judgements, validation_json
 from expdesign.export.validation_page.page import validation_html

@@ -40,7 +40,7 @@ class Mistake:
     """A possible mistake in the file.
 
     Attributes:
-        text: what is wrong, for the message.
+        text: the mistake, for the message.
         moved: (n, d) change of pose over the windows, with the mistake corrected.
         expected: (n, d) integral of the measured velocity, with the mistake corrected.
     """
@@ -121,10 +121,10 @@ def _heading_offset(as_is: Mistake) -> str:
     moved, expected = (pairs[:, 0] + 1j * pairs[:, 1] for pairs in (as_is.moved, as_is.expected))
     offset = float(np.angle(np.vdot(expected, moved)))
     turned = expected * np.exp(1j * offset)
-    mended = Mistake(text="", moved=as_is.moved, expected=np.stack([turned.real, turned.imag], axis=-1))
-    if mended.difference > TUNING.pose_explained * as_is.difference:
+    corrected = Mistake(text="", moved=as_is.moved, expected=np.stack([turned.real, turned.imag], axis=-1))
+    if corrected.difference > TUNING.pose_explained * as_is.difference:
         return ""
-    return f", only by {mended.difference:.0%} with {offset / DEGREE:+.0f} degrees added to the heading"
+    return f", only by {corrected.difference:.0%} with {offset / DEGREE:+.0f} degrees added to the heading"
 
 
 def _raise_explained(table: Table, name: str, problem: str, as_is: Mistake, mistakes: list[Mistake]) -> None:

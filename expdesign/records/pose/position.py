@@ -79,7 +79,7 @@ def with_continuous_heading(table: Table) -> Table:
 
 
 def check_jumps(table: Table, batches: tuple[slice, ...], sample_time_s: float, *, needed: set[str]) -> Table:
-    """Raise where what is needed jumps as no ship can; note other steps of the pose that are out of the ordinary.
+    """Raise where a column that is used jumps as no ship can; note other unusual steps of the pose.
 
     Args:
         table: a file in metres and radians.

@@ -2,7 +2,7 @@
 
 Each signal is an integrated random walk observed in white noise: x' = w, w' = white noise of intensity q. With a flat
 prior, the smoothed states are the minimum of a quadratic form whose matrix is block tridiagonal, so one banded Cholesky
-factorisation gives what the forward and backward recursions give, and the likelihood besides. The ratio of q to the
+factorisation gives the result of the forward and backward recursions, and the likelihood. The ratio of q to the
 measurement variance is the one that makes the data most likely.
 
 Sources: H. E. Rauch, F. Tung, C. T. Striebel, AIAA Journal 3 (1965) 1445-1450; B. M. Bell, SIAM Journal on

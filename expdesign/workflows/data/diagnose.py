@@ -37,7 +37,7 @@ def diagnose(
     seed: int = 0,
     progress: Progress = silent,
 ) -> Outcome:
-    """What the simulation gets wrong, why, and what mending gains, into `out` or runs/<first data file>.
+    """Causes of the simulation error, why, and what mending gains, into `out` or runs/<first data file>.
 
     Args:
         data: CSV files.
@@ -117,4 +117,4 @@ def _tables(found: Diagnosis) -> tuple[TextTable, ...]:
     if not found.findings:
         return ()
     header, rows = diagnosis_tables(found)
-    return (TextTable(title="What the simulation gets wrong", header=header, rows=tuple(rows)),)
+    return (TextTable(title="Causes of the simulation error", header=header, rows=tuple(rows)),)

@@ -49,7 +49,7 @@ def estimate(
         raise InputError("no data files are given, expected one or more CSV files")
     for path in tests:
         if path in data:
-            raise InputError(f"{path} is given for estimation and for testing, expected one of the two")
+            raise InputError(f"{path} is given for estimation and for testing, expected only one of them")
     progress("reading the data", 0.02)
     ship = load_vessel(vessel)
     options = EstimateOptions(
@@ -117,6 +117,6 @@ def _estimate_tables(found: Assessment) -> tuple[TextTable, ...]:
     tables = (
         ("Estimates, with standard deviations", parameter_table(found)),
         ("Fit of the simulated output to the measured one, in per cent", fit_table(found)),
-        (f"What limits the fit of {found.best.method.name}", limit_table(found)),
+        (f"Causes of misfit of {found.best.method.name}", limit_table(found)),
     )
     return tuple(TextTable(title=title, header=header, rows=tuple(rows)) for title, (header, rows) in tables)

@@ -45,7 +45,7 @@ def indices(
     progress("reading the vessel", 0.0)
     ship = load_vessel(vessel)
     seen, notes = _measured(data, ship, antenna_forward_m, progress)
-    progress("sailing the model's standard trials", 0.6)
+    progress("simulating the model's standard trials", 0.6)
     found, why_not = _simulated(ship, speed_mps, needed=not data)
     content = IndicesContent(
         vessel=ship,

@@ -1,4 +1,4 @@
-"""`expdesign mine`: the recorded batches that are worth estimating from."""
+"""`expdesign mine`: the most informative recorded batches."""
 
 from __future__ import annotations
 

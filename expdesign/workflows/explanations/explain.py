@@ -19,12 +19,12 @@ TOPICS: dict[str, tuple[str, Callable[[], Topic]]] = {
     "data": ("columns of measured data", plug_ins.data_topic),
     "structures": ("built-in model structures and their parameters", plug_ins.structures_topic),
     "criteria": ("design criteria", plug_ins.criteria_topic),
-    "outcomes": ("results of standard trials that a design can be made best for", plug_ins.outcomes_topic),
+    "outcomes": ("results of standard trials that a design can be optimised for", plug_ins.outcomes_topic),
     "methods": ("estimators", plug_ins.methods_topic),
-    "causes": ("causes that a diagnosis looks for", plug_ins.causes_topic),
+    "causes": ("causes that a diagnosis tests", plug_ins.causes_topic),
     "formats": ("route formats", plug_ins.formats_topic),
 }
-"""Topic -> one line about it, and what gives it."""
+"""Topic -> its summary and the function that explains it."""
 
 
 def explain(subject: str = "") -> Topic:

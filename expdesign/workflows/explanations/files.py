@@ -15,7 +15,7 @@ from expdesign.scenario.vessels.vessel_tables import ACTUATOR_TABLES, ActuatorTa
 from expdesign.workflows.explanations.values import Explained, Section, Topic
 
 VARIANTS = (
-    "Paths are relative to the file they stand in. A variant for expdesign whatif is a file with only the keys that "
+    "Paths are relative to their file. A variant for expdesign whatif is a file with only the keys that "
     "differ. Positions are given by lat_deg and lon_deg, or by north_m and east_m."
 )
 VESSELS = (
@@ -54,7 +54,7 @@ def dictionary_topic() -> Topic:
 
 def area_topic() -> Topic:
     """Keys of an area file."""
-    text = "Allowed water lies inside the bounds, is deep enough, and is neither land, danger nor a no-go zone."
+    text = "Allowed water is inside the bounds and deep enough, and is neither land, danger nor a no-go zone."
     return Topic(name="area", title="Area files", text=text, sections=_by_table(AreaTable))
 
 

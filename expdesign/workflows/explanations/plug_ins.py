@@ -61,7 +61,7 @@ def criteria_topic() -> Topic:
     """Design criteria."""
     from expdesign.durations import CRITERIA
 
-    entries = tuple(Explained(name=item.name, meaning=f"makes least the {item.title}") for item in CRITERIA)
+    entries = tuple(Explained(name=item.name, meaning=f"minimises the {item.title}") for item in CRITERIA)
     text = (
         "D_s, A and E are about the parameters in design.interest; V is about design.outcomes. A, E and V weigh "
         "equations against each other and need the sensors' noise in the vessel file."
@@ -122,7 +122,7 @@ def data_topic() -> Topic:
     text = (
         "A CSV file with one header row; the unit is the end of a column's name. Needed are time, the inputs of the "
         "vessel's model, and velocities or a pose to derive them from (--velocity). A gap of more than 1.5 sample "
-        "times starts a new batch. Remarkable data are reported; wrong data are refused with their rows."
+        "times starts a new batch. Unusual data are reported; wrong data are refused with their rows."
     )
     return _list("data", "Columns of measured data", entries, text)
 

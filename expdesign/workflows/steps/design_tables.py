@@ -41,7 +41,7 @@ def _shares_table(design: DurationDesign) -> TextTable:
     net = design.sensitivities - proof.prices
     columns = zip(design.problem.names, design.fractions, design.durations_s, design.repeats, net, strict=True)
     return TextTable(
-        title=f"How long to run each primitive; what is used has the sensitivity {proof.level:.6g}, no other more",
+        title=f"How long to run each primitive; at the optimum those used have sensitivity {proof.level:.6g}",
         header=("primitive", "share", "seconds", "whole runs", "sensitivity"),
         rows=tuple(
             (name, f"{share:.4f}", f"{seconds:.1f}", str(runs), f"{sensitivity:.4f}")
@@ -72,4 +72,4 @@ def _limits_tables(design: DurationDesign) -> tuple[TextTable, ...]:
         for item in limits_kept(design)
     )
     header = ("limit", "asked", "optimal shares", "whole runs", "price")
-    return (TextTable(title="Limits on the sharing", header=header, rows=rows),) if rows else ()
+    return (TextTable(title="Limits on the durations", header=header, rows=rows),) if rows else ()

@@ -78,7 +78,7 @@ def growth_note(case: Scenario) -> dict[str, object]:
     if not asked:
         return {}
     return {
-        "note_on_additions": "searched for criterion D of the nominal model alone; only the sharing of time counts "
+        "note_on_additions": "optimal for criterion D of the nominal model alone; only the durations account for "
         f"{', '.join(asked)} of [design]"
     }
 
@@ -114,7 +114,7 @@ def growth_tables(growth: Growth | None) -> tuple[TextTable, ...]:
         for number, row in enumerate(growth.rounds, start=1)
     )
     header = ("round", "added", "d before", "log det", "D-efficiency", "excites", "settings")
-    title = f"Manoeuvres added; one helps where d is above {growth.dimension}"
+    title = f"Manoeuvres added; one improves the design if its d is above {growth.dimension}"
     return (TextTable(title=title, header=header, rows=rows),) if rows else ()
 
 

@@ -191,7 +191,7 @@ def rest_of(state: PresentState, *, interest: Sequence[str] = ()) -> tuple[Scena
     kept, notes = _possible(state.ship, first.dictionary, needed={*settings.required, *settings.least_s})
     names = {spec.name for spec in kept}
     if settings.least_s or settings.most_s or settings.required or settings.budgets:
-        notes = (*notes, "Limits of the scenario's [design] on times, runs and budgets are taken to be about the rest.")
+        notes = (*notes, "Limits of the scenario's [design] on times, runs and budgets apply to the rest of the trial.")
     design = replace(
         settings,
         total_s=state.left_s,
@@ -215,7 +215,9 @@ def _possible(
             if spec.name in needed:
                 raise
             why = str(error)
-            notes.append(f"Left out of the dictionary, as the ship is known now: {why}.")
+            notes.append(f"Left out of the dictionary with the model as known now: {why}.")
     if not kept:
-        raise NoAnswer(f"the ship as known now can do none of the dictionary's manoeuvres; the last: {why}")
+        raise NoAnswer(
+            f"the ship cannot do any manoeuvre of the dictionary with the model as known now; the last: {why}"
+        )
     return tuple(kept), tuple(notes)

@@ -1,6 +1,6 @@
 """`expdesign replan`: the rest of a trial, from the present position and with what the data so far show.
 
-The ship is taken to be stopped through the water at its present place before the rest begins.
+The ship is assumed to be stopped through the water at its present place before the rest begins.
 """
 
 from __future__ import annotations
@@ -157,7 +157,7 @@ def _summary(known: Known) -> dict[str, object]:
         "weather": known.weather,
         "current_to_north_mps": float(known.environment.current_to[0]),
         "current_to_east_mps": float(known.environment.current_to[1]),
-        "start": f"{known.pose[0]:.1f} m north, {known.pose[1]:.1f} m east, taken to be stopped",
+        "start": f"{known.pose[0]:.1f} m north, {known.pose[1]:.1f} m east, assumed to be stopped",
         "new_parameters": list(known.new),
         "notes": list(known.notes),
     }
@@ -167,7 +167,7 @@ def _table(known: Known) -> TextTable:
     columns = zip(known.parameters, known.now, known.stated, known.so_far, known.after, known.purchases, strict=True)
     return TextTable(
         title="Parameters, and their standard deviations",
-        header=("parameter", "value now", "std before", "by the data so far", "after the rest", "bought by"),
+        header=("parameter", "value now", "std before", "from the data so far", "after the rest", "bought by"),
         rows=tuple(
             (name, f"{now:.4g}", _shown(stated or np.nan), _shown(so_far), _shown(after), item.primitive or "-")
             for name, now, stated, so_far, after, item in columns

@@ -140,7 +140,9 @@ def _summary(content: ValidationContent) -> dict[str, object]:
 
 def _comparison(content: ValidationContent) -> TextTable:
     return TextTable(
-        title="What the trials show", header=("",), rows=tuple((sentence,) for sentence in judgements(content))
+        title="Predicted and simulated accuracy",
+        header=("",),
+        rows=tuple((sentence,) for sentence in judgements(content)),
     )
 
 
