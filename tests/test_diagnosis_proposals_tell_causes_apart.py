@@ -65,7 +65,7 @@ def test_commands_become_the_inputs_that_the_data_have():
     np.testing.assert_allclose(as_inputs(commands, tug, barge.model), [[8.0, 6.0, -54.0]], atol=1e-12)
     np.testing.assert_array_equal(as_inputs(commands, tug, tug.model), values)
     orders = Commands(sample_time_s=1.0, names=("n1", "rudder1"), values=np.ones((1, 2)))
-    with pytest.raises(InputError, match="'coaster' takes n1, rudder1, the data drive the model by tau_x"):
+    with pytest.raises(InputError, match="'coaster' takes n1, rudder1, the inputs in the data are tau_x"):
         as_inputs(orders, coaster, barge.model)
 
 

@@ -46,7 +46,7 @@ def estimate(
         str,
         typer.Option(
             metavar="WHAT",
-            help="What the parameters describe: continuous, the motion between samples too, as plans use it; euler, "
+            help="Motion that the parameters describe: continuous, as plans use it, or euler, "
             "Euler's map at the sample time.",
         ),
     ] = "continuous",

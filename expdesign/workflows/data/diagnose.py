@@ -99,8 +99,8 @@ def as_inputs(commands: Commands, vessel: Vessel, model: VesselModel) -> Array:
         table = dict(zip(FORCE_SIGNALS, np.broadcast_arrays(*forces, commands.values[:, 0])[:3], strict=True))
     if not set(wanted) <= set(table):
         raise InputError(
-            f"the scenario's vessel {vessel.name!r} takes {', '.join(commands.names)}, the data drive the model by "
-            f"{', '.join(wanted)}; expected a scenario of the ship that the data are of"
+            f"the scenario's vessel {vessel.name!r} takes {', '.join(commands.names)}, the inputs in the data are "
+            f"{', '.join(wanted)}; expected a scenario of the ship in the data"
         )
     return np.column_stack([table[name] for name in wanted])
 

@@ -38,7 +38,7 @@ class PresentState:
         pose: (3,) of the ship in the area's frame.
         sailed_s: time in the data.
         left_s: informative time left.
-        left_stated: whether that was said rather than counted.
+        left_stated: whether --remaining gives it.
         ship: what the rest is planned with.
         origin: where its model comes from.
         notes: what a reader must hear.
@@ -141,7 +141,7 @@ def _left(first: Scenario, sailed_s: float, stated_s: float | None) -> float:
     if not left_s > 0:
         raise InputError(
             f"the data last {sailed_s:g} s and design.total_s of {first.path} is {first.design.total_s:g}: no time is "
-            "left; expected --remaining S, the informative time that is left, where the data hold repositioning too"
+            "left; expected --remaining S, the informative time left, if the data include repositioning"
         )
     return left_s
 
