@@ -10,7 +10,6 @@ from expdesign.errors import InputError, NoAnswer
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import (
     Conduct,
-    initial_turn,
     pull_out,
     simulate,
     steady_ahead,
@@ -27,7 +26,6 @@ SHIPS = {"rudder": nomoto_ship(), "azimuth": TUG_TRUE, "force": MODEL_SHIP_TRUE}
 TRIALS = {
     "circle": turning_circle,
     "zigzag": lambda ship, **how: zigzag(ship, heading_rad=TWENTY, helm_rad=TWENTY, **how),
-    "initial turn": initial_turn,
     "pull-out": pull_out,
     "stopping": lambda ship, side="port", **how: stopping(ship, **how),
 }

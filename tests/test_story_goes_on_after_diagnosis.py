@@ -123,10 +123,16 @@ def test_the_vessel_written_beside_the_plan_reproduces_its_track(story):
     assert np.abs(again.pose[:, 1] - track["east_m"]).max() < 0.05
 
 
-def test_the_extended_model_keeps_the_ship_nearer_to_its_plan_and_nothing_more_is_found_wrong(story):
-    folder, strayed, again = story
-    assert again["farthest_from_plan_m"] < strayed["farthest_from_plan_m"] / 3
-    assert read(folder / "after/diagnosis.json")["findings"] == []
+def test_the_extended_model_keeps_the_ship_nearer_to_its_plan_and_no_other_cause_is_found(story):
+    """More data may still improve the estimate of the current that the extended model states."""
+    folder, before, after = story
+    assert after["farthest_from_plan_m"] < before["farthest_from_plan_m"] / 3
+    findings = read(folder / "after/diagnosis.json")["findings"]
+    assert {item["cause"] for item in findings} <= {"current"}
+    for item in findings:
+        for name, true_mps in (("north_mps", 0.12), ("east_mps", -0.18)):
+            estimate = item["estimate"][name]
+            assert abs(estimate["value"] - true_mps) < 3 * estimate["std"]
 
 
 def test_the_report_says_where_the_trial_stands(story):

@@ -15,7 +15,7 @@ from expdesign.indices.admissibility import (
     beaufort,
 )
 from expdesign.indices.criteria import Criterion, Verdict, criteria, judge
-from expdesign.indices.measured import NotStandard, measured_trial, measured_trials
+from expdesign.indices.measured import NotStandard, measured_trial
 from expdesign.indices.outcomes import OUTCOMES, StandardResults, outcomes, standard_results
 from expdesign.indices.values import Circle, Execute, Stop, ZigZag
 from expdesign.indices.watched import Watched, watched
@@ -42,7 +42,6 @@ __all__ = [
     "criteria",
     "judge",
     "measured_trial",
-    "measured_trials",
     "outcomes",
     "standard_results",
     "watched",

@@ -7,7 +7,6 @@ there to half its way, in proportion.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -42,11 +41,6 @@ class NotStandard:
 
 
 Found = Circle | ZigZag | Stop | NotStandard
-
-
-def measured_trials(vessel: Vessel, batches: Iterable[Batch], *, thrusters: str = "stern") -> tuple[Found, ...]:
-    """What each batch shows, in order."""
-    return tuple(measured_trial(vessel, batch, thrusters=thrusters) for batch in batches)
 
 
 def measured_trial(

@@ -24,7 +24,7 @@ from expdesign.simulation.helmsman import Conduct
 from expdesign.simulation.motion import euler_step, motion_rates, relative_velocity, rk4_step, to_body
 from expdesign.simulation.run import simulate, simulate_many
 from expdesign.simulation.sensors import measure
-from expdesign.simulation.standard_trials import initial_turn, pull_out, stopping, turning_circle, zigzag
+from expdesign.simulation.standard_trials import pull_out, stopping, turning_circle, zigzag
 
 __all__ = [
     "CALM",
@@ -44,7 +44,6 @@ __all__ = [
     "draw_environment",
     "draw_weather",
     "euler_step",
-    "initial_turn",
     "measure",
     "motion_rates",
     "past_deadband",

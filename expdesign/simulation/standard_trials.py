@@ -83,27 +83,15 @@ def zigzag(
 
     def swing(number: int, past_rad: float) -> Stage:
         """Helm to one side until the heading is `past_rad` beyond the approach course on that side."""
-        way = (-1) ** number
-        helm = approach.angle_rad + way * change
-        return Stage(angle_rad=helm, drive=approach.drive, left=lambda _, state: past_rad - sign * way * state[2])
+        direction = (-1) ** number
+        helm = approach.angle_rad + direction * change
+        return Stage(angle_rad=helm, drive=approach.drive, left=lambda _, state: past_rad - sign * direction * state[2])
 
     if conduct.duration_s is None:  # the last helm stays until the ship has swung out and is back on the course
         stages = [*(swing(n, heading_rad) for n in range(executes - 1)), swing(executes - 1, 0.0)]
     else:
         stages = [swing(n, heading_rad) for n in range(MANY)]
     return sail(approach, stages, conduct, f"zig-zag {math.degrees(heading_rad):g}/{math.degrees(helm_rad):g}")
-
-
-def initial_turn(
-    vessel: Vessel,
-    *,
-    heading_rad: float = math.radians(10.0),
-    helm_rad: float = math.radians(10.0),
-    side: str = "starboard",
-    conduct: Conduct = AT_SERVICE_SPEED,
-) -> Trial:
-    """Helm over from a straight approach until the heading has changed by `heading_rad`; else as `turning_circle`."""
-    return turning_circle(vessel, helm_rad=helm_rad, side=side, turn_rad=heading_rad, conduct=conduct)
 
 
 def pull_out(
