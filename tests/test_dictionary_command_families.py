@@ -95,7 +95,9 @@ def test_desired_velocities_are_refused_for_direct_models_with_file_and_key(kind
     lines = "\n".join(f"{name} = {value}" for name, value in given.items())
     path.write_text(f'[dictionary]\nname = "d"\n[[primitives]]\nfamily = "{kind.name}"\n{lines}\n', encoding="utf-8")
     (wish,) = load_dictionary(path)
-    with pytest.raises(InputError, match=r"wishes.toml: primitives\[1\]: primitive .*X_n reads n1.*families with commands"):
+    with pytest.raises(
+        InputError, match=r"wishes.toml: primitives\[1\]: primitive .*X_n reads n1.*families with commands"
+    ):
         build_primitive(rudder_ship(), wish)
 
 
