@@ -33,6 +33,8 @@ AHEAD_S = 30.0
 """Prediction horizon from measured states [s]."""
 UNSTABLE = 5.0
 """Growth of an error over a run that counts as unstable."""
+CANCELLING = 2.0
+"""Share of the squared misfit above which its parts nearly cancel, so that their sizes have no meaning."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -215,7 +217,10 @@ def sentence(limits: Limits, run: RunCheck) -> str:
     if not np.isfinite([share for _, share in causes]).all():
         return tail
     parts = ", ".join(f"{round(100 * share)} % from {what}" for what, share in sorted(causes, key=lambda c: -c[1]))
-    uncertain = f" Parameter uncertainty explains {100 * limits.parameters[worst]:.0f} %."
+    if max(abs(share) for _, share in causes) > CANCELLING:
+        parts = "large parts of opposite sign that nearly cancel, so no single cause can be named"
+    doubt = limits.parameters[worst]
+    uncertain = f" Parameter uncertainty explains {f'{100 * doubt:.0f} %' if not doubt >= 1 else 'all of it'}."
     ceiling = limits.ceiling_percent[worst]
     quiet = f" Noise alone limits this fit to {ceiling:.0f} %." if ceiling < 95 else ""
     return f"The worst output is {limits.outputs[worst]}. Its squared error: {parts}.{uncertain}{quiet} {tail}"

@@ -45,7 +45,7 @@ class Asked:
 
 
 def ask(workflow: str, *arguments: object, **options: object) -> Asked:
-    """What a command asks for; lists become tuples."""
+    """Arguments of a command; lists become tuples."""
     fixed = {name: tuple(value) if isinstance(value, list) else value for name, value in options.items()}
     return Asked(workflow, tuple(tuple(value) if isinstance(value, list) else value for value in arguments), fixed)
 

@@ -1,4 +1,4 @@
-"""Commands that design and plan a trial, and compare or export what they give."""
+"""Commands that design and plan a trial, and compare or export the results."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def whatif(
     out: OutWhatIf = None,
     seed: Seed = 0,
 ) -> Asked:
-    """Compare variants of a scenario side by side: what changes and what it costs.
+    """Compare variants of a scenario side by side: time, accuracy and cost.
 
     Writes whatif.json and whatif.html.
 

@@ -110,7 +110,7 @@ def diagnose(
     out: OutByData = None,
     seed: Seed = 0,
 ) -> Asked:
-    """Show what the simulation gets wrong, name the cause, and extend the model.
+    """Find the causes of the simulation error and extend the model by them.
 
     Writes diagnosis.json, diagnosis.html and vessel-extended.toml. The causes: expdesign explain causes
 

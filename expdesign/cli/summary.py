@@ -1,4 +1,4 @@
-"""What a finished command says on stdout: where the results are and the key numbers, or the same as JSON."""
+"""Output of a finished command on stdout: key numbers and the place of the results, or the same as JSON."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def _print_table(console: Console, text: TextTable) -> None:
 
 
 def _rows(summary: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, str]]:
-    """(label, value with unit) of every entry, nested ones after the name of what holds them."""
+    """(label, value with unit) of every entry, nested ones after the name of their parent."""
     for key, value in summary.items():
         stem, _, suffix = key.rpartition("_")
         unit = UNITS.get(suffix, "") if stem else ""

@@ -54,7 +54,7 @@ def validate(
     out: Out = None,
     seed: Seed = 0,
 ) -> Asked:
-    """Test a design in simulated trials: predicted accuracy against what is found, beside equal shares and random runs.
+    """Test a design in simulated trials: predicted and simulated accuracy, beside equal shares and random runs.
 
     Writes validation.json and validation.html. An interrupted call continues where it stopped.
     """
@@ -109,7 +109,7 @@ def replan(
     out: Out = None,
     seed: Seed = 0,
 ) -> Asked:
-    """Plan the rest of a trial, from the present position and with what the data so far show.
+    """Plan the rest of a trial, from the present position, with a model updated from the data.
 
     Writes what run writes, for the rest; replan.json with what is known and what the rest will add; and
     vessel-used.toml, the model it is planned with. The ship is assumed to be stopped at the last position of the data.

@@ -34,7 +34,7 @@ STATES = ("u", "v", "r", *AIR)
 
 @dataclass(frozen=True, kw_only=True)
 class WorstCase:
-    """Largest magnitudes, zero for what is absent.
+    """Largest magnitudes, zero for absent disturbances.
 
     Attributes:
         velocity_mps, yaw_rate_radps, wind_sensor_mps: measurement noise of u and v, of r, and of the relative wind.
@@ -174,7 +174,7 @@ def _breaches(batch: Batch, table: SignalTable, moduli: list[Modulus], worst: Wo
 
 
 def _margin(inside: Polynomial, worst: WorstCase, windy: bool) -> float:
-    """What a sum of signals may be moved by; products are only held to their sign."""
+    """Largest change of a sum of signals by noise; products only have to keep their sign."""
     disturbed = max(worst.velocity_mps, worst.current_mps, worst.wind_mps if windy else 0.0)
     bounds = dict.fromkeys(("u", "v"), disturbed) | dict.fromkeys(AIR, worst.wind_sensor_mps)
     bounds["r"] = worst.yaw_rate_radps

@@ -27,7 +27,7 @@ class Tuning:
         spectrum_bins: bins of the periodogram, of equal width in the logarithm of frequency.
         spectrum_iterations: of reweighted non-negative least squares.
         spectrum_misfit: Bartlett's statistic at 1 % (Kolmogorov's distribution).
-        long_gap_samples: missing samples in a row after which the noise starts anew.
+        long_gap_samples: missing samples in a row after which the noise starts again.
         slowest_pole: bound on the autoregressive coefficient of a whitening filter.
         whitening_passes: the second filter finds a slow disturbance below the measurement noise.
         white_test_level: of White's test.

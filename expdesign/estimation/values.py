@@ -52,7 +52,7 @@ class Estimate:
         joint_covariance: (p + q, p + q) of parameters, then nuisance parameters.
         residuals: statistics.
         null_space: what the data cannot see, or see faintly.
-        refinements: how many times the instruments were simulated anew.
+        refinements: number of repeated simulations of the instruments.
         warnings: one sentence each.
     """
 

@@ -37,7 +37,7 @@ class _Slot:
             shutil.copy2(self.target, self.before)
 
     def undo(self) -> None:
-        """Restore the previous state from what is on the disk."""
+        """Restore the previous state from the disk."""
         renamed = not self.beside.exists()
         if renamed and self.before.exists():
             self.before.replace(self.target)

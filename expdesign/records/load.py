@@ -89,7 +89,7 @@ def _listed(names: list[str]) -> str:
 
 
 def _names(paths: Sequence[Path | str] | Path | str) -> dict[Path, str]:
-    """Each file and what it is called in notes and batches: its name, or its path where names coincide."""
+    """Each file with its name in notes and batches, or its path where names coincide."""
     files = [Path(path) for path in ([paths] if isinstance(paths, Path | str) else paths)]
     if not files:
         raise InputError("no data files are given, expected one or more CSV files")

@@ -137,7 +137,7 @@ def delivered_at_samples(
 
 
 def delivered(vessel: Vessel, commands: Commands, *, standing: Array | None = None) -> Commands:
-    """The mean over each sample of what a vessel's actuators deliver, for regressors and reports."""
+    """Delivered values of a vessel's actuators, as means over each sample, for regressors and reports."""
     values = deliver(vessel.responses, commands.values, sample_time_s=commands.sample_time_s, standing=standing)
     return Commands(sample_time_s=commands.sample_time_s, names=commands.names, values=values[:, 0])
 

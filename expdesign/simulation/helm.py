@@ -53,7 +53,7 @@ class Helm:
 
     @property
     def means(self) -> str:
-        """What steers: "rudder", "azimuth", "force", "propeller", or "" where nothing does."""
+        """Kind of steering: "rudder", "azimuth", "force", "propeller", or "" where nothing does."""
         kinds = [actuator.kind for actuator in self.vessel.actuators]
         sides = {np.sign(actuator.starboard_m) for actuator in self.vessel.actuators if actuator.kind == "propeller"}
         kinds = [kind for kind in kinds if kind != "propeller"] + ["propeller"] * ({-1.0, 1.0} <= sides)

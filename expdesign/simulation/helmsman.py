@@ -85,7 +85,7 @@ class _Orders:
 
 
 def _moved(value: float, goal: float, rate: float, time_s: float) -> tuple[float, float]:
-    """(mean, last) over a time of what moves from a value towards a goal at a rate and stays there."""
+    """(mean, last) over a time of a value that moves to a goal at a rate and stays there."""
     if time_s <= 0:
         return value, value
     way = goal - value
@@ -129,7 +129,7 @@ def sail(approach: Approach, stages: Iterable[Stage], conduct: Conduct, what: st
 
 
 def _delivered(actuators: ActuatorState, row: list[float]) -> list[list[float]]:
-    """(substeps, m) what the actuators give over the steps of a sample with these commands."""
+    """(substeps, m) delivered values over the steps of a sample with these commands."""
     given = actuators.mean(np.array(row)[:, None])[..., 0]
     return np.broadcast_to(given, (SUBSTEPS, len(row))).tolist()  # type: ignore[no-any-return]
 
@@ -150,7 +150,7 @@ def _share_left(
 
 
 def _stepped(vessel: Vessel, given: list[list[float]], state: State, step_s: float, until_s: float) -> State:
-    """The state a time into a sample, by the steps of `simulate`, under what is given in each of them."""
+    """The state a time into a sample, by the steps of `simulate`, with the delivered values of each."""
     theta = vessel.model.parameters.tolist()
     each_s = step_s / SUBSTEPS
     for number, held in enumerate(given):

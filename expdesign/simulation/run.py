@@ -122,7 +122,7 @@ def simulate_many(
 
 
 def _delivered(vessel: Vessel, commands: Commands, substeps: int, standing: Array | None) -> Any:
-    """For every sample a list of what the actuators give in each step."""
+    """For every sample the delivered values of each step."""
     given = deliver(
         vessel.responses,
         commands.values,

@@ -1,4 +1,4 @@
-"""Sensors: what a trial would record of a trajectory."""
+"""Sensors: measurements of a trajectory."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def prompt(sensors: Sensors) -> bool:
 
 
 def observe(sensors: Sensors, states: Array, air: Array, noise: Array, *, sample_time_s: float) -> None:
-    """What sensors measure of a motion.
+    """Measurements of a motion.
 
         position = north/east + R(heading) (forward, starboard)       heading = heading + bias
         u = u - r starboard     v = v + r forward, along axes turned from the ship's by an angle     r = scale r

@@ -85,7 +85,7 @@ class Tape:
 
 
 NEUTRAL = {"add": Entry("constant", (), 0.0), "multiply": Entry("constant", (), 1.0)}
-"""What changes nothing."""
+"""Operations that change nothing."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -160,7 +160,7 @@ class Actuator:
 
 
 def stem(signal: str) -> str:
-    """What a signal is, without the number of its actuator: n of n1, rudder of rudder2, tau_x of tau_x."""
+    """Stem of a signal, without the number of its actuator: n of n1, rudder of rudder2, tau_x of tau_x."""
     return signal.rstrip("0123456789")
 
 

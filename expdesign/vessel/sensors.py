@@ -1,4 +1,4 @@
-"""Sensors: noise, place, timing and faults of what measures the ship."""
+"""Sensors: noise, place, timing and faults."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ CENTRAL = Mounting()
 
 @dataclass(frozen=True, kw_only=True)
 class Sensors:
-    """What the measurements have beside the truth.
+    """Errors of the measurements.
 
     Attributes:
         position_m, heading_rad, velocity_mps, yaw_rate_radps: standard deviations of white noise, not negative.

@@ -22,7 +22,7 @@ FORCE_SIGNALS = ("tau_x", "tau_y", "tau_psi")
 
 @dataclass(frozen=True)
 class Term:
-    """One parameter and what it multiplies.
+    """One parameter and its regressor.
 
     Attributes:
         equation: "u", "v" or "r".

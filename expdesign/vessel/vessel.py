@@ -16,7 +16,7 @@ from expdesign.vessel.sensors import EXACT, Sensors
 
 @dataclass(frozen=True, kw_only=True)
 class Vessel:
-    """What the planner knows of the ship.
+    """A ship: particulars, model, sensors and weather.
 
     Attributes:
         name: for reports.

@@ -1,4 +1,4 @@
-"""A trial as one value for notebooks: what was found, shown as the report, written when asked for."""
+"""A planned trial as one value for notebooks, shown as its report."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class Trial:
 
 
 def plan_for(scenario: Scenario | Path | str, *, seed: int = 0, progress: Progress = silent) -> Trial:
-    """Score, share out time, plan and verify: what `expdesign run` does, without writing anything.
+    """Score, design durations, plan and verify as `expdesign run` does, without writing files.
 
     Args:
         scenario: a scenario, or its file.

@@ -1,4 +1,4 @@
-"""What every command takes and leaves behind."""
+"""Results of commands."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """What a command leaves behind.
+    """Results of a command.
 
     Attributes:
         files: written, in the order of their contents.

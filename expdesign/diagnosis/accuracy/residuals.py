@@ -26,7 +26,7 @@ TINY = 1e-300
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Dependence:
-    """Means of one output's residual over groups of stretches alike in one variable.
+    """Means of one output's residual over groups of stretches with similar values of a variable.
 
     Attributes:
         middle: (b,) of the variable.

@@ -36,7 +36,7 @@ class Candidate:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Situation:
-    """What candidates are made for: the model as it stands, and the data."""
+    """The present model and the data."""
 
     ship: ExtendedModel
     windows: Windows

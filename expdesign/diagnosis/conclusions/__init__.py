@@ -1,4 +1,4 @@
-"""What a diagnosis says: findings, verdict and notes."""
+"""Conclusions of a diagnosis: findings, verdict and notes."""
 
 from expdesign.diagnosis.conclusions.findings import finding_of
 from expdesign.diagnosis.conclusions.notes import (

@@ -16,7 +16,7 @@ FEW = 0.002
 
 
 def notes_on_data(vessel: Vessel, record: Record, windows: Windows, constant: Sequence[str]) -> tuple[str, ...]:
-    """What the data do not show.
+    """Effects that the data cannot show.
 
     Args:
         vessel: the model in use.

@@ -1,4 +1,4 @@
-"""The verdict of a diagnosis, in one sentence: what the simulation lacks, what adding it gains, what is still open."""
+"""The verdict of a diagnosis, in one sentence: missing effects, their gains and open questions."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ MISSING_EFFECTS = {
     "roll_coupling": "an oscillation like roll",
     "change_point": "a change of the ship during the trial",
 }
-"""Cause -> what the simulation lacks."""
+"""Cause -> missing effect of the simulation."""
 VISIBLE = 0.01
 """Reduction of an error below which no number is given."""
 WORDS = {"u": "surge", "v": "sway", "r": "yaw"}
@@ -51,7 +51,7 @@ MANOEUVRES = {
 
 
 def missing_effect(cause: str) -> str:
-    """What the simulation lacks, e.g. of "missing_term:Y_r"."""
+    """Missing effect of a cause, e.g. of "missing_term:Y_r"."""
     kind, _, term = cause.partition(":")
     return f"the term {term}" if kind == "missing_term" else MISSING_EFFECTS[kind]
 
@@ -76,7 +76,7 @@ def benefit(item: Finding) -> str:
 
 
 def unit_name(windows: Windows) -> str:
-    """What gains are measured on: whole runs, or stretches of them where there are too few runs."""
+    """Unit of held-out data: runs, or stretches where there are too few runs."""
     return "runs" if np.array_equal(validation_units(windows), windows.batch) else "stretches"
 
 
@@ -120,7 +120,7 @@ def _is_visible(reduction: ErrorReduction) -> bool:
 
 
 def _open_question(item: Finding) -> str:
-    """What explains the data as well, and what would distinguish it."""
+    """Alternatives of a finding, and the manoeuvre that distinguishes them."""
     alternatives = listed([missing_effect(name) for name in item.not_distinguishable_from], "or")
     if item.would_tell_apart is None:
         return f"these data cannot distinguish {missing_effect(item.cause)} from {alternatives}"

@@ -76,7 +76,7 @@ def redundant_step(steps: list[Step], windows: Windows) -> int | None:
 
 
 def without_step(steps: list[Step], index: int, windows: Windows) -> list[Step] | None:
-    """The other steps, the later ones fitted anew; None where one of them cannot be fitted."""
+    """The other steps, the later ones fitted again; None where one of them cannot be fitted."""
     others, before = steps[:index], steps[index].before
     for step in steps[index + 1 :]:
         reduced = _fit_without(step.chosen.fit, steps[index], windows)
@@ -92,7 +92,7 @@ def _own_effects(step: Step) -> set[str]:
 
 
 def _fit_without(whole: Fit, step: Step, windows: Windows) -> Fit | None:
-    """A later fit without the effects of a step, all others estimated anew."""
+    """A later fit without the effects of a step, all others estimated again."""
     own = _own_effects(step)
     others = tuple(key for key in whole.free_keys if key not in own)
     try:

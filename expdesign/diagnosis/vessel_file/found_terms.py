@@ -108,7 +108,7 @@ def _inertia(term: Term) -> tuple[str, ...]:
 def _scale(
     factors: tuple[tuple[str, ...], ...], divisor: tuple[str, ...], ship: ExtendedModel, std: Mapping[str, float]
 ) -> tuple[float, float]:
-    """What a term is multiplied with, and the relative standard error of that."""
+    """Factor of a term, and its relative standard error."""
     whole, variance = 1.0, 0.0
     for keys, power in [*((keys, 1) for keys in factors), (divisor, -1)]:
         factor = 1.0 + sum(ship.get(key) for key in keys)

@@ -87,7 +87,7 @@ def _driven(vessel: Vessel, record: Record) -> tuple[VesselModel, float]:
 
 
 def _rolled(roll: Roll | None) -> dict[str, float]:
-    """What a file says of roll."""
+    """Roll mode of a vessel file."""
     return {} if roll is None else {key: float(getattr(roll, name)) for key, name in ROLL.items()}
 
 

@@ -9,7 +9,7 @@ from expdesign.vessel import VesselModel, column_name
 
 
 def stated_values(keys: Iterable[str], ship: ExtendedModel) -> str:
-    """What the vessel file states of these effects, as a sentence to go on with; empty where it states nothing."""
+    """A sentence on the values of these effects in the vessel file; empty without any."""
     stated = []
     for key in keys:
         if key in ship.stated:
@@ -49,7 +49,7 @@ PATTERNS = {
     "gain": ("factor", 1.0, ""), "gyro": ("factor", 1.0, ""), "inertia": ("inertia_factor_{}", 1.0, ""),
     "change": ("{}_factor", 1.0, ""),
 }  # fmt: skip
-"""Kind of effect -> name in results of one that ends in what stands for {}, what it is when nothing is wrong, unit."""
+"""Kind of effect -> name in results with {} for the rest of its key, value without the effect, unit."""
 
 
 def _input_unit(group: str, model: VesselModel) -> str:
@@ -59,7 +59,7 @@ def _input_unit(group: str, model: VesselModel) -> str:
 
 
 def _lean_name(model: VesselModel) -> tuple[str, float, float, str]:
-    """Name of the yaw moment of ahead force: a length where force makes moments, else what the model is driven by."""
+    """Name of the yaw moment of ahead force: a length where force makes moments, else per unit of the model's input."""
     if turns_by_force(model):
         return "thrust_offset_m", 1.0, 0.0, "m"
     if ahead_force_text(model) == "tau_x":

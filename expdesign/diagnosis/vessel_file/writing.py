@@ -13,7 +13,7 @@ from expdesign.vessel import Actuator, Response, Sensors, Vessel
 
 
 def extend(vessel: Vessel, ship: ExtendedModel, std: Mapping[str, float]) -> tuple[Vessel, tuple[str, ...]]:
-    """The vessel with everything in `ship`, and what could not be written into it, one sentence each.
+    """The vessel with the effects of `ship`, and notes on those that it cannot hold, one sentence each.
 
     Args:
         vessel: the model in use.

@@ -1,4 +1,4 @@
-"""The noise in residuals: its parts, its memory, and what whitens it."""
+"""The noise in residuals: components, long-run variance and whitening filters."""
 
 from expdesign.estimation.noise.components import Components, fit_components, score_covariance
 from expdesign.estimation.noise.long_run import automatic_lags, long_run_covariance, lost_share

@@ -1,4 +1,4 @@
-"""Residual noise as a sum of independent parts, each with a known shape in time, and what it does to an estimate.
+"""Residual noise as a sum of independent parts, each with a known shape in time, and their effect on an estimate.
 
     cov eps(i), eps(j) = white [i = j] + sensor (2 [i = j] - [|i - j| = 1]) + sum over m of slow_m exp(-|i - j| / m)
 

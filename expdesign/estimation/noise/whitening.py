@@ -1,4 +1,4 @@
-"""Residuals made white, and their instruments changed so that the IV equations stay what they are.
+"""Whitened residuals, with instruments transformed so that the IV equations stay the same.
 
 A residual eps is modelled as ARMA(1, 1), (1 - a q^-1) eps(k) = (1 + c q^-1) n(k). Written as eps = T n with the lower
 triangular matrix T of that filter, its score is

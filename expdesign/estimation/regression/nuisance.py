@@ -1,4 +1,4 @@
-"""Nuisance regressors: what unknown mean current and wind add to the equations, from the terms themselves.
+"""Nuisance regressors for an unknown mean current and wind, derived from the terms.
 
 With a current (N, E) in the n-frame the water velocities are u - (N cos psi + E sin psi) and v - (-N sin psi + E cos
 psi). A term f(u, v) of second order then grows by its derivatives times cos psi and sin psi, and by its second
@@ -51,7 +51,7 @@ class Nuisance:
         return f"{self.equation}: {' '.join([*parts, *([self.heading] if self.heading else [])])}"
 
     def evaluate(self, table: SignalTable) -> Any:
-        """(k,) for a table of signals that includes the signs of the batch and what `headings` gives."""
+        """(k,) for a table of signals that includes the signs of the batch and the result of `headings`."""
         return self.factor.evaluate(table, self.algebra.functions) * table[self.heading]
 
 

@@ -24,7 +24,7 @@ MOVING = ("u", "v")
 
 @dataclass(frozen=True, eq=False)
 class Polynomial:
-    """Sum of coefficients times products of signals; supports what the term language supports."""
+    """Sum of coefficients times products of signals; with the operations of the term language."""
 
     terms: Mapping[Monomial, float]
 

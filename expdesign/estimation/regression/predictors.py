@@ -38,7 +38,7 @@ from expdesign.vessel.structures import MOTION_SIGNALS
 
 @dataclass(frozen=True)
 class Predictor:
-    """What goes into the regressors.
+    """Signals that the regressors are made from.
 
     Attributes:
         name: as users type it.
@@ -114,7 +114,7 @@ class Layout:
         return rows
 
     def known(self, table: Table) -> Array:
-        """(k, n) what the parameters held fixed explain."""
+        """(k, n) part explained by the parameters held fixed."""
         if self.quadrature == "euler":
             return self._known(table)
         return np.asarray(0.5 * (self._known(table) + self._known(ahead(table))))

@@ -1,4 +1,4 @@
-"""What the data cannot see: the null space of the scaled moment matrix, in words.
+"""Parameters that data cannot determine: the null space of the scaled moment matrix, in words.
 
 The moment matrix sum Z Phi^T is scaled so that its size does not depend on units; each singular vector is a combination
 of parameters, and its singular value says how much of that combination's effect the data show. Combinations are sought
@@ -122,7 +122,7 @@ def _weak(G: Array, second: Second, names: tuple[str, ...], samples: int) -> lis
 
 
 def require_informative(found: NullSpace) -> None:
-    """Refuse to estimate what the data cannot see.
+    """Refuse data that do not determine all parameters.
 
     Raises:
         NotInformative: naming every combination.

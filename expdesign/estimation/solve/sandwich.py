@@ -1,4 +1,4 @@
-"""The covariance of an estimate: what its instruments make of the noise in the residuals.
+"""The covariance of an estimate, from its instruments and the noise in the residuals.
 
     P = sum over k, l of W(k) cov(eps(k), eps(l)) W(l)^T,    W = G^-1 Z
 
@@ -87,7 +87,7 @@ class _Terms:
     n: Array
 
     def influences(self) -> Array:
-        """(t, p) what each term adds."""
+        """(t, p) contribution of each term."""
         return self._led(np.einsum("knp,kn->kp", self.zeta, self.n))
 
     def white_factor(self) -> Array:
@@ -185,5 +185,5 @@ def _exact(regression: Regression, parts: Sequence[Part], residuals: Array, fitt
 
 
 def by_batch(A: Sequence[Array], scores: Array, batches: Sequence[slice]) -> Array:
-    """Scores (k, p), as what they add to the estimate, with each batch's own A (p, p)."""
+    """Scores (k, p) as contributions to the estimate, with each batch's own A (p, p)."""
     return np.concatenate([scores[rows] @ own.T for rows, own in zip(batches, A, strict=True)])

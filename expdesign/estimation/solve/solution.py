@@ -28,7 +28,7 @@ from expdesign.values import Array, seal
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Solution:
-    """What a regression says.
+    """Result of a regression.
 
     Attributes:
         values: (p,) estimate.
@@ -129,7 +129,7 @@ def solve_quick(equations: Equations, instruments: Array) -> tuple[Array, Array]
 
 
 def _fitting(equations: Equations, instruments: Array) -> Equations:
-    """The same, or split anew where the instruments tie together what was apart."""
+    """The same, or split again where the instruments couple the parts."""
     power = _power(equations.regression, instruments)
     if not ((equations.uses == 0) & (power > 0)).any():
         return equations

@@ -1,4 +1,4 @@
-"""How the equations of instrumental variables are formed, and what their covariance allows for."""
+"""Options of instrumental variables: their equations, and the noise that their covariance accounts for."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ BLOCKS = ("one", "batch")
 
 @dataclass(frozen=True, kw_only=True)
 class Weighting:
-    """How equations are formed and what the covariance allows for.
+    """Options of the equations and of their covariance.
 
     Attributes:
         mean: subtracted from the instruments, one of `zero_mean.MEANS`.

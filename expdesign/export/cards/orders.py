@@ -126,4 +126,4 @@ SIGNS = {
     "a": "a: direction of thrust, 0 ahead, 90 to starboard.",
     "rudder": "rudder: 0 amidships; sign as in the vessel file.",
 }
-"""Stem of a signal -> what its sign means."""
+"""Stem of a signal -> meaning of its sign."""

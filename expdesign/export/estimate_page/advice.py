@@ -1,4 +1,4 @@
-"""Sentences on an estimation: what was estimated, and which estimate to use."""
+"""Sentences on an estimation: its parameters and data, and which estimate to use."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from expdesign.export.files import breach_sentences, unstable_warning
 
 
 def summary(content: EstimateContent) -> list[str]:
-    """What was estimated from what, in a few sentences."""
+    """The estimated parameters and the data, in a few sentences."""
     found, best = content.found, content.found.best
     batches = found.record.batches
     seconds = sum(len(batch) * batch.sample_time_s for batch in batches)

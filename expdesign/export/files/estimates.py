@@ -18,7 +18,7 @@ from expdesign.vessel import Vessel
 
 
 def estimate_json(found: Assessment, vessel: Vessel) -> str:
-    """One entry per method, as estimate.json; what is not a number is null."""
+    """One entry per method, as estimate.json; numbers that are not finite are null."""
     return strict_json({item.method.name: _method_entry(found, item, vessel) for item in found.methods})
 
 

@@ -1,4 +1,4 @@
-"""What is known when the rest of a trial is planned, and what the rest adds; as replan.json."""
+"""Knowledge when the rest of a trial is planned, and the gain from the rest; as replan.json."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ class Known:
 
 
 def replan_json(known: Known) -> str:
-    """All of it as replan.json; what is not a number is null."""
+    """Content of replan.json; numbers that are not finite are null."""
     columns = zip(
         known.parameters,
         *(column.tolist() for column in (known.before, known.now, known.stated, known.so_far, known.after)),

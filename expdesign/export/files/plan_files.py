@@ -26,7 +26,7 @@ FRAME_SENTENCE = (
 LATTICE_SENTENCE = (
     "cost_s is the repositioning time of the first placement of all runs by the rule of the lattice; no placement on "
     "this lattice costs less than lower_bound_s, but one off the lattice may; places_refused could not be sailed, and "
-    "the runs left were placed anew"
+    "the remaining runs were placed again"
 )
 
 METRE_DECIMALS, MOTION_DECIMALS, DEGREE_DECIMALS = 6, 9, 9
@@ -89,7 +89,7 @@ def plan_json(plan: Plan, *, scenario: str, vessel: Vessel, environment: Environ
 
 
 def _lattice_entry(proof: LatticeProof) -> dict[str, Any]:
-    """The proof of the lattice planner, and what it is a proof of."""
+    """The proof of the lattice planner, and its scope."""
     return {
         "spacing_m": proof.spacing_m,
         "headings": proof.headings,

@@ -31,7 +31,7 @@ def vessel_toml(vessel: Vessel, *, comments: Sequence[str] = ()) -> str:
     """The vessel file of a vessel; reading it back gives the same vessel, to the last bit.
 
     Args:
-        vessel: what to write. Limits that are infinite are left out.
+        vessel: to be written; infinite limits are left out.
         comments: lines to go first.
 
     Raises:

@@ -34,7 +34,7 @@ CHILDREN = {
     "scheduleElement": ("extensions",),
     "sheduleElement": ("extensions",),
 }
-"""Element of RTZ -> those that may stand in it; what is in `extensions` is not looked at."""
+"""Element of RTZ -> allowed children; the content of `extensions` is not checked."""
 RANGES = {
     "lat": (-90.0, 90.0, True),
     "lon": (-180.0, 180.0, False),
@@ -55,7 +55,7 @@ TIMES = ("eta", "etd", "validityPeriodStart", "validityPeriodStop")
 
 
 def check_route_file(path: Path) -> list[str]:
-    """What is wrong with an RTZ or GPX file, one sentence each; nothing when it is fit.
+    """Problems of an RTZ or GPX file, one sentence each.
 
     Raises:
         FileError: the file cannot be read, or is neither.
@@ -84,7 +84,7 @@ def check_rtz(content: bytes, file_stem: str) -> list[str]:
 
 
 def _parsed(content: bytes) -> etree._Element | str:
-    """The root element, or what is wrong."""
+    """The root element, or a problem."""
     parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False)
     try:
         root = etree.fromstring(content, parser)

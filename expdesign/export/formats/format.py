@@ -1,4 +1,4 @@
-"""What every route format is."""
+"""The common type of route formats."""
 
 from __future__ import annotations
 
@@ -45,6 +45,6 @@ def _in_xml(code: int) -> bool:
 
 
 def leg_sentence(waypoint: Waypoint) -> str:
-    """What the ship does on the way to the waypoint."""
+    """Motion of the ship on the leg to the waypoint."""
     what = "primitive" if waypoint.leg_kind == "primitive" else "reposition to"
     return f"leg {waypoint.leg}, {what} {waypoint.leg_name}"

@@ -1,4 +1,4 @@
-"""Manoeuvring indices as a form: what the resolution asks for beside what was found, as JSON, table and page."""
+"""Manoeuvring indices as a form: criteria of the resolution and results, as JSON, table and page."""
 
 from expdesign.export.indices_form.form import Held, IndicesContent, indices_json, verdict_rows
 from expdesign.export.indices_form.page import indices_html

@@ -106,7 +106,7 @@ def _criterion(content: IndicesContent, verdicts: list[Verdict], key: str) -> st
 
 
 def ship_rows(content: IndicesContent) -> list[tuple[str, str]]:
-    """Ship data; blanks for what the vessel file does not hold."""
+    """Ship data; blanks for data that are not in the vessel file."""
     vessel = content.vessel
     size = ", ".join(
         f"{letter} {value:.4g} m"

@@ -45,7 +45,7 @@ class Held:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class IndicesContent:
-    """What the form is made from.
+    """The content of the form.
 
     Attributes:
         vessel: particulars.

@@ -1,4 +1,4 @@
-"""What a report is made from."""
+"""The content of a report."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class ReportContent:
         compared: the design under every criterion.
         route: the waypoints as exported, or None when there are none.
         known: the state of a trial in progress, or None for a new trial.
-        growth: what was added to the dictionary, or None without a search.
+        growth: additions to the dictionary, or None without a search.
     """
 
     scenario: str

@@ -84,7 +84,7 @@ def certificate(content: ReportContent) -> str:
 
 
 def short_of_optimum(content: ReportContent) -> str:
-    """Upper bound on what any other design could gain in efficiency, rounded up to be true."""
+    """Upper bound on the possible gain in efficiency, rounded up."""
     design = content.design
     degree = len(content.parameters) if design.problem.aim.criterion == "D" else design.certificate.degree
     gain = math.expm1(max(design.gap, 0.0) / degree)

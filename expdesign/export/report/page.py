@@ -139,7 +139,7 @@ def lattice_sentences(proof: LatticeProof | None) -> list[str]:
     if proof is None:
         return []
     refused = (
-        f" {words.counted(proof.refused, 'place')} could not be sailed; the runs left were placed anew from there."
+        f" {words.counted(proof.refused, 'place')} could not be sailed; the remaining runs were placed again."
         if proof.refused
         else ""
     )

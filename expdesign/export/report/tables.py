@@ -30,7 +30,7 @@ class AgendaRow:
 
 
 def agenda(content: ReportContent) -> list[AgendaRow]:
-    """Leg by leg: when, what, for how long, from where, with which heading and speeds."""
+    """The agenda: time, name, duration, position, heading and speeds of every leg."""
     plan = content.plan
     numbers = {run.leg: run.number for run in primitive_runs(plan)}
     return [_agenda_row(plan, index, leg, numbers.get(index)) for index, leg in enumerate(plan.legs)]

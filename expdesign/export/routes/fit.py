@@ -22,7 +22,7 @@ POINTS = 17
 
 @dataclass(frozen=True, kw_only=True)
 class RouteFit:
-    """What was measured of a route.
+    """Accuracy of a route.
 
     Attributes:
         cross_track_m: largest distance of the track from the leg sailed at that time, straight in the plan's frame.

@@ -24,7 +24,7 @@ from expdesign.values import Array
 ROUTE_NAME = "route"
 """Stem of the file names; ECDIS expect it as the name inside the file too."""
 DEGREE_DECIMALS = 7
-"""Of every file, 11 mm: what autopilots store. Routes are checked after rounding to it."""
+"""Resolution of all files, 11 mm, as autopilots store it. Routes are checked after rounding to it."""
 XTD_STEP_M = METRES_PER_NAUTICAL_MILE / 10_000
 LARGEST_XTD_M = 10 * METRES_PER_NAUTICAL_MILE
 
@@ -72,7 +72,7 @@ class Route:
         waypoints: two or more.
         xtd_m: cross-track distance within which the track stays, to both sides [m].
         frame: relates north/east metres to latitude and longitude.
-        fit: what was measured of the legs, as written, against the track.
+        fit: deviation of the legs, as written, from the track.
         fence: allowed water around the track, or None when the chart is not at hand.
         departure: UTC time of the first waypoint, or None when not fixed.
     """

@@ -1,4 +1,4 @@
-"""What a column name means: the quantity, and the factor from the file's unit to the package's."""
+"""Meaning of column names: the quantity, and the factor from the file's unit to the package's."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ class Unitless:
 
 
 def meaning(header: str, column: int) -> Source | Unitless | None:
-    """What a column holds, or None when its name says nothing that is known here."""
+    """The quantity of a column, or None for an unknown name."""
     name = re.sub(r"[\s\[\]()]+", "_", header.lower()).strip("_")
     if name in PLAIN:
         return Source(column, header, name)

@@ -16,7 +16,7 @@ FULL_CIRCLE_DEG = 360.0
 
 @dataclass(frozen=True, kw_only=True)
 class Range:
-    """What a column may hold.
+    """Allowed values of a column.
 
     Attributes:
         pattern: of the contract names it is about.

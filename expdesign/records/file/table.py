@@ -34,7 +34,7 @@ class Table:
         columns: contract name -> (k,) in the contract's unit.
         sources: contract name -> where it stands in the file.
         first_row: row of the file that sample 0 comes from.
-        notes: what was found and how it was dealt with.
+        notes: unusual data and their treatment.
     """
 
     path: Path

@@ -1,4 +1,4 @@
-"""`expdesign diagnose`: what the simulation of measured data gets wrong."""
+"""`expdesign diagnose`: causes of the simulation error on measured data."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def diagnose(
     seed: int = 0,
     progress: Progress = silent,
 ) -> Outcome:
-    """Causes of the simulation error, why, and what mending gains, into `out` or runs/<first data file>.
+    """Causes of the simulation error and the gain from adding them to the model, into `out` or runs/<first data file>.
 
     Args:
         data: CSV files.

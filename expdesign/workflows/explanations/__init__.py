@@ -1,1 +1,1 @@
-"""`expdesign explain`: what may stand in files and on the command line, from the places that read it."""
+"""`expdesign explain`: keys of files and names on the command line, from the modules that read them."""

@@ -28,7 +28,7 @@ TOPICS: dict[str, tuple[str, Callable[[], Topic]]] = {
 
 
 def explain(subject: str = "") -> Topic:
-    """What a subject means.
+    """Explain a subject.
 
     Args:
         subject: a topic; a table, a manoeuvre family or another section of one; or a name, such as design.total_s or

@@ -1,4 +1,4 @@
-"""What can be chosen by name: families, causes, methods, criteria, formats, outcomes, structures, columns of data."""
+"""Explanations of names: families, causes, methods, criteria, formats, outcomes, structures, columns of data."""
 
 from __future__ import annotations
 

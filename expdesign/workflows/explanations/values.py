@@ -39,7 +39,7 @@ class Section:
 
 @dataclass(frozen=True, kw_only=True)
 class Topic:
-    """What one call of `expdesign explain` shows.
+    """Output of one call of `expdesign explain`.
 
     Attributes:
         name: the word that asks for it.

@@ -1,1 +1,1 @@
-"""Commands that design and plan a trial, and compare or export what they give; one file each."""
+"""Commands that design and plan a trial, and compare or export the results; one file each."""

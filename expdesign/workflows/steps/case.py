@@ -1,4 +1,4 @@
-"""A scenario read, and what a command on it leaves."""
+"""Reading a scenario, and writing the results of a command on it."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def written(
     progress: Progress,
     tables: tuple[TextTable, ...] = (),
 ) -> Outcome:
-    """Files written into `out` or runs/<scenario>, and what is said of them."""
+    """Write files into `out` or runs/<scenario>, and report them."""
     paths = write_files(out or Path("runs") / case.name, files)
     progress("done", 1.0)
     return Outcome(files=paths, summary={"scenario": case.name, **summary}, tables=tables)

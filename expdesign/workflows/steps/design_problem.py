@@ -1,4 +1,4 @@
-"""From a scored scenario to a duration problem: criterion, robustness, what is known already, and limits."""
+"""From a scored scenario to a duration problem: criterion, robustness, prior information, and limits."""
 
 from __future__ import annotations
 
@@ -192,7 +192,7 @@ def cubed_propeller_speed(primitive: Primitive) -> float:
 
 
 def _prior(case: Scenario, parameters: tuple[str, ...], stated: Mapping[str, float] | None) -> Array | None:
-    """What is known before, per sample of the informative time; None when that is nothing."""
+    """Prior information per sample of the informative time; None without any."""
     settings, model = case.design, case.vessel.model
     means = len(model.outputs) if settings.mean_subtraction == MEAN_SUBTRACTIONS[-1] else 0
     dimension, samples = len(parameters) + means, settings.total_s / case.vessel.sample_time_s

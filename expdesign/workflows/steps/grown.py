@@ -1,4 +1,4 @@
-"""The dictionary of a scenario grown, and what is written and reported of it."""
+"""The grown dictionary of a scenario, its files and its tables."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def grown(
 
 
 def growth_files(case: Scenario, growth: Growth | None) -> dict[str, str | bytes]:
-    """The grown dictionary as a file that every command takes, and what was added."""
+    """The grown dictionary as a file for every command, and the additions."""
     if growth is None:
         return {}
     comments = (
@@ -63,7 +63,7 @@ def growth_files(case: Scenario, growth: Growth | None) -> dict[str, str | bytes
 
 
 def growth_note(case: Scenario) -> dict[str, object]:
-    """What of the table [design] the search for additions does not count, where there is any."""
+    """Settings of [design] that the search for additions ignores, if any."""
     settings = case.design
     limits = {
         f"criterion {settings.criterion}": settings.criterion != "D",
@@ -84,7 +84,7 @@ def growth_note(case: Scenario) -> dict[str, object]:
 
 
 def growth_summary(growth: Growth | None, case: Scenario | None = None) -> dict[str, object]:
-    """Key numbers, and with the scenario what the search left out."""
+    """Key numbers, and with the scenario the settings that the search ignored."""
     if growth is None:
         return {}
     note = {} if case is None else growth_note(case)
@@ -98,7 +98,7 @@ def growth_summary(growth: Growth | None, case: Scenario | None = None) -> dict[
 
 
 def growth_tables(growth: Growth | None) -> tuple[TextTable, ...]:
-    """What each addition brought."""
+    """Gain of each addition."""
     if growth is None:
         return ()
     rows = tuple(

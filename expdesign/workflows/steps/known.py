@@ -1,4 +1,4 @@
-"""What the data so far show, what the rest of a trial adds, and which of its manoeuvres add it."""
+"""Knowledge from the data so far, the gain from the rest of a trial, and the manoeuvres that give it."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ def planned(
 def plan_problem(
     case: Scenario, information: Sequence[PrimitiveInformation], design: DurationDesign, *, seed: int = 0
 ) -> PlanProblem:
-    """What a scenario asks the planner for, with a dictionary and its durations.
+    """The planning problem of a scenario, with a dictionary and its durations.
 
     Raises:
         InputError: plans cannot be made for the vessel.
@@ -107,7 +107,7 @@ def _lattice_summary(proof: LatticeProof | None) -> dict[str, object]:
 
 
 def _risk_summary(risk: RiskEstimate | None) -> dict[str, object]:
-    """What drawn trials came to besides leaving allowed water; nothing where none were sailed."""
+    """Results of drawn trials other than leaving allowed water; empty without such trials."""
     if risk is None:
         return {}
     return {

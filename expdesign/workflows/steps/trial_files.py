@@ -54,7 +54,7 @@ def built_route(case: Scenario, plan: Plan) -> Route:
 def report_content(
     case: Scenario, information: tuple[PrimitiveInformation, ...], design: DurationDesign, plan: Plan, seed: int
 ) -> ReportContent:
-    """What the report and the run cards are made from."""
+    """Content of the report and the run cards."""
     return ReportContent(
         scenario=case.name,
         vessel=case.vessel,

@@ -1,4 +1,4 @@
-"""`expdesign replan`: the rest of a trial, from the present position and with what the data so far show.
+"""`expdesign replan`: the rest of a trial, from the present position, with a model updated from the data.
 
 The ship is assumed to be stopped through the water at its present place before the rest begins.
 """
@@ -45,7 +45,7 @@ def replan(
     seed: int = 0,
     progress: Progress = silent,
 ) -> Outcome:
-    """The rest of a trial, given what is known: all that `run` gives, from the ship's present position.
+    """Plan the rest of a trial from the ship's present position, with the results of `run`.
 
     Args:
         scenario: of the whole trial; its start no longer counts.
@@ -104,14 +104,14 @@ def replan(
 
 
 def _check_runs(design: DurationDesign) -> None:
-    """With what is known already no run at all may count as a design, but there is nothing to plan then."""
+    """Refuse a design without runs, which prior information allows."""
     if not any(design.repeats):
         shortest = float(design.problem.run_s.min())
         raise NoAnswer(f"no whole run fits in the {design.problem.total_s:g} s left; the shortest takes {shortest:g} s")
 
 
 def known_of(state: PresentState, case: Scenario, design: DurationDesign, plan: Plan) -> Known:
-    """What was known before, is known now and will be after the rest."""
+    """Parameters and standard deviations before the trial, now, and after the rest."""
     first, ship, subtraction = state.first.vessel, state.ship, case.design.mean_subtraction
     names = estimated_parameters(ship.model, case.design.fixed_parameters)
     so_far, rest = data_parts(state.record, ship), plan_part(plan, ship)

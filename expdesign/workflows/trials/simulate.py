@@ -32,7 +32,7 @@ def simulate(
     seed: int = 0,
     progress: Progress = silent,
 ) -> Outcome:
-    """The commands of a plan run open loop on another vessel in drawn weather, and what its sensors record.
+    """Run the commands of a plan open loop on another vessel in drawn weather, and record its sensors.
 
     Mean current and wind are drawn around the plan's forecast, and vary from sample to sample as the forecast says;
     where the vessel's file has a current or a wind, around that. With `until_s` the data end at that time, as of a

@@ -11,9 +11,9 @@ SHARES = (0.5, 1.5)
 
 
 def open_groups(situation: Situation, kind: str) -> list[str]:
-    """Groups of inputs of which the vessel file states nothing of a kind, and those of which it states one value.
+    """Groups of inputs without a stated effect of a kind, and those with one stated value.
 
-    None once something of the kind was found: what is then left is another cause's.
+    None once an effect of the kind was found.
     """
     ship = situation.ship
     if ship.has_found(f"{kind}:"):
@@ -25,7 +25,7 @@ def open_groups(situation: Situation, kind: str) -> list[str]:
 
 
 def followers(situation: Situation, kind: str, cause: str) -> tuple[Candidate, ...]:
-    """A time of every group of inputs, tried at a few values; smaller and larger than what the vessel file states."""
+    """Candidate times of every group of inputs, smaller and larger than the stated one."""
     sample, found = situation.windows.sample_s, []
     for group in open_groups(situation, kind):
         key = f"{kind}:{group}"

@@ -1,4 +1,4 @@
-"""A ship that turns at zero angle: thrust off the centre line, or angles that are not what they are said to be."""
+"""A ship that turns at zero angle: thrust off the centre line, or wrong angles."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ def uncertainty_figure(content: ReportContent, found: Expected) -> str:
 
 
 def parameter_size(content: ReportContent) -> Array:
-    """(p,) what standard deviations are compared with: the value, the prior where that is zero, else 1."""
+    """(p,) reference for standard deviations: the value, the prior where that is zero, else 1."""
     model = content.vessel.model
     nominal = dict(zip(model.names, np.abs(model.parameters).tolist(), strict=True))
     values = np.array([nominal[name] for name in content.parameters])
