@@ -23,7 +23,7 @@ GLOSSARY: tuple[tuple[str, str], ...] = (
     ),
     (
         "Sensitivity",
-        "derivative of the log det with respect to the time of a manoeuvre; equal for all used manoeuvres at the optimum",
+        "derivative of the log det with respect to the time of a manoeuvre; at the optimum equal for all used ones",
     ),
     (
         "Excitation condition",

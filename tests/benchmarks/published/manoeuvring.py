@@ -21,26 +21,19 @@ Source: F. Ljungberg, doctoral thesis, Linköping University, 6.1, (5.77), table
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from expdesign.errors import NoAnswer
 from expdesign.estimation.methods import Settings, estimate
+from expdesign.progress import Progress, silent
 from expdesign.signals import Record
 from expdesign.simulation import Ensemble, Environment, Variation, simulate_ensemble
 from expdesign.values import Array
 from expdesign.vessel import TERMS, Actuator, Limit, Sensors, Vessel, VesselModel, structure_terms
 from pulses import Pulses, draw_inputs
-
-Progress = Callable[[str, float], None]
-"""What is being done, and the share of it that is done."""
-
-
-def silent(what: str, share: float) -> None:
-    """Progress that nobody looks at."""
-
 
 PARAMETERS: dict[str, tuple[float, float]] = {
     "X_u": (-0.05, -0.2),
