@@ -9,7 +9,8 @@ from expdesign.plan.chart.goal_distance import build_goal_distance
 from expdesign.plan.local_planner import LegEnds, SearchSpace, local_planner
 from expdesign.plan.runs import Footprint
 from expdesign.plan.search.lattice import search_lattice
-from expdesign.plan.search.lattice_moves import Departure, Lattice, build_lattice, placements_of
+from expdesign.plan.search.lattice_grid import Lattice
+from expdesign.plan.search.lattice_moves import Departure, build_lattice
 from expdesign.plan.search.lattice_search import LatticeSearch
 from plan_case import leg_water
 
@@ -139,8 +140,8 @@ def test_a_current_helps_and_hinders():
 def test_runs_begin_only_where_their_discs_have_room():
     water = OPEN.difference(shapely.box(-200, 200, 500, 500))
     case = space(water, (900, 900, 0), run("ahead", (240, 0, 0), room_m=80.0))
-    lattice, _, plan = solve(case, (2,), np.array([-500.0, -500.0, 0.0]))
-    begun = [placement.pose for placement in placements_of(lattice, plan.steps)]
+    found = LatticeSearch(spacing_m=SPACING_M).place(case, (2,), start=np.array([-500.0, -500.0, 0.0]))
+    begun = [placement.pose for placement in found.runs]
     assert len(begun) == 2
     for pose in begun:
         end = pose[:2] + 240 * np.array([np.cos(pose[2]), np.sin(pose[2])])

@@ -92,22 +92,23 @@ def test_every_zigzag_is_run_three_times_on_a_verified_round_trip(harbour):
     assert track["north_m"].min() < 300.0 < track["north_m"].max()  # out between the moles and back
 
 
-def test_the_hull_stays_in_water_that_is_deep_enough(harbour):
+def test_the_hull_keeps_its_clearance_from_land_and_from_water_that_is_too_shallow(harbour):
     _, folder = harbour
     chart = json.loads((SCENARIOS / "areas" / "harbour.geojson").read_text())
-    layers = {feature["properties"]["layer"] for feature in chart["features"]}
-    deep, rest = (
-        shapely.union_all([shapely.geometry.shape(item["geometry"]) for item in chart["features"] if of(item)])
-        for of in (
-            lambda item: item["properties"]["layer"] in ("depth5m", "depth10m"),
-            lambda item: item["properties"]["layer"] == "land",
-        )
-    )
+    layers: dict[str, list[shapely.Geometry]] = {}
+    for feature in chart["features"]:
+        layers.setdefault(feature["properties"]["layer"], []).append(shapely.geometry.shape(feature["geometry"]))
+    assert set(layers) == {"land", "depth2m", "depth5m", "depth10m"}
+    deep = shapely.union_all(layers["depth5m"] + layers["depth10m"]).difference(shapely.union_all(layers["land"]))
     track = columns(folder / "track.csv")
-    places = shapely.points(track["lon_deg"], track["lat_deg"])
-    assert layers == {"land", "depth2m", "depth5m", "depth10m"}
-    assert shapely.contains(deep, places).all()
-    assert not shapely.intersects(rest, places).any()
+    metres = np.array([111_320 * np.cos(np.radians(track["lat_deg"][0])), 111_360.0])  # per degree east and north
+    boundary = shapely.transform(shapely.boundary(deep), lambda points: points * metres)
+    c, s = np.cos(track["heading_rad"]), np.sin(track["heading_rad"])
+    for forward, starboard in ((15.0, -4.5), (15.0, 4.5), (-15.0, -4.5), (-15.0, 4.5)):
+        east = track["lon_deg"] * metres[0] + s * forward + c * starboard
+        north = track["lat_deg"] * metres[1] + c * forward - s * starboard
+        assert shapely.contains(deep, shapely.points(east / metres[0], north / metres[1])).all()
+        assert shapely.distance(boundary, shapely.points(east, north)).min() > 0.98 * 20.0
 
 
 def test_the_proof_is_written_with_the_plan(harbour):

@@ -10,9 +10,10 @@ import numpy as np
 from expdesign.errors import NoPlan
 from expdesign.plan.local_planner import SearchSpace
 from expdesign.plan.search.lattice import search_lattice
-from expdesign.plan.search.lattice_moves import Departure, Lattice, build_lattice, placements_of
+from expdesign.plan.search.lattice_grid import Lattice
+from expdesign.plan.search.lattice_moves import Departure, build_lattice
 from expdesign.plan.search.tuning import SEARCH
-from expdesign.plan.values import LatticeProof, Placements
+from expdesign.plan.values import LatticeProof, Placement, Placements
 from expdesign.values import Array
 
 
@@ -79,7 +80,15 @@ def _placed(lattice: Lattice, repeats: Sequence[int], departure: Departure) -> P
         lower_bound_s=found.lower_bound,
     )
     return Placements(
-        runs=placements_of(lattice, found.steps),
+        runs=_placements(lattice, found.steps),
         work_s=SEARCH.lattice_state_s * found.expansions,
         lattice=proof,
     )
+
+
+def _placements(lattice: Lattice, steps: Sequence[tuple[int, int]]) -> tuple[Placement, ...]:
+    """Where the runs of a lattice plan begin, in its order."""
+    runs = [(pose, q) for pose, q in steps if q >= 0]
+    poses = lattice.poses(np.array([pose for pose, _ in runs], dtype=int))
+    names = [item.name for item in lattice.space.footprints]
+    return tuple(Placement(primitive=names[q], pose=pose) for (_, q), pose in zip(runs, poses, strict=True))
