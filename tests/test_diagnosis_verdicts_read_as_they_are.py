@@ -72,7 +72,7 @@ def test_an_invisible_improvement_is_given_no_number(share):
 
 
 def test_a_verdict_without_findings_states_the_accuracy():
-    assert verdict([], BEFORE).startswith("These data show no error of the model: the model accounts for 60 % of")
+    assert verdict([], BEFORE).startswith("These data show no error of the model: the fit is 60 % in surge")
     lost = Accuracy(**{**vars(BEFORE), "fit": np.array([-66608676.0, 50.0, 10.0])})
     assert "diverges from the ship" in verdict([], lost)
     assert "66608676" not in verdict([], lost)

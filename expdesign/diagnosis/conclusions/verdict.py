@@ -136,7 +136,7 @@ def accuracy_in_words(found: Accuracy) -> str:
     if has_diverged(found):
         return "simulated over whole runs, the model diverges from the ship"
     rows = zip(found.outputs, found.fit.tolist(), strict=True)
-    return f"the model accounts for {listed([f'{value:.0f} % of {WORDS[name]}' for name, value in rows])}"
+    return f"the fit is {listed([f'{value:.0f} % in {WORDS[name]}' for name, value in rows])}"
 
 
 def has_diverged(found: Accuracy) -> bool:
