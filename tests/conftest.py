@@ -2,13 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+import fcntl
+import json
+import os
+import signal
+from collections.abc import Callable, Generator
+from pathlib import Path
 
 import pytest
+
+# Workers share the processors already; threads of linear algebra would only wait for each other.
+for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(name, "1")
+# A shell starts background jobs with SIGINT ignored, and what they start inherits that.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--no-skips", action="store_true", help="a test or file that skips fails: nothing may be missing")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Whole trials, which take longest, come first, so that no worker is left with one at the end."""
+    items.sort(key=lambda item: "made_once" not in getattr(item, "fixturenames", ()))
 
 
 @pytest.hookimpl(wrapper=True)
@@ -21,6 +37,33 @@ def pytest_make_collect_report(
     collector: pytest.Collector,
 ) -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
     return _counted(collector.config, (yield))
+
+
+@pytest.fixture(scope="session")
+def made_once(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Callable[[str, Callable[[Path], object]], tuple[Path, object]]:
+    """Results made once in a run of the tests, by the worker that needs them first.
+
+    Call it with a name and a function that fills a new folder; it gives the folder and the function's answer, as JSON
+    keeps it.
+    """
+    root = tmp_path_factory.getbasetemp()
+    root = (root.parent if "PYTEST_XDIST_WORKER" in os.environ else root) / "made-once"
+    root.mkdir(exist_ok=True)
+
+    def made(name: str, make: Callable[[Path], object]) -> tuple[Path, object]:
+        folder, answer = root / name, root / f"{name}.json"
+        with (root / f"{name}.lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if not answer.exists():
+                assert not folder.exists(), f"{name} could not be made before"
+                folder.mkdir()
+                content = json.dumps(make(folder))
+                answer.write_text(content, encoding="utf-8")
+        return folder, json.loads(answer.read_text(encoding="utf-8"))
+
+    return made
 
 
 def _counted(config: pytest.Config, report):

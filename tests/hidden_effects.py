@@ -132,11 +132,16 @@ def sail(trials: list[Trial], orders: np.ndarray, step_s: float, weather: Weathe
     n, b, k, m = orders.shape
     e = {name: np.array([t.effects.get(name, 0.0) for t in trials])[:, None] for name in EFFECTS}
     th = {name: np.array([t.parameters[name] for t in trials])[:, None] for name in SHIPS[ship]}
+    present = {name for name, values in e.items() if values.any()}
     mask, small = (  # (n, 1, m)
         np.stack([(e[name].astype(int) >> j) & 1 for j in range(m)], axis=-1).astype(bool)
         for name in ("acts_on", "dead_on")
     )
     h = step_s / SUBSTEPS
+    delay = np.where(mask, e["delay_s"][..., None], 0.0) * np.ones((n, b, 1))
+    delayed = delay.any()
+    lag = np.where(mask, e["lag_s"][..., None], 0.0)
+    fade = np.where(lag > 0, np.exp(-h / np.maximum(lag, 1e-9)), 0.0)
     mean_c = np.array([t.current for t in trials]).T[:, :, None]
     mean_w = np.array([t.wind for t in trials]).T[:, :, None]
     vary_c, vary_w = (rng.standard_normal((2, 1, b)) * s for s in (weather.current_std, weather.wind_std))
@@ -151,12 +156,12 @@ def sail(trials: list[Trial], orders: np.ndarray, step_s: float, weather: Weathe
     for i in range(k):
         for part in range(SUBSTEPS):
             t = i * step_s + part * h
-            late = np.where(mask, e["delay_s"][..., None], 0.0) * np.ones((n, b, 1))
-            index = np.clip(np.floor((t - late + 1e-9) / step_s).astype(int), 0, k - 1)
-            order = orders[rows[0], rows[1], index, rows[2]]
+            if delayed:
+                index = np.clip(np.floor((t - delay + 1e-9) / step_s).astype(int), 0, k - 1)
+                order = orders[rows[0], rows[1], index, rows[2]]
+            else:
+                order = orders[:, :, i]
             order = np.where(small & (np.abs(order) < e["deadband"][..., None]), 0.0, order)
-            lag = np.where(mask, e["lag_s"][..., None], 0.0)
-            fade = np.where(lag > 0, np.exp(-h / np.maximum(lag, 1e-9)), 0.0)
             acting = order + (held - order) * (lag / h) * (1 - fade)  # mean over the step
             held = order + (held - order) * fade
             if part == 0:
@@ -171,7 +176,7 @@ def sail(trials: list[Trial], orders: np.ndarray, step_s: float, weather: Weathe
             current, wind = mean_c + vary_c, mean_w + vary_w
 
             def rates(x, acting=acting, shoal=shoal, after=after, current=current, wind=wind):
-                return _rates(ship, x, acting, th, e, shoal, after, current, wind)
+                return _rates(ship, x, acting, th, e, present, shoal, after, current, wind)
 
             k1 = rates(x)
             k2 = rates(x + h / 2 * k1)
@@ -190,14 +195,14 @@ EFFECTS = (
 )  # fmt: skip
 
 
-def _rates(ship, x, acting, th, e, shoal, after, current, wind):
+def _rates(ship, x, acting, th, e, present, shoal, after, current, wind):
     _, _, psi, u, v, r, phi, p = x
     c, s = np.cos(psi), np.sin(psi)
     ur, vr = u - (c * current[0] + s * current[1]), v - (c * current[1] - s * current[0])
-    uq, vq = u - (c * wind[0] + s * wind[1]), v - (c * wind[1] - s * wind[0])
-    gain = (1 + e["gain"]) * np.where(after, 1 + e["change_gain"], 1.0)
-    damp = np.where(after, 1 + e["change_damping"], 1.0) * (1 + e["shallow_damping"] * shoal)
-    heavy = 1 + e["shallow_inertia"] * shoal
+    gain, damp, heavy = 1 + e["gain"], 1 + e["shallow_damping"] * shoal, 1 + e["shallow_inertia"] * shoal
+    if "change_s" in present:
+        gain = gain * np.where(after, 1 + e["change_gain"], 1.0)
+        damp = np.where(after, 1 + e["change_damping"], 1.0) * damp
     if ship == "coaster":
         n, rudder = acting[..., 0], acting[..., 1] + e["angle_offset"]
         push, side, turn = np.abs(n) * n, ur * np.abs(ur) * rudder, ur * np.abs(ur) * rudder
@@ -217,6 +222,7 @@ def _rates(ship, x, acting, th, e, shoal, after, current, wind):
         fx, fy, fn = th["X_mu"] * tx, th["Y_mu"] * ty, th["N_mu"] * tn
         kx = (th.get("X_kappa", 0.0) + e["kappa"]) * ur * tx
     if ship == "tug":
+        uq, vq = u - (c * wind[0] + s * wind[1]), v - (c * wind[1] - s * wind[0])
         fx = fx + th["W_abs_u_u"] * np.abs(uq) * uq
         fy = fy + th["W_abs_v_v"] * np.abs(vq) * vq
         fn = fn + th["W_uv"] * uq * vq
@@ -226,11 +232,13 @@ def _rates(ship, x, acting, th, e, shoal, after, current, wind):
     dn = dn + th["N_uv"] * ur * vr
     extra = {"X": 0.0, "Y": 0.0, "N": 0.0}
     for name, term in TERMS.items():
-        if np.any(e[name]):
+        if name in present:
             extra[name[0]] = extra[name[0]] + e[name] * term(ur, vr, r)
     du = th["X_vr"] * vr * r + (damp * dx + gain * (fx + kx) + extra["X"]) / (1 + e["load_u"]) / heavy
     dv = th["Y_ur"] * ur * r + (damp * dy + gain * fy + extra["Y"]) / (1 + e["load_v"]) / heavy
     dr = (damp * dn + gain * fn + extra["N"]) / (1 + e["load_r"]) / heavy
+    if "roll_period_s" not in present:
+        return np.stack([u * c - v * s, u * s + v * c, r, du, dv, dr, p, np.zeros_like(p)])
     w0 = 2 * np.pi / np.where(e["roll_period_s"] > 0, e["roll_period_s"], 1.0)
     on = e["roll_period_s"] > 0
     side = dv + u * r  # the hull leans against the acceleration of the water it pushes

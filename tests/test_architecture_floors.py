@@ -212,6 +212,8 @@ def imported_names(path: Path) -> set[str]:
 @pytest.mark.parametrize("name", lazy_facades())
 def test_every_name_of_a_facade_that_loads_on_use_is_there(name: str) -> None:
     package = importlib.import_module(name)
+    modules = {path.stem for path in Path(str(package.__file__)).parent.iterdir()}
+    assert not modules & set(package.__all__)  # once a module is imported, it hides a name that it shares
     assert all(getattr(package, public) is not None for public in package.__all__)
     with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
         package.nonsense  # noqa: B018

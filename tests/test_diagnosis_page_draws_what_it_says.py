@@ -80,7 +80,7 @@ def test_a_current_shows_by_heading_before_any_cause_is_named():
         assert by["heading"] < 1e-6
 
 
-def test_a_stretch_tells_the_acceleration_that_is_missing():
+def test_a_stretch_shows_the_acceleration_that_is_missing():
     """Yaw acceleration g tau_x too much: after t the rate is off by g tau_x (1 - exp(-d t)) / d, with the damping d.
 
     What sway does to yaw beside it, and orders that change in a stretch, leave the comparison good to a seventh.
@@ -161,7 +161,7 @@ def test_two_findings_of_one_cause_have_a_picture_each(clean):
     assert page.index("Missing acceleration") < page.index('id="finding1"')
 
 
-def test_data_too_short_for_the_residuals_are_told_so(clean):
+def test_data_too_short_for_the_residuals_are_noted(clean):
     short = replace(
         clean.residuals,
         acceleration=clean.residuals.acceleration[:5],

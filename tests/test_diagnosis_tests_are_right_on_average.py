@@ -190,7 +190,7 @@ def test_standard_errors_of_factors_propagate_into_the_vessel_file():
     assert std["Y_v"] == 0.0
 
 
-def test_an_imitation_is_redundant_beside_the_true_cause_and_the_true_cause_is_not():
+def test_an_imitation_is_redundant_beside_the_true_cause_and_not_the_reverse():
     """A misaligned sensor that a drift term imitates: only the imitation is redundant, whichever is added first."""
     record = hidden_record("barge", seed=41, batches=3, samples=150, faults={"heading_bias": 0.04})
     extended = extended_model(vessel_of("barge"), record)

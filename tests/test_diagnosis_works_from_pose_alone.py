@@ -20,11 +20,9 @@ def pose_only(ship: str, *, smoothed: bool = False, wind: bool = True, **options
 
 def check(found, cause: str, name: str, truth: float) -> None:
     assert found.findings, f"{cause} was not found"
-    first = found.findings[0]
-    assert cause == first.cause or cause in first.not_distinguishable_from
-    for one in first.estimates:
-        if one.name == name:
-            assert abs(one.value - truth) < 4 * one.std + 0.002 * abs(truth)
+    assert found.findings[0].cause == cause
+    (one,) = [item for item in found.findings[0].estimates if item.name == name]
+    assert abs(one.value - truth) < 4 * one.std + 0.002 * abs(truth)
 
 
 def test_a_compass_that_shows_too_little_is_named():

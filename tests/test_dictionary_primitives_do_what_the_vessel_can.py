@@ -33,7 +33,7 @@ def departure(ship: Vessel, request: PrimitiveSpec) -> float:
 
 
 @pytest.mark.parametrize("request_", REQUESTS, ids=lambda request: request.family)
-def test_without_limits_the_run_follows_the_wish_to_second_order_in_the_sample_time(request_: PrimitiveSpec):
+def test_without_limits_the_run_follows_the_desired_motion_to_second_order_in_the_sample_time(request_: PrimitiveSpec):
     # Commands are held from the middle of each sample: an error of second order, so four times less at half the time.
     ship = with_limit(vessel("azimuth-30m-true"), Limit())
     ship = replace(ship, model=ship.model.with_parameters({n: 0.0 for n in ship.model.names if n.startswith("W_")}))

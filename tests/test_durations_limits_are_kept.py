@@ -69,6 +69,7 @@ def test_fractions_and_whole_runs_keep_every_limit_and_no_feasible_design_beats_
         if (v <= polytope.most).all() and costs @ v <= 900.0 and v.sum() <= 1:
             tried += 1
             assert collected.value(v) <= design.certificate.bound + 1e-9
+    assert tried > 0
     near = 0.999 * (design.fractions - polytope.least) + polytope.least
     assert collected.value(near) <= design.certificate.bound
     assert design.efficiency_repeats <= 1 + 1e-6

@@ -161,7 +161,7 @@ def test_a_mirrored_ship_gives_mirrored_parameters(method: str) -> None:
     np.testing.assert_allclose(other.std, one.std, rtol=1e-6)
 
 
-def test_what_a_constant_speed_run_cannot_tell_is_named() -> None:
+def test_parameters_that_a_constant_speed_run_cannot_identify_are_named() -> None:
     inputs = np.tile([10.0, 0.0, 10.0, 0.0], (200, 1))
     batch = measured(QUIET, inputs, velocity=(1.7, 0.0, 0.0))
     steady = replace(batch, velocity=np.tile(batch.velocity[-1], (200, 1)))

@@ -94,7 +94,7 @@ def test_a_qgroundcontrol_plan_obeys_its_guide_and_fences_the_allowed_water(rout
     assert all(fence.covers(shape({"type": "Point", "coordinates": place})) for place in places(route))
 
 
-def test_autopilots_are_told_the_speed_of_every_leg_before_it(route: Route) -> None:
+def test_missions_set_the_speed_before_every_leg(route: Route) -> None:
     speed, ordered, held = None, [], []
     for item in json.loads(written(route, "qgc"))["mission"]["items"]:
         if item["command"] == DO_CHANGE_SPEED:
@@ -129,7 +129,7 @@ def test_geojson_polygons_follow_the_right_hand_rule() -> None:
         assert not any(LinearRing(hole).is_ccw for hole in holes)
 
 
-def test_schedules_tell_speeds_and_times_in_order() -> None:
+def test_schedules_give_speeds_and_times_in_order() -> None:
     route = routes()["plain"]
     elements = etree.fromstring(written(route, "rtz")).findall(".//{*}scheduleElement")
     times = [datetime.fromisoformat(e.get("eta")) for e in elements[1:]]

@@ -59,7 +59,7 @@ def test_the_footprint_of_a_straight_run_reaches_from_its_start_to_a_corner_of_t
     assert ahead["footprint_radius_m"] == pytest.approx(math.hypot(reach, case.tug().beam_m / 2), rel=1e-12)
 
 
-def test_the_durations_file_carries_its_own_proof() -> None:
+def test_the_durations_file_contains_its_certificate() -> None:
     file = strictly(durations_json(case.design()))
     primitives = file["primitives"]
     assert sum(entry["fraction"] for entry in primitives) == pytest.approx(1.0, abs=1e-12)
@@ -79,7 +79,7 @@ def test_a_missing_certificate_is_null_and_never_nan() -> None:
         strict_json({"value": math.nan})
 
 
-def test_text_in_json_is_left_as_it_is() -> None:
+def test_text_in_json_is_unchanged() -> None:
     odd = {"name": "[ 1, 2 ]\n  [3]", "list": [1.5, -2.0], "nested": [[0.1, 1e-30], [2.0, 3.0]], "empty": []}
     assert json.loads(strict_json(odd)) == odd
 

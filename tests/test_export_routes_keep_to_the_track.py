@@ -173,7 +173,7 @@ def test_the_stated_distance_bounds_what_is_measured_on_the_files_own_positions(
     assert max(route.fit.loxodrome_m, route.fit.orthodrome_m) < 0.01
 
 
-def test_a_long_leg_shows_how_far_a_rhumb_line_strays_from_a_great_circle() -> None:
+def test_a_long_leg_shows_how_far_a_rhumb_line_deviates_from_a_great_circle() -> None:
     """By d^2 tan(lat) / (8 R) in the middle of an east-west leg."""
     points = np.stack([np.zeros(2), np.array([-5000.0, 5000.0])], axis=1)
     fit = build_route(track_along(points), tolerance_m=20.0).fit

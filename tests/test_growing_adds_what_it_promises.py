@@ -12,7 +12,7 @@ from expdesign.dictionary.batch import excite_many
 from expdesign.durations import bordered, build_durations, solve_durations
 from expdesign.errors import InputError, UnknownName
 from expdesign.growing.loop import grow_dictionary, motion_limits
-from expdesign.growing.optimum import optimum, sensitivity
+from expdesign.growing.optimal_design import optimum, sensitivity
 from expdesign.growing.search import violation
 from expdesign.growing.space import family_spaces
 from expdesign.growing.values import GrowSettings, Growth

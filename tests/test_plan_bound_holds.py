@@ -161,7 +161,7 @@ def test_a_leg_in_wind_takes_no_less_than_the_bound(wind):
     water = replace(leg_water(OPEN), vessel=windy(0.1), environment=sea)
     water = replace(water, ship=capability(water.vessel, PlanSettings()))
     rest = np.r_[water.environment.current_to, 0.0]  # heading north
-    start, end = np.r_[-100.0, 0.0, 0.0, rest], np.r_[100.0, 0.0, 0.0, rest]
+    start, end = np.r_[-60.0, 0.0, 0.0, rest], np.r_[60.0, 0.0, 0.0, rest]
     bound_s = reposition_bound_s(
         water.vessel,
         water.area,

@@ -67,7 +67,7 @@ def test_the_security_zone_is_closed_and_said(harbour):
     assert any("1 areas closed by rule: entry restricted" in note for note in harbour.notes)
 
 
-def test_edition_updates_and_datum_are_told(harbour):
+def test_edition_updates_and_datum_are_reported(harbour):
     assert any("edition 40, updates 1 to 4 applied, issued 2020-06-26" in note for note in harbour.notes)
     assert any("mean lower low water" in note for note in harbour.notes)
 

@@ -36,7 +36,7 @@ def test_a_ship_adrift_in_a_steady_current_goes_where_the_water_goes(heading: fl
     np.testing.assert_allclose(run.pose[:, :2], (5.0, 6.0) + run.time_s[:, None] * current, atol=1e-10)
 
 
-def test_a_straight_course_in_a_current_is_the_calm_one_carried_along():
+def test_a_straight_course_in_a_current_is_the_calm_one_displaced_by_the_current():
     straight = commands(np.tile([10.0, 0.0, 10.0, 0.0], (100, 1)))
     current = np.array([0.4, -0.3])
     heading = 0.8

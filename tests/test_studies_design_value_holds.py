@@ -76,7 +76,7 @@ def test_without_noise_every_way_of_sailing_gives_the_truth(case: Case, monkeypa
     assert (simulation_errors(case.truth, case.nominal, found.estimates) < 1e-6).all()
 
 
-def test_a_trial_that_never_turns_tells_nothing_of_turning(case: Case):
+def test_a_trial_without_turns_has_no_information_about_turning(case: Case):
     segments = [Segment(chosen=np.zeros(3, dtype=int), samples=300)]
     found = voyages(case.truth, case.nominal, case.primitives, segments, rng=np.random.default_rng(0))
     assert np.isnan(found.estimates).any()

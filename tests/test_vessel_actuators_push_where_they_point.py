@@ -69,7 +69,7 @@ def test_each_kind_pushes_along_its_axis_and_turns_by_its_lever(actuator: Actuat
     np.testing.assert_allclose(given_force((actuator,), np.array(command)), force, atol=1e-14)
 
 
-def test_columns_carry_the_units_of_their_signals():
+def test_columns_have_the_units_of_their_signals():
     assert [column_name(s) for s in ("n1", "a12", "rudder1", "tau_x", "tau_psi")] == [
         "n1_rps", "a12_rad", "rudder1_rad", "tau_x", "tau_psi"
     ]  # fmt: skip
@@ -89,7 +89,7 @@ def test_the_force_matrix_is_the_force_of_unit_thrusts():
 
 
 @pytest.mark.parametrize("structure", ["manoeuvring-10", "manoeuvring-18"])
-def test_the_required_force_gives_the_wished_acceleration(structure: str):
+def test_the_required_force_gives_the_desired_acceleration(structure: str):
     rng = np.random.default_rng(1)
     size = {"manoeuvring-10": 10, "manoeuvring-18": 18}[structure]
     for _ in range(20):
@@ -132,7 +132,7 @@ def test_fewer_thrusters_come_as_close_as_they_can():
 
 
 @pytest.mark.parametrize("draw", range(5))
-def test_limits_and_rates_hold_whatever_is_wished(draw: int):
+def test_limits_and_rates_hold_whatever_is_desired(draw: int):
     rng = np.random.default_rng(draw)
     actuators = (
         azimuth(1, speed=Limit(low=-3, high=15, rate=1.5), angle=Limit(rate=0.25), forward_m=9.0),

@@ -85,7 +85,7 @@ def test_eulers_map_has_the_decay_that_samples_show_and_the_motion_its_own(tmp_p
 
 def test_without_noise_the_trapezoid_leaves_its_own_error_and_output_error_none(tmp_path: Path) -> None:
     """A decay a per sample shows as 2 tanh(a / 2) under the trapezoidal rule, 1 - exp(-a) under Euler's."""
-    path = write_run(tmp_path / "one.csv", quiet(MODEL_SHIP_TRUE), model_ship_commands(2000), substeps=8)
+    path = write_run(tmp_path / "one.csv", quiet(MODEL_SHIP_TRUE), model_ship_commands(1000), substeps=8)
     euler, trapezoid = (decay_of(tmp_path, path, "iv", name)["value"] for name in ("euler", "continuous"))
     assert euler == pytest.approx(np.expm1(TRUTH["N_r"]), rel=1e-3)
     assert trapezoid == pytest.approx(2 * np.tanh(TRUTH["N_r"] / 2), rel=1e-3)
@@ -169,7 +169,9 @@ def test_the_true_model_in_the_measured_wind_repeats_the_run(tmp_path: Path) -> 
 
 
 def test_wind_is_used_where_it_is_measured_and_modelled(tmp_path: Path) -> None:
-    path = write_run(tmp_path / "one.csv", TUG_TRUE, tug_commands(), velocity=(1.7, 0.7, 0), environment=WIND, **EULER)
+    path = write_run(
+        tmp_path / "one.csv", TUG_TRUE, tug_commands(1500), velocity=(1.7, 0.7, 0), environment=WIND, **EULER
+    )
     workflows.estimate([path], tmp_path / "out", vessel=TUG)
     found = estimates(tmp_path / "out")
     assert {"ls", "iv", "ls-air"} <= set(found)

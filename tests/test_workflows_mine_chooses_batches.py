@@ -141,14 +141,14 @@ def test_without_a_definite_part_the_magnitude_of_the_determinant_decides():
         (["--keep", "4", "--fixed", "X_uu"], 2, "X_uu"),
     ],
 )
-def test_wrong_wishes_are_one_line_and_leave_nothing(files, tmp_path, capsys, options, status, words):
+def test_wrong_options_give_one_line_and_no_files(files, tmp_path, capsys, options, status, words):
     out = tmp_path / "out"
     assert main(["mine", *map(str, files), "--vessel", str(SHIP), "--out", str(out), *options]) == status
     assert words in capsys.readouterr().err.strip().splitlines()[-1]
     assert not out.exists()
 
 
-def test_what_no_run_tells_is_named(files, tmp_path, capsys):
+def test_parameters_without_information_are_named(files, tmp_path, capsys):
     straight = str(files[0])
     out = tmp_path / "out"
     assert main(["mine", straight, "--vessel", str(SHIP), "--keep", "1", "--out", str(out)]) == 3

@@ -73,7 +73,7 @@ def test_the_rest_begins_at_the_last_row_in_metres_or_in_degrees(tmp_path, degre
     assert case.start.tolist() == state.pose.tolist()
 
 
-def test_the_last_file_tells_the_place(tmp_path):
+def test_the_last_file_gives_the_present_place(tmp_path):
     measured(tmp_path / "a.csv")
     last = measured(tmp_path / "b.csv", pose=(0.0, 0.0, 2.0))
     state = present_state(STORY, [tmp_path / "a.csv", tmp_path / "b.csv"])
@@ -126,7 +126,7 @@ def test_without_a_vessel_the_parameters_are_estimated_from_the_data(tmp_path):
     assert (state.ship.model.parameters != SHIP.model.parameters).all()
 
 
-def test_what_the_data_cannot_tell_stays_as_it_was_and_is_told(tmp_path):
+def test_parameters_that_the_data_cannot_identify_keep_their_values_and_are_named(tmp_path):
     values = wandering().values.copy()
     values[:, 1::2] = 0.0
     commands = Commands(sample_time_s=1.0, names=SHIP.model.inputs, values=values)
@@ -184,7 +184,7 @@ def test_the_vessel_files_weather_counts_only_where_the_scenario_has_none():
     assert same.wind_to.tolist() == [5.0, 0.0]
 
 
-def test_manoeuvres_that_the_ship_can_no_longer_do_are_left_out_and_told(tmp_path):
+def test_manoeuvres_that_the_ship_can_no_longer_do_are_left_out_and_named(tmp_path):
     measured(tmp_path / "a.csv")
     text = (SCENARIOS / "vessels/tender-20m.toml").read_text(encoding="utf-8")
     (tmp_path / "weak.toml").write_text(text.replace("X_mu = 0.012\n", "X_mu = 0.0045\n"), encoding="utf-8")
@@ -213,7 +213,7 @@ def test_the_rest_can_be_made_best_for_one_parameter(tmp_path):
 # what is told
 
 
-def test_the_rest_can_only_add_and_what_is_not_told_is_not_a_number():
+def test_the_rest_only_adds_information_and_unidentified_parameters_are_nan():
     straight = Commands(sample_time_s=1.0, names=SHIP.model.inputs, values=np.tile([8.0, 0.0, 8.0, 0.0], (60, 1)))
     ahead = TrialPart(commands=straight, velocity=np.zeros(3))
     both = (ahead, TrialPart(commands=wandering(), velocity=np.zeros(3)))
@@ -228,7 +228,7 @@ def test_the_rest_can_only_add_and_what_is_not_told_is_not_a_number():
     )
 
 
-def test_a_parameter_is_bought_by_the_runs_that_tell_of_it():
+def test_the_runs_credited_with_a_parameter_have_the_information_about_it():
     problem = DurationProblem(
         names=("of a", "of b"),
         parameters=("a", "b"),

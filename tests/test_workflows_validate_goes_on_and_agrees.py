@@ -35,7 +35,7 @@ def test_an_interrupted_call_goes_on_and_gives_the_same(tmp_path):
     assert resumed.files[0].read_text("utf-8") == whole.files[0].read_text("utf-8")
 
 
-def test_the_file_holds_what_the_page_tells(tmp_path):
+def test_the_page_shows_what_the_file_holds(tmp_path):
     outcome = workflows.validate_design(MODEL_SHIP, tmp_path, **OPTIONS)
     content = json.loads(outcome.files[0].read_text("utf-8"))
     page = outcome.files[1].read_text("utf-8")
@@ -62,7 +62,7 @@ def test_the_file_holds_what_the_page_tells(tmp_path):
         (("--truth", str(SCENARIOS / "vessels" / "azimuth-30m.toml")), "expected the same actuators"),
     ],
 )
-def test_wrong_wishes_are_one_line_and_leave_nothing(tmp_path, capsys, options, words):
+def test_wrong_options_give_one_line_and_no_files(tmp_path, capsys, options, words):
     assert main(["validate", str(MODEL_SHIP), "--out", str(tmp_path / "out"), "--jobs", "1", *options]) == 2
     error = capsys.readouterr().err.strip().splitlines()[-1]
     assert words in error

@@ -68,7 +68,7 @@ def test_a_position_in_other_keys_replaces_the_first(tmp_path):
     assert np.allclose(load_variant(MODEL_SHIP, other).scenario.start, base.start, atol=1e-3)
 
 
-def test_a_variant_without_answer_is_told_beside_the_others(tmp_path):
+def test_a_variant_without_answer_is_listed_beside_the_others(tmp_path):
     alone = variant(tmp_path, "circles-only", f"[design]\nexcluded = {json.dumps(_all_but_first())}\n")
     found = cases(workflows.whatif(MODEL_SHIP, [alone], tmp_path / "out", jobs=1))
     assert "cannot tell these parameters apart" in found["circles-only"]["problem"]

@@ -6,7 +6,7 @@ from expdesign.lazy import load_on_use
 
 if TYPE_CHECKING:
     from expdesign.growing.loop import grow_dictionary
-    from expdesign.growing.optimum import optimum, shared
+    from expdesign.growing.optimal_design import optimum, shared
     from expdesign.growing.values import GrowRound, GrowSettings, Growth
 
 __all__ = ["GrowRound", "GrowSettings", "Growth", "grow_dictionary", "optimum", "shared"]
@@ -16,7 +16,7 @@ if not TYPE_CHECKING:
         __name__,
         {
             "loop": ("grow_dictionary",),
-            "optimum": ("optimum", "shared"),
+            "optimal_design": ("optimum", "shared"),
             "values": ("GrowRound", "GrowSettings", "Growth"),
         },
     )

@@ -17,7 +17,7 @@ import numpy as np
 from expdesign.dictionary import FAMILIES, Primitive, PrimitiveSpec, build_primitive, family
 from expdesign.errors import InputError, UnknownName
 from expdesign.growing._casadi import FreeForm, optimise_commands
-from expdesign.growing.optimum import Optimum, optimum, sensitivity
+from expdesign.growing.optimal_design import Optimum, optimum, sensitivity
 from expdesign.growing.search import Measure, best_of, pool_of, refined, violation
 from expdesign.growing.space import FamilySpace, family_spaces
 from expdesign.growing.values import GrowRound, GrowSettings, Growth

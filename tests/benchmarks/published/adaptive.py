@@ -31,7 +31,7 @@ from expdesign.scenario import load_dictionary, load_vessel
 from expdesign.simulation import Conduct, Environment, pull_out, steady_ahead, stopping, turning_circle, zigzag
 from expdesign.vessel import Vessel
 
-SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
+SCENARIOS = Path(__file__).resolve().parents[3] / "scenarios"
 WIND = Environment(wind_to=np.array([3.0, 2.0]))
 """As in scenarios/helsinki.toml: without wind its parameters cannot be estimated."""
 RUN_S = 120.0

@@ -69,7 +69,7 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("line", "key", "words"), WRONG)
-def test_wrong_wishes_are_refused_with_their_place(tmp_path: Path, line: str, key: str, words: str):
+def test_invalid_settings_are_refused_with_file_and_key(tmp_path: Path, line: str, key: str, words: str):
     path = write_scenario(tmp_path)
     spoil(path, 'criterion = "D"', line)
     with pytest.raises(FileError) as caught:

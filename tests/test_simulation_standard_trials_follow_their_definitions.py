@@ -83,7 +83,7 @@ def test_the_approach_is_steady(kind: str) -> None:
     assert np.allclose(motion.velocity, start.velocity, atol=1e-8)
 
 
-def test_a_ship_that_carries_helm_is_held_straight_and_zigzags_about_its_own_neutral_angle() -> None:
+def test_a_ship_with_a_neutral_helm_angle_is_held_straight_and_zigzags_about_it() -> None:
     ship = nomoto_ship(bias=0.03)
     assert steady_ahead(ship, 7.0).angle_rad == pytest.approx(-0.03)
     commands, _ = zigzag(ship, heading_rad=TEN, helm_rad=TEN)

@@ -173,12 +173,12 @@ def test_several_numbers_are_tested_together():
 
 def test_a_block_of_parameters_is_replaced_by_the_one_effect_behind_it(monkeypatch):
     """While a change during the trial is unknown, a heavier ship looks like a block of yaw parameters."""
-    effects = {"load_r": 0.35, "change_s": 700.0, "change_gain": 0.25}
-    record = hidden_record("barge", seed=44, batches=6, samples=200, effects=effects)
+    effects = {"load_r": 0.35, "change_s": 350.0, "change_gain": 0.25}
+    record = hidden_record("barge", seed=44, batches=4, samples=150, effects=effects)
     extended = extended_model(vessel_of("barge"), record)
     windows = cut_windows(extended.model, record)
     block = Candidate(cause="parameters", free={f"theta:{name}": 0.0 for name in ("N_r", "N_uv", "N_mu")})
-    change = Candidate(cause="change_point", free={"change:gain": 0.0}, fixed={"change:time": 700.0})
+    change = Candidate(cause="change_point", free={"change:gain": 0.0}, fixed={"change:time": 350.0})
     start = initial_states(windows)
     rounds = iter((block, change))
     real = select_forward.__globals__["selection_round"]
@@ -193,7 +193,9 @@ def test_a_block_of_parameters_is_replaced_by_the_one_effect_behind_it(monkeypat
 
     monkeypatch.setitem(select_forward.__globals__, "selection_round", scripted)
     found = select_forward(extended, windows, start, np.random.default_rng(0), lambda what, share: None)
-    assert {step.chosen.candidate.cause for step in found.steps} == {"change_point", "load_change"}
+    causes = {step.chosen.candidate.cause for step in found.steps}
+    assert {"change_point", "load_change"} <= causes
+    assert "parameters" not in causes
     assert abs(found.last.value("inertia:r") - 0.35) < 3 * found.last.std("inertia:r") + 0.01
 
 

@@ -14,6 +14,7 @@ from lxml import etree
 import export_case as case
 from expdesign.durations import MEAN_SUBTRACTIONS, build_durations, solve_durations
 from expdesign.export import build_route, words
+from expdesign.export.report import page as report_page
 from expdesign.export.report import report_html
 from expdesign.export.report.checks import least_charted_depth
 from expdesign.export.report.content import information_rate, primitive_runs, relative_information
@@ -63,6 +64,15 @@ def page() -> str:
     return report_html(case.report_content())
 
 
+@pytest.fixture
+def _no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pages of which only the words are read are not drawn."""
+    names = ("chart", "durations", "information", "timeline", "uncertainty")
+    drawn = dict.fromkeys(names, "") | {"primitives": [""] * len(case.scored())}
+    monkeypatch.setattr(report_page, "_figures", lambda content, after: drawn)
+
+
+@cache
 def odd_page(name: str = ODD) -> str:
     renamed = replace(case.scored()[0].primitive, name=name)
     information = (replace(case.scored()[0], primitive=renamed), *case.scored()[1:])
@@ -110,7 +120,7 @@ def test_odd_names_are_shown_and_never_run() -> None:
     assert 'x <script>alert(1)</script> & "$\\alpha$" $ \N{REPLACEMENT CHARACTER} \N{SNOWMAN}' in read.text
 
 
-def test_a_very_long_name_is_told_whole_and_cut_only_beside_axes() -> None:
+def test_a_very_long_name_is_whole_in_the_text_and_cut_only_beside_axes() -> None:
     long = "a very long name " * 30 + "end"
     html = odd_page(long)  # a figure squeezed by a name would be a warning, and so an error
     assert Page(html).text.count(long) >= 6
@@ -143,6 +153,7 @@ def test_the_page_says_what_the_values_say() -> None:
     assert all(name in text for name in (*design.problem.names, *design.problem.parameters))
 
 
+@pytest.mark.usefixtures("_no_figures")
 def test_a_plan_that_is_not_verified_is_called_that() -> None:
     text = Page(report_html(case.report_content(plan=case.unverified()))).text
     assert "not verified: do not sail" in text
@@ -264,18 +275,20 @@ def growth_of(name: str) -> Growth:
     )  # fmt: skip
 
 
-def test_what_was_added_to_the_dictionary_is_told_with_what_it_brought() -> None:
+@pytest.mark.usefixtures("_no_figures")
+def test_additions_to_the_dictionary_are_reported_with_their_gain() -> None:
     told = Page(report_html(case.report_content(growth=growth_of("found-1")))).text.replace("\N{NO-BREAK SPACE}", " ")
     assert "1 found-1 steps; speed 1.5 m/s, duration 60 s 20.25 +2.125 125 % holds" in told
     assert "2 found-1 steps; speed 1.5 m/s, duration 60 s 19.25 +2.125 225 % does not hold" in told
     assert "The search evaluated 321 candidates, with u from 0.00 to 3.00 m/s" in told
     assert f"at least {100 * math.exp(-0.05):.1f} % among all evaluated candidates" in told
-    assert "Manoeuvres added by the search" not in page()
+    assert "Manoeuvres added by the search" not in report_html(case.report_content())
     empty = Page(report_html(case.report_content(growth=replace(growth_of("x"), rounds=())))).text
     assert "The search found no manoeuvre that improves the design." in empty
     assert "<script>" not in report_html(case.report_content(growth=growth_of(ODD)))
 
 
+@pytest.mark.usefixtures("_no_figures")
 @pytest.mark.parametrize("deep", [True, False])
 def test_a_chart_without_depths_is_called_that_before_anything_else(deep: bool) -> None:
     area = case.plan().area

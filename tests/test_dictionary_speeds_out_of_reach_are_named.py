@@ -41,12 +41,12 @@ def test_a_ship_with_a_rudder_reaches_what_full_ahead_holds(family):
     steady_ahead(ship, 0.999 * reached)
 
 
-def test_motion_beyond_the_actuators_names_all_that_is_wished_for():
+def test_motion_beyond_the_actuators_is_named_completely():
     text = told("model-ship", "inward_spiral", duration_s=10, speed_mps=5, yaw_rate_radps=0.1)
     assert "cannot hold its entry state u = 5 m/s" in text
 
 
-def test_astern_is_told_astern():
+def test_speeds_astern_are_called_astern():
     text = told("model-ship", "deceleration", duration_s=10, speed_mps=-20)
     wished, reached = (float(x) for x in re.findall(r"u = (-[\d.]+) m/s", text))
     assert wished == -20

@@ -40,7 +40,7 @@ def line_of(capsys: pytest.CaptureFixture[str]) -> str:
         ("--vessel missing.toml", "missing.toml"),
     ],
 )
-def test_wrong_wishes_are_one_line_and_no_file(
+def test_wrong_options_give_one_line_and_no_file(
     run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], options: str, named: str
 ) -> None:
     typed = options.replace("RUN", str(run)).split()
@@ -72,7 +72,7 @@ def test_bad_data_are_one_line_and_no_file(
     assert not (tmp_path / "out").exists()
 
 
-def test_a_trial_that_tells_nothing_of_a_parameter_names_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_parameter_without_information_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """No side force, ever: Y_mu cannot be seen."""
     values = model_ship_commands(800).values * (1, 0, 1)
     commands = Commands(sample_time_s=0.125, names=MODEL_SHIP_TRUE.model.inputs, values=values)

@@ -108,7 +108,7 @@ def test_a_repeated_reading_repeats_its_noise_and_new_ones_are_independent():
     assert abs(np.corrcoef(readings[1:], readings[:-1])[0, 1]) < 5 / np.sqrt(len(readings) - 1)
 
 
-def test_a_quiet_vane_tells_the_same_as_a_quiet_cartesian_sensor():
+def test_a_vane_without_noise_agrees_with_a_cartesian_sensor_without_noise():
     flat, vane = (seen(Sensors(wind_sensor=kind), TURN, WIND) for kind in ("cartesian", "vane"))
     for name in ("wind_u_mps", "wind_v_mps"):
         np.testing.assert_allclose(vane[name], flat[name], atol=1e-12)

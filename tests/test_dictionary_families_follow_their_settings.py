@@ -64,7 +64,7 @@ def test_a_turning_circle_settles_on_the_radius_of_its_speed_over_its_yaw_rate(s
     assert (np.sign(r) == np.sign(rate)).all()
 
 
-def test_a_turning_circle_drifts_outwards_as_told():
+def test_a_turning_circle_drifts_outwards_as_commanded():
     reference = wished(
         "turning_circle", speed_mps=1.1, turn_speed_mps=0.8, yaw_rate_radps=0.1, entry_s=15.0, sway_mps=0.2
     )

@@ -261,7 +261,7 @@ def test_inputs_come_in_the_order_of_the_vessel(tmp_path: Path) -> None:
     assert load_records(path, vessel_inputs=()).batches[0].inputs.shape == (80, 0)
 
 
-def test_files_with_the_same_name_are_told_apart(tmp_path: Path) -> None:
+def test_files_with_the_same_name_are_distinguished(tmp_path: Path) -> None:
     paths = [tmp_path / folder / "trial.csv" for folder in ("a", "b")]
     for path in paths:
         path.parent.mkdir()
