@@ -43,7 +43,7 @@ from expdesign.plan.bounds.displacement import Displacement, Headway, differs_by
 from expdesign.plan.bounds.tuning import BOUNDS
 from expdesign.plan.chart import build_visibility_graph, simplified
 from expdesign.plan.control import LegEnd, least_loss, leg_end
-from expdesign.plan.legs import BEYOND_ENDS, leg_speed_mps
+from expdesign.plan.legs import LEGS, leg_speed_mps
 from expdesign.sea_area import SeaArea
 from expdesign.simulation import Environment
 from expdesign.values import Array
@@ -77,7 +77,7 @@ def reposition_bound_s(
     entries = [item.entry_velocity for item in runs]
     speed_mps = leg_speed_mps(transit_mps, [*entries, *(np.array([most, 0.0]) for _, most, _ in exits)])
     turns = [*(abs(float(entry[2])) for entry in entries), *(turn for _, _, turn in exits)]
-    yaw_rate_radps = max([yaw_rate_radps, *(BEYOND_ENDS * turn for turn in turns)])
+    yaw_rate_radps = max([yaw_rate_radps, *(LEGS.beyond_ends * turn for turn in turns)])
     headway = Headway(speed_mps=speed_mps, current_to=environment.current_to)
     displacements = {item.name: displacement_of(vessel, item, environment, headway) for item in runs}
     counts = {item.name: repeats[item.name] for item in runs}

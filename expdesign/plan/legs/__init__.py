@@ -6,10 +6,11 @@ from expdesign.plan.legs.dubins import curved_leg
 from expdesign.plan.legs.escape_check import check_ends
 from expdesign.plan.legs.helm import helm_leg
 from expdesign.plan.legs.recovery import displaced, recover
-from expdesign.plan.legs.water import BEYOND_ENDS, LegTask, LegWater, last_state, leg_speed_mps, nearest_turns
+from expdesign.plan.legs.tuning import LEGS
+from expdesign.plan.legs.water import LegTask, LegWater, last_state, leg_speed_mps, nearest_turns
 
 __all__ = [
-    "BEYOND_ENDS",
+    "LEGS",
     "LegTask",
     "LegWater",
     "agile_leg",

@@ -1,4 +1,4 @@
-"""The only door to CasADi and IPOPT: fastest smooth commands between two states, within limits and a region.
+"""The planner's only use of CasADi and IPOPT: fastest smooth commands between states, within limits and a region.
 
 Direct multiple shooting on the very map that simulates the trial: commands are linear between nodes, sampled and held,
 and each sample is integrated with the simulation's Runge-Kutta steps. Programs of one size are built once and reused:
@@ -19,6 +19,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from expdesign.plan.legs.tuning import LEGS
 from expdesign.plan.work_budget import WorkBudget
 from expdesign.simulation import Environment, motion_rates, rk4_step, sample_map
 from expdesign.simulation.run import SUBSTEPS
@@ -26,21 +27,11 @@ from expdesign.values import Array, seal
 from expdesign.vessel import Operators, Vessel
 
 CASADI = Operators(ca.fabs, ca.sin, ca.cos)
-SMOOTHNESS = 0.02
-"""Weight of squared command steps against time in units of `LegProblem.time_scale_s`."""
-SMALLNESS = 1e-4
-"""Weight of squared commands: decides between commands that give the same force."""
-NODES = (12, 18, 24, 32, 44, 60, 80, 110, 160)
-"""Numbers of nodes tried while the time is free."""
-SETTLED = 1e-4
-"""How near what lagging actuators deliver must be to the end's commands, relative to the largest."""
-PROGRAMS = 24
-"""Programs kept built."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LegProblem:
-    """A leg to be made into commands.
+    """An optimal control problem for a leg.
 
     Attributes:
         vessel: model, actuator limits and rates.
@@ -59,9 +50,9 @@ class LegProblem:
         top_speed_mps, yaw_rate_radps: bounds on speed through water, in any direction, and yaw rate at the nodes.
         lateral_mps2: bound on surge speed through water times yaw rate.
         node_s: least time between nodes; 0 for the sample time.
-        wish: (2,) seconds that a metre made good north and east is worth to legs that may end anywhere, and if it is
-            zero with any heading; None for those that have to end at `end`.
-        budget: that may be spent, and that is; without any left, nothing is found.
+        displacement_value: (2,) value of displacement to north and east [s/m] for legs that may end anywhere, if it is
+            zero with any heading; None for legs that end at `end`.
+        budget: work budget; once it is exhausted, nothing is found.
     """
 
     vessel: Vessel
@@ -85,7 +76,7 @@ class LegProblem:
     yaw_rate_radps: float
     lateral_mps2: float
     node_s: float = 0.0
-    wish: Array | None = None
+    displacement_value: Array | None = None
     budget: WorkBudget = field(default_factory=WorkBudget)
 
     def __post_init__(self) -> None:
@@ -95,7 +86,7 @@ class LegProblem:
 
 
 def solve_transition(problem: LegProblem) -> tuple[float, Array] | None:
-    """Time of the leg that gains most by its `wish`, on whole samples, and its end pose (3,); None if none is found."""
+    """Time on whole samples and end pose (3,) of the leg with the least time less the value of displacement, or None."""
     sample_s, duration_s = problem.vessel.sample_time_s, problem.duration_s
     nodes, block = _size(problem, duration_s)
     fastest = _program(problem.vessel, problem.environment, nodes, block, True)
@@ -119,7 +110,7 @@ def _even(problem: LegProblem) -> LegProblem:
 def _size(problem: LegProblem, duration_s: float) -> tuple[int, int]:
     """Number of nodes for a leg of some time, and samples between two of them."""
     sample_s = problem.vessel.sample_time_s
-    nodes = next((n for n in NODES if n >= duration_s / max(sample_s, problem.node_s)), NODES[-1])
+    nodes = next((n for n in LEGS.nodes if n >= duration_s / max(sample_s, problem.node_s)), LEGS.nodes[-1])
     return nodes, max(1, round(duration_s / (nodes * sample_s)))
 
 
@@ -190,7 +181,11 @@ class _Program:
     def _build(self) -> None:
         j, m = self.nodes, len(self.limits)
         x, u, h = ca.MX.sym("x", 6, j + 1), ca.MX.sym("u", m, j + 1), ca.MX.sym("h")
-        path, circle, wish = ca.MX.sym("path", 3, j - 1), ca.MX.sym("circle", 2), ca.MX.sym("wish", 2)
+        path, circle, displacement_value = (
+            ca.MX.sym("path", 3, j - 1),
+            ca.MX.sym("circle", 2),
+            ca.MX.sym("displacement_value", 2),
+        )
         unit_s, arm = ca.MX.sym("unit_s"), ca.MX.sym("arm")
         past, d = ca.MX.sym("past", m, self.memory), ca.MX.sym("d", len(self.lagging), j + 1)
         inputs = ca.DM(self.input_scale) * u
@@ -207,14 +202,18 @@ class _Program:
         through = x[3:5, 1:-1] - self._current_b(x[2, 1:-1])
         rows += [ca.sum1(through**2).T, (through[0, :] * x[5, 1:-1]).T]
         steps = ca.diff(u, 1, 1)
-        cost = SMOOTHNESS * ca.sumsqr(steps) + SMALLNESS * ca.sumsqr(u) / j - ca.dot(wish, states[:2, -1]) / unit_s
+        cost = (
+            LEGS.smoothness * ca.sumsqr(steps)
+            + LEGS.smallness * ca.sumsqr(u) / j
+            - ca.dot(displacement_value, states[:2, -1]) / unit_s
+        )
         if self.free:
             cost = cost + h * j * self.block / unit_s
         options: dict[str, Any] = {"print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}
         options |= {"ipopt.max_iter": 100, "ipopt.constr_viol_tol": 1e-9, "ipopt.acceptable_iter": 0}
         options |= {"ipopt.tol": 1e-5 if self.free else 1e-7}
         nlp: Any = {"x": ca.vertcat(ca.vec(x), ca.vec(u), ca.vec(d), h), "f": cost, "g": ca.vertcat(*rows)}
-        nlp["p"] = ca.vertcat(ca.vec(path), circle, wish, unit_s, arm, ca.vec(past))
+        nlp["p"] = ca.vertcat(ca.vec(path), circle, displacement_value, unit_s, arm, ca.vec(past))
         self.solver = ca.nlpsol("leg", "ipopt", nlp, options)
 
     @property
@@ -303,8 +302,11 @@ class _Program:
         low = -high
         low[0] = high[0] = (problem.start - origin) / self.state_scale
         low[-1] = high[-1] = (problem.end - origin) / self.state_scale
-        if problem.wish is not None:
-            low[-1, : 2 if problem.wish.any() else 3], high[-1, : 2 if problem.wish.any() else 3] = -np.inf, np.inf
+        if problem.displacement_value is not None:
+            (
+                low[-1, : 2 if problem.displacement_value.any() else 3],
+                high[-1, : 2 if problem.displacement_value.any() else 3],
+            ) = -np.inf, np.inf
         first, last = (np.tile([getattr(x, name) for x in self.limits], (j + 1, 1)) for name in ("low", "high"))
         first[0] = last[0] = problem.start_inputs
         for index, response in enumerate(self.vessel.responses):  # nothing may still be on its way at the end
@@ -315,7 +317,7 @@ class _Program:
         least, most = (np.full((j + 1, len(self.lagging)), sign * np.inf) for sign in (-1, 1))
         scale = self.input_scale[self.lagging]
         least[0] = most[0] = ends[0] / scale
-        least[-1], most[-1] = ends[1] / scale - SETTLED, ends[1] / scale + SETTLED
+        least[-1], most[-1] = ends[1] / scale - LEGS.settled, ends[1] / scale + LEGS.settled
         sample_s = self.vessel.sample_time_s
         times = (0.2 * sample_s, 3.0 * sample_s) if self.free else (sample_s, sample_s)
         return (
@@ -345,7 +347,7 @@ class _Program:
             p=np.r_[
                 path.ravel(),
                 problem.circle[:2] - origin[:2],
-                np.zeros(2) if problem.wish is None else problem.wish,
+                np.zeros(2) if problem.displacement_value is None else problem.displacement_value,
                 problem.time_scale_s,
                 problem.hull_arm_m,
                 past.ravel(),
@@ -373,6 +375,6 @@ def _mixed(weights: Array, start: Any, early: Any, late: Any) -> Any:
     return sum(parts[1:], parts[0]) if parts else 0.0
 
 
-@lru_cache(maxsize=PROGRAMS)
+@lru_cache(maxsize=LEGS.programs)
 def _program(vessel: Vessel, environment: Environment, nodes: int, block: int, free_time: bool) -> _Program:
     return _Program(vessel, environment, nodes, block, free_time)

@@ -1,7 +1,7 @@
-"""Legs of agile vessels: turn and gather speed, follow the way, turn and slow down.
+"""Legs of agile vessels: turn and accelerate, follow the path, turn and slow down.
 
-Short legs, straight ones of some length, and both ends of long ones are optimised; the middle of a long leg, steady but
-for bends, is steered.
+Short legs, straight ones of some length, and both ends of long ones are optimised. The middle of a long leg is tracked
+in closed loop.
 """
 
 from __future__ import annotations
@@ -16,24 +16,15 @@ from expdesign.plan.chart import polyline_length
 from expdesign.plan.control import AgileShip, Helmsman, Reference
 from expdesign.plan.legs._casadi import LegProblem, solve_leg, solve_transition
 from expdesign.plan.legs.problem import hull_discs, leg_problem
+from expdesign.plan.legs.tuning import LEGS
 from expdesign.plan.legs.water import LegTask, LegWater, acceptable, last_state, nearest_turns
 from expdesign.values import Array
 from expdesign.vessel import allocate, required_force
 
-GUESS_NODES = 40
-MOST_NODES = 24
-"""Nodes of joints that are tried."""
-WHOLE = 100.0
-"""Samples up to which straight legs are optimised as a whole."""
-MOST_REMEMBERED = 5000
-"""Commands looked back at while steering."""
-BENDS = (1.5, 0.8, 0.4)
-"""Lengths over which bends of a way are rounded, in turning radii."""
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Line:
-    """A rounded way.
+    """A path with rounded bends.
 
     Attributes:
         points: (k, 2) north/east.
@@ -62,12 +53,12 @@ class Line:
 
 def agile_leg(task: LegTask, water: LegWater, ship: AgileShip) -> Array | None:
     """Commands (k, m) from one state to the other, or None."""
-    for way in water.candidate_paths(task.start[:2], task.end[:2]):
-        line = _line(water, way)
+    for path in water.candidate_paths(task.start[:2], task.end[:2]):
+        line = _line(water, path)
         first_m, last_m = _end_lengths(task, water, ship, line)
         short = line.length_m < first_m + last_m + 2 * water.vessel.length_m
-        brief_m = WHOLE * water.vessel.sample_time_s * water.ship.transit_speed_mps
-        whole = short or (len(way) == 2 and line.length_m < brief_m)  # loses less, where it is not too much to ask
+        brief_m = LEGS.whole_samples * water.vessel.sample_time_s * water.ship.transit_speed_mps
+        whole = short or (len(path) == 2 and line.length_m < brief_m)  # loses less time, where it is small enough
         values = _optimised(task, water, ship, line) if whole else None
         if values is None and not short:
             values = _in_parts(task, water, ship, line, first_m, last_m)
@@ -76,26 +67,26 @@ def agile_leg(task: LegTask, water: LegWater, ship: AgileShip) -> Array | None:
     return None
 
 
-def _line(water: LegWater, way: Array) -> Line:
-    """A way with its bends rounded as widely as the water allows."""
-    for share in BENDS:
+def _line(water: LegWater, path: Array) -> Line:
+    """A path with its bends rounded as widely as the water allows."""
+    for share in LEGS.bend_radii:
         window_m = share * water.ship.turning_radius_m
-        line = rounded(way, window_m=window_m, spacing_m=water.vessel.length_m / 6)
-        if share == BENDS[-1] or len(way) < 3 or water.holds(line.at(line.along_m)):
+        line = rounded(path, window_m=window_m, spacing_m=water.vessel.length_m / 6)
+        if share == LEGS.bend_radii[-1] or len(path) < 3 or water.holds(line.at(line.along_m)):
             break
     return line
 
 
-def rounded(way: Array, *, window_m: float, spacing_m: float) -> Line:
-    """A way (k, 2) with its bends rounded by averaging over a window, its ends kept."""
-    steps = np.hypot(*np.diff(way, axis=0).T)
+def rounded(path: Array, *, window_m: float, spacing_m: float) -> Line:
+    """A path (k, 2) with its bends rounded by a moving average, its ends kept."""
+    steps = np.hypot(*np.diff(path, axis=0).T)
     along = np.r_[0.0, np.cumsum(steps)]
     if along[-1] < 1e-6:
-        return Line(points=np.array([way[0], way[0] + 1e-6]))
+        return Line(points=np.array([path[0], path[0] + 1e-6]))
     even = np.linspace(0.0, along[-1], max(2, int(np.ceil(along[-1] / spacing_m))) + 1)
     half = np.minimum(window_m / 2, np.minimum(even, along[-1] - even))
     columns = []
-    for values in way.T:
+    for values in path.T:
         mean = (_integral(along, values, even + half) - _integral(along, values, even - half)) / np.maximum(
             2 * half, 1e-12
         )
@@ -151,7 +142,7 @@ def _cut(line: Line, first_m: float, last_m: float) -> Line:
 
 
 def _steady(water: LegWater, line: Line, first_m: float, last_m: float, heading: float) -> tuple[Array, Array]:
-    """States (k + 1, 6) at every sample on the middle of a way at transit speed, and commands that hold the first."""
+    """States (k + 1, 6) at every sample on the middle of a path at transit speed, and commands that hold the first."""
     vessel, transit = water.vessel, water.ship.transit_speed_mps
     current = water.environment.current_to
     fine = np.arange(first_m, last_m, vessel.length_m / 12)
@@ -178,14 +169,14 @@ def _steady(water: LegWater, line: Line, first_m: float, last_m: float, heading:
 
 
 def _steered(water: LegWater, reference: Reference, state: Array, before: Array) -> tuple[Array, Array]:
-    """Commands (k, m) of the helmsman along a reference, and the state they end in, after commands (h, m)."""
+    """Closed-loop commands (k, m) along a reference, and the state they end in, after commands (h, m)."""
     helm = Helmsman(vessel=water.vessel, environment=water.environment, ship=water.ship)
     sample, given, first = np.zeros(1), list(water.remembered(before)), len(water.remembered(before))
     states = state[None]
     while sample[0] < len(reference.states) - 1:
         sample = sample + np.maximum(reference.pace(sample, states, water.vessel.length_m / 2), 0.2)
         row = helm.commands(reference.at(sample), states, given[-1][None])
-        past = None if water.prompt else water.remembered(np.array(given[-MOST_REMEMBERED:]))
+        past = None if water.prompt else water.remembered(np.array(given[-LEGS.remembered_commands :]))
         states = last_state(water.sail(states[0], row, past))[None]
         given.append(row[0])
     return np.array(given[first:]), states[0]
@@ -201,34 +192,34 @@ def _optimised(task: LegTask, water: LegWater, ship: AgileShip, line: Line) -> A
 
 
 def _problems(task: LegTask, water: LegWater, ship: AgileShip, line: Line) -> Iterator[LegProblem]:
-    """First guesses: the short way round, then, for great turns, the long one; each in its region of free water."""
+    """First guesses: the short turn, then, for large turns, the opposite one; each in its region of free water."""
     turn = float(wrap_angle(task.end[2] - task.start[2]))
-    ways = [turn] if abs(turn) < np.pi / 2 else [turn, turn - np.copysign(2 * np.pi, turn)]
-    for way in ways:
-        yield _problem(task, water, ship, line, way)
+    turns = [turn] if abs(turn) < np.pi / 2 else [turn, turn - np.copysign(2 * np.pi, turn)]
+    for angle in turns:
+        yield _problem(task, water, ship, line, angle)
 
 
-def free_leg(task: LegTask, water: LegWater, ship: AgileShip, wish: Array) -> tuple[float, Array] | None:
+def free_leg(task: LegTask, water: LegWater, ship: AgileShip, displacement_value: Array) -> tuple[float, Array] | None:
     """Time and end pose (3,) of the leg that gains most from a state, in open water, or None.
 
     Args:
-        task: its end tells heading, motion and commands; its place is only a first guess.
+        task: its end gives heading, motion and commands; its place is only a first guess.
         water: open water.
-        wish: (2,) seconds that a metre made good north and east is worth; zero when any end will do.
+        displacement_value: (2,) value of displacement to north and east [s/m]; zero where any end will do.
     """
     line = _line(water, np.stack([task.start[:2], task.end[:2]]))
     problems = (
-        replace(problem, wish=wish, node_s=problem.duration_s / MOST_NODES)
+        replace(problem, displacement_value=displacement_value, node_s=problem.duration_s / LEGS.transition_nodes)
         for problem in _problems(task, water, ship, line)
     )
     found = [answer for problem in problems if (answer := solve_transition(problem)) is not None]
-    return min(found, key=lambda answer: answer[0] - float(wish @ answer[1][:2]), default=None)
+    return min(found, key=lambda answer: answer[0] - float(displacement_value @ answer[1][:2]), default=None)
 
 
 def _problem(task: LegTask, water: LegWater, ship: AgileShip, line: Line, turn: float) -> LegProblem:
     duration_s = _duration_s(task, ship, line, turn)
     states = _guess(task, line, turn, duration_s)
-    path = line.at(np.linspace(0.0, line.length_m, GUESS_NODES + 1))
+    path = line.at(np.linspace(0.0, line.length_m, LEGS.guess_nodes + 1))
     problem = leg_problem(
         task,
         water,
@@ -262,15 +253,15 @@ def _circle(water: LegWater, line: Line, arm: float, margin_m: float) -> Array |
 
 def _duration_s(task: LegTask, ship: AgileShip, line: Line, turn: float) -> float:
     course = line.at(np.array([0.0, line.length_m]))[:, 2]
-    spot_s, way_s = 1.3 * abs(turn) / ship.swing_radps, line.length_m / ship.transit_speed_mps
+    spot_s, path_s = 1.3 * abs(turn) / ship.swing_radps, line.length_m / ship.transit_speed_mps
     if line.length_m > 0.1 * ship.turning_radius_m:
-        way_s += float(ship.turn_loss_s(task.start[2] - course[0], task.end[2] - course[1]))
-    return max(way_s, spot_s) + float(ship.speed_loss_s(task.start[3], task.end[3]))
+        path_s += float(ship.turn_loss_s(task.start[2] - course[0], task.end[2] - course[1]))
+    return max(path_s, spot_s) + float(ship.speed_loss_s(task.start[3], task.end[3]))
 
 
 def _guess(task: LegTask, line: Line, turn: float, duration_s: float) -> Array:
     """(j + 1, 6) states along a line, the heading turning evenly, velocities fitting the places."""
-    share = np.linspace(0.0, 1.0, GUESS_NODES + 1)[:, None]
+    share = np.linspace(0.0, 1.0, LEGS.guess_nodes + 1)[:, None]
     ends = np.stack([task.start, task.end])
     c, s = np.cos(ends[:, 2]), np.sin(ends[:, 2])
     tangents = duration_s * np.stack([ends[:, 3] * c - ends[:, 4] * s, ends[:, 3] * s + ends[:, 4] * c], axis=1)
@@ -278,7 +269,7 @@ def _guess(task: LegTask, line: Line, turn: float, duration_s: float) -> Array:
     place = line.at(smooth[:, 0] * line.length_m)[:, :2] + (task.start[:2] - line.points[0]) * (1 - smooth)
     place += (share - 2 * share**2 + share**3) * tangents[0] + (share**3 - share**2) * tangents[1]
     heading = task.start[2] + smooth[:, 0] * turn
-    step_s = duration_s / GUESS_NODES
+    step_s = duration_s / LEGS.guess_nodes
     motion = np.gradient(place, step_s, axis=0)
     c, s = np.cos(heading), np.sin(heading)
     states = np.column_stack(
@@ -297,7 +288,7 @@ def _guess(task: LegTask, line: Line, turn: float, duration_s: float) -> Array:
 
 def _guessed_inputs(task: LegTask, water: LegWater, states: Array, duration_s: float) -> Array:
     """Commands (j + 1, m) that would give the guessed motion."""
-    vessel, step_s = water.vessel, duration_s / GUESS_NODES
+    vessel, step_s = water.vessel, duration_s / LEGS.guess_nodes
     force = required_force(vessel.model, states[1:, 3:], np.gradient(states[:, 3:], step_s, axis=0)[1:])
     values = allocate(vessel.actuators, force, sample_time_s=step_s, before=task.start_inputs)
     inputs = np.vstack([task.start_inputs, values])

@@ -1,6 +1,6 @@
-"""Whether a ship that sails arcs gets away from a place, or to one: looked at before anything is placed.
+"""Escape check: whether a ship that sails arcs can leave its start and reach its goal, before anything is placed.
 
-A berth in a basin narrower than the ship's turns has no such way, and no leg would be found however long one looked.
+A berth in a basin narrower than the ship's turns has no such path, so the search for legs would be in vain.
 """
 
 from __future__ import annotations
@@ -10,37 +10,29 @@ import heapq
 import numpy as np
 
 from expdesign.errors import NoPlan
+from expdesign.plan.legs.tuning import LEGS
 from expdesign.plan.legs.water import LegWater
 from expdesign.values import Array
-
-AWAY = 2.5
-"""Turning radii from the place at which a ship has got away."""
-STEP_RAD = 0.35
-"""Turn of one arc; straights are as long."""
-CELL = 0.25, 12
-"""Places are told apart by shares of the radius, and courses by parts of half a circle."""
-MOST_LOOKED_AT = 6000
-"""Arcs looked at."""
 
 
 def escapes(pose: Array, water: LegWater, *, backwards: bool = False) -> bool:
     """Whether arcs of the ship's turning radius and straights lead from a pose (3,) out of its surroundings.
 
-    Found by looking at places nearest to open water first; where the grid of places is too coarse to find a way that
-    there is, the answer is no, too.
+    Best-first search over arcs, farthest from the pose first, with one arc to each cell of position and course. It ends
+    with "no" after finitely many arcs, which a sampling planner does not; too coarse cells may miss a path.
 
     Args:
         pose: where the ship is.
         water: what the hull keeps to, and who sails.
-        backwards: the way is sailed towards the pose.
+        backwards: the path leads to the pose.
     """
     radius, start = water.ship.turning_radius_m, np.add(pose, (0.0, 0.0, np.pi * backwards))
     queue: list[tuple[float, int, Array]] = [(0.0, 0, start)]
     seen, count = set[tuple[int, ...]](), 0
-    while queue and count < MOST_LOOKED_AT:
+    while queue and count < LEGS.escape_arcs:
         _, _, place = heapq.heappop(queue)
         for bend in (0.0, 1.0, -1.0):
-            arc = _arc(place, bend / radius, STEP_RAD * radius, water.vessel.length_m)
+            arc = _arc(place, bend / radius, LEGS.escape_arc_rad * radius, water.vessel.length_m)
             key = _cell(arc[-1], radius)
             if key in seen:
                 continue
@@ -49,7 +41,7 @@ def escapes(pose: Array, water: LegWater, *, backwards: bool = False) -> bool:
             if not water.holds(arc):
                 continue
             away = float(np.hypot(*(arc[-1] - start)[:2]))
-            if away > AWAY * radius:
+            if away > LEGS.escaped_radii * radius:
                 return True
             heapq.heappush(queue, (-away, count, arc[-1]))
     return False
@@ -65,7 +57,7 @@ def _arc(pose: Array, curvature: float, length_m: float, hull_m: float) -> Array
 
 
 def _cell(pose: Array, radius: float) -> tuple[int, ...]:
-    share, courses = CELL
+    share, courses = LEGS.escape_cell, LEGS.escape_courses
     course = round(float(pose[2]) / np.pi * courses) % (2 * courses)
     return round(float(pose[0]) / (share * radius)), round(float(pose[1]) / (share * radius)), course
 
@@ -81,7 +73,7 @@ def check_ends(start: Array, goal: Array, water: LegWater) -> None:
         if not escapes(pose, water, backwards=backwards):
             lat, lon = water.area.frame.to_degrees(pose[:2])
             raise NoPlan(
-                f"no way was found {to} the {name}, near {lat:.5f}, {lon:.5f} and heading "
+                f"no path was found {to} the {name}, near {lat:.5f}, {lon:.5f} and heading "
                 f"{np.degrees(pose[2]) % 360.0:.0f} degrees, on turns of {water.ship.turning_radius_m:.3g} m radius, "
                 f"which vessel {water.vessel.name!r} sails at {water.ship.transit_speed_mps:.3g} m/s, with "
                 f"{water.clearance_m:g} m of clearance; a {name} with more room, another heading or a smaller "

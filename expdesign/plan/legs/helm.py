@@ -1,9 +1,9 @@
 """Legs of ships that are steered by a helm: straight off, arcs that the ship can turn on, straight into the next run.
 
-First the helmsman checks what swing the ship has. From there the path is a Dubins curve of the ship's own turning
-radius between straights: one to gather way, one in which the turn dies out and, before a goal, the ship stops.
-Optimisation starts from steady turns along it. The last stretch before a run is the run-up of the standard trials:
-steady speed, helm as it holds the course, engines as the run begins with.
+First the ship recovers from what it was doing. From there the path is a Dubins curve of the ship's own turning radius
+between straights: one to accelerate, one in which the turn decays and, before a goal, the ship stops. Optimisation
+starts from steady turns along it. The last part before a run is the run-up of the standard trials: steady speed, helm
+as it holds the course, engines as the run begins with.
 """
 
 from __future__ import annotations
@@ -19,18 +19,10 @@ from expdesign.plan.legs._casadi import LegProblem, solve_leg
 from expdesign.plan.legs._ompl import dubins_curve
 from expdesign.plan.legs.dubins import find_path
 from expdesign.plan.legs.problem import leg_problem
-from expdesign.plan.legs.recovery import OFF, Recovery, recover
-from expdesign.plan.legs.water import ARRIVAL, LegTask, LegWater, acceptable, last_state, nearest_turns, through_water
+from expdesign.plan.legs.recovery import Recovery, recover
+from expdesign.plan.legs.tuning import LEGS
+from expdesign.plan.legs.water import LegTask, LegWater, acceptable, last_state, nearest_turns, through_water
 from expdesign.values import Array
-
-SLOW = 0.3
-"""Transit speeds below which a ship is about to gather way or to stop."""
-STRAIGHTS = ((1.0, 2.0, 1.0), (1.0, 1.0, 0.7), (0.5, 0.5, 0.4), (0.0, 0.0, 0.1))
-"""Shares tried of `OFF`, of the hull lengths to settle before a run-up, and of the stopping distance before a goal."""
-NODE = 0.25
-"""Time between nodes, in that of a hull length at transit speed."""
-SMOOTHED = 1.0
-"""Hull lengths over which the guess eases into turns."""
 
 
 def helm_leg(task: LegTask, water: LegWater, ship: HelmShip) -> Array | None:
@@ -63,11 +55,11 @@ def _run_up(task: LegTask, water: LegWater) -> tuple[LegTask, int]:
     """The leg up to the run-up, and the samples of that: none before a goal, or where wind would turn the ship."""
     vessel, speed = water.vessel, _speed_mps(water, task.end)
     samples = int(np.ceil(CONTROL.approach_hulls * vessel.length_m / max(speed, 1e-9) / vessel.sample_time_s))
-    if speed < SLOW * water.ship.transit_speed_mps:
+    if speed < LEGS.slow_share * water.ship.transit_speed_mps:
         return task, 0
     track = water.sail(task.end, np.tile(task.end_inputs, (samples, 1)))
     scale = np.r_[1.0, [water.ship.transit_speed_mps] * 2, water.ship.yaw_rate_radps]
-    if (np.abs(last_state(track) - task.end)[2:] > ARRIVAL / 10 * scale).any():
+    if (np.abs(last_state(track) - task.end)[2:] > LEGS.arrival / 10 * scale).any():
         return task, 0
     moved = track.pose[-1, :2] - track.pose[0, :2]
     return replace(task, end=np.r_[task.end[:2] - moved, task.end[2:]]), samples
@@ -99,21 +91,21 @@ class Straights:
 
 
 def _shortest_first(start: Array, task: LegTask, water: LegWater, ship: HelmShip) -> list[Straights]:
-    """What is tried: of paths hardly longer than the shortest those with the longest straights, then others.
+    """Candidates: of paths hardly longer than the shortest those with the longest straights, then others.
 
-    Not those with a turn all round for want of length: another place for the run is better.
+    Not those that need a full circle for lack of length: another place for the run is better.
     """
     length, radius = water.vessel.length_m, ship.turning_radius_m
     first, last = _course_pose(start, water), _course_pose(task.end, water)
-    stopping = _speed_mps(water, task.end) < SLOW * water.ship.transit_speed_mps
+    stopping = _speed_mps(water, task.end) < LEGS.slow_share * water.ship.transit_speed_mps
     tries = [
         Straights(
             first=first,
             last=last,
-            off_m=off * OFF * length,
+            off_m=off * LEGS.straight_off_hulls * length,
             into_m=stop * ship.stopping_m if stopping else settle * CONTROL.settling_hulls * length,
         )
-        for off, settle, stop in STRAIGHTS
+        for off, settle, stop in LEGS.straights
     ]
     lengths = [item.length_m(radius) for item in tries]
     longer = np.maximum(np.array(lengths) - min(lengths) - radius / 2, 0.0)
@@ -134,7 +126,7 @@ def _path(task: LegTask, water: LegWater, straights: Straights) -> Array | None:
 
 def _course_pose(state: Array, water: LegWater) -> Array:
     """(3,) place and course over ground of a state (6,); heading for course where it hardly moves."""
-    if _speed_mps(water, state) < SLOW * water.ship.transit_speed_mps:
+    if _speed_mps(water, state) < LEGS.slow_share * water.ship.transit_speed_mps:
         return np.asarray(state[:3])
     return np.asarray(state[:3] + np.array([0.0, 0.0, np.arctan2(state[4], state[3])]))
 
@@ -162,7 +154,7 @@ def _problem(task: LegTask, water: LegWater, ship: HelmShip, check: Recovery, pa
         path=places,
         duration_s=duration_s,
         turning_rate_radps=ship.yaw_rate_radps,
-        node_s=NODE * water.vessel.length_m / ship.transit_speed_mps,
+        node_s=LEGS.helm_node * water.vessel.length_m / ship.transit_speed_mps,
     )
 
 
@@ -191,7 +183,7 @@ def _steady_along(start: Array, end: Array, ship: HelmShip, path: Array) -> tupl
     """
     approach = ship.approach
     along = np.r_[0.0, np.cumsum(np.hypot(*np.diff(path[:, :2], axis=0).T))]
-    bend = _eased(along, path[:, 2], SMOOTHED * approach.helm.vessel.length_m)
+    bend = _eased(along, path[:, 2], LEGS.eased_hulls * approach.helm.vessel.length_m)
     helm, slowed, drift = _turn_at(ship, bend)
     speed = _speeds((start, end), ship, along, slowed * ship.transit_speed_mps)
     time_s = np.r_[0.0, np.cumsum(np.diff(along) * 2 / (speed[1:] + speed[:-1]))]
@@ -230,7 +222,7 @@ def _turn_at(ship: HelmShip, curvature: Array) -> tuple[Array, Array, Array]:
 
 
 def _speeds(ends: tuple[Array, Array], ship: HelmShip, along: Array, most: Array) -> Array:
-    """(k,) speeds along the path between two states (6,) that gathering way, turns and stopping allow [m/s]."""
+    """(k,) speeds along the path between two states (6,) that acceleration, turns and stopping allow [m/s]."""
     first, last = (float(np.hypot(*state[3:5])) for state in ends)
     braking = ship.transit_speed_mps**2 / (2 * max(ship.stopping_m, 1e-9))
     gathered = np.sqrt(first**2 + 2 * ship.acceleration_mps2 * along)

@@ -1,11 +1,12 @@
-"""What every optimised leg asks, whatever its path is made of: its water, its limits, and what stood before it."""
+"""The optimal control problem of a leg: its corridor, its limits, and the commands before it."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from expdesign.plan.legs._casadi import LegProblem
-from expdesign.plan.legs.water import BEYOND_ENDS, LegTask, LegWater, leg_speed_mps, room_beside, through_water
+from expdesign.plan.legs.tuning import LEGS
+from expdesign.plan.legs.water import LegTask, LegWater, leg_speed_mps, room_beside, through_water
 from expdesign.values import Array
 from expdesign.vessel.hull import covering_discs
 
@@ -31,7 +32,7 @@ def leg_problem(
     """A task as it is optimised, from a first guess between its ends, inside the room beside a path.
 
     Args:
-        task, water: what is asked, and where.
+        task, water: the leg and its water.
         end: (6,) the task's, with its heading continuous along the guess.
         states, inputs: (j + 1, 6) and (j + 1, m) first guess; the ends become the task's, the last inputs are kept.
         path: (j + 1, 3) poses that the corridor is measured from.
@@ -63,7 +64,7 @@ def leg_problem(
         circle=np.r_[path[0, :2], np.inf],
         hull_arm_m=arm_m,
         top_speed_mps=leg_speed_mps(fastest, ends),
-        yaw_rate_radps=max(turning_rate_radps, *(BEYOND_ENDS * abs(motion[2]) for motion in ends)),
+        yaw_rate_radps=max(turning_rate_radps, *(LEGS.beyond_ends * abs(motion[2]) for motion in ends)),
         lateral_mps2=max(water.ship.lateral_mps2, *(1.05 * abs(motion[0] * motion[2]) for motion in ends)),
         node_s=node_s,
         budget=task.budget,

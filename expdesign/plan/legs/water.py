@@ -12,6 +12,7 @@ import shapely
 from expdesign.conventions import whole_turns
 from expdesign.plan.chart import ClearanceField, VisibilityGraph, build_visibility_graph, polyline_length, simplified
 from expdesign.plan.control import Capability, arc_spare_m
+from expdesign.plan.legs.tuning import LEGS
 from expdesign.plan.work_budget import WorkBudget
 from expdesign.sea_area import ARC_SEGMENTS, SeaArea
 from expdesign.signals import Commands, Trajectory
@@ -21,16 +22,8 @@ from expdesign.values import Array, seal
 from expdesign.vessel import IDEAL, NUMPY, Vessel
 from expdesign.vessel.hull import swept_area
 
-ROOM_M = 3.0
-"""Hull lengths to either side beyond which a corridor is not widened."""
-MEMORY = 20.0
-"""Time constants after which a lagging actuator has forgotten: two parts in a thousand million are left."""
-ARRIVAL = 1e-3
-"""Largest miss of a leg's end state, in hull lengths, and in transit speeds."""
 ROUND = 1.0 / float(np.cos(np.pi / (4 * ARC_SEGMENTS)))
-"""Taken off a shore by so much more, no rounded corner is nearer than asked: arcs are drawn inside their circles."""
-BEYOND_ENDS = 1.02
-"""Largest speed and yaw rate of legs whose ends are faster than legs need be, in those of their ends."""
+"""Factor on a margin by which no rounded corner is nearer than required: arcs are drawn inside their circles."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -43,7 +36,7 @@ class LegTask:
         seed: of the path search.
         before: (h, m) commands given before the leg, the standing one last; None when it has stood for long. Only
             lagging and late actuators remember them.
-        budget: that may be spent on it, and that is.
+        budget: work budget of the search.
     """
 
     start: Array
@@ -70,7 +63,7 @@ class LegWater:
     """Vessel, weather and water that all legs of a plan share.
 
     Attributes:
-        vessel, environment, ship: who sails, in what, how fast.
+        vessel, environment, ship: vessel, weather, and speeds on legs.
         area: allowed water.
         clearance_m: least distance of the hull from anything forbidden.
         field: the same water on a grid.
@@ -85,7 +78,7 @@ class LegWater:
 
     @cached_property
     def safe(self) -> shapely.MultiPolygon:
-        """Water that the hull may touch where a sample's hull and the next one's do, so that all between keep clear."""
+        """Water that the hulls at both ends of a sample must keep to, so that those in between keep the clearance."""
         turned = 2.0 * self.ship.yaw_rate_radps * self.vessel.sample_time_s  # runs turn faster than legs
         swing_m = np.hypot(*self.vessel.hull_b.T).max() * (1 - np.cos(min(turned, np.pi) / 2))
         safe = self.area.safe_water((self.clearance_m + float(swing_m)) * ROUND)
@@ -148,18 +141,18 @@ class LegWater:
     def sail(self, start: Array, values: Array, before: Array | None = None) -> Trajectory:
         """The motion that commands (k, m) give from a state (6,), after commands `before` (h, m).
 
-        What was given before matters for lagging and late actuators only; the first of them has stood for long.
+        Earlier commands matter for lagging and late actuators only; the first of them has stood for long.
         """
         vessel, names = self.vessel, self.vessel.model.inputs
         if before is None or self.prompt:
             commands = Commands(sample_time_s=vessel.sample_time_s, names=names, values=values)
             return simulate(vessel, commands, pose=start[:3], velocity=start[3:], environment=self.environment)
-        told = np.concatenate([before, values])
+        given = np.concatenate([before, values])
         step_s = vessel.sample_time_s / SUBSTEPS
-        given = deliver(
-            vessel.responses, told, sample_time_s=vessel.sample_time_s, substeps=SUBSTEPS, standing=before[0]
+        delivered = deliver(
+            vessel.responses, given, sample_time_s=vessel.sample_time_s, substeps=SUBSTEPS, standing=before[0]
         )
-        fine = Commands(sample_time_s=step_s, names=names, values=given[len(before) :].reshape(-1, len(names)))
+        fine = Commands(sample_time_s=step_s, names=names, values=delivered[len(before) :].reshape(-1, len(names)))
         track = simulate(
             self._prompt_vessel, fine, pose=start[:3], velocity=start[3:], environment=self.environment, substeps=1
         )
@@ -181,8 +174,9 @@ class LegWater:
         return replace(self.vessel, model=replace(self.vessel.model, actuators=actuators))
 
     def remembered(self, commands: Array) -> Array:
-        """The last of given commands (k, m), as many as any actuator still shows."""
-        longest_s = max(MEMORY * response.lag_s + response.delay_s for response in self.vessel.responses)
+        """The last of given commands (k, m), as many as still act through any actuator."""
+        memory = LEGS.memory_time_constants
+        longest_s = max(memory * response.lag_s + response.delay_s for response in self.vessel.responses)
         return commands[-int(np.ceil(longest_s / self.vessel.sample_time_s)) - 2 :]
 
     def delivered(self, before: Array) -> Array:
@@ -207,7 +201,7 @@ def acceptable(start: Array, end: Array, water: LegWater, values: Array, before:
     """Whether commands, simulated from a state after others, arrive at another state and stay in safe water."""
     track = water.sail(start, values, before)
     scale = np.r_[[water.vessel.length_m] * 2, 1.0, [water.ship.transit_speed_mps] * 2, water.ship.yaw_rate_radps]
-    return bool((np.abs(last_state(track) - end) <= ARRIVAL * scale).all()) and water.holds(track.pose)
+    return bool((np.abs(last_state(track) - end) <= LEGS.arrival * scale).all()) and water.holds(track.pose)
 
 
 def nearest_turns(vessel: Vessel, inputs: Array, near: Array) -> Array:
@@ -216,8 +210,8 @@ def nearest_turns(vessel: Vessel, inputs: Array, near: Array) -> Array:
 
 
 def room_beside(water: LegWater, centre: Array, side: Array, margin_m: float) -> Array:
-    """(j,) how far each centre may move to one side while its discs keep clear, at most `ROOM_M` hull lengths."""
-    steps = np.arange(0.0, ROOM_M * water.vessel.length_m, water.field.cell_m)
+    """(j,) how far each centre may move to one side while its discs keep clear; bounded by `Tuning.corridor_hulls`."""
+    steps = np.arange(0.0, LEGS.corridor_hulls * water.vessel.length_m, water.field.cell_m)
     points = centre[:, None] + steps[:, None] * side[:, None, :]
     free = water.field.at(points) >= margin_m
     free[:, 0] = True
@@ -225,10 +219,10 @@ def room_beside(water: LegWater, centre: Array, side: Array, margin_m: float) ->
 
 
 def leg_speed_mps(transit_mps: float, ends: Iterable[Array]) -> float:
-    """Largest speed on a leg: transit speed, or `BEYOND_ENDS` of what its ends (3,) have, where they are faster.
+    """Largest speed on a leg: transit speed, or `Tuning.beyond_ends` of its ends' (3,), where they are faster.
 
     All through water.
     """
     steady = 1.001 * transit_mps
     fastest = max((float(np.hypot(*velocity[:2])) for velocity in ends), default=0.0)
-    return BEYOND_ENDS * fastest if fastest > steady else steady
+    return LEGS.beyond_ends * fastest if fastest > steady else steady

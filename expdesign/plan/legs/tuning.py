@@ -1,0 +1,76 @@
+"""The numbers of this room that are chosen, not derived."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tuning:
+    """Legs: optimisation, paths and recovery.
+
+    Attributes:
+        corridor_hulls: width of corridors to either side at most, in hull lengths.
+        memory_time_constants: after which a lagging actuator has forgotten: two parts in a thousand million are left.
+        arrival: largest miss of a leg's end state, in hull lengths, and in transit speeds.
+        beyond_ends: largest speed and yaw rate of legs whose ends are faster than legs need be, in those of their ends.
+        smoothness: weight of squared command steps against time in units of `LegProblem.time_scale_s`.
+        smallness: weight of squared commands: decides between commands that give the same force.
+        nodes: numbers of nodes tried while the time is free.
+        settled: miss of what lagging actuators deliver at the end, relative to the largest.
+        programs: nonlinear programs kept built.
+        guess_nodes: of first guesses of agile legs.
+        transition_nodes: of optimised transitions at most.
+        whole_samples: up to which straight agile legs are optimised as a whole.
+        remembered_commands: that are looked back at while steering.
+        bend_radii: lengths over which bends of agile legs' paths are rounded, in turning radii.
+        slow_share: transit speeds below which a helm-steered ship is about to accelerate from rest or to stop.
+        straights: shares tried of `straight_off_hulls`, of the hull lengths to settle before a run-up, and of the
+            stopping distance before a goal.
+        helm_node: time between nodes of helm-steered legs, in that of a hull length at transit speed.
+        eased_hulls: hull lengths over which their first guess eases into turns.
+        straight_off_hulls: straight before the first turn, as the helm takes that long to act.
+        counter_helm: helm against a residual turn, per yaw rate, in times of a hull length at transit speed.
+        recovered_share: yaw rate at which the ship has recovered, in that of a leg's turns.
+        recovery_hulls: time after which a recovery ends in any case, in that of a hull length at transit speed.
+        escaped_radii: turning radii from a place at which a ship has escaped from it.
+        escape_arc_rad: turn of one arc of the escape check; straights are as long.
+        escape_cell, escape_courses: cells of its search: their size in turning radii, and courses to half a circle.
+        escape_arcs: checked at most.
+    """
+
+    corridor_hulls: float = 3.0
+    memory_time_constants: float = 20.0
+    arrival: float = 1e-3
+    beyond_ends: float = 1.02
+    smoothness: float = 0.02
+    smallness: float = 1e-4
+    nodes: tuple[int, ...] = (12, 18, 24, 32, 44, 60, 80, 110, 160)
+    settled: float = 1e-4
+    programs: int = 24
+    guess_nodes: int = 40
+    transition_nodes: int = 24
+    whole_samples: float = 100.0
+    remembered_commands: int = 5000
+    bend_radii: tuple[float, ...] = (1.5, 0.8, 0.4)
+    slow_share: float = 0.3
+    straights: tuple[tuple[float, float, float], ...] = (
+        (1.0, 2.0, 1.0),
+        (1.0, 1.0, 0.7),
+        (0.5, 0.5, 0.4),
+        (0.0, 0.0, 0.1),
+    )
+    helm_node: float = 0.25
+    eased_hulls: float = 1.0
+    straight_off_hulls: float = 1.0
+    counter_helm: float = 3.0
+    recovered_share: float = 0.05
+    recovery_hulls: float = 8.0
+    escaped_radii: float = 2.5
+    escape_arc_rad: float = 0.35
+    escape_cell: float = 0.25
+    escape_courses: int = 12
+    escape_arcs: int = 6000
+
+
+LEGS = Tuning()
