@@ -28,11 +28,15 @@ def hull_polygons(pose: Array, hull_b: Array) -> np.ndarray:
 
 def swept_area(pose: Array, hull_b: Array) -> shapely.Geometry:
     """Everything the hull touches between consecutive poses: the union of the pairs' convex hulls."""
+    return shapely.union_all(swept_hulls(pose, hull_b))
+
+
+def swept_hulls(pose: Array, hull_b: Array) -> np.ndarray:
+    """(k - 1,) convex hulls of the outlines at consecutive poses (k, 3); the outline itself where there is one pose."""
     corners = hull_outlines(pose, hull_b)
     if len(corners) == 1:
-        return shapely.Polygon(corners[0])
-    pairs = np.concatenate([corners[:-1], corners[1:]], axis=1)
-    return shapely.union_all(shapely.convex_hull(shapely.multipoints(pairs)))
+        return np.asarray(shapely.polygons(corners))
+    return np.asarray(shapely.convex_hull(shapely.multipoints(np.concatenate([corners[:-1], corners[1:]], axis=1))))
 
 
 def covering_discs(length_m: float, beam_m: float, *, count: int = 3) -> tuple[Array, float]:

@@ -86,7 +86,7 @@ class LegProblem:
 
 
 def solve_transition(problem: LegProblem) -> tuple[float, Array] | None:
-    """Time on whole samples and end pose (3,) of the leg with the least time less the value of displacement, or None."""
+    """Time on whole samples and end pose (3,) of the leg with least time less the value of displacement, or None."""
     sample_s, duration_s = problem.vessel.sample_time_s, problem.duration_s
     nodes, block = _size(problem, duration_s)
     fastest = _program(problem.vessel, problem.environment, nodes, block, True)

@@ -1,4 +1,4 @@
-"""The only door to OMPL: shortest Dubins curves, free and among obstacles.
+"""The only module that uses OMPL: shortest Dubins curves, free and among obstacles.
 
 OMPL's (x, y, yaw) are taken as (north, east, heading): both turn from the first axis towards the second.
 """
@@ -6,6 +6,7 @@ OMPL's (x, y, yaw) are taken as (north, east, heading): both turn from the first
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 from ompl import base as ob
@@ -13,28 +14,19 @@ from ompl import geometric as og
 from ompl import util as ou
 
 from expdesign.conventions import whole_turns
+from expdesign.plan.legs.tuning import LEGS
 from expdesign.values import Array
 
 ou.setLogLevel(ou.LogLevel.LOG_NONE)
 
-SLICE = 300
-"""Iterations between looks for a solution."""
-
-Clear = Callable[[float, float], bool]
-"""(north, east) -> whether the centre line may pass there."""
+Holds = Callable[[Array], bool]
+"""(k, 3) poses -> whether the hull may sweep from each to the next."""
 
 
 def dubins_curve(start: Array, end: Array, *, radius_m: float, spacing_m: float) -> Array:
     """(k, 3) poses along the shortest Dubins curve between two poses (3,), obstacles ignored."""
     space = ob.DubinsStateSpace(radius_m)
-    states = [_state(space, start), _state(space, end)]
-    length = space.distance(*states)
-    middle = space.allocState()
-    rows = []
-    for share in np.linspace(0.0, 1.0, max(2, int(np.ceil(length / spacing_m)) + 1)):
-        space.interpolate(*states, float(share), middle)
-        rows.append((middle.getX(), middle.getY(), middle.getYaw()))
-    return _continuous(rows, start[2])
+    return _continuous(_curve(space, _state(space, start), _state(space, end), spacing_m), start[2])
 
 
 def search_dubins(
@@ -45,24 +37,21 @@ def search_dubins(
     spacing_m: float,
     low: Array,
     high: Array,
-    clear: Clear,
+    holds: Holds,
     seed: int,
-    slices: int = 12,
-    improving: int = 2,
 ) -> Array | None:
-    """(k, 3) poses along a short Dubins path that the checker accepts, or None when none is found.
+    """(k, 3) poses along a short Dubins path on which the swept hull is clear, or None when none is found.
 
-    SORRT* is counted in iterations, not seconds, so the same seed gives the same path on any machine.
+    BIT* is counted in iterations, not seconds, so the same seed gives the same path on any machine. Its motions are
+    checked by the hull they sweep, so every path it returns is clear as a whole, up to the spacing of poses.
 
     Args:
         start, end: (3,) poses.
         radius_m: turning radius.
-        spacing_m: between returned poses, and of the checks.
+        spacing_m: between returned poses, and between those of the checks.
         low, high: (2,) north/east box to search.
-        clear: point check; it is also asked about points outside the box.
+        holds: check of a whole motion; it is also asked about poses outside the box.
         seed: of the sampler.
-        slices: of `SLICE` iterations, at most.
-        improving: slices spent after the first solution.
     """
     ou.RNG.setSeed(seed)
     space = ob.DubinsStateSpace(radius_m)
@@ -73,22 +62,47 @@ def search_dubins(
     space.setBounds(bounds)
     setup = og.SimpleSetup(space)
     information = setup.getSpaceInformation()
-    setup.setStateValidityChecker(lambda state: clear(state.getX(), state.getY()))
-    information.setStateValidityCheckingResolution(spacing_m / space.getMaximumExtent())
+    setup.setStateValidityChecker(lambda state: True)  # every pose of a path ends a motion, which is checked
+    information.setMotionValidator(_SweptHull(information, space, holds, spacing_m))
     setup.setStartAndGoalStates(_state(space, start), _state(space, end))
-    setup.setPlanner(og.SORRTstar(information))
-    # the planner reports a solution only between calls of solve, so it is called in slices and goes on where it was
+    setup.setPlanner(og.BITstar(information))
+    # the planner reports a solution only between calls of solve, so it is called in slices and continues where it was
     solved = 0
-    for _ in range(slices):
-        setup.solve(ob.PlannerTerminationCondition(_after(SLICE)))
+    for _ in range(LEGS.search_slices):
+        setup.solve(ob.PlannerTerminationCondition(_after(LEGS.search_iterations)))
         solved += bool(setup.haveExactSolutionPath())
-        if solved > improving:
+        if solved > LEGS.improving_slices:
             break
     if not solved:
         return None
-    path = setup.getSolutionPath()
-    path.interpolate(max(2, int(np.ceil(path.length() / spacing_m)) + 1))
-    return _continuous([(s.getX(), s.getY(), s.getYaw()) for s in path.getStates()], start[2])
+    states = setup.getSolutionPath().getStates()
+    parts = [_curve(space, a, b, spacing_m) for a, b in pairwise(states)]
+    return _continuous([parts[0][0], *(row for part in parts for row in part[1:])], start[2])
+
+
+class _SweptHull(ob.MotionValidator):  # type: ignore[misc]
+    """Motions are valid where the hull that they sweep is clear; OMPL calls this class instead of checking points."""
+
+    def __init__(
+        self, information: ob.SpaceInformation, space: ob.DubinsStateSpace, holds: Holds, spacing_m: float
+    ) -> None:
+        super().__init__(information)
+        self._space, self._holds, self._spacing_m = space, holds, spacing_m
+
+    def checkMotion(self, first: ob.State, last: ob.State, *_: object) -> bool:  # noqa: N802
+        """Whether the Dubins curve from one state to another is clear."""
+        return self._holds(np.array(_curve(self._space, first, last, self._spacing_m)))
+
+
+def _curve(
+    space: ob.DubinsStateSpace, first: ob.State, last: ob.State, spacing_m: float
+) -> list[tuple[float, float, float]]:
+    """Poses along the Dubins curve between two states, evenly spaced."""
+    count, middle, rows = max(2, int(np.ceil(space.distance(first, last) / spacing_m)) + 1), space.allocState(), []
+    for share in np.linspace(0.0, 1.0, count).tolist():
+        space.interpolate(first, last, share, middle)
+        rows.append((middle.getX(), middle.getY(), middle.getYaw()))
+    return rows
 
 
 def _after(iterations: int) -> Callable[[], bool]:

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
 
 from expdesign.plan.control import Capability
 from expdesign.plan.legs._casadi import LegProblem, solve_leg
-from expdesign.plan.legs._ompl import Clear, dubins_curve, search_dubins
+from expdesign.plan.legs._ompl import dubins_curve, search_dubins
 from expdesign.plan.legs.problem import leg_problem
+from expdesign.plan.legs.tuning import LEGS
 from expdesign.plan.legs.water import LegTask, LegWater, acceptable, nearest_turns
 from expdesign.values import Array
 from expdesign.vessel import Vessel, allocate, required_force
-
-NEAR_ENDS = 2.0
-"""Hull lengths round a leg's ends within which its path needs no more clearance than the ends have."""
 
 
 def curved_leg(task: LegTask, water: LegWater) -> Array | None:
@@ -43,7 +40,7 @@ def find_path(task: LegTask, water: LegWater) -> Array | None:
     direct = dubins_curve(task.start[:3], task.end[:3], radius_m=radius, spacing_m=spacing)
     if water.holds(direct):
         return direct
-    for attempt, (reach, slack) in enumerate(((4.0, 0.5), (4.0, 1.5), (40.0, 1.0))):
+    for attempt, reach in enumerate(LEGS.search_boxes):
         box = reach * (radius + water.vessel.length_m)
         path = search_dubins(
             task.start[:3],
@@ -52,32 +49,12 @@ def find_path(task: LegTask, water: LegWater) -> Array | None:
             spacing_m=2 * spacing,
             low=np.minimum(task.start, task.end)[:2] - box,
             high=np.maximum(task.start, task.end)[:2] + box,
-            clear=_checker(task, water, slack * water.field.cell_m),
+            holds=water.holds,
             seed=task.seed + 7919 * attempt,
         )
         if path is not None and water.holds(path):
             return path
     return None
-
-
-def _checker(task: LegTask, water: LegWater, slack_m: float) -> Clear:
-    """Point check on the clearance grid; near the leg's ends no more is asked than the ends themselves have."""
-    field, margin = water.field, water.path_margin_m + slack_m
-    grid, (north, east), cell = field.clearance_m, field.origin.tolist(), field.cell_m
-    rows, columns = grid.shape
-    near = NEAR_ENDS * water.vessel.length_m
-    ends = [(*end[:2].tolist(), float(field.at(end[:2])) - cell) for end in (task.start, task.end)]
-
-    def clear(x: float, y: float) -> bool:
-        row, column = round((x - north) / cell), round((y - east) / cell)
-        if not (0 <= row < rows and 0 <= column < columns):
-            return False
-        found = float(grid[row, column])
-        if found >= margin:
-            return True
-        return any(found >= least and math.hypot(x - a, y - b) < near for a, b, least in ends)
-
-    return clear
 
 
 def _leg_problem(task: LegTask, water: LegWater, path: Array) -> LegProblem:

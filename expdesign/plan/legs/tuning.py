@@ -10,6 +10,11 @@ class Tuning:
     """Legs: optimisation, paths and recovery.
 
     Attributes:
+        search_boxes: margins of the boxes searched for Dubins paths round a leg's ends, in turning radii plus hull
+            lengths.
+        search_iterations, search_slices: iterations of the path planner between looks for a solution, and how often
+            at most.
+        improving_slices: spent on a shorter path after the first solution.
         corridor_hulls: width of corridors to either side at most, in hull lengths.
         memory_time_constants: after which a lagging actuator has forgotten: two parts in a thousand million are left.
         arrival: largest miss of a leg's end state, in hull lengths, and in transit speeds.
@@ -39,6 +44,10 @@ class Tuning:
         escape_arcs: checked at most.
     """
 
+    search_boxes: tuple[float, ...] = (4.0, 40.0)
+    search_iterations: int = 1500
+    search_slices: int = 4
+    improving_slices: int = 1
     corridor_hulls: float = 3.0
     memory_time_constants: float = 20.0
     arrival: float = 1e-3

@@ -20,7 +20,7 @@ from expdesign.simulation import Environment, deliver, delivered_at_samples, sim
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array, seal
 from expdesign.vessel import IDEAL, NUMPY, Vessel
-from expdesign.vessel.hull import swept_area
+from expdesign.vessel.hull import swept_hulls
 
 ROUND = 1.0 / float(np.cos(np.pi / (4 * ARC_SEGMENTS)))
 """Factor on a margin by which no rounded corner is nearer than required: arcs are drawn inside their circles."""
@@ -79,11 +79,15 @@ class LegWater:
     @cached_property
     def safe(self) -> shapely.MultiPolygon:
         """Water that the hulls at both ends of a sample must keep to, so that those in between keep the clearance."""
-        turned = 2.0 * self.ship.yaw_rate_radps * self.vessel.sample_time_s  # runs turn faster than legs
-        swing_m = np.hypot(*self.vessel.hull_b.T).max() * (1 - np.cos(min(turned, np.pi) / 2))
-        safe = self.area.safe_water((self.clearance_m + float(swing_m)) * ROUND)
+        safe = self.area.safe_water(self._safe_margin_m)
         shapely.prepare(safe)
         return safe
+
+    @property
+    def _safe_margin_m(self) -> float:
+        turned = 2.0 * self.ship.yaw_rate_radps * self.vessel.sample_time_s  # runs turn faster than legs
+        swing_m = np.hypot(*self.vessel.hull_b.T).max() * (1 - np.cos(min(turned, np.pi) / 2))
+        return (self.clearance_m + float(swing_m)) * ROUND
 
     @cached_property
     def visibility_graphs(self) -> tuple[VisibilityGraph, ...]:
@@ -136,7 +140,22 @@ class LegWater:
 
     def holds(self, pose: Array) -> bool:
         """Whether the hull stays in safe water between consecutive poses (k, 3)."""
-        return bool(shapely.contains_properly(self.safe, swept_area(pose, self.vessel.hull_b)))
+        lowest, highest = self._surely_clear_m
+        clearance = self.field.at(pose[:, :2])
+        if clearance.min() < lowest:
+            return False
+        spacing_m = float(np.hypot(*np.diff(pose[:, :2], axis=0).T).max(initial=0.0))
+        close = clearance < highest + spacing_m / 2
+        spans = close[:-1] | close[1:] if len(pose) > 1 else close
+        return bool(shapely.contains_properly(self.safe, swept_hulls(pose, self.vessel.hull_b)[spans]).all())
+
+    @cached_property
+    def _surely_clear_m(self) -> tuple[float, float]:
+        """Clearances on the grid below which no hull is in safe water at any heading, and above which every one is."""
+        outline, middle, grid_m = shapely.Polygon(self.vessel.hull_b), shapely.Point(0.0, 0.0), self.field.error_m
+        inner_m = outline.exterior.distance(middle) if outline.contains(middle) else 0.0
+        outer_m = float(np.hypot(*self.vessel.hull_b.T).max())
+        return self.clearance_m + inner_m - grid_m, self._safe_margin_m + outer_m + grid_m
 
     def sail(self, start: Array, values: Array, before: Array | None = None) -> Trajectory:
         """The motion that commands (k, m) give from a state (6,), after commands `before` (h, m).
