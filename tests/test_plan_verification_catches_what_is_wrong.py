@@ -93,7 +93,7 @@ def test_a_sound_plan_has_no_problems_and_its_true_clearance():
         (lambda p: {"commands": ramped(p["vessel"], p["commands"])}, "passes its limit"),
         (lambda p: {"commands": turned_at_once(p["vessel"], p["commands"])}, "passes its rate"),
         (lambda p: {"commands": changed(p["commands"], 30, 0, 0.5)}, "not the dictionary's"),
-        (lambda p: {"commands": changed(p["commands"], -1, 0, 0.1)}, "to have stopped"),
+        (lambda p: {"commands": changed(p["commands"], -1, 0, 0.1)}, "at the goal, expected 0"),
         (lambda p: {"repeats": {"go": 2}}, "run 1 times"),
         (lambda p: {"repeats": {}}, "ask for 0"),
         (lambda p: {"legs": p["legs"][:1]}, "gaps"),

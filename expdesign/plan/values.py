@@ -210,12 +210,12 @@ class Plan:
         trajectory: k + 1 samples.
         legs: in time order, without gaps.
         reposition_bound_s: no plan with these runs, and legs no faster through water than transit speed, repositions in
-            less time [s]; proved but for what `expdesign.plan.bounds.repositioning` says it looks for among draws.
+            less time [s]; proved except for the quantities that `expdesign.plan.bounds.repositioning` estimates.
         leave_water_probability: chance that the hull leaves allowed water in the trial as it is sailed, by
             `risk`, or None if not computed.
         leave_water_by_leg: the same for each leg, or () if not computed.
         design_efficiency_realised: efficiency of the whole trajectory's information, by the design's criterion, against
-            the optimal design's in the time asked for; None where the track alone cannot tell.
+            the optimal design's in the time asked for; None where the track alone does not determine it.
         verification: what the independent check found.
         design_efficiency_placed: as realised, of the runs alone, with the headings in wind and the entries they got.
         risk: what drawn trials of the plan came to; None if not computed.

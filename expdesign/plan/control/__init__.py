@@ -1,4 +1,4 @@
-"""What the ship can do on legs, and how she is steered along them."""
+"""Capability of ships on legs, and the controllers that steer them along references."""
 
 from expdesign.plan.control.acceleration_limits import LegEnd, SpeedChanges, least_loss, leg_end, to_work_s
 from expdesign.plan.control.capability import capability

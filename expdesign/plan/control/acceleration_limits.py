@@ -45,7 +45,7 @@ class SpeedChanges:
         return self._followed(speed_mps, time_s, self.slower_mps2, -1.0)
 
     def reversed(self) -> SpeedChanges:
-        """The same looked at backwards in time."""
+        """The same backwards in time."""
         return SpeedChanges(
             edges_mps=self.edges_mps,
             until_s=self.until_s,

@@ -74,7 +74,7 @@ def _reach(limit: Limit) -> float:
 
 
 def needs_helm(vessel: Vessel) -> bool:
-    """Whether no inverse model steers it: its model reads actuators directly, or they cannot push every way."""
+    """Whether no inverse model steers it: its model reads actuators directly, or cannot push in every direction."""
     return bool(direct_terms(vessel.model)) or bool(np.linalg.matrix_rank(force_matrix(vessel.actuators)) < 3)
 
 

@@ -74,8 +74,8 @@ class HelmController:
         turn = np.clip(wrap_angle(desired[:, 1]), -CONTROL.helm_farthest_rad, CONTROL.helm_farthest_rad)
         damping = 2 * CONTROL.course_damping * quick - self._own_damping
         missing = quick**2 * turn + damping * (desired[:, 2] - moving[:, 2]) - unexplained[:, 2]
-        bite = self._bite * np.maximum(moving[:, 0] / self.transit_speed_mps, CONTROL.helm_slowest) ** 2
-        change = np.interp(desired[:, 2], *self._turns) + missing / bite
+        effect = self._helm_effect * np.maximum(moving[:, 0] / self.transit_speed_mps, CONTROL.helm_slowest) ** 2
+        change = np.interp(desired[:, 2], *self._turns) + missing / effect
         return np.asarray(approach.angle_rad + approach.starboard * np.clip(change, -self._hardest, self._hardest))
 
     def _drive(self, speed: Array, moving: Array, angle: Array, unexplained: Array) -> Array:
@@ -97,7 +97,7 @@ class HelmController:
         return float(approach.helm.hardest(approach.drive) - abs(approach.angle_rad))
 
     @cached_property
-    def _bite(self) -> float:
+    def _helm_effect(self) -> float:
         """Yaw acceleration per helm angle on the straight approach [1/s2]."""
         approach, tilt = self.approach, 1e-3
         motion = tuple(approach.velocity.tolist())
@@ -112,7 +112,7 @@ class HelmController:
         """What the ship herself damps yaw rates by, sway following [1/s]; negative for course-unstable ones."""
         rates, angles = self._turns
         nearest = int(np.abs(rates[rates != 0.0]).argmin())
-        return float(self._bite * angles[rates != 0.0][nearest] / rates[rates != 0.0][nearest])
+        return float(self._helm_effect * angles[rates != 0.0][nearest] / rates[rates != 0.0][nearest])
 
     @cached_property
     def _turns(self) -> tuple[Array, Array]:

@@ -147,7 +147,7 @@ class AgileShip(ForceSteered):
 
 @dataclass(frozen=True, kw_only=True)
 class DubinsShip(ForceSteered):
-    """Ships that forces steer but that hardly turn without way: they sail arcs of the turning radius."""
+    """Force-steered ships that hardly turn at rest: they sail arcs of the turning radius."""
 
     def path_spares_m(self, vessel: Vessel) -> tuple[float, ...]:
         """What keeps the hull clear on arcs."""
@@ -172,7 +172,7 @@ class HelmShip(Capability):
 
     @property
     def keeps_station(self) -> bool:
-        """No: the rudder needs way."""
+        """No: the rudder needs flow."""
         return False
 
     def path_spares_m(self, vessel: Vessel) -> tuple[float, ...]:

@@ -11,161 +11,24 @@ IFAC Proc. 17 (1984), 1603-1608.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import lru_cache
-from itertools import pairwise
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from expdesign.plan.legs.problem import LegProblem
 from expdesign.plan.legs.tuning import LEGS
-from expdesign.plan.work_budget import WorkBudget
 from expdesign.simulation import Environment, motion_rates, rk4_step, sample_map
 from expdesign.simulation.run import SUBSTEPS
-from expdesign.values import Array, seal
+from expdesign.values import Array
 from expdesign.vessel import Operators, Vessel
 
 CASADI = Operators(ca.fabs, ca.sin, ca.cos)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class LegProblem:
-    """An optimal control problem for a leg.
-
-    Attributes:
-        vessel: model, actuator limits and rates.
-        environment: its means act.
-        start, end: (6,) states; heading continuous along the reference.
-        start_inputs, end_inputs: (m,) commands standing before the leg, and as its last sample.
-        past: (h, m) commands given before the leg, the standing one last.
-        delivered: (m,) what the actuators deliver as the leg begins, misalignment included.
-        states, inputs: (j + 1, 6) and (j + 1, m) first guess at even times.
-        duration_s: first guess.
-        time_scale_s: unit of time in which smoothness is weighed.
-        path: (j + 1, 3) poses that the corridor is measured from.
-        room_port_m, room_starboard_m: (j + 1,) how far the origin may be from the path to either side.
-        circle: (3,) north, east, radius that the hull's discs keep to; the radius may be infinite.
-        hull_arm_m: points this far ahead and astern of the origin must keep to corridor and circle too.
-        top_speed_mps, yaw_rate_radps: bounds on speed through water, in any direction, and yaw rate at the nodes.
-        lateral_mps2: bound on surge speed through water times yaw rate.
-        node_s: least time between nodes; 0 for the sample time.
-        displacement_value: (2,) value of displacement to north and east [s/m] for legs that may end anywhere, if it is
-            zero with any heading; None for legs that end at `end`.
-        budget: work budget; once it is exhausted, nothing is found.
-    """
-
-    vessel: Vessel
-    environment: Environment
-    start: Array
-    end: Array
-    start_inputs: Array
-    end_inputs: Array
-    past: Array
-    delivered: Array
-    states: Array
-    inputs: Array
-    duration_s: float
-    time_scale_s: float
-    path: Array
-    room_port_m: Array
-    room_starboard_m: Array
-    circle: Array
-    hull_arm_m: float
-    top_speed_mps: float
-    yaw_rate_radps: float
-    lateral_mps2: float
-    node_s: float = 0.0
-    displacement_value: Array | None = None
-    budget: WorkBudget = field(default_factory=WorkBudget)
-
-    def __post_init__(self) -> None:
-        seal(self, start="6", end="6", start_inputs="m", end_inputs="m", states="j 6", inputs="j m")
-        seal(self, past="h m", delivered="m")
-        seal(self, path="j 3", room_port_m="j", room_starboard_m="j", circle="3")
-
-
-def solve_transition(problem: LegProblem) -> tuple[float, Array] | None:
-    """Time on whole samples and end pose (3,) of the leg with least time less the value of displacement, or None."""
-    sample_s, duration_s = problem.vessel.sample_time_s, problem.duration_s
-    nodes, block = _size(problem, duration_s)
-    fastest = _program(problem.vessel, problem.environment, nodes, block, True)
-    for guess in (problem, _even(problem)):
-        found = fastest.solve(_respaced(guess, nodes), duration_s / (nodes * block))
-        if found is None:
-            continue
-        count = max(2, int(np.ceil(nodes * found[1] / sample_s - 1e-6)))
-        smooth = _program(problem.vessel, problem.environment, count, block, False)
-        exact = smooth.solve(_respaced(found[0], count), sample_s)
-        if exact is not None:
-            return count * block * sample_s, exact[0].states[-1, :3]
-    return None
-
-
-def _even(problem: LegProblem) -> LegProblem:
-    """The same leg with commands that change evenly as a first guess."""
-    return replace(problem, inputs=np.linspace(problem.inputs[0], problem.inputs[-1], len(problem.inputs)))
-
-
-def _size(problem: LegProblem, duration_s: float) -> tuple[int, int]:
-    """Number of nodes for a leg of some time, and samples between two of them."""
-    sample_s = problem.vessel.sample_time_s
-    nodes = next((n for n in LEGS.nodes if n >= duration_s / max(sample_s, problem.node_s)), LEGS.nodes[-1])
-    return nodes, max(1, round(duration_s / (nodes * sample_s)))
-
-
-def solve_leg(problem: LegProblem) -> Array | None:
-    """Commands (k, m) at the vessel's sample time, or None when IPOPT finds none.
-
-    First the fastest motion is sought with the sample time free, then the smoothest one on whole samples in that
-    time. Where commands that would give the guessed motion lead nowhere, evenly changing ones often do. The answer is
-    for the caller to check by simulation.
-    """
-    sample_s = problem.vessel.sample_time_s
-    for guess, stretch in ((problem, 1.0), (_even(problem), 1.0), (problem, 1.6), (problem, 3.0)):
-        guess_s = stretch * problem.duration_s
-        nodes, block = _size(problem, guess_s)
-        fastest = _program(problem.vessel, problem.environment, nodes, block, True)
-        found = fastest.solve(_respaced(guess, nodes), guess_s / (nodes * block))
-        if found is None:
-            continue
-        time_s = nodes * block * found[1]
-        least = max(2, int(np.ceil(time_s / (block * sample_s) - 0.1)))
-        for count in (least, least + 1, least + 3, least + 8, least + 16):
-            smooth = _program(problem.vessel, problem.environment, count, block, False)
-            exact = smooth.solve(_respaced(found[0], count), sample_s)
-            if exact is not None:
-                return _samples(exact[0].inputs, block)
-    return None
-
-
-def _spread(rows: Array, count: int) -> Array:
-    """Rows (j + 1, ...) linearly resampled to count + 1."""
-    old, new = np.linspace(0, 1, len(rows)), np.linspace(0, 1, count + 1)
-    return np.stack([np.interp(new, old, column) for column in np.atleast_2d(rows.T)], axis=-1).reshape(
-        count + 1, *rows.shape[1:]
-    )
-
-
-def _respaced(problem: LegProblem, count: int) -> LegProblem:
-    """The same leg with another number of nodes."""
-    return replace(
-        problem,
-        states=_spread(problem.states, count),
-        inputs=_spread(problem.inputs, count),
-        path=_spread(problem.path, count),
-        room_port_m=_spread(problem.room_port_m, count),
-        room_starboard_m=_spread(problem.room_starboard_m, count),
-    )
-
-
-def _samples(nodes: Array, block: int) -> Array:
-    """(count x block, m) commands, linear from node to node; the first node is what stands before the leg."""
-    shares = (np.arange(1, block + 1) / block)[:, None]
-    return np.concatenate([a + (b - a) * shares for a, b in pairwise(nodes)])
-
-
-class _Program:
+class Program:
     """The nonlinear program of legs with a given number of nodes and samples per node."""
 
     def __init__(self, vessel: Vessel, environment: Environment, nodes: int, block: int, free_time: bool) -> None:
@@ -376,5 +239,6 @@ def _mixed(weights: Array, start: Any, early: Any, late: Any) -> Any:
 
 
 @lru_cache(maxsize=LEGS.programs)
-def _program(vessel: Vessel, environment: Environment, nodes: int, block: int, free_time: bool) -> _Program:
-    return _Program(vessel, environment, nodes, block, free_time)
+def program(vessel: Vessel, environment: Environment, nodes: int, block: int, free_time: bool) -> Program:
+    """The program of a size, built once and kept."""
+    return Program(vessel, environment, nodes, block, free_time)

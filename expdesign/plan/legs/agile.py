@@ -14,8 +14,8 @@ import numpy as np
 from expdesign.conventions import whole_turns, wrap_angle
 from expdesign.plan.chart import polyline_length
 from expdesign.plan.control import AgileShip, Helmsman, Reference
-from expdesign.plan.legs._casadi import LegProblem, solve_leg, solve_transition
-from expdesign.plan.legs.problem import hull_discs, leg_problem
+from expdesign.plan.legs.optimise import solve_leg, solve_transition
+from expdesign.plan.legs.problem import LegProblem, hull_discs, leg_problem
 from expdesign.plan.legs.tuning import LEGS
 from expdesign.plan.legs.water import LegTask, LegWater, acceptable, last_state, nearest_turns
 from expdesign.values import Array

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from expdesign.plan.control import Capability
-from expdesign.plan.legs._casadi import LegProblem, solve_leg
 from expdesign.plan.legs._ompl import dubins_curve, search_dubins
-from expdesign.plan.legs.problem import leg_problem
+from expdesign.plan.legs.optimise import solve_leg
+from expdesign.plan.legs.problem import LegProblem, leg_problem
 from expdesign.plan.legs.tuning import LEGS
 from expdesign.plan.legs.water import LegTask, LegWater, acceptable, nearest_turns
 from expdesign.values import Array

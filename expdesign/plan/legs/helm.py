@@ -15,10 +15,10 @@ import numpy as np
 from expdesign.conventions import whole_turns
 from expdesign.plan.chart import polyline_length
 from expdesign.plan.control import CONTROL, HelmShip
-from expdesign.plan.legs._casadi import LegProblem, solve_leg
 from expdesign.plan.legs._ompl import dubins_curve
 from expdesign.plan.legs.dubins import find_path
-from expdesign.plan.legs.problem import leg_problem
+from expdesign.plan.legs.optimise import solve_leg
+from expdesign.plan.legs.problem import LegProblem, leg_problem
 from expdesign.plan.legs.recovery import Recovery, recover
 from expdesign.plan.legs.tuning import LEGS
 from expdesign.plan.legs.water import LegTask, LegWater, acceptable, last_state, nearest_turns, through_water

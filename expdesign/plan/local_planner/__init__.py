@@ -1,4 +1,4 @@
-"""Local planners: how each kind of ship gets from one state to another, as the search and the voyage ask it."""
+"""Local planners: how each kind of ship gets from one state to another."""
 
 from expdesign.plan.local_planner.arcs import arc_end, moved
 from expdesign.plan.local_planner.factory import local_planner

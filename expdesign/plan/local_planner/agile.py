@@ -13,7 +13,6 @@ from expdesign.plan.chart import polyline_length
 from expdesign.plan.control import AgileShip, leg_end
 from expdesign.plan.legs import LegTask, LegWater, agile_leg, curved_leg
 from expdesign.plan.local_planner.agile_times import (
-    NEAR,
     TURNS,
     LegTimes,
     leg_times,
@@ -64,7 +63,7 @@ class AgilePlanner:
 
     @property
     def transition_trials(self) -> int:
-        """How short a leg may be depends on the runs: no rule tells, so it is tried."""
+        """The least length of a leg depends on the runs; it is found by optimisation."""
         return LOCAL.transition_trials
 
     def check_ends(self, start: Array, goal: Array, water: LegWater) -> None:
@@ -121,7 +120,9 @@ class AgilePlanner:
         direct = np.arctan2(away[:, 1], away[:, 0])
         helped_m = away @ space.current_to / rule.speed_mps
         path_m = np.maximum(space.goal_distance.to_goal(pose[:, :2]) - helped_m, 0.0)
-        more_s = np.where(path_m < NEAR * space.hull_m, rule.settle_s / 2, 0.0)  # may turn out to be too near
+        more_s = np.where(
+            path_m < LOCAL.near_hulls * space.hull_m, rule.settle_s / 2, 0.0
+        )  # may turn out to be too near
         more_s += np.array([space.more_s(int(last), -1) for last in plans.last])
         angles = pose[:, 2] - direct, space.goal[2] - direct, space.goal[2] - pose[:, 2]
         return rule.seconds(path_m, *angles, plans.exit_mps, np.zeros(1)) + more_s
@@ -130,7 +131,7 @@ class AgilePlanner:
         """Length from which on a leg takes as long as the rule says [m]."""
         tried = space.tried.get(pair)
         tried_m = 0.0 if tried is None else float(np.hypot(*tried.step[:2]))
-        return space.hull_m * float(np.clip(tried_m / space.hull_m, NEAR, LOCAL.far_hulls))
+        return space.hull_m * float(np.clip(tried_m / space.hull_m, LOCAL.near_hulls, LOCAL.far_hulls))
 
     def losses_s(self, space: SearchSpace, *, made_good: bool) -> tuple[Array, Array]:
         """Least losses of transitions.

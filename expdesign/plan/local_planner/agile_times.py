@@ -1,7 +1,7 @@
 """How long legs of agile vessels take, for the search: a rule that optimised legs follow.
 
 Such a vessel moves as if pushed equally in every direction while it turns, so a leg lasts about as long as the longer
-of two: a point that is accelerated from one velocity to the other over the leg's way, along it and across it, and a
+of two: a point that is accelerated from one velocity to the other over the leg's path, along it and across it, and a
 turn on the spot; a little longer where both last equally long. Before and after, actuators need time to get to work
 while the ship goes on as it did.
 """
@@ -15,16 +15,10 @@ import numpy as np
 
 from expdesign.conventions import wrap_angle
 from expdesign.plan.control import AgileShip, SpeedChanges, to_work_s
+from expdesign.plan.local_planner.tuning import LOCAL
 from expdesign.values import Array
 from expdesign.vessel import Vessel
 
-PUSH, SWING, POWER, SETTLE = 1.1, 0.7, 2.0, 1.2
-"""Shares of the mean largest acceleration and of the yaw rate on the spot that legs make use of, exponent of the mean
-of both times, and time to settle in those of the actuators from nothing to full. Fitted to 540 optimised legs of three
-vessels, 20 m, 30 m and a model, between random places, headings and speeds: half of the ships' legs are met within
-three seconds, half of the model's within 0.4 s."""
-NEAR = 1.5
-"""Hull lengths that a leg needs to suit any place, heading and speed at its ends; shorter ones have to be tried."""
 LENGTHS = np.array([0.0, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9, 1.2, 1.5, 2.0, 2.7, 3.5, 5.0])
 """Lengths of transitions between runs, in hull lengths."""
 GOING_ON = np.array([1.0, 1.1, 1.25])
@@ -68,11 +62,11 @@ class LegTimes:
     def seconds(
         self, length_m: Array, first_rad: Array, last_rad: Array, turn_rad: Array, exit_mps: Array, entry_mps: Array
     ) -> Array:
-        """(...,) time of legs along a way [s].
+        """(...,) time of legs along a path [s].
 
         Args:
-            length_m: of the way.
-            first_rad, last_rad: heading at the beginning and at the end, from the way's course there.
+            length_m: of the path.
+            first_rad, last_rad: heading at the beginning and at the end, from the path's course there.
             turn_rad: from the one heading to the other.
             exit_mps, entry_mps: speeds ahead, at the beginning and at the end.
         """
@@ -81,28 +75,31 @@ class LegTimes:
         along = _least_s(length_m - wait_s * (begins[0] + ends[0]), begins[0], ends[0], a, top)
         across = _least_s(-wait_s * (begins[1] + ends[1]), begins[1], ends[1], a, top)
         turn_s = np.abs(wrap_angle(turn_rad)) / self.swing_radps
-        return np.asarray((np.maximum(along, across) ** POWER + turn_s**POWER) ** (1 / POWER) + self.settle_s)
+        return np.asarray(
+            (np.maximum(along, across) ** LOCAL.time_power + turn_s**LOCAL.time_power) ** (1 / LOCAL.time_power)
+            + self.settle_s
+        )
 
 
 def leg_times(vessel: Vessel, ship: AgileShip, changes: SpeedChanges) -> LegTimes:
     """The rule for a vessel."""
     return LegTimes(
         speed_mps=ship.transit_speed_mps,
-        push_mps2=PUSH * changes.mean_mps2,
-        swing_radps=SWING * ship.spot_rate_radps,
-        settle_s=SETTLE * to_work_s(vessel),
+        push_mps2=LOCAL.acceleration_share * changes.mean_mps2,
+        swing_radps=LOCAL.yaw_rate_share * ship.spot_rate_radps,
+        settle_s=LOCAL.settling_share * to_work_s(vessel),
         hull_m=vessel.length_m,
     )
 
 
-def _least_s(way: Array, first: Array, last: Array, a: float, top: float) -> Array:
-    """Least time of a point over a way in one dimension from one velocity to another [s]."""
-    sign = np.where(way >= (first + last) * np.abs(last - first) / (2 * a), 1.0, -1.0)
-    way, first, last = sign * way, sign * first, sign * last
+def _least_s(distance: Array, first: Array, last: Array, a: float, top: float) -> Array:
+    """Least time of a point over a distance in one dimension from one velocity to another [s]."""
+    sign = np.where(distance >= (first + last) * np.abs(last - first) / (2 * a), 1.0, -1.0)
+    distance, first, last = sign * distance, sign * first, sign * last
     ends = np.maximum(first, last)
-    peak = np.maximum(np.sqrt(np.maximum(a * way + (first**2 + last**2) / 2, 0.0)), ends)
+    peak = np.maximum(np.sqrt(np.maximum(a * distance + (first**2 + last**2) / 2, 0.0)), ends)
     most = np.maximum(top, ends)
-    cruise = (way - (most**2 - (first**2 + last**2) / 2) / a) / most
+    cruise = (distance - (most**2 - (first**2 + last**2) / 2) / a) / most
     return np.asarray((2 * np.minimum(peak, most) - first - last) / a + np.maximum(cruise, 0.0))
 
 
@@ -123,7 +120,7 @@ class Transitions:
 def transitions(times: LegTimes, exit_mps: float, entry_mps: float, *, short: bool = True) -> Transitions:
     """The best legs between two speeds: for every turn and every direction to go, the one that loses least time.
 
-    Unless they may be `short` they are `NEAR` hull lengths long.
+    Unless they may be `short` they are `Tuning.near_hulls` hull lengths long.
     """
     course, length, turn, seconds = _all_transitions(times, exit_mps, entry_mps, short)
     along = np.cos(course - DIRECTIONS[:, None, None, None]) * length / times.speed_mps
@@ -144,7 +141,7 @@ def _all_transitions(
 ) -> tuple[Array, Array, Array, Array]:
     going_on_m = times.settle_s * (exit_mps + entry_mps) / 2
     lengths = np.r_[times.hull_m * LENGTHS, going_on_m * GOING_ON]
-    lengths = lengths[short | (lengths >= NEAR * times.hull_m)]
+    lengths = lengths[short | (lengths >= LOCAL.near_hulls * times.hull_m)]
     turn, length, course = np.meshgrid(TURNS, lengths, COURSES, indexing="ij")
     step = np.stack([length * np.cos(course), length * np.sin(course), turn], axis=-1)
     seconds = times.step_s(step, np.array(exit_mps), np.array(entry_mps))

@@ -58,7 +58,7 @@ def path_successors(
         departures: of all plans.
         able: plans that still have the run to do.
         q: the run.
-        turning_radius_m: of the turns into and out of the path, whose length is added; 0 where that is told otherwise.
+        turning_radius_m: of the turns into and out of the path, whose length is added; 0 where leg times include it.
     """
     parents, starts, seconds = [np.zeros(0, dtype=int)], [np.zeros((0, 3))], [np.zeros(0)]
     for index in able:

@@ -1,4 +1,4 @@
-"""Local planner of ships that forces steer but that hardly turn without way: Dubins curves at transit speed."""
+"""Local planner of force-steered ships that hardly turn at rest: Dubins curves at transit speed."""
 
 from __future__ import annotations
 

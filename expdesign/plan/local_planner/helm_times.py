@@ -1,7 +1,7 @@
 """A rule for the time of legs of helm-steered ships: accelerate, go on, stop, as the ship's own simulation does.
 
-Such a ship needs way to change her speed: a leg too short for it is sailed by going astern first, which takes long. She
-checks her swing, goes along a Dubins curve, and straight for the last hull length before a run.
+Such a ship needs distance to change its speed: on a leg too short for it, it has to go astern first, which takes long.
+It recovers from the run before, follows a Dubins curve, and goes straight for the last hull length before a run.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ class HelmTimes:
         speed_mps, radius_m: of long legs, and of their turns.
         run_up_m, steady_m: straight before each run, and the last of that, steady.
         at_rest_m: of legs to a stop at least.
-        spare_m: before a run besides the way in which speeds change.
-        answer_s: until a new engine order is worth what it says.
-        speeding_up: (k, 3) speed m/s, way m and time s from rest with the engines full ahead.
+        spare_m: before a run besides the distance in which speeds change.
+        answer_s: until a new engine order takes effect.
+        speeding_up: (k, 3) speed m/s, distance m and time s from rest with the engines full ahead.
         stopping: (k, 3) the same until rest with the engines full astern, counted backwards.
     """
 
@@ -117,7 +117,7 @@ def helm_times(ship: HelmShip) -> HelmTimes:
 
 
 def _between(table: Array, low: float, high: Array) -> Array:
-    """(k, 2) way and time between one speed and others."""
+    """(k, 2) distance and time between one speed and others."""
     path_m, time_s = (np.interp(np.r_[low, high], table[:, 0], column) for column in table[:, 1:].T)
     return np.stack([path_m[1:] - path_m[0], time_s[1:] - time_s[0]], axis=1)
 
@@ -130,7 +130,7 @@ def _speeding_up(ship: HelmShip) -> Array:
 
 
 def _stopping(ship: HelmShip) -> Array:
-    """(k, 3) from transit speed to rest, looked at backwards."""
+    """(k, 3) from transit speed to rest, backwards in time."""
     approach = ship.approach
     vessel = approach.helm.vessel
     speed = np.hypot(*stopped(vessel, ship.transit_speed_mps).velocity[::-1, :2].T)
@@ -138,9 +138,9 @@ def _stopping(ship: HelmShip) -> Array:
 
 
 def _table(speed: Array, step_s: float, top_mps: float) -> Array:
-    """(k, 3) speeds that grow to the top, way and time until each, of speeds at even times."""
+    """(k, 3) speeds that grow to the top, distance and time until each, from speeds at even times."""
     count = int(np.argmax(speed >= 0.999 * top_mps)) + 1 if (speed >= 0.999 * top_mps).any() else len(speed)
     most = np.maximum.accumulate(speed[:count])
     path_m = np.r_[0.0, np.cumsum((speed[1:count] + speed[: count - 1]) / 2 * step_s)]
-    most += 1e-9 * np.arange(count)  # that every speed has its place
+    most += 1e-9 * np.arange(count)  # strictly increasing, for interpolation
     return np.column_stack([most, path_m, step_s * np.arange(count)])

@@ -1,6 +1,6 @@
-"""What the search knows, and what it asks the local planner: how one kind of ship gets from one state to another.
+"""The search space, and the protocol of local planners: how one kind of ship gets from one state to another.
 
-The local planner is the only part that knows the kind of ship. Everything above it asks through `LocalPlanner`.
+Only the local planner knows the kind of ship. Everything above it uses the protocol `LocalPlanner`.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class TriedTransition:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SearchSpace:
-    """What the search looks up.
+    """Data of the search for places and orders.
 
     Attributes:
         footprints: the primitives to place.
@@ -191,7 +191,7 @@ class TransitionTrials:
         primitives: the runs by name.
         start: (3,) pose of the plan.
         made_good: whether displacement towards the goal saves time on later legs.
-        budget: that may be spent; transitions that are not tried then are left to the rule.
+        budget: work budget; transitions that are not tried within it keep the rule for leg times.
     """
 
     water: LegWater

@@ -1,8 +1,8 @@
-"""Transitions between runs tried with optimised legs, so that the search knows where they lead and their time.
+"""Transitions between runs, optimised in advance, so that the search knows their displacement and their time.
 
-How short a leg may be without making the ship slow down, or circle, to arrive as the run asks depends on how actuators
-stand and how the ship moves as the run before ends, which no rule tells. Each pair of runs is tried once, in open calm
-water: the leg may end anywhere, and displacement made good counts as much as it would at full speed.
+The least length of a leg on which the ship arrives at a run's entry without slowing down or circling depends on the
+motion and the actuators at the end of the run before, for which there is no rule. Each pair of runs is optimised once,
+in open calm water: the leg may end anywhere, and displacement counts as much as at transit speed.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from expdesign.dictionary import Primitive
 from expdesign.plan.chart import clearance_field
 from expdesign.plan.control import AgileShip
 from expdesign.plan.legs import LegTask, LegWater, free_leg
-from expdesign.plan.local_planner.agile_times import NEAR, LegTimes
+from expdesign.plan.local_planner.agile_times import LegTimes
 from expdesign.plan.local_planner.protocol import Pair, SearchSpace, TransitionTrials, TriedTransition
 from expdesign.plan.local_planner.tuning import LOCAL
 from expdesign.plan.runs import Footprint
@@ -53,7 +53,7 @@ def with_transitions(
 
 def _tried(space: SearchSpace, times: LegTimes, pair: Pair, seconds: float, step: Array) -> TriedTransition:
     more_s = 0.0
-    if np.hypot(*step[:2]) >= NEAR * space.hull_m:
+    if np.hypot(*step[:2]) >= LOCAL.near_hulls * space.hull_m:
         before, after = _runs(space, pair)
         speeds = before.exit_mps if before else 0.0, after.entry_mps if after else 0.0
         more_s = max(0.0, seconds - float(times.step_s(step, *np.array(speeds))))

@@ -1,4 +1,4 @@
-"""What the legs between runs still to be done lose at least, in the best order: tells good orders apart early."""
+"""Least loss of the legs between the remaining runs, in their best order: distinguishes good orders early."""
 
 from __future__ import annotations
 

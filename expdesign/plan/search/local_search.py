@@ -44,7 +44,7 @@ class Chain:
     Attributes:
         runs: (n,) of the space's primitives.
         poses: (n, 3) where they begin.
-        bends: n + 1 corners (k, 2) of each leg's way, both ends left out; the last leg leads to the goal.
+        bends: n + 1 corners (k, 2) of each leg's path, both ends left out; the last leg leads to the goal.
         legs_s: (n + 1,) time of the legs.
     """
 
@@ -89,10 +89,10 @@ class _Legs:
     ends: ChainEnds
 
     def measured(self, runs: np.ndarray, poses: Array) -> Chain:
-        """A chain with the shortest ways for its legs."""
+        """A chain with the shortest paths for its legs."""
         froms, tos = self._ends(runs, poses)
-        ways = [self.space.goal_distance.graph.shortest(a[:2], b[:2]) for a, b in zip(froms, tos, strict=True)]
-        bends = tuple(np.zeros((0, 2)) if way is None else way[1:-1] for way in ways)
+        paths = [self.space.goal_distance.graph.shortest(a[:2], b[:2]) for a, b in zip(froms, tos, strict=True)]
+        bends = tuple(np.zeros((0, 2)) if path is None else path[1:-1] for path in paths)
         legs_s = [
             self._tried_s(runs, k, froms[k], tos[k])
             or self._leg_s(runs, k, froms[k : k + 1], tos[k : k + 1], bends[k])[0]
@@ -174,7 +174,7 @@ class _Legs:
         return np.vstack([self.ends.start, run_ends(self.space, runs, poses)]), np.vstack([poses, self.space.goal])
 
     def _leg_s(self, runs: np.ndarray, k: int, froms: Array, tos: Array, bends: Array) -> Array:
-        """(m,) time of leg k from poses (m, 3) to poses (m, 3) along a way's bends (b, 2)."""
+        """(m,) time of leg k from poses (m, 3) to poses (m, 3) along a path's bends (b, 2)."""
         runs_of = self.space.footprints
         ends = LegEnds(
             before=int(runs[k - 1]) if k else self.ends.last,

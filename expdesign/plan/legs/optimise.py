@@ -1,0 +1,93 @@
+"""Optimised legs: the fastest motion first, then the smoothest commands on whole samples in that time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from expdesign.plan.legs._casadi import program
+from expdesign.plan.legs.problem import LegProblem
+from expdesign.plan.legs.tuning import LEGS
+from expdesign.values import Array
+
+
+def solve_transition(problem: LegProblem) -> tuple[float, Array] | None:
+    """Time on whole samples and end pose (3,) of the leg with least time less the value of displacement, or None."""
+    sample_s, duration_s = problem.vessel.sample_time_s, problem.duration_s
+    nodes, block = _size(problem, duration_s)
+    fastest = program(problem.vessel, problem.environment, nodes, block, True)
+    for guess in (problem, _even(problem)):
+        found = fastest.solve(_respaced(guess, nodes), duration_s / (nodes * block))
+        if found is None:
+            continue
+        count = max(2, int(np.ceil(nodes * found[1] / sample_s - 1e-6)))
+        smooth = program(problem.vessel, problem.environment, count, block, False)
+        exact = smooth.solve(_respaced(found[0], count), sample_s)
+        if exact is not None:
+            return count * block * sample_s, exact[0].states[-1, :3]
+    return None
+
+
+def _even(problem: LegProblem) -> LegProblem:
+    """The same leg with commands that change evenly as a first guess."""
+    return replace(problem, inputs=np.linspace(problem.inputs[0], problem.inputs[-1], len(problem.inputs)))
+
+
+def _size(problem: LegProblem, duration_s: float) -> tuple[int, int]:
+    """Number of nodes for a leg of some time, and samples between two of them."""
+    sample_s = problem.vessel.sample_time_s
+    nodes = next((n for n in LEGS.nodes if n >= duration_s / max(sample_s, problem.node_s)), LEGS.nodes[-1])
+    return nodes, max(1, round(duration_s / (nodes * sample_s)))
+
+
+def solve_leg(problem: LegProblem) -> Array | None:
+    """Commands (k, m) at the vessel's sample time, or None when IPOPT finds none.
+
+    First the fastest motion is sought with the sample time free, then the smoothest one on whole samples in that
+    time. Where commands that would give the guessed motion lead nowhere, evenly changing ones often do. The answer is
+    for the caller to check by simulation.
+    """
+    sample_s = problem.vessel.sample_time_s
+    for guess, stretch in ((problem, 1.0), (_even(problem), 1.0), (problem, 1.6), (problem, 3.0)):
+        guess_s = stretch * problem.duration_s
+        nodes, block = _size(problem, guess_s)
+        fastest = program(problem.vessel, problem.environment, nodes, block, True)
+        found = fastest.solve(_respaced(guess, nodes), guess_s / (nodes * block))
+        if found is None:
+            continue
+        time_s = nodes * block * found[1]
+        least = max(2, int(np.ceil(time_s / (block * sample_s) - 0.1)))
+        for count in (least, least + 1, least + 3, least + 8, least + 16):
+            smooth = program(problem.vessel, problem.environment, count, block, False)
+            exact = smooth.solve(_respaced(found[0], count), sample_s)
+            if exact is not None:
+                return _samples(exact[0].inputs, block)
+    return None
+
+
+def _spread(rows: Array, count: int) -> Array:
+    """Rows (j + 1, ...) linearly resampled to count + 1."""
+    old, new = np.linspace(0, 1, len(rows)), np.linspace(0, 1, count + 1)
+    return np.stack([np.interp(new, old, column) for column in np.atleast_2d(rows.T)], axis=-1).reshape(
+        count + 1, *rows.shape[1:]
+    )
+
+
+def _respaced(problem: LegProblem, count: int) -> LegProblem:
+    """The same leg with another number of nodes."""
+    return replace(
+        problem,
+        states=_spread(problem.states, count),
+        inputs=_spread(problem.inputs, count),
+        path=_spread(problem.path, count),
+        room_port_m=_spread(problem.room_port_m, count),
+        room_starboard_m=_spread(problem.room_starboard_m, count),
+    )
+
+
+def _samples(nodes: Array, block: int) -> Array:
+    """(count x block, m) commands, linear from node to node; the first node is what stands before the leg."""
+    shares = (np.arange(1, block + 1) / block)[:, None]
+    return np.concatenate([a + (b - a) * shares for a, b in pairwise(nodes)])
