@@ -1,4 +1,4 @@
-"""Frames, signs, units and column names: what every number in the package means.
+"""Frames, signs, units and column names of the package.
 
 - n-frame: north, east, down, fixed to the earth; its origin is the reference point of the sea area.
 - b-frame: x forward, y starboard, z down; origin at the centre of rotation.

@@ -1,7 +1,7 @@
-"""Exceptions, split by what the reader can do about them.
+"""Exceptions, by what the user can do about them.
 
-Every message is one line: the thing, the value found, and what would have been right. The command line turns
-`InputError` into exit status 2 and `NoAnswer` into exit status 3.
+Every message is one line: the entry, its value, and the allowed values. The command line turns `InputError` into exit
+status 2 and `NoAnswer` into exit status 3.
 """
 
 from __future__ import annotations
@@ -16,20 +16,20 @@ class ExpdesignError(Exception):
 
 
 class InputError(ExpdesignError):
-    """What was given is wrong; the message says which value, and what would be right."""
+    """An input is wrong; the message states its value and the allowed values."""
 
 
 class NoAnswer(ExpdesignError):
-    """The input is fine but has no answer; the message says what stands in the way."""
+    """The input is correct but has no solution; the message states the obstacle."""
 
 
 class FileError(InputError):
-    """A file is missing, unreadable, or says something that is not allowed.
+    """A file is missing or unreadable, or an entry in it is wrong.
 
     Attributes:
         path: the file.
         key: dotted name of the entry inside the file, or "" for the file as a whole.
-        problem: what is wrong and what would be right.
+        problem: the value found and the allowed values.
     """
 
     def __init__(self, path: Path | str, key: str, problem: str) -> None:
@@ -38,7 +38,7 @@ class FileError(InputError):
 
 
 class UnknownName(InputError):
-    """A name that is not in the list it must come from; the nearest known one is offered."""
+    """An unknown name; the message offers the nearest known one."""
 
     def __init__(self, what: str, name: str, *, known: Iterable[str]) -> None:
         self.what, self.name, self.known = what, name, tuple(known)
@@ -48,18 +48,18 @@ class UnknownName(InputError):
 
 
 class ShapeError(InputError):
-    """An array whose shape contradicts the value it is part of."""
+    """An array has a shape that contradicts the other fields of its value."""
 
 
 class Diverged(NoAnswer):
-    """A simulation left the range in which its numbers mean anything."""
+    """A simulation diverged."""
 
 
 class SpeedOutOfReach(InputError):
-    """A steady speed is asked for that the engines do not give.
+    """The engines cannot hold a requested steady speed.
 
     Attributes:
-        reached_mps: what they give.
+        reached_mps: the speed that they can hold.
     """
 
     def __init__(self, message: str, *, reached_mps: float) -> None:
@@ -68,14 +68,14 @@ class SpeedOutOfReach(InputError):
 
 
 class Unreachable(NoAnswer):
-    """A manoeuvre must begin with a motion that the vessel cannot hold; the message names it and what can be held."""
+    """The vessel cannot hold the entry state of a manoeuvre; the message states it and the limit."""
 
 
 class NotInformative(NoAnswer):
-    """The experiment cannot tell some parameters apart.
+    """Some parameters are not identifiable from the experiment.
 
     Attributes:
-        parameters: the names that nothing informs about.
+        parameters: their names.
     """
 
     def __init__(self, message: str, *, parameters: tuple[str, ...] = ()) -> None:
@@ -84,7 +84,7 @@ class NotInformative(NoAnswer):
 
 
 class NoPlan(NoAnswer):
-    """No trajectory satisfies the limits; the message names the place or the primitive in the way."""
+    """No trajectory satisfies the limits; the message names the place or the primitive."""
 
 
 def nearest(name: str, known: Iterable[str]) -> str | None:

@@ -1,7 +1,7 @@
-"""Ctrl-C and termination that wait for places where stopping is safe.
+"""Deferral of Ctrl-C and termination to points where stopping is safe.
 
-Python turns them into exceptions between any two instructions: while files are renamed, that leaves half of them; while
-the solvers load, it ends the process from within them.
+Python raises them between any two instructions: during the renaming of files only some would be renamed; during the
+import of solvers the process would abort.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from contextlib import ExitStack, contextmanager
 
 @contextmanager
 def interruptions_wait() -> Iterator[Callable[[], None]]:
-    """Let Ctrl-C and termination wait for the end of the block, where they act as they would have.
+    """Defer Ctrl-C and termination to the end of the block.
 
-    Yields a function to be called where stopping is safe: it raises KeyboardInterrupt when one of them came.
+    Yields a function to call where stopping is safe; it raises KeyboardInterrupt if one of them is pending.
     """
     came: list[int] = []
 
@@ -29,7 +29,7 @@ def interruptions_wait() -> Iterator[Callable[[], None]]:
             signal.raise_signal(came[0])
 
     with ExitStack() as stack:
-        if threading.current_thread() is threading.main_thread():  # in others nothing interrupts
+        if threading.current_thread() is threading.main_thread():  # other threads receive no signals
             stack.callback(deliver)
             for number in (signal.SIGINT, signal.SIGTERM):
                 handler = signal.getsignal(number)

@@ -1,4 +1,4 @@
-"""Façades whose names are loaded when they are first used, so that a command loads only the rooms it needs."""
+"""Façades that load names on first use, so that a command imports only the rooms it needs."""
 
 from __future__ import annotations
 

@@ -17,11 +17,11 @@ from expdesign.errors import NoPlan
 from expdesign.values import Array
 
 DENSE = 10.0
-"""Corners in a stretch of shore as long as the clearance, from which on it is taken off in steps."""
+"""Corners per clearance length of shore above which the clearance is eroded in steps."""
 ARC_SEGMENTS = 16
-"""Straight pieces in a quarter of a circle where corners are rounded."""
+"""Chords of a quarter circle at rounded corners."""
 STEPS = (1 / 16, 3 / 16, 3 / 4)
-"""Shares of it."""
+"""Shares of the clearance eroded in each step."""
 
 
 @dataclass(frozen=True)
@@ -66,8 +66,8 @@ class SeaArea:
         frame: relates metres to latitude and longitude.
         water: allowed water before any clearance: deep enough, inside the bounds, outside land and no-go zones.
         land: land inside the bounds, for drawing.
-        depth_rule: one sentence on how depth was taken into account.
-        notes: what was repaired or assumed while reading the chart.
+        depth_rule: the rule for depth, in one sentence.
+        notes: on repairs and assumptions in the chart.
         source: chart file and licence notice.
         depths: (charted least depth [m], polygons) from shallow to deep, for drawing; empty where depth is not charted.
     """
@@ -82,15 +82,15 @@ class SeaArea:
     depths: tuple[tuple[float, shapely.MultiPolygon], ...] = ()
 
     def safe_water(self, clearance_m: float) -> shapely.MultiPolygon:
-        """The water that a hull may touch when it must keep `clearance_m` from everything forbidden."""
+        """The water at least `clearance_m` from everything forbidden."""
         return as_multipolygon(eroded(self.water, clearance_m))
 
 
 def eroded(water: shapely.Geometry, distance_m: float, *, join_style: str = "round") -> shapely.Geometry:
-    """What of a water lies farther than a distance from its shore.
+    """The part of a water farther than a distance from its shore.
 
-    From a shore with many corners in a stretch as long as the distance it is taken off in growing steps, each of which
-    smooths the shore for the next: the same is left, as discs add up to discs, in a tenth of the time.
+    A shore with many corners is eroded in growing steps, each of which smooths the shore for the next. The result is
+    the same, because the Minkowski sum of discs is a disc, in a tenth of the time.
     """
     dense = DENSE * water.length < distance_m * shapely.get_num_coordinates(water)
     for share in STEPS if dense else (1.0,):
@@ -100,13 +100,13 @@ def eroded(water: shapely.Geometry, distance_m: float, *, join_style: str = "rou
 
 @dataclass(frozen=True, kw_only=True)
 class Zones:
-    """What makes up a sea area, as valid polygons (east_m, north_m).
+    """The zones of a sea area, as valid polygons (east_m, north_m).
 
     Attributes:
         bounds: the trial stays inside.
         land: the trial stays outside.
-        no_go: the trial stays outside, too.
-        deep: water known to be deep enough, or None when depth is not taken into account.
+        no_go: the trial stays outside.
+        deep: water known to be deep enough, or None when depth is not checked.
         depths: (charted least depth [m], polygons), for drawing.
     """
 
@@ -125,13 +125,12 @@ def build_sea_area(
     Args:
         name: for reports.
         frame: in which the zones are given.
-        zones: what is allowed and what is not.
-        depth_rule: as in `SeaArea`, like what follows.
-        notes: what was repaired or assumed.
+        zones: allowed and forbidden ones.
+        depth_rule, notes, source: as in `SeaArea`.
         source: chart file and licence notice.
 
     Raises:
-        NoPlan: no water remains; the message says what took the last of it.
+        NoPlan: no water remains; the message states the reason.
     """
     water = zones.bounds.difference(zones.land)
     reason = "all of it is land" if _dry(water) else ""

@@ -1,4 +1,4 @@
-"""Time series: commands to the actuators, and the motion that answers them."""
+"""Time series: commands to the actuators, motion, and measured data."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Commands:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Trajectory:
-    """Motion sampled at the ends of every command: one sample more than the commands that made it.
+    """Motion sampled at the ends of every command: one sample more than there are commands.
 
     Attributes:
         sample_time_s: time between samples [s].
@@ -84,14 +84,14 @@ class Batch:
         sample_time_s: time between samples [s].
         input_names: actuator signals, e.g. ("n1", "a1"), or ("tau_x", "tau_y", "tau_psi").
         inputs: (k, m) commands, held from their sample to the next.
-        velocity: (k, 3) b-frame u, v, r over ground, measured or derived from pose; nan in a whole column that nothing
-            tells, which records have only when they were told to do without it.
+        velocity: (k, 3) b-frame u, v, r over ground, measured or derived from pose; a column that is neither is nan,
+            where the reader was asked to allow that.
         pose: (k, 3) n-frame, heading continuous, or None when not measured; nan where a part is not measured.
         wind: (k, 2) relative wind in the b-frame, the air's velocity past the ship as (u_q, v_q) = velocity - wind,
             or None when not measured.
         depth_m: (k,) water depth, or None.
-        derived: those of u, v, r that come from the pose rather than from a sensor of their own, as far as is known.
-        first_row: row of the file (header is row 1) that the first sample comes from, 0 when not from a file.
+        derived: those of u, v, r that are known to be derived from pose, not measured.
+        first_row: row of the first sample in its file (the header is row 1), 0 when not from a file.
     """
 
     name: str
@@ -126,7 +126,7 @@ class Record:
 
     Attributes:
         batches: with the same inputs and the same sample time.
-        notes: what was found in the files and how it was dealt with, one sentence each.
+        notes: on flaws of the files and their treatment, one sentence each.
     """
 
     batches: tuple[Batch, ...]

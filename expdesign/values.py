@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 
 def readonly(values: ArrayLike) -> Array:
-    """A private float copy that nobody can write to."""
+    """A read-only copy as floats."""
     array = np.array(values, dtype=float)
     array.setflags(write=False)
     return array

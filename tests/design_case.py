@@ -68,7 +68,7 @@ def tunnel(number: int = 1, *, speed: Limit = FREE, forward_m: float = 0.0) -> A
 
 
 def structured(structure: str, parameters: Array, actuators: tuple[Actuator, ...], **more: object) -> VesselModel:
-    """A model of a built-in structure; discrete at 1 s unless told otherwise."""
+    """A model of a built-in structure; discrete at 1 s by default."""
     given = {"form": "discrete", "sample_time_s": 1.0, "parameter_std": np.zeros(len(parameters)), **more}
     return VesselModel(terms=structure_terms(structure), parameters=parameters, actuators=actuators, **given)
 

@@ -78,8 +78,8 @@ def test_a_crash_stop_takes_the_way_off_faster_than_idling():
 
 
 def test_helm_that_the_actuators_cannot_give_is_refused_with_file_and_key():
-    asked = request("turning_circle_helm", helm_rad=1.2)
-    placed = PrimitiveSpec(name="hard", family=asked.family, settings=asked.settings, place="d.toml: primitives[3]")
+    hard = request("turning_circle_helm", helm_rad=1.2)
+    placed = PrimitiveSpec(name="hard", family=hard.family, settings=hard.settings, place="d.toml: primitives[3]")
     with pytest.raises(
         InputError, match=r"^d.toml: primitives\[3\]: primitive 'hard': .*68.75 deg needs rudder1"
     ) as caught:
@@ -89,16 +89,16 @@ def test_helm_that_the_actuators_cannot_give_is_refused_with_file_and_key():
 
 @pytest.mark.parametrize("kind", [item for item in FAMILIES if item.reference is not None], ids=lambda kind: kind.name)
 def test_desired_velocities_are_refused_for_direct_models_with_file_and_key(kind, tmp_path: Path):
-    path = tmp_path / "wishes.toml"
+    path = tmp_path / "requests.toml"
     needed = {item.name: 1.0 for item in kind.settings if item.default is None} | {"duration_s": 30.0}
     given = {**needed, **({"period_s": 10.0} if "period_s" in needed else {})}
     lines = "\n".join(f"{name} = {value}" for name, value in given.items())
     path.write_text(f'[dictionary]\nname = "d"\n[[primitives]]\nfamily = "{kind.name}"\n{lines}\n', encoding="utf-8")
-    (wish,) = load_dictionary(path)
+    (request_,) = load_dictionary(path)
     with pytest.raises(
-        InputError, match=r"wishes.toml: primitives\[1\]: primitive .*X_n reads n1.*families with commands"
+        InputError, match=r"requests.toml: primitives\[1\]: primitive .*X_n reads n1.*families with commands"
     ):
-        build_primitive(rudder_ship(), wish)
+        build_primitive(rudder_ship(), request_)
 
 
 def test_a_direct_model_can_be_scored_from_helm_and_engine_alone():

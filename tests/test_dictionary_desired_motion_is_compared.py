@@ -17,7 +17,7 @@ TIME_S = np.linspace(0.0, 60.0, 6001)
 MULTISINE = {"period_s": 20.0, "speed_mps": 1.0, "speed_swing_mps": 0.5, "sway_mps": 0.2, "yaw_rate_radps": 0.1}
 
 
-def test_a_multisine_has_the_stated_amplitude_about_its_mean():
+def test_a_multisine_has_its_amplitudes_around_its_mean():
     desired = family("multisine").reference(spec("multisine", duration_s=60.0, **MULTISINE).settings, TIME_S)
     np.testing.assert_allclose(np.abs(desired - (1.0, 0.0, 0.0)).max(axis=0), (0.5, 0.2, 0.1), rtol=1e-12)
     np.testing.assert_allclose(desired[0], (1.0, 0.0, 0.0), atol=1e-12)
@@ -25,7 +25,7 @@ def test_a_multisine_has_the_stated_amplitude_about_its_mean():
 
 def test_the_three_velocities_of_a_multisine_share_no_frequency():
     desired = family("multisine").reference(spec("multisine", duration_s=60.0, **MULTISINE).settings, TIME_S)
-    middle = desired[2000:4000] - desired[2000:4000].mean(axis=0)  # one whole period, beyond what is faded in and out
+    middle = desired[2000:4000] - desired[2000:4000].mean(axis=0)  # one whole period, outside the fades
     products = np.corrcoef(middle.T)
     np.testing.assert_allclose(products, np.eye(3), atol=1e-2)
 
@@ -54,7 +54,7 @@ def test_offsets_lie_beneath_the_wave_and_begin_and_end_at_zero(name: str, more:
     np.testing.assert_allclose((lifted - plain)[[0, -1]], 0.0, atol=1e-12)
 
 
-def test_slow_actuators_cause_a_deviation_and_actuators_without_limits_do_not():
+def test_a_ship_with_slow_actuators_deviates_and_a_ship_without_limits_does_not():
     request = spec("sway_zigzag", duration_s=60, sway_mps=0.3, period_s=30)
     free, slow = (
         build_primitive(with_limit(vessel("azimuth-30m"), Limit(low=-40, high=40, rate=rate)), request)
@@ -74,13 +74,13 @@ def test_departure_is_the_largest_difference_by_hand():
     assert deviation(changed) == pytest.approx(np.abs(moved - desired)[:, 0].max() / 0.8, rel=1e-12)
 
 
-def test_command_families_have_no_desired_velocities():
+def test_families_that_give_commands_have_no_desired_velocities():
     run = build_primitive(vessel("model-ship"), spec("turning_circle_helm", duration_s=20, speed_mps=0.8))
     assert desired_motion(run) is None
     assert deviation(run) == 0.0
 
 
-def test_slow_thrusters_make_only_steep_waves_deviate_from_the_desired_motion():
+def test_only_steep_waves_deviate_with_slow_thrusters():
     assert not deviating(example_dictionary("model-ship"))
     names = {item.name for item in deviating(example_dictionary("standard"))}
     waves = ("zigzag-steep", "sway-zigzag", "telegraph")
@@ -88,7 +88,7 @@ def test_slow_thrusters_make_only_steep_waves_deviate_from_the_desired_motion():
     assert all(name.startswith(waves) for name in names)
 
 
-def test_the_compact_dictionary_needs_little_room_and_has_twice_the_information_rate():
+def test_the_compact_dictionary_follows_its_references_in_little_room_with_twice_the_information_per_minute():
     ship = vessel("azimuth-30m")
     runs = build_dictionary(ship, load_dictionary(SCENARIOS / "dictionaries" / "compact-azimuth-30m.toml"))
     assert not deviating(runs)

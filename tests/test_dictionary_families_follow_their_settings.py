@@ -1,4 +1,4 @@
-"""What each family wishes for is what its settings say; settings that make no sense are refused in one line."""
+"""The desired motion of each family has its settings; contradictory settings are refused in one line."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from expdesign.values import Array
 TIME_S = np.linspace(0.0, 60.0, 6001)
 
 
-def wished(name: str, **settings: float) -> Array:
+def desired(name: str, **settings: float) -> Array:
     """(k, 3) u, v, r over a minute."""
     request = spec(name, duration_s=60.0, **settings)
     return family(name).reference(request.settings, TIME_S)
@@ -29,7 +29,7 @@ def corners(rate: Array) -> int:
 
 @pytest.mark.parametrize(("period_s", "swings"), [(60.0, 1), (20.0, 3), (7.0, 8)])
 def test_a_zigzag_swings_to_its_amplitude_in_its_period_and_returns_to_its_heading(period_s: float, swings: int):
-    u, v, r = wished("zigzag", speed_mps=1.2, yaw_rate_radps=0.2, sway_mps=0.1, period_s=period_s).T
+    u, v, r = desired("zigzag", speed_mps=1.2, yaw_rate_radps=0.2, sway_mps=0.1, period_s=period_s).T
     assert (u == 1.2).all()
     assert np.abs(r).max() == pytest.approx(0.2, rel=1e-12)
     np.testing.assert_allclose(v, -0.5 * r, atol=1e-15)  # outwards of the turn
@@ -37,18 +37,18 @@ def test_a_zigzag_swings_to_its_amplitude_in_its_period_and_returns_to_its_headi
     assert corners(r) in (2 * swings, 2 * swings + 1)
     assert r[np.flatnonzero(np.abs(r) > 1e-9)[0]] > 0  # first to starboard
     heading = np.concatenate([[0.0], np.cumsum((r[1:] + r[:-1]) / 2 * np.diff(TIME_S))])
-    # Evenly to both sides: a quarter period either way, up to the ends that are faded and what centring adds.
+    # Evenly to both sides: a quarter period either way, up to the ends that are faded and the effect of centring.
     assert heading.max() == pytest.approx(-heading.min(), rel=0.5)
 
 
 def test_a_negative_yaw_rate_zigzags_the_other_way():
     settings = {"speed_mps": 1.0, "period_s": 20.0, "sway_mps": 0.1}
-    starboard, port = (wished("zigzag", yaw_rate_radps=rate, **settings) for rate in (0.2, -0.2))
+    starboard, port = (desired("zigzag", yaw_rate_radps=rate, **settings) for rate in (0.2, -0.2))
     np.testing.assert_array_equal(port[:, 2], -starboard[:, 2])
 
 
 def test_a_sway_zigzag_comes_back_to_its_line_on_a_steady_heading():
-    u, v, r = wished("sway_zigzag", sway_mps=0.4, period_s=20.0, speed_mps=0.3).T
+    u, v, r = desired("sway_zigzag", sway_mps=0.4, period_s=20.0, speed_mps=0.3).T
     assert (u == 0.3).all()
     assert not r.any()
     assert np.abs(v).max() == pytest.approx(0.4, rel=1e-12)
@@ -57,22 +57,22 @@ def test_a_sway_zigzag_comes_back_to_its_line_on_a_steady_heading():
 
 @pytest.mark.parametrize(("speed", "rate"), [(0.8, 0.1), (0.8, -0.1), (2.5, 0.02)])
 def test_a_turning_circle_settles_on_the_radius_of_its_speed_over_its_yaw_rate(speed: float, rate: float):
-    reference = wished("turning_circle", speed_mps=1.1, turn_speed_mps=speed, yaw_rate_radps=rate, entry_s=15.0)
+    reference = desired("turning_circle", speed_mps=1.1, turn_speed_mps=speed, yaw_rate_radps=rate, entry_s=15.0)
     np.testing.assert_allclose(reference[0], (1.1, 0.0, 0.0), atol=1e-15)
     u, v, r = reference[TIME_S >= 15.0].T
     np.testing.assert_allclose(np.hypot(u, v) / np.abs(r), speed / abs(rate), rtol=1e-12)
     assert (np.sign(r) == np.sign(rate)).all()
 
 
-def test_a_turning_circle_drifts_outwards_as_commanded():
-    reference = wished(
+def test_a_turning_circle_drifts_outwards_as_set():
+    reference = desired(
         "turning_circle", speed_mps=1.1, turn_speed_mps=0.8, yaw_rate_radps=0.1, entry_s=15.0, sway_mps=0.2
     )
     np.testing.assert_allclose(reference[-1], (0.8, -0.2, 0.1), atol=1e-12)
 
 
 def test_an_inward_spiral_tightens_steadily_to_its_end_rate():
-    u, v, r = wished("inward_spiral", speed_mps=0.75, yaw_rate_radps=-0.6, sway_mps=0.125, entry_s=5.0).T
+    u, v, r = desired("inward_spiral", speed_mps=0.75, yaw_rate_radps=-0.6, sway_mps=0.125, entry_s=5.0).T
     assert (u == 0.75).all()
     np.testing.assert_allclose(r, -0.6 * TIME_S / 60.0, atol=1e-15)
     assert v[0] == 0.0
@@ -89,7 +89,7 @@ def test_an_inward_spiral_tightens_steadily_to_its_end_rate():
     ],
 )
 def test_accelerations_and_decelerations_end_where_they_should(name: str, settings: dict, first: float, last: float):
-    reference = wished(name, ramp_fraction=0.5, **settings)
+    reference = desired(name, ramp_fraction=0.5, **settings)
     assert not reference[:, 1:].any()
     assert reference[0, 0] == first
     np.testing.assert_allclose(reference[TIME_S >= 30.0, 0], last, atol=1e-12)
@@ -103,7 +103,7 @@ TELEGRAPH = {
 
 
 def test_a_telegraph_switches_between_its_two_levels():
-    reference = wished("telegraph", **TELEGRAPH) - (0.8, 0.0, 0.0)
+    reference = desired("telegraph", **TELEGRAPH) - (0.8, 0.0, 0.0)
     swings = reference / (0.3, 0.2, 0.05)
     assert np.abs(swings).max() <= 1.0 + 1e-12
     assert not swings[[0, -1]].any()  # it begins and ends at its mean
@@ -113,14 +113,14 @@ def test_a_telegraph_switches_between_its_two_levels():
 
 
 def test_a_telegraph_is_the_same_for_the_same_draw_and_another_for_another():
-    first, again, other = (wished("telegraph", **TELEGRAPH, draw=draw) for draw in (1, 1, 2))
+    first, again, other = (desired("telegraph", **TELEGRAPH, draw=draw) for draw in (1, 1, 2))
     np.testing.assert_array_equal(first, again)
     assert np.abs(first - other).max() > 0.1
 
 
 def test_a_telegraph_switches_as_often_as_its_hold_time_says():
     counts = [
-        sum(corners(wished("telegraph", **TELEGRAPH | {"rise_s": 0.05}, draw=draw)[:, i]) for i in (1, 2))
+        sum(corners(desired("telegraph", **TELEGRAPH | {"rise_s": 0.05}, draw=draw)[:, i]) for i in (1, 2))
         for draw in range(30)
     ]
     expected = 2 * 60.0 / 4.0  # two signals, Poisson: the standard error of the mean over draws is sqrt(expected / 30)

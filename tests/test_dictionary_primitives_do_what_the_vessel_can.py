@@ -1,4 +1,4 @@
-"""Primitives follow their wishes where the vessel can, keep its limits always, and begin in equilibrium."""
+"""Primitives follow the desired motion where the vessel can, keep its limits always, and begin in equilibrium."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -27,7 +27,7 @@ EXAMPLES = [("model-ship", "model-ship"), ("azimuth-30m", "standard")]
 
 
 def departure(ship: Vessel, request: PrimitiveSpec) -> float:
-    """Largest difference between the simulated and the wished velocities, m/s or rad/s."""
+    """Largest difference between the simulated and the desired velocities, m/s or rad/s."""
     run = build_primitive(ship, request).trajectory
     return float(np.abs(run.velocity - family(request.family).reference(request.settings, run.time_s)).max())
 

@@ -15,7 +15,7 @@ from expdesign.errors import Unreachable
 from expdesign.simulation import steady_ahead
 
 
-def told(name: str, family: str, **settings: float) -> str:
+def message(name: str, family: str, **settings: float) -> str:
     with pytest.raises(Unreachable) as caught:
         build_primitive(vessel(name), spec(family, name="odd one", **settings))
     text = str(caught.value)
@@ -25,7 +25,7 @@ def told(name: str, family: str, **settings: float) -> str:
 
 
 def test_a_ship_steered_by_forces_reaches_what_full_thrust_holds():
-    text = told("azimuth-30m", "deceleration", duration_s=60, speed_mps=5)
+    text = message("azimuth-30m", "deceleration", duration_s=60, speed_mps=5)
     # nominal model: X_u u + X_mu tau_x = 0 with both propellers at 15 rps
     assert "cannot hold its entry state u = 5 m/s" in text
     assert float(re.search(r"reach u = ([\d.]+) m/s", text)[1]) == pytest.approx(0.01 * 30 / 0.2, rel=1e-3)
@@ -33,7 +33,7 @@ def test_a_ship_steered_by_forces_reaches_what_full_thrust_holds():
 
 @pytest.mark.parametrize("family", ["zigzag_heading", "turning_circle_helm", "crash_stop"])
 def test_a_ship_with_a_rudder_reaches_what_full_ahead_holds(family):
-    ship, text = vessel("coaster-80m"), told("coaster-80m", family, duration_s=60, speed_mps=9)
+    ship, text = vessel("coaster-80m"), message("coaster-80m", family, duration_s=60, speed_mps=9)
     assert "cannot hold 9 m/s" in text
     reached = float(re.search(r"reaches ([\d.]+) m/s", text)[1])
     left = drift(ship, np.array([reached, 0.0, 0.0]), np.array([3.4, 0.0]))  # full ahead
@@ -41,15 +41,15 @@ def test_a_ship_with_a_rudder_reaches_what_full_ahead_holds(family):
     steady_ahead(ship, 0.999 * reached)
 
 
-def test_motion_beyond_the_actuators_is_named_completely():
-    text = told("model-ship", "inward_spiral", duration_s=10, speed_mps=5, yaw_rate_radps=0.1)
+def test_motion_beyond_the_actuators_names_the_whole_desired_motion():
+    text = message("model-ship", "inward_spiral", duration_s=10, speed_mps=5, yaw_rate_radps=0.1)
     assert "cannot hold its entry state u = 5 m/s" in text
 
 
-def test_speeds_astern_are_called_astern():
-    text = told("model-ship", "deceleration", duration_s=10, speed_mps=-20)
-    wished, reached = (float(x) for x in re.findall(r"u = (-[\d.]+) m/s", text))
-    assert wished == -20
+def test_motion_astern_is_reported_astern():
+    text = message("model-ship", "deceleration", duration_s=10, speed_mps=-20)
+    desired, reached = (float(x) for x in re.findall(r"u = (-[\d.]+) m/s", text))
+    assert desired == -20
     assert -20 < reached < 0
 
 

@@ -1,5 +1,8 @@
 """The durations are optimal, proven from the problem, and no independent search finds better ones."""
 
+import subprocess
+import sys
+
 import cvxpy
 import numpy as np
 import pytest
@@ -20,7 +23,7 @@ from expdesign.simulation import CALM
 from expdesign.values import Array
 
 CERTIFICATE = 1e-6
-"""Relative to the dimension: what a certificate must reach to be given out."""
+"""Relative to the dimension: what a certificate must reach to be returned."""
 EXAMPLES = {"model-ship": ("model-ship", CALM, 450.0), "standard": ("azimuth-30m", WIND, 3600.0)}
 subtractions = pytest.mark.parametrize("subtraction", MEAN_SUBTRACTIONS)
 dictionaries = pytest.mark.parametrize("dictionary", EXAMPLES)
@@ -71,7 +74,7 @@ def random_problem(draw: int) -> DurationProblem:
     count = int(rng.integers(3, 41))
     samples = int(rng.integers(max(2, 2 * parameters // count + 2), 3 * parameters + 3))
     matrices = random_matrices(rng, count=count, parameters=parameters, outputs=outputs, samples=samples)
-    if draw % 4 in (1, 3) and parameters > outputs:  # two parameters that can hardly be told apart
+    if draw % 4 in (1, 3) and parameters > outputs:  # two parameters that are nearly collinear
         mix = np.eye(parameters + outputs)
         mix[outputs, 0], mix[outputs, outputs] = 1.0, 1e-4
         matrices = mix @ matrices @ mix.T
@@ -217,5 +220,23 @@ def test_an_outside_solver_finds_the_same(draw: int):
     problem = cvxpy.Problem(cvxpy.Maximize(cvxpy.log_det((total + total.T) / 2)), [cvxpy.sum(shares) == 1])
     theirs = problem.solve(solver=cvxpy.CLARABEL)
     own = solved(duration_problem(matrices, means=2))
-    assert own.log_det == pytest.approx(theirs, abs=1e-5)  # what that solver promises
+    assert own.log_det == pytest.approx(theirs, abs=1e-5)  # the tolerance of that solver
     assert theirs <= own.log_det_bound + 1e-6
+
+
+PLAIN_D = """
+import sys
+import numpy as np
+import expdesign
+from expdesign.durations import DurationProblem, solve_durations
+matrices = np.array([np.diag([1.0, 0.0]), np.diag([0.0, 1.0])])
+problem = DurationProblem(
+    names=("a", "b"), parameters=("x", "y"), mean_subtraction="none", matrices=matrices, run_s=np.ones(2), total_s=4.0
+)
+assert solve_durations(problem).repeats == (2, 2)
+assert "cvxpy" not in sys.modules
+"""
+
+
+def test_plain_d_does_not_load_the_conic_solver():
+    subprocess.run([sys.executable, "-c", PLAIN_D], check=True)

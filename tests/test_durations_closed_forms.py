@@ -19,12 +19,12 @@ def regression(points: Array, degree: int) -> Array:
     return rows[:, :, None] * rows[:, None, :]
 
 
-def test_two_primitives_that_tell_of_one_parameter_each_share_half_and_half():
+def test_two_primitives_that_inform_about_one_parameter_each_share_half_and_half():
     np.testing.assert_allclose(fractions([np.diag([3.0, 0.0]), np.diag([0.0, 7e-4])]), 0.5, atol=1e-7)
 
 
 @pytest.mark.parametrize("p", [1, 3, 10])
-def test_as_many_primitives_as_parameters_share_equally_whatever_they_tell(p: int):
+def test_as_many_primitives_as_parameters_share_equally_whatever_their_information(p: int):
     rows = np.random.default_rng(p).standard_normal((p, p))  # one direction each, not even orthogonal
     np.testing.assert_allclose(fractions(rows[:, :, None] * rows[:, None, :]), 1 / p, atol=1e-7)
 

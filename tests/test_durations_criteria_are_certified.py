@@ -8,7 +8,7 @@ from scipy.optimize import minimize
 
 from design_case import duration_problem, random_matrices
 from expdesign.durations import Aim, DurationProblem, efficiencies, optimal_shares, solve_durations
-from expdesign.durations.collected import Collected
+from expdesign.durations.concave import Collected
 from expdesign.errors import InputError, UnknownName
 from expdesign.values import Array
 
@@ -37,12 +37,12 @@ def problem(criterion: str, draw: int, *, count: int = 15, parameters: int = 5) 
 
 def by_definition(given: DurationProblem, w: Array) -> float:
     """The criterion as -log of its textbook form, from the covariance after mean subtraction."""
-    p, wish = len(given.parameters), given.aim
+    p, given_aim = len(given.parameters), given.aim
     B = np.tensordot(w, given.matrices, axes=1)
     C = np.linalg.inv(B[:p, :p] - B[:p, p:] @ np.linalg.solve(B[p:, p:], B[p:, :p]))
-    physical = C * np.outer(wish.noise, wish.noise)
-    relative = physical / np.outer(wish.unit, wish.unit)
-    match wish.criterion:
+    physical = C * np.outer(given_aim.noise, given_aim.noise)
+    relative = physical / np.outer(given_aim.unit, given_aim.unit)
+    match given_aim.criterion:
         case "D":
             return -float(np.linalg.slogdet(C)[1])
         case "D_s":
@@ -51,7 +51,7 @@ def by_definition(given: DurationProblem, w: Array) -> float:
             return -float(np.log(np.trace(relative)))
         case "E":
             return float(np.log(np.linalg.eigvalsh(np.linalg.inv(relative))[0]))
-    return -float(np.log(np.trace(wish.gradients @ physical @ wish.gradients.T)))
+    return -float(np.log(np.trace(given_aim.gradients @ physical @ given_aim.gradients.T)))
 
 
 @every
@@ -85,7 +85,7 @@ def test_the_sensitivities_are_the_slope_and_level_where_time_is_free(criterion:
     design = optimal_shares(given)
     used = design.fractions > 1e-6
     level = design.certificate.level
-    # The corner of E makes its slope a mixture, found to the square root of what the certificate resolves.
+    # E is not differentiable at its optimum: its slope is a mixture, accurate to the square root of the gap.
     np.testing.assert_allclose(design.sensitivities[used], level, rtol=1e-4 if criterion != "E" else 2e-3)
     assert (design.sensitivities <= level * (1 + 1e-6)).all()
     if criterion != "E":
@@ -116,11 +116,11 @@ def test_units_of_the_parameters_do_not_change_the_shares(criterion: str, seed: 
 def test_with_one_parameter_all_criteria_agree():
     matrices = np.array([[[3.0]], [[5.0]], [[1.0]]])
     for criterion in CRITERIA:
-        wish = Aim(
+        given_aim = Aim(
             criterion=criterion, interest=("parameter 0",), unit=np.ones(1), noise=np.ones(1), outcomes=("a",),
             gradients=np.ones((1, 1)),
         )  # fmt: skip
-        design = optimal_shares(replace(duration_problem(matrices), aim=wish))
+        design = optimal_shares(replace(duration_problem(matrices), aim=given_aim))
         np.testing.assert_allclose(design.fractions, [0, 1, 0], atol=1e-6)
 
 
@@ -128,16 +128,16 @@ def test_the_a_optimal_shares_of_independent_parameters_are_as_their_standard_de
     # Minimise sum c_q / w_q: w_q as sqrt(c_q). Parameter q is seen by primitive q alone, information a_q.
     a = np.array([1.0, 4.0, 25.0])
     matrices = np.array([np.diag(a * (np.arange(3) == q)) for q in range(3)])
-    wish = Aim(criterion="A", unit=np.ones(3), noise=np.ones(3))
-    w = optimal_shares(replace(duration_problem(matrices), aim=wish)).fractions
+    given_aim = Aim(criterion="A", unit=np.ones(3), noise=np.ones(3))
+    w = optimal_shares(replace(duration_problem(matrices), aim=given_aim)).fractions
     np.testing.assert_allclose(w, a**-0.5 / (a**-0.5).sum(), atol=1e-7)
 
 
 def test_the_e_optimal_shares_of_independent_parameters_level_their_eigenvalues():
     a = np.array([1.0, 4.0, 25.0])
     matrices = np.array([np.diag(a * (np.arange(3) == q)) for q in range(3)])
-    wish = Aim(criterion="E", unit=np.ones(3), noise=np.ones(3))
-    design = optimal_shares(replace(duration_problem(matrices), aim=wish))
+    given_aim = Aim(criterion="E", unit=np.ones(3), noise=np.ones(3))
+    design = optimal_shares(replace(duration_problem(matrices), aim=given_aim))
     np.testing.assert_allclose(design.fractions, (1 / a) / (1 / a).sum(), atol=1e-5)
     assert np.exp(design.certificate.bound) == pytest.approx(1 / (1 / a).sum(), rel=1e-5)
 
@@ -165,7 +165,7 @@ def test_no_design_is_more_efficient_than_the_optimum_and_the_table_agrees_with_
     assert table[criterion].of["repeats"] == pytest.approx(design.efficiency_repeats)
 
 
-def test_what_a_criterion_needs_is_asked_for():
+def test_settings_that_a_criterion_lacks_are_named():
     given = duration_problem(random_matrices(np.random.default_rng(0), count=6, parameters=3, outputs=1, samples=6))
     for criterion, words in (("A", "needs a unit"), ("E", "needs a unit"), ("V", "needs outcomes")):
         with pytest.raises(InputError, match=words):

@@ -1,4 +1,4 @@
-"""Limits hold, their certificate holds with them, and what cannot be is refused in one line."""
+"""Limits hold, their certificate holds with them, and contradictory ones are refused in one line."""
 
 from dataclasses import replace
 
@@ -17,8 +17,7 @@ from expdesign.durations import (
     optimal_shares,
     solve_durations,
 )
-from expdesign.durations.collected import Collected
-from expdesign.durations.concave import polytope_of
+from expdesign.durations.concave import Collected, polytope_of
 from expdesign.errors import ExpdesignError, InputError, NoAnswer, UnknownName
 
 
@@ -90,14 +89,14 @@ def test_an_outside_solver_agrees_under_limits(draw: int):
 
 @pytest.mark.parametrize("criterion", ["D_s", "A", "E", "V"])
 def test_the_other_criteria_are_certified_under_limits_too(criterion: str):
-    wish = Aim(
+    given_aim = Aim(
         criterion=criterion, interest=("parameter 0",) if criterion == "D_s" else (), unit=np.ones(4),
         noise=np.ones(4), outcomes=("a",), gradients=np.array([[1.0, -1.0, 0.5, 2.0]]),
     )  # fmt: skip
-    check(solve_durations(problem(0, mixed(0), aim=wish)), 0)
+    check(solve_durations(problem(0, mixed(0), aim=given_aim)), 0)
 
 
-def test_limits_that_do_not_matter_change_nothing_and_have_no_price():
+def test_inactive_limits_change_no_fraction_and_have_no_price():
     loose = Constraints(budgets=(Budget(name="wear", cost_per_s={"primitive 0": 1.0}, limit=1e6),))
     free, limited = optimal_shares(problem(1, Constraints())), optimal_shares(problem(1, loose))
     np.testing.assert_allclose(limited.fractions, free.fractions, atol=1e-5)
@@ -143,13 +142,13 @@ REFUSED = {
         Constraints(least_s={"primitive 0": 30.0},
                     budgets=(Budget(name="energy", cost_per_s={"primitive 0": 5.0}, limit=100.0),)),
         NoAnswer,
-        "'energy' has the limit 100, but no sharing of the time uses less than 150",
+        "'energy' has the limit 100, but any feasible durations use at least 150",
     ),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_what_cannot_be_is_refused_in_one_line(case: str):
+def test_contradictory_limits_are_refused_in_one_line(case: str):
     constraints, kind, words = REFUSED[case]
     with pytest.raises(ExpdesignError, match=words) as caught:
         solve_durations(problem(0, constraints))

@@ -1,4 +1,4 @@
-"""Wishes that cannot be met end `expdesign durations` with one line and its status, never with a traceback."""
+"""Limits that cannot be satisfied end `expdesign durations` with one line and its status, never with a traceback."""
 
 from pathlib import Path
 
@@ -26,15 +26,15 @@ CASES = [
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize(("wish", "status", "words"), CASES)
+@pytest.mark.parametrize(("design", "status", "words"), CASES)
 def test_limits_end_in_one_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], wish: str, status: int, words: str
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], design: str, status: int, words: str
 ) -> None:
     path = write_scenario(tmp_path)
     spoil(tmp_path / "dictionary.toml", "[0.5, 1.1]", "[0.5, 0.4]")
     spoil(path, "fixed_parameters = []", 'fixed_parameters = ["W_abs_u_u"]')
-    spoil(path, 'criterion = "D"', wish if "criterion" in wish else f'criterion = "D"\n{wish}')
+    spoil(path, 'criterion = "D"', design if "criterion" in design else f'criterion = "D"\n{design}')
     assert main(["durations", str(path), "--out", str(tmp_path / "out"), "--quiet"]) == status
-    told = capsys.readouterr().err.splitlines()
-    assert len(told) == (status != 0)
-    assert all(words in line for line in told)
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == (status != 0)
+    assert all(words in line for line in lines)

@@ -1,4 +1,4 @@
-"""Several models, what is known already, recorded primitives, subsets of batches, fused covariances."""
+"""Several models, prior information, recorded primitives, subsets of batches, fused covariances."""
 
 from dataclasses import replace
 from itertools import combinations
@@ -18,6 +18,7 @@ from expdesign.durations import (
     solve_durations,
 )
 from expdesign.durations.asymmetric import log_abs_det
+from expdesign.durations.tuning import Tuning
 from expdesign.errors import InputError, NotInformative
 from expdesign.information import score_models, score_primitives
 from expdesign.information.prior import score_prior, stated_information
@@ -83,7 +84,7 @@ def test_models_of_the_prior_are_the_same_for_the_same_seed():
 
 
 def test_data_from_before_are_completed_not_repeated():
-    # Primitive 0 tells of the first parameter only; when that is known as well already, all time goes to the other.
+    # Primitive 0 informs about the first parameter only; with as much prior information, all time goes to the other.
     problem = duration_problem([np.diag([1.0, 0.0]), np.diag([0.0, 1.0])])
     half = optimal_shares(problem).fractions
     np.testing.assert_allclose(half, 0.5, atol=1e-7)
@@ -93,7 +94,7 @@ def test_data_from_before_are_completed_not_repeated():
     np.testing.assert_allclose(much, [0.0, 1.0], atol=1e-6)
 
 
-def test_a_prior_makes_up_for_a_dictionary_that_does_not_tell_everything():
+def test_a_prior_completes_a_dictionary_without_information_about_a_parameter():
     problem = duration_problem([np.diag([1.0, 0.0]), np.diag([2.0, 0.0])])
     with pytest.raises(NotInformative):
         optimal_shares(problem)
@@ -131,16 +132,16 @@ def test_recorded_primitives_get_at_least_the_guaranteed_value(noise: float):
     assert guaranteed > 0
 
 
-def test_nothing_definite_is_said_and_the_local_search_goes_on():
+def test_without_a_definite_symmetric_part_the_local_search_remains():
     turn = np.array([[0.0, 1.0], [-1.0, 0.0]])  # antisymmetric: its symmetric part is zero, its determinant is not
     design = solve_durations(duration_problem([turn, 2 * turn]))
-    assert "no sharing makes the symmetric part positive definite" in design.certificate.kind
+    assert "no fractions make the symmetric part positive definite" in design.certificate.kind
     np.testing.assert_allclose(design.fractions, [0, 1], atol=1e-6)
     assert design.log_det == pytest.approx(np.log(4.0))
 
 
 def test_other_criteria_refuse_recorded_primitives():
-    with pytest.raises(InputError, match="only be shared out by criterion D"):
+    with pytest.raises(InputError, match="need criterion D"):
         solve_durations(replace(recorded(0.2, 0), aim=Aim(criterion="A", unit=np.ones(4), noise=np.ones(4))))
 
 
@@ -173,7 +174,7 @@ def test_the_best_subset_is_the_best_of_all(draw: int):
 def test_a_large_choice_has_a_bound_that_holds(monkeypatch: pytest.MonkeyPatch):
     items = batches(1, 12)
     exact = best_subset(items, ("a", "b", "c"), size=5)
-    monkeypatch.setattr("expdesign.durations.mining.LARGEST_EXACT", 10)
+    monkeypatch.setattr("expdesign.durations.mining.TUNING", Tuning(all_subsets=10))
     quick = best_subset(items, ("a", "b", "c"), size=5)
     assert not quick.exact
     assert quick.efficiency <= exact.efficiency + 1e-9 <= quick.bound + 2e-9

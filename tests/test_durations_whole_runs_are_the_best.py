@@ -1,4 +1,4 @@
-"""Whole runs fit the time, keep what is needed, and are the best or nearly so."""
+"""Whole runs fit the time, inform about every parameter, and are optimal or nearly so."""
 
 from itertools import product
 
@@ -69,17 +69,17 @@ def test_whole_runs_fit_and_leave_no_room_and_say_their_efficiency(draw: int):
     design = solve_durations(problem)
     left = problem.total_s - np.dot(design.repeats, problem.run_s)
     assert -1e-9 <= left < problem.run_s.min()
-    promised = design.log_det + len(problem.parameters) * np.log(problem.total_s)
+    optimal = design.log_det + len(problem.parameters) * np.log(problem.total_s)
     assert len(design.repeats) == len(problem.names)
     _, offset = scaled(problem.matrices)
-    ratio = np.exp((information(problem, design.repeats) + offset - promised) / len(problem.parameters))
+    ratio = np.exp((information(problem, design.repeats) + offset - optimal) / len(problem.parameters))
     assert design.efficiency_repeats == pytest.approx(ratio, rel=1e-9)
     assert design.efficiency_repeats <= 1 + 1e-9
 
 
 @pytest.mark.parametrize("weak", [1.0, 1e-3, 1e-8])
 @pytest.mark.parametrize("total_s", [20.0, 50.0, 1000.0])
-def test_the_only_primitive_that_tells_of_a_parameter_is_never_dropped(weak: float, total_s: float):
+def test_the_only_primitive_with_information_about_a_parameter_is_never_dropped(weak: float, total_s: float):
     rich = [np.diag([a, b, 0.0]) for a, b in ((3.0, 1.0), (1.0, 3.0), (2.0, 2.0))]
     design = solve_durations(duration_problem([*rich, np.diag([0.0, 0.0, weak])], run_s=10.0, total_s=total_s))
     assert design.repeats[3] >= 1
@@ -87,7 +87,7 @@ def test_the_only_primitive_that_tells_of_a_parameter_is_never_dropped(weak: flo
 
 
 def test_a_long_run_that_is_needed_pushes_short_ones_out():
-    # 3 s runs would leave no room for the 40 s run that alone tells of the second parameter.
+    # 3 s runs would leave no room for the 40 s run that alone informs about the second parameter.
     design = solve_durations(
         duration_problem([np.diag([1.0, 0.0]), np.diag([0.0, 1e-6])], run_s=[3.0, 40.0], total_s=47)
     )

@@ -1,4 +1,4 @@
-"""A planned trial is admissible exactly within the limits of MSC/Circ.1053, and what is not known is not called met."""
+"""A planned trial is admissible exactly within the limits of MSC/Circ.1053, and unknown conditions are not met."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -24,7 +24,7 @@ KNOWN = Conditions(
     current_mps=0.2,
     current_std_mps=0.1,
     room_m=40.0,
-    room_asked_m=30.0,
+    required_room_m=30.0,
 )
 
 
@@ -56,7 +56,7 @@ def test_sea_state_is_four_at_most(state: int | None, expected: bool | None) -> 
     assert met(sea_state=state)["Sea state"] is expected
 
 
-def test_room_is_what_was_asked_for_and_uniform_current_is_for_the_day_to_show() -> None:
+def test_room_is_compared_with_the_required_and_a_uniform_current_stays_open() -> None:
     assert met()["Sea room"] is True
     assert met(room_m=29.9)["Sea room"] is False
     assert met()["Current"] is None

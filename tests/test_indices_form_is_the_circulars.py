@@ -64,7 +64,7 @@ def test_what_exceeds_its_limit_is_marked_and_what_was_not_run_is_not_shown() ->
     assert any(row.startswith("Turning circle Advance 811 m 4.51 L \N{BALLOT X} exceeds no result") for row in rows)
 
 
-def test_ship_data_are_the_vessels_and_unknown_entries_are_left_open() -> None:
+def test_ship_data_are_the_vessels_and_data_without_a_file_stay_open() -> None:
     rows = dict(ship_rows(content()))
     assert rows["Length, beam, mean draught"] == "L 180 m, B 30 m, T 10 m"
     assert (rows["L/B"], rows["B/T"]) == ("6.00", "3.00")

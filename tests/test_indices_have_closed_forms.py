@@ -13,7 +13,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from expdesign.errors import InputError
-from expdesign.indices import OUTCOMES, Circle, Stop, ZigZag, criteria, judge, outcomes, standard_results, watched
+from expdesign.indices import OUTCOMES, Circle, Stop, ZigZag, criteria, judge, outcomes, standard_results, steered_run
 from expdesign.indices.read import read_circle
 from expdesign.simulation import Conduct, turning_circle
 from nomoto_ship import GAIN, LAG, nomoto_ship
@@ -85,14 +85,14 @@ def test_a_uniform_current_is_found_and_taken_out() -> None:
     velocity[:, 1] += flow[1] * c - flow[0] * s
     drifted = replace(still, pose=pose, velocity=velocity)
     how = {"order_s": 0.0, "course_rad": 0.0, "side": 1, "helm_rad": FULL, "speed_mps": SPEED}
-    calm = read_circle(watched(SHIP, commands, still, name="calm"), current=False, **how)
-    found = read_circle(watched(SHIP, commands, drifted, name="in current"), current=True, **how)
+    calm = read_circle(steered_run(SHIP, commands, still, name="calm"), current=False, **how)
+    found = read_circle(steered_run(SHIP, commands, drifted, name="in current"), current=True, **how)
     assert (found.current_north_mps, found.current_east_mps) == pytest.approx(tuple(flow), abs=1e-4)
     for key in ("advance_m", "transfer_m", "tactical_diameter_m", "steady_diameter_m"):
         assert getattr(found, key) == pytest.approx(getattr(calm, key), rel=1e-3)
 
 
-def test_outcomes_are_the_results_by_name_and_only_what_is_asked_for() -> None:
+def test_outcomes_are_the_requested_results_by_name() -> None:
     results = standard_results(SHIP, speed_mps=SPEED)
     ten, twenty = results.zigzags[:2]
     found = outcomes(SHIP, speed_mps=SPEED)

@@ -1,4 +1,4 @@
-"""Exactly the parameters that a dictionary cannot tell apart are named, whatever the units; nothing else is."""
+"""Exactly the parameters that are not identifiable from a dictionary are named, in any units."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -47,7 +47,7 @@ def refused(items: Sequence[PrimitiveInformation], names: Sequence[str], subtrac
 
 
 @subtractions
-def test_without_wind_water_and_air_drag_cannot_be_told_apart(subtraction: str):
+def test_without_wind_water_and_air_drag_cannot_be_separated(subtraction: str):
     names = vessel("azimuth-30m").model.names
     assert refused(scored_example("standard", CALM), names, subtraction) == COLLINEAR_IN_CALM
     assert refused(scored_example("standard", WIND), names, subtraction) == set()
@@ -58,7 +58,7 @@ def test_without_wind_water_and_air_drag_cannot_be_told_apart(subtraction: str):
 
 @subtractions
 @pytest.mark.parametrize("name", ["model-ship", "azimuth-30m"])
-def test_straight_lines_tell_nothing_of_sway_and_yaw(name: str, subtraction: str):
+def test_straight_lines_do_not_inform_about_sway_and_yaw(name: str, subtraction: str):
     ship = vessel(name)
     unseen = {"X_vr"} | (set(ship.model.names) - SURGE)
     pair = {"X_abs_u_u", "W_abs_u_u"} & set(ship.model.names) if name == "azimuth-30m" else set()
@@ -141,6 +141,6 @@ def test_what_changes_only_between_runs_is_blind_to_batches_alone():
 def test_no_durations_are_made_for_a_dictionary_that_leaves_parameters_blind(subtraction: str):
     ship = vessel("azimuth-30m")
     items = score_primitives(ship, straight_line(ship), mean_subtraction=subtraction)
-    with pytest.raises(NotInformative, match=r"cannot tell these parameters apart: X_vr, .*N_mu") as caught:
+    with pytest.raises(NotInformative, match=r"cannot separate these parameters: X_vr, .*N_mu") as caught:
         build_durations(items, estimated_parameters(ship.model, ()), total_s=600.0, mean_subtraction=subtraction)
     assert one_line(caught.value)

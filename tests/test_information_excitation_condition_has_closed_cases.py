@@ -1,4 +1,4 @@
-"""The excitation condition: what stands in a modulus keeps its sign, clear of noise and disturbance."""
+"""The excitation condition: the argument of a modulus keeps its sign, with a margin for noise and disturbance."""
 
 from dataclasses import replace
 
@@ -25,7 +25,7 @@ def holds(
     vessel_: Vessel, velocity: tuple[float, float, float] | np.ndarray, sea: Environment = CALM, **options: float
 ) -> bool:
     """The condition for a run at a given velocity (3,) or velocities (COUNT, 3) on a steady heading north."""
-    nu = np.vstack([np.broadcast_to(velocity, (COUNT, 3)), np.zeros(3)])  # what follows the last command is not used
+    nu = np.vstack([np.broadcast_to(velocity, (COUNT, 3)), np.zeros(3)])  # the state after the last command is not used
     commands = Commands(
         sample_time_s=1.0, names=vessel_.model.inputs, values=np.ones((COUNT, len(vessel_.model.inputs)))
     )
@@ -95,7 +95,7 @@ def test_a_sum_inside_a_modulus_clears_the_noise_of_all_its_parts():
     assert not holds(ship("abs(u + 2*v)*r", velocity_mps=0.1), (0.66, 0.0, 0.0))
 
 
-def test_models_without_moduli_have_nothing_to_meet():
+def test_models_without_moduli_always_meet_the_condition():
     assert holds(ship("u*v", velocity_mps=9.0), (0.0, 0.0, 0.0))
 
 

@@ -135,7 +135,7 @@ def test_information_adds_over_runs_one_after_the_other():
     np.testing.assert_allclose(summed / scale[:, None], Y / scale[:, None], atol=1e-13)
 
 
-def test_the_mirrored_primitive_tells_the_same_with_mirrored_means():
+def test_the_mirrored_primitive_has_the_same_information_with_mirrored_means():
     ship = vessel("azimuth-30m")
     ship = replace(ship, model=replace(ship.model, actuators=(force_actuator(),)))
     settings = {"duration_s": 60, "speed_mps": 1, "turn_speed_mps": 0.7, "entry_s": 20}
@@ -164,18 +164,18 @@ def test_fixed_parameters_are_left_out_of_every_matrix():
         np.testing.assert_array_equal(some.Y, all_.Y[kept])
 
 
-def test_unknown_parameters_or_subtractions_and_nothing_to_estimate_are_refused():
+def test_unknown_parameters_or_subtractions_and_no_free_parameter_are_refused():
     ship = vessel("model-ship")
     with pytest.raises(UnknownName, match="'N_vu', did you mean 'N_uv'"):
         estimated_parameters(ship.model, ("N_vu",))
-    with pytest.raises(InputError, match="nothing is left to estimate"):
+    with pytest.raises(InputError, match="expected at least one parameter to estimate"):
         estimated_parameters(ship.model, ship.model.names)
     with pytest.raises(UnknownName, match="'batches', did you mean 'batch'"):
         score_primitives(ship, example_dictionary("model-ship")[:1], mean_subtraction="batches")
 
 
 @pytest.mark.parametrize("draw", range(5))
-def test_log_det_is_that_of_the_eigenvalues_whatever_the_units(draw: int):
+def test_log_det_is_that_of_the_eigenvalues_in_any_units(draw: int):
     rng = np.random.default_rng(draw)
     rows = rng.standard_normal((30, 6))
     matrix, units = rows.T @ rows, 10.0 ** rng.uniform(-8, 8, 6)
@@ -183,7 +183,7 @@ def test_log_det_is_that_of_the_eigenvalues_whatever_the_units(draw: int):
     assert value == pytest.approx(np.log(np.linalg.eigvalsh(matrix)).sum() + 2 * np.log(units).sum(), abs=1e-10)
 
 
-def test_a_straight_run_alone_tells_nothing_of_sway_and_a_rich_one_of_all():
+def test_a_straight_run_alone_does_not_inform_about_sway_and_a_rich_one_informs_about_all():
     straight, rich = score_primitives(vessel("azimuth-30m"), example_dictionary("standard")[::13], environment=WIND)
     assert straight.log_det_alone is None
     assert rich.log_det_alone is not None

@@ -1,4 +1,4 @@
-"""What data have told is counted in the depth they were taken in, not in deep water."""
+"""Information of data is counted at the depth of the data, not in deep water."""
 
 from dataclasses import replace
 
@@ -39,9 +39,9 @@ def case():
 def test_expected_deviations_scale_with_the_factor_of_the_depth(case):
     """theta (1 + a h) is one number where h is constant, so theta is known by that factor better."""
     reading, there, record, factor = case
-    told = with_depth(record, reading.draught_m)
+    deep = with_depth(record, reading.draught_m)
     arguments = {"environment": CALM, "mean_subtraction": "none"}
-    found = expected_std(in_recorded_depth(reading), data_parts(told, reading), PARAMETERS, **arguments)
+    found = expected_std(in_recorded_depth(reading), data_parts(deep, reading), PARAMETERS, **arguments)
     wanted = expected_std(there, data_parts(record, there), PARAMETERS, **arguments) / [factor, 1.0, 1.0]
     np.testing.assert_allclose(found, wanted, rtol=1e-6)
 

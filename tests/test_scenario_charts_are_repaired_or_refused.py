@@ -158,7 +158,7 @@ def test_flaws_that_leave_no_doubt_about_land_and_water_are_mended(area):
 
 @pytest.mark.parametrize("size_deg", [1e-5, 1e-4, 1e-3])
 def test_a_crossing_of_a_metre_on_a_long_coast_is_still_refused(area, size_deg):
-    """However large the land is, what a small crossing encloses stays in doubt."""
+    """The area enclosed by a small crossing is ambiguous, however large the land is."""
     loop = [[0.0, -0.5], [size_deg, -0.5 - size_deg], [0.0, -0.5 - size_deg], [size_deg, -0.5]]
     coast = [[-0.5, -0.5], *loop, [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5]]
     _write(area, collection(feature("land", coast)))
@@ -218,7 +218,7 @@ def test_bounds_beyond_the_chart_are_noted(tmp_path):
     spoil(path, "depth_layers = {seabed5m = 5.0, seabed20m = 20}", "")
     assert load_area(path, draught_m=1.0).notes == ()
     spoil(path, "south_deg = -0.01", "south_deg = -0.03")
-    assert "beyond everything drawn" in load_area(path, draught_m=1.0).notes[0]
+    assert "beyond the polygons" in load_area(path, draught_m=1.0).notes[0]
 
 
 def test_depth_layers_admit_only_water_deep_enough_for_draught_and_margin(tmp_path):
@@ -267,7 +267,7 @@ def test_areas_with_a_depth_of_their_own_admit_water_deep_enough_and_the_least_d
 
 
 def test_the_layer_may_stand_under_another_name(area):
-    """The same chart with its layers under another property is the same water; what is none is told with known ones."""
+    """Layers under another property give the same water; an unknown property is refused with the known ones."""
     rings = [square(0.02), square(0.008)]
     plain = _water(area, collection(feature("land", *rings), feature("sea", square(0.001))))
     _with_keys(area, 'layer_property = "objectType"')
@@ -281,7 +281,7 @@ def test_the_layer_may_stand_under_another_name(area):
     with pytest.raises(FileError, match=r"chart.depth_property: is 'DRVAL', .*DRVAL1"):
         load_area(area, draught_m=1.0)
     _with_keys(area, 'depth_property = "DRVAL1"', "depth_layers = {sea = 5.0}")
-    with pytest.raises(FileError, match=r"chart.depth_property: stands beside depth_layers"):
+    with pytest.raises(FileError, match=r"chart.depth_property: is given with depth_layers"):
         load_area(area, draught_m=1.0)
     _with_keys(area, 'depth_property = "DRVAL1"')
     _write(area, collection(_of_depth("ten", square(0.01))))

@@ -59,17 +59,17 @@ WRONG = [
     ('interest = ["X_v"]', "design.interest[1]", "is 'X_v'"),
     ('excluded = ["acc"]', "design.excluded[1]", "is 'acc'"),
     ("least_s = {zz = 1.0}", "design.least_s", "is 'zz'"),
-    ("prior_samples = 3", "design.prior_samples", "says nothing"),
+    ("prior_samples = 3", "design.prior_samples", "has no effect"),
     ("balance = 1.0", "design.balance", "is 1"),
     ('budgets = [{name = "wear", limit = 1.0}]', "design.budgets[1]", "needs either"),
     ('required = ["acceleration"]\nexcluded = ["acceleration"]', "design.excluded", "design.required names too"),
-    ('predictor = "wind"\nrobust = "average"', "design.predictor", "goes with neither"),
+    ('predictor = "wind"\nrobust = "average"', "design.predictor", "excludes design.robust"),
     ('prior_data = ["gone.csv"]', "design.prior_data[1]", "does not exist"),
 ]
 
 
 @pytest.mark.parametrize(("line", "key", "words"), WRONG)
-def test_invalid_settings_are_refused_with_file_and_key(tmp_path: Path, line: str, key: str, words: str):
+def test_wrong_settings_are_refused_with_their_place(tmp_path: Path, line: str, key: str, words: str):
     path = write_scenario(tmp_path)
     spoil(path, 'criterion = "D"', line)
     with pytest.raises(FileError) as caught:

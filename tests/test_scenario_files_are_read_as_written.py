@@ -115,8 +115,8 @@ def _dictionary(tmp_path, body):
 def test_lists_make_every_combination_with_unique_deterministic_names(tmp_path):
     body = '[[primitives]]\nfamily = "box"\nduration_s = [60, 90.5]\nspeed_mps = [-1, 1e-3, 2]\n'
     specs = _dictionary(tmp_path, body)
-    wished = [(60.0, -1.0), (60.0, 0.001), (60.0, 2.0), (90.5, -1.0), (90.5, 0.001), (90.5, 2.0)]
-    assert [(spec.settings["duration_s"], spec.settings["speed_mps"]) for spec in specs] == wished
+    expected = [(60.0, -1.0), (60.0, 0.001), (60.0, 2.0), (90.5, -1.0), (90.5, 0.001), (90.5, 2.0)]
+    assert [(spec.settings["duration_s"], spec.settings["speed_mps"]) for spec in specs] == expected
     assert all(spec.settings["lean"] == 0.5 and spec.family == "box" for spec in specs)
     assert specs[1].name == "box-duration-60-speed-0.001"
     assert len({spec.name for spec in specs}) == 6

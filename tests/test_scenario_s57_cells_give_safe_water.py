@@ -67,17 +67,17 @@ def test_the_security_zone_is_closed_and_said(harbour):
     assert any("1 areas closed by rule: entry restricted" in note for note in harbour.notes)
 
 
-def test_edition_updates_and_datum_are_reported(harbour):
+def test_edition_updates_and_datum_are_noted(harbour):
     assert any("edition 40, updates 1 to 4 applied, issued 2020-06-26" in note for note in harbour.notes)
     assert any("mean lower low water" in note for note in harbour.notes)
 
 
-def test_without_update_files_it_says_so_and_with_a_gap_it_stops(tmp_path):
+def test_missing_update_files_are_noted_and_a_gap_is_refused(tmp_path):
     cell = Path(shutil.copy(CELL, tmp_path))
     area = load_area(write_area(tmp_path, cell), draught_m=DRAUGHT_M)
-    assert any("no updates lie beside the cell" in note for note in area.notes)
+    assert any("no updates in its folder" in note for note in area.notes)
     shutil.copy(CELL.with_suffix(".002"), tmp_path)
-    with pytest.raises(FileError, match=r"US5WA22M\.002 beside it but not US5WA22M\.001, expected all updates"):
+    with pytest.raises(FileError, match=r"US5WA22M\.002 but not US5WA22M\.001 in its folder, expected all updates"):
         load_area(write_area(tmp_path, cell), draught_m=DRAUGHT_M)
 
 

@@ -23,7 +23,7 @@ SCENARIO_CASES = [
     ("total_s = 600", "total_s = 2026-01-01", "design.total_s", "is 2026-01-01, expected a number"),
     ("total_s = 600", "total_s = [600]", "design.total_s", "is a list, expected a number"),
     ("total_s = 600", "total_s = 0.5", "design.total_s", "is 0.5, expected at least the vessel's sample_time_s = 1"),
-    ("total_s = 600", "", "design.total_s", "is missing, expected the informative time"),
+    ("total_s = 600", "", "design.total_s", "is missing, expected the total informative time"),
     ("total_s = 600", "total = 600", "design.total", "did you mean 'total_s'?"),
     ("[design]", "[desing]", "desing", "did you mean 'design'?"),
     ('criterion = "D"', 'criterion = "C"', "design.criterion", "is 'C', expected 'D', 'D_s', 'A', 'E' or 'V'"),
@@ -123,8 +123,8 @@ AREA_CASES = [
     ("geojson =", "geojsn =", "chart.geojsn", "did you mean 'geojson'?"),
     ('geojson = "chart.geojson"', "", "chart.geojson", "is missing, expected the path of a GeoJSON chart"),
     ('geojson = "chart.geojson"', 'geojson = "no.geojson"', "chart.geojson", "'no.geojson'"),
-    ("geojson =", "s57 =", "chart.land_layers", "stands beside s57, expected it with geojson only"),
-    ("geojson =", "s57 = 'a.000'\ngeojson =", "chart.s57", "is 'a.000' beside geojson, expected one chart"),
+    ("geojson =", "s57 =", "chart.land_layers", "is given with s57, expected it with geojson only"),
+    ("geojson =", "s57 = 'a.000'\ngeojson =", "chart.s57", "is 'a.000' in addition to geojson, expected one chart"),
     ('["land"]', '["lnad"]', "chart.land_layers[1]", "is 'lnad', did you mean 'land'? (known: buoy, land, seabed20m"),
     ('["land"]', '"land"', "chart.land_layers", "is 'land', expected a list"),
     ('["land"]', '["land", "seabed5m"]', "chart.depth_layers.seabed5m", "is also a land layer"),
@@ -232,7 +232,7 @@ def test_a_generalised_force_stands_alone(tmp_path):
     path = tmp_path / "vessel.toml"
     limits = "\n".join(f"{axis}_min = -1\n{axis}_max = 1" for axis in ("x", "y", "psi"))
     spoil(path, "[model]", f'[[actuators]]\nkind = "force"\n{limits}\n[model]')
-    _check(_refusal(load_vessel, path), path, "actuators[3].kind", "expected no other thruster beside it")
+    _check(_refusal(load_vessel, path), path, "actuators[3].kind", "expected no other thruster")
 
 
 def test_water_that_is_nowhere_deep_enough_is_no_answer_rather_than_wrong_input(tmp_path):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from expdesign.assessment import EstimateOptions, assess, check_run, sentence, what_limits
+from expdesign.assessment import EstimateOptions, assess, check_run, decomposed, sentence
 from expdesign.assessment.limits import AHEAD_S, Limits
 from expdesign.assessment.runs import RunCheck
 from expdesign.estimation.methods import estimate
@@ -42,7 +42,7 @@ def judged(batch: Batch, model: VesselModel = MODEL) -> tuple[Limits, RunCheck]:
     found = estimate(Record(batches=(batch,)), model, method="ls")
     known = replace(found, values=model.parameters, covariance=0 * found.covariance)
     run = check_run(model, batch, use="test", wind=False, integration=RK4)
-    return what_limits(model, run, known, wind=False, integration=RK4), run
+    return decomposed(model, run, known, wind=False, integration=RK4), run
 
 
 def test_a_constant_force_is_named_as_one() -> None:
@@ -113,7 +113,7 @@ def test_the_misfit_that_a_wrong_parameter_makes_is_the_one_to_be_expected_of_it
     covariance[index, index] = off**2
     known = replace(found, values=wrong.parameters, covariance=covariance)
     run = check_run(wrong, batch, use="test", wind=False, integration=RK4)
-    limits = what_limits(wrong, run, known, wind=False, integration=RK4)
+    limits = decomposed(wrong, run, known, wind=False, integration=RK4)
     assert limits.parameters[2] == pytest.approx(1.0, abs=0.05)
 
 
@@ -155,4 +155,4 @@ def test_on_the_pond_instruments_in_the_measured_wind_give_a_stable_model() -> N
 
 def _limits(item):
     how = Integration("rk4", 1)
-    return [what_limits(item.model, run, item.estimate, wind=True, integration=how) for run in item.runs]
+    return [decomposed(item.model, run, item.estimate, wind=True, integration=how) for run in item.runs]

@@ -71,7 +71,7 @@ def test_a_position_in_other_keys_replaces_the_first(tmp_path):
 def test_a_variant_without_answer_is_listed_beside_the_others(tmp_path):
     alone = variant(tmp_path, "circles-only", f"[design]\nexcluded = {json.dumps(_all_but_first())}\n")
     found = cases(workflows.whatif(MODEL_SHIP, [alone], tmp_path / "out", jobs=1))
-    assert "cannot tell these parameters apart" in found["circles-only"]["problem"]
+    assert "cannot separate these parameters" in found["circles-only"]["problem"]
     assert found["model-ship"]["problem"] is None
     assert "No result" in (tmp_path / "out" / "whatif.html").read_text("utf-8")
 

@@ -1,7 +1,7 @@
 """Assessment: estimates are validated on their estimation runs and on test runs."""
 
 from expdesign.assessment.assess import NO_TESTS, EstimateOptions, assess, default_methods
-from expdesign.assessment.limits import Limits, sentence, what_limits
+from expdesign.assessment.limits import Limits, decomposed, sentence
 from expdesign.assessment.residuals import OneStep, one_step
 from expdesign.assessment.runs import RunCheck, check_run
 from expdesign.assessment.values import Assessed, Assessment, Current
@@ -17,8 +17,8 @@ __all__ = [
     "RunCheck",
     "assess",
     "check_run",
+    "decomposed",
     "default_methods",
     "one_step",
     "sentence",
-    "what_limits",
 ]

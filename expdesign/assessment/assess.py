@@ -1,11 +1,11 @@
-"""Estimate by several methods and check each: the choice of methods, of instruments, and of the one to go on with."""
+"""Estimates by several methods with their diagnostics, and the choice of methods, instruments and final estimate."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from expdesign.assessment.limits import Limits, what_limits
+from expdesign.assessment.limits import Limits, decomposed
 from expdesign.assessment.residuals import one_step
 from expdesign.assessment.runs import ESTIMATION, TEST, check_run
 from expdesign.assessment.values import INSTRUMENTAL, Assessed, Assessment, Current
@@ -38,8 +38,8 @@ class EstimateOptions:
         mean: subtracted from the instruments: "none", "batch" or "complete".
         start: of the first instruments: "nominal" for the vessel's values, "ls" for the least-squares estimate, "auto"
             for the vessel's values unless they are all zero or fail.
-        motion: what the parameters describe: "continuous" the motion between samples too, which is what plans are made
-            from; "euler" Euler's map at the sample time.
+        motion: "continuous" for parameters of the continuous-time motion, which plans use; "euler" for those of Euler's
+            map at the sample time.
         horizon_s: simulation horizon of output error [s], None for whole runs.
         constant: whether output error gives every run a constant force of its own.
     """
@@ -65,12 +65,12 @@ class EstimateOptions:
 
     @property
     def integration(self) -> Integration:
-        """How models are simulated."""
+        """Integrator of the models."""
         return Integration("rk4", 1) if self.motion == CONTINUOUS else Integration()
 
     @property
     def quadrature(self) -> str:
-        """How regressors stand for an interval."""
+        """Quadrature of the regressors over a sample interval."""
         return "trapezoid" if self.motion == CONTINUOUS else "euler"
 
 
@@ -97,8 +97,8 @@ def assess(
 
     Args:
         vessel: structure, start values and sensors.
-        record: what the estimates come from.
-        options: methods and what is held fixed.
+        record: estimation data.
+        options: methods, fixed parameters and settings.
         tests: runs that are simulated but not used.
         progress: of the assessment.
 
@@ -137,15 +137,16 @@ def assess(
 
 
 def limits_of(item: Assessed, integration: Integration) -> tuple[Limits, ...]:
-    """What limits the fit of every run simulated with an estimate."""
+    """The decomposed misfit of every run simulated with an estimate."""
     wind = USES_WIND[item.method.predictor]
-    return tuple(what_limits(item.model, run, item.estimate, wind=wind, integration=integration) for run in item.runs)
+    return tuple(decomposed(item.model, run, item.estimate, wind=wind, integration=integration) for run in item.runs)
 
 
 def preferred(found: Sequence[Assessed]) -> int:
-    """The first with instruments whose model can simulate every run; the first such without; else the best at that.
+    """Index of the first stable estimate with instruments, else of the first stable one, else of the most stable one.
 
-    Only instruments can be consistent when the regressors are noisy, and an unstable model is of no use.
+    An estimate is stable if its model can simulate every run. With noisy regressors only instrumental variables are
+    consistent.
     """
     stable = [index for index, item in enumerate(found) if item.stable]
     fewest = min(range(len(found)), key=lambda index: sum(bool(run.problem) for run in found[index].runs))
@@ -191,7 +192,7 @@ def _current(found: Estimate, vessel: Vessel) -> Current | None:
 
 
 def _estimated(vessel: Vessel, record: Record, method: Method, options: EstimateOptions) -> tuple[Estimate, str]:
-    """The estimate, and what its first instruments came from: the vessel's values, or least squares where they fail."""
+    """The estimate, and the start of its first instruments: the vessel's values, or least squares where they fail."""
 
     def attempt(start: str) -> Estimate:
         weighting = Weighting(mean=options.mean)

@@ -32,7 +32,7 @@ SLOW_S = 20.0
 AHEAD_S = 30.0
 """Prediction horizon from measured states [s]."""
 UNSTABLE = 5.0
-"""Growth of an error over a run that counts as unstable."""
+"""Growth of an error over a run above which the ship is unstable."""
 CANCELLING = 2.0
 """Share of the squared misfit above which its parts nearly cancel, so that their sizes have no meaning."""
 
@@ -43,10 +43,10 @@ class Limits:
 
     Attributes:
         outputs: names.
-        constant, slow, quick: (n,) shares of the squared misfit by the kind of one-step residual that they grew from.
-        parameters: (n,) squared misfit that the parameters' covariance leads to expect, over the one found.
-        ceiling_percent: (n,) fit that measurement noise alone would leave, at least: the noise is read from third
-            differences, which count motion that is quick at the sample time as noise.
+        constant, slow, quick: (n,) shares of the squared misfit by the kind of one-step residual that causes it.
+        parameters: (n,) squared misfit expected from the parameters' covariance, over the actual one.
+        ceiling_percent: (n,) lower bound on the fit with measurement noise alone: the noise is estimated by third
+            differences, which also contain motion that is fast at the sample time.
         ahead_rms: (n,) of predictions `AHEAD_S` ahead from measured velocities [m/s, rad/s].
         ahead_share: (n,) the same over the standard deviation of the measured output.
         growth: how many times an error of the first velocity is larger at the end of the run, at worst.
@@ -79,7 +79,7 @@ class Limits:
         return self.duration_s * float(np.log(2) / np.log(self.growth)) if self.growth > 1 else float("inf")
 
 
-def what_limits(model: VesselModel, run: RunCheck, found: Estimate, *, wind: bool, integration: Integration) -> Limits:
+def decomposed(model: VesselModel, run: RunCheck, found: Estimate, *, wind: bool, integration: Integration) -> Limits:
     """Decompose the misfit of a run.
 
     Args:
@@ -164,7 +164,7 @@ def _one_step(stretches: Stretches) -> Compiled:
 
 
 def _slow_part(values: Array, sample_time_s: float) -> Array:
-    """What varies with periods over `SLOW_S` or 40 samples; cosines do not wrap one end round to the other."""
+    """The part with periods over `SLOW_S` or 40 samples; a cosine transform is not periodic at the ends."""
     spectrum = dct(values, axis=0, norm="ortho")
     period_s = max(SLOW_S, 40 * sample_time_s)
     spectrum[int(2 * len(values) * sample_time_s / period_s) + 1 :] = 0.0
@@ -183,7 +183,7 @@ def _ahead(stretches: Stretches, values: Array, measured: Array, sample_time_s: 
 
 
 def _whole(values: Array) -> Array:
-    """Gaps filled linearly; zero in columns that hold nothing."""
+    """Gaps filled linearly; zero in columns without data."""
     places, filled = np.arange(len(values)), np.zeros_like(values)
     for index, column in enumerate(values.T):
         seen = np.isfinite(column)

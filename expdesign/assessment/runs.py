@@ -19,7 +19,7 @@ ESTIMATION, TEST = "estimation", "test"
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RunCheck:
-    """What a simulation of one run gives.
+    """The simulation of one run and its errors.
 
     Attributes:
         batch: the run.

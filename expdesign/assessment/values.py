@@ -41,7 +41,7 @@ class Assessed:
     Attributes:
         method: how it was made.
         estimate: parameters with their uncertainty.
-        start: what the first instruments were simulated with, "nominal" or "ls"; "" for least squares.
+        start: parameters of the first instruments, "nominal" or "ls"; "" for least squares.
         model: the vessel's model with the estimate.
         runs: every run simulated with it, first the estimation runs, then the test runs.
         one_step: its residuals.
@@ -74,15 +74,15 @@ class Assessment:
     """All methods on the same data.
 
     Attributes:
-        record: what the estimates come from.
+        record: estimation data.
         tests: test runs, not used for estimation; may be empty.
-        methods: one entry for each method that gave an estimate, in the order asked for.
+        methods: one entry for each method that gave an estimate, in the order of the options.
         left_out: one sentence for each default method that gave no estimate.
         chosen: index of the method whose estimate goes into the vessel file.
         mean: how the mean was subtracted from instruments.
         fixed: parameters held at the vessel file's values.
-        motion: "continuous" or "euler", what the parameters describe.
-        limits: what limits the fit of every run of the chosen estimate.
+        motion: "continuous" or "euler", as in `EstimateOptions`.
+        limits: decomposed misfit of every run of the chosen estimate.
     """
 
     record: Record

@@ -1,4 +1,4 @@
-"""Many candidates at once: commands and calm-water motion of requests of one length, without building primitives."""
+"""Commands and entry states of many specifications of one duration, without building primitives."""
 
 from __future__ import annotations
 
@@ -17,13 +17,12 @@ from expdesign.vessel import Vessel, within_limits
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ExcitedRuns:
-    """What requests of one length command.
+    """Commands and entry states of specifications of one duration.
 
     Attributes:
-        possible: (n,) 1 where the request makes sense and the vessel can hold its entry state; the others' rows are
-            zero.
+        possible: (n,) 1 where the settings are consistent and the vessel can hold the entry state, else 0.
         velocity: (n, 3) entry u, v, r through water.
-        entry_inputs: (n, m) commands that must be standing when they begin.
+        entry_inputs: (n, m) commands before the run.
         commands: (n, k, m) within limits and rates.
     """
 
@@ -37,11 +36,11 @@ class ExcitedRuns:
 
 
 def excite_many(vessel: Vessel, specs: Sequence[PrimitiveSpec]) -> ExcitedRuns:
-    """Commands of many requests; those that cannot be are marked instead of raising.
+    """Commands of many specifications; impossible ones are marked instead of raising.
 
     Args:
         vessel: nominal.
-        specs: requests of the same duration; those of families with a reference are turned round together.
+        specs: of the same duration.
     """
     samples = round(specs[0].settings["duration_s"] / vessel.sample_time_s)
     possible, velocity = np.zeros(len(specs)), np.zeros((len(specs), 3))

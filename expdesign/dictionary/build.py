@@ -1,4 +1,4 @@
-"""From a request to a primitive: desired velocities or commands, kept within limits, and the simulated response."""
+"""From a specification to a primitive: commands within limits, and the simulated motion."""
 
 from __future__ import annotations
 
@@ -32,20 +32,19 @@ def family(name: str) -> Family:
 
 
 def build_dictionary(vessel: Vessel, specs: Iterable[PrimitiveSpec]) -> tuple[Primitive, ...]:
-    """Every requested primitive, in order."""
+    """All primitives of the specifications, in order."""
     return tuple(build_primitive(vessel, spec) for spec in specs)
 
 
 def build_primitive(vessel: Vessel, spec: PrimitiveSpec) -> Primitive:
     """One primitive: commands of its family, or by the inverse nominal model, within limits and rates, then simulated.
 
-    The simulated motion is what counts from here on; where limits or unmodelled directions keep the vessel from the
-    desired velocities it differs from them.
+    Designs use the simulated motion, which differs from the desired one where limits are active.
 
     Raises:
-        InputError: the run is shorter than two samples, or the family asks for what the vessel cannot do; the message
-            names the primitive and, where it has one, its file and key.
-        Unreachable: the actuators cannot hold its entry state; the message also tells what they reach.
+        InputError: the run is shorter than two samples, or the vessel cannot run the family; the message names the
+            primitive and, where it has one, its file and key.
+        Unreachable: the actuators cannot hold its entry state; the message states their limit.
         Diverged: the nominal model is unstable under the commands.
     """
     try:
@@ -66,7 +65,7 @@ def build_primitive(vessel: Vessel, spec: PrimitiveSpec) -> Primitive:
 
 
 def excitation(vessel: Vessel, spec: PrimitiveSpec) -> Excitation:
-    """Entry state and commands (k, m) of a request, within limits and rates.
+    """Entry state and commands (k, m) of a specification, within limits and rates.
 
     Raises:
         InputError, SpeedOutOfReach, Unreachable: as in `build_primitive`.
@@ -90,10 +89,10 @@ def excitation(vessel: Vessel, spec: PrimitiveSpec) -> Excitation:
 
 
 def desired_commands(vessel: Vessel, spec: PrimitiveSpec) -> Excitation:
-    """What a family with orders asks for, before limits and rates.
+    """Commands of a family with orders, before limits and rates.
 
     Raises:
-        InputError: the vessel cannot do it.
+        InputError: the vessel cannot follow them.
     """
     orders = family(spec.family).orders
     assert orders is not None
@@ -104,7 +103,7 @@ def desired_velocities(vessel: Vessel, spec: PrimitiveSpec) -> Array:
     """(k + 1, 3) desired velocities of a family with a reference.
 
     Raises:
-        InputError: its settings make no sense together.
+        InputError: its settings contradict each other.
     """
     reference = family(spec.family).reference
     assert reference is not None
@@ -119,7 +118,7 @@ def follow(vessel: Vessel, desired: Array) -> tuple[Array, Array]:
     """Entry commands (..., m) and commands (..., k, m) for desired velocities (..., k + 1, 3), by the inverse model.
 
     Raises:
-        InputError: the model reads its actuators directly.
+        InputError: the model has no generalised forces.
     """
     slopes = np.diff(desired, axis=-2) / vessel.sample_time_s
     middles = (desired[..., :-1, :] + desired[..., 1:, :]) / 2
@@ -129,7 +128,7 @@ def follow(vessel: Vessel, desired: Array) -> tuple[Array, Array]:
 
 
 def _ready(vessel: Vessel, entry: Array, force: Array) -> Array:
-    """Entry commands with every azimuth that gives no thrust turned to where the run will need it first."""
+    """Entry commands with idle azimuths turned to the first direction that the run needs."""
     size = np.linalg.norm(force, axis=-1)
     pushes = size > 1e-3 * np.maximum(size.max(axis=-1, keepdims=True), 1e-12)
     first = np.take_along_axis(force, np.argmax(pushes, axis=-1)[..., None, None], axis=-2)

@@ -1,4 +1,4 @@
-"""The motion that a family desires beside the motion that the vessel makes: designs use only the second."""
+"""Deviation of the simulated motion from the desired one; designs use the simulated motion."""
 
 from __future__ import annotations
 

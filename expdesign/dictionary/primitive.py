@@ -1,4 +1,4 @@
-"""A manoeuvre primitive: commands, the state they must start from, and the simulated answer."""
+"""A manoeuvre primitive: commands, entry state, and simulated motion."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ class Primitive:
         family: the manoeuvre family that made it.
         settings: the family's parameters, units in the names.
         commands: actuator commands (k samples).
-        entry_inputs: (m,) actuator commands that must be standing when it begins.
-        trajectory: the answer, k + 1 samples; its first velocity is the entry velocity through water.
+        entry_inputs: (m,) actuator commands before the run.
+        trajectory: simulated motion, k + 1 samples; its first velocity is the entry velocity through water.
     """
 
     name: str

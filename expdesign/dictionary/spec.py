@@ -13,8 +13,8 @@ from expdesign.values import Array
 from expdesign.vessel import Vessel
 
 SEARCHED = ("", "surge", "sway", "yaw", "time", "share", "helm", "heading", "draw")
-"""What a setting is when a search moves it: a velocity, a time within the run, a share of 1, a helm angle, a change of
-heading, the number of a random draw; "" for one that a search leaves at its default."""
+"""Kinds of searched settings: a velocity, a time within the run, a share of 1, a helm angle, a change of heading, the
+number of a random draw; "" for a setting that a search leaves at its default."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,11 +38,11 @@ class Setting:
 
     def __post_init__(self) -> None:
         if self.searched not in SEARCHED:
-            raise UnknownName(f"way to search {self.name}:", self.searched, known=SEARCHED[1:])
+            raise UnknownName(f"kind of searched setting {self.name}:", self.searched, known=SEARCHED[1:])
 
 
 Reference = Callable[[Mapping[str, float], Array], Array]
-"""(settings, time_s (k,)) -> (k, 3) desired u, v, r through water; the row at time 0 is the entry velocity."""
+"""(settings, time_s (k,)) -> (k, 3) desired u, v, r through water; the first row is the entry velocity."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,7 +53,7 @@ class PrimitiveSpec:
         name: unique in the dictionary.
         family: name of the family.
         settings: every setting of the family, by name.
-        commands: what a "recorded" primitive repeats; None for the other families.
+        commands: of a "recorded" primitive; None for the other families.
         place: file and key of the request, for messages; "" when it comes from no file.
     """
 
@@ -66,12 +66,12 @@ class PrimitiveSpec:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Excitation:
-    """Desired commands, and the steady state they start from.
+    """Commands of a run, and the steady state before it.
 
     Attributes:
         velocity: (3,) u, v, r through water at the start.
         inputs: (m,) commands that hold it.
-        commands: (k, m) desired commands; the builder keeps them within limits and rates.
+        commands: (k, m).
     """
 
     velocity: Array
@@ -84,16 +84,15 @@ Orders = Callable[[Vessel, PrimitiveSpec], Excitation]
 
 @dataclass(frozen=True, kw_only=True)
 class Family:
-    """A kind of manoeuvre, by its desired velocities or its commands; one of the two.
+    """A kind of manoeuvre, defined either by desired velocities or by commands.
 
     Attributes:
         name: as in dictionary files.
         summary: one line for the user.
         settings: its parameters; each family also has `duration_s`.
-        reference: its desired velocities; the builder turns them into commands within the actuators' limits.
-        orders: the commands it gives. Any vessel can follow them, also one with propeller and rudder whose model does
-            not see generalised forces.
-        closed_loop: whether its commands depend on the simulated motion, so that each must be simulated by itself.
+        reference: desired velocities; the builder computes commands within the actuators' limits.
+        orders: commands, also for vessels with propeller and rudder, whose models have no generalised forces.
+        closed_loop: whether its commands depend on the simulated motion; its candidates are simulated one by one.
     """
 
     name: str

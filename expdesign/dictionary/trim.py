@@ -1,4 +1,4 @@
-"""Steady states: commands that hold a velocity, and what they leave over."""
+"""Steady states: commands that hold a velocity, and their residual."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from expdesign.values import Array
 from expdesign.vessel import NUMPY, Vessel, allocate, direct_terms, required_force
 
 STEADY = 1e-6
-"""Share of its speed that a vessel may lose or gain per sample where a state counts as held."""
+"""Largest relative change of speed per sample of a steady state."""
 SHARES = (0.9, 0.75, 0.5, 0.25, 0.1, 0.03, 0.01)
 """Where the search for the largest share of a velocity that can be held begins."""
 STARTS = (0.05, 0.4, 0.9)

@@ -1,7 +1,7 @@
 """Durations: how long to run each primitive, with a certificate."""
 
 from expdesign.durations.certificate import Certificate, DurationDesign, log_det, scaled, sensitivities, whitened
-from expdesign.durations.collected import Collected
+from expdesign.durations.concave import Collected
 from expdesign.durations.criteria import CRITERIA, Aim, Criterion
 from expdesign.durations.efficiency import Efficiencies, Kept, efficiencies, limits_kept
 from expdesign.durations.large_scale import LargeDesign, d_optimal, rows_of

@@ -1,8 +1,7 @@
 """The convex problem of any criterion and any limits, stated in cvxpy; the only importer of it, imported when needed.
 
-A new limit is one expression in `_limits`, a new criterion one in `_hypograph`. Answers are approximate: the solver's
-status is not looked at, `newton_step` sharpens what is smooth, and the certificate is computed elsewhere, from the
-problem.
+A new limit is one expression in `_limits`, a new criterion one in `_hypograph`. The solver's status is not used:
+`newton_step` refines smooth problems, and `certificate` computes the gap from the problem alone.
 
 Source: S. Diamond and S. Boyd, CVXPY: a Python-embedded modeling language for convex optimization, J. Mach. Learn. Res.
 17 (2016), no. 83; P. J. Goulart and Y. Chen, Clarabel: an interior-point solver for conic programs with quadratic
@@ -24,10 +23,8 @@ from expdesign.durations.concave import ConcaveProblem
 from expdesign.durations.criteria import LogDet, LogTrace, Measure
 from expdesign.durations.criteria.models import Piece
 from expdesign.durations.limits import Polytope
+from expdesign.durations.tuning import TUNING
 from expdesign.values import Array
-
-PRECISION = {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11}
-"""What the solver aims at; where rounding stops it earlier, its last iterate is taken."""
 
 
 def conic_optimum(task: ConcaveProblem) -> tuple[Array, tuple[Array, ...]] | None:
@@ -58,7 +55,7 @@ def conic_optimum(task: ConcaveProblem) -> tuple[Array, tuple[Array, ...]] | Non
 
 
 def newton_step(task: ConcaveProblem, w: Array, *, mixture: Array, floor_prices: Sequence[float]) -> Array | None:
-    """A step (q,) of Newton's method under all limits.
+    """A step (q,) of sequential quadratic programming under all limits.
 
     It maximises the quadratic model of the Lagrangian, with the floors and the models of a worst case to first order.
 
@@ -94,6 +91,14 @@ def newton_step(task: ConcaveProblem, w: Array, *, mixture: Array, floor_prices:
     return None if step.value is None or not np.isfinite(step.value).all() else np.asarray(step.value)
 
 
+def largest_least_eigenvalue(matrices: Array, prior: Array, polytope: Polytope) -> Array | None:
+    """Fractions (q,) w that maximise the least eigenvalue of prior (d, d) + sum_q w_q B_q, B_q symmetric (q, d, d)."""
+    w, d = cp.Variable(len(matrices)), len(prior)
+    total = prior + cp.reshape(matrices.reshape(len(matrices), d * d).T @ w, (d, d), order="C")
+    _solve(cp.Problem(cp.Maximize(cp.lambda_min((total + total.T) / 2)), _limits(polytope, w)))
+    return None if w.value is None or not np.isfinite(w.value).all() else np.asarray(w.value)
+
+
 def _limits(polytope: Polytope, w: Any) -> list[Any]:
     """All linear limits on fractions w."""
     limits = [cp.sum(w) == 1, w >= polytope.least]
@@ -106,7 +111,7 @@ def _limits(polytope: Polytope, w: Any) -> list[Any]:
 
 
 def _hypograph(piece: Piece, w: Any) -> tuple[Any, list[Any]]:
-    """A concave expression for a piece's value, and what it holds under, the matrix inequality in M first."""
+    """A concave expression for a piece's value, and its constraints, the matrix inequality in M first."""
     count, d = piece.matrices.shape[:2]
     total = piece.prior + cp.reshape(piece.matrices.reshape(count, d * d).T @ w, (d, d), order="C")
     M = (total + total.T) / 2
@@ -141,7 +146,8 @@ def _multiplier(piece: Piece, dual: Array | None, w: Array) -> Array:
 def _solve(problem: Any) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # an inaccurate answer is judged by its certificate
+        tolerance = dict.fromkeys(("tol_gap_abs", "tol_gap_rel", "tol_feas"), TUNING.solver_tolerance)
         try:
-            problem.solve(solver=cp.CLARABEL, **PRECISION)
+            problem.solve(solver=cp.CLARABEL, **tolerance)
         except cp.error.SolverError:
             return

@@ -1,13 +1,13 @@
-"""Equivalence theorems: what any design is worth, computed from the problem alone.
+"""Optimality certificates from equivalence theorems, computed from the problem alone.
 
 For f(w) = log det B(w), B(w) = sum_q w_q B_q with B_q positive semidefinite, the sensitivities
 d_q = trace(B(w)^-1 B_q) are the gradient of f, their w-weighted mean is the dimension, and concavity bounds every
 other design by f(w) + max_q d_q - dimension.
 
 In general every measure is bounded by linear functions of the information matrix (see `criteria.measures`), so every
-model and every floor is bounded by a linear function of the fractions. The largest value under all these and the
-linear limits is a linear programme; its dual solution gives the mixture of the models and the prices of the limits. The
-bound that is given out is computed from them by weak duality, so it holds whatever they are.
+model and every floor is bounded by a linear function of the fractions. Maximising under these bounds and the linear
+limits is a linear programme. Its dual solution gives the mixture of the models and the multipliers of the limits. The
+bound follows from these by weak duality, so it is valid for any mixture and any multipliers.
 
 Source: J. Kiefer and J. Wolfowitz, The equivalence of two extremum problems, Canad. J. Math. 12 (1960), 363-366;
 F. Pukelsheim, Optimal Design of Experiments (2006), 7.19-7.23 (general equivalence theorem) and 11 (mixtures).
@@ -23,31 +23,29 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import linprog
 
 from expdesign.durations.concave import ConcaveProblem
-from expdesign.durations.criteria.models import SINGULAR, Tangent
+from expdesign.durations.criteria.models import Tangent
 from expdesign.durations.problem import DurationProblem
+from expdesign.durations.tuning import TUNING
 from expdesign.values import Array, seal
-
-LP_TOLERANCE = 1e-10
-"""Of the linear programme's feasibility and optimality."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Certificate:
-    """Why no other sharing can be better by more than the gap, as numbers that anyone can check.
+    """Proof that no feasible design is better by more than the gap.
 
-    For any feasible v the criterion is at most `value` + slope (v - w), with the slope mixed from the models and the
-    limits at their prices; the largest value of that over all feasible v is the bound.
+    For any feasible v the criterion is at most `value` + slope (v - w), with the slope of the Lagrangian. The largest
+    value of that over all feasible v is the bound.
 
     Attributes:
-        kind: the theorem in a few words, or why there is none.
-        value: the criterion at the design, as a logarithm; `degree` of it are one unit of information.
-        bound: no feasible sharing has more; inf when there is no certificate.
-        degree: value of twice the information is higher by degree x log 2.
-        level: what every sensitivity less its price is at most, and where time is free to move, exactly.
+        kind: the theorem, or why there is none.
+        value: the criterion at the design, as a logarithm.
+        bound: upper bound on the criterion of any feasible design; inf when there is no certificate.
+        degree: doubling the information raises the value by degree x log 2.
+        level: upper bound on every sensitivity less its price, reached where no limit on the time is active.
         mixture: (m,) weights of the sampled models.
-        prices: (q,) what the limits take off each sensitivity.
-        multipliers: price of every limit by name; a limit whose price is zero does not matter.
-        guaranteed: for recorded primitives, the log det that the symmetric part guarantees; -inf when it is nowhere
+        prices: (q,) part of each sensitivity that is due to limits.
+        multipliers: Lagrange multiplier of every limit by name; zero for inactive limits.
+        guaranteed: for recorded primitives, the log det guaranteed by the symmetric part; -inf when it is nowhere
             positive definite; nan where the problem is convex.
     """
 
@@ -72,21 +70,21 @@ class Certificate:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DurationDesign:
-    """How long to run each primitive, with the proof.
+    """Optimal durations with their certificate.
 
     Attributes:
-        problem: what was asked.
+        problem: the duration problem.
         fractions: (q,) optimal time fractions, sum 1; less where budgets make it better to leave time unused.
-        sensitivities: (q,) slope of the criterion; for D trace(B(w)^-1 B_q), at the optimum at most `dimension`, equal
-            where w_q > 0.
+        sensitivities: (q,) gradient of the criterion; for D trace(B(w)^-1 B_q), at the optimum at most `dimension`,
+            equal where w_q > 0.
         log_det: log det B at `fractions`, by the nominal model.
-        gap: what any other design may be better by, in the criterion's logarithm (for D in log det).
+        gap: upper bound on the improvement by any other design, in the criterion's logarithm (for D in log det).
         repeats: (q,) whole runs.
-        efficiency_repeats: of the whole runs against the optimum, by the criterion: share of the time that the optimum
-            would need for the same.
+        efficiency_repeats: efficiency of the whole runs by the criterion: the optimum reaches the same in this share
+            of the time.
         efficiency_uniform: the same for equal time on every primitive, whether that is allowed or not.
-        certificate: the proof.
-        note: what has to be known of the whole runs, in a sentence, or "".
+        certificate: proof of optimality.
+        note: a warning about the whole runs in one sentence, or "".
     """
 
     problem: DurationProblem
@@ -105,13 +103,13 @@ class DurationDesign:
 
     @property
     def log_det_bound(self) -> float:
-        """Upper bound on the log det of any design; inf when the certificate is about something else."""
+        """Upper bound on the log det of any design; inf unless the criterion is D of the nominal model."""
         own = self.problem.aim.criterion == "D" and self.problem.robust == "nominal"
         return self.log_det + self.gap if own else float("inf")
 
     @property
     def gap_relative(self) -> float:
-        """The gap per degree of the criterion: the share of information that may be missing."""
+        """The gap per degree of the criterion: a bound on the loss of efficiency."""
         return self.gap / self.certificate.degree
 
     @property
@@ -121,7 +119,7 @@ class DurationDesign:
 
 
 def scaled(matrices: Array) -> tuple[Array, float]:
-    """Matrices (q, d, d) with unit mean diagonal, and what the scaling took off every log det.
+    """Matrices (q, d, d) with unit mean diagonal, and the log det of original less scaled matrices.
 
     Parameters span many orders of magnitude; a diagonal scaling changes no design and no sensitivity, only accuracy.
     """
@@ -131,10 +129,10 @@ def scaled(matrices: Array) -> tuple[Array, float]:
 
 
 def whitened(matrices: Array) -> tuple[Array, float]:
-    """Matrices (q, d, d) whose mean is the identity, and what the transformation took off every log det.
+    """Matrices (q, d, d) whose mean is the identity, and the log det of original less whitened matrices.
 
-    Any congruence leaves designs and sensitivities as they are. This one makes the equal-share design perfectly
-    conditioned, so that nearly collinear parameters cost the solver no accuracy.
+    A congruence changes no design and no sensitivity. This one gives the equal-share design condition number 1, so
+    that nearly collinear parameters cost the solver no accuracy.
 
     Raises:
         numpy.linalg.LinAlgError: the mean is not positive definite.
@@ -149,10 +147,10 @@ def whitened(matrices: Array) -> tuple[Array, float]:
 def log_det(matrices: Array, fractions: Array) -> float:
     """log det of sum_q w_q B_q, or -inf when it is singular to working precision.
 
-    The matrices should be scaled or whitened: singular means an eigenvalue below `SINGULAR` times the largest.
+    The matrices should be scaled or whitened: singular means an eigenvalue below `Tuning.singular` times the largest.
     """
     eigenvalues = np.linalg.eigvalsh(np.tensordot(fractions, matrices, axes=1))
-    return float(np.log(eigenvalues).sum()) if eigenvalues[0] > SINGULAR * eigenvalues[-1] else -np.inf
+    return float(np.log(eigenvalues).sum()) if eigenvalues[0] > TUNING.singular * eigenvalues[-1] else -np.inf
 
 
 def sensitivities(matrices: Array, fractions: Array) -> Array:
@@ -169,13 +167,13 @@ def sensitivities(matrices: Array, fractions: Array) -> Array:
 def certify(
     task: ConcaveProblem, w: Array, *, kind: str, multipliers: Sequence[Array] = ()
 ) -> tuple[Certificate, Array]:
-    """The best bound at a design, and the criterion's sensitivities (q,) there.
+    """The tightest bound at a design, and the criterion's sensitivities (q,) there.
 
     Args:
         task: the problem.
         w: (q,) the design.
         kind: the theorem, in words.
-        multipliers: (d, d) for each model, tried beside the gradients; the bound holds whatever they are.
+        multipliers: (d, d) for each model, tried in addition to the gradients; the bound is valid for any.
 
     Raises:
         numpy.linalg.LinAlgError: the design is singular, and no multipliers are given.
@@ -228,7 +226,7 @@ def _certified(
 def _dual(
     task: ConcaveProblem, w: Array, values: Array, slopes: Array, floors: Sequence[Tangent]
 ) -> tuple[Array, Array, Array]:
-    """Weights (m,) of the models, prices (i,) of the polytope's rows and (j,) of the floors, from linear programming.
+    """Weights (m,) of the models, multipliers (i,) of the rows and (j,) of the floors, by linear programming.
 
     The programme: the largest t with t <= values + slopes (v - w) for every model, or for their average, every floor's
     tangent at 0 or more, v in the polytope.
@@ -250,7 +248,7 @@ def _dual(
     b = np.r_[heights - tilts @ w, polytope.limits, [item.value - item.slope @ w for item in floors]]
     bounds = [*zip(polytope.least, np.maximum(polytope.most, polytope.least), strict=True), (None, None)]
     whole = np.r_[np.ones(len(w)), 0.0][None]
-    options = {"primal_feasibility_tolerance": LP_TOLERANCE, "dual_feasibility_tolerance": LP_TOLERANCE}
+    options = {"primal_feasibility_tolerance": TUNING.lp_tolerance, "dual_feasibility_tolerance": TUNING.lp_tolerance}
     answer = linprog(np.r_[np.zeros(len(w)), -1.0], A, b, whole, [1.0], bounds, method="highs", options=options)
     dual = np.zeros(len(b)) if answer.status else np.maximum(-answer.ineqlin.marginals, 0.0)
     mixture = np.full(count, 1.0 / count)
@@ -260,7 +258,7 @@ def _dual(
 
 
 def _level(task: ConcaveProblem, w: Array, net: Array) -> float:
-    """The net sensitivity of primitives whose time is free to move both ways."""
+    """The net sensitivity of primitives whose time is at no bound."""
     least, most = task.polytope.least, task.polytope.most
     free = (w > least + 1e-6) & (w < np.where(most < 1.0, most - 1e-9, 2.0))
     if not free.any():

@@ -1,4 +1,4 @@
-"""Every design under every criterion: what the choice of one costs by the others."""
+"""Efficiency of every design under every criterion, and how far limits are used."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from expdesign.durations.certificate import DurationDesign
-from expdesign.durations.collected import Collected
-from expdesign.durations.concave import with_idle
+from expdesign.durations.concave import Collected, with_idle
 from expdesign.durations.criteria import CRITERIA
 from expdesign.durations.criteria.models import stacked_values
 from expdesign.durations.problem import DurationProblem
@@ -18,20 +17,20 @@ from expdesign.errors import InputError, NoAnswer
 from expdesign.values import Array
 
 DESIGNS = ("continuous", "repeats", "uniform")
-"""The optimal sharing, its whole runs, and equal time on every primitive."""
+"""The optimal fractions, their whole runs, and equal time on every primitive."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Efficiencies:
     """Efficiency of designs by one criterion, against the optimum under the same limits.
 
-    An efficiency of 0.8 means that the optimum reaches the same with 80 % of the time, when nothing is known before.
+    An efficiency of 0.8 means that the optimum reaches the same with 80 % of the time, without prior information.
 
     Attributes:
         criterion: its name.
-        title: what it makes best.
-        of: design -> efficiency; empty when the criterion cannot be had.
-        missing: why it cannot, or "".
+        title: the quantity that it minimises.
+        of: design -> efficiency; empty when the criterion cannot be evaluated.
+        missing: the reason, or "".
     """
 
     criterion: str
@@ -43,7 +42,7 @@ class Efficiencies:
 def efficiencies(design: DurationDesign) -> tuple[Efficiencies, ...]:
     """The design, its whole runs, equal shares and every other criterion's optimum under every criterion.
 
-    A criterion that the aim does not say enough for is listed with the reason. D_s is listed when it differs from D.
+    A criterion that needs more than the aim states is listed with the reason, as is D_s when it equals D.
     """
     problem = design.problem
     named = {"continuous": design.fractions}
@@ -71,14 +70,14 @@ def efficiencies(design: DurationDesign) -> tuple[Efficiencies, ...]:
 
 @dataclass(frozen=True, kw_only=True)
 class Kept:
-    """How a limit on the whole sharing is kept.
+    """How far a budget is used, or a balance is reached.
 
     Attributes:
         name: of the budget or the balance.
-        limit: what was asked, for a balance the least share.
-        continuous: what the optimal fractions use, or reach.
-        repeats: what the whole runs use, or reach; a balance may be missed, because runs come in whole numbers.
-        price: multiplier in the certificate; zero when the limit does not matter.
+        limit: of the budget; for a balance the least share.
+        continuous: used or reached by the optimal fractions.
+        repeats: used or reached by the whole runs, which may fall short of a balance.
+        price: Lagrange multiplier in the certificate; zero when the limit is not active.
     """
 
     name: str

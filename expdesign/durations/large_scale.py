@@ -1,10 +1,10 @@
-"""D-optimal fractions of very many candidates: Newton's method on a small working set, and passes over all of them.
+"""D-optimal fractions of very many candidates: Newton's method on a working set, and passes over all candidates.
 
     maximise log det (B_prior + sum_q w_q R_q^T R_q)    over w >= 0, sum w = 1
 
 A candidate is its r regressor rows R_q, (r, d), never a dense matrix. The fractions of a working set are found by
 Newton's method for log det + mu sum log w_q with a falling mu. One pass over all candidates then gives every
-sensitivity d_q = trace(M^-1 B_q). Candidates with d_q above the dimension join the working set, until none is left: by
+sensitivity d_q = trace(M^-1 B_q). Candidates with d_q above the dimension join the working set until none is left. By
 the equivalence theorem no other design has a log det higher by more than max d_q - sum w_q d_q.
 
 Source: J. Kiefer and J. Wolfowitz, The equivalence of two extremum problems, Canad. J. Math. 12 (1960), 363-366;
@@ -22,41 +22,10 @@ from scipy.linalg import cho_factor, cho_solve
 
 from expdesign.durations.criteria.measures import gram, root
 from expdesign.durations.criteria.models import whitening
+from expdesign.durations.tuning import TUNING
 from expdesign.values import Array, seal
 
 Indices = NDArray[np.intp]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Tuning:
-    """Settings of the working-set method.
-
-    Attributes:
-        smallest_set: candidates in the first working set at least, and about as many as may join at a time.
-        set_per_dimension: the same per dimension d.
-        first_tolerance: relative gap to which the first working set is solved.
-        sharper: factor between tolerances of one working set and the next.
-        newton_steps: most steps for one mu.
-        most_sets: working sets that are tried.
-        crumb: fractions below this are left out at the end.
-        chunk: rows that a pass handles at a time, so that they stay in the processor's cache.
-    """
-
-    smallest_set: int = 50
-    set_per_dimension: int = 4
-    first_tolerance: float = 1e-2
-    sharper: float = 1e-2
-    newton_steps: int = 60
-    most_sets: int = 60
-    crumb: float = 1e-7
-    chunk: int = 16384
-
-
-TUNING = Tuning()
-INDEFINITE = 1e-9
-"""Eigenvalues below minus this, relative to the largest, are not rounding."""
-REGULAR = 1e-8
-"""A first working set has a least eigenvalue above this, relative to the largest."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -65,7 +34,7 @@ class LargeDesign:
 
     Attributes:
         fractions: (q,) of the candidates, sum 1.
-        gap: no other design has a log det higher by more.
+        gap: upper bound on the log det of any design less that of this one.
         dimension: d.
     """
 
@@ -85,7 +54,7 @@ class LargeDesign:
 def rows_of(matrices: Array) -> Array | None:
     """(q, r, d) rows R_q with R_q^T R_q = B_q of (q, d, d), or None where one is not positive semidefinite."""
     values, vectors = np.linalg.eigh(matrices)
-    if (values[:, 0] < -INDEFINITE * np.maximum(values[:, -1], 0.0)).any():
+    if (values[:, 0] < -TUNING.indefinite * np.maximum(values[:, -1], 0.0)).any():
         return None
     return np.asarray(np.sqrt(np.maximum(values, 0.0))[:, :, None] * np.swapaxes(vectors, 1, 2))
 
@@ -95,31 +64,31 @@ def d_optimal(rows: Array, *, prior: Array | None = None, tolerance: float = 1e-
 
     Args:
         rows: (q, r, d) regressor rows of each candidate; (q, d) for one row each.
-        prior: (d, d) information that is there already; none when not given.
-        tolerance: gap per dimension to aim at; rounding may leave a larger one.
+        prior: (d, d) prior information; none when not given.
+        tolerance: desired gap per dimension; rounding may leave a larger one.
 
     Raises:
-        NotInformative: all candidates together are singular to working precision.
+        NotInformative: the information of all candidates together is singular to working precision.
     """
     pool = _Pool.of(rows[:, None, :] if rows.ndim == 2 else rows, prior)
     chosen = _first_set(pool)
-    w, aim = np.full(len(chosen), 1.0 / len(chosen)), max(TUNING.first_tolerance, tolerance)
-    best = _spread(pool, chosen, w)
+    w, aim = np.full(len(chosen), 1.0 / len(chosen)), max(TUNING.first_gap, tolerance)
+    best = _evaluated(pool, chosen, w)
     for _ in range(TUNING.most_sets):
         w = _solved(pool, chosen, w, aim)
-        found = _spread(pool, chosen, w)
+        found = _evaluated(pool, chosen, w)
         best = min(best, found, key=lambda item: item[0].gap)
         _, sensitivities = found
-        worth = (1 + aim) * pool.dimension
-        joining = np.setdiff1d(np.flatnonzero(sensitivities > worth), chosen)
+        least = (1 + aim) * pool.dimension
+        joining = np.setdiff1d(np.flatnonzero(sensitivities > least), chosen)
         if not len(joining) and aim <= tolerance:
             break
         if len(joining):
             joining = joining[np.argsort(-sensitivities[joining], kind="stable")[: _set_size(pool.dimension)]]
-            kept = (sensitivities[chosen] > (1 - max(10 * aim, 1e-3)) * pool.dimension) | (w > TUNING.crumb)
+            kept = (sensitivities[chosen] > (1 - max(10 * aim, 1e-3)) * pool.dimension) | (w > TUNING.barrier_fraction)
             chosen, w = np.r_[chosen[kept], joining], np.r_[w[kept], np.zeros(len(joining))]
         aim = max(TUNING.sharper * aim, tolerance)
-    return _without_crumbs(pool, best[0], tolerance)
+    return _trimmed(pool, best[0], tolerance)
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +139,7 @@ def _set_size(dimension: int) -> int:
 
 
 def _first_set(pool: _Pool) -> Indices:
-    """Candidates of largest sensitivity at equal fractions, completed until they inform about every direction."""
+    """Candidates of largest sensitivity at equal fractions, completed until their information is regular."""
     count, d = len(pool.rows), pool.dimension
     size = _set_size(d)
     if count <= 2 * size:
@@ -179,15 +148,15 @@ def _first_set(pool: _Pool) -> Indices:
     chosen = np.argpartition(-leverage, size)[:size]
     for _ in range(d):
         values, vectors = np.linalg.eigh(pool.prior + pool.parts(chosen).mean(axis=0))
-        if values[0] > REGULAR * values[-1]:
+        if values[0] > TUNING.regular_set * values[-1]:
             return np.sort(chosen)
-        dark = vectors[:, values <= REGULAR * values[-1]]
+        dark = vectors[:, values <= TUNING.regular_set * values[-1]]
         within = pool.sensitivities(np.eye(d) + 1e12 * (np.eye(d) - dark @ dark.T))
         chosen = np.union1d(chosen, np.argsort(-within, kind="stable")[:d])
     return np.arange(count)
 
 
-def _spread(pool: _Pool, chosen: Indices, w: Array) -> tuple[LargeDesign, Array]:
+def _evaluated(pool: _Pool, chosen: Indices, w: Array) -> tuple[LargeDesign, Array]:
     """The design that gives fractions (c,) to the chosen candidates, and all sensitivities (q,) there."""
     fractions = np.zeros(len(pool.rows))
     fractions[chosen] = w
@@ -212,10 +181,10 @@ def _solved(pool: _Pool, chosen: Indices, w: Array, tolerance: float) -> Array:
 def _centred(pool: _Pool, parts: Array, w: Array, barrier: float) -> Array:
     """The maximum (c,) of log det + barrier sum log w by Newton's method in relative steps of w.
 
-    Near the maximum, where the decrement is small against the barrier, full steps are safe, because the function is
-    self-concordant; farther away the step is halved until it gains.
+    The function is self-concordant: where the decrement is small against the barrier, full steps are safe. Farther away
+    the step is halved until the merit rises.
     """
-    for _ in range(TUNING.newton_steps):
+    for _ in range(TUNING.centring_steps):
         T = root(pool.prior + np.tensordot(w, parts, axes=1))
         white = T @ parts @ T.T
         slope = w * np.trace(white, axis1=1, axis2=2) + barrier
@@ -242,14 +211,14 @@ def _merit(pool: _Pool, parts: Array, w: Array, barrier: float) -> float:
     return float(value + barrier * np.log(w).sum()) if sign > 0 and w.min() > 0 else -np.inf
 
 
-def _without_crumbs(pool: _Pool, design: LargeDesign, tolerance: float) -> LargeDesign:
-    """The design with nothing where only the barrier kept a fraction above zero, unless that widens the gap."""
-    kept = np.flatnonzero(design.fractions > TUNING.crumb)
+def _trimmed(pool: _Pool, design: LargeDesign, tolerance: float) -> LargeDesign:
+    """The design without the fractions that only the barrier keeps above zero, unless that widens the gap."""
+    kept = np.flatnonzero(design.fractions > TUNING.barrier_fraction)
     w = design.fractions[kept] / design.fractions[kept].sum()
     try:
         if len(kept) > 1:
             w = _centred(pool, pool.parts(kept), w, tolerance * pool.dimension / (10 * len(kept)))
-        trimmed, _ = _spread(pool, kept, w)
+        trimmed, _ = _evaluated(pool, kept, w)
     except np.linalg.LinAlgError:
         return design
     return trimmed if trimmed.gap <= max(design.gap, tolerance * pool.dimension) else design

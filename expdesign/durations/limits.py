@@ -1,10 +1,10 @@
-"""Limits on how the time may be shared, and the polytope of time fractions that they leave.
+"""Limits on the durations, and the polytope of feasible time fractions.
 
     least <= w <= most,   rows w <= limits,   sum w = 1
 
 Linear functions over it are bounded from weak duality: for any prices l >= 0 and any feasible v,
-g v <= l limits + max over the box of (g - rows^T l) v, and that maximum is found by sorting. The bound holds whatever
-the prices are; good ones make it tight.
+g v <= l limits + max over the box of (g - rows^T l) v, and that maximum is found by sorting. The bound is valid
+for any prices; dual optimal ones make it tight.
 """
 
 from __future__ import annotations
@@ -15,23 +15,19 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.optimize import linprog
 
+from expdesign.durations.tuning import TUNING
 from expdesign.errors import InputError, NoAnswer, UnknownName
 from expdesign.values import Array, seal
-
-CRUMB = 1e-9
-"""Fractions less than this above their least are rounding."""
-TIGHT = 1e-9
-"""Limits are loosened by this share of themselves where they leave no room inside."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Budget:
-    """Something that is used up, e.g. energy or wear.
+    """A limited resource, e.g. energy or wear.
 
     Attributes:
         name: for reports.
-        cost_per_s: use per second of each primitive, by name; those left out use nothing.
-        limit: what there is, in the same unit.
+        cost_per_s: use per second of each primitive, by name; 0 for primitives without an entry.
+        limit: amount available, in the same unit.
     """
 
     name: str
@@ -41,15 +37,15 @@ class Budget:
 
 @dataclass(frozen=True, kw_only=True)
 class Constraints:
-    """What the user asks of the sharing, by names of primitives.
+    """Limits on the durations, by names of primitives.
 
     Attributes:
-        least_s, most_s: least and most time of a primitive in all [s].
-        required: primitives that get one whole run at least.
+        least_s, most_s: least and most total time of a primitive [s].
+        required: primitives that get at least one whole run.
         excluded: primitives that get no time.
-        budgets: what may be used up.
-        balance: from 0 to 1: the information about each equation's parameters (surge, sway, yaw) must be at least this
-            share, in D-efficiency, of the most that could be had for that equation alone.
+        budgets: limited resources.
+        balance: from 0 to 1: least D-efficiency of the information about the parameters of each equation (surge, sway,
+            yaw), relative to the optimum for that equation alone.
     """
 
     least_s: Mapping[str, float] = field(default_factory=dict)
@@ -78,7 +74,7 @@ class Polytope:
     Attributes:
         least, most: (q,) bounds, 0 to 1.
         rows: (i, q) use per unit of fraction, each as a share of its limit.
-        limits: (i,) all 1, or 0 where nothing may be used.
+        limits: (i,) all 1, or 0 for budgets of 0.
         labels: (i) names of the rows.
     """
 
@@ -106,7 +102,7 @@ class Polytope:
         return float(prices @ self.limits + reduced @ self.least + reduced[order] @ taken)
 
     def inside(self) -> Array | None:
-        """(q,) fractions as far from every bound as possible, or None when there is no room."""
+        """(q,) fractions as far from every bound as possible, or None when there is no interior."""
         free = self.most > self.least
         margin = np.where(free, 1.0 / len(free), 0.0)
         upper = np.where(self.most < 1.0, margin, 0.0)
@@ -118,27 +114,27 @@ class Polytope:
         bounds = [(None, None)] * len(free) + [(None, 1.0)]
         goal = np.r_[np.zeros(len(free)), -1.0]
         answer = linprog(goal, A, b, sum_row, [1.0], bounds, method="highs")
-        if answer.status != 0 or answer.x[-1] <= TIGHT:
+        if answer.status != 0 or answer.x[-1] <= TUNING.loosening:
             return None
         return np.asarray(answer.x[:-1])
 
     def middle(self) -> Array:
-        """(q,) fractions well inside the limits where there is room, else as far as rounding allows."""
+        """(q,) fractions well inside the limits where there is an interior, else feasible up to rounding."""
         if self.plain:
             return np.full(len(self.least), 1.0 / len(self.least))
         found = self.inside()
-        if found is None:  # a checked polytope has points; only rounding leaves it no inside
+        if found is None:  # a checked polytope is not empty
             found = self.loosened().inside()
         return self.tidied(np.array(self.least)) if found is None else found
 
     def tidied(self, w: Array) -> Array:
-        """(q,) with rounding taken off: in the box, nothing where next to nothing was, and of sum one."""
+        """(q,) projected to the box, with tiny fractions set to their bound, and scaled to sum one."""
         above = np.clip(w, self.least, np.maximum(self.most, self.least)) - self.least
-        above = np.where(above > CRUMB, above, 0.0)
+        above = np.where(above > TUNING.least_fraction, above, 0.0)
         return np.asarray(self.least + above * (1.0 - self.least.sum()) / max(float(above.sum()), 1e-300))
 
     def feasible(self) -> bool:
-        """Whether there are fractions within the limits at all."""
+        """Whether the polytope is not empty."""
         bounds = np.stack([self.least, np.maximum(self.most, self.least)], axis=1)
         total = np.clip(1.0, self.least.sum(), self.most.sum())
         ones = np.ones((1, len(self.least)))
@@ -146,9 +142,9 @@ class Polytope:
         return bool(answer.status == 0)
 
     def loosened(self) -> Polytope:
-        """The same with limits of rows moved by `TIGHT`."""
+        """The same with limits of rows moved by `Tuning.loosening`."""
         return Polytope(
-            least=self.least, most=self.most, rows=self.rows, limits=self.limits + TIGHT, labels=self.labels
+            least=self.least, most=self.most, rows=self.rows, limits=self.limits + TUNING.loosening, labels=self.labels
         )
 
 
@@ -156,15 +152,15 @@ def feasible_set(constraints: Constraints, names: Sequence[str], *, run_s: Array
     """The polytope of time fractions.
 
     Args:
-        constraints: what was asked.
+        constraints: the limits.
         names: of the q primitives.
         run_s: (q,) duration of one run [s].
-        total_s: time to share out [s].
+        total_s: total time of all primitives [s].
 
     Raises:
         UnknownName: a primitive that is not in the dictionary.
         InputError: limits that contradict each other.
-        NoAnswer: no sharing meets them all; the message names the one in the way.
+        NoAnswer: no fractions satisfy all limits; the message names one that cannot be satisfied.
     """
     least, most = np.zeros(len(names)), np.ones(len(names))
     for name, value in constraints.least_s.items():
@@ -177,8 +173,8 @@ def feasible_set(constraints: Constraints, names: Sequence[str], *, run_s: Array
     for name in constraints.excluded:
         most[_index(names, name, "design.excluded")] = 0.0
     rows, limits = _rows(constraints.budgets, names, total_s)
-    dear = rows * TIGHT > limits[:, None]  # a budget allows no time that matters
-    most = np.where(dear.any(axis=0) & (least == 0), 0.0, most)
+    too_costly = rows * TUNING.loosening > limits[:, None]
+    most = np.where(too_costly.any(axis=0) & (least == 0), 0.0, most)
     rows[:, most == 0] = 0.0
     limits = np.where(rows.any(axis=1), limits, 1.0)
     polytope = Polytope(
@@ -230,20 +226,20 @@ def _check_box(polytope: Polytope, names: Sequence[str], total_s: float) -> None
 
 
 def _check_budgets(polytope: Polytope, budgets: Sequence[Budget]) -> None:
-    """Each budget alone against the least it can be brought to, then all together."""
+    """Each budget alone against the least feasible use, then all together."""
     for row, limit, budget in zip(polytope.rows, polytope.limits, budgets, strict=True):
         alone = Polytope(
             least=polytope.least, most=polytope.most, rows=np.zeros((0, len(row))), limits=np.zeros(0), labels=()
         )
         needed = -alone.bound(-row, np.zeros(0))
-        if needed > limit * (1 + TIGHT) + TIGHT:
+        if needed > limit * (1 + TUNING.loosening) + TUNING.loosening:
             scale = budget.limit / limit if limit else 1.0
             raise NoAnswer(
-                f"budget {budget.name!r} has the limit {budget.limit:g}, but no sharing of the time uses less than "
+                f"budget {budget.name!r} has the limit {budget.limit:g}, but any feasible durations use at least "
                 f"{needed * scale:g}"
             )
     if len(budgets) and not polytope.loosened().feasible():
         raise NoAnswer(
-            f"no sharing of the time keeps the budgets {', '.join(item.name for item in budgets)} together with the "
-            "least and most times"
+            f"no durations satisfy the budgets {', '.join(item.name for item in budgets)} together with the least and "
+            "most times"
         )

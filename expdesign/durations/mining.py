@@ -1,7 +1,7 @@
-"""Which recorded batches to estimate from again: the k that tell most together (thesis 7.3).
+"""Selection of the k most informative recorded batches for re-estimation (thesis 7.3).
 
-Choosing k of N batches is the design problem with fractions of 0 or their share; letting them take anything between 0
-and that share gives an upper bound with a certificate, so every answer says how far from the best it may be.
+Choosing k of N batches is the design problem with fractions of 0 or the batch's share. The relaxation to fractions
+between 0 and that share gives an upper bound with a certificate.
 
 Source: F. Ljungberg, doctoral thesis, Linköping University, 7.3; relaxation: S. Joshi and S. Boyd, Sensor selection via
 convex optimization, IEEE Trans. Signal Process. 57 (2009), 451-462.
@@ -16,18 +16,15 @@ from math import comb
 
 import numpy as np
 
-from expdesign.durations.collected import Collected
-from expdesign.durations.concave import symmetric_part
+from expdesign.durations.concave import Collected, symmetric_part
 from expdesign.durations.criteria import Aim
 from expdesign.durations.limits import Constraints
 from expdesign.durations.problem import DurationProblem
 from expdesign.durations.solve import optimal_shares
+from expdesign.durations.tuning import TUNING
 from expdesign.errors import InputError, NotInformative
 from expdesign.information.recorded import BatchInformation
 from expdesign.values import Array, seal
-
-LARGEST_EXACT = 20_000
-"""Subsets up to this number are all tried."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -35,14 +32,14 @@ class Subset:
     """The chosen batches.
 
     Attributes:
-        names: of all batches, most informative first: in the order in which greedy choice would take them.
-        chosen: of those to estimate from.
+        names: of all batches, in the order of greedy selection.
+        chosen: names of the selected batches.
         efficiency: against all batches together, by the criterion.
-        bound: no subset of that size has a higher efficiency; the same as `efficiency` where all were tried, nan where
-            none is known.
-        exact: whether all were tried.
+        bound: upper bound on the efficiency of any subset of that size; equal to `efficiency` when exact, nan when
+            unknown.
+        exact: whether all subsets were evaluated.
         symmetric: whether the symmetric part of the information counted; else the magnitude of its determinant, which
-            guarantees nothing.
+            is not a guaranteed value.
         first: (N,) efficiency of the first 1, 2, ... N of `names`; 0 while they do not inform about every parameter.
     """
 
@@ -68,33 +65,34 @@ def best_subset(
 ) -> Subset:
     """Rank recorded batches and choose `size` of them for re-estimation.
 
-    The symmetric part of each batch's matrix counts, which is a guaranteed part of its information. Where the nominal
-    model is so far off that all batches together have none, the magnitude of the determinant counts instead.
+    The symmetric part of each batch's matrix counts, which is a guaranteed part of its information. Where the sum of
+    all symmetric parts is not positive definite, the magnitude of the determinant counts instead.
 
     Args:
         batches: measured or simulated, see `information.recorded_information`.
         parameters: names in the order of their matrices.
-        size: how many to choose.
+        size: number of batches to choose.
         mean_subtraction: "none", "batch" or "complete".
-        aim: criterion; D when not given.
+        aim: criterion with its settings; D when not given.
 
     Raises:
-        InputError: a size that cannot be.
-        NotInformative: all batches together, or no subset of that size that was tried, inform about every parameter.
+        InputError: the size is not from 1 to the number of batches.
+        NotInformative: the batches together, or every evaluated subset, lack information about a parameter.
     """
     if not 1 <= size <= len(batches):
         raise InputError(f"{size} of {len(batches)} batches cannot be chosen, expected 1 to {len(batches)}")
     problem, collected = _pool(batches, parameters, mean_subtraction, aim or Aim())
     shares = problem.run_s / problem.total_s
     order = _greedy(collected, shares)
-    exact = comb(len(batches), size) <= LARGEST_EXACT
+    exact = comb(len(batches), size) <= TUNING.all_subsets
     if exact:
         chosen = max(combinations(range(len(batches)), size), key=lambda picked: _value(collected, shares, picked))
     else:
         chosen = _exchanged(collected, shares, tuple(order[:size]))
     if not np.isfinite(_value(collected, shares, chosen)):
         raise NotInformative(
-            f"no {size} batches that were tried inform about every parameter", parameters=tuple(parameters)
+            f"no subset of {size} batches that was evaluated informs about every parameter",
+            parameters=tuple(parameters),
         )
     efficiency = collected.efficiency(_indicator(shares, chosen), shares)
     return Subset(
@@ -111,7 +109,7 @@ def best_subset(
 def _pool(
     batches: Sequence[BatchInformation], parameters: Sequence[str], mean_subtraction: str, aim: Aim
 ) -> tuple[DurationProblem, Collected]:
-    """All batches as primitives of one run each, in a time that holds them all, and what counts of them."""
+    """All batches as primitives of one run each, in their total time, and the criterion."""
     matrices = np.array([batch.bordered(mean_subtraction) for batch in batches])
     samples = np.array([float(batch.samples) for batch in batches])
     problem = DurationProblem(
@@ -148,7 +146,7 @@ def _value(collected: Collected, shares: Array, chosen: Sequence[int]) -> float:
 def _with_each(collected: Collected, shares: Array, taken: Array, candidates: Sequence[int]) -> Array:
     """(c,) values of shares (q,) with each candidate added to them."""
     added = np.array(candidates)
-    return collected.worth(
+    return collected.values(
         tuple(
             total + shares[added, None, None] * piece.matrices[added]
             for total, piece in zip(collected.totals(taken), collected.pieces, strict=True)
@@ -157,18 +155,18 @@ def _with_each(collected: Collected, shares: Array, taken: Array, candidates: Se
 
 
 def _greedy(collected: Collected, shares: Array) -> list[int]:
-    """All batches, each time the one that adds most; a little of all is lent so that few can be compared too."""
-    lent = 1e-6 * shares
+    """All batches in greedy order; a small share of all is added, so that small subsets are not singular."""
+    small = TUNING.added_share * shares
     order: list[int] = []
     left = list(range(len(shares)))
     while left:
-        values = _with_each(collected, shares, _indicator(shares, order) + lent, left)
+        values = _with_each(collected, shares, _indicator(shares, order) + small, left)
         order.append(left.pop(int(np.argmax(values))))
     return order
 
 
 def _exchanged(collected: Collected, shares: Array, chosen: tuple[int, ...]) -> tuple[int, ...]:
-    """Swaps of one batch for another while one helps."""
+    """Swaps of one batch for another while one raises the value."""
     best = _value(collected, shares, chosen)
     while True:
         others = [index for index in range(len(shares)) if index not in chosen]
@@ -185,7 +183,7 @@ def _bound(problem: DurationProblem, collected: Collected, size: int, efficiency
 
 
 def _relaxed(problem: DurationProblem, collected: Collected, size: int) -> float:
-    """Upper bound on the efficiency of any subset of that size: every batch may be taken in part, z_q from 0 to 1.
+    """Upper bound on the efficiency of any subset of that size by relaxation: z_q from 0 to 1 of every batch.
 
     With v = z / size the information is sum v_q (size x share_q x B_q), the v sum to one, and each is at most 1 / size.
     Means are eliminated, not counted, because the time taken is not fixed: for D that is D_s of all parameters.

@@ -1,12 +1,12 @@
 """The duration problem, built from scored primitives or from covariances of estimates.
 
-In the covariance domain every primitive is informative on its own and has a covariance P_q of its own estimate, that
-one total time of it alone would give:
+In the covariance domain every primitive is informative on its own. P_q is the covariance of the estimate if the total
+time is spent on primitive q alone:
 
     P(w)^-1 = sum_q w_q P_q^-1
 
-Estimates from separate runs are fused by their covariances. Covariances from Monte Carlo runs of the estimator count
-everything that the information matrix leaves out: coloured residuals, bias of the method, weak instruments.
+Estimates from separate runs are fused by their covariances. Covariances from Monte Carlo runs of the estimator include
+what the information matrix leaves out: coloured residuals, bias of the method, weak instruments.
 
 Source: F. Ljungberg, doctoral thesis, Linköping University, (7.50)-(7.63).
 """
@@ -25,7 +25,7 @@ from expdesign.information import MEAN_SUBTRACTIONS, PrimitiveInformation, check
 from expdesign.values import Array, frozen_set, seal
 
 ROBUST = ("nominal", "average", "worst")
-"""What several models of the ship count for: only the nominal one, their average, or the least of them."""
+"""The nominal model only, the average over sampled models, or the worst of them."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -41,15 +41,15 @@ class DurationProblem:
         mean_subtraction: "none", "batch" or "complete".
         matrices: (q, d, d) B_q of the nominal model, in physical parameter scale.
         run_s: (q,) duration of one whole run of each primitive [s].
-        total_s: time to share out [s].
-        aim: the criterion and what it needs to know.
-        constraints: limits on the sharing.
-        prior: (d, d) what is known already, per sample of the total time (thesis (7.58)).
+        total_s: total time of all primitives [s].
+        aim: the criterion with its settings.
+        constraints: limits on the durations.
+        prior: (d, d) prior information, per sample of the total time (thesis (7.58)).
         robust: one of `ROBUST`.
         sampled: (m, q, d, d) B_q of models drawn from the prior of the nominal parameters; m is 0 for "nominal".
         equations: (p) equation, "u", "v" or "r", of each parameter; only `constraints.balance` needs it.
-        nuisance: parameters of disturbances that are estimated along; where runs make two of their regressors coincide,
-            the estimator merges them, see `estimable`.
+        nuisance: parameters of disturbances in the augmented predictor; where runs make two of their regressors
+            coincide, the estimator merges them, see `estimation.nuisance`.
 
     Source: F. Ljungberg, doctoral thesis, Linköping University, (7.50)-(7.58); Schur complement form derived here.
     """
@@ -91,7 +91,7 @@ class DurationProblem:
 
     @property
     def picked(self) -> Picked:
-        """What a criterion works on."""
+        """The arguments of a criterion."""
         return Picked(aim=self.aim, parameters=self.parameters, dimension=self.dimension)
 
     @property
@@ -126,19 +126,19 @@ def build_durations(
     Args:
         information: of each primitive, by the nominal model.
         parameters: p names in the order of the matrices.
-        total_s: time to share out [s].
+        total_s: total time of all primitives [s].
         mean_subtraction: "none", "batch" or "complete".
-        aim: criterion and what it needs; D when not given.
-        constraints: limits on the sharing.
-        prior: (d, d) what is known already, per sample of the total time; see `prior_information`.
-        sampled: the information again by every model drawn from the prior of the nominal parameters.
-        robust: "nominal", or what the sampled models count for: "average" or "worst".
+        aim: criterion with its settings; D when not given.
+        constraints: limits on the durations.
+        prior: (d, d) prior information, per sample of the total time; see `prior_information`.
+        sampled: the information by each model drawn from the prior of the nominal parameters.
+        robust: one of `ROBUST`.
         equations: of each parameter; only needed for `constraints.balance`.
-        nuisance: parameters of disturbances that are estimated along.
+        nuisance: as in `DurationProblem`.
 
     Raises:
         UnknownName: no such mean subtraction.
-        NotInformative: no shares of these primitives inform about every parameter.
+        NotInformative: the primitives together do not inform about every parameter.
     """
     if mean_subtraction not in MEAN_SUBTRACTIONS:
         raise UnknownName("mean subtraction", mean_subtraction, known=MEAN_SUBTRACTIONS)
@@ -167,12 +167,12 @@ def _stack(information: Sequence[PrimitiveInformation], mean_subtraction: str) -
 
 
 def bordered(item: PrimitiveInformation, mean_subtraction: str) -> Array:
-    """B_q of one primitive, linear in time fractions: see `DurationProblem`."""
+    """(d, d) B_q of one primitive, see `DurationProblem`."""
     return bordered_moments(item.X, item.Y, item.Z, item.YZ, mean_subtraction)
 
 
 def bordered_moments(X: Array, Y: Array, Z: Array, YZ: Array, mean_subtraction: str) -> Array:
-    """The same of moments X (p, p), means Y and Z (p, outputs) and the means' products YZ (p, p)."""
+    """B_q from moments X (p, p), means Y and Z (p, outputs) and the means' products YZ (p, p)."""
     if mean_subtraction == "none":
         return X
     if mean_subtraction == "batch":
@@ -209,10 +209,10 @@ def build_fused(
         names: of the q primitives.
         parameters: p names.
         covariances: (q, p, p) of estimates from each primitive alone.
-        seconds: (q,) length of the data that each covariance is for; covariances fall with time as 1/t.
+        seconds: (q,) length of the data behind each covariance [s]; covariances fall with time as 1/t.
         run_s: (q,) duration of one whole run [s].
-        total_s: time to share out [s].
-        aim: criterion; D when not given. Covariances are in physical units, so noise counts as one.
+        total_s: total time of all primitives [s].
+        aim: criterion with its settings; D when not given. Covariances are in physical units, so noise must be 1.
         constraints: limits.
 
     Raises:
@@ -229,8 +229,8 @@ def build_fused(
                 parameters=tuple(parameters),
             ) from None
         matrices.append(root.T @ root / np.outer(scale, scale) * total_s / time_s)
-    wish = aim or Aim()
-    if wish.noise.size and not np.allclose(wish.noise, 1.0):
+    aim = aim or Aim()
+    if aim.noise.size and not np.allclose(aim.noise, 1.0):
         raise InputError("covariances are in physical units already, expected a noise of 1 for every parameter")
     return DurationProblem(
         names=tuple(names),
@@ -239,6 +239,6 @@ def build_fused(
         matrices=np.array(matrices),
         run_s=run_s,
         total_s=total_s,
-        aim=wish,
+        aim=aim,
         constraints=constraints,
     )

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from expdesign.durations.collected import Collected, merged_nuisance, sees_everything
-from expdesign.durations.concave import limits_of
-from expdesign.durations.limits import TIGHT, Polytope
+from expdesign.durations.concave import Collected, informs_about_all, limits_of, merged_nuisance
+from expdesign.durations.limits import Polytope
 from expdesign.durations.problem import DurationProblem
+from expdesign.durations.tuning import TUNING
 from expdesign.errors import NoAnswer
 from expdesign.values import Array
 
@@ -19,39 +19,27 @@ Indices = NDArray[np.intp]
 Totals = tuple[Array, ...]
 """(..., d, d) information collected, for each model."""
 
-LENT = 1e-6
-"""Share of the optimal design lent to every set of runs, so that singular ones can be compared too."""
-GAIN = 1e-9
-"""Gains below this count as rounding."""
-FAINT, FAINT_GAIN = 1e-9, 1e-6
-"""Share of equal times lent besides where the optimal design is itself this close to singular, as only criteria about
-some of the parameters allow; and what then counts as rounding."""
-NAMED = 3
-"""Pairs of merged regressors that a note names."""
-PUSHES = 200
-"""Primitives that are tried as pushes, those that would gain most per second first."""
-
 
 def whole_runs(problem: DurationProblem, fractions: Array) -> tuple[int, ...]:
     """Numbers of whole runs within the total time and the limits, by greedy addition and exchange on the criterion.
 
-    The value of a set of runs is the criterion of the information they collect. Every primitive that is alone in
-    informing about a parameter stays, since without it the value is minus infinity. The result is a local optimum; on
-    problems small enough to try every set it was the best set whenever runs were of one length, else in nine cases out
-    of ten, and never lost more than 3 % of efficiency to it.
+    The value of a set of runs is the criterion of their information. The only primitive with information about a
+    parameter is never dropped, because the value without it is minus infinity. The result is a local optimum. Against
+    complete enumeration of small problems it was the global one whenever runs were of one length, else in nine cases
+    of ten, and the loss of efficiency was at most 3 %.
 
     Args:
         problem: gives run lengths, the total time and the limits.
         fractions: (q,) optimal fractions, where the search starts.
 
     Raises:
-        NoAnswer: no set of whole runs was found that keeps the limits and informs about every parameter.
+        NoAnswer: no set of whole runs was found that satisfies the limits and informs about every parameter.
     """
     search = _Search.of(problem, fractions)
     runs = _searched(search, search.rounded(fractions))
     if not search.informative(runs) and problem.symmetric:
-        # The criterion may do without what has to be estimated along: from the runs best for everything, exchange
-        # only what leaves that seen.
+        # A criterion about some parameters may leave others without information: start from the runs that are best
+        # for all parameters, and accept only exchanges that keep them identifiable.
         everything = _Search.of(replace(problem, aim=replace(problem.aim, criterion="D")), fractions)
         runs = _searched(everything, everything.rounded(fractions))
         if search.informative(runs):
@@ -65,28 +53,28 @@ def whole_runs(problem: DurationProblem, fractions: Array) -> tuple[int, ...]:
     return tuple(int(n) for n in runs)
 
 
-def _anything(runs: Array) -> bool:
+def _any_runs(runs: Array) -> bool:
     return True
 
 
-def _searched(search: _Search, runs: Array, *, accepted: Callable[[Array], bool] = _anything) -> Array:
+def _searched(search: _Search, runs: Array, *, accepted: Callable[[Array], bool] = _any_runs) -> Array:
     """The local optimum (q,) by exchanges from given runs, among sets that are accepted."""
-    best = search.worth_of(runs)
+    best = search.value_of(runs)
     while (better := _exchanged(search, runs, accepted)) is not None:
-        gained = search.worth_of(better)
-        if not gained > best:  # rounding in nearly singular sums; without this the exchange could go round in circles
+        gained = search.value_of(better)
+        if not gained > best:  # rounding in nearly singular sums could make the exchange cycle
             break
         runs, best = better, gained
     return runs
 
 
 def note_on_runs(problem: DurationProblem, runs: Array) -> str:
-    """What the estimator will merge after whole runs (q,), in a sentence, or ""."""
+    """A sentence about the regressors that the estimator will merge after whole runs (q,), or ""."""
     pairs = merged_nuisance(problem, runs * problem.run_s / problem.total_s) if problem.nuisance else ()
     if not pairs:
         return ""
-    shown = "; ".join(f"{one} with {other}" for one, other in pairs[:NAMED])
-    more = f" and {len(pairs) - NAMED} more" if len(pairs) > NAMED else ""
+    shown = "; ".join(f"{one} with {other}" for one, other in pairs[: TUNING.named_pairs])
+    more = f" and {len(pairs) - TUNING.named_pairs} more" if len(pairs) > TUNING.named_pairs else ""
     return (
         f"in these whole runs {len(pairs)} regressors of disturbances coincide with others, and the estimator merges "
         f"them: {shown}{more}"
@@ -100,15 +88,16 @@ def efficiency_of_shares(problem: DurationProblem, fractions: Array, shares: Arr
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Search:
-    """What is the same for all sets of runs.
+    """The quantities common to all sets of runs.
 
     Attributes:
-        problem: what is asked.
+        problem: the duration problem.
         collected: the criterion.
         pieces: for each model (q, d, d) share of one run in the total time, times B_q.
         shares: (q,) that share.
-        lent: for each model (d, d) prior and a little of the optimal design, or of equal shares where that is singular.
-        gain: what an exchange must gain at least.
+        added: for each model (d, d) prior and a small share of the optimal design, and of equal shares where that is
+            nearly singular.
+        gain: least gain of an exchange.
         polytope: limits.
         fewest, most_runs: (q,) least and most runs.
     """
@@ -117,7 +106,7 @@ class _Search:
     collected: Collected
     pieces: Totals
     shares: Array
-    lent: Totals
+    added: Totals
     gain: float
     polytope: Polytope
     fewest: NDArray[np.int64]
@@ -128,100 +117,100 @@ class _Search:
         collected, polytope = Collected.of(problem), limits_of(problem)
         shares = np.asarray(problem.run_s / problem.total_s)
         most = np.where(polytope.most < 1.0, polytope.most, np.inf) / shares
-        faint = FAINT if collected.symmetric and _nearly_singular(collected, fractions) else 0.0
+        small = TUNING.equal_share if collected.symmetric and _nearly_singular(collected, fractions) else 0.0
         return _Search(
             problem=problem,
             collected=collected,
             pieces=tuple(shares[:, None, None] * piece.matrices for piece in collected.pieces),
             shares=shares,
-            lent=tuple(
+            added=tuple(
                 piece.prior
-                + LENT * np.tensordot(fractions, piece.matrices, axes=1)
-                + faint * np.eye(problem.dimension)  # equal shares, in whitened coordinates
+                + TUNING.added_share * np.tensordot(fractions, piece.matrices, axes=1)
+                + small * np.eye(problem.dimension)  # equal shares, in whitened coordinates
                 for piece in collected.pieces
             ),
-            gain=FAINT_GAIN if faint else GAIN,
+            gain=TUNING.least_gain_nearly_singular if small else TUNING.least_gain,
             polytope=polytope,
             fewest=np.ceil(polytope.least / shares - 1e-9).astype(int),
             most_runs=np.floor(np.minimum(most, 1e9) + 1e-9).astype(int),
         )
 
     def totals(self, runs: Array) -> Totals:
-        """Sum of the runs' pieces and what is lent, for each model."""
-        return tuple(np.tensordot(runs, P, axes=1) + L for P, L in zip(self.pieces, self.lent, strict=True))
+        """Information of the runs plus `added`, for each model."""
+        return tuple(np.tensordot(runs, P, axes=1) + L for P, L in zip(self.pieces, self.added, strict=True))
 
-    def worth_of(self, runs: Array) -> float:
+    def value_of(self, runs: Array) -> float:
         """Value of one set of runs (q,), never infinite."""
-        return float(self.collected.compared(tuple(total[None] for total in self.totals(runs)))[0])
+        return float(self.collected.regular_values(tuple(total[None] for total in self.totals(runs)))[0])
 
     def after(self, totals: Totals, indices: Indices, sign: float) -> Array:
-        """(c,) worth after one run of each indexed primitive is added (sign 1) or taken away (sign -1)."""
+        """(c,) values after one run of each indexed primitive is added (sign 1) or removed (sign -1)."""
         moved = tuple(total + sign * P[indices] for total, P in zip(totals, self.pieces, strict=True))
-        return self.collected.compared(moved)
+        return self.collected.regular_values(moved)
 
     def allowed(self, runs: Array) -> bool:
-        """Whether runs keep the time and all limits."""
+        """Whether runs satisfy the total time and all limits."""
         shares = runs * self.shares
         return bool(
             shares.sum() <= 1.0 + 1e-9
             and (runs >= self.fewest).all()
             and (runs <= self.most_runs).all()
-            and (self.polytope.rows @ shares <= self.polytope.limits + 2 * TIGHT).all()
+            and (self.polytope.rows @ shares <= self.polytope.limits + 2 * TUNING.loosening).all()
         )
 
     def informative(self, runs: Array) -> bool:
-        """Whether runs keep the limits and inform about every parameter without anything lent."""
-        return self.allowed(runs) and sees_everything(self.problem, self.collected, runs * self.shares)
+        """Whether runs satisfy the limits and inform about every parameter by themselves."""
+        return self.allowed(runs) and informs_about_all(self.problem, self.collected, runs * self.shares)
 
     def rounded(self, fractions: Array) -> Array:
         """Fractions rounded down to allowed runs, then filled up."""
         runs = np.maximum(np.floor(fractions / self.shares + 1e-9).astype(int), self.fewest)
-        return self.grown(self.thinned(np.minimum(runs, np.maximum(self.most_runs, self.fewest)), -1))
+        return self.filled_up(self.trimmed(np.minimum(runs, np.maximum(self.most_runs, self.fewest)), -1))
 
     def fitting(self, runs: Array) -> Indices:
         """Indices of the primitives of which one more run fits."""
         used = runs * self.shares
         fits = (self.shares <= 1.0 - used.sum() + 1e-9) & (runs < self.most_runs)
-        left = self.polytope.limits + TIGHT - self.polytope.rows @ used
+        left = self.polytope.limits + TUNING.loosening - self.polytope.rows @ used
         fits &= (self.polytope.rows * self.shares <= left[:, None]).all(axis=0)
         return np.flatnonzero(fits)
 
-    def grown(self, runs: Array) -> Array:
-        """With runs added, always the one that gains most per second, while one fits."""
+    def filled_up(self, runs: Array) -> Array:
+        """Runs with others added while one fits, best gain per second first."""
         while len(fits := self.fitting(runs)):
-            gains = self.after(self.totals(runs), fits, 1.0) - self.worth_of(runs)
+            gains = self.after(self.totals(runs), fits, 1.0) - self.value_of(runs)
             runs = runs + _unit(int(fits[np.argmax(gains / self.shares[fits])]), runs)
         return runs
 
-    def thinned(self, runs: Array, keep: int) -> Array:
-        """With runs taken away until the limits hold, always the one that loses least per second; `keep` is left."""
+    def trimmed(self, runs: Array, keep: int) -> Array:
+        """Runs with others removed until the limits hold, least loss per second first; `keep` stays."""
         while not self.allowed(runs):
             spare = np.setdiff1d(np.flatnonzero(runs > self.fewest), keep)
             if not len(spare):
                 return np.array(self.fewest)
-            losses = self.worth_of(runs) - self.after(self.totals(runs), spare, -1.0)
+            losses = self.value_of(runs) - self.after(self.totals(runs), spare, -1.0)
             runs = runs - _unit(int(spare[np.argmin(losses / self.shares[spare])]), runs)
         return runs
 
 
 def _exchanged(search: _Search, runs: Array, accepted: Callable[[Array], bool]) -> Array | None:
-    """A better set of runs nearby, or None: the best swap of one run for one, else any push that helps."""
-    target = search.worth_of(runs) + search.gain
+    """A better set of runs, or None: the best swap of one run for one, else an insertion that replaces several."""
+    target = search.value_of(runs) + search.gain
     swap = _swapped(search, runs, target, accepted)
     if swap is not None:
-        filled = search.grown(swap)
+        filled = search.filled_up(swap)
         return filled if accepted(filled) else swap
     if np.ptp(search.shares) < 1e-12 and search.polytope.plain:
-        return None  # runs of one length: a push is a swap
+        return None  # runs of one length: an insertion is a swap
     everything = np.flatnonzero(runs < search.most_runs)
     added = search.after(search.totals(runs), everything, 1.0)
-    for place in np.argsort(-(added - search.worth_of(runs)) / search.shares[everything])[:PUSHES]:
+    for place in np.argsort(-(added - search.value_of(runs)) / search.shares[everything])[: TUNING.insertions]:
         index = int(everything[place])
-        pushed = search.thinned(runs + _unit(index, runs), index)
-        if not search.allowed(pushed):
+        inserted = search.trimmed(runs + _unit(index, runs), index)
+        if not search.allowed(inserted):
             continue
-        if search.worth_of(pushed := search.grown(pushed)) > target and accepted(pushed):
-            return pushed
+        if search.value_of(inserted := search.filled_up(inserted)) > target and accepted(inserted):
+            return inserted
     return None
 
 
@@ -233,19 +222,19 @@ def _swapped(search: _Search, runs: Array, target: float, accepted: Callable[[Ar
         fits = search.fitting(left)
         if not len(fits):
             continue
-        worths = search.after(search.totals(left), fits, 1.0)
-        for place in np.argsort(-worths):
-            if not worths[place] > target:
+        values = search.after(search.totals(left), fits, 1.0)
+        for place in np.argsort(-values):
+            if not values[place] > target:
                 break
             if accepted(swapped := left + _unit(int(fits[place]), runs)):
-                target, best = float(worths[place]), swapped
+                target, best = float(values[place]), swapped
                 break
     return best
 
 
 def _nearly_singular(collected: Collected, shares: Array) -> bool:
     values = [np.linalg.eigvalsh(total) for total in collected.totals(shares)]
-    return any(item[0] < LENT * item[-1] for item in values)
+    return any(item[0] < TUNING.added_share * item[-1] for item in values)
 
 
 def _unit(index: int, runs: Array) -> Array:

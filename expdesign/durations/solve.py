@@ -1,8 +1,8 @@
-"""Problem -> durations with a certificate.
+"""From a duration problem to certified durations.
 
-Plain D goes through the working-set method for many candidates. Every other criterion and limit is stated in cvxpy; a
-few Newton steps sharpen its answer. Either way the certificate is computed from the problem alone, and a design without
-one is not given out.
+D without limits is solved by the working-set method. Every other criterion and limit is solved with cvxpy, and smooth
+criteria are refined by Newton's method. The certificate is computed from the problem alone; a design without one is
+not returned.
 """
 
 from __future__ import annotations
@@ -14,32 +14,26 @@ import numpy as np
 
 from expdesign.durations.asymmetric import definite_start, improved, log_abs_det
 from expdesign.durations.certificate import Certificate, DurationDesign, certify
-from expdesign.durations.collected import Collected, sees_everything, unseen
 from expdesign.durations.concave import (
+    Collected,
     ConcaveProblem,
     collected_measure,
     floor_of,
+    informs_about_all,
     objective_of,
     polytope_of,
+    unidentifiable,
     with_idle,
 )
 from expdesign.durations.criteria import criterion
 from expdesign.durations.criteria.models import Objective
 from expdesign.durations.large_scale import d_optimal, rows_of
-from expdesign.durations.limits import TIGHT
 from expdesign.durations.problem import DurationProblem
 from expdesign.durations.rounding import efficiency_of_shares, note_on_runs, whole_runs
+from expdesign.durations.tuning import TUNING
 from expdesign.errors import InputError, NoAnswer, NotInformative
 from expdesign.values import Array
 
-LARGEST_GAP = 1e-6
-"""Certificates above this, per degree, are not given out as optimal designs."""
-AIM = 1e-10
-"""Gap per degree at which sharpening ends."""
-NEWTON_STEPS = 30
-"""Most steps that sharpen an answer; from the convex solver's two or three are usual."""
-FLOOR_ROUNDING = 1e-6
-"""A floor missed by less, as a logarithm, is rounding."""
 THEOREMS = {
     "D": "Kiefer and Wolfowitz 1960",
     "D_s": "Pukelsheim 2006, general equivalence theorem",
@@ -50,21 +44,21 @@ THEOREMS = {
 
 NO_THEOREM = (
     "none: recorded primitives make the problem non-convex; the guaranteed value is that of the symmetric part "
-    "(Ostrowski and Taussky 1951), the rest was found by local search"
+    "(Ostrowski and Taussky 1951), improved by local search"
 )
 NOTHING_DEFINITE = (
-    "none: recorded primitives make the problem non-convex, and no sharing makes the symmetric part positive definite; "
-    "found by local search from random starts"
+    "none: recorded primitives make the problem non-convex, and no fractions make the symmetric part positive "
+    "definite; found by local search from random starts"
 )
 
 
 def solve_durations(problem: DurationProblem) -> DurationDesign:
-    """The optimal time fractions by the problem's criterion, whole runs, and the proof of both.
+    """The optimal time fractions by the problem's criterion, their certificate, and whole runs.
 
     Raises:
         UnknownName, InputError: the aim or the limits are wrong.
         NotInformative: no shares inform about every parameter.
-        NoAnswer: no sharing meets the limits, the certificate cannot be brought below `LARGEST_GAP`, or whole runs do
+        NoAnswer: no fractions satisfy the limits, the gap stays above `Tuning.largest_gap`, or whole runs do
             not fit.
     """
     design = optimal_shares(problem)
@@ -76,22 +70,22 @@ def optimal_shares(problem: DurationProblem) -> DurationDesign:
     try:
         return _certified_shares(problem, None) if problem.symmetric else _improved_shares(problem)
     except np.linalg.LinAlgError:
-        raise _blinded(problem) from None
+        raise _not_informative(problem) from None
 
 
-def _blinded(problem: DurationProblem) -> NotInformative:
-    """What the limits leave too little time for."""
-    blind = unseen(problem, polytope_of(problem).most) or problem.parameters
+def _not_informative(problem: DurationProblem) -> NotInformative:
+    """The error that names the parameters without information within the limits."""
+    blind = unidentifiable(problem, polytope_of(problem).most) or problem.parameters
     return NotInformative(
-        f"what the limits of [design] leave does not inform about every parameter, to working precision; too little or "
-        f"nothing is told of {', '.join(blind)}",
+        f"no durations within the limits of [design] inform about every parameter, to working precision; too little or "
+        f"no information about {', '.join(blind)}",
         parameters=blind,
     )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Optimum:
-    """Fractions (q,), what they prove, and the criterion's sensitivities (q,) there."""
+    """Fractions (q,), their certificate, and the criterion's sensitivities (q,) there."""
 
     fractions: Array
     certificate: Certificate
@@ -106,13 +100,13 @@ class _Optimum:
 def concave_problem(problem: DurationProblem, *, within: Array | None = None) -> ConcaveProblem:
     """The concave problem of a duration problem; `within` as in `objective_of`.
 
-    Where budgets limit what is used up, some of the time may be better left unused: there is then one more primitive at
-    the end, idling, which informs about nothing and costs nothing.
+    With budgets it may be optimal to leave time unused: an idle primitive without information and without cost is then
+    added at the end.
 
     Raises:
         UnknownName, InputError: the aim or the limits are wrong.
         NotInformative: equal shares do not inform about every parameter.
-        NoAnswer: no sharing meets the limits.
+        NoAnswer: no fractions satisfy the limits.
     """
     measure = criterion(problem.aim.criterion).measure(problem.picked)
     if problem.constraints.budgets:
@@ -146,10 +140,10 @@ def _maximised(task: ConcaveProblem, kind: str = "") -> _Optimum:
 
     Raises:
         NoAnswer: the floors cannot all be kept.
-        numpy.linalg.LinAlgError: what the limits leave is singular.
+        numpy.linalg.LinAlgError: every feasible design is singular.
     """
     least = task.polytope.least
-    if not 1.0 - least.sum() > TIGHT:  # least times take everything
+    if not 1.0 - least.sum() > TUNING.loosening:  # least times take everything
         return _proven(task, least / least.sum(), kind)
     if task.plain_d and (w := _plain_d(task)) is not None:
         return _proven(task, w, kind)
@@ -157,7 +151,7 @@ def _maximised(task: ConcaveProblem, kind: str = "") -> _Optimum:
         len(task.objective.pieces) > 1 and task.smooth and not task.floors
     ):  # Newton's method is quicker with many models
         found = _sharpened(task, _proven(task, task.polytope.middle(), kind))
-        if found.gap < LARGEST_GAP:
+        if found.gap < TUNING.largest_gap:
             return found
     from expdesign.durations._cvxpy import conic_optimum
 
@@ -176,7 +170,7 @@ def _proven(task: ConcaveProblem, w: Array, kind: str, multipliers: Sequence[Arr
 
 
 def _plain_d(task: ConcaveProblem) -> Array | None:
-    """The D-optimal fractions, what has to be spent counted as known before; None where a B_q is indefinite."""
+    """The D-optimal fractions, with the least times as prior; None where a B_q is indefinite."""
     (piece,), polytope = task.objective.pieces, task.polytope
     free = np.flatnonzero(polytope.most > polytope.least)
     left = 1.0 - float(polytope.least.sum())
@@ -184,19 +178,19 @@ def _plain_d(task: ConcaveProblem) -> Array | None:
     if rows is None:
         return None
     w = np.array(polytope.least)
-    w[free] += left * d_optimal(rows, prior=piece.matrix(polytope.least) / left, tolerance=AIM).fractions
+    w[free] += left * d_optimal(rows, prior=piece.matrix(polytope.least) / left, tolerance=TUNING.target_gap).fractions
     return w
 
 
 def _sharpened(task: ConcaveProblem, best: _Optimum) -> _Optimum:
-    """The same or better by Newton's method with all limits kept, where every measure is smooth."""
+    """An optimum with a gap no wider, by Newton's method under all limits, where every measure is smooth."""
     if not task.smooth:
         return best
     from expdesign.durations._cvxpy import newton_step
 
     here = best
-    for _ in range(NEWTON_STEPS):
-        if best.gap < AIM:
+    for _ in range(TUNING.newton_steps):
+        if best.gap < TUNING.target_gap:
             break
         proof, w = here.certificate, here.fractions
         prices = [proof.multipliers[name] for name in task.floor_names]
@@ -208,12 +202,14 @@ def _sharpened(task: ConcaveProblem, best: _Optimum) -> _Optimum:
             here = _proven(task, moved, proof.kind)
         except np.linalg.LinAlgError:
             break
-        best = min(best, here, key=lambda item: item.gap)
+        before, best = best.gap, min(best, here, key=lambda item: item.gap)
+        if before / 2 < best.gap < TUNING.rounding_gap:
+            break
     return best
 
 
 def _ascended(task: ConcaveProblem, w: Array, step: Array, prices: Sequence[float]) -> Array | None:
-    """Fractions (q,) that gain along a step, halved until they do; None where none gain."""
+    """Fractions (q,) along a step that raise the merit, by backtracking; None where none do."""
 
     def merit(v: Array) -> float:
         missed = [min(floor.value(v), 0.0) for floor in task.floors]
@@ -228,8 +224,8 @@ def _ascended(task: ConcaveProblem, w: Array, step: Array, prices: Sequence[floa
 
 
 def _check_floors(task: ConcaveProblem, w: Array | None) -> None:
-    """Raises NoAnswer where fractions (q,) miss a floor because all cannot be kept together."""
-    if w is not None and all(floor.value(w) > -FLOOR_ROUNDING for floor in task.floors):
+    """Raises NoAnswer where fractions (q,) violate a floor because the floors contradict each other."""
+    if w is not None and all(floor.value(w) > -TUNING.floor_rounding for floor in task.floors):
         return
     together = Objective(
         tuple(floor.pieces[0] for floor in task.floors),
@@ -240,8 +236,8 @@ def _check_floors(task: ConcaveProblem, w: Array | None) -> None:
     kept = min(float(np.exp(floor.value(best) / floor.degree)) for floor in task.floors)
     if kept < 1.0:
         raise NoAnswer(
-            "design.balance cannot be met: no sharing within the other limits informs so well about every equation; "
-            f"{kept:.3g} times the asked share was found"
+            "design.balance cannot be met: no durations within the other limits are this informative about every "
+            f"equation; at most {kept:.3g} times the required share is possible"
         )
 
 
@@ -256,16 +252,16 @@ def _certified_shares(problem: DurationProblem, within: Array | None) -> Duratio
     if within is None and not np.isfinite(task.objective.value(task.polytope.middle())):
         raise np.linalg.LinAlgError
     best = _maximised(task, THEOREMS.get(problem.aim.criterion, ""))
-    if not best.gap < LARGEST_GAP:
+    if not best.gap < TUNING.largest_gap:
         raise NoAnswer(
-            f"the durations could not be certified: a design better by {best.gap:.2g} "
-            f"in {problem.aim.criterion}-efficiency is not excluded, at most {LARGEST_GAP:g} is accepted"
+            f"the durations could not be certified: the gap in {problem.aim.criterion}-efficiency is {best.gap:.2g}, "
+            f"at most {TUNING.largest_gap:g} is accepted"
         )
     gap, count = max(best.certificate.gap, 0.0), len(problem.names)
     certificate = replace(best.certificate, bound=best.certificate.value + gap, prices=best.certificate.prices[:count])
     fractions, own = best.fractions[:count], problem.aim.criterion == "D" and problem.robust == "nominal"
     log_det = log_abs_det(problem, fractions, symmetric=within is not None)
-    if problem.constraints.budgets:  # unused time: what is collected counts, with means eliminated
+    if problem.constraints.budgets:  # with unused time, the information with means eliminated counts
         log_det = certificate.value if own else Collected.of(problem, "D").value(fractions)
     return DurationDesign(
         problem=problem,
@@ -281,16 +277,16 @@ def _certified_shares(problem: DurationProblem, within: Array | None) -> Duratio
 
 
 def _improved_shares(problem: DurationProblem) -> DurationDesign:
-    """Recorded primitives: the best guaranteed value first, where there is one, then a local search from it."""
+    """Recorded primitives: the largest guaranteed value, where there is one, then a local search from it."""
     if problem.aim.criterion != "D" or len(problem.sampled):
         raise InputError(
-            "recorded primitives (regressors measured, instruments simulated) can only be shared out by criterion D "
-            "for the nominal model; simulate their commands for the others"
+            "recorded primitives (regressors measured, instruments simulated) need criterion D and the nominal model; "
+            "simulate their commands for other criteria"
         )
     if problem.constraints.balance:
         raise InputError("design.balance needs primitives that are simulated, not recorded ones")
     polytope = polytope_of(problem)
-    within, _ = definite_start(problem, polytope)
+    within = definite_start(problem, polytope)
     guaranteed = None if within is None else _certified_shares(problem, within)
     fractions = improved(problem, polytope, None if guaranteed is None else guaranteed.fractions)
     value = log_abs_det(problem, fractions)
@@ -323,13 +319,13 @@ def _improved_shares(problem: DurationProblem) -> DurationDesign:
 
 
 def with_repeats(design: DurationDesign, repeats: Sequence[int]) -> DurationDesign:
-    """The same optimum with other whole runs, their efficiency measured against it.
+    """The same optimum with other whole runs and their efficiency.
 
     Raises:
         NotInformative: the runs do not inform about every parameter.
     """
     problem, changed = design.problem, _with_runs(design, tuple(repeats))
-    if not sees_everything(problem, Collected.of(problem), np.array(repeats) * problem.run_s / problem.total_s):
+    if not informs_about_all(problem, Collected.of(problem), np.array(repeats) * problem.run_s / problem.total_s):
         raise NotInformative("the given whole runs do not inform about every parameter", parameters=problem.parameters)
     return changed
 

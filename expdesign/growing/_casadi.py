@@ -1,7 +1,7 @@
-"""The only door to CasADi here: commands that maximise a linear functional of a run's information.
+"""Optimal control with CasADi: commands that maximise a linear functional of a run's information.
 
-Multiple shooting with one interval per sample. The solver's status is not looked at: the caller simulates the commands
-exactly, checks the limits and keeps them only where they are worth more.
+Multiple shooting with one interval per sample. The solver's status is not used: the caller simulates the commands
+exactly, checks the limits, and uses them only if they are more informative.
 
 Source: H. G. Bock and K. J. Plitt, A multiple shooting algorithm for direct solution of optimal control problems, IFAC
 Proc. Vol. 17(2) (1984), 1603-1608; A. Waechter and L. T. Biegler, IPOPT, Math. Program. 106 (2006), 25-57.
@@ -16,24 +16,15 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from expdesign.growing.tuning import TUNING
 from expdesign.simulation import motion_rates, rk4_step
 from expdesign.values import Array, seal
 from expdesign.vessel import Operators, Vessel
 
-ITERATIONS = 300
-INSIDE = 0.005
-"""Share of each range by which the program stays inside the limits, for what its own integration leaves out."""
-ROUNDED = 1e-3
-"""Moduli are rounded within this share of a signal's size, so that they have derivatives."""
-STRAIGHT = 1e-3
-"""Share of their ranges that sway and yaw rate may still have at the end."""
-SMOOTH = 1e-4
-"""Weight of the squared changes of commands, as a share of the start's sensitivity: among equals the calmest."""
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FreeForm:
-    """Which commands give a run the largest trace(G B)?
+    """Find the commands whose run has the largest trace(G B).
 
     Attributes:
         vessel: nominal, in calm water.
@@ -41,9 +32,9 @@ class FreeForm:
         gradient: (d, d) G, for the D criterion B(w)^-1.
         mean_subtraction: "none", "batch" or "complete".
         limits: (3, 2) low and high of u, v, r.
-        entry_inputs: (m,) commands that stand before the run.
-        commands: (k, m) to start from.
-        velocity: (k + 1, 3) the motion they give; its first row stays.
+        entry_inputs: (m,) commands before the run.
+        commands: (k, m) initial guess.
+        velocity: (k + 1, 3) motion under the guess; its first row is fixed.
     """
 
     vessel: Vessel
@@ -60,9 +51,9 @@ class FreeForm:
 
 
 def optimise_commands(problem: FreeForm) -> Array | None:
-    """Commands (k, m) that tell more than those to start from, or None where the program gives no numbers.
+    """Optimised commands (k, m), or None where the solver gives no numbers.
 
-    The run ends going straight: sway and yaw rate are zero at its end.
+    Sway and yaw rate are zero at the end of the run.
     """
     k, m = problem.commands.shape
     low, high = problem.limits.T
@@ -77,16 +68,16 @@ def optimise_commands(problem: FreeForm) -> Array | None:
     changes = c - before
     constraints = ca.vertcat(defects, *(changes[int(i), :].T for i in bounded))
     sides = np.r_[np.zeros(3 * k), np.repeat(reach[bounded], k)]
-    worth = _sensitivity(problem, states[:, :-1], inputs)
+    information = _sensitivity(problem, states[:, :-1], inputs)
     variables = ca.vertcat(ca.vec(x), ca.vec(c))
     guess = np.r_[(problem.velocity / span).ravel(), (problem.commands / size).ravel()]
-    scale = max(abs(float(ca.Function("start", [variables], [worth])(guess))), 1e-12)
-    cost = -worth / scale + SMOOTH * ca.sumsqr(changes) / k
+    scale = max(abs(float(ca.Function("start", [variables], [information])(guess))), 1e-12)
+    cost = -information / scale + TUNING.calmness * ca.sumsqr(changes) / k
     solver = ca.nlpsol("freeform", "ipopt", {"x": variables, "f": cost, "g": constraints}, _options())
     lower, upper = _variable_bounds(problem, span, size)
     answer = solver(x0=np.clip(guess, lower, upper), lbx=lower, ubx=upper, lbg=-sides, ubg=sides)
     if solver.stats()["return_status"] == "NonIpopt_Exception_Thrown":
-        raise KeyboardInterrupt  # nothing in the program calls back to Python, so it can be nothing else
+        raise KeyboardInterrupt  # the only exception possible without Python callbacks
     values = np.asarray(answer["x"]).ravel()[3 * (k + 1) :].reshape(k, m) * size
     return values if np.isfinite(values).all() else None
 
@@ -96,7 +87,7 @@ def _options() -> dict[str, Any]:
         "ipopt.print_level": 0,
         "print_time": False,
         "ipopt.sb": "yes",
-        "ipopt.max_iter": ITERATIONS,
+        "ipopt.max_iter": TUNING.iterations,
         "ipopt.tol": 1e-5,
         "ipopt.constr_viol_tol": 1e-7,
         "ipopt.mu_strategy": "adaptive",
@@ -115,9 +106,9 @@ def _command_scale(problem: FreeForm) -> Array:
 def _variable_bounds(problem: FreeForm, span: Array, size: Array) -> tuple[Array, Array]:
     k = len(problem.commands)
     low, high = problem.limits.T / span
-    lows, highs = (np.tile(side, (k + 1, 1)) for side in (low + INSIDE, high - INSIDE))
+    lows, highs = (np.tile(side, (k + 1, 1)) for side in (low + TUNING.margin, high - TUNING.margin))
     lows[0] = highs[0] = problem.velocity[0] / span
-    lows[-1, 1:], highs[-1, 1:] = -STRAIGHT, STRAIGHT
+    lows[-1, 1:], highs[-1, 1:] = -TUNING.end_motion, TUNING.end_motion
     least, most = (np.array([getattr(x, side) for x in problem.vessel.limits]) / size for side in ("low", "high"))
     return np.r_[lows.ravel(), np.tile(least, k)], np.r_[highs.ravel(), np.tile(most, k)]
 
@@ -136,12 +127,12 @@ def _step(problem: FreeForm) -> ca.Function:
 
 
 def _operators(problem: FreeForm) -> Operators:
-    small = ROUNDED * float(np.abs(problem.limits[:2]).max())
+    small = TUNING.modulus_rounding * float(np.abs(problem.limits[:2]).max())
     return Operators(lambda x: ca.sqrt(x * x + small**2), ca.sin, ca.cos)
 
 
 def _sensitivity(problem: FreeForm, states: ca.MX, inputs: ca.MX) -> ca.MX:
-    """trace(G B) of the run, but for a constant."""
+    """trace(G B) of the run, up to a constant."""
     model, k = problem.vessel.model, len(problem.commands)
     chosen = [model.names.index(name) for name in problem.names]
     equations = [model.terms[index].equation for index in chosen]
@@ -154,8 +145,8 @@ def _sensitivity(problem: FreeForm, states: ca.MX, inputs: ca.MX) -> ca.MX:
     phi = ca.vertcat(*(values[index] for index in chosen))
     linear = _linear(problem, equations, model.outputs)
     stage = ca.Function("stage", [nu, held], [ca.bilin(ca.DM(G), phi, phi) + ca.dot(ca.DM(linear), phi), phi])
-    worth, rows = stage.map(k)(states, inputs)
-    total = ca.sum2(worth) / k
+    information, rows = stage.map(k)(states, inputs)
+    total = ca.sum2(information) / k
     if problem.mean_subtraction == "batch":
         mean = ca.sum2(rows) / k
         total = total - ca.bilin(ca.DM(G), mean, mean)
@@ -163,7 +154,7 @@ def _sensitivity(problem: FreeForm, states: ca.MX, inputs: ca.MX) -> ca.MX:
 
 
 def _linear(problem: FreeForm, equations: Sequence[str], outputs: Sequence[str]) -> Array:
-    """(p,) what each mean regressor is worth by itself: twice G's border, where B has one."""
+    """(p,) weight of each mean regressor: twice G's border, where B has one."""
     p = len(equations)
     if problem.mean_subtraction != "complete":
         return np.zeros(p)

@@ -1,7 +1,7 @@
-"""Growing the dictionary: search for the manoeuvre whose information the present design lacks most, add it, repeat.
+"""Growth of the dictionary: search for the manoeuvre of largest sensitivity, add it, and solve again.
 
-A run with d = trace(B(w)^-1 B_run) above the dimension raises the optimal log det; none above it means that nothing
-is to be gained, by the equivalence theorem over all the runs that were looked at.
+A run with d = trace(B(w)^-1 B_run) above the dimension raises the optimal log det. If no evaluated run is above it, the
+design is optimal over all evaluated runs, by the equivalence theorem.
 
 Source: V. V. Fedorov, Theory of Optimal Experiments (1972), chapter 2 (adding the point of largest sensitivity);
 J. Kiefer and J. Wolfowitz, Canad. J. Math. 12 (1960), 363-366.
@@ -20,6 +20,7 @@ from expdesign.growing._casadi import FreeForm, optimise_commands
 from expdesign.growing.optimal_design import Optimum, optimum, sensitivity
 from expdesign.growing.search import Measure, best_of, pool_of, refined, violation
 from expdesign.growing.space import FamilySpace, family_spaces
+from expdesign.growing.tuning import TUNING
 from expdesign.growing.values import GrowRound, GrowSettings, Growth
 from expdesign.information import PrimitiveInformation, check_informative, estimated_parameters, score_primitives
 from expdesign.progress import Progress, silent, within
@@ -28,8 +29,6 @@ from expdesign.values import Array
 from expdesign.vessel import Vessel
 
 OUTPUT_KEYS = ("u_mps", "v_mps", "r_radps")
-ROUNDING = 1e-6
-"""Share of a range by which freely optimised commands may pass a limit."""
 
 
 def grow_dictionary(
@@ -42,19 +41,19 @@ def grow_dictionary(
     mean_subtraction: str = "complete",
     progress: Progress = silent,
 ) -> Growth:
-    """Add the most telling manoeuvres of the families to a scored dictionary, one by one, for the D criterion.
+    """Add the most informative manoeuvres of the families to a scored dictionary, one by one, for the D criterion.
 
     Args:
         vessel: nominal.
         information: the present dictionary, scored with the same environment, fixed parameters and mean subtraction.
-        settings: what to search, and how far.
+        settings: of the search.
         environment, fixed_parameters, mean_subtraction: as in `score_primitives`.
         progress: of the search.
 
     Raises:
-        NotInformative: the present dictionary cannot tell all parameters apart.
+        NotInformative: the present dictionary does not inform about every parameter.
         UnknownName: no such family.
-        InputError: limits or families that leave nothing to search.
+        InputError: no family or no range is left to search.
     """
     case = _Case(
         vessel=vessel,
@@ -114,7 +113,7 @@ def grow_dictionary(
 def _addition(
     case: _Case, best: Optimum, spec: PrimitiveSpec, settings: GrowSettings, progress: Progress
 ) -> tuple[PrimitiveInformation, PrimitiveSpec]:
-    """The candidate found, or freely optimised commands that began as its own and are worth more."""
+    """The candidate found, or commands optimised from it if they are more informative."""
     item = case.scored(spec)
     if not settings.free_form:
         return item, spec
@@ -125,7 +124,7 @@ def _addition(
     scored = case.scored(free)
     over = violation(scored.primitive.trajectory.velocity[None], case.limits)[0]
     better = sensitivity(best, scored, case.mean_subtraction) > sensitivity(best, item, case.mean_subtraction)
-    return (scored, free) if better and over <= ROUNDING else (item, spec)
+    return (scored, free) if better and over <= TUNING.free_form_excess else (item, spec)
 
 
 def _free_form(case: _Case, best: Optimum, item: PrimitiveInformation) -> PrimitiveSpec | None:
@@ -152,7 +151,7 @@ def _free_form(case: _Case, best: Optimum, item: PrimitiveInformation) -> Primit
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Case:
-    """What every candidate is scored with."""
+    """The arguments common to the scoring of all candidates."""
 
     vessel: Vessel
     environment: Environment
@@ -176,10 +175,10 @@ class _Case:
 
 
 def motion_limits(settings: GrowSettings, primitives: Sequence[Primitive]) -> Array:
-    """(3, 2) low and high of u, v, r: as wished, else what the primitives span in calm water.
+    """(3, 2) low and high of u, v, r: as in the settings, else the range of the primitives in calm water.
 
     Raises:
-        UnknownName: a wish for something else.
+        UnknownName: a limit on another quantity.
         InputError: low is not below high.
     """
     motion = np.concatenate([primitive.trajectory.velocity for primitive in primitives])

@@ -1,4 +1,4 @@
-"""The D-optimal shares of a dictionary, and what one more run would be worth to them."""
+"""The D-optimal shares of a dictionary, and the sensitivity of one more run."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from expdesign.values import Array, seal
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Optimum:
-    """Shares of the time, in most cases the best ones, and what they give.
+    """Shares of the time, the optimal ones or others, and their information.
 
     Attributes:
         fractions: (q,) time fractions.

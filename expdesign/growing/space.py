@@ -1,4 +1,4 @@
-"""The settings that a search may choose: every family's, as points of the unit cube, within stated velocities."""
+"""The search space: the settings of every family as points of the unit cube, within velocity limits."""
 
 from __future__ import annotations
 
@@ -8,14 +8,10 @@ import numpy as np
 
 from expdesign.dictionary import Family, PrimitiveSpec, Setting
 from expdesign.errors import InputError
+from expdesign.growing.tuning import TUNING
 from expdesign.simulation.helm import steady_ahead
 from expdesign.values import Array
 from expdesign.vessel import Vessel, direct_terms
-
-DRAWS = 100_000
-"""Random draws that a search chooses among."""
-HEADING_RAD = (0.05, 1.0)
-HELM_RAD = float(np.radians(35.0))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -43,12 +39,12 @@ class Axis:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FamilySpace:
-    """All members of a family of one length that could keep to given velocities.
+    """All members of a family with one duration and within velocity limits.
 
     Attributes:
         family: the family.
         axes: its searched settings.
-        run_s: length of a run [s].
+        run_s: duration of a run [s].
     """
 
     family: Family
@@ -67,10 +63,10 @@ class FamilySpace:
 
 
 def family_spaces(vessel: Vessel, families: tuple[Family, ...], limits: Array, run_s: float) -> tuple[FamilySpace, ...]:
-    """The spaces of those families that the vessel can follow at all.
+    """The search spaces of the families that the vessel can run.
 
-    Families with a reference need a model that sees generalised forces; those that steer need a helm that turns the
-    ship; recorded commands cannot be searched.
+    Families with a reference motion need a model with generalised forces; families of helm orders need a helm that
+    turns the ship; recorded commands are not searched.
 
     Raises:
         InputError: no family is left.
@@ -80,12 +76,12 @@ def family_spaces(vessel: Vessel, families: tuple[Family, ...], limits: Array, r
         item for item in families if item.name != "recorded" and (not direct if item.reference is not None else steers)
     ]
     if not chosen:
-        raise InputError(f"no manoeuvre family to grow from suits vessel {vessel.name!r} within the limits")
+        raise InputError(f"vessel {vessel.name!r} can run no searched manoeuvre family within the limits")
     return tuple(_space(vessel, item, limits, run_s) for item in chosen)
 
 
 def _steers(vessel: Vessel, limits: Array) -> bool:
-    """Whether the vessel can approach straight ahead at half the largest speed, and turn by its helm."""
+    """Whether the vessel can hold a straight approach at half the largest speed and turn by its helm."""
     try:
         return limits[0, 1] > 0 and steady_ahead(vessel, float(limits[0, 1]) / 2).starboard != 0
     except InputError:
@@ -100,7 +96,7 @@ def _space(vessel: Vessel, family: Family, limits: Array, run_s: float) -> Famil
 def _axis(vessel: Vessel, setting: Setting, limits: Array, run_s: float) -> Axis:
     (u_low, u_high), sway, yaw = limits.tolist()
     widest = {"sway": max(map(abs, sway)), "yaw": max(map(abs, yaw))}
-    low, high, scale = 0.0, 1.0, "linear"
+    low, high, scale, helm_rad = 0.0, 1.0, "linear", float(np.radians(TUNING.helm_deg))
     if setting.searched == "surge":
         low, high = (0.0, (u_high - u_low) / 2) if "swing" in setting.name else (u_low, u_high)
     elif setting.searched in widest:
@@ -108,11 +104,11 @@ def _axis(vessel: Vessel, setting: Setting, limits: Array, run_s: float) -> Axis
     elif setting.searched == "time":
         low, high, scale = max(4 * vessel.sample_time_s, run_s / 40), run_s, "log"
     elif setting.searched == "helm":
-        low, high = -HELM_RAD, HELM_RAD
+        low, high = -helm_rad, helm_rad
     elif setting.searched == "heading":
-        low, high, scale = (*HEADING_RAD, "log")
+        low, high, scale = (*TUNING.heading_rad, "log")
     elif setting.searched == "draw":
-        low, high, scale = 0.0, float(DRAWS), "whole"
+        low, high, scale = 0.0, float(TUNING.draws), "whole"
     low, high = max(low, setting.low), min(high, setting.high)
     if setting.searched == "share":
         low = max(low, 0.02)

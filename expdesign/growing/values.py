@@ -1,4 +1,4 @@
-"""Wishes for growing a dictionary, and what came of them."""
+"""Settings and results of the growth of a dictionary."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from expdesign.values import Array, seal
 
 @dataclass(frozen=True, kw_only=True)
 class GrowSettings:
-    """How to search for manoeuvres that add to a dictionary.
+    """Settings of the search for manoeuvres that add information to a dictionary.
 
     Attributes:
-        families: names of those searched; () for all that the vessel can do.
+        families: names of the searched families; () for all that the vessel can do.
         rounds: most primitives to add.
         tolerance: the search ends when no candidate found has a sensitivity above (1 + tolerance) x dimension.
-        limits: (low, high) of u [m/s], v [m/s] and r [rad/s] through calm water that an addition must keep to; None
-            for what the present dictionary spans.
-        free_form: whether the commands of the best candidate are themselves optimised.
-        run_s: length of an added run, or None for the middle length of the present runs.
-        pool: candidates of every family that the search begins with.
-        seed: of all chance; None for the command's.
+        limits: key -> (low, high) of u [m/s], v [m/s] and r [rad/s] of an addition in calm water; without a key, the
+            range of the present dictionary.
+        free_form: whether the commands of the best candidate are optimised.
+        run_s: duration of an added run [s], or None for the median duration of the present runs.
+        pool: initial candidates of every family.
+        seed: of the search; None for the command's.
     """
 
     families: tuple[str, ...] = ()
@@ -53,11 +53,11 @@ class GrowRound:
 
     Attributes:
         name, family, settings: of the addition.
-        sensitivity: its d = trace(B(w)^-1 B) at the optimum before it came.
-        searched: the largest d among candidates of the families, before commands were optimised freely.
-        log_det_gain: what it adds to the optimal log det.
-        efficiency: of the new optimum relative to the first, determinant to the power 1/p.
-        excitation_condition: as of every primitive.
+        sensitivity: its d = trace(B(w)^-1 B) at the optimum without it.
+        searched: the largest d among candidates of the families, before commands were optimised.
+        log_det_gain: increase of the optimal log det.
+        efficiency: ratio of the new optimum to the first, determinant to the power 1/p.
+        excitation_condition: as in `PrimitiveInformation`.
     """
 
     name: str
@@ -77,12 +77,12 @@ class Growth:
     Attributes:
         specs: of the additions, in order.
         information: of the whole dictionary, additions last.
-        rounds: what each addition brought.
-        limits: (3, 2) low and high of u, v, r that were kept to.
-        evaluated: number of candidates looked at.
-        dimension: p, plus means when they are subtracted over the complete data.
+        rounds: one for each addition.
+        limits: (3, 2) low and high of u, v, r of all additions.
+        evaluated: number of evaluated candidates.
+        dimension: p, plus means with complete mean subtraction.
         parameters: p.
-        best_left: largest sensitivity that the search still finds at the end.
+        best_left: largest sensitivity found at the end.
     """
 
     specs: tuple[PrimitiveSpec, ...]
@@ -99,8 +99,8 @@ class Growth:
 
     @property
     def efficiency_left(self) -> float:
-        """Efficiency at least, against any design over the candidates that were looked at: exp(-(d - dimension) / p).
+        """Least efficiency against any design over the evaluated candidates: exp(-(d - dimension) / p).
 
-        It says nothing about manoeuvres that the search did not come across.
+        Other manoeuvres may be more informative.
         """
         return float(np.exp(-max(self.best_left - self.dimension, 0.0) / self.parameters))

@@ -17,8 +17,8 @@ from expdesign.indices.admissibility import (
 from expdesign.indices.criteria import Criterion, Verdict, criteria, judge
 from expdesign.indices.measured import NotStandard, measured_trial
 from expdesign.indices.outcomes import OUTCOMES, StandardResults, outcomes, standard_results
+from expdesign.indices.steered_run import SteeredRun, steered_run
 from expdesign.indices.values import Circle, Execute, Stop, ZigZag
-from expdesign.indices.watched import Watched, watched
 
 __all__ = [
     "BEAUFORT_MPS",
@@ -33,9 +33,9 @@ __all__ = [
     "Execute",
     "NotStandard",
     "StandardResults",
+    "SteeredRun",
     "Stop",
     "Verdict",
-    "Watched",
     "ZigZag",
     "admissibility",
     "beaufort",
@@ -44,5 +44,5 @@ __all__ = [
     "measured_trial",
     "outcomes",
     "standard_results",
-    "watched",
+    "steered_run",
 ]

@@ -1,4 +1,4 @@
-"""May trials be held here and now? The limits of IMO MSC/Circ.1053 (2002), 2.2, on a trial that is only planned."""
+"""Conditions of IMO MSC/Circ.1053 (2002), 2.2, for a planned trial."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ STRONGEST_WIND, HIGHEST_SEA, DEPTH_BY_DRAUGHT = 5, 4, 4.0
 
 @dataclass(frozen=True, kw_only=True)
 class Conditions:
-    """What is known of place and weather beforehand.
+    """Place and weather of a planned trial.
 
     Attributes:
         draught_m: mean draught.
-        least_depth_m: least charted depth under the track, or None when the chart does not tell.
-        wind_mps: mean wind speed expected.
+        least_depth_m: least charted depth under the track, or None when it is not charted.
+        wind_mps: expected mean wind speed.
         wind_std_mps: standard deviation of its components.
         sea_state: World Meteorological Organization code, or None when not given.
-        current_mps: mean current expected.
+        current_mps: expected mean current.
         current_std_mps: standard deviation of its components.
         room_m: least distance from the hull to forbidden water over the trial.
-        room_asked_m: the distance asked for.
+        required_room_m: the required least distance.
     """
 
     draught_m: float
@@ -34,7 +34,7 @@ class Conditions:
     current_mps: float
     current_std_mps: float
     room_m: float
-    room_asked_m: float
+    required_room_m: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,8 +43,8 @@ class Condition:
 
     Attributes:
         what: the condition.
-        found: what is known in advance.
-        required: what the source requires.
+        found: its expected value, in words.
+        required: the requirement of the source.
         met: True, False, or None where it cannot be known in advance.
     """
 
@@ -60,7 +60,7 @@ def beaufort(wind_mps: float) -> int:
 
 
 def admissibility(known: Conditions) -> tuple[Condition, ...]:
-    """Each condition that can be judged in advance."""
+    """All conditions."""
     return (_depth(known), _wind(known), _sea(known), _current(known), _room(known))
 
 
@@ -110,6 +110,6 @@ def _room(known: Conditions) -> Condition:
     return Condition(
         what="Sea room",
         found=f"{known.room_m:.0f} m from the hull to forbidden water",
-        required=f"at least {known.room_asked_m:g} m",
-        met=known.room_m >= known.room_asked_m,
+        required=f"at least {known.required_room_m:g} m",
+        met=known.room_m >= known.required_room_m,
     )

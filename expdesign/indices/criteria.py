@@ -1,7 +1,7 @@
 """The criteria of IMO MSC.137(76) (2002), 5.3, and whether results meet them.
 
 They apply to ships of 100 m and over, and to chemical tankers and gas carriers of any length; for others they are a
-yardstick. Limits on overshoots depend on L/V, length by approach speed, of the full-scale ship.
+reference. Limits on overshoots depend on L/V, length over approach speed, of the full-scale ship.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from expdesign.indices.values import Circle, Stop, ZigZag
 LEAST_LENGTH_M = 100.0
 DEGREE = math.pi / 180.0
 NEAR = 2.0 * DEGREE
-"""A zig-zag counts as a 10/10 or 20/20 when helm and heading are as near as this to the nominal angles."""
+"""Largest deviation of helm and heading of a 10/10 or 20/20 zig-zag from the nominal angles."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,13 +37,13 @@ class Criterion:
 
 @dataclass(frozen=True, kw_only=True)
 class Verdict:
-    """One index beside its limit.
+    """One index compared with its limit.
 
     Attributes:
         criterion: the limit.
         run: name of the run that shows the index.
         side: "starboard", "port", or "" where there is none.
-        value: what was found [m or rad], or None where the run does not show it.
+        value: of the index [m or rad], or None where the run does not show it.
     """
 
     criterion: Criterion
@@ -53,7 +53,7 @@ class Verdict:
 
     @property
     def met(self) -> bool | None:
-        """Whether the criterion is met; None where the run does not tell."""
+        """Whether the criterion is met; None where the run does not show the index."""
         return None if self.value is None else self.value <= self.criterion.limit
 
 
@@ -63,7 +63,7 @@ def criteria(length_m: float, speed_mps: float, *, scale: float = 1.0) -> tuple[
     Args:
         length_m: between perpendiculars, of the hull the results are from [m].
         speed_mps: approach speed of the trial.
-        scale: of a model: ship length by model length; L/V of the ship is its root times the model's.
+        scale: of a model: ship length over model length; L/V of the ship is its root times the model's.
     """
     ratio_s = length_m / speed_mps * math.sqrt(scale)
     first = min(max(5.0 + ratio_s / 2.0, 10.0), 20.0)
@@ -81,7 +81,7 @@ def criteria(length_m: float, speed_mps: float, *, scale: float = 1.0) -> tuple[
 
 
 def judge(found: Iterable[Circle | ZigZag | Stop], *, length_m: float, scale: float = 1.0) -> tuple[Verdict, ...]:
-    """Every index that a criterion speaks of, run by run; other zig-zags than 10/10 and 20/20 have none."""
+    """Every index with a criterion, run by run; zig-zags other than 10/10 and 20/20 have none."""
     verdicts: list[Verdict] = []
     for trial in found:
         limits = {limit.key: limit for limit in criteria(length_m, trial.speed_mps, scale=scale)}
@@ -93,7 +93,7 @@ def judge(found: Iterable[Circle | ZigZag | Stop], *, length_m: float, scale: fl
 
 
 def indices_of(trial: Circle | ZigZag | Stop) -> dict[str, float | None]:
-    """Key -> value of the indices that criteria speak of."""
+    """Key -> value of the indices that have criteria."""
     if isinstance(trial, Circle):
         return {"advance_m": trial.advance_m, "tactical_diameter_m": trial.tactical_diameter_m}
     if isinstance(trial, Stop):

@@ -1,7 +1,7 @@
-"""Measured standard trials: what kind a run is, when its orders were given, and what it shows.
+"""Measured standard trials: the kind of a run, the times of its orders, and its indices.
 
-A helm order counts from where the rudder leaves its old angle: the time when it has moved 10 %, less what it took from
-there to half its way, in proportion.
+A helm order is timed where the rudder leaves its old angle: linear extrapolation from the times at 10 % and 50 % of its
+travel.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ import numpy as np
 
 from expdesign.errors import InputError
 from expdesign.indices.read import read_circle, read_stop, read_zigzag
+from expdesign.indices.steered_run import SteeredRun, orders
 from expdesign.indices.values import Circle, Stop, ZigZag
-from expdesign.indices.watched import Watched, orders
 from expdesign.signals import Batch
 from expdesign.simulation import Helm
 from expdesign.values import Array
@@ -60,7 +60,7 @@ def measured_trial(
     if batch.pose is None or not np.isfinite(batch.pose).all():
         raise InputError(f"{batch.name}: has no complete positions and headings, which the indices need")
     helm = Helm(vessel=vessel, thrusters=thrusters)
-    run = _watched(vessel, batch, helm, reference_forward_m)
+    run = _steered_run(vessel, batch, helm, reference_forward_m)
     turned = _orders(run)
     if turned:
         return _steered(run, turned)
@@ -72,14 +72,14 @@ def measured_trial(
     return stop or NotStandard(name=batch.name, reason="the helm stays amidships and the ship keeps its headway")
 
 
-def _watched(vessel: Vessel, batch: Batch, helm: Helm, forward_m: float) -> Watched:
+def _steered_run(vessel: Vessel, batch: Batch, helm: Helm, forward_m: float) -> SteeredRun:
     assert batch.pose is not None
     pose, velocity = np.array(batch.pose), np.array(batch.velocity)
     if not np.isfinite(velocity).all():
         raise InputError(f"{batch.name}: has no complete velocities, which the indices need")
     pose[:, :2] -= forward_m * np.stack([np.cos(pose[:, 2]), np.sin(pose[:, 2])], axis=1)
     velocity[:, 1] -= forward_m * velocity[:, 2]
-    return Watched(
+    return SteeredRun(
         name=batch.name,
         length_m=vessel.length_m,
         time_s=batch.time_s,
@@ -98,8 +98,8 @@ class _Order:
     helm_rad: float
 
 
-def _orders(run: Watched) -> tuple[_Order, ...]:
-    """Helm orders in time order; each plateau lies on the other side of neutral than the one before."""
+def _orders(run: SteeredRun) -> tuple[_Order, ...]:
+    """Helm orders in time order; successive plateaus lie on alternate sides of neutral."""
     neutral = float(np.median(run.helm_rad[: max(3, len(run.helm_rad) // 200)]))
     helm = run.helm_rad - neutral
     largest = float(np.abs(helm).max())
@@ -116,7 +116,7 @@ def _orders(run: Watched) -> tuple[_Order, ...]:
 
 
 def _left(time_s: Array, helm: Array, arrived: int, before: float, after: float) -> float:
-    """When the helm left one level for another, at which it had arrived by a sample."""
+    """Time at which the helm left one level for another, which it had reached at sample `arrived`."""
     way = (helm - before) / (after - before)
     moments = []
     for share in (0.1, 0.5):
@@ -127,7 +127,7 @@ def _left(time_s: Array, helm: Array, arrived: int, before: float, after: float)
     return float(max(time_s[0], moments[0] - (moments[1] - moments[0]) / 4))
 
 
-def _steered(run: Watched, turned: tuple[_Order, ...]) -> Found:
+def _steered(run: SteeredRun, turned: tuple[_Order, ...]) -> Found:
     course, speed = _approach(run, turned[0].time_s)
     if speed < _slow(run):
         return NotStandard(name=run.name, reason=f"the ship makes {speed:.3g} m/s when the helm is ordered")
@@ -157,8 +157,8 @@ def _steered(run: Watched, turned: tuple[_Order, ...]) -> Found:
     return found
 
 
-def _approach(run: Watched, order_s: float) -> tuple[float, float]:
-    """Mean heading and speed over the last ship length before an order, or over what there is of it."""
+def _approach(run: SteeredRun, order_s: float) -> tuple[float, float]:
+    """Mean heading and speed over the last ship length before an order, or over the part of it that was recorded."""
     before = run.time_s <= order_s
     speeds = np.hypot(*run.velocity[:, :2].T)
     last = float(speeds[before][-1]) if before.any() else float(speeds[0])
@@ -168,11 +168,11 @@ def _approach(run: Watched, order_s: float) -> tuple[float, float]:
     return float(run.pose[stretch, 2].mean()), float(speeds[stretch].mean())
 
 
-def _slow(run: Watched) -> float:
+def _slow(run: SteeredRun) -> float:
     return SLOW * math.sqrt(run.length_m)
 
 
-def _astern(run: Watched) -> float | None:
+def _astern(run: SteeredRun) -> float | None:
     """When the engines leave their first order for one that is not ahead."""
     first = float(np.median(run.drive[: max(3, len(run.drive) // 200)]))
     stopped = np.flatnonzero(run.drive <= 0)

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 from expdesign.errors import InputError, NoAnswer
 from expdesign.indices.read import read_circle, read_stop, read_zigzag
+from expdesign.indices.steered_run import steered_run
 from expdesign.indices.values import Circle, Stop, ZigZag
-from expdesign.indices.watched import watched
 from expdesign.simulation import Conduct, stopping, turning_circle, zigzag
 from expdesign.simulation.helm import steady_ahead
 from expdesign.values import Array
@@ -36,8 +36,8 @@ class StandardResults:
         vessel: its name.
         length_m: of the ship.
         speed_mps: approach speed.
-        helm: what steered, in words.
-        circles, zigzags, stops: what was run, starboard before port.
+        helm: steering actuators, in words.
+        circles, zigzags, stops: the trials, starboard before port.
         not_run: why a trial could not be run, one sentence each.
     """
 
@@ -69,7 +69,7 @@ def standard_results(
     Args:
         vessel: with its nominal model.
         speed_mps: approach speed, or None for the speed at 85 % of the engines' power.
-        helm_rad: of the turning circles, or None for 35 degrees or what the actuators can give.
+        helm_rad: of the turning circles, or None for 35 degrees, or the actuators' limit where that is less.
         sides: of the first turn.
         thrusters: "stern" or "all", which azimuth thrusters steer a vessel without rudders.
 
@@ -109,7 +109,7 @@ def standard_results(
 def simulated_circle(vessel: Vessel, *, side: str, helm_rad: float | None, conduct: Conduct) -> Circle:
     """A simulated turning circle."""
     commands, motion = turning_circle(vessel, side=side, helm_rad=helm_rad, conduct=conduct)
-    run = watched(vessel, commands, motion, name=f"circle to {side}", thrusters=conduct.thrusters)
+    run = steered_run(vessel, commands, motion, name=f"circle to {side}", thrusters=conduct.thrusters)
     approach = steady_ahead(vessel, conduct.speed_mps, thrusters=conduct.thrusters)
     return read_circle(
         run,
@@ -126,7 +126,9 @@ def simulated_zigzag(vessel: Vessel, *, angle_rad: float, side: str, conduct: Co
     """A simulated zig-zag with equal angles of heading and helm."""
     commands, motion = zigzag(vessel, heading_rad=angle_rad, helm_rad=angle_rad, side=side, conduct=conduct)
     degrees = f"{math.degrees(angle_rad):.0f}"
-    run = watched(vessel, commands, motion, name=f"zig-zag {degrees}/{degrees} to {side}", thrusters=conduct.thrusters)
+    run = steered_run(
+        vessel, commands, motion, name=f"zig-zag {degrees}/{degrees} to {side}", thrusters=conduct.thrusters
+    )
     way = 1 if side == "starboard" else -1
     first = run.first_turned(way * angle_rad, since_s=0.0, course_rad=0.0)
     second = None if first is None else run.first_turned(-way * angle_rad, since_s=first, course_rad=0.0)
@@ -144,7 +146,7 @@ def simulated_zigzag(vessel: Vessel, *, angle_rad: float, side: str, conduct: Co
 def simulated_stop(vessel: Vessel, *, conduct: Conduct) -> Stop:
     """A simulated stop at full astern."""
     commands, motion = stopping(vessel, conduct=conduct)
-    run = watched(vessel, commands, motion, name="full astern", thrusters=conduct.thrusters)
+    run = steered_run(vessel, commands, motion, name="full astern", thrusters=conduct.thrusters)
     found = read_stop(run, order_s=0.0, course_rad=0.0, speed_mps=float(math.hypot(*motion.velocity[0, :2])))
     if found is None:
         raise NoAnswer(f"stopping: vessel {vessel.name!r} keeps its headway")
@@ -160,7 +162,7 @@ def outcomes(
     side: str = "starboard",
     thrusters: str = "stern",
 ) -> dict[str, float]:
-    """Named outcomes of the standard trials, for criteria that ask what the model predicts.
+    """Named outcomes of the standard trials, for criterion V.
 
     They vary continuously with the parameters: orders fall between samples and crossings are interpolated.
 
@@ -169,13 +171,13 @@ def outcomes(
         speed_mps: approach speed, or None for the speed at 85 % of the engines' power *of these parameters*; give it
             when parameters vary, so that the trial stays the same.
         parameters: (p,) other parameter values, or None for the vessel's.
-        names: keys of `OUTCOMES`, in the order of the result; only the trials they need are run.
+        names: keys of `OUTCOMES`, in the desired order; only the trials they need are run.
         side: of the first turn.
         thrusters: "stern" or "all".
 
     Raises:
         InputError: the vessel cannot run a trial, or a name is not an outcome.
-        NoAnswer: a trial does not come to its end.
+        NoAnswer: a trial does not end.
     """
     ship = vessel if parameters is None else replace(vessel, model=vessel.model.with_parameters(parameters))
     unknown = [name for name in names if name not in OUTCOMES]

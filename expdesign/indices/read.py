@@ -1,4 +1,4 @@
-"""Indices read off a run whose first rudder or engine order is known."""
+"""Indices of a run with known rudder or engine orders."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
+from expdesign.indices.steered_run import SteeredRun, crossing
 from expdesign.indices.values import Circle, Execute, Stop, ZigZag
-from expdesign.indices.watched import Watched, crossing
 from expdesign.values import Array
 
 TEN = math.radians(10.0)
@@ -15,7 +15,7 @@ SIDE_NAMES = {1: "starboard", -1: "port"}
 
 
 def read_circle(
-    run: Watched, *, order_s: float, course_rad: float, side: int, helm_rad: float, speed_mps: float, current: bool
+    run: SteeredRun, *, order_s: float, course_rad: float, side: int, helm_rad: float, speed_mps: float, current: bool
 ) -> Circle:
     """A turning circle.
 
@@ -26,7 +26,7 @@ def read_circle(
         side: +1 to starboard, -1 to port.
         helm_rad: size of the helm.
         speed_mps: approach speed.
-        current: whether to look for a uniform current and take it out, which needs 540 degrees of turn.
+        current: whether to estimate and subtract a uniform current, which needs 540 degrees of turn.
     """
     drift = uniform_current(run, order_s=order_s, course_rad=course_rad, side=side) if current else None
     flow = np.zeros(2) if drift is None else drift
@@ -53,13 +53,13 @@ def read_circle(
     )
 
 
-def sailed_to(run: Watched, *, order_s: float, course_rad: float, change_rad: float) -> float | None:
+def sailed_to(run: SteeredRun, *, order_s: float, course_rad: float, change_rad: float) -> float | None:
     """Distance sailed from the order until the heading has changed by so much [m]."""
     time = run.first_turned(change_rad, since_s=order_s, course_rad=course_rad)
     return None if time is None else run.sailed_m(order_s, time)
 
 
-def uniform_current(run: Watched, *, order_s: float, course_rad: float, side: int) -> Array | None:
+def uniform_current(run: SteeredRun, *, order_s: float, course_rad: float, side: int) -> Array | None:
     """(2,) north, east [m/s]: drift between equal headings one full turn apart, from 180 degrees on; None if too short.
 
     Source: IMO MSC/Circ.1053 (2002), on turning trials in a current.
@@ -76,7 +76,7 @@ def uniform_current(run: Watched, *, order_s: float, course_rad: float, side: in
     return np.mean(drifts, axis=0) if drifts else None
 
 
-def _steady_diameter(run: Watched, *, order_s: float, course_rad: float, side: int, flow: Array) -> float | None:
+def _steady_diameter(run: SteeredRun, *, order_s: float, course_rad: float, side: int, flow: Array) -> float | None:
     """Length through the water of the last half turn beyond 270 degrees, as the diameter of that half circle."""
     last = side * (run.pose[-1, 2] - course_rad)
     since = run.first_turned(side * (last - math.pi), since_s=order_s, course_rad=course_rad)
@@ -88,7 +88,7 @@ def _steady_diameter(run: Watched, *, order_s: float, course_rad: float, side: i
 
 
 def read_zigzag(
-    run: Watched,
+    run: SteeredRun,
     *,
     orders_s: tuple[float, ...],
     course_rad: float,
@@ -106,7 +106,7 @@ def read_zigzag(
         side: of the first turn, +1 to starboard.
         helm_rad: size of the helm.
         speed_mps: approach speed.
-        heading_rad: change of heading at which orders were given, or None to take each as it was.
+        heading_rad: nominal change of heading at the orders, or None for the actual ones.
     """
     executes = tuple(Execute(time_s=t, heading_rad=side * float(run.at(t)[2] - course_rad)) for t in orders_s)
     swings = [(-1) ** n for n in range(len(orders_s))]
@@ -136,7 +136,7 @@ def read_zigzag(
     )
 
 
-def read_stop(run: Watched, *, order_s: float, course_rad: float, speed_mps: float) -> Stop | None:
+def read_stop(run: SteeredRun, *, order_s: float, course_rad: float, speed_mps: float) -> Stop | None:
     """A stopping trial, or None when the ship keeps headway."""
     gone = np.flatnonzero((run.velocity[:, 0] <= 0) & (run.time_s > order_s))
     if not len(gone) or gone[0] == 0:

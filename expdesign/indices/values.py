@@ -1,4 +1,4 @@
-"""What standard trials show."""
+"""Indices of the standard trials."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ class Circle:
         side: "starboard" or "port", to which the ship turned.
         helm_rad: size of the helm, positive.
         speed_mps: approach speed.
-        advance_m: way along the approach heading from the rudder order to 90 degrees change of heading.
-        transfer_m: way across it to 90 degrees.
-        tactical_diameter_m: way across it to 180 degrees.
+        advance_m: distance along the approach heading from the rudder order to 90 degrees change of heading.
+        transfer_m: distance across it to 90 degrees.
+        tactical_diameter_m: distance across it to 180 degrees.
         initial_turning_m: distance sailed until the heading has changed by 10 degrees.
         steady_diameter_m: of the steady turn.
-        current_north_mps, current_east_mps: uniform current that was found in the turn and taken out, or None.
+        current_north_mps, current_east_mps: uniform current, estimated from the turn and subtracted, or None.
     """
 
     name: str

@@ -1,8 +1,8 @@
-"""Information when the predictor carries nuisance regressors for unknown current and wind.
+"""Information with nuisance regressors for unknown current and wind in the predictor.
 
-The estimator then has to tell the ship's parameters from those of the disturbances, so the design's matrices carry the
-nuisance columns too, and a criterion about the ship alone is D_s. The regressors are the estimator's own, on a
-noise-free run of every primitive on headings all around, because the heading of a run is not known before the plan is.
+The estimator then also estimates parameters of the disturbances, so the design's matrices have columns for them, and a
+criterion about the ship alone is D_s. The regressors are those of the estimator, in noise-free runs of every primitive
+on evenly spread headings, because the heading of a run is not known before the plan.
 
 Source: F. Ljungberg, doctoral thesis, Linköping University, (5.63)-(5.76), (7.50)-(7.57).
 """
@@ -17,9 +17,10 @@ import numpy as np
 from expdesign.dictionary import Primitive
 from expdesign.errors import Diverged
 from expdesign.estimation.regression import Layout, batch_signs, build_layout, measured_table, model_for
-from expdesign.information.moments import HEADINGS, log_det_or_none
+from expdesign.information.moments import log_det_or_none
 from expdesign.information.primitive_information import PrimitiveInformation
 from expdesign.information.scoring import score_primitives
+from expdesign.information.tuning import TUNING
 from expdesign.signals import Batch, Record
 from expdesign.simulation import CALM, Environment, delivered, simulate_many, to_body
 from expdesign.values import Array
@@ -64,7 +65,7 @@ def score_augmented(
 
     Raises:
         UnknownName: no such predictor, parameter or mean subtraction.
-        InputError: nothing is left to estimate, or a term of third order.
+        InputError: every parameter is fixed, or a term is of third order.
         Diverged: the nominal model is unstable.
     """
     basic = score_primitives(
@@ -81,7 +82,7 @@ def score_augmented(
     found = [_moments(layout, batch) for batch in batches]
     information = []
     for number, item in enumerate(basic):
-        own = found[number * HEADINGS : (number + 1) * HEADINGS]
+        own = found[number * TUNING.headings : (number + 1) * TUNING.headings]
         X, Y = np.mean([X for X, _ in own], axis=0), np.mean([Y for _, Y in own], axis=0)
         YZ = np.mean([Y @ Y.T for _, Y in own], axis=0)
         taken = {"none": np.zeros_like(X), "batch": YZ, "complete": Y @ Y.T}[mean_subtraction]
@@ -104,7 +105,7 @@ def _measured(vessel: Vessel, primitives: Sequence[Primitive], environment: Envi
     Raises:
         Diverged: the nominal model is unstable.
     """
-    headings = 2 * np.pi * np.arange(HEADINGS) / HEADINGS
+    headings = 2 * np.pi * np.arange(TUNING.headings) / TUNING.headings
     current_b = np.stack(to_body(environment.current_to, headings, NUMPY), axis=1)
     pose = np.pad(headings[:, None], ((0, 0), (2, 0)))
     lengths: dict[tuple[int, float], list[int]] = {}
@@ -116,21 +117,23 @@ def _measured(vessel: Vessel, primitives: Sequence[Primitive], environment: Envi
         some = [primitives[index] for index in members]
         states = simulate_many(
             vessel,
-            np.repeat([primitive.commands.values for primitive in some], HEADINGS, axis=0),
+            np.repeat([primitive.commands.values for primitive in some], TUNING.headings, axis=0),
             pose=np.tile(pose, (len(some), 1)),
             velocity=np.concatenate([item.entry_velocity + np.pad(current_b, ((0, 0), (0, 1))) for item in some]),
-            current_to=np.tile(environment.current_to, (len(some) * HEADINGS, 1)),
-            wind_to=np.tile(environment.wind_to, (len(some) * HEADINGS, 1)),
-            parameters=np.tile(vessel.model.parameters, (len(some) * HEADINGS, 1)),
-            standing=np.repeat([primitive.entry_inputs for primitive in some], HEADINGS, axis=0),
+            current_to=np.tile(environment.current_to, (len(some) * TUNING.headings, 1)),
+            wind_to=np.tile(environment.wind_to, (len(some) * TUNING.headings, 1)),
+            parameters=np.tile(vessel.model.parameters, (len(some) * TUNING.headings, 1)),
+            standing=np.repeat([primitive.entry_inputs for primitive in some], TUNING.headings, axis=0),
         )
         for place, index in enumerate(members):
-            own = states[:-1, place * HEADINGS : (place + 1) * HEADINGS]
+            own = states[:-1, place * TUNING.headings : (place + 1) * TUNING.headings]
             if not np.isfinite(own).all():
                 raise Diverged(
                     f"vessel {vessel.name!r}: the model is unstable under the commands of {some[place].name!r}"
                 )
-            found[index] = [_batch(vessel, some[place], own[:, heading], environment) for heading in range(HEADINGS)]
+            found[index] = [
+                _batch(vessel, some[place], own[:, heading], environment) for heading in range(TUNING.headings)
+            ]
     return [batch for index in range(len(primitives)) for batch in found[index]]
 
 

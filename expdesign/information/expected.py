@@ -1,15 +1,15 @@
-"""The covariance that instrumental-variable estimates will have, before any data are taken.
+"""The covariance of instrumental-variable estimates, predicted before any data are taken.
 
     y(k+1) - y(k) = Phi(y(k))^T theta + eps(k)
     eps(k) = e(k+1) - (I + J(k)) e(k) - Ja(k) a(k) - Jc(k) c(k)
 
-e is the noise of the velocity sensors, which enters at both ends of a sample and, through J = d(Phi^T theta)/d nu, the
-regressors; a is the noise of the wind sensor and c the white part of the current, each with its own derivative. Summed
-against instruments Z, every noise sample meets a known matrix, so the covariance of sum Z eps is exact to first order:
-no autocorrelation has to be estimated. With G = sum Z Phi^T the estimate has covariance G^-1 Omega G^-T.
+e is the noise of the velocity sensors; it enters at both ends of a sample and, through J = d(Phi^T theta)/d nu, the
+regressors. a is the noise of the wind sensor and c the white part of the current, each with its own derivative. In the
+sum with instruments Z every noise sample is multiplied by a known matrix, so the covariance Omega of sum Z eps is exact
+to first order, without estimated autocorrelations. With G = sum Z Phi^T the estimate has covariance G^-1 Omega G^-T.
 
-It holds while noise is small enough for one derivative to describe it, and nothing inside a modulus changes its sign
-with it. What stays constant for a whole trial, such as a mean current, is a bias and not in it.
+It is valid for noise small enough for a first-order expansion that changes no sign inside a modulus. Disturbances that
+are constant for a whole trial, such as a mean current, cause a bias, which is not included.
 
 Source: F. Ljungberg, doctoral thesis, Linköping University, (2.21), (5.3), (5.61), (7.9); the first-order form is
 derived here.
@@ -24,14 +24,12 @@ import numpy as np
 
 from expdesign.errors import NotInformative
 from expdesign.information.moments import regressor_rows
+from expdesign.information.tuning import TUNING
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import CALM, Environment, delivered, relative_velocity, simulate
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array, seal
 from expdesign.vessel import NUMPY, Vessel, VesselModel
-
-STEP = 1e-6
-"""Of central differences, relative to the larger of 1 and the signal [m/s, rad/s]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -42,8 +40,8 @@ class TrialPart:
         commands: k samples.
         velocity: (3,) over ground at the first sample.
         heading_rad: at the first sample; matters in wind or current.
-        standing: (m,) commands that stood before, or None for those of the first sample.
-        repeats: how often it is run, each with noise of its own; may be a fraction, for what is run only sometimes.
+        standing: (m,) commands before the first sample; None for those of the first sample.
+        repeats: number of runs, with independent noise; may be a fraction, as an average.
     """
 
     commands: Commands
@@ -69,13 +67,13 @@ def expected_covariance(
     """(p, p) covariance of the estimates of the named parameters from a trial.
 
     Args:
-        vessel: whose motion and sensors the trial has.
-        parts: what is run; noise is independent between parts.
-        parameters: estimated ones, in the order of the result.
-        environment: mean current and wind, and the current's variation (white) from sample to sample.
-        mean_subtraction: taken off the instruments: "none", "batch" (each part's own) or "complete".
-        instruments: model that simulates the instruments; the vessel's own by default, as after refining.
-        integrator: "rk4" for the motion of a ship, "euler" for the map that the discrete parameters are defined by.
+        vessel: gives the motion and the sensors.
+        parts: of the trial; noise is independent between parts.
+        parameters: names of the estimated parameters, in the order of the result.
+        environment: mean current and wind, and the current's white variation from sample to sample.
+        mean_subtraction: from the instruments: "none", "batch" (each part's own mean) or "complete".
+        instruments: model that simulates the instruments; the vessel's own by default, as after refinement.
+        integrator: "rk4" for the motion of a ship, "euler" for the map that defines discrete parameters.
 
     Raises:
         NotInformative: the trial contains no information about some parameters.
@@ -99,7 +97,7 @@ def expected_covariance(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Rows:
-    """Regressors and instruments (k, p, n), derivatives and variances of what disturbs the residual."""
+    """Regressors and instruments (k, p, n), and the derivatives and variances of the residual's disturbances."""
 
     regressors: Array
     instruments: Array
@@ -179,7 +177,7 @@ def _derivatives(
     columns = []
     for index in range(5):
         step = np.zeros_like(signals)
-        step[index] = STEP * np.maximum(1.0, np.abs(signals[index]))
+        step[index] = TUNING.velocity_step * np.maximum(1.0, np.abs(signals[index]))
         columns.append((change(signals + step) - change(signals - step)) / (2 * step[index])[:, None])
     table = np.stack(columns, axis=2)
     return table[:, :, :3], table[:, :, 3:]
@@ -202,7 +200,7 @@ def _sandwich(G: Array, Omega: Array, parameters: Sequence[str]) -> Array:
     scale = np.sqrt(np.abs(np.diag(G)))
     blind = tuple(name for name, size in zip(parameters, scale, strict=True) if not size > 0)
     scaled = G / np.outer(np.where(scale > 0, scale, 1.0), np.where(scale > 0, scale, 1.0))
-    if blind or np.linalg.cond(scaled) > 1e12:
+    if blind or np.linalg.cond(scaled) > TUNING.singular:
         raise NotInformative(
             f"the trial contains no information about some parameters{': ' + ', '.join(blind) if blind else ''}",
             parameters=blind or tuple(parameters),

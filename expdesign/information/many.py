@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from expdesign.information.moments import HEADINGS, rows_of, signals_of
+from expdesign.information.moments import rows_of, signals_of
+from expdesign.information.tuning import TUNING
 from expdesign.simulation import Environment, deliver, simulate_many, to_body
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, Vessel
@@ -31,9 +32,9 @@ def bordered_runs(
         commands: (n, k, m) commands of each run.
         velocity: (n, 3) entry velocities through water.
         names: parameters to estimate.
-        environment: mean current and wind; information is averaged over headings where they matter.
+        environment: mean current and wind; information is averaged over headings in them.
         mean_subtraction: "none", "batch" or "complete".
-        standing: (n, m) commands that stood before; None for those of the first sample.
+        standing: (n, m) commands before the first sample; None for those of the first sample.
     """
     start = (velocity, commands[:, 0] if standing is None else standing)
     given = deliver(
@@ -44,7 +45,7 @@ def bordered_runs(
         pieces = [_matrices(vessel, calm, given, names, Environment(), mean_subtraction)]
     else:
         pieces = []
-        for heading in 2 * np.pi * np.arange(HEADINGS) / HEADINGS:
+        for heading in 2 * np.pi * np.arange(TUNING.headings) / TUNING.headings:
             states = _states(vessel, commands, start, environment, float(heading))
             pieces.append(_matrices(vessel, states, given, names, environment, mean_subtraction))
     return np.mean(pieces, axis=0), calm[..., 3:].transpose(1, 0, 2)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from expdesign.errors import InputError, NotInformative, UnknownName
 from expdesign.information.primitive_information import PrimitiveInformation
+from expdesign.information.tuning import TUNING
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import Environment, relative_velocity
 from expdesign.simulation.motion import State
@@ -25,10 +26,6 @@ from expdesign.vessel.expressions import Expression, Signals
 from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS
 
 MEAN_SUBTRACTIONS = ("none", "batch", "complete")
-HEADINGS = 8
-"""Headings over which information is averaged when wind or current make it depend on them."""
-ROUNDING = 1e-12
-"""A regressor that stays below this share of what the run's velocities and forces could make of it is rounding."""
 
 
 def estimated_parameters(model: VesselModel, fixed: Sequence[str]) -> tuple[str, ...]:
@@ -36,35 +33,35 @@ def estimated_parameters(model: VesselModel, fixed: Sequence[str]) -> tuple[str,
 
     Raises:
         UnknownName: a fixed name is not a parameter.
-        InputError: nothing is left to estimate.
+        InputError: every parameter is fixed.
     """
     for name in fixed:
         if name not in model.names:
             raise UnknownName("parameter", name, known=model.names)
     kept = tuple(name for name in model.names if name not in fixed)
     if not kept:
-        raise InputError("fixed_parameters names every parameter, nothing is left to estimate")
+        raise InputError("fixed_parameters names every parameter, expected at least one parameter to estimate")
     return kept
 
 
 def regressor_rows(model: VesselModel, trajectory: Trajectory, commands: Commands, environment: Environment) -> Array:
     """(k, p) value of every term at every command's start, under the environment's mean current and wind.
 
-    Commands are what the actuators deliver, `simulation.delivered`, where they do not follow at once. A term that only
-    rounding keeps from being zero throughout the run is zero: no matrix could tell afterwards.
+    Commands are the inputs that the actuators deliver, `simulation.delivered`. A term that differs from zero only by
+    rounding throughout the run is set to zero.
     """
     return rows_of(model, _signals(model, trajectory, commands, environment), (len(commands),)).T
 
 
 def _signals(model: VesselModel, trajectory: Trajectory, commands: Commands, environment: Environment) -> Signals:
-    """Everything a term may read, at every command's start."""
+    """All signals of terms, at every command's start."""
     k = len(commands)
     state = (*trajectory.pose[:k].T, *trajectory.velocity[:k].T)
     return signals_of(model, state, commands.values.T, environment)
 
 
 def signals_of(model: VesselModel, state: State, inputs: Array, environment: Environment) -> Signals:
-    """Everything a term may read, for states and inputs of any shape (k, ...)."""
+    """All signals of terms, for states and inputs of any shape (k, ...)."""
     water, air = relative_velocity(state, environment.current_to, environment.wind_to, NUMPY)
     return model.signals(water, air, inputs, NUMPY)
 
@@ -75,7 +72,7 @@ def rows_of(model: VesselModel, table: Signals, shape: tuple[int, ...]) -> Array
     for row, expression in zip(rows, model.expressions, strict=True):
         row[...] = expression.evaluate(table, NUMPY)
     largest = np.maximum(rows.max(axis=1), -rows.min(axis=1))
-    rounding = largest <= ROUNDING * _magnitudes(model, table, shape[1:])
+    rounding = largest <= TUNING.regressor_rounding * _magnitudes(model, table, shape[1:])
     if rounding.any():
         np.multiply(rows, ~rounding[:, None], out=rows)
     return rows
@@ -105,10 +102,10 @@ def moments(model: VesselModel, rows: Array, parameters: Sequence[str]) -> tuple
 def excitation_condition(
     vessel: Vessel, trajectory: Trajectory, commands: Commands, environment: Environment, *, sigmas: float = 3.0
 ) -> bool:
-    """Whether everything inside a modulus keeps its sign and stays clear of zero by `sigmas` deviations.
+    """Whether the argument of every modulus keeps its sign and is at least `sigmas` standard deviations from zero.
 
-    The deviation counts the sensors' noise and the stated spread of current (through water) and wind (through air), as
-    far as they move what is inside the modulus; moduli of commands only have to keep their sign.
+    The standard deviation includes the sensors' noise and the stated spread of current and wind. Arguments that depend
+    on commands only have to keep their sign.
 
     Source: F. Ljungberg, doctoral thesis, Linköping University, assumptions A5 and A7, (5.8).
     """
@@ -129,7 +126,7 @@ def clear_of_zero(
 
 
 def _signal_noise(vessel: Vessel, environment: Environment) -> dict[str, float]:
-    """Standard deviation of what a sensor says of each motion signal about the disturbed true one."""
+    """Standard deviation of each motion signal, from its sensor and from current or wind."""
     sensors = vessel.sensors
     water = math.hypot(sensors.velocity_mps, environment.current_std_mps)
     air = math.hypot(sensors.velocity_mps, sensors.wind_mps, environment.wind_std_mps)
@@ -149,20 +146,20 @@ def _keeps_clear(
 
 
 def log_det_or_none(information: Array, squares: Array) -> float | None:
-    """log det of an information matrix, or None when it is singular to working precision, whatever its scaling.
+    """log det of an information matrix, or None when it is singular to working precision in any scaling.
 
     Args:
-        information: (p, p) symmetric, after means were taken off.
-        squares: (p,) mean squares of the regressors, its diagonal before.
+        information: (p, p) symmetric, after mean subtraction.
+        squares: (p,) mean squares of the regressors.
     """
-    if _blind(information, squares).any():
+    if _unidentifiable(information, squares).any():
         return None
     scale = np.sqrt(np.diag(information))
     return float(np.linalg.slogdet(information / np.outer(scale, scale))[1] + 2 * np.log(scale).sum())
 
 
 def check_informative(information: Sequence[PrimitiveInformation], names: Sequence[str], mean_subtraction: str) -> None:
-    """Refuse a dictionary that cannot tell all parameters apart.
+    """Refuse a dictionary from which not all parameters are identifiable.
 
     Raises:
         NotInformative: naming the parameters in the null space of the equal-share information matrix.
@@ -171,10 +168,10 @@ def check_informative(information: Sequence[PrimitiveInformation], names: Sequen
     S = np.mean([item.Y for item in information], axis=0)
     YZ = np.mean([item.YZ for item in information], axis=0)
     taken = {"none": np.zeros_like(X), "batch": YZ, "complete": S @ S.T}[mean_subtraction]
-    unseen = _blind(X - taken, np.diag(X))
-    if not unseen.any():
+    unidentifiable = _unidentifiable(X - taken, np.diag(X))
+    if not unidentifiable.any():
         return
-    blind = tuple(name for name, is_unseen in zip(names, unseen, strict=True) if is_unseen)
+    blind = tuple(np.array(names)[unidentifiable].tolist())
     raise NotInformative(
         f"the dictionary cannot separate these parameters: {', '.join(blind)}; add primitives that excite them, "
         "state a mean wind if they are W terms, or list some in design.fixed_parameters",
@@ -182,10 +179,10 @@ def check_informative(information: Sequence[PrimitiveInformation], names: Sequen
     )
 
 
-def _blind(information: Array, squares: Array) -> Array:
-    """(p,) whether a parameter moves nothing beyond its mean, or nothing that the others could not move alike.
+def _unidentifiable(information: Array, squares: Array) -> Array:
+    """(p,) whether a regressor is constant, or a linear combination of the others.
 
-    The limits allow for what subtracting means leaves of rounding.
+    The tolerances allow for the rounding of mean subtraction.
     """
     spread = np.diag(information)
     blind = ~(spread > 1e-9 * squares)

@@ -1,4 +1,4 @@
-"""How predicted outcomes of standard trials move with the parameters: central differences of the simulated trials."""
+"""Gradients of predicted outcomes of standard trials, by central differences of the simulated trials."""
 
 from __future__ import annotations
 
@@ -9,25 +9,21 @@ import numpy as np
 
 from expdesign.errors import NoAnswer
 from expdesign.indices import outcomes
+from expdesign.information.tuning import TUNING
 from expdesign.progress import Progress, silent
 from expdesign.simulation.helm import steady_ahead
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
 
-STEP = 1e-3
-"""Relative change of each parameter, small against its uncertainty and large against the simulation's rounding."""
-AGREEMENT = 0.05
-"""How much halving the step may change a gradient, relative to the largest effect of a relative change."""
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class OutcomeGradients:
-    """Outcomes and their slopes.
+    """Outcomes and their gradients.
 
     Attributes:
         names: of the outcomes.
         values: (o,) at the nominal parameters.
-        gradients: (o, p) slope with each parameter.
+        gradients: (o, p) derivative by each parameter.
     """
 
     names: tuple[str, ...]
@@ -47,19 +43,19 @@ def outcome_gradients(
     side: str = "starboard",
     progress: Progress = silent,
 ) -> OutcomeGradients:
-    """Slopes of named outcomes with named parameters, at the nominal model.
+    """Gradients of named outcomes by named parameters, at the nominal model.
 
     Args:
         vessel: nominal.
         names: keys of `indices.OUTCOMES`.
         parameters: p names.
-        speed_mps: approach speed, the same whatever the parameters; that of the nominal model when not given.
+        speed_mps: approach speed for all parameter values; that of the nominal model when not given.
         side: of the first turn.
         progress: of the simulations.
 
     Raises:
         InputError: the vessel cannot run a trial, or a name is not an outcome.
-        NoAnswer: a trial does not come to its end, or an outcome jumps with a parameter.
+        NoAnswer: a trial does not end, or an outcome is not smooth in a parameter.
     """
     speed = float(steady_ahead(vessel, speed_mps).velocity[0])
     theta = vessel.model.parameters
@@ -83,7 +79,7 @@ def outcome_gradients(
 def _slopes(found: Callable[[Array], Array], theta: Array, index: int, size: float) -> list[Array]:
     """Central differences (o,) in one parameter, with the step and with half of it."""
     slopes = []
-    for step in (STEP * size, STEP * size / 2):
+    for step in (TUNING.parameter_step * size, TUNING.parameter_step * size / 2):
         moved = np.zeros_like(theta)
         moved[index] = step
         slopes.append((found(theta + moved) - found(theta - moved)) / (2 * step))
@@ -91,11 +87,11 @@ def _slopes(found: Callable[[Array], Array], theta: Array, index: int, size: flo
 
 
 def _check_smooth(coarse: Array, fine: Array, names: Sequence[str], parameters: Sequence[str]) -> None:
-    """Refuse slopes (o, p), as effects of relative changes, that depend on the step."""
-    jumps = np.argwhere(np.abs(coarse - fine) > AGREEMENT * np.abs(fine).max(axis=1, keepdims=True))
+    """Refuse gradients (o, p), as effects of relative changes, that depend on the step."""
+    jumps = np.argwhere(np.abs(coarse - fine) > TUNING.gradient_agreement * np.abs(fine).max(axis=1, keepdims=True))
     if len(jumps):
         o, p = jumps[0]
         raise NoAnswer(
-            f"outcome {names[o]} does not vary smoothly with {parameters[p]}: a relative change moves it by "
-            f"{coarse[o, p]:.3g} per one over {STEP:g} and by {fine[o, p]:.3g} over half of that"
+            f"outcome {names[o]} is not smooth in {parameters[p]}: its derivative by a relative change is "
+            f"{coarse[o, p]:.3g} with a step of {TUNING.parameter_step:g} and {fine[o, p]:.3g} with half of that"
         )

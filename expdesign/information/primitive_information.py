@@ -1,4 +1,4 @@
-"""What one primitive tells about the parameters."""
+"""The information of one primitive about the parameters."""
 
 from __future__ import annotations
 
@@ -17,10 +17,9 @@ class PrimitiveInformation:
         X: (p, p) mean of Phi Z^T.
         Y: (p, n) mean of Phi.
         Z: (p, n) mean of the instruments.
-        YZ: (p, p) what subtracting each run's own means takes off X: the mean over headings of Y Z^T, and Y Z^T itself
-            when heading does not matter.
+        YZ: (p, p) to subtract from X in batch mean subtraction: the mean of Y Z^T over headings.
         log_det_alone: log det of its own information matrix under the design's mean subtraction, or None if singular.
-        excitation_condition: whether every state inside a modulus keeps its sign and clears the stated noise.
+        excitation_condition: whether every argument of a modulus keeps its sign, with a margin for the stated noise.
     """
 
     primitive: Primitive

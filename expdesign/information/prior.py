@@ -1,4 +1,4 @@
-"""What is known before the trial: as models to be robust against, and as information that the trial only adds to."""
+"""Prior knowledge: as models sampled for robust designs, and as information to which the trial adds."""
 
 from __future__ import annotations
 
@@ -11,12 +11,10 @@ from expdesign.errors import InputError, NoAnswer
 from expdesign.information.moments import estimated_parameters
 from expdesign.information.primitive_information import PrimitiveInformation
 from expdesign.information.scoring import score_models
+from expdesign.information.tuning import TUNING
 from expdesign.simulation import CALM, Environment
 from expdesign.values import Array
 from expdesign.vessel import Vessel, VesselModel
-
-REDRAWS = 5
-"""How many times as many models may be drawn as are wanted, because some are unstable."""
 
 
 def equation_noise(vessel: Vessel, parameters: Sequence[str]) -> Array:
@@ -25,11 +23,11 @@ def equation_noise(vessel: Vessel, parameters: Sequence[str]) -> Array:
     The residual is the difference of two samples, each with the sensor's noise; it is counted in the units in which
     regressors stand in X, so that X over its square is information per sample about the parameters.
 
-    Successive residuals share a sample, so their noise has a colour, and noise reaches the regressors, too. Both are
-    left out on purpose: the covariance with them, `expected.expected_covariance`, does not follow from a sum of
-    matrices over primitives, so no certificate could be given for it. Criteria A, E and V only weigh equations against
-    each other by this number; a factor common to all cancels. Against a stated prior it counts as it is, and then too
-    little is made of data whose regressors vary slowly, in which the shared samples partly cancel.
+    Successive residuals share a sample, so their noise is coloured, and noise also enters the regressors. Both are
+    neglected on purpose: the covariance with them, `expected.expected_covariance`, is not a function of a sum of
+    matrices over primitives, so it has no certificate. Criteria A, E and V use this number only to weigh equations
+    against each other; a common factor cancels. With a stated prior its absolute size matters, and data with slowly
+    varying regressors, in which the shared samples partly cancel, are then underrated.
     """
     sensors, model = vessel.sensors, vessel.model
     spread = {"u": sensors.velocity_mps, "v": sensors.velocity_mps, "r": sensors.yaw_rate_radps}
@@ -41,23 +39,23 @@ def equation_noise(vessel: Vessel, parameters: Sequence[str]) -> Array:
 def stated_information(std: Array, noise: Array, *, dimension: int, samples: float) -> Array:
     """(d, d) information of independent prior standard deviations (p,), per sample of the total time.
 
-    A standard deviation of zero or infinity says nothing: what counts as known should be fixed, not estimated.
+    Parameters with a standard deviation of zero or infinity get none; known parameters should be fixed instead.
 
     Args:
         std: (p,) of the parameters.
         noise: (p,) as from `equation_noise`.
-        dimension: d, p or p plus the number of means, of which nothing is known.
-        samples: in the time to share out.
+        dimension: d, p or p plus the number of means, which have no prior.
+        samples: in the total time.
 
     Raises:
         InputError: a parameter with a prior whose equation's noise is not stated.
     """
-    told = (std > 0) & np.isfinite(std)
-    if not (noise[told] > 0).all():
+    stated = (std > 0) & np.isfinite(std)
+    if not (noise[stated] > 0).all():
         raise InputError("a prior from standard deviations needs the sensors' noise of every equation")
     prior = np.zeros((dimension, dimension))
-    index = np.flatnonzero(told)
-    prior[index, index] = (noise[told] / std[told]) ** 2 / samples
+    index = np.flatnonzero(stated)
+    prior[index, index] = (noise[stated] / std[stated]) ** 2 / samples
     return prior
 
 
@@ -65,7 +63,7 @@ def drawn_parameters(model: VesselModel, parameters: Sequence[str], count: int, 
     """(count, all) parameter vectors, normal around the nominal ones where a standard deviation is stated.
 
     Raises:
-        InputError: none of the parameters has one.
+        InputError: no parameter has a standard deviation.
     """
     std = np.array([s if n in parameters else 0.0 for n, s in zip(model.names, model.parameter_std, strict=True)])
     if not std.any():
@@ -83,10 +81,10 @@ def score_prior(
     fixed_parameters: Sequence[str] = (),
     mean_subtraction: str = "complete",
 ) -> tuple[tuple[tuple[PrimitiveInformation, ...], ...], int]:
-    """The dictionary scored with models drawn from the prior, under the commands made for the nominal one.
+    """The dictionary scored with models drawn from the prior, under the commands of the nominal model.
 
     Returns:
-        Information by model, and how many unstable models were drawn besides.
+        Information by model, and the number of unstable models drawn.
 
     Raises:
         InputError: no standard deviations are stated.
@@ -96,11 +94,11 @@ def score_prior(
     stable: list[tuple[PrimitiveInformation, ...]] = []
     unstable = 0
     while len(stable) < samples:
-        wanted = samples - len(stable)
+        missing = samples - len(stable)
         scored = score_models(
             vessel,
             primitives,
-            drawn_parameters(vessel.model, names, wanted, rng),
+            drawn_parameters(vessel.model, names, missing, rng),
             environment=environment,
             fixed_parameters=fixed_parameters,
             mean_subtraction=mean_subtraction,
@@ -108,7 +106,7 @@ def score_prior(
         )
         stable += [items for items, is_stable in scored if is_stable]
         unstable += sum(not is_stable for _, is_stable in scored)
-        if unstable > REDRAWS * samples:
+        if unstable > TUNING.redraws * samples:
             raise NoAnswer(
                 f"design.robust: {unstable} of {unstable + len(stable)} models drawn from the prior are unstable; "
                 "state smaller model.parameter_std"

@@ -2,7 +2,7 @@
 
     X = mean Phi Z^T,   Y = mean Phi,   Z = mean of the instruments                                   (7.50)-(7.55)
 
-Regressors carry noise that instruments do not, so X is not symmetric, and the design problem is not convex.
+Regressors are noisy and instruments are not, so X is not symmetric, and the design problem is not convex.
 
 Source: F. Ljungberg, doctoral thesis, Linköping University, 7.3 and (7.50)-(7.55).
 """
@@ -34,7 +34,7 @@ class BatchInformation:
     Attributes:
         name: of the batch.
         seconds: its length [s].
-        samples: rows that count.
+        samples: number of regression rows.
         X: (p, p) mean of Phi Z^T.
         Y: (p, n) mean of Phi.
         Z: (p, n) mean of the instruments.
@@ -69,15 +69,15 @@ def recorded_information(
 ) -> tuple[BatchInformation, ...]:
     """Information of every batch about named parameters, in the units of `information.moments`.
 
-    A parameter that the predictor leaves out (one of wind, where none was measured) has rows of zeros: these data tell
-    nothing of it.
+    A parameter that is not in the predictor (of wind, where wind was not measured) has rows of zeros: these data do not
+    inform about it.
 
     Args:
         record: measured data.
         model: nominal; its simulation gives the instruments.
-        parameters: p names; all others count as known.
+        parameters: p names; all others are fixed.
         predictor: name in `estimation.predictors.PREDICTORS` without nuisance regressors, "basic" or "basic-wind".
-        regressors: "measured", or "simulated" for those of the instruments, which makes X symmetric.
+        regressors: "measured", or "simulated" as in the instruments, which makes X symmetric.
 
     Raises:
         InputError: a predictor with nuisance regressors, or data that lack what it needs.
@@ -121,7 +121,7 @@ def recorded_information(
 
 
 def _as_delivered(model: VesselModel, record: Record) -> Record:
-    """The record with the mean over each sample of what the actuators deliver of its inputs."""
+    """The record with the mean delivered input of each sample."""
     responses = [response for actuator in model.actuators for response in actuator.responses]
     if all(response == IDEAL for response in responses):
         return record

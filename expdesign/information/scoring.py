@@ -15,7 +15,6 @@ from expdesign.dictionary import Primitive
 from expdesign.errors import Diverged, UnknownName
 from expdesign.estimation.regression import AIR
 from expdesign.information.moments import (
-    HEADINGS,
     MEAN_SUBTRACTIONS,
     clear_of_zero,
     estimated_parameters,
@@ -24,17 +23,13 @@ from expdesign.information.moments import (
     signals_of,
 )
 from expdesign.information.primitive_information import PrimitiveInformation
+from expdesign.information.tuning import TUNING
 from expdesign.simulation import CALM, Environment, deliver, rk4_step, simulate, to_body
 from expdesign.simulation.motion import begun
 from expdesign.simulation.program import STATES, RatesProgram, march
 from expdesign.simulation.run import LARGEST_SPEED, SUBSTEPS
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, Vessel
-
-SIMULATED_AT_ONCE, EVALUATED_AT_ONCE = 3_000_000, 500_000
-"""Samples held in memory."""
-MARCHED_AT_ONCE = 2048
-"""Runs simulated in one go; what they need then stays in the processor's cache."""
 
 
 def score_primitives(
@@ -47,12 +42,12 @@ def score_primitives(
 ) -> tuple[PrimitiveInformation, ...]:
     """Information of every primitive about the parameters to estimate.
 
-    When a mean current or wind singles out headings, each primitive is simulated on `HEADINGS` evenly spread ones
-    and its moments are averaged, because its heading is not known before the plan is.
+    In a mean current or wind, each primitive is simulated on `Tuning.headings` evenly spread headings and its moments
+    are averaged, because its heading is not known before the plan.
 
     Raises:
         UnknownName: no such parameter or mean subtraction.
-        InputError: nothing is left to estimate.
+        InputError: every parameter is fixed.
         Diverged: the nominal model is unstable.
     """
     ((scored, _),) = score_models(
@@ -141,17 +136,19 @@ class _Moments:
 
 
 def _headings(environment: Environment) -> Array:
-    return np.zeros(1) if environment.isotropic else np.asarray(2 * np.pi * np.arange(HEADINGS) / HEADINGS)
+    return (
+        np.zeros(1) if environment.isotropic else np.asarray(2 * np.pi * np.arange(TUNING.headings) / TUNING.headings)
+    )
 
 
 def _groups(primitives: Sequence[Primitive], copies: int) -> Iterator[list[int]]:
-    """Indices of primitives that can be simulated together: of one length, and not too many."""
+    """Indices of primitives to simulate together: of one length, within the memory limit."""
     lengths: dict[tuple[int, float], list[int]] = {}
     for index, primitive in enumerate(primitives):
         key = (len(primitive.commands), primitive.commands.sample_time_s)
         lengths.setdefault(key, []).append(index)
     for (samples, _), members in lengths.items():
-        size = max(1, SIMULATED_AT_ONCE // (samples * copies))
+        size = max(1, TUNING.simulated_samples // (samples * copies))
         yield from (members[first : first + size] for first in range(0, len(members), size))
 
 
@@ -161,7 +158,7 @@ class _Runs:
 
     Attributes:
         vessel, environment: as given.
-        inputs: (k, inputs, n) mean over each sample of what the actuators deliver.
+        inputs: (k, inputs, n) mean delivered input of each sample.
         states: (k, 6, m, h, n) at the start of every command; nan where a run diverges.
     """
 
@@ -184,7 +181,7 @@ class _Runs:
     def moments(self, names: Sequence[str]) -> _Moments:
         """Averages over headings, some primitives at a time."""
         samples, _, models, headings, count = self.states.shape
-        size = max(1, EVALUATED_AT_ONCE // (samples * models * headings))
+        size = max(1, TUNING.evaluated_samples // (samples * models * headings))
         parts = [self._some(slice(first, first + size), names) for first in range(0, count, size)]
         columns = {name: np.concatenate([getattr(part, name) for part in parts], axis=1) for name in vars(parts[0])}
         return _Moments(**columns)
@@ -219,8 +216,8 @@ def _sailed(
 ) -> Array:
     """(k, 6, m, h, n) states of all models on all headings, from entry velocities (3, n) through water.
 
-    Where wind moves no model and there is no current, motion does not depend on heading and is simulated on one only;
-    the position of the others is not turned with their heading.
+    Without current and without aerodynamic terms, motion does not depend on heading: one heading is simulated and
+    copied. Positions are not rotated.
     """
     headings = _headings(environment)
     if len(headings) > 1 and not environment.current_to.any() and not _moved_by_air(vessel, parameters):
@@ -232,7 +229,7 @@ def _sailed(
 
 
 def _moved_by_air(vessel: Vessel, parameters: Array) -> bool:
-    """Whether any of the models has a force of the air."""
+    """Whether any model has an aerodynamic force."""
     reads = [bool(set(AIR) & set(expression.signals)) for expression in vessel.model.expressions]
     return bool(parameters[:, reads].any())
 
@@ -248,7 +245,7 @@ def _simulated(
 ) -> Array:
     """(k, 6, m, h, n) states at the start of every command; runs that diverge are nan throughout.
 
-    `given` (k, steps, inputs, n) is what the actuators deliver in each integrator step, or (k, 1, ...) all the time.
+    `given` (k, steps, inputs, n) are the delivered inputs in each integrator step, or (k, 1, ...) if constant.
     """
     shape = (len(parameters), len(headings), entry.shape[1])
     current_b = to_body(environment.current_to, headings[:, None], NUMPY)
@@ -257,7 +254,7 @@ def _simulated(
     first = np.array(begun(vessel.model, start))
     own = np.repeat(parameters, shape[1] * shape[2], axis=0)
     states = np.empty((len(given), STATES, first.shape[1]))
-    size = shape[2] * max(1, MARCHED_AT_ONCE // shape[2])
+    size = shape[2] * max(1, TUNING.runs_at_once // shape[2])
     for begin in range(0, first.shape[1], size):
         some = slice(begin, begin + size)
         runs = first[:, some].shape[1]
@@ -282,7 +279,7 @@ def _marched(program: RatesProgram, given: Array, start: Array, step_s: float) -
 
 
 def _raise_diverged(vessel: Vessel, primitives: Sequence[Primitive], environment: Environment) -> None:
-    """Simulate one by one, for the message of the first that diverges."""
+    """Simulate one by one and raise the error of the first run that diverges."""
     for primitive in primitives:
         for heading in _headings(environment):
             current_b = np.array(to_body(environment.current_to, float(heading), NUMPY))

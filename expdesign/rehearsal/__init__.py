@@ -1,4 +1,4 @@
-"""Monte Carlo validation of designs: estimates of many simulated trials beside what was predicted."""
+"""Monte Carlo validation of designs: estimates from many simulated trials, compared with the predictions."""
 
 from expdesign.rehearsal.validation import RANDOM, Rehearsal, Validated, equal_runs, trial_parts, validate
 

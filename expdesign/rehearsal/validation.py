@@ -1,14 +1,14 @@
-"""What a design is worth when it is sailed: estimates of many simulated trials, beside what was predicted.
+"""Monte Carlo validation of designs: estimates from many simulated trials, compared with the predictions.
 
-A trial is a number of whole runs, each simulated with a true ship from its entry velocity, measured with the ship's
-sensors, and estimated as measured data would be, with the scenario's vessel as the nominal model. Designs are compared
-at the same informative time: the optimised one, equal shares, and runs drawn at random, anew for every trial.
+A trial is a number of whole runs. Each is simulated with a true ship from its entry velocity, measured with the ship's
+sensors, and used for estimation with the scenario's vessel as the nominal model. Designs are compared at the same
+informative time: the optimised one, equal shares, and runs drawn at random for every trial.
 
-Each run of a trial begins at a heading of its own, the same in every trial: a golden angle further than the last, which
-spreads the runs of every manoeuvre evenly over the wind. Predictions are made for these headings.
+The initial heading advances by the golden angle from run to run, the same in every trial, which spreads the runs of
+every manoeuvre evenly over the wind. Predictions use these headings.
 
-Work is cut into chunks with random numbers of their own: any number of processes gives the same result, and chunks that
-are done need not be done again.
+Trials are divided into chunks with independent random streams: the result does not depend on the number of processes,
+and finished chunks are kept.
 
 Source: F. Ljungberg, doctoral thesis, Linköping University, 9.1.2.
 """
@@ -26,7 +26,7 @@ from expdesign.errors import InputError, NoAnswer
 from expdesign.estimation.methods import Settings, estimate
 from expdesign.estimation.solve import Weighting
 from expdesign.information.expected import TrialPart, expected_covariance
-from expdesign.information.moments import HEADINGS
+from expdesign.information.tuning import TUNING
 from expdesign.progress import Progress, silent
 from expdesign.signals import Batch, Record
 from expdesign.simulation import CALM, Environment, simulate_ensemble
@@ -35,7 +35,7 @@ from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
 
 CHUNK = 20
-"""Trials of one chunk."""
+"""Trials in one chunk."""
 RANDOM = "random"
 GOLDEN_ANGLE_RAD = np.pi * (3.0 - 5.0**0.5)
 """From the heading of one run to that of the next."""
@@ -43,20 +43,20 @@ GOLDEN_ANGLE_RAD = np.pi * (3.0 - 5.0**0.5)
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Rehearsal:
-    """What is to be tried.
+    """The designs and ships of a validation.
 
     Attributes:
-        truth: the ship that sails, with its sensors.
-        nominal: the ship that was designed for, with the same actuators: it simulates the instruments.
+        truth: the simulated ship, with its sensors.
+        nominal: the ship of the design, with the same actuators; it simulates the instruments.
         primitives: the dictionary.
-        designs: name -> whole runs of each primitive; None for runs drawn at random for each trial.
+        designs: name -> whole runs of each primitive; None for random runs.
         total_s: informative time of a random design [s].
         environment: weather; its mean is drawn for each trial with its standard deviation.
-        parameters: estimated ones; the others are held at the nominal model's values.
+        parameters: names of the estimated parameters; the others are fixed at the nominal model's values.
         method, mean_subtraction: of the estimator.
-        integrator: of the true ship, "rk4" or "euler", the map that discrete parameters are defined by.
-        trials: of each design.
-        seed: of everything drawn.
+        integrator: of the true ship, "rk4" or "euler", the map that defines discrete parameters.
+        trials: number for each design.
+        seed: of all random numbers.
     """
 
     truth: Vessel
@@ -89,16 +89,16 @@ class Rehearsal:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Validated:
-    """What came of one design.
+    """The result of one design.
 
     Attributes:
         design: its name.
-        parameters: estimated ones.
-        truth: (p,) values of the true ship; nan for what its model does not have.
-        estimates, stated: (n, p) estimates and the standard deviations that came with them.
+        parameters: names of the estimated parameters.
+        truth: (p,) values of the true ship; nan for parameters that its model does not have.
+        estimates, stated: (n, p) estimates and their stated standard deviations.
         forecast: (p,) standard deviations predicted with the nominal model, nan for random designs.
-        theory: (p,) the same with the true ship, which nobody knows before; nan for random designs.
-        failed: trials that gave no estimate.
+        theory: (p,) standard deviations predicted with the true ship; nan for random designs.
+        failed: number of trials without an estimate.
     """
 
     design: str
@@ -137,7 +137,7 @@ class Validated:
 
 
 def equal_runs(primitives: Sequence[Primitive], total_s: float) -> tuple[int, ...]:
-    """Whole runs of every primitive that come nearest to equal shares of a time, at least one of each."""
+    """Whole runs of every primitive nearest to equal shares of a time, at least one of each."""
     share = total_s / len(primitives)
     return tuple(max(1, round(share / primitive.duration_s)) for primitive in primitives)
 
@@ -150,13 +150,13 @@ def validate(
     keep: Callable[[str, Array], None] = lambda key, rows: None,
     progress: Progress = silent,
 ) -> tuple[Validated, ...]:
-    """Every design of a rehearsal, tried.
+    """Validate every design of a rehearsal.
 
     Args:
-        rehearsal: what to try.
+        rehearsal: the designs and ships.
         jobs: processes; a `joblib.parallel_config` around the call chooses another backend.
         done: rows of chunks from an earlier, interrupted call with the same rehearsal.
-        keep: told each chunk's rows as soon as they are there.
+        keep: called with the key and rows of each finished chunk.
         progress: of the trials.
 
     Raises:
@@ -197,7 +197,7 @@ def _chunk(rehearsal: Rehearsal, key: str, design: str, number: int, trials: int
 
 
 def _random_runs(rehearsal: Rehearsal, rng: np.random.Generator) -> tuple[int, ...]:
-    """Runs drawn one after the other until the time is full."""
+    """Runs drawn one by one until the time is used."""
     counts, spent = [0] * len(rehearsal.primitives), 0.0
     while spent < rehearsal.total_s * (1 - 1e-9):
         index = int(rng.integers(len(counts)))
@@ -220,7 +220,7 @@ def _drawn(weather: Environment, rng: np.random.Generator) -> Environment:
 def _sailed(
     rehearsal: Rehearsal, runs: Sequence[int], weather: Environment, trials: int, rng: np.random.Generator
 ) -> list[Record]:
-    """What every trial measures, one batch for each whole run."""
+    """Measured data of every trial, one batch for each whole run."""
     batches: list[list[Batch]] = []
     for primitive, count in zip(rehearsal.primitives, runs, strict=True):
         for repeat in range(count):
@@ -279,7 +279,7 @@ def _validated(rehearsal: Rehearsal, design: str, chunks: Mapping[str, Array]) -
 
 
 def _predicted(rehearsal: Rehearsal, design: str, vessel: Vessel) -> Array:
-    """(p,) standard deviations that the design should give with a ship, by that ship's sensors; nan for random runs."""
+    """(p,) standard deviations predicted with a vessel's model and the true ship's sensors; nan for random runs."""
     runs = rehearsal.designs[design]
     if runs is None or not set(rehearsal.parameters) <= set(vessel.model.names):
         return np.full(len(rehearsal.parameters), np.nan)
@@ -295,7 +295,7 @@ def _predicted(rehearsal: Rehearsal, design: str, vessel: Vessel) -> Array:
 
 
 def _rehearsed_parts(rehearsal: Rehearsal, runs: Sequence[int]) -> tuple[TrialPart, ...]:
-    """Every run of a trial at its heading; repeats are counted where headings do not matter."""
+    """Every run of a trial at its heading; runs are combined in isotropic weather."""
     if rehearsal.environment.isotropic:
         return trial_parts(rehearsal.primitives, runs)
     order = [item for item, count in zip(rehearsal.primitives, runs, strict=True) for _ in range(count)]
@@ -315,10 +315,10 @@ def trial_parts(
 ) -> tuple[TrialPart, ...]:
     """The parts of a trial of whole runs, in the dictionary's order.
 
-    Wind and current make information depend on the heading; a trial of unknown headings then counts as spread evenly
-    over `HEADINGS` of them.
+    In wind or current, information depends on the heading; unknown headings are then replaced by `Tuning.headings`
+    evenly spread ones.
     """
-    count = 1 if environment.isotropic else HEADINGS
+    count = 1 if environment.isotropic else TUNING.headings
     return tuple(
         TrialPart(
             commands=primitive.commands,

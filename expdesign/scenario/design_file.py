@@ -1,4 +1,4 @@
-"""The `[design]` table of a scenario: criterion, robustness, what is known already, and limits on the sharing."""
+"""The `[design]` table of a scenario: criterion, robustness, prior information, and limits on the durations."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class BudgetTable(Table):
     """One of `[[design.budgets]]`."""
 
     name: Text = Field(description="a name for reports, e.g. 'energy'")
-    limit: NonNegative = Field(description="what there is for the whole informative time")
+    limit: NonNegative = Field(description="the amount available for the whole informative time")
     cost_per_s: dict[str, NonNegative] = Field(default={}, description="the use per second of each primitive, by name")
     use: Literal["cubed_propeller_speed"] | None = Field(
         default=None,
@@ -34,13 +34,13 @@ class BudgetTable(Table):
 class DesignTable(Table):
     """`[design]`."""
 
-    total_s: Positive = Field(description="the informative time to share out [s]")
+    total_s: Positive = Field(description="the total informative time of all primitives [s]")
     criterion: Literal["D", "D_s", "A", "E", "V"] = Field(
         default="D", description="the design criterion, see expdesign explain criteria"
     )
     mean_subtraction: Literal["none", "batch", "complete"] = Field(
         default="complete",
-        description="the mean that the estimator will subtract from its instruments, against constant disturbances: of "
+        description="the mean that the estimator subtracts from its instruments, against constant disturbances: of "
         "each batch, of the complete data, or none",
     )
     fixed_parameters: list[Text] = Field(
@@ -48,7 +48,7 @@ class DesignTable(Table):
     )
     interest: list[Text] = Field(
         default=[],
-        description="the parameters that criteria D_s, A and E are about, the others being unknown too; all if empty",
+        description="the parameters of interest in criteria D_s, A and E; the others are estimated, too; all if empty",
     )
     relative_to: Literal["nominal", "parameter_std"] = Field(
         default="nominal",
@@ -70,36 +70,36 @@ class DesignTable(Table):
     )
     predictor: Literal["model", "augmented", "wind"] = Field(
         default="model",
-        description="the terms that will be estimated: the model's; 'augmented' with those of an unknown current; "
-        "'wind' with those of current and measured wind; the last two go with criterion D_s",
+        description="the terms that are estimated: the model's; 'augmented' with those of an unknown current; 'wind' "
+        "with those of an unknown current and measured wind; use the last two with criterion D_s",
     )
     robust: Literal["nominal", "average", "worst"] = Field(
         default="nominal",
-        description="the models that the criterion counts: the nominal one, or the average or worst over models drawn "
-        "from [model.parameter_std]",
+        description="the models in the criterion: the nominal one, or the average or the worst over models drawn from "
+        "[model.parameter_std]",
     )
     prior_samples: Annotated[int, Field(ge=1, le=MOST_SAMPLES)] | None = Field(
         default=None, description="the number of models drawn where robust is not 'nominal'; 20 when not given"
     )
     prior: Literal["none", "parameter_std"] = Field(
         default="none",
-        description="the knowledge that the trial adds to: none, or that of the vessel's [model.parameter_std]",
+        description="the prior information: none, or that of the vessel's [model.parameter_std]",
     )
     prior_data: list[Text] = Field(
-        default=[], description="the CSV files of earlier trials, whose information counts as known already"
+        default=[], description="the CSV files of earlier trials, whose information is prior information"
     )
     least_s: dict[str, NonNegative] = Field(
         default={}, description="the least time of a primitive [s], e.g. {acceleration = 120.0}"
     )
     most_s: dict[str, NonNegative] = Field(default={}, description="the most time of a primitive [s]")
     required: list[Text] = Field(default=[], description="the primitives that get at least one run")
-    excluded: list[Text] = Field(default=[], description="the primitives that get none")
+    excluded: list[Text] = Field(default=[], description="the primitives that get no time")
     budgets: list[BudgetTable] = Field(
-        default=[], description="the tables [[design.budgets]] of what is used up; time may then stay unused"
+        default=[], description="the tables [[design.budgets]] of limited resources; time may then stay unused"
     )
     balance: Annotated[float, Field(ge=0, lt=1)] = Field(
         default=0.0,
-        description="the least share that each of surge, sway and yaw gets of the information it could have alone",
+        description="the least D-efficiency for each of surge, sway and yaw, relative to the optimum for it alone",
     )
     grow: GrowTable | None = Field(
         default=None, description="a table [design.grow]: search for manoeuvres to add to the dictionary"
@@ -107,16 +107,16 @@ class DesignTable(Table):
 
 
 def design_settings(table: DesignTable, vessel: Vessel, primitives: tuple[str, ...], entry: Entry) -> DesignSettings:
-    """Checked settings.
+    """The checked settings.
 
     Args:
         table: of the file.
-        vessel: whose parameters are named.
+        vessel: gives the names of parameters.
         primitives: names in the dictionary.
         entry: the table's place, for messages.
 
     Raises:
-        FileError: a name that is not known or stands twice, or keys that do not go together.
+        FileError: a name is unknown or given twice, or keys contradict each other.
     """
     names = vessel.model.names
     _check_fixed(table, names, entry)
@@ -183,20 +183,20 @@ def _check_keys(given: Mapping[str, float], known: Iterable[str], entry: Entry) 
 
 
 def _check_together(table: DesignTable, vessel: Vessel, entry: Entry) -> None:
-    """Keys without which others mean nothing."""
+    """Keys that need other keys."""
     if table.criterion == "D_s" and not table.interest and table.predictor == "model":
         raise entry.at("interest").error("is missing, criterion D_s needs the parameters of interest")
     if table.criterion == "V" and not table.outcomes:
         raise entry.at("outcomes").error(f"is missing, criterion V needs one or more of {', '.join(OUTCOMES)}")
     if table.prior_samples is not None and table.robust == "nominal":
-        raise entry.at("prior_samples").error("says nothing while design.robust is 'nominal'")
+        raise entry.at("prior_samples").error("has no effect while design.robust is 'nominal'")
     uses_std = {"robust": table.robust != "nominal", "prior": table.prior != "none",
                 "relative_to": table.relative_to != "nominal"}  # fmt: skip
     if any(uses_std.values()) and not np.any(vessel.model.parameter_std):
         key = next(key for key, used in uses_std.items() if used)
         raise entry.at(key).error("needs standard deviations in the vessel's [model.parameter_std], found none")
     if table.predictor != "model" and (table.robust != "nominal" or table.prior_data):
-        raise entry.at("predictor").error("with nuisance regressors goes with neither design.robust nor prior_data")
+        raise entry.at("predictor").error("with nuisance regressors excludes design.robust and prior_data")
     for name in table.required:
         if name in table.excluded:
             raise entry.at("excluded").error(f"names {name!r}, which design.required names too")

@@ -32,5 +32,5 @@ def load_repeats(path: Path | str, *, names: Sequence[str]) -> tuple[int, ...]:
         if not isinstance(count, int) or isinstance(count, bool) or count < 0:
             raise FileError(path, f"primitives.{name}.repeats", f"is {count!r}, expected a whole number of 0 or more")
     if not sum(repeats.values()):
-        raise FileError(path, "primitives", "asks for no run at all")
+        raise FileError(path, "primitives", "has no run, expected at least one repeat")
     return tuple(repeats.get(name, 0) for name in names)

@@ -1,4 +1,4 @@
-"""`[design.grow]`: how to search for manoeuvres that add to the dictionary."""
+"""`[design.grow]`: the search for manoeuvres that add information to the dictionary."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Pair = Annotated[list[Number], Field(min_length=2, max_length=2)]
 
 
 class LimitsTable(Table):
-    """Velocities through calm water that additions keep to; what is not given, the dictionary's own."""
+    """Velocity limits of additions in calm water; the dictionary's range where not given."""
 
     u_mps: Pair | None = Field(
         default=None, description="the lowest and highest surge speed [m/s]; the dictionary's range when not given"
@@ -33,27 +33,27 @@ class GrowTable(Table):
     families: list[Text] = Field(
         default=[], description="the manoeuvre families to search; all that the vessel can do if empty"
     )
-    rounds: int = Field(default=GrowSettings.rounds, ge=1, le=200, description="the most manoeuvres to add")
+    rounds: int = Field(default=GrowSettings.rounds, ge=1, le=200, description="the largest number of additions")
     tolerance: Positive = Field(
         default=GrowSettings.tolerance,
         description="the relative gain at which the search ends: when no candidate has a sensitivity "
         "above (1 + tolerance) times the number of parameters",
     )
     limits: LimitsTable = Field(
-        default=LimitsTable(), description="the velocities through calm water that added manoeuvres keep to"
+        default=LimitsTable(), description="the limits on the velocities of added manoeuvres in calm water"
     )
     free_form: bool = Field(
         default=GrowSettings.free_form, description="whether the commands of the best candidate are optimised, too"
     )
     run_s: Positive | None = Field(
         default=GrowSettings.run_s,
-        description="the length of an added run [s]; the median of the present runs when not given",
+        description="the duration of an added run [s]; the median of the present runs when not given",
     )
     pool: int = Field(
         default=GrowSettings.pool,
         ge=8,
         le=65536,
-        description="the candidates of each family that the search begins with",
+        description="the number of initial candidates of each family",
     )
     seed: Annotated[int, Field(ge=0)] | None = Field(
         default=GrowSettings.seed, description="the seed of the search; that of the command when not given"
@@ -64,7 +64,7 @@ def build_grow(table: GrowTable, entry: Entry) -> GrowSettings:
     """The settings of a checked table.
 
     Raises:
-        FileError: a family that there is not, or a limit whose low is not below its high.
+        FileError: an unknown family, or a limit whose low is not below its high.
     """
     known = [item.name for item in FAMILIES if item.name != "recorded"]
     for number, name in enumerate(table.families, start=1):

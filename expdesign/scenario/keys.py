@@ -1,4 +1,4 @@
-"""The keys of a file, as the models that read it describe them."""
+"""The keys of a file, from the descriptions of its tables."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class Key:
 
     Attributes:
         name: dotted; entries of a list of tables are marked as in "no_go[].name".
-        meaning: what it is, with its unit.
-        default: as it would be written; "required", or "" where nothing stands in for it.
-        allowed: the values it may have.
+        meaning: its description, with unit.
+        default: as in a file; "required", or "" for no default.
+        allowed: its allowed values.
     """
 
     name: str

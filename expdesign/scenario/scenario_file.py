@@ -62,21 +62,22 @@ class PlanTable(Table):
         default=PlanSettings.confidence,
         gt=0,
         lt=1,
-        description="the share of trials with drawn ships, currents and winds that must stay in allowed water",
+        description="the least share of simulated trials that stay in allowed water, with randomly drawn ships, "
+        "currents and winds",
     )
     time_budget_s: Positive = Field(
         default=PlanSettings.time_budget_s,
-        description="the work that the planner may spend on other placements [s] of a usual computer; it is counted, "
-        "not timed, so that every computer finds the same plan",
+        description="the work budget for other placements [s] on a usual computer; work is counted, not timed, so that "
+        "every computer finds the same plan",
     )
     transit_speed_mps: Positive | None = Field(
         default=PlanSettings.transit_speed_mps,
-        description="the speed of repositioning legs through water [m/s]; when not given, nine tenths of what the "
-        "actuators allow",
+        description="the speed of repositioning legs through water [m/s]; when not given, nine tenths of the "
+        "actuators' limit",
     )
     turning_radius_m: Positive | None = Field(
         default=PlanSettings.turning_radius_m,
-        description="the turning radius of repositioning legs [m]; when not given, what the vessel's model allows",
+        description="the turning radius of repositioning legs [m]; when not given, that of the vessel's model",
     )
     planner: PlannerName = Field(
         default=PlanSettings.planner,
@@ -99,7 +100,7 @@ class ScenarioFile(Table):
     design: DesignTable = Field(description="a table [design] with total_s")
     start: PoseTable = Field(description="a table [start] with a position and heading_deg")
     goal: PoseTable = Field(description="a table [goal] with a position and heading_deg")
-    environment: EnvironmentTable = Field(default=EnvironmentTable(), description="the current, wind and sea to expect")
+    environment: EnvironmentTable = Field(default=EnvironmentTable(), description="the expected current, wind and sea")
     plan: PlanTable = Field(default=PlanTable(), description="the clearance, safety and repositioning legs of the plan")
 
 
@@ -110,7 +111,7 @@ def load_scenario(path: Path | str) -> Scenario:
         path: a TOML file with `[scenario]`, `[design]`, `[start]`, `[goal]` and optionally `[environment]`, `[plan]`.
 
     Raises:
-        FileError: a file is unreadable, something is wrong, missing or unknown, or start or goal has no room.
+        FileError: a file is unreadable, an entry is wrong, missing or unknown, or start or goal has no room.
         NoPlan: the area holds no allowed water.
     """
     entry = Entry(Path(path))

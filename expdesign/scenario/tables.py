@@ -1,7 +1,7 @@
-"""TOML files to checked tables; whatever is wrong becomes one `FileError`.
+"""From TOML files to checked tables; every mistake becomes one `FileError`.
 
-A table is a pydantic model that refuses unknown keys, other types, not-a-numbers and infinities; whole numbers may
-stand for decimal ones. A field's description says what the key means, in messages and in `expdesign explain`.
+A table is a pydantic model that refuses unknown keys, other types, not-a-numbers and infinities; integers are accepted
+as floats. A field's description is the meaning of the key, in messages and in `expdesign explain`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from pydantic_core import ErrorDetails
 from expdesign.errors import FileError, nearest
 
 LARGEST = 1e12
-"""No length, time or speed of a trial is near it; what is larger would only overflow further on."""
+"""Largest accepted number, far beyond any length, time or speed of a trial."""
 
 Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 Positive = Annotated[float, Field(gt=0, le=LARGEST)]
@@ -31,7 +31,7 @@ class Table(BaseModel):
     """Base of all file tables.
 
     Attributes:
-        topic: of `expdesign explain`, for tables that are read by themselves.
+        topic: of `expdesign explain`, for whole files.
     """
 
     topic: ClassVar[str] = ""
@@ -63,7 +63,7 @@ class Entry:
         return Entry(self.path, f"{self.key}[{number}]")
 
     def error(self, problem: str) -> FileError:
-        """The error that says so."""
+        """The error with this place and problem."""
         return FileError(self.path, self.key, problem)
 
     def unknown(self, name: str, known: Iterable[str]) -> FileError:
@@ -71,10 +71,10 @@ class Entry:
         return self.error(f"is {shown(name)}, {offer(name, tuple(known))}")
 
     def file(self, named: str) -> Path:
-        """The file that this entry names, relative to the file it stands in.
+        """The file that this entry names, relative to the file that contains it.
 
         Raises:
-            FileError: it is not there.
+            FileError: it does not exist.
         """
         target = self.path.parent / named
         try:
@@ -91,7 +91,7 @@ def read_text(path: Path, kind: str) -> str:
 
     Args:
         path: the file.
-        kind: what it should be, for messages, e.g. "TOML".
+        kind: expected kind of file, for messages, e.g. "TOML".
 
     Raises:
         FileError: missing, a directory, unreadable or not UTF-8.
@@ -129,11 +129,11 @@ def check_table(model: type[T], data: object, entry: Entry) -> T:
 
     Args:
         model: the table's model.
-        data: what the file says.
-        entry: where it says so.
+        data: content of the file.
+        entry: its place.
 
     Raises:
-        FileError: the first thing wrong; a mistyped key comes before the missing one it was meant to be.
+        FileError: the first mistake; mistyped keys come before missing ones.
     """
     try:
         return model.model_validate(data)
@@ -174,7 +174,7 @@ def _explain(model: type[Table], problem: ErrorDetails) -> tuple[str, str]:
 
 
 def see(topic: str) -> str:
-    """Where a message sends the reader; nothing without a topic."""
+    """A reference to `expdesign explain` for messages, or ""."""
     return f" (see expdesign explain {topic})" if topic else ""
 
 

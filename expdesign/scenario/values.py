@@ -1,4 +1,4 @@
-"""A scenario: everything a trial is planned from, typed and checked."""
+"""A scenario as typed and checked values."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from expdesign.vessel import Vessel
 
 @dataclass(frozen=True, kw_only=True)
 class BudgetSettings:
-    """Something that is used up.
+    """A limited resource.
 
     Attributes:
         name: for reports.
-        limit: what there is for the whole informative time.
-        cost_per_s: use per second by primitive, where the user says it.
-        use: what the use is computed from otherwise: "cubed_propeller_speed", the mean over the run of the sum of
-            |n|^3 of all propellers and thrusters [rps3], which grows like shaft power.
+        limit: amount available for the whole informative time.
+        cost_per_s: use per second by primitive, where stated.
+        use: computed use otherwise: "cubed_propeller_speed", the mean over the run of the sum of |n|^3 of all
+            propellers and thrusters [rps3], which grows like shaft power.
     """
 
     name: str
@@ -35,27 +35,27 @@ class BudgetSettings:
 
 @dataclass(frozen=True, kw_only=True)
 class DesignSettings:
-    """Settings of the design.
+    """Settings of the durations.
 
     Attributes:
-        total_s: informative time to share out [s].
+        total_s: total informative time of all primitives [s].
         criterion: name of a design criterion: "D", "D_s", "A", "E" or "V".
         mean_subtraction: "none", "batch" or "complete".
         fixed_parameters: parameters held at the vessel file's values and not estimated.
-        interest: parameters that D_s, A and E are about; empty for all.
-        relative_to: what errors of parameters are counted in for A and E: their "nominal" size or their prior
-            standard deviation, "parameter_std".
-        parameter_units: error of a parameter that counts as one, instead of that.
-        outcomes: what V predicts, keys of `indices.OUTCOMES`.
-        outcome_units: error of an outcome that counts as one; its nominal size where not given.
+        interest: parameters of interest in D_s, A and E; empty for all.
+        relative_to: unit of parameter errors in A and E: their "nominal" size or their prior standard deviation,
+            "parameter_std".
+        parameter_units: unit of error of single parameters, instead of that.
+        outcomes: predicted outcomes in V, keys of `indices.OUTCOMES`.
+        outcome_units: unit of error of an outcome; its nominal size where not given.
         outcome_speed_mps: approach speed of the predicted trials, or None for the nominal one.
-        predictor: "model" for the model's terms, "augmented" or "wind" with nuisance regressors besides.
+        predictor: "model" for the model's terms, "augmented" or "wind" with nuisance regressors, too.
         robust: "nominal", "average" or "worst".
         prior_samples: models drawn from the prior.
-        prior: "none" or "parameter_std", what is known before.
-        prior_data: files of earlier trials, whose information is added.
+        prior: prior information, "none" or "parameter_std".
+        prior_data: files of earlier trials, whose information is added to the prior.
         least_s, most_s, required, excluded, budgets, balance: see `durations.Constraints`.
-        grow: how to add manoeuvres to the dictionary, or None to leave it as it is.
+        grow: settings of the dictionary growth, or None for no growth.
     """
 
     total_s: float
@@ -84,13 +84,13 @@ class DesignSettings:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Scenario:
-    """What the user wrote, as values.
+    """A scenario file and the files that it names, as values.
 
     Attributes:
         name: of the scenario; also the default folder of its results.
         path: the scenario file.
         vessel: with its nominal model.
-        dictionary: the primitives to choose from, not yet simulated.
+        dictionary: specifications of the primitives, not yet simulated.
         area: allowed water.
         design, plan: settings.
         start, goal: (3,) poses in the area's frame [north m, east m, heading rad]; the ship starts and ends at rest.

@@ -1,4 +1,4 @@
-"""Variants of a scenario: a file that holds only what differs."""
+"""Variants of a scenario: files with only the changed entries."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from expdesign.scenario.tables import Entry, read_toml, shown
 from expdesign.scenario.values import Scenario
 
 FILE_KEYS = {"scenario": ("vessel", "dictionary", "area"), "design": ("prior_data",)}
-"""Keys that name files, relative to the file they stand in."""
+"""Keys that name files, relative to the file that contains them."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Variant:
-    """A scenario and what it changes.
+    """A changed scenario and its changes.
 
     Attributes:
         scenario: complete.
@@ -29,7 +29,7 @@ class Variant:
 
 
 def load_variant(base: Path | str, variant: Path | str) -> Variant:
-    """A scenario file with the entries of another file put over it.
+    """A scenario file with entries replaced by those of another file.
 
     Args:
         base: a scenario file.
@@ -37,7 +37,7 @@ def load_variant(base: Path | str, variant: Path | str) -> Variant:
             by its own `scenario.name`, or by its file name.
 
     Raises:
-        FileError, NoPlan: as for `load_scenario`; wrong entries are told as the variant file's.
+        FileError, NoPlan: as for `load_scenario`; wrong entries are reported with the variant's path.
     """
     below, entry = Path(base), Entry(Path(variant))
     first, over = read_toml(below), read_toml(entry.path)
@@ -51,7 +51,7 @@ def load_variant(base: Path | str, variant: Path | str) -> Variant:
 
 
 def _absolute(content: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """The tables with the files they name spelled out from the root."""
+    """The tables with absolute paths of the files they name."""
 
     def resolved(value: Any) -> Any:
         if isinstance(value, list):
@@ -77,7 +77,7 @@ def _merged(first: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]
 
 
 def _changes(first: Mapping[str, Any], over: Mapping[str, Any], prefix: str = "") -> list[str]:
-    """What the second says otherwise than the first, in the second's order."""
+    """Entries of the second that differ from the first, in the second's order."""
     lines: list[str] = []
     for key, value in over.items():
         name, before = f"{prefix}{key}", first.get(key)

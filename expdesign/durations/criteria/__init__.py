@@ -1,7 +1,7 @@
-"""Criteria: what makes one sharing of the time better than another.
+"""Optimality criteria.
 
-A new criterion is a line in the table `CRITERIA`. If its measure is new too, that is a class beside `LogDet` and one
-expression in the convex solver.
+A new criterion is one entry of `CRITERIA`. A new measure is also a class like `LogDet` and one expression in the convex
+solver.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from expdesign.durations.criteria.measures import LogDet, LogSmallest, LogTrace,
 from expdesign.errors import UnknownName
 
 CRITERIA = (
-    # The means count in D too: their part of the determinant is constant when fractions sum to one.
+    # D includes the means: their part of the determinant is constant when fractions sum to one.
     Criterion(
         name="D",
         title="volume of the confidence region of all parameters",

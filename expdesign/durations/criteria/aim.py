@@ -1,4 +1,4 @@
-"""The aim of a design: a criterion, and what it needs to know from the user."""
+"""The aim of a design: a criterion with its settings."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from expdesign.values import Array, seal
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Aim:
-    """What the estimates are for.
+    """A criterion with its settings.
 
-    The noise of an equation is the standard deviation of its one-step residual; with it M / noise^2 is information in
-    the units of the parameters. D and D_s do without, because each parameter stands in one equation; A, E and V compare
+    The noise of an equation is the standard deviation of its one-step residual; M / noise^2 is information in the units
+    of the parameters. D and D_s do not depend on it, because each parameter stands in one equation. A, E and V compare
     parameters of different equations and need it.
 
     Attributes:
         criterion: name in `CRITERIA`.
-        interest: parameters of interest; empty for all. Parameters that stand for disturbances should be left out.
-        unit: (p,) error of each parameter of interest that counts as one, e.g. |theta|; empty when not stated, zero
-            where it is not known. A and E use it.
-        noise: (p,) residual noise of each parameter's equation; empty when not stated, zero where it is not known.
-        outcomes: names of what is to be predicted.
-        gradients: (o, p) slope of each outcome with the parameters, in units of the error that counts as one.
+        interest: parameters of interest, without those of disturbances; empty for all.
+        unit: (p,) unit of the error of each parameter in A and E, e.g. |theta|; empty when not stated, zero where
+            unknown.
+        noise: (p,) residual noise of each parameter's equation; empty when not stated, zero where unknown.
+        outcomes: names of the predicted outcomes.
+        gradients: (o, p) derivative of each outcome by the parameters, in the outcome's unit of error.
     """
 
     criterion: str = "D"
@@ -43,10 +43,10 @@ class Aim:
 
 @dataclass(frozen=True, kw_only=True)
 class Picked:
-    """What a criterion works on.
+    """The arguments of a criterion.
 
     Attributes:
-        aim: what the user said.
+        aim: the criterion's settings.
         parameters: p names.
         dimension: d, size of the information matrix: parameters, then means.
     """
@@ -72,7 +72,7 @@ class Picked:
         return self.aim.interest or self.parameters
 
     def scaled_columns(self, criterion: str) -> Array:
-        """(d, k) columns of the parameters of interest, each over the error that counts as one, times its noise.
+        """(d, k) columns of the parameters of interest, each times its noise over its unit of error.
 
         Raises:
             InputError: a unit or a noise is not stated.
@@ -103,8 +103,8 @@ class Criterion:
 
     Attributes:
         name: as in scenario files.
-        title: what it makes best, in a few words.
-        measure: of the information matrix; raises InputError when the aim does not say enough.
+        title: the quantity that it minimises.
+        measure: of the information matrix; raises InputError when the aim lacks a setting.
     """
 
     name: str
@@ -113,10 +113,10 @@ class Criterion:
 
 
 def prediction_columns(picked: Picked) -> Array:
-    """(d, o) slopes of the outcomes with the parameters, times the residual noise of their equations.
+    """(d, o) derivatives of the outcomes by the parameters, times the residual noise of their equations.
 
     Raises:
-        InputError: the outcomes are not stated, or no estimated parameter moves them.
+        InputError: the outcomes are not stated, or no estimated parameter affects them.
     """
     aim, p = picked.aim, len(picked.parameters)
     if not aim.gradients.size:
@@ -125,7 +125,7 @@ def prediction_columns(picked: Picked) -> Array:
         raise InputError(f"gradients of outcomes have {aim.gradients.shape[1]} columns for {p} parameters")
     moved = tuple(name for name, column in zip(picked.parameters, aim.gradients.T, strict=True) if column.any())
     if not moved:
-        raise InputError(f"no parameter to be estimated moves {', '.join(aim.outcomes)}")
+        raise InputError(f"no estimated parameter affects {', '.join(aim.outcomes)}")
     L = np.zeros((picked.dimension, len(aim.gradients)))
     index = [picked.parameters.index(name) for name in moved]
     L[index] = (aim.gradients[:, index] * picked.noise("V", moved)).T

@@ -1,7 +1,7 @@
-"""Concave measures of an information matrix: functions of the covariance V = L^T M^-1 L of what L picks out.
+"""Concave measures of an information matrix: functions of the covariance V = L^T M^-1 L of parameter combinations.
 
 M is (d, d), L is (d, k). Every value is the logarithm of a positively homogeneous, concave function of M, so that a
-gain of 0.01 reads as one per cent of information per degree. Whatever is concave in M is concave in time fractions.
+gain of 0.01 per degree is one per cent of information. A function concave in M is concave in time fractions.
 
 Each measure f has a concave conjugate f*(G) = inf over M of trace(G M) - f(M). It turns any positive semidefinite G
 into an upper bound, f(M) <= trace(G M) - f*(G) for every M; with G the gradient of f the bound touches f.
@@ -21,11 +21,11 @@ from expdesign.values import Array, seal
 
 
 class Measure(Protocol):
-    """What a criterion makes of an information matrix.
+    """A concave measure of an information matrix.
 
     Attributes:
-        L: (d, k) what is picked out.
-        degree: homogeneity of exp(value): twice the information adds `degree` x log 2 to the value.
+        L: (d, k) parameter combinations in its columns.
+        degree: homogeneity of exp(value): doubling the information raises the value by `degree` x log 2.
     """
 
     @property
@@ -43,7 +43,7 @@ class Measure(Protocol):
         ...
 
     def conjugate(self, G: Array) -> float:
-        """f*(G) of a positive semidefinite G; -inf where G bounds nothing."""
+        """f*(G) of a positive semidefinite G; -inf where G gives no bound."""
         ...
 
     def transformed(self, T: Array) -> Measure:
@@ -100,7 +100,7 @@ class LogDet:
         value = np.linalg.slogdet(M)[1] - np.linalg.slogdet(self.L.T @ self.L)[1]
         if d == k:
             return np.asarray(value)
-        rest = np.linalg.qr(self.L, mode="complete")[0][:, k:]  # what L does not see, eliminated by its own block
+        rest = np.linalg.qr(self.L, mode="complete")[0][:, k:]  # the complement of L is eliminated
         return np.asarray(value - np.linalg.slogdet(rest.T @ M @ rest)[1])
 
     def gradient(self, M: Array) -> Array:
@@ -177,7 +177,7 @@ class LogTrace:
 
 @dataclass(frozen=True, eq=False)
 class LogSmallest:
-    """-log of the largest eigenvalue of V: E. Where eigenvalues meet it has a corner."""
+    """-log of the largest eigenvalue of V: E. It is not differentiable where eigenvalues meet."""
 
     L: Array
 
@@ -194,7 +194,7 @@ class LogSmallest:
         return np.asarray(-np.log(np.linalg.eigvalsh(covariance(self.L, M))[..., -1]))
 
     def gradient(self, M: Array) -> Array:
-        """As `Measure`: of the eigenvector that comes last; at a corner it is one of many."""
+        """As `Measure`: of the largest eigenvalue's eigenvector; where eigenvalues meet, one supergradient of many."""
         values, vectors = np.linalg.eigh(covariance(self.L, M))
         back = np.linalg.solve(M, self.L @ vectors[:, -1])
         return np.asarray(np.outer(back, back) / values[-1])

@@ -9,24 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from expdesign.durations.criteria.measures import Measure, SmoothMeasure
+from expdesign.durations.tuning import TUNING
 from expdesign.errors import NotInformative
 from expdesign.values import Array
 
 Indices = NDArray[np.intp]
-SINGULAR = 1e-13
-"""Eigenvalues below this, relative to the largest, are rounding."""
-NEARLY_SINGULAR = 1e-10
-"""Below this, rounding shows in what is computed from a matrix by elimination."""
-OUT_OF_RANGE = 1e-6
-"""What is to be estimated may reach out of a singular matrix's range by this share of itself."""
 
 
 @dataclass(frozen=True, eq=False)
 class Tangent:
-    """A linear function that is nowhere below a concave one: value + slope (v - w).
+    """A linear upper bound of a concave function: value + slope (v - w).
 
     Attributes:
-        value: at the fractions w where it was made.
+        value: at the fractions w where it is tangent.
         slope: (q,).
     """
 
@@ -68,7 +63,7 @@ class Piece:
         return np.asarray(self.prior + np.tensordot(w, self.matrices, axes=1))
 
     def value(self, w: Array) -> float:
-        """The measure, -inf where it cannot be estimated."""
+        """The measure; -inf where its combinations are not estimable."""
         return float(stacked_values(self.measure, self.matrix(w)[None])[0])
 
     def tangent(self, w: Array, multiplier: Array | None = None) -> Tangent:
@@ -98,7 +93,7 @@ class Objective:
 
     Attributes:
         pieces: one for each model.
-        levels: (m,) what each piece is compared with.
+        levels: (m,) subtracted from each piece.
         worst: the least instead of the average.
     """
 
@@ -118,28 +113,31 @@ class Objective:
 
 
 def stacked_values(measure: Measure, M: Array) -> Array:
-    """(c,) values of (c, d, d); where one is singular to working precision, that of what it still estimates.
+    """(c,) values of (c, d, d), also of singular ones.
 
-    What a measure picks out can be estimated from a singular M when it lies in the range of M (F. Pukelsheim, Optimal
-    Design of Experiments (2006), 3.3); else the value is -inf.
+    Combinations are estimable from a singular M when they lie in the range of M (F. Pukelsheim, Optimal Design of
+    Experiments (2006), 3.3); else the value is -inf.
     """
     eigenvalues = np.linalg.eigvalsh(M)
-    regular = eigenvalues[:, 0] > SINGULAR * eigenvalues[:, -1]
+    regular = eigenvalues[:, 0] > TUNING.singular * eigenvalues[:, -1]
     values = np.full(len(M), -np.inf)
     if regular.any():
         values[regular] = measure.values(M[regular])
     if measure.L.shape[1] < M.shape[1]:
-        doubtful = eigenvalues[:, 0] < NEARLY_SINGULAR * eigenvalues[:, -1]
+        doubtful = eigenvalues[:, 0] < TUNING.nearly_singular * eigenvalues[:, -1]
         values[doubtful] = [_value_within(measure, item) for item in M[doubtful]]
     return values
 
 
 def _value_within(measure: Measure, M: Array) -> float:
-    """The value of a matrix that is nearly singular, in coordinates where rounding in its null space is harmless."""
+    """The value of a nearly singular matrix, in the coordinates of its range."""
     eigenvalues, vectors = np.linalg.eigh(M)
-    seen = vectors[:, eigenvalues > SINGULAR * max(eigenvalues[-1], 0.0)]
+    seen = vectors[:, eigenvalues > TUNING.singular * max(eigenvalues[-1], 0.0)]
     missing = measure.L - seen @ (seen.T @ measure.L)
-    if not seen.size or (np.linalg.norm(missing, axis=0) > OUT_OF_RANGE * np.linalg.norm(measure.L, axis=0)).any():
+    if (
+        not seen.size
+        or (np.linalg.norm(missing, axis=0) > TUNING.outside_range * np.linalg.norm(measure.L, axis=0)).any()
+    ):
         return -np.inf
     return float(measure.transformed(seen.T).values(np.diag(eigenvalues[-seen.shape[1] :])))
 
@@ -163,7 +161,7 @@ def whitening(matrices: Array, prior: Array, shares: Array | None = None) -> Arr
         return np.linalg.inv(np.linalg.cholesky(mean / np.outer(size, size))) / size
     except np.linalg.LinAlgError:
         raise NotInformative(
-            "all primitives together do not inform about every parameter, to working precision"
+            "the primitives together do not inform about every parameter, to working precision"
         ) from None
 
 

@@ -89,7 +89,7 @@ def conditions(content: ReportContent) -> tuple[Condition, ...]:
             current_mps=float(np.hypot(*environment.current_to)),
             current_std_mps=environment.current_std_mps,
             room_m=plan.verification.clearance_min_m,
-            room_asked_m=content.clearance_m,
+            required_room_m=content.clearance_m,
         )
     )
 

@@ -11,11 +11,11 @@ from expdesign.errors import NoPlan
 from expdesign.scenario.charts.area_tables import AreaTable, BoundsTable, NoGoTable
 from expdesign.scenario.charts.geojson_zones import open_geojson
 from expdesign.scenario.charts.metres import Box, in_metres
+from expdesign.scenario.charts.tuning import TUNING
 from expdesign.scenario.charts.zones import OpenChart
 from expdesign.scenario.tables import Entry, check_table, read_toml, shown
 from expdesign.sea_area import LocalFrame, SeaArea, Zones, build_sea_area
 
-LARGEST_EXTENT_KM = 250.0
 KM_PER_DEGREE = 111.2
 
 
@@ -31,7 +31,7 @@ def load_area(path: Path | str, *, draught_m: float) -> SeaArea:
 
     Raises:
         FileError: the file or its chart is unreadable, or something in it is wrong, missing or unknown.
-        NoPlan: no water remains; the message says why.
+        NoPlan: no water remains; the message states the reason.
     """
     entry = Entry(Path(path))
     file = check_table(AreaTable, read_toml(entry.path), entry)
@@ -64,7 +64,7 @@ def load_area(path: Path | str, *, draught_m: float) -> SeaArea:
 def _open_chart(file: AreaTable, draught_m: float, given: Box | None, entry: Entry) -> OpenChart:
     chart = file.chart
     if chart.geojson is not None and chart.s57 is not None:
-        raise entry.at("s57").error(f"is {shown(chart.s57)} beside geojson, expected one chart")
+        raise entry.at("s57").error(f"is {shown(chart.s57)} in addition to geojson, expected one chart")
     if chart.s57 is not None:
         from expdesign.scenario.charts.s57_zones import open_cell  # its reader takes a second to load
 
@@ -91,10 +91,10 @@ def _checked_bounds(given: Box | None, chart: OpenChart, entry: Entry) -> Box:
     west, south, east, north = given or chart.extent
     height_km = (north - south) * KM_PER_DEGREE
     width_km = (east - west) * KM_PER_DEGREE * float(np.cos(np.radians((south + north) / 2)))
-    if max(height_km, width_km) > LARGEST_EXTENT_KM or max(-south, north) > 85:
+    if max(height_km, width_km) > TUNING.largest_extent_km or max(-south, north) > 85:
         found = "cover" if given else "are missing and the chart covers"
         size = f"{height_km:.0f} x {width_km:.0f} km from latitude {south:.4g} to {north:.4g}"
-        raise entry.error(f"{found} {size}, expected at most {LARGEST_EXTENT_KM:g} km and no pole")
+        raise entry.error(f"{found} {size}, expected at most {TUNING.largest_extent_km:g} km and no pole")
     chart_west, chart_south, chart_east, chart_north = chart.extent
     if given and (west > chart_east or east < chart_west or south > chart_north or north < chart_south):
         covered = f"{chart_south:.5g} to {chart_north:.5g} and longitudes {chart_west:.5g} to {chart_east:.5g}"

@@ -24,12 +24,12 @@ class ChartTable(Table):
     geojson: Text | None = Field(default=None, description="the path of a GeoJSON chart, from this file")
     s57: Text | None = Field(
         default=None,
-        description="the path of an S-57 cell, *.000, instead of geojson; update files beside it are read, too",
+        description="the path of an S-57 cell, *.000, instead of geojson; update files in the same folder are applied",
     )
     land_layers: list[Text] = Field(default=["land"], description="the layers of the GeoJSON chart that are land")
     layer_property: Text = Field(default="layer", description="the property that names the layer of a GeoJSON feature")
     depth_layers: dict[str, Number] | None = Field(
-        default=None, description="the GeoJSON layers of water at least so deep [m], e.g. {seabed5m = 5.0}"
+        default=None, description="the GeoJSON layers of water with their least depth [m], e.g. {seabed5m = 5.0}"
     )
     depth_property: Text | None = Field(
         default=None, description="the property that holds the depth of a GeoJSON area [m], instead of depth_layers"
@@ -51,7 +51,7 @@ class BoundsTable(Table):
 
 
 class DepthTable(Table):
-    """`[depth]`: charted depth plus the tide must exceed the draught by what is kept under the keel."""
+    """`[depth]`: charted depth plus tide must be at least draught plus depth under the keel."""
 
     under_keel_m: NonNegative = Field(default=1.0, description="the least depth under the keel [m]")
     tide_m: Number = Field(
@@ -78,5 +78,5 @@ class AreaTable(Table):
     bounds: BoundsTable | None = Field(
         default=None, description="the table [bounds] of the sea area; the extent of the chart when not given"
     )
-    depth: DepthTable = Field(default=DepthTable(), description="the depth that the ship needs besides her draught")
+    depth: DepthTable = Field(default=DepthTable(), description="the depth under the keel and the tide")
     no_go: list[NoGoTable] = Field(default=[], description="the tables [[no_go]] of zones to keep out of")

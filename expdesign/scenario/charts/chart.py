@@ -1,7 +1,7 @@
 """Charts: the polygons of GeoJSON layers in degrees, every one checked.
 
 Harmless flaws are repaired and noted: rings that are not closed, repeated points, rings that touch themselves.
-Whatever would leave open what is land and what is water is refused.
+Polygons that leave it ambiguous where land ends and water begins are refused.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import shapely
 
 from expdesign.errors import InputError
 from expdesign.scenario.charts.geojson import Feature, polygon_rings
+from expdesign.scenario.charts.tuning import TUNING
 from expdesign.scenario.tables import Entry
 from expdesign.values import Array
 
@@ -25,8 +26,6 @@ REPEATED = "repeated points removed"
 CLOSED = "rings closed"
 SPLIT = "polygons that touch themselves taken apart where they touch"
 MOVED = "polygons moved by a full turn: the chart crosses the antimeridian"
-ROUNDING = 1e-13
-"""Area that is no more than rounding, for outlines of about a degree: a tenth of a square decimetre [deg2]."""
 WORDS = {
     "Ring Self-intersection": "crosses itself",
     "Interior is disconnected": "crosses itself",
@@ -42,7 +41,7 @@ class Chart:
 
     Attributes:
         layers: layer name to polygons; they may overlap.
-        notes: what was repaired.
+        notes: on repairs.
     """
 
     layers: Mapping[str, tuple[shapely.Polygon, ...]]
@@ -61,7 +60,7 @@ def read_layers(features: tuple[Feature, ...], names: Iterable[str], *, near_lon
 
     Args:
         features: of one file, as read.
-        names: layers to read; the others are not looked at.
+        names: layers to read; others are ignored.
         near_lon_deg: longitudes are counted within half a turn of it; by default of the first polygon.
 
     Raises:
@@ -147,7 +146,7 @@ def _valid(polygon: shapely.Polygon, entry: Entry, repairs: Counter[str]) -> lis
     mended = shapely.make_valid(polygon, method="structure", keep_collapsed=False)
     parts = [part for part in shapely.get_parts(mended) if part.geom_type == "Polygon"]
     west, south, east, north = polygon.bounds
-    rounding = ROUNDING * max(1.0, polygon.length * max(east - west, north - south) / 100)
+    rounding = TUNING.area_rounding_deg2 * max(1.0, polygon.length * max(east - west, north - south) / 100)
     if sum(part.area for part in parts) <= rounding:
         raise entry.error(f"encloses no area{where}, expected an outline of land or water")
     if abs(sum(part.area for part in parts) - polygon.area) <= rounding:

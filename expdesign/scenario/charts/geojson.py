@@ -1,6 +1,6 @@
-"""GeoJSON files to features and the rings of their polygons; nothing about geometry is judged here.
+"""From GeoJSON files to features and the rings of their polygons; geometry is not checked here.
 
-Source of the format: RFC 7946; which of its properties names the layer of a feature, the caller says.
+Source of the format: RFC 7946; the caller states which property names the layer of a feature.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class Feature:
         entry: the file and the number of the feature in it, from 1.
         layer: name of its layer.
         geometry: the GeoJSON geometry.
-        properties: what else the file says of it.
+        properties: its other properties.
         assumed: the file names no layer at all, so that all is taken to be land.
     """
 

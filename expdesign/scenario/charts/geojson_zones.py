@@ -51,7 +51,7 @@ def _chart_path(chart: ChartTable, entry: Entry) -> Path:
     if chart.depth_layers is not None and not chart.depth_layers:
         raise entry.at("depth_layers").error("is empty, expected layers with their depth, e.g. seabed5m = 5.0")
     if chart.depth_layers is not None and chart.depth_property is not None:
-        raise entry.at("depth_property").error("stands beside depth_layers, expected one of the two")
+        raise entry.at("depth_property").error("is given with depth_layers, expected one of the two")
     return entry.at("geojson").file(chart.geojson or "")
 
 
@@ -114,26 +114,26 @@ def _check_layers(chart: ChartTable, known: list[str], entry: Entry) -> None:
 def _deep_water(
     file: AreaTable, depths: Mapping[str, float], draught_m: float, entry: Entry
 ) -> tuple[list[str] | None, str]:
-    """The layers that are deep enough, or None when depth is not checked, and the sentence that says so."""
-    needed_m, rule = rule_text(file.depth, draught_m)
+    """The layers that are deep enough, or None when depth is not checked, and the rule in one sentence."""
+    needed_m, required = rule_text(file.depth, draught_m)
     if not depths:
         return None, "Depth is not checked: no depth layers are named, all water outside land counts as deep enough."
     deep = sorted((name for name in depths if depths[name] >= needed_m), key=lambda name: depths[name])
     key = file.chart.depth_property
     if not deep:
         deepest = max(depths, key=lambda name: depths[name])
-        found = f"no layer is as deep as {rule}, the deepest is {deepest!r} with {depths[deepest]:g} m"
+        found = f"no layer is as deep as {required}, the deepest is {deepest!r} with {depths[deepest]:g} m"
         raise NoPlan(str(entry.at("depth_property" if key else "depth_layers").error(found)))
     where = f"where {key} is" if key else f"in the layers {', '.join(deep)}:"
-    return deep, f"Allowed water lies {where} at least {depths[deep[0]]:g} m{'' if key else ' deep'} for {rule}."
+    return deep, f"Allowed water lies {where} at least {depths[deep[0]]:g} m{'' if key else ' deep'} for {required}."
 
 
 def _deep_union(
     table: ChartTable, chart: Chart, deep: list[str], depths: Mapping[str, float], box: Box, frame: LocalFrame
 ) -> shapely.Geometry:
-    """Water deep enough: layers mean "at least so deep" and may lie on each other, areas with a depth of their own not.
+    """Water deep enough. Layers state a least depth and may overlap; so may areas with a depth property.
 
-    Where such areas overlap the least depth counts.
+    Where areas with a depth property overlap, the least depth counts.
     """
     water = _layer_union(chart, deep, box, frame)
     shallow = [name for name in depths if name not in deep] if table.depth_property else []
@@ -152,4 +152,4 @@ def _beyond_chart(box: Box, chart: Chart, deep: list[str] | None) -> tuple[str, 
     west, south, east, north = chart.extent
     if deep is not None or (box[0] >= west and box[1] >= south and box[2] <= east and box[3] <= north):
         return ()
-    return ("the bounds reach beyond everything drawn in the chart; what lies there counts as water",)
+    return ("the bounds reach beyond the polygons of the chart; the area outside counts as water",)

@@ -15,7 +15,7 @@ Box = tuple[float, float, float, float]
 
 
 def around(box: Box) -> shapely.Polygon:
-    """The bounds with a margin, so that what is cut off does not touch them."""
+    """The bounds with a margin, so that cut edges do not touch them."""
     west, south, east, north = box
     margin = 0.02 * max(east - west, north - south)
     return shapely.box(west - margin, south - margin, east + margin, north + margin)

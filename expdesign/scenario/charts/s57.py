@@ -1,6 +1,6 @@
 """S-57 cells (electronic navigational charts) to the features that decide where a ship may go, in degrees.
 
-GDAL reads the cell and applies the update files beside it (.001, .002, ...). Whether it did is checked against the
+GDAL reads the cell and applies the update files in its folder (.001, .002, ...). Whether it did is checked against the
 update number that the cell then states; a gap in the chain of updates is refused.
 
 Source: International Hydrographic Organization, S-57 edition 3.1 (2000), appendix A (object catalogue) and B.1 (ENC
@@ -29,7 +29,7 @@ SOLID = (
     *("LNDARE", "SLCONS", "PONTON", "HULKES", "FLODOC", "DRYDOC", "GATCON", "DAMCON", "DYKCON", "CAUSWY", "LOGPON"),
     *("MORFAC", "PILPNT", "OFSPLF", "PYLONS", "BCNCAR", "BCNISD", "BCNLAT", "BCNSAW", "BCNSPP", "MARCUL", "FSHFAC"),
 )
-"""What a hull must not touch whatever the depth: land, works, moored and floating structures, piles, beacons."""
+"""Obstacles at any depth: land, works, moored and floating structures, piles, beacons."""
 BUOYS = ("BOYCAR", "BOYINB", "BOYISD", "BOYLAT", "BOYSAW", "BOYSPP", "LITFLT", "LITVES", "ICEARE", "WEDKLP")
 DANGERS = {"OBSTRN": "VALSOU", "WRECKS": "VALSOU", "UWTROC": "VALSOU", "SOUNDG": "DEPTH"}
 """Dangers and the attribute with their depth; where it is empty they count as at the surface."""
@@ -72,11 +72,11 @@ class Feature57:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Cell:
-    """What a cell says of where a ship may go.
+    """The features of a cell that limit where a ship may go.
 
     Attributes:
         features: of the classes in `DEPTHS`, `SOLID`, `BUOYS`, `DANGERS`, `OVERHEAD`, and restricted areas.
-        notes: edition, updates, datum, scale, and what was repaired.
+        notes: edition, updates, datum, scale, and repairs.
     """
 
     features: tuple[Feature57, ...]
@@ -88,7 +88,7 @@ class Cell:
 
     @property
     def restricted(self) -> tuple[Feature57, ...]:
-        """Areas that a trial keeps out of by rule."""
+        """Areas that are closed by regulation."""
         return tuple(feature for feature in self.features if feature.why)
 
     @property
@@ -102,7 +102,7 @@ def read_cell(path: Path) -> Cell:
     """Read a base cell and its updates.
 
     Args:
-        path: the file `NAME.000`; its updates `NAME.001`, ... lie beside it.
+        path: the file `NAME.000`, in one folder with its updates `NAME.001`, ...
 
     Raises:
         FileError: no S-57 cell, not in WGS84 and metres, an update is missing or did not apply, or no depths in it.
@@ -122,7 +122,7 @@ def read_cell(path: Path) -> Cell:
 
 
 def _updates(path: Path, entry: Entry) -> int:
-    """The number of update files beside the cell."""
+    """The number of update files of the cell."""
     numbers = sorted(
         int(other.suffix[1:])
         for other in path.parent.glob(f"{path.stem}.[0-9][0-9][0-9]")
@@ -131,8 +131,8 @@ def _updates(path: Path, entry: Entry) -> int:
     for expected, number in enumerate(numbers, start=1):
         if number != expected:
             raise entry.error(
-                f"has the update {path.stem}.{number:03d} beside it but not {path.stem}.{expected:03d}, expected all "
-                "updates up to the newest, or none"
+                f"has the update {path.stem}.{number:03d} but not {path.stem}.{expected:03d} in its folder, expected "
+                "all updates up to the newest, or none"
             )
     return len(numbers)
 
@@ -186,7 +186,7 @@ def _features(path: Path, layer: str, repaired: list[str]) -> Iterator[Feature57
 
 
 def _keep_out(codes: Any) -> str:
-    """Why a trial keeps out, from the list of restrictions of an area, or ""."""
+    """The reason to keep out, from the list of restrictions of an area, or ""."""
     given = codes if isinstance(codes, Iterable) and not isinstance(codes, str) else str(codes or "").split(",")
     return ", ".join(KEEP_OUT[str(code)] for code in given if str(code) in KEEP_OUT)
 
@@ -194,10 +194,10 @@ def _keep_out(codes: Any) -> str:
 def _notes(header: dict[str, Any], updates: int, entry: Entry) -> tuple[str, ...]:
     edition, update, issued = header["DSID_EDTN"], int(header["DSID_UPDN"]), header["DSID_ISDT"]
     if update < updates:
-        raise entry.error(f"has {updates} updates beside it of which {update} apply, expected all to apply")
-    state = f"updates 1 to {update} applied" if updates else "no updates lie beside the cell, so none are applied"
+        raise entry.error(f"has {updates} updates in its folder of which {update} apply, expected all to apply")
+    state = f"updates 1 to {update} applied" if updates else "no updates in its folder, so none are applied"
     if update and not updates:
-        state = f"issued with updates up to {update}, none lie beside the cell"
+        state = f"issued with updates up to {update}, none in its folder"
     datum = DATUMS.get(int(header["DSPM_SDAT"]), f"datum {header['DSPM_SDAT']}")
     return (
         f"edition {edition}, {state}, issued {issued[:4]}-{issued[4:6]}-{issued[6:]}, scale 1:{header['DSPM_CSCL']}",

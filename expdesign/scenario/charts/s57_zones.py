@@ -1,7 +1,7 @@
-"""Which water of an S-57 cell a ship may use: deep enough, clear of everything solid, of dangers and of rules.
+"""Allowed water of an S-57 cell: deep enough, clear of solid objects, dangers and restricted areas.
 
-Unknown depths count as too shallow, dangers without a stated depth as at the surface, bridges and cables of unknown
-height, or when the vessel's air draught is not given, as closed.
+Unknown depths count as too shallow, dangers without a stated depth as at the surface. Bridges and cables are closed if
+their height or the vessel's air draught is unknown.
 """
 
 from __future__ import annotations
@@ -17,23 +17,22 @@ from expdesign.errors import NoPlan
 from expdesign.scenario.charts.area_tables import AreaTable
 from expdesign.scenario.charts.metres import Box, around, in_metres
 from expdesign.scenario.charts.s57 import BUOYS, DANGERS, DEPTHS, OVERHEAD, SOLID, Cell, Feature57, read_cell
+from expdesign.scenario.charts.tuning import TUNING
 from expdesign.scenario.charts.zones import ChartZones, OpenChart, rule_text
 from expdesign.scenario.tables import Entry
 from expdesign.sea_area import LocalFrame
 
 GEOJSON_ONLY = ("land_layers", "layer_property", "depth_layers", "depth_property")
-THIN_M = 1.0
-"""Half the width given to walls and pontoons drawn as lines."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class CellRules:
-    """What the ship needs.
+    """Requirements of the ship.
 
     Attributes:
-        needed_m: charted depth, the tide already taken off [m].
-        margin_m: kept from charted points of danger [m].
-        air_draught_m: height above water, or None when nothing overhead may be passed [m].
+        needed_m: least charted depth, with the tide subtracted [m].
+        margin_m: least distance from charted points of danger [m].
+        air_draught_m: height above water [m], or None to close all bridges and cables.
     """
 
     needed_m: float
@@ -44,20 +43,22 @@ class CellRules:
 def open_cell(file: AreaTable, *, draught_m: float, entry: Entry) -> OpenChart:
     """The cell that an area file names with `chart.s57`."""
     for name in [name for name in GEOJSON_ONLY if name in file.chart.model_fields_set]:
-        raise entry.at(name).error("stands beside s57, expected it with geojson only: a cell knows its own layers")
+        raise entry.at(name).error("is given with s57, expected it with geojson only: a cell has its own layers")
     path = entry.at("s57").file(file.chart.s57 or "")
     cell = read_cell(path)
-    needed_m, rule = rule_text(file.depth, draught_m)
+    needed_m, required = rule_text(file.depth, draught_m)
     rules = CellRules(needed_m=needed_m, margin_m=file.chart.hazard_margin_m, air_draught_m=file.chart.air_draught_m)
 
     def zones(box: Box, frame: LocalFrame) -> ChartZones:
         found = cell_zones(cell, rules, box, frame)
         if found.deep is None or found.deep.is_empty:
             deepest = max((depth for depth, _ in found.depths), default=float("nan"))
-            raise NoPlan(str(entry.at("s57").error(f"no charted depth reaches {rule}, the deepest is {deepest:g} m")))
+            raise NoPlan(
+                str(entry.at("s57").error(f"no charted depth reaches {required}, the deepest is {deepest:g} m"))
+            )
         return replace(
             found,
-            depth_rule=f"Allowed water lies in charted areas at least {needed_m:g} m deep: {rule}.",
+            depth_rule=f"Allowed water lies in charted areas at least {needed_m:g} m deep: {required}.",
             notes=tuple(f"{path.name}: {note}" for note in (*cell.notes, *found.notes)),
         )
 
@@ -76,8 +77,8 @@ def cell_zones(cell: Cell, rules: CellRules, box: Box, frame: LocalFrame) -> Cha
     closed = {
         f"dangers less than {rules.needed_m:g} m deep or of unknown depth": (dangers, rules.margin_m),
         "buoys": (cell.of(*BUOYS), rules.margin_m),
-        "bridges, cables and pipes overhead" + _height(rules.air_draught_m): (overhead, THIN_M),
-        "restricted areas": (cell.restricted, THIN_M),
+        "bridges, cables and pipes overhead" + _height(rules.air_draught_m): (overhead, TUNING.wall_half_width_m),
+        "restricted areas": (cell.restricted, TUNING.wall_half_width_m),
     }
     found = {
         what: [feature for feature in features if feature.geometry.intersects(window)]
@@ -112,7 +113,7 @@ def _united(
     """The union in metres: points with a margin around them, lines as thin walls, areas as they are."""
     cut = [item.geometry.intersection(window) for item in features if item.geometry.intersects(window)]
     metres = [in_metres(geometry, frame) for geometry in cut]
-    widths = np.array([(margin_m, THIN_M, 0.0)[shapely.get_dimensions(item)] for item in metres])
+    widths = np.array([(margin_m, TUNING.wall_half_width_m, 0.0)[shapely.get_dimensions(item)] for item in metres])
     grown = shapely.buffer(metres, widths, quad_segs=8) if metres else []
     return shapely.union_all([item for item in grown if not item.is_empty])
 

@@ -1,4 +1,4 @@
-"""What any chart gives: the zones that allowed water is made of."""
+"""The zones of a chart, from which allowed water is built."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ class ChartZones:
     """Polygons (east_m, north_m) of a chart inside bounds.
 
     Attributes:
-        land: solid things.
+        land: land and solid structures.
         deep: deep enough, or None when depth is not checked.
-        closed: kept out of for other reasons.
+        closed: forbidden for other reasons.
         depths: (least depth [m], polygons), for drawing.
-        depth_rule: one sentence on how depth was taken into account.
-        notes: what was repaired, assumed or closed.
+        depth_rule: the rule for depth, in one sentence.
+        notes: on repairs, assumptions and closed areas.
     """
 
     land: shapely.Geometry
@@ -36,11 +36,11 @@ class ChartZones:
 
 @dataclass(frozen=True, kw_only=True)
 class OpenChart:
-    """A chart that was read.
+    """An open chart.
 
     Attributes:
         path: its file.
-        extent: west, south, east, north of what is drawn in it [deg].
+        extent: west, south, east, north of its polygons [deg].
         zones: bounds and frame -> zones.
     """
 
@@ -50,7 +50,7 @@ class OpenChart:
 
 
 def rule_text(depth: DepthTable, draught_m: float) -> tuple[float, str]:
-    """The charted depth that is needed, and the sum that says why."""
+    """The required charted depth [m], and its calculation in words."""
     needed_m = draught_m + depth.under_keel_m - depth.tide_m
     tide = f" - {depth.tide_m:g} m tide" if depth.tide_m else ""
     return needed_m, f"{draught_m:g} m draught + {depth.under_keel_m:g} m under the keel{tide} = {needed_m:g} m"

@@ -30,7 +30,7 @@ class NameTable(Table):
 
 
 class PrimitiveTable(Table):
-    """What `[[primitives]]` has besides the settings of its family."""
+    """Keys of `[[primitives]]` in addition to the settings of the family."""
 
     family: Text = Field(description="the manoeuvre family, see expdesign explain families")
     name: Text | None = Field(
@@ -57,7 +57,7 @@ def load_dictionary(path: Path | str, *, families: tuple[Family, ...] = FAMILIES
     Each `[[primitives]]` names a family and gives its settings; one with lists of values stands for every combination,
     in the order of the file, the last list running fastest. Names are given by `name` or else by the family (with -2,
     -3 ... for further entries of the same family); a grid adds `-setting-value`, without the unit, for every list.
-    `family = "recorded"` takes `file`, the path of a CSV of commands beside this file, instead of a duration.
+    `family = "recorded"` takes `file`, the path of a CSV of commands relative to this file, instead of a duration.
 
     Args:
         path: a TOML file with `[dictionary]` and `[[primitives]]`.
@@ -112,7 +112,7 @@ def _recorded(row: Mapping[str, Any], family: Family, stem: str, entry: Entry) -
         found = "is missing" if named is None else f"is {shown(named)}"
         raise entry.at("file").error(f"{found}, expected {PrimitiveTable.model_fields['file'].description}")
     if "duration_s" in row:
-        raise entry.at("duration_s").error("is given, but the file of a recorded primitive tells how long it lasts")
+        raise entry.at("duration_s").error("is given, but the duration of a recorded primitive is that of its file")
     commands, begins = load_recorded(entry.at("file").file(named))
     rest = {name: value for name, value in row.items() if name != "file"}
     for name in rest:

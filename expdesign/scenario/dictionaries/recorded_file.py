@@ -23,7 +23,7 @@ SPREAD = 1e-3
 
 
 def load_recorded(path: Path | str) -> tuple[Commands, dict[str, float]]:
-    """Commands of a file, and the velocity they start from where the file tells it.
+    """Commands of a file, and the entry velocity where the file has it.
 
     Args:
         path: a CSV with `time_s` in even steps and one column for each actuator signal, named as in commands.csv

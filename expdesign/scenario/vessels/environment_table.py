@@ -1,4 +1,4 @@
-"""`[environment]` of scenario and vessel files: the current and wind to expect."""
+"""`[environment]` of scenario and vessel files: expected current and wind."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ CURRENT_LIMIT_MPS = 15.0
 
 
 class FlowTable(Table):
-    """How well a mean velocity is known and how it varies around the trial's mean."""
+    """Uncertainty of a mean velocity, and its variation around the trial's mean."""
 
     std_mps: NonNegative = Field(
         default=0.0, description="the standard deviation of each component of a trial's mean [m/s]"
@@ -63,7 +63,7 @@ class EnvironmentTable(Table):
         default=WindTable(north_mps=0.0, east_mps=0.0), description="the wind, by where the air moves to"
     )
     sea_state: int | None = Field(
-        default=None, ge=0, le=9, description="the WMO code of the sea state, for the report to judge"
+        default=None, ge=0, le=9, description="the WMO code of the sea state, which the report compares with limits"
     )
 
 

@@ -118,9 +118,9 @@ def _check_place(table: ActuatorTable, ship: ParticularsTable, entry: Entry) -> 
 
 
 def _check_force_alone(kinds: list[str], entry: Entry) -> None:
-    """Generalised forces are the sum over all thrusters: no thruster can stand beside them."""
+    """Generalised forces are the sum over all thrusters: no other thruster is allowed."""
     if "force" in kinds and sum(kind != "rudder" for kind in kinds) > 1:
-        raise entry.item(kinds.index("force") + 1).at("kind").error("is 'force', expected no other thruster beside it")
+        raise entry.item(kinds.index("force") + 1).at("kind").error("is 'force', expected no other thruster")
 
 
 def _limit(table: ActuatorTable, keys: tuple[str, str, str], entry: Entry) -> Limit:

@@ -26,7 +26,7 @@ class ParticularsTable(Table):
 
 
 class ActuatorTable(Table):
-    """What every entry of `[[actuators]]` has."""
+    """Keys of every entry of `[[actuators]]`."""
 
     topic = "vessel"
 
@@ -52,7 +52,7 @@ class PropellerTable(ActuatorTable):
     )
     speed_delay_s: NonNegative = Field(default=0.0, description="the dead time of the propeller speed [s]")
     speed_deadband_rps: NonNegative = Field(
-        default=0.0, description="the size of commanded speeds below which nothing happens [rps]"
+        default=0.0, description="the dead band: smaller commanded speeds have no effect [rps]"
     )
 
 
@@ -69,7 +69,7 @@ class AzimuthTable(PropellerTable):
     angle_lag_s: NonNegative = Field(default=0.0, description="the time constant with which the angle follows [s]")
     angle_delay_s: NonNegative = Field(default=0.0, description="the dead time of the angle [s]")
     angle_deadband_rad: NonNegative = Field(
-        default=0.0, description="the size of commanded angles below which nothing happens [rad]"
+        default=0.0, description="the dead band: smaller commanded angles have no effect [rad]"
     )
     angle_offset_rad: HalfTurn = Field(
         default=0.0, description="the misalignment [rad]: the true angle less the commanded one"
@@ -77,7 +77,7 @@ class AzimuthTable(PropellerTable):
 
 
 class PoddedTable(AzimuthTable):
-    """A podded drive: an azimuth thruster that turns only so far."""
+    """A podded drive: an azimuth thruster with angle limits."""
 
     angle_min_rad: TwoTurns = Field(description="the lowest angle [rad]")
     angle_max_rad: TwoTurns = Field(description="the highest angle [rad]")
@@ -94,7 +94,7 @@ class RudderTable(ActuatorTable):
     angle_lag_s: NonNegative = Field(default=0.0, description="the time constant with which the angle follows [s]")
     angle_delay_s: NonNegative = Field(default=0.0, description="the dead time of the angle [s]")
     angle_deadband_rad: NonNegative = Field(
-        default=0.0, description="the size of commanded angles below which nothing happens [rad]"
+        default=0.0, description="the dead band: smaller commanded angles have no effect [rad]"
     )
     angle_offset_rad: HalfTurn = Field(
         default=0.0, description="the misalignment [rad]: the true angle less the commanded one"
@@ -111,7 +111,7 @@ class ForceTable(ActuatorTable):
     )
     x_lag_s: NonNegative = Field(default=0.0, description="the time constant with which tau_x follows [s]")
     x_delay_s: NonNegative = Field(default=0.0, description="the dead time of tau_x [s]")
-    x_deadband: NonNegative = Field(default=0.0, description="the size of tau_x below which nothing happens")
+    x_deadband: NonNegative = Field(default=0.0, description="the dead band: smaller tau_x have no effect")
     y_min: Number = Field(description="the lowest tau_y, the sway force in the model's unit")
     y_max: Number = Field(description="the highest tau_y")
     y_rate: Positive | None = Field(
@@ -119,7 +119,7 @@ class ForceTable(ActuatorTable):
     )
     y_lag_s: NonNegative = Field(default=0.0, description="the time constant with which tau_y follows [s]")
     y_delay_s: NonNegative = Field(default=0.0, description="the dead time of tau_y [s]")
-    y_deadband: NonNegative = Field(default=0.0, description="the size of tau_y below which nothing happens")
+    y_deadband: NonNegative = Field(default=0.0, description="the dead band: smaller tau_y have no effect")
     psi_min: Number = Field(description="the lowest tau_psi, the yaw moment in the model's unit")
     psi_max: Number = Field(description="the highest tau_psi")
     psi_rate: Positive | None = Field(
@@ -127,7 +127,7 @@ class ForceTable(ActuatorTable):
     )
     psi_lag_s: NonNegative = Field(default=0.0, description="the time constant with which tau_psi follows [s]")
     psi_delay_s: NonNegative = Field(default=0.0, description="the dead time of tau_psi [s]")
-    psi_deadband: NonNegative = Field(default=0.0, description="the size of tau_psi below which nothing happens")
+    psi_deadband: NonNegative = Field(default=0.0, description="the dead band: smaller tau_psi have no effect")
 
 
 class TermTable(Table):
@@ -142,7 +142,7 @@ class TermTable(Table):
 
 
 class RollTable(Table):
-    """`[model.roll]`: an oscillation in sway and yaw beside what the terms say."""
+    """`[model.roll]`: an oscillation in sway and yaw in addition to the terms."""
 
     period_s: Positive = Field(description="the period of roll [s]")
     damping_ratio: NonNegative = Field(description="the damping ratio of roll")

@@ -162,7 +162,7 @@ class Minutes:
     wind: float
 
 
-def minutes_for_the_same(wish: GrowSettings) -> tuple[tuple[Minutes, ...], dict[str, Growth]]:
+def minutes_for_the_same(options: GrowSettings) -> tuple[tuple[Minutes, ...], dict[str, Growth]]:
     """The 30 m ship's standard trials against designed ones, in wind, for all parameters of its model.
 
     First the set itself, then its trials with the time shared out optimally, the optimal design of the ship's
@@ -183,7 +183,7 @@ def minutes_for_the_same(wish: GrowSettings) -> tuple[tuple[Minutes, ...], dict[
         return Minutes(name=name, same=same, no_worse=hull, wind=air)
 
     growths = {
-        name: grow_dictionary(ship, trials, settings=replace(wish, free_form=free, run_s=RUN_S), environment=WIND)
+        name: grow_dictionary(ship, trials, settings=replace(options, free_form=free, run_s=RUN_S), environment=WIND)
         for name, free in (("families", False), ("free form", True))
     }
     specs = load_dictionary(SCENARIOS / "dictionaries" / "standard.toml")
@@ -249,26 +249,28 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--part", choices=("ship", "trials", "both"), default="both")
     chosen = parser.parse_args(arguments)
     console = Console(highlight=False, markup=False, soft_wrap=True)
-    wish = GrowSettings(rounds=chosen.rounds, pool=chosen.pool, seed=chosen.seed)
+    options = GrowSettings(rounds=chosen.rounds, pool=chosen.pool, seed=chosen.seed)
     if chosen.part != "trials":
-        console.print(_ship_part(wish, chosen.runs))
+        console.print(_ship_part(options, chosen.runs))
     if chosen.part != "ship":
-        console.print(_trials_part(wish))
+        console.print(_trials_part(options))
 
 
-def _ship_part(wish: GrowSettings, runs: int) -> str:
+def _ship_part(options: GrowSettings, runs: int) -> str:
     cases = (
-        ("families", wish, False),
-        ("families + free form", replace(wish, free_form=True), False),
-        ("families, same forces", wish, True),
+        ("families", options, False),
+        ("families + free form", replace(options, free_form=True), False),
+        ("families, same forces", options, True),
     )
-    found = [compare(name, settings, runs=runs, seed=wish.seed or 0, narrow=narrow) for name, settings, narrow in cases]
+    found = [
+        compare(name, settings, runs=runs, seed=options.seed or 0, narrow=narrow) for name, settings, narrow in cases
+    ]
     parts = [f"tau1 to tau11 grown by {item.name}\n{growth_table(item.growth)}" for item in found]
     return "\n\n".join([*parts, comparison_table(found, model_ship()[0].model.names), ""])
 
 
-def _trials_part(wish: GrowSettings) -> str:
-    minutes, growths = minutes_for_the_same(wish)
+def _trials_part(options: GrowSettings) -> str:
+    minutes, growths = minutes_for_the_same(options)
     parts = [
         f"Standard trials of the 30 m ship grown by {name}\n{growth_table(item)}" for name, item in growths.items()
     ]

@@ -118,7 +118,8 @@ def fitted_vessel(case: Case, record: Record, *, wind: bool) -> Vessel:
     )
     ship = replace(ship, model=still, sample_time_s=PACE_S)
     return replace(
-        ship, model=assess(ship, record, EstimateOptions(methods=("ls-air" if wind else "ls",), mean="none")).best.model
+        ship,
+        model=assess(ship, record, EstimateOptions(methods=("ls-air" if wind else "ls",), mean="none")).best.model,
     )
 
 

@@ -18,7 +18,7 @@ ACCELERATION = Family(
     name="acceleration",
     summary="from a lower to a higher surge speed on a straight course",
     settings=(
-        Setting(name="duration_s", meaning="length of one run", low=1e-3, high=1e5),
+        Setting(name="duration_s", meaning="duration of one run", low=1e-3, high=1e5),
         Setting(name="speed_mps", meaning="surge speed reached", low=-50, high=50, searched="surge"),
         Setting(
             name="from_speed_mps", meaning="surge speed at the start", default=0.0, low=-50, high=50, searched="surge"

@@ -18,7 +18,7 @@ DECELERATION = Family(
     name="deceleration",
     summary="from a surge speed down to a lower one, or to rest, on a straight course",
     settings=(
-        Setting(name="duration_s", meaning="length of one run", low=1e-3, high=1e5),
+        Setting(name="duration_s", meaning="duration of one run", low=1e-3, high=1e5),
         Setting(name="speed_mps", meaning="surge speed at the start", low=-50, high=50, searched="surge"),
         Setting(name="to_speed_mps", meaning="surge speed reached", default=0.0, low=-50, high=50, searched="surge"),
         Setting(

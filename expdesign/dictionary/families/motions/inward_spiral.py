@@ -21,7 +21,7 @@ INWARD_SPIRAL = Family(
     name="inward_spiral",
     summary="steady surge and sway while the yaw rate grows from zero, so the turn tightens",
     settings=(
-        Setting(name="duration_s", meaning="length of one run", low=1e-3, high=1e5),
+        Setting(name="duration_s", meaning="duration of one run", low=1e-3, high=1e5),
         Setting(name="speed_mps", meaning="surge speed", low=-50, high=50, searched="surge"),
         Setting(
             name="yaw_rate_radps", meaning="yaw rate at the end, positive to starboard", low=-5, high=5, searched="yaw"

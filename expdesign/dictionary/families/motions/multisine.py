@@ -39,7 +39,7 @@ MULTISINE = Family(
     name="multisine",
     summary="multisines in surge speed, sway speed and yaw rate, with four different frequencies each",
     settings=(
-        Setting(name="duration_s", meaning="length of one run, best a whole number of periods", low=1e-3, high=1e5),
+        Setting(name="duration_s", meaning="duration of one run, best a whole number of periods", low=1e-3, high=1e5),
         Setting(name="period_s", meaning="common period of all sines", low=1e-2, high=1e5, searched="time"),
         Setting(name="speed_mps", meaning="mean surge speed", low=-50, high=50, searched="surge"),
         Setting(

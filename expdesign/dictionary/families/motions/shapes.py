@@ -1,4 +1,4 @@
-"""Smooth pieces that references are made of: actuators have rates, so nothing jumps."""
+"""Smooth shapes of reference motions: without jumps, because actuators have rate limits."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from expdesign.errors import InputError
 from expdesign.values import Array
 
 LEAST_SWING = 0.5
-"""A wave that does not reach this far to both sides before it is brought to amplitude 1 is not the wave asked for."""
+"""Least amplitude to both sides of a wave before it is scaled to amplitude 1."""
 
 
 def ramp(time_s: Array, *, start_s: float = 0.0, length_s: float) -> Array:
@@ -25,8 +25,8 @@ def envelope(time_s: Array, *, length_s: float) -> Array:
 def flat_wave(time_s: Array, *, period_s: float) -> Array:
     """A rounded square wave of amplitude 1 that begins and ends at zero and has zero mean.
 
-    It starts in the middle of a plateau, so what it is the rate of (heading, sideways distance) swings evenly to both
-    sides and comes back.
+    It starts in the middle of a plateau, so that its integral (heading, sideways distance) swings evenly to both sides
+    and returns.
 
     Raises:
         InputError: the samples hold no swing of that period.

@@ -1,4 +1,4 @@
-"""Sway step: sideways motion that sets in, stays and goes again, on a steady heading."""
+"""Sway step: sideways motion that starts, stays and ends, on a steady heading."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ SWAY_STEP = Family(
     name="sway_step",
     summary="a step of sway speed on a steady heading, and back",
     settings=(
-        Setting(name="duration_s", meaning="length of one run", low=1e-3, high=1e5),
+        Setting(name="duration_s", meaning="duration of one run", low=1e-3, high=1e5),
         Setting(name="sway_mps", meaning="sway speed, positive to starboard", low=-20, high=20, searched="sway"),
         Setting(name="rise_s", meaning="time that a step takes", low=1e-2, high=1e4, searched="time"),
         Setting(name="speed_mps", meaning="surge speed", default=0.0, low=-50, high=50, searched="surge"),
         Setting(
             name="held_fraction",
-            meaning="share of the run after which sway goes back",
+            meaning="share of the run after which the sway returns to zero",
             default=0.6,
             low=0.05,
             high=1,

@@ -21,7 +21,7 @@ SWAY_ZIGZAG = Family(
     name="sway_zigzag",
     summary="alternating sideways motion on a steady heading, with or without headway",
     settings=(
-        Setting(name="duration_s", meaning="length of one run, best a whole number of periods", low=1e-3, high=1e5),
+        Setting(name="duration_s", meaning="duration of one run, best a whole number of periods", low=1e-3, high=1e5),
         Setting(
             name="sway_mps",
             meaning="largest sway speed; the first push is to starboard",

@@ -23,7 +23,7 @@ ZIGZAG = Family(
     name="zigzag",
     summary="alternating turns at a steady surge speed, drifting outwards; without offsets the heading returns",
     settings=(
-        Setting(name="duration_s", meaning="length of one run, best a whole number of periods", low=1e-3, high=1e5),
+        Setting(name="duration_s", meaning="duration of one run, best a whole number of periods", low=1e-3, high=1e5),
         Setting(name="speed_mps", meaning="surge speed", low=-50, high=50, searched="surge"),
         Setting(
             name="yaw_rate_radps",

@@ -1,4 +1,4 @@
-"""Engine and helm orders of a vessel on a steady straight approach: what command-type families are made of."""
+"""Engine and helm orders from a steady straight approach, for families defined by commands."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from expdesign.simulation.helm import Approach, steady_ahead
 from expdesign.values import Array
 from expdesign.vessel import Vessel
 
-DURATION = Setting(name="duration_s", meaning="length of one run", low=1e-3, high=1e5)
+DURATION = Setting(name="duration_s", meaning="duration of one run", low=1e-3, high=1e5)
 APPROACH = Setting(name="speed_mps", meaning="approach speed, more than 0", low=1e-6, high=50, searched="surge")
 HALF_TURN = np.pi / 2
 
 
 def helm_setting(meaning: str, *, default: float | None = None) -> Setting:
-    """A helm angle; positive turns to starboard, whatever the sign of the actuator's own angle."""
+    """A helm angle; positive turns to starboard, independent of the sign of the actuator's angle."""
     return Setting(name="helm_rad", meaning=meaning, default=default, low=-HALF_TURN, high=HALF_TURN, searched="helm")
 
 
@@ -32,7 +32,7 @@ def steered(approach: Approach) -> Approach:
     """The same approach.
 
     Raises:
-        InputError: its helm does not turn the vessel.
+        InputError: the helm does not turn the vessel.
     """
     if not approach.starboard:
         raise InputError(
@@ -58,7 +58,7 @@ def ordered(approach: Approach, drive: Array, helm_rad: Array) -> Excitation:
 def helm_family(
     helm: Callable[[PrimitiveSpec, Array], Array],
 ) -> Callable[[Vessel, PrimitiveSpec], Excitation]:
-    """Orders that leave the engine alone and put the helm to `helm`(request, time_s (k,)) -> (k,) rad."""
+    """Orders with the approach's engine order and the helm `helm`(request, time_s (k,)) -> (k,) rad."""
 
     def orders(vessel: Vessel, request: PrimitiveSpec) -> Excitation:
         approach = steered(steady_ahead(vessel, request.settings["speed_mps"]))

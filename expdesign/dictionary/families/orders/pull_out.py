@@ -1,4 +1,4 @@
-"""Pull-out: a turn, then helm amidships; how the yaw rate dies out tells whether the ship is stable on course.
+"""Pull-out: a turn, then helm amidships; the decay of the yaw rate shows whether the ship is stable on course.
 
 Source: ITTC Recommended Procedure 7.5-04-02-01 (2017).
 """

@@ -33,7 +33,7 @@ RECORDED = Family(
     name="recorded",
     summary="commands read from a CSV file, recorded or made by hand",
     settings=(
-        Setting(name="duration_s", meaning="length of one run, as the file has it", low=1e-3, high=1e5),
+        Setting(name="duration_s", meaning="duration of one run, that of the file", low=1e-3, high=1e5),
         Setting(name="speed_mps", meaning="surge speed at the start", default=0.0, low=-50, high=50),
         Setting(name="sway_mps", meaning="sway speed at the start", default=0.0, low=-20, high=20),
         Setting(name="yaw_rate_radps", meaning="yaw rate at the start", default=0.0, low=-5, high=5),

@@ -28,7 +28,7 @@ def _orders(vessel: Vessel, request: PrimitiveSpec) -> Excitation:
 
 ZIGZAG_HEADING = Family(
     name="zigzag_heading",
-    summary="helm to one side until the heading has changed so far, then to the other, and so on",
+    summary="helm to one side until the heading has changed by a given angle, then to the other, and so on",
     settings=(
         DURATION,
         APPROACH,

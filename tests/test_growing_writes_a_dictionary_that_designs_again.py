@@ -1,4 +1,4 @@
-"""The grown dictionary is written as a file that gives the same design again; wrong wishes name file and key."""
+"""The grown dictionary is written as a file that gives the same design again; wrong settings name file and key."""
 
 import json
 from pathlib import Path
@@ -50,15 +50,15 @@ def test_the_written_dictionary_gives_the_same_design_without_searching(grown, t
     assert "manoeuvres_added" not in again.summary
 
 
-def test_every_addition_is_told_with_what_it_brings(grown):
+def test_every_addition_is_reported_with_its_gain(grown):
     folder, outcome = grown
-    told = json.loads((folder / "growth.json").read_text())
+    growth = json.loads((folder / "growth.json").read_text())
     (table,) = (item for item in outcome.tables if item.title.startswith("Manoeuvres added"))
-    assert len(table.rows) == len(told["rounds"]) == outcome.summary["manoeuvres_added"] > 0
+    assert len(table.rows) == len(growth["rounds"]) == outcome.summary["manoeuvres_added"] > 0
     names = [spec.name for spec in load_dictionary(folder / "dictionary-grown.toml")]
-    assert [row["name"] for row in told["rounds"]] == names[-len(table.rows) :]
-    assert told["limits"]["v_mps"] == [-0.15, 0.2]
-    assert all(row["sensitivity_before"] > told["dimension"] for row in told["rounds"])
+    assert [row["name"] for row in growth["rounds"]] == names[-len(table.rows) :]
+    assert growth["limits"]["v_mps"] == [-0.15, 0.2]
+    assert all(row["sensitivity_before"] > growth["dimension"] for row in growth["rounds"])
 
 
 def test_recorded_additions_lie_beside_the_dictionary(grown):
@@ -92,7 +92,7 @@ def test_trials_are_rehearsed_with_the_design_that_a_run_makes(grown):
         ("round = 3", "design.grow.round: is not a known key, did you mean 'rounds'"),
     ],
 )
-def test_wishes_that_make_no_sense_are_refused_with_file_and_key(grow: str, says: str, tmp_path: Path):
+def test_wrong_settings_are_refused_with_file_and_key(grow: str, says: str, tmp_path: Path):
     dictionary = SCENARIOS / "dictionaries" / "model-ship.toml"
     path = scenario(tmp_path, dictionary=dictionary, grow=f"\n[design.grow]\n{grow}\n")
     with pytest.raises(FileError) as caught:

@@ -84,7 +84,7 @@ def test_repeats_are_the_same_as_parts_written_out():
         assert np.allclose(expected_covariance(QUIET, twice, NAMES, mean_subtraction=mean), written_out, rtol=1e-9)
 
 
-def test_what_nothing_excites_is_named():
+def test_parameters_without_excitation_are_named():
     straight = trial_parts(PRIMITIVES, (1,) + (0,) * 10)
     with pytest.raises(NotInformative, match="Y_v"):
         expected_covariance(QUIET, straight, NAMES, mean_subtraction="none")
@@ -151,7 +151,7 @@ def test_eighteen_parameters_in_measured_wind_are_as_uncertain_as_predicted(tria
     assert (np.abs(result.bias) < (0.1 + 3.3 / np.sqrt(trials)) * result.found).all()
 
 
-def test_headings_of_a_trial_are_spread_evenly_whatever_part_of_it_one_looks_at():
+def test_headings_of_any_consecutive_runs_are_spread_evenly():
     headings = np.array([heading_rad(number) for number in range(60)])
     for first in range(0, 50, 7):
         part = np.exp(1j * headings[first : first + 8])

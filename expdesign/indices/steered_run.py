@@ -1,4 +1,4 @@
-"""A run of a steered ship as the indices see it: motion between samples, helm, engine order."""
+"""A run of a steered ship: motion between samples, helm, engine order."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Curve = Callable[[float], float]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Watched:
+class SteeredRun:
     """Motion and orders of one run; between samples positions and heading are cubics that fit the velocities.
 
     Attributes:
@@ -97,10 +97,12 @@ def crossing(curve: Curve, low: float, high: float) -> float:
     return float(brentq(curve, low, high, xtol=1e-9))
 
 
-def watched(vessel: Vessel, commands: Commands, motion: Trajectory, *, name: str, thrusters: str = "stern") -> Watched:
-    """A simulated trial as the indices see it; the mean command of a sample belongs to its middle."""
+def steered_run(
+    vessel: Vessel, commands: Commands, motion: Trajectory, *, name: str, thrusters: str = "stern"
+) -> SteeredRun:
+    """A simulated trial; the mean command of a sample belongs to its middle."""
     helm = Helm(vessel=vessel, thrusters=thrusters)
-    return Watched(
+    return SteeredRun(
         name=name,
         length_m=vessel.length_m,
         time_s=motion.time_s,
@@ -112,7 +114,7 @@ def watched(vessel: Vessel, commands: Commands, motion: Trajectory, *, name: str
 
 
 def orders(helm: Helm, names: tuple[str, ...], values: Array) -> dict[str, Array]:
-    """`helm_rad` and `drive` (k,) of recorded actuator signals (k, m); zero where nothing tells."""
+    """`helm_rad` and `drive` (k,) of recorded actuator signals (k, m); zero without such signals."""
     column = {name: values[:, index] for index, name in enumerate(names)}
     thrust = [column[a.signals[0]] for a in helm.vessel.actuators if KINDS[a.kind][0] == "n" and a.signals[0] in column]
     if "tau_x" in column:
@@ -120,8 +122,8 @@ def orders(helm: Helm, names: tuple[str, ...], values: Array) -> dict[str, Array
     turned = [column[a.signals[-1]] for a in helm.steering if a.kind != "force" and a.signals[-1] in column]
     if not turned and {"tau_x", "tau_y"} <= column.keys():
         turned = [np.arctan2(column["tau_y"], np.abs(column["tau_x"]))]
-    nothing = np.zeros(len(values))
+    zero = np.zeros(len(values))
     return {
-        "helm_rad": np.mean(turned, axis=0) if turned else nothing,
-        "drive": np.mean(thrust, axis=0) if thrust else nothing,
+        "helm_rad": np.mean(turned, axis=0) if turned else zero,
+        "drive": np.mean(thrust, axis=0) if thrust else zero,
     }

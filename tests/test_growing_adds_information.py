@@ -1,4 +1,4 @@
-"""A grown dictionary keeps to its limits, gains what its certificate allows, and says what its search guarantees."""
+"""A grown dictionary satisfies its limits, gains as much as certified, and bounds the sensitivities that were found."""
 
 from dataclasses import replace
 from functools import cache
@@ -107,9 +107,9 @@ def test_freely_optimised_commands_tell_more_than_the_candidate_they_began_as_an
 
 def test_the_same_seed_grows_the_same_and_another_seed_looks_elsewhere():
     ship, information = vessel("model-ship"), scored_example("model-ship")
-    wish = replace(SMALL, rounds=1, pool=8)
+    given = replace(SMALL, rounds=1, pool=8)
     first, again, other = (
-        grow_dictionary(ship, information, settings=replace(wish, seed=seed)).rounds[0].settings for seed in (1, 1, 2)
+        grow_dictionary(ship, information, settings=replace(given, seed=seed)).rounds[0].settings for seed in (1, 1, 2)
     )
     assert first == again
     assert first != other
@@ -132,7 +132,7 @@ def test_what_is_left_is_the_largest_sensitivity_of_all_that_was_looked_at():
     d = np.einsum("ij,nji->n", best.inverse, matrices)
     allowed = (runs.possible > 0) & (violation(motion, growth.limits) <= 1e-9)
     assert growth.best_left <= 1.001 * growth.dimension
-    assert d[allowed].max() <= 1.01 * growth.dimension  # chance points find nothing the search has missed
+    assert d[allowed].max() <= 1.01 * growth.dimension  # random points are no better than the search
     assert growth.efficiency_left >= 0.99
     for item in growth.information:
         assert sensitivity(best, item, "complete") <= growth.dimension * (1 + 1e-6)
@@ -148,17 +148,17 @@ def test_a_ship_with_propeller_and_rudder_grows_from_helm_and_engine_families():
     information = score_primitives(ship, runs)
     settings = GrowSettings(rounds=1, pool=16, families=("steps", "pull_out", "zigzag"))
     growth = grow_dictionary(ship, information, settings=settings)
-    assert growth.rounds[0].family in ("steps", "pull_out")  # velocities cannot be wished for
+    assert growth.rounds[0].family in ("steps", "pull_out")  # velocities are no settings of these
     assert growth.rounds[0].efficiency > 1
 
 
-def test_limits_are_those_wished_or_those_that_the_dictionary_spans():
+def test_limits_are_those_stated_or_the_range_of_the_dictionary():
     runs = example_dictionary("model-ship")
     spans = motion_limits(GrowSettings(), runs)
     velocity = np.concatenate([run.trajectory.velocity for run in runs])
     np.testing.assert_array_equal(spans, np.stack([velocity.min(axis=0), velocity.max(axis=0)], axis=1))
-    wished = motion_limits(GrowSettings(limits={"v_mps": (-0.1, 0.3)}), runs)
-    np.testing.assert_array_equal(wished, [spans[0], (-0.1, 0.3), spans[2]])
+    stated = motion_limits(GrowSettings(limits={"v_mps": (-0.1, 0.3)}), runs)
+    np.testing.assert_array_equal(stated, [spans[0], (-0.1, 0.3), spans[2]])
 
 
 @pytest.mark.parametrize(
@@ -170,10 +170,10 @@ def test_limits_are_those_wished_or_those_that_the_dictionary_spans():
         (
             GrowSettings(families=("recorded",)),
             InputError,
-            "no manoeuvre family to grow from suits vessel 'model-ship'",
+            "vessel 'model-ship' can run no searched manoeuvre family",
         ),
     ],
 )
-def test_wishes_that_make_no_sense_are_named(settings: GrowSettings, error: type, says: str):
+def test_wrong_settings_are_named(settings: GrowSettings, error: type, says: str):
     with pytest.raises(error, match=says):
         grow_dictionary(vessel("model-ship"), scored_example("model-ship"), settings=settings)

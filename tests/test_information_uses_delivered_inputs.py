@@ -1,4 +1,4 @@
-"""Actuators that answer late, not to little, or askew: information is that of what they deliver, however it is counted.
+"""Actuators with delay, dead band, lag or misalignment: information is that of the delivered inputs, by any path.
 
 With dead time of whole samples, dead band and misalignment a vessel does exactly what an ideal one does under shifted,
 cut and turned commands; with lag what is delivered changes within a sample, and they agree to second order in it.

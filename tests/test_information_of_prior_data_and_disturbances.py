@@ -30,7 +30,7 @@ def scaled(matrix: Array, other: Array) -> tuple[Array, Array]:
 
 @pytest.mark.parametrize("predictor", ["wind", "augmented"])
 @pytest.mark.parametrize("sea", [CALM, BREEZE], ids=["calm", "breeze"])
-def test_what_is_told_of_the_ship_is_a_block_of_what_is_told_with_disturbances(predictor: str, sea: Environment):
+def test_information_about_the_ship_is_a_block_of_that_with_disturbances(predictor: str, sea: Environment):
     ship = vessel("azimuth-30m")
     wide = score_augmented(ship, FEW, predictor=predictor, environment=sea)
     assert wide.parameters[: len(wide.interest)] == wide.interest
@@ -45,7 +45,7 @@ def test_what_is_told_of_the_ship_is_a_block_of_what_is_told_with_disturbances(p
         assert eigenvalues[0] > -1e-12  # mean squares
 
 
-def test_unknown_disturbances_never_add_to_what_is_told_of_the_ship():
+def test_unknown_disturbances_never_add_information_about_the_ship():
     ship, primitives = vessel("azimuth-30m"), example_dictionary("standard")
     wide = score_augmented(ship, primitives, predictor="wind", environment=BREEZE)
     p = len(wide.interest)
@@ -80,7 +80,7 @@ def of_water() -> tuple[str, ...]:
 
 @pytest.mark.parametrize("subtraction", ["none", "batch", "complete"])
 @pytest.mark.parametrize("regressors", ["measured", "simulated"])
-def test_data_of_a_simulated_run_tell_what_the_run_tells(subtraction: str, regressors: str):
+def test_data_of_a_simulated_run_have_the_information_of_the_run(subtraction: str, regressors: str):
     ship, names, air = vessel("azimuth-30m"), of_water(), ("W_abs_u_u", "W_abs_v_v", "W_uv")
     shorter = [  # the last sample of data has no successor, so it does not count
         replace(primitive, commands=replace(primitive.commands, values=primitive.commands.values[:-1]))
@@ -102,7 +102,7 @@ def test_data_of_a_simulated_run_tell_what_the_run_tells(subtraction: str, regre
     np.testing.assert_allclose(matrix / units, parts / (samples * units), atol=1e-12)
 
 
-def test_pooling_nothing_is_refused():
+def test_pooling_no_batches_is_refused():
     with pytest.raises(InputError, match="pooling needs batches"):
         pooled((), "complete")
 

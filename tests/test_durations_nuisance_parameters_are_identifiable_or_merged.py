@@ -1,4 +1,4 @@
-"""Criteria about some parameters: what is estimated along must be seen, unless the estimator merges it with another."""
+"""Criteria about some parameters: nuisance parameters must be identifiable, unless the estimator merges regressors."""
 
 from dataclasses import replace
 from itertools import product
@@ -8,7 +8,7 @@ import pytest
 
 from design_case import duration_problem, one_line, random_matrices
 from expdesign.durations import Aim, DurationProblem, optimal_shares, solve_durations, with_repeats
-from expdesign.durations.collected import Collected, merged_nuisance, unseen
+from expdesign.durations.concave import Collected, merged_nuisance, unidentifiable
 from expdesign.durations.criteria import LogDet, LogSmallest, LogTrace
 from expdesign.durations.criteria.models import stacked_values
 from expdesign.errors import NotInformative
@@ -33,16 +33,16 @@ def test_regressors_that_coincide_are_counted_once_only_where_they_stand_for_dis
     problem = steady_signs()
     first = np.array([1.0, 1, 1, 1, 0, 0]) / 4
     assert merged_nuisance(problem, first) == (("parameter 2", "parameter 1"),)
-    assert unseen(problem, first) == ()
+    assert unidentifiable(problem, first) == ()
     assert merged_nuisance(problem, np.full(6, 1 / 6)) == ()
     own = replace(problem, nuisance=())
-    assert unseen(own, first) == ("parameter 1", "parameter 2")
+    assert unidentifiable(own, first) == ("parameter 1", "parameter 2")
 
 
-def test_runs_whose_signs_are_steady_are_worth_what_the_merged_regression_is():
+def test_runs_with_steady_signs_have_the_value_of_the_merged_regression():
     design = solve_durations(steady_signs())
     runs = np.array(design.repeats)
-    assert runs[:4].sum() == 10  # the strong ones, although they do not tell parameter 1 from parameter 2
+    assert runs[:4].sum() == 10  # the strong ones, although they do not separate parameters 1 and 2
     assert "parameter 2 with parameter 1" in design.note
     assert one_line(design.note)
     problem = design.problem
@@ -72,24 +72,24 @@ def test_without_an_estimator_that_merges_every_parameter_has_to_be_seen():
 
 @pytest.mark.parametrize("draw", range(4))
 def test_whole_runs_that_must_see_everything_are_nearly_the_best_such_set(draw: int):
-    # Two strong primitives tell of parameter 0 alone; the rest is seen in four weak ones.
+    # Two strong primitives inform about parameter 0 only, four weak ones about all.
     rng = np.random.default_rng(draw)
     weak = random_matrices(rng, count=4, parameters=3, outputs=1, samples=2)[:, :3, :3]
     strong = [np.diag([c, 0.0, 0.0]) for c in (50.0, 60.0)]
     problem = replace(duration_problem([*strong, *weak], run_s=100.0, total_s=600.0), aim=OF_INTEREST)
     design = solve_durations(problem)
-    assert unseen(problem, np.array(design.repeats) / 6) == ()
-    worth = Collected.of(problem)
+    assert unidentifiable(problem, np.array(design.repeats) / 6) == ()
+    criterion = Collected.of(problem)
     best = max(
-        worth.value(np.array(runs) / 6)
+        criterion.value(np.array(runs) / 6)
         for runs in product(range(7), repeat=6)
-        if sum(runs) == 6 and not unseen(problem, np.array(runs) / 6)
+        if sum(runs) == 6 and not unidentifiable(problem, np.array(runs) / 6)
     )
-    assert worth.value(np.array(design.repeats) / 6) >= best + np.log(0.97)
+    assert criterion.value(np.array(design.repeats) / 6) >= best + np.log(0.97)
 
 
 @pytest.mark.parametrize("measure", [LogDet, LogTrace, LogSmallest])
-def test_a_singular_matrix_is_worth_the_limit_where_what_counts_is_seen(measure: type):
+def test_a_singular_matrix_has_the_limit_value_where_the_parameters_of_interest_are_estimable(measure: type):
     rng = np.random.default_rng(1)
     half = rng.standard_normal((5, 3))
     M, L = half @ half.T, half @ rng.standard_normal((3, 2))  # columns of L lie in the range of M
@@ -100,7 +100,7 @@ def test_a_singular_matrix_is_worth_the_limit_where_what_counts_is_seen(measure:
     assert stacked_values(outside, M[None])[0] == -np.inf
 
 
-def test_limits_that_leave_too_little_are_told_with_the_parameters():
+def test_limits_without_information_about_parameters_name_them():
     problem = duration_problem([np.diag([1.0, 0.0]), np.diag([0.0, 1.0])])
     for limits in ({"excluded": ("primitive 1",)}, {"most_s": {"primitive 1": 1e-14}}):
         narrowed = replace(problem, constraints=replace(problem.constraints, **limits))

@@ -1,0 +1,85 @@
+"""The tuning constants of the durations, in one place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tuning:
+    """Constants that were chosen, not derived. Gaps and eigenvalues are relative: to the degree, to the largest.
+
+    Attributes:
+        largest_gap: designs with a wider gap are not returned.
+        target_gap: gap at which Newton's method ends.
+        rounding_gap: below this gap, a Newton step that does not halve it is the last: the rest is rounding.
+        newton_steps: most Newton steps from a conic optimum; two or three are usual.
+        floor_rounding: shortfall of a floor, as a logarithm, that counts as rounding.
+        solver_tolerance: gap and feasibility tolerance of the conic solver.
+        lp_tolerance: feasibility and optimality tolerance of linear programmes.
+        singular: eigenvalues below this are rounding.
+        nearly_singular: below this, elimination loses digits that matter.
+        outside_range: share of an estimated combination that may lie outside the range of a singular matrix.
+        least_fraction: fractions less than this above their bound are set to it.
+        loosening: share by which limits are loosened where they leave no interior.
+        smallest_set: least size of a working set, and about as many as may join it at a time.
+        set_per_dimension: the same per dimension of the information matrix.
+        first_gap: to which the first working set is solved.
+        sharper: ratio of the gaps of successive working sets.
+        centring_steps: most Newton steps for one barrier weight.
+        most_sets: working sets.
+        barrier_fraction: fractions below this are removed from the solution of the barrier method.
+        chunk: rows of a pass that are handled together, so that they stay in the processor's cache.
+        indefinite: eigenvalues below minus this are not rounding.
+        regular_set: least eigenvalue of a first working set.
+        starts: random starts of a local search.
+        definite: least eigenvalue, in scaled parameters, of a positive definite matrix.
+        coincide: regressors coincide whose correlation, means included, falls short of 1 by less.
+        negligible: eigenvalues of scaled information below this are rounding.
+        small_weight: least weight in a null vector of a parameter that a message names.
+        added_share: share of the optimal design added to every set of runs, so that singular ones compare.
+        least_gain: gains of an exchange below this are rounding.
+        equal_share: share of equal times added where the optimal design itself is nearly singular.
+        least_gain_nearly_singular: `least_gain` there.
+        named_pairs: pairs of merged regressors that a note names.
+        insertions: primitives, best gain per second first, tried in an exchange of one run for several.
+        all_subsets: up to this number, every subset of batches is evaluated.
+    """
+
+    largest_gap: float = 1e-6
+    target_gap: float = 1e-10
+    rounding_gap: float = 1e-9
+    newton_steps: int = 30
+    floor_rounding: float = 1e-6
+    solver_tolerance: float = 1e-11
+    lp_tolerance: float = 1e-10
+    singular: float = 1e-13
+    nearly_singular: float = 1e-10
+    outside_range: float = 1e-6
+    least_fraction: float = 1e-9
+    loosening: float = 1e-9
+    smallest_set: int = 50
+    set_per_dimension: int = 4
+    first_gap: float = 1e-2
+    sharper: float = 1e-2
+    centring_steps: int = 60
+    most_sets: int = 60
+    barrier_fraction: float = 1e-7
+    chunk: int = 16384
+    indefinite: float = 1e-9
+    regular_set: float = 1e-8
+    starts: int = 20
+    definite: float = 1e-10
+    coincide: float = 1e-9
+    negligible: float = 1e-12
+    small_weight: float = 0.05
+    added_share: float = 1e-6
+    least_gain: float = 1e-9
+    equal_share: float = 1e-9
+    least_gain_nearly_singular: float = 1e-6
+    named_pairs: int = 3
+    insertions: int = 200
+    all_subsets: int = 20_000
+
+
+TUNING = Tuning()
