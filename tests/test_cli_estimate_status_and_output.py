@@ -36,7 +36,7 @@ def line_of(capsys: pytest.CaptureFixture[str]) -> str:
         ("--mean some", "unknown instrument mean 'some'"),
         ("--start here", "unknown start 'here'"),
         ("--test RUN", "is given for estimation and for testing"),
-        ("--fixed X_u X_abs_u_u X_vr X_mu Y_v Y_ur Y_mu N_r N_uv N_mu", "nothing is left to estimate"),
+        ("--fixed X_u X_abs_u_u X_vr X_mu Y_v Y_ur Y_mu N_r N_uv N_mu", "none is left to estimate"),
         ("--vessel missing.toml", "missing.toml"),
     ],
 )
