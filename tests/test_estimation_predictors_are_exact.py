@@ -98,7 +98,7 @@ def test_rows_with_missing_numbers_are_left_out_and_said_so() -> None:
     velocity[50:53, 1] = np.nan
     found = estimate(record(replace(batch, velocity=velocity)), NOMINAL, method="ls")
     assert found.residuals.left_out == 4
-    assert any("4 samples are left out" in warning for warning in found.warnings)
+    assert any("4 samples with missing values are not used" in warning for warning in found.warnings)
     assert_true(found)
 
 

@@ -70,7 +70,7 @@ def test_a_schedule_out_of_order_and_a_file_too_large_are_refused() -> None:
         ('lat="60.1"', 'lat="160"', "lat = '160'"),
         ('lat="60.1"', "", "has no lat"),
         ("08:10:00Z", "07:10:00Z", "goes back in time"),
-        ("08:10:00Z", "soon", "a time that is none"),
+        ("08:10:00Z", "soon", "invalid time"),
         ("</gpx>", "", "not well-formed"),
     ],
 )

@@ -58,7 +58,7 @@ def test_too_narrow_a_passage_names_its_width_its_place_and_the_setting():
 
 def test_a_goal_on_another_lake_is_distinguished_from_a_narrow_passage():
     text = refusal(WIDE.difference(shapely.box(-10, -1000, 10, 1000)))
-    assert "forbidden water lies between them on every way" in text
+    assert "forbidden water lies between them on every path" in text
 
 
 def test_a_speed_between_runs_beyond_the_ship_names_both():
