@@ -1,8 +1,8 @@
 """Runs a benchmark and records what it prints in the README beside it.
 
 ``python tests/benchmarks/record.py planner [ARGUMENT ...]``: the section `planner` is replaced by the benchmark's
-description, the command, the machine, and the output. A path that exists is recorded as FOLDER. Nothing is recorded of
-a benchmark that fails.
+description, the command, the machine, and the output. A path outside the project is recorded as FOLDER. Nothing is
+recorded of a benchmark that fails.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 HERE = Path(__file__).parent
+ROOT = HERE.parents[1]
 README = HERE / "README.md"
 
 
@@ -37,10 +38,18 @@ def measured(script: Path, arguments: list[str]) -> str:
 def section(name: str, script: Path, arguments: list[str], output: str) -> str:
     """Heading, description, command, machine and output in Markdown."""
     summary = (ast.get_docstring(ast.parse(script.read_text("utf-8"))) or "").split("\n\n")[0].replace("\n", " ")
-    shown = ["FOLDER" if Path(item).exists() else item for item in arguments]
+    shown = [_without_places(item) for item in arguments]
     command = " ".join(["python", f"tests/benchmarks/{name}.py", *shown])
     machine = f"{os.cpu_count()} cores, Python {platform.python_version()}, NumPy {version('numpy')}"
     return f"## {name}\n\n{summary}\n\n`{command}` on {date.today()}, {machine}:\n\n{in_markdown(output)}\n"
+
+
+def _without_places(argument: str) -> str:
+    """An argument as anyone can give it: paths of the project from its root, others as FOLDER."""
+    path = Path(argument).resolve()
+    if not path.exists():
+        return argument
+    return path.relative_to(ROOT).as_posix() if path.is_relative_to(ROOT) else "FOLDER"
 
 
 def in_markdown(output: str) -> str:
