@@ -1,4 +1,4 @@
-"""Whole trials of drawn ships in drawn weather: how many leave allowed water or are broken off, and what time it costs.
+"""Whole trials of drawn ships in drawn weather: how many leave allowed water or are aborted, and what time it costs.
 
 Run with the package installed: ``python tests/benchmarks/safety.py [DRAWS] [SCENARIO.toml ...]``, by default 500 draws
 of all examples. One draw is one trial, sailed by the procedure of `expdesign.plan.monte_carlo.procedure`; the
@@ -6,7 +6,7 @@ hull is looked at against the chart at every step, of runs, of legs and of ways 
 the plan's own.
 
 Each scenario is sailed three times: in the weather it forecasts; with current and wind that besides wander slowly
-(Gauss-Markov, `WANDERING`), which the plan knew nothing of; and *without a break*: nobody goes round, every run begins
+(Gauss-Markov, `WANDERING`), which the plan knew nothing of; and *without go-arounds*: nobody goes around, every run begins
 wherever the ship has got to. The last is what the procedure is worth. A table in Markdown ends the output.
 """
 
@@ -92,7 +92,7 @@ def report(path: str, draws: int) -> list[str]:
     plan = workflows.planned(case, information, workflows.designed(case, information))
     calm = water_of(case, plan)
     wanders = replace(calm, environment=wandering(case.environment))
-    kinds = {"as forecast": (calm, True), "wandering": (wanders, True), "without a break": (calm, False)}
+    kinds = {"as forecast": (calm, True), "wandering": (wanders, True), "without go-arounds": (calm, False)}
     rows = []
     for seed, (kind, (water, breaks)) in enumerate(kinds.items(), start=7):
         found = sailed(water, plan, draws=draws, breaks=breaks, rng=np.random.default_rng(seed))
@@ -112,5 +112,5 @@ if __name__ == "__main__":
     lines = [
         line for path in sys.argv[2:] or sorted(map(str, SCENARIOS.glob("*.toml"))) for line in report(path, number)
     ]
-    print("\n| scenario | weather | left water (95 %) | broken off | plan | more: middle | more: 95 % |")
+    print("\n| scenario | weather | left water (95 %) | aborted | plan | extra time, median | extra time, 95 % |")
     print("|---|---|---|---|---|---|---|", *lines, sep="\n")
