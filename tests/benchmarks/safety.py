@@ -6,8 +6,8 @@ hull is looked at against the chart at every step, of runs, of legs and of ways 
 the plan's own.
 
 Each scenario is sailed three times: in the weather it forecasts; with current and wind that besides wander slowly
-(Gauss-Markov, `WANDERING`), which the plan knew nothing of; and *without go-arounds*: nobody goes around, every run begins
-wherever the ship has got to. The last is what the procedure is worth. A table in Markdown ends the output.
+(Gauss-Markov, `WANDERING`), which the plan knew nothing of; and *without go-arounds*: every run begins wherever the
+ship is. The last shows what the procedure is worth. A table in Markdown ends the output.
 """
 
 from __future__ import annotations
