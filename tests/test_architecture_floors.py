@@ -81,7 +81,12 @@ EXCEPTIONS = {("__main__", "cli")}  # `python -m` is nothing but the command lin
 IMPORTERS = {
     "cvxpy": ("durations/_cvxpy.py",),
     "ompl": ("plan/legs/_ompl.py",),
-    "casadi": ("estimation/replay/_casadi.py", "growing/_casadi.py", "plan/legs/_casadi.py"),
+    "casadi": (
+        "simulation/_casadi.py",
+        "estimation/replay/_casadi.py",
+        "growing/_casadi.py",
+        "plan/legs/_casadi.py",
+    ),
     "matplotlib": ("export/",),
 }
 BANNED_CALLS = ("eval", "exec", "compile", "__import__", "import_module")

@@ -20,11 +20,10 @@ from expdesign.simulation.environment import (
     draw_weather,
 )
 from expdesign.simulation.helm import Approach, Helm, service_speed, steady_ahead
-from expdesign.simulation.helmsman import Conduct
 from expdesign.simulation.motion import euler_step, motion_rates, relative_velocity, rk4_step, to_body
-from expdesign.simulation.run import simulate, simulate_many
+from expdesign.simulation.run import integrate_motion, simulate, simulate_many
 from expdesign.simulation.sensors import measure
-from expdesign.simulation.standard_trials import pull_out, stopping, turning_circle, zigzag
+from expdesign.simulation.standard_trials import Conduct, pull_out, stopping, turning_circle, zigzag
 
 __all__ = [
     "CALM",
@@ -44,6 +43,7 @@ __all__ = [
     "draw_environment",
     "draw_weather",
     "euler_step",
+    "integrate_motion",
     "measure",
     "motion_rates",
     "past_deadband",

@@ -1,9 +1,6 @@
-"""Runs: one with plain floats, many at once with arrays; inputs are held between samples."""
+"""Runs: one by compiled steps, many at once with arrays; inputs are held between samples."""
 
 from __future__ import annotations
-
-import math
-from typing import Any
 
 import numpy as np
 
@@ -11,10 +8,10 @@ from expdesign.errors import Diverged, InputError
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation.actuation import deliver
 from expdesign.simulation.environment import CALM, Environment, WeatherSeries, weather_rows
-from expdesign.simulation.motion import State, begun, integrator_step, motion_rates, rk4_step
+from expdesign.simulation.motion import begun, rk4_step
 from expdesign.simulation.program import STATES, RatesProgram, march
 from expdesign.values import Array
-from expdesign.vessel import SCALAR, Vessel
+from expdesign.vessel import Vessel
 
 SUBSTEPS = 2
 """Runge-Kutta steps per sample; a step is at most a fifth of the fastest time constant of the reference vessels."""
@@ -50,26 +47,64 @@ def simulate(
         InputError: commands of another vessel.
     """
     _check_inputs(vessel, commands)
-    step = integrator_step(integrator, vessel.model)
-    current, wind = (rows.tolist() for rows in weather_rows(environment, len(commands)))
-    theta = vessel.model.parameters.tolist()
-    step_s = commands.sample_time_s / substeps
-    state: State = begun(vessel.model, tuple(float(x) for x in (*pose, *velocity)))
-    rows = [state]
-    for delivered, water, air in zip(_delivered(vessel, commands, substeps, standing), current, wind, strict=True):
+    given = deliver(
+        vessel.responses,
+        commands.values,
+        sample_time_s=commands.sample_time_s,
+        substeps=substeps,
+        standing=standing,
+    )
+    states = integrate_motion(
+        vessel,
+        given,
+        np.array([*pose, *velocity]),
+        sea=np.concatenate(weather_rows(environment, len(commands)), axis=1),
+        sample_time_s=commands.sample_time_s,
+        substeps=substeps,
+        integrator=integrator,
+    )
+    return Trajectory(sample_time_s=commands.sample_time_s, pose=states[:, :3], velocity=states[:, 3:])
 
-        def rates(x: State, held: Any, water: Any = water, air: Any = air) -> State:
-            return motion_rates(vessel.model, x, held, current_to=water, wind_to=air, ops=SCALAR, parameters=theta)
 
-        state = _advanced(step, rates, delivered, state, step_s)
-        if not all(abs(speed) < LARGEST_SPEED for speed in state[3:]):
-            raise Diverged(
-                f"vessel {vessel.name!r}: the simulation diverges after {len(rows) * commands.sample_time_s:.1f} s: "
-                f"a speed passes {LARGEST_SPEED:g} m/s or rad/s; the model is unstable under these commands"
-            )
-        rows.append(state)
-    table: Array = np.array(rows)
-    return Trajectory(sample_time_s=commands.sample_time_s, pose=table[:, :3], velocity=table[:, 3:6])
+def integrate_motion(
+    vessel: Vessel,
+    delivered: Array,
+    start: Array,
+    *,
+    sea: Array,
+    sample_time_s: float,
+    substeps: int = SUBSTEPS,
+    integrator: str = "rk4",
+) -> Array:
+    """`simulate` for delivered inputs: states (k + 1, 6), pose and velocity, the start first.
+
+    Args:
+        vessel: whose model is integrated.
+        delivered: (k, substeps, m), or (k, 1, m) where inputs are held over a sample; as `deliver` gives them.
+        start: (6,) pose and velocity over ground; a model with a roll mode begins upright.
+        sea: (k, 4), or (1, 4) where steady: n-frame current and wind to north and east [m/s].
+        sample_time_s: time between samples [s].
+        substeps, integrator: as in `simulate`.
+
+    Raises:
+        Diverged: a speed passed `LARGEST_SPEED`.
+    """
+    from expdesign.simulation._casadi import compiled_integrator  # CasADi is loaded when a motion is integrated
+
+    samples, _, inputs = delivered.shape
+    drive = np.empty((samples, substeps, inputs + 4))
+    drive[..., :inputs], drive[..., inputs:] = delivered, sea[:, None]
+    compiled = compiled_integrator(vessel.model, integrator)
+    steps = drive.reshape(samples * substeps, inputs + 4)
+    states = compiled.states(np.array(begun(vessel.model, tuple(start))), steps, sample_time_s / substeps)[::substeps]
+    settled = (np.abs(states[1:, 3:]) < LARGEST_SPEED).all(axis=1)
+    if not settled.all():
+        time_s = (int(np.argmin(settled)) + 1) * sample_time_s
+        raise Diverged(
+            f"vessel {vessel.name!r}: the simulation diverges after {time_s:.1f} s: "
+            f"a speed passes {LARGEST_SPEED:g} m/s or rad/s; the model is unstable under these commands"
+        )
+    return states[:, :STATES]
 
 
 def simulate_many(
@@ -119,28 +154,6 @@ def simulate_many(
     settled = np.abs(result[..., 3:]).max(axis=(0, 2)) < LARGEST_SPEED
     result[:, ~settled] = np.nan
     return result
-
-
-def _delivered(vessel: Vessel, commands: Commands, substeps: int, standing: Array | None) -> Any:
-    """For every sample the delivered values of each step."""
-    given = deliver(
-        vessel.responses,
-        commands.values,
-        sample_time_s=commands.sample_time_s,
-        substeps=substeps,
-        standing=standing,
-    )
-    return np.broadcast_to(given, (len(commands), substeps, given.shape[-1])).tolist()
-
-
-def _advanced(step: Any, rates: Any, delivered: Any, state: State, step_s: float) -> State:
-    """The state one sample later; not-a-numbers where it left the range of floating point."""
-    try:
-        for held in delivered:
-            state = step(lambda x, held=held: rates(x, held), state, step_s)
-    except ValueError:  # the sine of an infinite heading
-        return (math.nan,) * len(state)
-    return state
 
 
 def _check_inputs(vessel: Vessel, commands: Commands) -> None:

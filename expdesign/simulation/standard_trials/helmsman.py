@@ -17,10 +17,10 @@ from expdesign.errors import Diverged, NoAnswer
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation.actuation import ActuatorState
 from expdesign.simulation.helm import Approach, Helm
-from expdesign.simulation.motion import State, begun, motion_rates, rk4_step
+from expdesign.simulation.motion import begun
 from expdesign.simulation.run import LARGEST_SPEED, SUBSTEPS
 from expdesign.values import Array
-from expdesign.vessel import SCALAR, Vessel
+from expdesign.vessel import Vessel
 
 Trial = tuple[Commands, Trajectory]
 LONGEST = 300.0
@@ -52,7 +52,7 @@ class Stage:
 
     angle_rad: float
     drive: float
-    left: Callable[[float, State], float]
+    left: Callable[[float, Array], float]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,7 +103,7 @@ def sail(approach: Approach, stages: Iterable[Stage], conduct: Conduct, what: st
     ahead = Stage(angle_rad=approach.angle_rad, drive=approach.drive, left=lambda time, _: lead_s - time)
     waiting = [ahead, *stages] if lead_s else list(stages)
     end_s = LONGEST * vessel.length_m / approach.speed_mps if conduct.duration_s is None else conduct.duration_s
-    state: State = begun(vessel.model, (0.0, 0.0, 0.0, *approach.velocity.tolist()))
+    state: Array = np.array(begun(vessel.model, (0.0, 0.0, 0.0, *approach.velocity.tolist())))
     rows: list[list[float]] = []
     states, began_s, finished = [state], 0.0, False
     standing = approach.inputs[:, None]
@@ -128,14 +128,14 @@ def sail(approach: Approach, stages: Iterable[Stage], conduct: Conduct, what: st
     return commands, Trajectory(sample_time_s=step_s, pose=table[:, :3], velocity=table[:, 3:6])
 
 
-def _delivered(actuators: ActuatorState, row: list[float]) -> list[list[float]]:
+def _delivered(actuators: ActuatorState, row: list[float]) -> Array:
     """(substeps, m) delivered values over the steps of a sample with these commands."""
     given = actuators.mean(np.array(row)[:, None])[..., 0]
-    return np.broadcast_to(given, (SUBSTEPS, len(row))).tolist()  # type: ignore[no-any-return]
+    return np.broadcast_to(given, (SUBSTEPS, len(row)))
 
 
 def _share_left(
-    vessel: Vessel, given: list[list[float]], state: State, stage: Stage, since_s: float, step_s: float
+    vessel: Vessel, given: Array, state: Array, stage: Stage, since_s: float, step_s: float
 ) -> float | None:
     """The share of a sample after which a stage is over, or None when it goes on."""
 
@@ -149,16 +149,15 @@ def _share_left(
     return 0.0 if left(0.0) <= 0 else float(brentq(left, 0.0, 1.0, xtol=1e-12))
 
 
-def _stepped(vessel: Vessel, given: list[list[float]], state: State, step_s: float, until_s: float) -> State:
+def _stepped(vessel: Vessel, given: Array, state: Array, step_s: float, until_s: float) -> Array:
     """The state a time into a sample, by the steps of `simulate`, with the delivered values of each."""
-    theta = vessel.model.parameters.tolist()
-    each_s = step_s / SUBSTEPS
-    for number, held in enumerate(given):
+    from expdesign.simulation._casadi import compiled_integrator  # CasADi is loaded when a motion is integrated
 
-        def rates(x: State, held: list[float] = held) -> State:
-            return motion_rates(vessel.model, x, held, ops=SCALAR, parameters=theta)
-
-        state = rk4_step(rates, state, min(max(until_s - number * each_s, 0.0), each_s))
-    if not all(abs(speed) < LARGEST_SPEED for speed in state[3:]):
+    each_s, integrator = step_s / SUBSTEPS, compiled_integrator(vessel.model, "rk4")
+    drive = np.concatenate([given, np.zeros((SUBSTEPS, 4))], axis=1)
+    for number in range(SUBSTEPS):
+        part_s = min(max(until_s - number * each_s, 0.0), each_s)
+        state = integrator.states(state, drive[number : number + 1], part_s)[-1]
+    if not (np.abs(state[3:]) < LARGEST_SPEED).all():
         raise Diverged(f"vessel {vessel.name!r}: the model is unstable: a speed passes {LARGEST_SPEED:g} m/s or rad/s")
     return state

@@ -13,7 +13,7 @@ import math
 
 from expdesign.errors import InputError, UnknownName
 from expdesign.simulation.helm import Approach, steady_ahead
-from expdesign.simulation.helmsman import Conduct, Stage, Trial, sail
+from expdesign.simulation.standard_trials.helmsman import Conduct, Stage, Trial, sail
 from expdesign.vessel import Vessel
 
 SIDES = {"starboard": 1, "port": -1}

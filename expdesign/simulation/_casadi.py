@@ -1,0 +1,118 @@
+"""The simulation's only use of CasADi: integrator steps of the equations of motion as compiled functions.
+
+Parameters, weather and the length of a step are inputs, so models of one structure share the functions. Steps are
+chained into flat functions of 1, 2, 4, ... `LONGEST` steps: every number of them takes few calls.
+
+Source: J. A. E. Andersson et al., CasADi, Mathematical Programming Computation 11 (2019), 1-36.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache, partial
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from expdesign.simulation.motion import State, integrator_step, motion_rates
+from expdesign.values import Array
+from expdesign.vessel import Actuator, Operators, Roll, Term, VesselModel
+
+CASADI = Operators(ca.fabs, ca.sin, ca.cos)
+LONGEST = 16
+"""Steps in one function; with more of them a step takes the same time."""
+
+
+class CompiledIntegrator:
+    """Integrator steps of a model."""
+
+    def __init__(self, model: VesselModel, integrator: str) -> None:
+        """Take the structure and the parameters of a model.
+
+        Raises:
+            UnknownName: no such integrator.
+            InputError: Euler's map for a model that rolls.
+        """
+        integrator_step(integrator, model)
+        structure = model.terms, model.form, model.sample_time_s, model.actuators, model.roll
+        self._chain = partial(chain, structure, integrator)
+        self._states, self._parameters = model.states, np.array(model.parameters)
+
+    def states(self, start: Array, drive: Array, step_s: float, parameters: Array | None = None) -> Array:
+        """The state after every step; not-a-numbers and infinities where the motion diverges.
+
+        Args:
+            start: (6,) pose and velocity, with a roll mode (8,).
+            drive: (k, m + 4) over each step: delivered inputs, then n-frame current and wind to north and east [m/s].
+            step_s: length of a step [s].
+            parameters: (p,) in the model's own form; None for the model's.
+
+        Returns:
+            (k + 1, 6 or 8), the start first.
+        """
+        theta = self._parameters if parameters is None else np.array(parameters, dtype=float)
+        drive, result = np.ascontiguousarray(drive, dtype=float), np.empty((len(drive) + 1, self._states))
+        result[0], length_s, done = start, np.array([step_s]), 0
+        while done < len(drive):
+            length = min(LONGEST, 1 << (len(drive) - done).bit_length() - 1)
+            buffer, run = self._chain(length).buffer()
+            buffer.set_arg(2, theta.data)
+            buffer.set_arg(3, length_s.data)
+            while done + length <= len(drive):
+                end = done + length
+                buffer.set_arg(0, result[done].data)
+                buffer.set_arg(1, drive[done:end].data)
+                buffer.set_res(0, result[done + 1 : end + 1].data)
+                run()
+                done = end
+        return result
+
+
+@lru_cache(maxsize=64)
+def compiled_integrator(model: VesselModel, integrator: str) -> CompiledIntegrator:
+    """The integrator of a model, made once and kept."""
+    return CompiledIntegrator(model, integrator)
+
+
+Structure = tuple[tuple[Term, ...], str, float, tuple[Actuator, ...], Roll | None]
+"""Terms, form, sample time, actuators and roll of a model: everything but the values of its parameters."""
+
+
+@lru_cache(maxsize=160)
+def chain(structure: Structure, integrator: str, length: int) -> Any:
+    """So many steps: (state, drive of each step, parameters, length of a step) -> states."""
+    if length == 1:
+        return _step(structure, integrator)
+    step = chain(structure, integrator, 1)
+    x, drive = ca.SX.sym("x", step.size1_in(0)), ca.SX.sym("drive", step.size1_in(1), length)
+    theta, step_s = ca.SX.sym("theta", step.size1_in(2)), ca.SX.sym("step_s")
+    states = [x]
+    for index in range(length):
+        states.append(step(states[-1], drive[:, index], theta, step_s))
+    return ca.Function("steps", [x, drive, theta, step_s], [ca.horzcat(*states[1:])])
+
+
+def _step(structure: Structure, integrator: str) -> ca.Function:
+    """`motion_rates` stepped once; what depends on the inputs alone is worked out once."""
+    terms, form, sample_time_s, actuators, roll = structure
+    zeros = np.zeros(len(terms))
+    model = VesselModel(
+        terms=terms,
+        parameters=zeros,
+        parameter_std=zeros,
+        form=form,
+        sample_time_s=sample_time_s,
+        actuators=actuators,
+        roll=roll,
+    )
+    m = len(model.inputs)
+    x, drive = ca.SX.sym("x", model.states), ca.SX.sym("drive", m + 4)
+    theta, step_s = ca.SX.sym("theta", len(terms)), ca.SX.sym("step_s")
+    inputs, current, wind = (ca.vertsplit(part) for part in ca.vertsplit(drive, [0, m, m + 2, m + 4]))
+    values = ca.vertsplit(theta)
+
+    def rates(state: State) -> State:
+        return motion_rates(model, state, inputs, current_to=current, wind_to=wind, ops=CASADI, parameters=values)
+
+    after = integrator_step(integrator, model)(rates, tuple(ca.vertsplit(x)), step_s)
+    return ca.Function("step", [x, drive, theta, step_s], [ca.densify(ca.cse(ca.vertcat(*after)))])
