@@ -1,14 +1,14 @@
 """The simulation's only use of CasADi: integrator steps of the equations of motion as compiled functions.
 
 Parameters, weather and the length of a step are inputs, so models of one structure share the functions. Steps are
-chained into flat functions of 1, 2, 4, ... `LONGEST` steps: every number of them takes few calls.
+chained into flat functions of several lengths, so that any number of them takes few calls.
 
 Source: J. A. E. Andersson et al., CasADi, Mathematical Programming Computation 11 (2019), 1-36.
 """
 
 from __future__ import annotations
 
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import Any
 
 import casadi as ca
@@ -19,8 +19,8 @@ from expdesign.values import Array
 from expdesign.vessel import Actuator, Operators, Roll, Term, VesselModel
 
 CASADI = Operators(ca.fabs, ca.sin, ca.cos)
-LONGEST = 16
-"""Steps in one function; with more of them a step takes the same time."""
+LENGTHS = (16, 8, 4, 2, 1)
+"""Steps in one function; in longer ones a step takes as much time."""
 
 
 class CompiledIntegrator:
@@ -35,7 +35,7 @@ class CompiledIntegrator:
         """
         integrator_step(integrator, model)
         structure = model.terms, model.form, model.sample_time_s, model.actuators, model.roll
-        self._chain = partial(chain, structure, integrator)
+        self._functions = compiled_steps(structure, integrator)
         self._states, self._parameters = model.states, np.array(model.parameters)
 
     def states(self, start: Array, drive: Array, step_s: float, parameters: Array | None = None) -> Array:
@@ -53,9 +53,10 @@ class CompiledIntegrator:
         theta = self._parameters if parameters is None else np.array(parameters, dtype=float)
         drive, result = np.ascontiguousarray(drive, dtype=float), np.empty((len(drive) + 1, self._states))
         result[0], length_s, done = start, np.array([step_s]), 0
-        while done < len(drive):
-            length = min(LONGEST, 1 << (len(drive) - done).bit_length() - 1)
-            buffer, run = self._chain(length).buffer()
+        for length, function in zip(LENGTHS, self._functions, strict=True):
+            if done + length > len(drive):
+                continue
+            buffer, run = function.buffer()
             buffer.set_arg(2, theta.data)
             buffer.set_arg(3, length_s.data)
             while done + length <= len(drive):
@@ -78,12 +79,15 @@ Structure = tuple[tuple[Term, ...], str, float, tuple[Actuator, ...], Roll | Non
 """Terms, form, sample time, actuators and roll of a model: everything but the values of its parameters."""
 
 
-@lru_cache(maxsize=160)
-def chain(structure: Structure, integrator: str, length: int) -> Any:
-    """So many steps: (state, drive of each step, parameters, length of a step) -> states."""
-    if length == 1:
-        return _step(structure, integrator)
-    step = chain(structure, integrator, 1)
+@lru_cache(maxsize=32)
+def compiled_steps(structure: Structure, integrator: str) -> tuple[Any, ...]:
+    """Functions of `LENGTHS` steps: (state, drive of each step, parameters, length of a step) -> states."""
+    step = _step(structure, integrator)
+    return tuple(_chained(step, length) for length in LENGTHS)
+
+
+def _chained(step: ca.Function, length: int) -> ca.Function:
+    """So many steps as one flat function."""
     x, drive = ca.SX.sym("x", step.size1_in(0)), ca.SX.sym("drive", step.size1_in(1), length)
     theta, step_s = ca.SX.sym("theta", step.size1_in(2)), ca.SX.sym("step_s")
     states = [x]

@@ -17,7 +17,7 @@ from expdesign.plan.control import AgileShip, Helmsman, Reference
 from expdesign.plan.legs.optimise import solve_leg, solve_transition
 from expdesign.plan.legs.problem import LegProblem, hull_discs, leg_problem
 from expdesign.plan.legs.tuning import LEGS
-from expdesign.plan.legs.water import LegTask, LegWater, acceptable, last_state, nearest_turns
+from expdesign.plan.legs.water import LegTask, LegWater, acceptable, nearest_turns
 from expdesign.values import Array
 from expdesign.vessel import allocate, required_force
 
@@ -119,16 +119,14 @@ def _in_parts(
     if first is None:
         return None
     given = np.concatenate([task.past, first])
-    middle, state = _steered(
-        water, Reference(states=track), last_state(water.sail(task.start, first, task.past)), given
-    )
+    middle, state = _steered(water, Reference(states=track), water.states(task.start, first, task.past)[-1], given)
     given = water.remembered(np.concatenate([given, middle]))
     arrival = replace(task, start=state, start_inputs=middle[-1], before=given)
     last = _optimised(arrival, water, ship, _cut(line, line.length_m - last_m, line.length_m))
     if last is None:
         return None
     values = np.concatenate([first, middle, last])
-    turned = last_state(water.sail(task.start, values, task.past))[2]
+    turned = water.states(task.start, values, task.past)[-1, 2]
     whole = whole_turns(turned - task.end[2])
     end = np.r_[task.end[:2], task.end[2] + whole, task.end[3:]]
     return values if acceptable(task.start, end, water, values, task.past) else None
@@ -177,7 +175,7 @@ def _steered(water: LegWater, reference: Reference, state: Array, before: Array)
         sample = sample + np.maximum(reference.pace(sample, states, water.vessel.length_m / 2), 0.2)
         row = helm.commands(reference.at(sample), states, given[-1][None])
         past = None if water.prompt else water.remembered(np.array(given[-LEGS.remembered_commands :]))
-        states = last_state(water.sail(states[0], row, past))[None]
+        states = water.states(states[0], row, past)[-1:]
         given.append(row[0])
     return np.array(given[first:]), states[0]
 

@@ -21,7 +21,7 @@ from expdesign.plan.legs.optimise import solve_leg
 from expdesign.plan.legs.problem import LegProblem, leg_problem
 from expdesign.plan.legs.recovery import Recovery, recover
 from expdesign.plan.legs.tuning import LEGS
-from expdesign.plan.legs.water import LegTask, LegWater, acceptable, last_state, nearest_turns, through_water
+from expdesign.plan.legs.water import LegTask, LegWater, acceptable, nearest_turns, through_water
 from expdesign.values import Array
 
 
@@ -57,11 +57,11 @@ def _run_up(task: LegTask, water: LegWater) -> tuple[LegTask, int]:
     samples = int(np.ceil(CONTROL.approach_hulls * vessel.length_m / max(speed, 1e-9) / vessel.sample_time_s))
     if speed < LEGS.slow_share * water.ship.transit_speed_mps:
         return task, 0
-    track = water.sail(task.end, np.tile(task.end_inputs, (samples, 1)))
+    states = water.states(task.end, np.tile(task.end_inputs, (samples, 1)))
     scale = np.r_[1.0, [water.ship.transit_speed_mps] * 2, water.ship.yaw_rate_radps]
-    if (np.abs(last_state(track) - task.end)[2:] > LEGS.arrival / 10 * scale).any():
+    if (np.abs(states[-1] - task.end)[2:] > LEGS.arrival / 10 * scale).any():
         return task, 0
-    moved = track.pose[-1, :2] - track.pose[0, :2]
+    moved = (states[-1] - states[0])[:2]
     return replace(task, end=np.r_[task.end[:2] - moved, task.end[2:]]), samples
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from expdesign.plan.control import Capability, HelmShip
 from expdesign.plan.legs.tuning import LEGS
-from expdesign.plan.legs.water import LegWater, last_state
+from expdesign.plan.legs.water import LegWater
 from expdesign.values import Array, seal
 from expdesign.vessel import within_limits
 
@@ -47,7 +47,7 @@ def recover(state: Array, past: Array, water: LegWater, ship: HelmShip) -> Recov
         desired = np.array(approach.helm.inputs(approach.drive, approach.angle_rad - approach.starboard * against))
         row = within_limits(vessel.actuators, desired[None], sample_time_s=vessel.sample_time_s, before=rows[-1])
         given = past if water.prompt else water.remembered(np.concatenate([past, *(row[None] for row in rows[1:])]))
-        states.append(last_state(water.sail(states[-1], row, given)))
+        states.append(water.states(states[-1], row, given)[-1])
         rows.append(row[0])
     return Recovery(states=np.array(states), commands=np.array(rows[1:]).reshape(-1, len(vessel.limits)))
 

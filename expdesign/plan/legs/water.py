@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -15,8 +15,8 @@ from expdesign.plan.control import Capability, arc_spare_m
 from expdesign.plan.legs.tuning import LEGS
 from expdesign.plan.work_budget import WorkBudget
 from expdesign.sea_area import ARC_SEGMENTS, SeaArea
-from expdesign.signals import Commands, Trajectory
-from expdesign.simulation import Environment, deliver, delivered_at_samples, simulate, to_body
+from expdesign.signals import Trajectory
+from expdesign.simulation import Environment, deliver, delivered_at_samples, integrate_motion, to_body
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array, seal
 from expdesign.vessel import IDEAL, NUMPY, Vessel
@@ -162,35 +162,30 @@ class LegWater:
 
         Earlier commands matter for lagging and late actuators only; the first of them has stood for long.
         """
-        vessel, names = self.vessel, self.vessel.model.inputs
-        if before is None or self.prompt:
-            commands = Commands(sample_time_s=vessel.sample_time_s, names=names, values=values)
-            return simulate(vessel, commands, pose=start[:3], velocity=start[3:], environment=self.environment)
-        given = np.concatenate([before, values])
-        step_s = vessel.sample_time_s / SUBSTEPS
-        delivered = deliver(
-            vessel.responses, given, sample_time_s=vessel.sample_time_s, substeps=SUBSTEPS, standing=before[0]
-        )
-        fine = Commands(sample_time_s=step_s, names=names, values=delivered[len(before) :].reshape(-1, len(names)))
-        track = simulate(
-            self._prompt_vessel, fine, pose=start[:3], velocity=start[3:], environment=self.environment, substeps=1
-        )
-        return Trajectory(
-            sample_time_s=vessel.sample_time_s, pose=track.pose[::SUBSTEPS], velocity=track.velocity[::SUBSTEPS]
-        )
+        states = self.states(start, values, before)
+        return Trajectory(sample_time_s=self.vessel.sample_time_s, pose=states[:, :3], velocity=states[:, 3:])
 
-    @property
+    def states(self, start: Array, values: Array, before: Array | None = None) -> Array:
+        """(k + 1, 6) states of `sail`, the start first."""
+        sample_s, earlier = self.vessel.sample_time_s, 0
+        if self.prompt:
+            delivered = values[:, None]
+        else:
+            if before is not None:
+                earlier, values = len(before), np.concatenate([before, values])
+            given = deliver(self.vessel.responses, values, sample_time_s=sample_s, substeps=SUBSTEPS)
+            delivered = given[earlier:]
+        return integrate_motion(self.vessel, delivered, start, sea=self._sea, sample_time_s=sample_s)
+
+    @cached_property
     def prompt(self) -> bool:
         """Whether every actuator delivers its commands at once."""
         return all(response == IDEAL for response in self.vessel.responses)
 
     @cached_property
-    def _prompt_vessel(self) -> Vessel:
-        """The same vessel with actuators that deliver at once."""
-        actuators = tuple(
-            replace(actuator, responses=(IDEAL,) * len(actuator.limits)) for actuator in self.vessel.actuators
-        )
-        return replace(self.vessel, model=replace(self.vessel.model, actuators=actuators))
+    def _sea(self) -> Array:
+        """(1, 4) mean current and wind."""
+        return np.concatenate([self.environment.current_to, self.environment.wind_to])[None]
 
     def remembered(self, commands: Array) -> Array:
         """The last of given commands (k, m), as many as still act through any actuator."""
@@ -218,9 +213,9 @@ def through_water(environment: Environment, state: Array) -> Array:
 
 def acceptable(start: Array, end: Array, water: LegWater, values: Array, before: Array) -> bool:
     """Whether commands, simulated from a state after others, arrive at another state and stay in safe water."""
-    track = water.sail(start, values, before)
+    states = water.states(start, values, before)
     scale = np.r_[[water.vessel.length_m] * 2, 1.0, [water.ship.transit_speed_mps] * 2, water.ship.yaw_rate_radps]
-    return bool((np.abs(last_state(track) - end) <= LEGS.arrival * scale).all()) and water.holds(track.pose)
+    return bool((np.abs(states[-1] - end) <= LEGS.arrival * scale).all()) and water.holds(states[:, :3])
 
 
 def nearest_turns(vessel: Vessel, inputs: Array, near: Array) -> Array:
