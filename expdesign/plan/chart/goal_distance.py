@@ -6,6 +6,7 @@ Paths are those of the visibility graph, so the distance prefers no direction; t
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import shapely
@@ -50,6 +51,19 @@ class GoalDistance:
         """(k, 2) shortest path from a point to the goal."""
         row, column = self.field.index(point)
         return np.array([point, *path_over(int(self.first_bend[row, column]), self.nodes, self.next_node)])
+
+    def paths(self, points: Array) -> Array:
+        """(b, k, 2) shortest paths from points (b, 2) to the goal, which the shorter ones repeat."""
+        chains = self._chains[self.first_bend[self.field.index(points)]]
+        return np.concatenate([points[:, None], self.nodes[chains]], axis=1)
+
+    @cached_property
+    def _chains(self) -> np.ndarray:
+        """(n, k) each node and those after it on the path to the goal, which is repeated."""
+        chains = [np.arange(len(self.next_node))]
+        while (after := self.next_node[chains[-1]]).tolist() != chains[-1].tolist():
+            chains.append(after)
+        return np.stack(chains, axis=1)
 
 
 def build_goal_distance(graph: VisibilityGraph, field: ClearanceField, goal: Array) -> GoalDistance | None:

@@ -20,8 +20,9 @@ from expdesign.plan.local_planner.agile_times import (
     transition_losses_s,
     transitions,
 )
-from expdesign.plan.local_planner.arcs import between, moved, on_paths, path_points
+from expdesign.plan.local_planner.arcs import PathPoints, all_round, between, moved, on_paths, path_points
 from expdesign.plan.local_planner.protocol import (
+    Alike,
     LegEnds,
     Pair,
     PartialPlans,
@@ -35,11 +36,6 @@ from expdesign.plan.runs import Footprint
 from expdesign.simulation import CALM
 from expdesign.values import Array
 from expdesign.vessel import Vessel
-
-COURSES = np.arange(6) * np.pi / 3
-"""Courses of straight legs, from the heading that the run before ends with."""
-HEADINGS = np.arange(16) * np.pi / 8
-"""Headings of runs, from that heading or from the direction of the path."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -80,15 +76,16 @@ class AgilePlanner:
         """The space with the transitions of these pairs tried."""
         return with_transitions(space, self.ship, self.times, pairs, trials)
 
-    def successors(self, space: SearchSpace, plans: PartialPlans, q: int) -> list[Successors]:
+    def successors(self, space: SearchSpace, plans: PartialPlans) -> Successors:
         """Transitions, straight legs, and points of the path to the goal."""
-        able = np.flatnonzero(plans.left[:, q] > 0)
-        more_m = np.array([space.more_run_up_m(int(last), q) for last in plans.last[able]])
-        return [
-            self._transitions(space, plans, able, q, more_m),
-            self._straights(space, plans, able, q, more_m),
-            self._on_path(space, plans, able, q),
-        ]
+        points, found = path_points(space, plans.pose, LOCAL.agile_path_stretches), []
+        for q in plans.wanted:
+            able = plans.able(q)
+            alike = plans.alike(able)
+            found.append(self._transitions(space, plans, able, q, alike))
+            found.append(self._straights(space, plans, able, q, alike))
+            found.append(self._on_path(space, plans, able, q, points))
+        return Successors.joined(found)
 
     def leg_s(self, space: SearchSpace, ends: LegEnds, froms: Array, tos: Array, bends: Array) -> Array:
         """(n,) time of legs straight on, or along the path with bends [s]."""
@@ -165,85 +162,84 @@ class AgilePlanner:
         return float(lost[:, nearest_direction(last.course_from_end_rad)].min())
 
     def _transitions(
-        self, space: SearchSpace, plans: PartialPlans, able: np.ndarray, q: int, more_m: Array
+        self, space: SearchSpace, plans: PartialPlans, able: np.ndarray, q: int, alike: Alike
     ) -> Successors:
         """Runs near the end of the one before, placed and headed as suits the transition."""
-        parents, steps, seconds = [np.zeros(0, dtype=int)], [np.zeros((0, 3))], [np.zeros(0)]
-        entry = np.array(space.footprints[q].entry_mps)
-        for (last, exit_mps), where in plans.alike(able).items():
-            tried, longer = space.tried.get(space.pair(last, q)), float(more_m[where[0]])
-            found = transitions(self.times, exit_mps, float(entry), short=tried is None)
-            step, leg_s = found.step, found.seconds + space.more_s(last, q)
+        found, entry = [], np.array(space.footprints[q].entry_mps)
+        for (last, exit_mps), where in alike.items():
+            tried, longer = space.tried.get(space.pair(last, q)), space.more_run_up_m(last, q)
+            best = transitions(self.times, exit_mps, float(entry), short=tried is None)
+            step, leg_s = best.step, best.seconds + space.more_s(last, q)
             if tried is not None:
                 step, leg_s = np.vstack([step, tried.step]), np.r_[leg_s, tried.seconds]
             if longer:  # straight before the run
                 step = step + longer * np.column_stack([np.cos(step[:, 2]), np.sin(step[:, 2]), 0 * leg_s])
                 leg_s = self.times.step_s(step, np.array(exit_mps), entry) + space.more_s(last, q)
-            parents.append(np.repeat(able[where], len(leg_s)))
-            steps.append(np.tile(step, (len(where), 1)))
-            seconds.append(np.tile(leg_s, len(where)))
-        return _stepped(space, plans, q, *(np.concatenate(part) for part in (parents, steps, seconds)))
+            found.append(_stepped(space, plans, q, able[where], step, leg_s))
+        return Successors.joined(found)
 
-    def _straights(
-        self, space: SearchSpace, plans: PartialPlans, able: np.ndarray, q: int, more_m: Array
-    ) -> Successors:
+    def _straights(self, space: SearchSpace, plans: PartialPlans, able: np.ndarray, q: int, alike: Alike) -> Successors:
         """Straight legs to all sides, the run with any heading."""
         lengths = space.hull_m * np.array(LOCAL.agile_straights)
-        course, length, heading = (grid.ravel() for grid in np.meshgrid(COURSES, lengths, HEADINGS, indexing="ij"))
-        parent = np.repeat(able, len(course))
-        course, heading = np.tile(course, len(able)), np.tile(heading, len(able))
-        length = np.tile(length, len(able)) + np.repeat(more_m, len(parent) // max(len(able), 1))
-        step = np.column_stack([length * np.cos(course), length * np.sin(course), heading])
-        leg_s = self.times.step_s(step, plans.exit_mps[parent], np.array(space.footprints[q].entry_mps))
-        leg_s += np.array([space.more_s(int(last), q) for last in plans.last])[parent]
-        return _stepped(space, plans, q, parent, step, leg_s)
+        grids = np.meshgrid(all_round(LOCAL.agile_courses), lengths, all_round(LOCAL.agile_headings), indexing="ij")
+        course, length, heading = (grid.ravel() for grid in grids)
+        step, leg_s = np.zeros((len(able), len(course), 3)), np.zeros((len(able), len(course)))
+        for (last, exit_mps), where in alike.items():
+            longer = length + space.more_run_up_m(last, q)
+            steps = np.column_stack([longer * np.cos(course), longer * np.sin(course), heading])
+            seconds = self.times.step_s(steps, np.array(exit_mps), np.array(space.footprints[q].entry_mps))
+            step[where], leg_s[where] = steps, seconds + space.more_s(last, q)
+        return _stepped(space, plans, q, able, step, leg_s)
 
-    def _on_path(self, space: SearchSpace, plans: PartialPlans, able: np.ndarray, q: int) -> Successors:
+    def _on_path(
+        self, space: SearchSpace, plans: PartialPlans, able: np.ndarray, q: int, points: PathPoints
+    ) -> Successors:
         """Runs at points of the path to the goal, with any heading."""
-        parents, starts, seconds = [np.zeros(0, dtype=int)], [np.zeros((0, 3))], [np.zeros(0)]
-        for index in able:
-            points, along = path_points(space, plans.pose[index], np.array(LOCAL.agile_path_stretches))
-            if len(points):
-                heading = np.arctan2(points[:, 3], points[:, 2])[:, None] + HEADINGS
-                leg_s = self._along_s(space, plans, int(index), q, points, along)
-                placed = np.repeat(points[:, :2], len(HEADINGS), axis=0)
-                starts.append(np.column_stack([placed, heading.ravel()]))
-                seconds.append(leg_s.ravel())
-                parents.append(np.full(len(placed), index))
-        return on_paths(q, plans.pose, np.concatenate(parents), np.concatenate(starts), np.concatenate(seconds))
-
-    def _along_s(
-        self, space: SearchSpace, plans: PartialPlans, index: int, q: int, points: Array, along: Array
-    ) -> Array:
-        """(points, headings) time of legs along the path [s]."""
-        pose, direction = plans.pose[index], np.arctan2(points[:, 3], points[:, 2])
-        near = along < 10 * space.hull_m
-        to_point = np.arctan2(*(points[:, :2] - pose[:2]).T[::-1])
-        first = pose[2] - np.where(near, to_point, direction[0])
-        heading = direction[:, None] + HEADINGS
-        helped_m = (points[:, :2] - pose[:2]) @ space.current_to / self.times.speed_mps
-        return self.times.seconds(
-            np.maximum(along - helped_m, 0.0)[:, None],
+        plan, point = np.nonzero(points.exists[able])
+        parent, turns = able[plan], all_round(LOCAL.agile_headings)
+        pose, place = plans.pose[parent], points.place[parent, point]
+        direction, along_m = points.direction_rad[parent, point], points.along_m[parent, point]
+        away = place - pose[:, :2]
+        to_point, near = np.arctan2(away[:, 1], away[:, 0]), along_m < LOCAL.near_path_hulls * space.hull_m
+        first = pose[:, 2] - np.where(near, to_point, points.first_rad[parent])
+        heading = direction[:, None] + turns
+        helped_m = away @ space.current_to / self.times.speed_mps
+        leg_s = self.times.seconds(
+            np.maximum(along_m - helped_m, 0.0)[:, None],
             first[:, None],
             heading - np.where(near, to_point, direction)[:, None],
-            heading - pose[2],
-            plans.exit_mps[index],
+            heading - pose[:, 2:],
+            plans.exit_mps[parent, None],
             np.array(space.footprints[q].entry_mps),
-        ) + space.more_s(int(plans.last[index]), q)
+        )
+        more_s = np.array([space.more_s(last, q) for last in range(-1, len(space.footprints))])
+        leg_s += more_s[plans.last[parent] + 1, None]
+        start = np.column_stack([np.repeat(place, len(turns), axis=0), heading.ravel()])
+        return on_paths(q, plans.pose, np.repeat(parent, len(turns)), start, leg_s.ravel())
 
 
 def _stepped(
-    space: SearchSpace, plans: PartialPlans, q: int, parent: np.ndarray, step: Array, leg_s: Array
+    space: SearchSpace, plans: PartialPlans, q: int, able: np.ndarray, step: Array, leg_s: Array
 ) -> Successors:
-    """Straight legs by steps through water (n, 3) from where partial plans end."""
-    n, start = len(parent), moved(plans.pose[parent], step)
-    start[:, :2] += leg_s[:, None] * space.current_to
+    """Straight legs through water from where plans `able` (b,) end.
+
+    Args:
+        space: the water.
+        plans: partial plans.
+        able: those that are continued.
+        q: the run.
+        step: (m, 3) or (b, m, 3) ahead m, to starboard m, turn rad.
+        leg_s: (m,) or (b, m) time.
+    """
+    start = moved(plans.pose[able, None], step)
+    start[..., :2] += leg_s[..., None] * space.current_to
+    b, m, _ = start.shape
     return Successors(
-        parent=parent,
-        primitive=np.full(n, q),
-        departure=plans.pose[parent],
-        start=start,
-        leg_s=leg_s,
-        turn=np.full(n, np.nan),
-        straight=np.ones(n, dtype=bool),
+        departure=plans.pose,
+        parent=np.repeat(able, m),
+        primitive=np.full(b * m, q),
+        start=start.reshape(-1, 3),
+        leg_s=np.broadcast_to(leg_s, (b, m)).ravel(),
+        turn=np.full(b * m, np.nan),
+        straight=np.ones(b * m, dtype=bool),
     )

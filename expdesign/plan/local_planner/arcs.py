@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,10 +11,6 @@ from expdesign.conventions import wrap_angle
 from expdesign.plan.local_planner.protocol import SearchSpace, Successors
 from expdesign.plan.local_planner.tuning import LOCAL
 from expdesign.values import Array
-
-TURNS = np.deg2rad([0, 15, -15, 30, -30, 50, -50, 75, -75, 105, -105, 140, -140, 180, -180])
-OFFSETS = np.deg2rad([0, 30, -30, 60, -60, 90, -90, 135, -135, 180])
-"""Headings of runs from the direction of the path."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -32,15 +29,18 @@ class Departures:
 def arc_successors(space: SearchSpace, departures: Departures, able: np.ndarray, q: int, run_up_m: Array) -> Successors:
     """An arc and a straight to the run, after plans `able`; `run_up_m` of them is part of the straight."""
     radius = space.ship.turning_radius_m
-    turn, extra = (grid.ravel() for grid in np.meshgrid(TURNS, space.hull_m * np.array(LOCAL.arc_straights)))
+    turn, extra = (
+        grid.ravel()
+        for grid in np.meshgrid(np.deg2rad(LOCAL.arc_turns_deg), space.hull_m * np.array(LOCAL.arc_straights))
+    )
     count, pose = len(turn), departures.pose
     departure = np.repeat(pose[able], count, axis=0)
     turns, straight = np.tile(turn, len(able)), np.tile(extra, len(able)) + np.repeat(run_up_m, count)
     sail_s = (radius * np.abs(turns) + straight) / space.ship.transit_speed_mps
     return Successors(
+        departure=pose,
         parent=np.repeat(able, count),
         primitive=np.full(len(turns), q),
-        departure=departure,
         start=arc_end(departure, turns, straight, radius),
         leg_s=sail_s + np.repeat(departures.wait_s[able], count),
         turn=turns,
@@ -49,7 +49,7 @@ def arc_successors(space: SearchSpace, departures: Departures, able: np.ndarray,
 
 
 def path_successors(
-    space: SearchSpace, departures: Departures, able: np.ndarray, q: int, *, turning_radius_m: float
+    space: SearchSpace, departures: Departures, able: np.ndarray, q: int, points: PathPoints, *, turning_radius_m: float
 ) -> Successors:
     """A stretch of the shortest path to the goal, then the run with some heading.
 
@@ -58,31 +58,28 @@ def path_successors(
         departures: of all plans.
         able: plans that still have the run to do.
         q: the run.
+        points: of the paths of all plans.
         turning_radius_m: of the turns into and out of the path, whose length is added; 0 where leg times include it.
     """
-    parents, starts, seconds = [np.zeros(0, dtype=int)], [np.zeros((0, 3))], [np.zeros(0)]
-    for index in able:
-        pose = departures.pose[index]
-        points, along = path_points(space, pose, np.array(LOCAL.path_stretches))
-        if not len(points):
-            continue
-        heading = np.arctan2(points[:, 3], points[:, 2])
-        first = np.abs(wrap_angle(heading[:1] - pose[2]))
-        for offset in OFFSETS:
-            length = along + turning_radius_m * (abs(offset) + first)
-            starts.append(np.column_stack([points[:, :2], heading + offset]))
-            seconds.append(length / space.ship.transit_speed_mps + departures.wait_s[index])
-            parents.append(np.full(len(points), index))
-    return on_paths(q, departures.pose, np.concatenate(parents), np.concatenate(starts), np.concatenate(seconds))
+    off_path = np.deg2rad(LOCAL.path_headings_deg)
+    plan, heading, point = np.nonzero(
+        np.broadcast_to(points.exists[able, None], (len(able), len(off_path), points.count))
+    )
+    parent, offset = able[plan], off_path[heading]
+    first = np.abs(wrap_angle(points.first_rad[parent] - departures.pose[parent, 2]))
+    length_m = points.along_m[parent, point] + turning_radius_m * (np.abs(offset) + first)
+    start = np.column_stack([points.place[parent, point], points.direction_rad[parent, point] + offset])
+    leg_s = length_m / space.ship.transit_speed_mps + departures.wait_s[parent]
+    return on_paths(q, departures.pose, parent, start, leg_s)
 
 
-def on_paths(q: int, pose: Array, parent: np.ndarray, start: Array, leg_s: Array) -> Successors:
-    """Successors by paths that keep their clearance by construction, after plans at poses (b, 3)."""
+def on_paths(q: int, departure: Array, parent: np.ndarray, start: Array, leg_s: Array) -> Successors:
+    """Successors by paths that keep their clearance by construction, after plans that depart from poses (b, 3)."""
     n = len(parent)
     return Successors(
+        departure=departure,
         parent=parent,
         primitive=np.full(n, q),
-        departure=pose[parent],
         start=start,
         leg_s=leg_s,
         turn=np.full(n, np.nan),
@@ -90,25 +87,57 @@ def on_paths(q: int, pose: Array, parent: np.ndarray, start: Array, leg_s: Array
     )
 
 
-def path_points(space: SearchSpace, pose: Array, stretches: Array) -> tuple[Array, Array]:
-    """Rows (north, east, direction north, direction east) along the path to the goal, and their distances along it.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PathPoints:
+    """Points along the shortest paths of several plans to the goal.
+
+    Attributes:
+        place: (b, s, 2) north, east.
+        direction_rad: (b, s) of the path there.
+        along_m: (b, s) distance along the path.
+        exists: (b, s) whether the path is that long.
+    """
+
+    place: Array
+    direction_rad: Array
+    along_m: Array
+    exists: np.ndarray
+
+    @property
+    def count(self) -> int:
+        """Points of each path."""
+        return int(self.along_m.shape[1])
+
+    @property
+    def first_rad(self) -> Array:
+        """(b,) direction at the first point of each path."""
+        return np.asarray(self.direction_rad[np.arange(len(self.exists)), self.exists.argmax(axis=1)])
+
+
+def path_points(space: SearchSpace, pose: Array, stretches: Sequence[float]) -> PathPoints:
+    """Points along the paths to the goal.
 
     Args:
         space: the water.
-        pose: (3,) where the path begins.
-        stretches: hull lengths along it; the whole path is always among them.
+        pose: (b, 3) where the paths begin.
+        stretches: hull lengths along them; the whole path is always the last.
     """
-    path = space.goal_distance.path(pose[:2])
-    steps = np.hypot(*np.diff(path, axis=0).T)
-    path, steps = path[np.r_[True, steps > 1e-6]], steps[steps > 1e-6]
-    if not len(steps):
-        return np.zeros((0, 4)), np.zeros(0)
-    along = np.r_[0.0, np.cumsum(steps)]
-    chosen = np.r_[stretches * space.hull_m, along[-1]]
-    chosen = chosen[chosen <= along[-1]]
-    piece = np.clip(np.searchsorted(along, chosen, side="left") - 1, 0, len(steps) - 1)
-    places = np.stack([np.interp(chosen, along, column) for column in path.T], axis=1)
-    return np.column_stack([places, np.diff(path, axis=0)[piece] / steps[piece, None]]), chosen
+    path, plans = space.goal_distance.paths(pose[:, :2]), np.arange(len(pose))[:, None]
+    steps = np.diff(path, axis=1)
+    length_m = np.hypot(steps[..., 0], steps[..., 1])
+    length_m[length_m <= 1e-6] = 0.0
+    until_m = np.cumsum(length_m, axis=1)
+    whole_m = until_m[:, -1:]
+    along_m = np.hstack([np.tile(space.hull_m * np.array(stretches), (len(pose), 1)), whole_m])
+    piece = (until_m[:, None] < along_m[..., None]).sum(axis=-1).clip(max=steps.shape[1] - 1)
+    step, step_m = steps[plans, piece], length_m[plans, piece]
+    share = 1.0 - (until_m[plans, piece] - along_m) / np.where(step_m > 0, step_m, 1.0)
+    return PathPoints(
+        place=path[plans, piece] + share[..., None] * step,
+        direction_rad=np.arctan2(step[..., 1], step[..., 0]),
+        along_m=along_m,
+        exists=(along_m <= whole_m) & (whole_m > 0),
+    )
 
 
 def arc_end(pose: Array, turn: Array, straight: Array, radius: float) -> Array:
@@ -124,9 +153,14 @@ def between(start: Array, end: Array, spacing_m: float) -> Array:
     return np.linspace(start[:2], end[:2], count + 1)
 
 
+def all_round(count: int) -> Array:
+    """(count,) directions at even angles, ahead first [rad]."""
+    return np.asarray(np.arange(count) * np.pi / (count / 2))
+
+
 def moved(pose: Array, step: Array) -> Array:
-    """(n, 3) poses moved ahead [m], to starboard [m] and turned [rad]."""
-    c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
-    north = pose[:, 0] + c * step[:, 0] - s * step[:, 1]
-    east = pose[:, 1] + s * step[:, 0] + c * step[:, 1]
-    return np.stack([north, east, pose[:, 2] + step[:, 2]], axis=1)
+    """(..., 3) poses moved ahead [m], to starboard [m] and turned [rad]."""
+    c, s = np.cos(pose[..., 2]), np.sin(pose[..., 2])
+    ahead, starboard = step[..., 0], step[..., 1]
+    north, east = pose[..., 0] + c * ahead - s * starboard, pose[..., 1] + s * ahead + c * starboard
+    return np.stack([north, east, pose[..., 2] + step[..., 2]], axis=-1)

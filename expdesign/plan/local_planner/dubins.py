@@ -11,7 +11,14 @@ from expdesign.conventions import wrap_angle
 from expdesign.plan.chart import polyline_length
 from expdesign.plan.control import DubinsShip
 from expdesign.plan.legs import LegTask, LegWater, curved_leg, dubins_curve
-from expdesign.plan.local_planner.arcs import Departures, arc_successors, between, moved, path_successors
+from expdesign.plan.local_planner.arcs import (
+    Departures,
+    arc_successors,
+    between,
+    moved,
+    path_points,
+    path_successors,
+)
 from expdesign.plan.local_planner.dubins_length import dubins_m
 from expdesign.plan.local_planner.protocol import (
     LegEnds,
@@ -21,6 +28,7 @@ from expdesign.plan.local_planner.protocol import (
     Successors,
     TransitionTrials,
 )
+from expdesign.plan.local_planner.tuning import LOCAL
 from expdesign.values import Array
 
 
@@ -50,15 +58,16 @@ class DubinsPlanner:
         """The space itself."""
         return space
 
-    def successors(self, space: SearchSpace, plans: PartialPlans, q: int) -> list[Successors]:
+    def successors(self, space: SearchSpace, plans: PartialPlans) -> Successors:
         """Arcs, and stretches of the path to the goal."""
-        able = np.flatnonzero(plans.left[:, q] > 0)
-        run_up_m = space.hull_m + np.array([space.more_run_up_m(int(last), q) for last in plans.last[able]])
-        departures = Departures(pose=plans.pose, wait_s=self._change_s(plans.exit_mps, space.footprints[q].entry_mps))
-        return [
-            arc_successors(space, departures, able, q, run_up_m),
-            path_successors(space, departures, able, q, turning_radius_m=self.ship.turning_radius_m),
-        ]
+        points, radius_m, found = path_points(space, plans.pose, LOCAL.path_stretches), self.ship.turning_radius_m, []
+        for q in plans.wanted:
+            able, change_s = plans.able(q), self._change_s(plans.exit_mps, space.footprints[q].entry_mps)
+            run_up_m = space.hull_m + np.array([space.more_run_up_m(int(last), q) for last in plans.last[able]])
+            departures = Departures(pose=plans.pose, wait_s=change_s)
+            found.append(arc_successors(space, departures, able, q, run_up_m))
+            found.append(path_successors(space, departures, able, q, points, turning_radius_m=radius_m))
+        return Successors.joined(found)
 
     def leg_s(self, space: SearchSpace, ends: LegEnds, froms: Array, tos: Array, bends: Array) -> Array:
         """(n,) time of the Dubins curve, or of the path with bends where that is longer [s]."""

@@ -12,7 +12,15 @@ from expdesign.dictionary import Primitive
 from expdesign.plan.chart import polyline_length
 from expdesign.plan.control import HelmShip
 from expdesign.plan.legs import LegTask, LegWater, check_ends, displaced, dubins_curve, helm_leg, last_state, recover
-from expdesign.plan.local_planner.arcs import Departures, arc_successors, between, moved, path_successors
+from expdesign.plan.local_planner.arcs import (
+    Departures,
+    PathPoints,
+    arc_successors,
+    between,
+    moved,
+    path_points,
+    path_successors,
+)
 from expdesign.plan.local_planner.helm_times import HelmTimes, helm_times
 from expdesign.plan.local_planner.protocol import (
     LegEnds,
@@ -22,6 +30,7 @@ from expdesign.plan.local_planner.protocol import (
     Successors,
     TransitionTrials,
 )
+from expdesign.plan.local_planner.tuning import LOCAL
 from expdesign.simulation import CALM
 from expdesign.values import Array, seal
 
@@ -64,17 +73,21 @@ class HelmPlanner:
         """The space itself."""
         return space
 
-    def successors(self, space: SearchSpace, plans: PartialPlans, q: int) -> list[Successors]:
+    def successors(self, space: SearchSpace, plans: PartialPlans) -> Successors:
         """Arcs and stretches of the path to the goal, in the time that changes of speed and turns take."""
-        able = np.flatnonzero(plans.left[:, q] > 0)
+        departures = self._departures(space, plans)
+        points = path_points(space, departures.pose, LOCAL.path_stretches)
+        return Successors.joined([self._to_run(space, plans, q, departures, points) for q in plans.wanted])
+
+    def _to_run(
+        self, space: SearchSpace, plans: PartialPlans, q: int, departures: Departures, points: PathPoints
+    ) -> Successors:
+        able = plans.able(q)
         more_m = np.array([space.more_run_up_m(int(last), q) for last in plans.last[able]])
-        departures, run_up_m = self._departures(space, plans), max(space.hull_m, self.ship.run_up_m) + more_m
-        found = Successors.joined(
-            [
-                arc_successors(space, departures, able, q, run_up_m),
-                path_successors(space, departures, able, q, turning_radius_m=0.0),  # `between_s` has the turns
-            ]
-        )
+        run_up_m = max(space.hull_m, self.ship.run_up_m) + more_m
+        arcs = arc_successors(space, departures, able, q, run_up_m)
+        paths = path_successors(space, departures, able, q, points, turning_radius_m=0.0)  # `between_s` has the turns
+        found = Successors.joined([arcs, paths])
         paths_m, leg_s = found.leg_s * self.times.speed_mps, np.zeros(len(found.leg_s))
         entry_mps = space.footprints[q].entry_mps
         for (last, exit_mps), where in plans.alike(found.parent).items():
@@ -83,7 +96,7 @@ class HelmPlanner:
             )
             on_path_s = self.times.seconds(paths_m[where], exit_mps, entry_mps)
             leg_s[where] = np.maximum(open_s, np.where(np.isnan(found.turn[where]), on_path_s, 0.0))
-        return [replace(found, leg_s=leg_s)]
+        return replace(found, leg_s=leg_s)
 
     def leg_s(self, space: SearchSpace, ends: LegEnds, froms: Array, tos: Array, bends: Array) -> Array:
         """(n,) time of legs in open water, or along the path with bends where that takes longer [s]."""

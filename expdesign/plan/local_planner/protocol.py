@@ -25,6 +25,8 @@ from expdesign.values import Array, seal
 
 Pair = tuple[str, str]
 """Names of the runs before and after a leg; "" for start and goal."""
+Alike = Mapping[tuple[int, float], np.ndarray]
+"""Positions of partial plans by the run that was last and its exit speed."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -128,8 +130,17 @@ class PartialPlans:
     cost_s: Array
     history: tuple[tuple[tuple[int, Array], ...], ...]
 
-    def alike(self, rows: np.ndarray) -> dict[tuple[int, float], np.ndarray]:
-        """Indices into `rows` by the run that was last and its exit speed."""
+    @property
+    def wanted(self) -> list[int]:
+        """Runs that some plan still has to do."""
+        return [q for q in range(self.left.shape[1]) if self.left[:, q].any()]
+
+    def able(self, q: int) -> np.ndarray:
+        """Indices of plans that still have a run to do."""
+        return np.flatnonzero(self.left[:, q] > 0)
+
+    def alike(self, rows: np.ndarray) -> Alike:
+        """Positions in `rows` of plans after the same run at the same exit speed."""
         found: dict[tuple[int, float], list[int]] = {}
         for where, index in enumerate(rows):
             found.setdefault((int(self.last[index]), float(self.exit_mps[index])), []).append(where)
@@ -141,30 +152,33 @@ class Successors:
     """Continuations of partial plans by one leg and one run, one per row.
 
     Attributes:
+        departure: (b, 3) pose from which the leg of each partial plan is checked for clearance.
         parent: (n,) index of the partial plan.
         primitive: (n,) index of the run to do next.
-        departure: (n, 3) pose from which its leg is checked for clearance.
         start: (n, 3) where the run begins.
         leg_s: (n,) time to get there.
         turn: (n,) angle of the arc that leads there, before a straight; nan for others.
         straight: (n,) whether a straight line leads there.
     """
 
+    departure: Array
     parent: np.ndarray
     primitive: np.ndarray
-    departure: Array
     start: Array
     leg_s: Array
     turn: Array
     straight: np.ndarray
 
     def __getitem__(self, rows: np.ndarray) -> Successors:
-        return Successors(**{name: column[rows] for name, column in vars(self).items()})
+        return replace(self, **{name: vars(self)[name][rows] for name in _COLUMNS})
 
     @classmethod
     def joined(cls, parts: Sequence[Successors]) -> Successors:
-        """All rows of several sets."""
-        return cls(**{name: np.concatenate([vars(part)[name] for part in parts]) for name in vars(parts[0])})
+        """All rows of several sets that continue the same partial plans."""
+        return replace(parts[0], **{name: np.concatenate([vars(part)[name] for part in parts]) for name in _COLUMNS})
+
+
+_COLUMNS = ("parent", "primitive", "start", "leg_s", "turn", "straight")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -224,8 +238,8 @@ class LocalPlanner(Protocol):
     def with_transitions(self, space: SearchSpace, pairs: Sequence[Pair], trials: TransitionTrials) -> SearchSpace:
         """The space with the transitions of these pairs tried."""
 
-    def successors(self, space: SearchSpace, plans: PartialPlans, q: int) -> list[Successors]:
-        """Placements of run q after each partial plan."""
+    def successors(self, space: SearchSpace, plans: PartialPlans) -> Successors:
+        """Placements of every run that is left after each partial plan."""
 
     def leg_s(self, space: SearchSpace, ends: LegEnds, froms: Array, tos: Array, bends: Array) -> Array:
         """(n,) time of legs between poses (n or 1, 3) along a path with bends (b, 2) [s]."""

@@ -10,10 +10,14 @@ class Tuning:
     """Local planners.
 
     Attributes:
-        arc_straights: straight after an arc, beyond the run-up, in hull lengths.
+        arc_turns_deg, arc_straights: turns of arcs, and the straight after them beyond the run-up in hull lengths.
         path_stretches: of the shortest path to the goal, in hull lengths; the whole path is always tried too.
+        path_headings_deg: headings of runs on it, from its direction.
         agile_path_stretches, agile_straights: the same of agile ships, and lengths of their straight legs besides the
             best transitions, beyond the run-up.
+        agile_courses, agile_headings: courses of those legs to a full turn, from the heading that the run before ends
+            with, and headings of runs, from that heading or from the direction of the path.
+        near_path_hulls: hull lengths along the path within which it is taken for a straight line.
         far_hulls: hull lengths that are enough for any leg.
         acceleration_share, yaw_rate_share: of the mean largest acceleration and of the yaw rate on the spot, that agile
             legs make use of. This and the next two are fitted to 540 optimised legs of three vessels, 20 m, 30 m and a
@@ -35,10 +39,15 @@ class Tuning:
         stopped_share: of transit speed below which a ship has stopped or is about to: no run-up then.
     """
 
+    arc_turns_deg: tuple[float, ...] = (0, 15, -15, 30, -30, 50, -50, 75, -75, 105, -105, 140, -140, 180, -180)
     arc_straights: tuple[float, ...] = (0.0, 1.0, 2.0, 3.0, 4.5, 6.0)
     path_stretches: tuple[float, ...] = (5.0, 12.0, 25.0, 50.0, 100.0)
+    path_headings_deg: tuple[float, ...] = (0, 30, -30, 60, -60, 90, -90, 135, -135, 180)
     agile_path_stretches: tuple[float, ...] = (1.5, 2.5, 4.0, 7.0, 12.0, 25.0, 50.0, 100.0)
     agile_straights: tuple[float, ...] = (1.5, 2.5, 6.0)
+    agile_courses: int = 6
+    agile_headings: int = 16
+    near_path_hulls: float = 10.0
     acceleration_share: float = 1.1
     yaw_rate_share: float = 0.7
     time_power: float = 2.0

@@ -91,14 +91,11 @@ def _chain(beam: PartialPlans, index: int) -> tuple[list[int], Array]:
 
 def _advance(space: SearchSpace, beam: PartialPlans, width: int, ahead: OrdersAhead) -> PartialPlans:
     """The best partial plans with one more run each."""
-    wanted = [q for q in range(len(space.footprints)) if beam.left[:, q].any()]
-    found = Successors.joined([part for q in wanted for part in space.planner.successors(space, beam, q)])
-    cost = beam.cost_s[found.parent] + found.leg_s
-    left = beam.left[found.parent].copy()
-    left[np.arange(len(left)), found.primitive] -= 1
+    found = space.planner.successors(space, beam)
+    left = beam.left[:, None] - np.eye(len(space.footprints), dtype=int)  # (b, q, q) after each next run
     end = run_ends(space, found.primitive, found.start)
-    rest_s = _rest_s(space, end, left) + ahead.seconds(left, found.primitive)
-    kept = _select(space, beam, found, end, left, cost + rest_s, width)
+    cost_s = beam.cost_s[found.parent] + found.leg_s
+    kept = _select(space, found, end, left, cost_s + _rest_s(space, found, end, left, ahead), width)
     if not len(kept):
         raise NoPlan(_what_blocks(space, beam))
     chosen = found[kept]
@@ -106,8 +103,8 @@ def _advance(space: SearchSpace, beam: PartialPlans, width: int, ahead: OrdersAh
         pose=end[kept],
         exit_mps=np.array([space.footprints[q].exit_mps for q in chosen.primitive]),
         last=chosen.primitive,
-        left=left[kept],
-        cost_s=cost[kept],
+        left=left[chosen.parent, chosen.primitive],
+        cost_s=cost_s[kept],
         history=tuple(
             (*beam.history[parent], (int(q), start))
             for parent, q, start in zip(chosen.parent, chosen.primitive, chosen.start, strict=True)
@@ -115,34 +112,49 @@ def _advance(space: SearchSpace, beam: PartialPlans, width: int, ahead: OrdersAh
     )
 
 
-def _rest_s(space: SearchSpace, end: Array, left: np.ndarray) -> Array:
-    """(n,) least repositioning time left, by the path to the goal and the displacement of the runs left [s]."""
+def _rest_s(space: SearchSpace, found: Successors, end: Array, left: np.ndarray, ahead: OrdersAhead) -> Array:
+    """(n,) repositioning time left after successors that end at poses (n, 3) [s].
+
+    At least that of the path to the goal less the displacement of the runs left (b, q, q), and what their order loses.
+    """
+    speed_mps = space.ship.transit_speed_mps
     made_good_m = left @ np.array([run.displacement_m for run in space.footprints])
-    helped_m = (space.goal[:2] - end[:, :2]) @ space.current_to / space.ship.transit_speed_mps
-    ahead_m = space.goal_distance.to_goal(end[:, :2]) - made_good_m - helped_m
-    return np.asarray(np.clip(ahead_m, 0.0, None) / space.ship.transit_speed_mps)
+    lost_s = ahead.seconds(left.clip(0), np.arange(len(space.footprints)))
+    helped_m = (space.goal[:2] - end[:, :2]) @ space.current_to / speed_mps
+    next_run = found.parent, found.primitive
+    ahead_m = space.goal_distance.to_goal(end[:, :2]) - made_good_m[next_run] - helped_m
+    return np.asarray(np.clip(ahead_m, 0.0, None) / speed_mps + lost_s[next_run])
 
 
 def _select(
-    space: SearchSpace, beam: PartialPlans, found: Successors, end: Array, left: np.ndarray, total: Array, width: int
+    space: SearchSpace, found: Successors, end: Array, left: np.ndarray, total_s: Array, width: int
 ) -> np.ndarray:
     """Indices of the best successors whose leg and run are clear, at most one for each kind of place and remainder."""
-    order = np.argsort(total, kind="stable")
-    order = order[np.isfinite(total[order])]
-    places = np.rint(end[:, :2] / (SEARCH.cell_hulls * space.hull_m)).astype(int)
-    headings = np.rint(wrap_angle(end[:, 2]) / SEARCH.heading_rad).astype(int)
     kept: list[int] = []
     seen: set[tuple[int, ...]] = set()
-    for first in range(0, len(order), SEARCH.checked_at_once):
-        chunk = order[first : first + SEARCH.checked_at_once]
-        for index in chunk[clear_successors(space, found[chunk])]:
-            key = (*places[index], headings[index], *left[index])
-            if key not in seen:
-                seen.add(key)
+    for some in _in_order(total_s, SEARCH.checked_at_once):
+        clear = some[clear_successors(space, found[some])]
+        places = np.rint(end[clear, :2] / (SEARCH.cell_hulls * space.hull_m)).astype(int)
+        headings = np.rint(wrap_angle(end[clear, 2]) / SEARCH.heading_rad).astype(int)
+        remainders = left[found.parent[clear], found.primitive[clear]]
+        for index, key in zip(clear, np.column_stack([places, headings, remainders]).tolist(), strict=True):
+            if (kind := tuple(key)) not in seen:
+                seen.add(kind)
                 kept.append(int(index))
         if len(kept) >= width:
             break
     return np.array(kept[:width], dtype=int)
+
+
+def _in_order(values: Array, at_once: int) -> Iterator[np.ndarray]:
+    """Indices of finite values, the least first and equals as they come, about so many at once."""
+    left = np.flatnonzero(np.isfinite(values))
+    while len(left):
+        count = min(at_once, len(left))
+        among = values[left] <= np.partition(values[left], count - 1)[count - 1]
+        some = left[among]
+        yield some[np.argsort(values[some], kind="stable")]
+        left = left[~among]
 
 
 def _what_blocks(space: SearchSpace, beam: PartialPlans) -> str:

@@ -25,8 +25,8 @@ class OrdersAhead:
     lost_s: Array
 
     def seconds(self, left: np.ndarray, last: np.ndarray) -> Array:
-        """(n,) time lost from plans with runs left (n, q) after runs (n,)."""
-        if self.lost_s.shape[1] == 1 and len(self.lost_s) == left.shape[1]:
+        """(...,) time lost from plans with runs left (..., q) after runs (...,)."""
+        if self.lost_s.shape[1] == 1 and len(self.lost_s) == left.shape[-1]:
             return np.asarray(left @ self.lost_s[:, 0])
         return np.asarray(self.lost_s[left @ self.base, last])
 

@@ -21,9 +21,9 @@ def clear_successors(space: SearchSpace, found: Successors) -> np.ndarray:
     start, turn = found.start, found.turn
     clear = _ends_clear(space, found.primitive, start)
     arcs = np.flatnonzero(clear & ~np.isnan(turn))
-    clear[arcs] = _arcs_clear(space, found.departure[arcs], turn[arcs], start[arcs])
+    clear[arcs] = _arcs_clear(space, found.departure[found.parent[arcs]], turn[arcs], start[arcs])
     lines = np.flatnonzero(clear & found.straight)
-    clear[lines] = _lines_clear(space, found.departure[lines], start[lines])
+    clear[lines] = _lines_clear(space, found.departure[found.parent[lines]], start[lines])
     left = np.flatnonzero(clear)
     clear[left] = _hulls_clear(space, found.primitive[left], start[left])
     return clear
