@@ -40,15 +40,22 @@ class VisibilityGraph:
 
         Points outside the water are connected to its nearest point by a straight line.
         """
+        inside = np.array([self.nearest(start), self.nearest(end)])
+        straight = shapely.covers(self.water, shapely.LineString(inside[:, ::-1]))
+        between = inside if straight else self._bent(*inside)
+        if between is None:
+            return None
+        path = np.array([start, *between, end])
+        return path[np.r_[True, np.hypot(*np.diff(path, axis=0).T) > 1e-9]]
+
+    def _bent(self, start: Array, end: Array) -> Array | None:
+        """(k, 2) the shortest path between two points of the water, or None."""
         nodes, distance, before = self._least_costs(start, end, lambda step: np.hypot(*step.T))
         n = len(self.corners)
-        if not np.isfinite(distance[n + 1]):
-            return None
         chain = [n + 1]
-        while chain[-1] != n:
+        while np.isfinite(distance[n + 1]) and chain[-1] != n:
             chain.append(int(before[chain[-1]]))
-        path = np.array([start, *nodes[chain[::-1]], end])
-        return path[np.r_[True, np.hypot(*np.diff(path, axis=0).T) > 1e-9]]
+        return nodes[chain[::-1]] if chain[-1] == n else None
 
     def least_cost(self, start: Array, end: Array, cost: Callable[[Array], Array]) -> float:
         """Least cost of a path between two points (2,), infinite where there is none.
@@ -57,17 +64,16 @@ class VisibilityGraph:
         if they depend on direction: the best path then bends at corners only. For points outside the water it is the
         cost between its nearest points.
         """
-        _, least, _ = self._least_costs(start, end, cost)
+        _, least, _ = self._least_costs(self.nearest(start), self.nearest(end), cost)
         return float(least[len(self.corners) + 1])
 
     def _least_costs(self, start: Array, end: Array, cost: Callable[[Array], Array]) -> tuple[Array, Array, np.ndarray]:
-        """Corners and the points nearest to both ends, least costs from the start to all, and the node before each."""
-        inside = [self.nearest(point) for point in (start, end)]
-        nodes = np.concatenate([self.corners, inside])
+        """Corners and two points of the water, least costs from the first to all, and the node before each."""
+        nodes = np.concatenate([self.corners, [start, end]])
         n = len(self.corners)
         rows, columns = self.lengths.nonzero()
         tails, heads = [rows, columns], [columns, rows]
-        for k, point in enumerate(inside):
+        for k, point in enumerate((start, end)):
             seen = self.sees(point, nodes)
             tails += [np.full(len(seen), n + k), seen]
             heads += [seen, np.full(len(seen), n + k)]
