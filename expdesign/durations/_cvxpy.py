@@ -1,7 +1,7 @@
 """The convex problem of any criterion and any limits, stated in cvxpy; the only importer of it, imported when needed.
 
 A new limit is one expression in `_limits`, a new criterion one in `_hypograph`. The solver's status is not used:
-`newton_step` refines smooth problems, and `certificate` computes the gap from the problem alone.
+`certificate` computes the gap from the problem alone.
 
 Source: S. Diamond and S. Boyd, CVXPY: a Python-embedded modeling language for convex optimization, J. Mach. Learn. Res.
 17 (2016), no. 83; P. J. Goulart and Y. Chen, Clarabel: an interior-point solver for conic programs with quadratic
@@ -21,10 +21,12 @@ import numpy as np
 
 from expdesign.durations.concave import ConcaveProblem
 from expdesign.durations.criteria import LogDet, LogTrace, Measure
-from expdesign.durations.criteria.models import Piece
+from expdesign.durations.criteria.models import Indices, Piece
 from expdesign.durations.limits import Polytope
 from expdesign.durations.tuning import TUNING
 from expdesign.values import Array
+
+ALL = slice(None)
 
 
 def conic_optimum(task: ConcaveProblem) -> tuple[Array, tuple[Array, ...]] | None:
@@ -54,7 +56,9 @@ def conic_optimum(task: ConcaveProblem) -> tuple[Array, tuple[Array, ...]] | Non
     return w.value, tuple(_multiplier(piece, dual, w.value) for piece, dual in pairs)
 
 
-def newton_step(task: ConcaveProblem, w: Array, *, mixture: Array, floor_prices: Sequence[float]) -> Array | None:
+def newton_step(
+    task: ConcaveProblem, w: Array, *, chosen: Indices, mixture: Array, floor_prices: Sequence[float]
+) -> Array | None:
     """A step (q,) of sequential quadratic programming under all limits.
 
     It maximises the quadratic model of the Lagrangian, with the floors and the models of a worst case to first order.
@@ -62,33 +66,37 @@ def newton_step(task: ConcaveProblem, w: Array, *, mixture: Array, floor_prices:
     Args:
         task: with smooth measures.
         w: (q,) where B is positive definite for every model.
+        chosen: (c,) fractions that may change.
         mixture: (m,) weights of the models.
         floor_prices: of the floors.
 
     Returns:
         None where the solver gives no numbers.
     """
-    pieces, every = task.objective.pieces, np.arange(len(w))
-    weighed = zip((*mixture, *floor_prices), (*pieces, *(floor.pieces[0] for floor in task.floors)), strict=True)
-    curvatures = [weight * piece.curvature(w, every) for weight, piece in weighed if weight > 0]
-    H = np.sum(curvatures, axis=0)
-    values, vectors = np.linalg.eigh(H)
-    kept = values > 1e-14 * values[-1]
-    step, height = cp.Variable(len(w)), cp.Variable()
-    constraints = _limits(task.polytope, w + step)
+    pieces, floors = task.objective.pieces, [floor.pieces[0] for floor in task.floors]
+    weighed = zip((*mixture, *floor_prices), (*pieces, *floors), strict=True)
+    H = np.sum([weight * piece.curvature(w, chosen) for weight, piece in weighed if weight > 0], axis=0)
+    H[np.diag_indices_from(H)] += TUNING.curvature_rounding * np.trace(H)
+    step, height = cp.Variable(len(chosen)), cp.Variable()
+    fixed = np.array(w)
+    fixed[chosen] = 0.0
+    constraints = _limits(task.polytope, w[chosen] + step, chosen=chosen, fixed=fixed)
     tangents = [piece.tangent(w) for piece in pieces]
     heights = np.array([item.value for item in tangents]) - task.objective.levels
-    tilts = np.array([item.slope for item in tangents])
+    tilts = np.array([item.slope[chosen] for item in tangents])
     if task.objective.worst:
         constraints.append(height <= (heights - heights.min()) + tilts @ step)
     else:
         constraints.append(height == tilts.mean(axis=0) @ step)
-    for floor in task.floors:
-        tangent = floor.pieces[0].tangent(w)
-        constraints.append(tangent.value - float(floor.levels[0]) + tangent.slope @ step >= 0)
-    root = np.sqrt(values[kept])[:, None] * vectors[:, kept].T
-    _solve(cp.Problem(cp.Maximize(height - cp.sum_squares(root @ step) / 2), constraints))
-    return None if step.value is None or not np.isfinite(step.value).all() else np.asarray(step.value)
+    for floor, piece in zip(task.floors, floors, strict=True):
+        tangent = piece.tangent(w)
+        constraints.append(tangent.value - float(floor.levels[0]) + tangent.slope[chosen] @ step >= 0)
+    _solve(cp.Problem(cp.Maximize(height - cp.quad_form(step, cp.psd_wrap(H)) / 2), constraints))
+    if step.value is None or not np.isfinite(step.value).all():
+        return None
+    whole = np.zeros(len(w))
+    whole[chosen] = step.value
+    return whole
 
 
 def largest_least_eigenvalue(matrices: Array, prior: Array, polytope: Polytope) -> Array | None:
@@ -99,14 +107,16 @@ def largest_least_eigenvalue(matrices: Array, prior: Array, polytope: Polytope) 
     return None if w.value is None or not np.isfinite(w.value).all() else np.asarray(w.value)
 
 
-def _limits(polytope: Polytope, w: Any) -> list[Any]:
-    """All linear limits on fractions w."""
-    limits = [cp.sum(w) == 1, w >= polytope.least]
-    bounded = np.flatnonzero(polytope.most < 1.0)
+def _limits(polytope: Polytope, w: Any, *, chosen: Indices | slice = ALL, fixed: Array | None = None) -> list[Any]:
+    """All linear limits on the chosen fractions w (c,) beside fixed ones (q,), which are zero where chosen."""
+    least, most, rows, rest = polytope.least, polytope.most, polytope.rows, 0.0 if fixed is None else fixed
+    least, most, rows = least[chosen], np.maximum(most, least)[chosen], rows[:, chosen]
+    limits = [cp.sum(w) == 1 - np.sum(rest), w >= least]
+    bounded = np.flatnonzero(polytope.most[chosen] < 1.0)
     if len(bounded):
-        limits.append(w[bounded] <= np.maximum(polytope.most, polytope.least)[bounded])
-    if len(polytope.rows):
-        limits.append(polytope.rows @ w <= polytope.limits)
+        limits.append(w[bounded] <= most[bounded])
+    if len(rows):
+        limits.append(rows @ w <= polytope.limits - np.sum(polytope.rows * rest, axis=1))
     return limits
 
 

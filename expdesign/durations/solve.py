@@ -1,8 +1,8 @@
 """From a duration problem to certified durations.
 
-D without limits is solved by the working-set method. Every other criterion and limit is solved with cvxpy, and smooth
-criteria are refined by Newton's method. The certificate is computed from the problem alone; a design without one is
-not returned.
+D without limits is solved by the working-set method of `large_scale`. Other smooth criteria are solved by Newton's
+method under the limits, and E, or an optimum with singular information, as a conic problem. The certificate is computed
+from the problem alone; a design without one is not returned.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from expdesign.durations.concave import (
     with_idle,
 )
 from expdesign.durations.criteria import criterion
-from expdesign.durations.criteria.models import Objective
+from expdesign.durations.criteria.models import Indices, Objective
 from expdesign.durations.large_scale import d_optimal, rows_of
 from expdesign.durations.problem import DurationProblem
 from expdesign.durations.rounding import efficiency_of_shares, note_on_runs, whole_runs
@@ -147,12 +147,8 @@ def _maximised(task: ConcaveProblem, kind: str = "") -> _Optimum:
         return _proven(task, least / least.sum(), kind)
     if task.plain_d and (w := _plain_d(task)) is not None:
         return _proven(task, w, kind)
-    if (
-        len(task.objective.pieces) > 1 and task.smooth and not task.floors
-    ):  # Newton's method is quicker with many models
-        found = _sharpened(task, _proven(task, task.polytope.middle(), kind))
-        if found.gap < TUNING.largest_gap:
-            return found
+    if task.smooth and (found := _by_newton(task, kind)) is not None:
+        return found
     from expdesign.durations._cvxpy import conic_optimum
 
     answer = conic_optimum(task)
@@ -182,6 +178,15 @@ def _plain_d(task: ConcaveProblem) -> Array | None:
     return w
 
 
+def _by_newton(task: ConcaveProblem, kind: str) -> _Optimum | None:
+    """The optimum of smooth measures by Newton's method from the middle, or None where that does not lead there."""
+    try:
+        found = _sharpened(task, _proven(task, task.polytope.middle(), kind))
+    except np.linalg.LinAlgError:
+        return None
+    return found if found.gap < TUNING.largest_gap and _floors_kept(task, found.fractions) else None
+
+
 def _sharpened(task: ConcaveProblem, best: _Optimum) -> _Optimum:
     """An optimum with a gap no wider, by Newton's method under all limits, where every measure is smooth."""
     if not task.smooth:
@@ -195,7 +200,7 @@ def _sharpened(task: ConcaveProblem, best: _Optimum) -> _Optimum:
         proof, w = here.certificate, here.fractions
         prices = [proof.multipliers[name] for name in task.floor_names]
         try:
-            step = newton_step(task, w, mixture=proof.mixture, floor_prices=prices)
+            step = newton_step(task, w, chosen=_working_set(task, here), mixture=proof.mixture, floor_prices=prices)
             moved = None if step is None else _ascended(task, w, step, prices)
             if moved is None:
                 break
@@ -206,6 +211,13 @@ def _sharpened(task: ConcaveProblem, best: _Optimum) -> _Optimum:
         if before / 2 < best.gap < TUNING.rounding_gap:
             break
     return best
+
+
+def _working_set(task: ConcaveProblem, here: _Optimum) -> Indices:
+    """(c,) fractions above their least value, and those whose net sensitivity lets them rise."""
+    proof = here.certificate
+    rising = here.sensitivities - proof.prices > proof.level - TUNING.margin * proof.degree
+    return np.flatnonzero(rising | (here.fractions > task.polytope.least))
 
 
 def _ascended(task: ConcaveProblem, w: Array, step: Array, prices: Sequence[float]) -> Array | None:
@@ -223,9 +235,13 @@ def _ascended(task: ConcaveProblem, w: Array, step: Array, prices: Sequence[floa
     return None
 
 
+def _floors_kept(task: ConcaveProblem, w: Array) -> bool:
+    return all(floor.value(w) > -TUNING.floor_rounding for floor in task.floors)
+
+
 def _check_floors(task: ConcaveProblem, w: Array | None) -> None:
     """Raises NoAnswer where fractions (q,) violate a floor because the floors contradict each other."""
-    if w is not None and all(floor.value(w) > -TUNING.floor_rounding for floor in task.floors):
+    if w is not None and _floors_kept(task, w):
         return
     together = Objective(
         tuple(floor.pieces[0] for floor in task.floors),

@@ -13,7 +13,10 @@ class Tuning:
         largest_gap: designs with a wider gap are not returned.
         target_gap: gap at which Newton's method ends.
         rounding_gap: below this gap, a Newton step that does not halve it is the last: the rest is rounding.
-        newton_steps: most Newton steps from a conic optimum; two or three are usual.
+        newton_steps: most Newton steps; six to ten are usual, two or three from a conic optimum.
+        margin: a fraction at its least value may change in a Newton step where its net sensitivity falls short of the
+            others' by less, per degree.
+        curvature_rounding: added to the diagonal of a curvature, as a share of its trace, to make it positive definite.
         floor_rounding: shortfall of a floor, as a logarithm, that counts as rounding.
         solver_tolerance: gap and feasibility tolerance of the conic solver.
         lp_tolerance: feasibility and optimality tolerance of linear programmes.
@@ -50,6 +53,8 @@ class Tuning:
     target_gap: float = 1e-10
     rounding_gap: float = 1e-9
     newton_steps: int = 30
+    margin: float = 0.01
+    curvature_rounding: float = 1e-14
     floor_rounding: float = 1e-6
     solver_tolerance: float = 1e-11
     lp_tolerance: float = 1e-10
