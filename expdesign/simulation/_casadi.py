@@ -1,7 +1,7 @@
 """The simulation's only use of CasADi: integrator steps of the equations of motion as compiled functions.
 
 Parameters, weather and the length of a step are inputs, so models of one structure share the functions. Steps are
-chained into flat functions of several lengths, so that any number of them takes few calls.
+chained into flat functions of 1, 2, 4, ... steps, so that any number of them takes few calls.
 
 Source: J. A. E. Andersson et al., CasADi, Mathematical Programming Computation 11 (2019), 1-36.
 """
@@ -19,8 +19,8 @@ from expdesign.values import Array
 from expdesign.vessel import Actuator, Operators, Roll, Term, VesselModel
 
 CASADI = Operators(ca.fabs, ca.sin, ca.cos)
-LENGTHS = (16, 8, 4, 2, 1)
-"""Steps in one function; in longer ones a step takes as much time."""
+LARGEST = 16_000
+"""Instructions in one function; in longer ones a step takes as much time."""
 
 
 class CompiledIntegrator:
@@ -38,26 +38,35 @@ class CompiledIntegrator:
         self._functions = compiled_steps(structure, integrator)
         self._states, self._parameters = model.states, np.array(model.parameters)
 
-    def states(self, start: Array, drive: Array, step_s: float, parameters: Array | None = None) -> Array:
-        """The state after every step; not-a-numbers and infinities where the motion diverges.
+    def states(self, start: Array, delivered: Array, *, sea: Array, sample_time_s: float, substeps: int) -> Array:
+        """States at every sample; not-a-numbers and infinities where the motion diverges.
 
         Args:
             start: (6,) pose and velocity, with a roll mode (8,).
-            drive: (k, m + 4) over each step: delivered inputs, then n-frame current and wind to north and east [m/s].
-            step_s: length of a step [s].
-            parameters: (p,) in the model's own form; None for the model's.
+            delivered: (k, substeps, m) inputs over each step, or (k, 1, m) where they are held over a sample.
+            sea: (k, 4), or (1, 4) where steady: n-frame current and wind to north and east [m/s].
+            sample_time_s: time between samples [s].
+            substeps: integrator steps per sample.
 
         Returns:
             (k + 1, 6 or 8), the start first.
         """
-        theta = self._parameters if parameters is None else np.array(parameters, dtype=float)
-        drive, result = np.ascontiguousarray(drive, dtype=float), np.empty((len(drive) + 1, self._states))
-        result[0], length_s, done = start, np.array([step_s]), 0
-        for length, function in zip(LENGTHS, self._functions, strict=True):
+        samples, _, inputs = delivered.shape
+        drive = np.empty((samples, substeps, inputs + 4))
+        drive[..., :inputs], drive[..., inputs:] = delivered, sea[:, None]
+        result = np.empty((samples * substeps + 1, self._states))
+        result[0] = start
+        self._fill(result, drive.reshape(samples * substeps, inputs + 4), sample_time_s / substeps)
+        return result[::substeps]
+
+    def _fill(self, result: Array, drive: Array, step_s: float) -> None:
+        """Write the states (k + 1, n) after the first, for drives (k, m + 4) over each step."""
+        length_s, done = np.array([step_s]), 0
+        for length, function in self._functions.items():
             if done + length > len(drive):
                 continue
             buffer, run = function.buffer()
-            buffer.set_arg(2, theta.data)
+            buffer.set_arg(2, self._parameters.data)
             buffer.set_arg(3, length_s.data)
             while done + length <= len(drive):
                 end = done + length
@@ -66,7 +75,6 @@ class CompiledIntegrator:
                 buffer.set_res(0, result[done + 1 : end + 1].data)
                 run()
                 done = end
-        return result
 
 
 @lru_cache(maxsize=64)
@@ -79,11 +87,12 @@ Structure = tuple[tuple[Term, ...], str, float, tuple[Actuator, ...], Roll | Non
 """Terms, form, sample time, actuators and roll of a model: everything but the values of its parameters."""
 
 
-@lru_cache(maxsize=32)
-def compiled_steps(structure: Structure, integrator: str) -> tuple[Any, ...]:
-    """Functions of `LENGTHS` steps: (state, drive of each step, parameters, length of a step) -> states."""
+@lru_cache(maxsize=16)
+def compiled_steps(structure: Structure, integrator: str) -> dict[int, Any]:
+    """Number of steps, largest first -> (state, drive of each step, parameters, length of a step) -> states."""
     step = _step(structure, integrator)
-    return tuple(_chained(step, length) for length in LENGTHS)
+    most = max(1, LARGEST // step.n_instructions())
+    return {length: _chained(step, length) for length in (1 << power for power in reversed(range(most.bit_length())))}
 
 
 def _chained(step: ca.Function, length: int) -> ca.Function:

@@ -91,12 +91,9 @@ def integrate_motion(
     """
     from expdesign.simulation._casadi import compiled_integrator  # CasADi is loaded when a motion is integrated
 
-    samples, _, inputs = delivered.shape
-    drive = np.empty((samples, substeps, inputs + 4))
-    drive[..., :inputs], drive[..., inputs:] = delivered, sea[:, None]
-    compiled = compiled_integrator(vessel.model, integrator)
-    steps = drive.reshape(samples * substeps, inputs + 4)
-    states = compiled.states(np.array(begun(vessel.model, tuple(start))), steps, sample_time_s / substeps)[::substeps]
+    states = compiled_integrator(vessel.model, integrator).states(
+        np.array(begun(vessel.model, tuple(start))), delivered, sea=sea, sample_time_s=sample_time_s, substeps=substeps
+    )
     settled = (np.abs(states[1:, 3:]) < LARGEST_SPEED).all(axis=1)
     if not settled.all():
         time_s = (int(np.argmin(settled)) + 1) * sample_time_s

@@ -105,7 +105,7 @@ def hull_clearance(area: SeaArea, trajectory: Trajectory, hull_b: Array) -> Arra
     """
     hulls = hull_polygons(trajectory.pose, hull_b)
     corners = shapely.get_coordinates(hulls).reshape(len(hulls), -1, 2)
-    spans = shapely.convex_hull(shapely.multipoints(np.concatenate([corners[:-1], corners[1:]], axis=1)))
+    spans = shapely.convex_hull(shapely.linestrings(np.concatenate([corners[:-1], corners[1:]], axis=1)))
     spans = np.append(spans, hulls[-1])
     water = area.water
     shapely.prepare(water)

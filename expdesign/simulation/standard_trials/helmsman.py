@@ -153,11 +153,10 @@ def _stepped(vessel: Vessel, given: Array, state: Array, step_s: float, until_s:
     """The state a time into a sample, by the steps of `simulate`, with the delivered values of each."""
     from expdesign.simulation._casadi import compiled_integrator  # CasADi is loaded when a motion is integrated
 
-    each_s, integrator = step_s / SUBSTEPS, compiled_integrator(vessel.model, "rk4")
-    drive = np.concatenate([given, np.zeros((SUBSTEPS, 4))], axis=1)
-    for number in range(SUBSTEPS):
+    each_s, integrator, still = step_s / SUBSTEPS, compiled_integrator(vessel.model, "rk4"), np.zeros((1, 4))
+    for number, held in enumerate(given):
         part_s = min(max(until_s - number * each_s, 0.0), each_s)
-        state = integrator.states(state, drive[number : number + 1], part_s)[-1]
+        state = integrator.states(state, held[None, None], sea=still, sample_time_s=part_s, substeps=1)[-1]
     if not (np.abs(state[3:]) < LARGEST_SPEED).all():
         raise Diverged(f"vessel {vessel.name!r}: the model is unstable: a speed passes {LARGEST_SPEED:g} m/s or rad/s")
     return state
