@@ -4,6 +4,9 @@ Direct multiple shooting on the very map that simulates the trial: commands are 
 and each sample is integrated with the simulation's Runge-Kutta steps. Programs of one size are built once and reused:
 everything that differs from leg to leg is a bound or a parameter.
 
+The Hessian of the Lagrangian is that of a coarse map, which takes several steps of the simulation as one: it only decides
+how fast IPOPT converges. Constraints and their Jacobian are those of the exact map.
+
 Source: H. G. Bock and K. J. Plitt, A multiple shooting algorithm for direct solution of optimal control problems,
 IFAC Proc. 17 (1984), 1603-1608.
 """
@@ -42,6 +45,14 @@ class Program:
         self._build()
 
     def _build(self) -> None:
+        options: dict[str, Any] = {"print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}
+        options |= {"ipopt.max_iter": LEGS.iterations, "ipopt.constr_viol_tol": 1e-9, "ipopt.acceptable_iter": 0}
+        options |= {"ipopt.tol": 1e-5 if self.free else 1e-7}
+        options["hess_lag"] = _lagrangian_hessian(self._nlp(self._block_map(LEGS.coarse_steps)))
+        self.solver = ca.nlpsol("leg", "ipopt", self._nlp(self._block_map(1)), options)
+
+    def _nlp(self, block_map: ca.Function) -> dict[str, Any]:
+        """Variables, parameters, cost and constraints, with the map over a block of samples."""
         j, m = self.nodes, len(self.limits)
         x, u, h = ca.MX.sym("x", 6, j + 1), ca.MX.sym("u", m, j + 1), ca.MX.sym("h")
         path, circle, displacement_value = (
@@ -55,7 +66,7 @@ class Program:
         states = ca.DM(self.state_scale) * x
         lag_scale = ca.DM(self.input_scale[self.lagging])
         early, late = self._arriving(past, inputs)
-        ends, held = self._block_map().map(j)(states[:, :-1], lag_scale * d[:, :-1], early, late, ca.repmat(h, 1, j))
+        ends, held = block_map.map(j)(states[:, :-1], lag_scale * d[:, :-1], early, late, ca.repmat(h, 1, j))
         rows = [ca.vec((ends - states[:, 1:]) / ca.DM(self.state_scale)), ca.vec(held / lag_scale - d[:, 1:])]
         rows += self._region(states[:, 1:-1], path, circle, arm)
         for index in self._rated:
@@ -72,12 +83,12 @@ class Program:
         )
         if self.free:
             cost = cost + h * j * self.block / unit_s
-        options: dict[str, Any] = {"print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}
-        options |= {"ipopt.max_iter": 100, "ipopt.constr_viol_tol": 1e-9, "ipopt.acceptable_iter": 0}
-        options |= {"ipopt.tol": 1e-5 if self.free else 1e-7}
-        nlp: Any = {"x": ca.vertcat(ca.vec(x), ca.vec(u), ca.vec(d), h), "f": cost, "g": ca.vertcat(*rows)}
-        nlp["p"] = ca.vertcat(ca.vec(path), circle, displacement_value, unit_s, arm, ca.vec(past))
-        self.solver = ca.nlpsol("leg", "ipopt", nlp, options)
+        return {
+            "x": ca.vertcat(ca.vec(x), ca.vec(u), ca.vec(d), h),
+            "p": ca.vertcat(ca.vec(path), circle, displacement_value, unit_s, arm, ca.vec(past)),
+            "f": cost,
+            "g": ca.vertcat(*rows),
+        }
 
     @property
     def _rated(self) -> np.ndarray:
@@ -97,25 +108,34 @@ class Program:
         early = ca.vertcat(*[given[i, first - 1 : first - 1 + j * block] for i, first in enumerate(firsts)])
         return ca.reshape(early, m * block, j), ca.reshape(late, m * block, j)
 
-    def _block_map(self) -> ca.Function:
+    def _block_map(self, at_once: int) -> ca.Function:
         """State and delivered values after a block of samples, from the commands that arrive in them.
 
         Dead bands are left out: commands inside them make the leg miss its end, which the caller finds.
+
+        Args:
+            at_once: steps of the simulation taken as one, under the mean of what the actuators deliver.
         """
         m, count = len(self.limits), len(self.lagging)
         x, d, h = ca.SX.sym("x", 6), ca.SX.sym("d", count), ca.SX.sym("h")
         early, late = ca.SX.sym("early", m * self.block), ca.SX.sym("late", m * self.block)
-        state: tuple[Any, ...] = tuple(ca.vertsplit(x))
         lagged: dict[int, Any] = {int(i): d[k] for k, i in enumerate(self.lagging)}
+        given: list[list[Any]] = []
         for sample in range(self.block):
             start, after = early[sample * m : (sample + 1) * m], late[sample * m : (sample + 1) * m]
-            for step in range(SUBSTEPS):
-                given = [
+            given += [
+                [
                     _mixed(through.means[step], lagged.get(i, 0.0), start[i], after[i]) + through.offset
                     for i, through in enumerate(self.maps)
                 ]
-                state = rk4_step(self._rates(given), state, h / SUBSTEPS)
+                for step in range(SUBSTEPS)
+            ]
             lagged = {i: _mixed(self.maps[i].end, value, start[i], after[i]) for i, value in lagged.items()}
+        state: tuple[Any, ...] = tuple(ca.vertsplit(x))
+        for first in range(0, len(given), at_once):
+            together = given[first : first + at_once]
+            mean = [sum(values) / len(together) for values in zip(*together, strict=True)]
+            state = rk4_step(self._rates(mean), state, len(together) * h / SUBSTEPS)
         delivered = ca.vertcat(*[lagged[int(i)] for i in self.lagging]) if count else ca.SX(0, 1)
         return ca.Function("block", [x, d, early, late, h], [ca.vertcat(*state), delivered])
 
@@ -230,6 +250,13 @@ class Program:
         states = values[: 6 * (j + 1)].reshape(j + 1, 6) * self.state_scale + origin
         inputs = values[6 * (j + 1) : (6 + m) * (j + 1)].reshape(j + 1, m) * self.input_scale
         return replace(problem, states=states, inputs=inputs), float(values[-1])
+
+
+def _lagrangian_hessian(nlp: dict[str, Any]) -> ca.Function:
+    """Upper triangle of the Hessian of the Lagrangian of a nonlinear program, as `nlpsol` takes it."""
+    oracle = ca.Function("nlp", [nlp["x"], nlp["p"]], [nlp["f"], nlp["g"]], ["x", "p"], ["f", "g"])
+    arguments = ["x", "p", "lam:f", "lam:g"]
+    return oracle.factory("nlp_hess_l", arguments, ["triu:hess:gamma:x:x"], {"gamma": ["f", "g"]})
 
 
 def _mixed(weights: Array, start: Any, early: Any, late: Any) -> Any:
