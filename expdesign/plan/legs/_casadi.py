@@ -4,8 +4,8 @@ Direct multiple shooting on the very map that simulates the trial: commands are 
 and each sample is integrated with the simulation's Runge-Kutta steps. Programs of one size are built once and reused:
 everything that differs from leg to leg is a bound or a parameter.
 
-The Hessian of the Lagrangian is that of a coarse map, which takes several steps of the simulation as one: it only decides
-how fast IPOPT converges. Constraints and their Jacobian are those of the exact map.
+Derivatives follow the structure: those of the map over a block of samples are worked out symbolically, once for each
+size of block, and placed by the constant matrix that gives the map's arguments from the variables.
 
 Source: H. G. Bock and K. J. Plitt, A multiple shooting algorithm for direct solution of optimal control problems,
 IFAC Proc. 17 (1984), 1603-1608.
@@ -13,9 +13,8 @@ IFAC Proc. 17 (1984), 1603-1608.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
-from functools import lru_cache
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
 from typing import Any
 
 import casadi as ca
@@ -45,50 +44,61 @@ class Program:
         self._build()
 
     def _build(self) -> None:
-        options: dict[str, Any] = {"print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}
-        options |= {"ipopt.max_iter": LEGS.iterations, "ipopt.constr_viol_tol": 1e-9, "ipopt.acceptable_iter": 0}
-        options |= {"ipopt.tol": 1e-5 if self.free else 1e-7}
-        options["hess_lag"] = _lagrangian_hessian(self._nlp(self._block_map(LEGS.coarse_steps)))
-        self.solver = ca.nlpsol("leg", "ipopt", self._nlp(self._block_map(1)), options)
-
-    def _nlp(self, block_map: ca.Function) -> dict[str, Any]:
-        """Variables, parameters, cost and constraints, with the map over a block of samples."""
-        j, m = self.nodes, len(self.limits)
+        j, m, block = self.nodes, len(self.limits), block_map(self.vessel, self.environment, self.block)
         x, u, h = ca.MX.sym("x", 6, j + 1), ca.MX.sym("u", m, j + 1), ca.MX.sym("h")
+        d, past = ca.MX.sym("d", len(self.lagging), j + 1), ca.MX.sym("past", m, self.memory)
         path, circle, displacement_value = (
             ca.MX.sym("path", 3, j - 1),
             ca.MX.sym("circle", 2),
             ca.MX.sym("displacement_value", 2),
         )
         unit_s, arm = ca.MX.sym("unit_s"), ca.MX.sym("arm")
-        past, d = ca.MX.sym("past", m, self.memory), ca.MX.sym("d", len(self.lagging), j + 1)
-        inputs = ca.DM(self.input_scale) * u
-        states = ca.DM(self.state_scale) * x
-        lag_scale = ca.DM(self.input_scale[self.lagging])
-        early, late = self._arriving(past, inputs)
-        ends, held = block_map.map(j)(states[:, :-1], lag_scale * d[:, :-1], early, late, ca.repmat(h, 1, j))
-        rows = [ca.vec((ends - states[:, 1:]) / ca.DM(self.state_scale)), ca.vec(held / lag_scale - d[:, 1:])]
-        rows += self._region(states[:, 1:-1], path, circle, arm)
+        inputs, states = ca.DM(self.input_scale) * u, ca.DM(self.state_scale) * x
+        delivered = ca.DM(self.input_scale[self.lagging]) * d
+        variables = ca.vertcat(ca.vec(x), ca.vec(u), ca.vec(d), h)
+        given = ca.vertcat(states, delivered)
+        arguments = ca.vertcat(given[:, :-1], *self._arriving(past, inputs), ca.repmat(h, 1, j))
+        scale = np.tile(1.0 / np.r_[self.state_scale, self.input_scale[self.lagging]], j)
+        motion = ca.DM(scale) * ca.vec(block.value.map(j)(arguments) - given[:, 1:])
+        rows = self._region(states[:, 1:-1], path, circle, arm)
         for index in self._rated:
             step = (inputs[int(index), 1:] - inputs[int(index), :-1]).T / self.input_scale[index]
             reach = self.limits[index].rate * self.block * h / self.input_scale[index]
             rows += [step - reach, -step - reach]
         through = x[3:5, 1:-1] - self._current_b(x[2, 1:-1])
-        rows += [ca.sum1(through**2).T, (through[0, :] * x[5, 1:-1]).T]
-        steps = ca.diff(u, 1, 1)
+        others = ca.vertcat(*rows, ca.sum1(through**2).T, (through[0, :] * x[5, 1:-1]).T)
         cost = (
-            LEGS.smoothness * ca.sumsqr(steps)
+            LEGS.smoothness * ca.sumsqr(ca.diff(u, 1, 1))
             + LEGS.smallness * ca.sumsqr(u) / j
             - ca.dot(displacement_value, states[:2, -1]) / unit_s
         )
         if self.free:
             cost = cost + h * j * self.block / unit_s
-        return {
-            "x": ca.vertcat(ca.vec(x), ca.vec(u), ca.vec(d), h),
-            "p": ca.vertcat(ca.vec(path), circle, displacement_value, unit_s, arm, ca.vec(past)),
-            "f": cost,
-            "g": ca.vertcat(*rows),
-        }
+        parameters = ca.vertcat(ca.vec(path), circle, displacement_value, unit_s, arm, ca.vec(past))
+        constraints = ca.vertcat(motion, others)
+
+        # the chain rule through the constant matrices that give the map's arguments, and what it must arrive at
+        placed = ca.evalf(ca.jacobian(ca.vec(arguments), variables))
+        arrived = ca.evalf(ca.jacobian(ca.vec(given[:, 1:]), variables))
+        slopes = ca.sparsity_cast(block.jacobian.map(j)(arguments), _repeated(block.jacobian, j))
+        jacobian = ca.vertcat(
+            ca.mtimes(ca.diag(ca.DM(scale)), ca.mtimes(slopes, placed) - arrived), ca.jacobian(others, variables)
+        )
+        of_cost, of_rows = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", constraints.numel())
+        of_motion, of_others = ca.vertsplit(of_rows, [0, motion.numel(), constraints.numel()])
+        weights = ca.reshape(ca.DM(scale) * of_motion, -1, j)
+        bends = ca.sparsity_cast(block.hessian.map(j)(arguments, weights), _repeated(block.hessian, j))
+        hessian = ca.mtimes(placed.T, ca.mtimes(bends, placed))
+        hessian += ca.hessian(of_cost * cost + ca.dot(of_others, others), variables)[0]
+
+        options: dict[str, Any] = {"print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}
+        options |= {"ipopt.max_iter": LEGS.iterations, "ipopt.constr_viol_tol": 1e-9, "ipopt.acceptable_iter": 0}
+        options |= {"ipopt.tol": 1e-5 if self.free else 1e-7}
+        both = [variables, parameters]
+        options["jac_g"] = ca.Function("nlp_jac_g", both, [constraints, jacobian])
+        options["hess_lag"] = ca.Function("nlp_hess_l", [*both, of_cost, of_rows], [ca.triu(hessian)])
+        nlp: Any = {"x": variables, "p": parameters, "f": cost, "g": constraints}
+        self.solver = ca.nlpsol("leg", "ipopt", nlp, options)
 
     @property
     def _rated(self) -> np.ndarray:
@@ -107,42 +117,6 @@ class Program:
         late = ca.vertcat(*[given[i, first : first + j * block] for i, first in enumerate(firsts)])
         early = ca.vertcat(*[given[i, first - 1 : first - 1 + j * block] for i, first in enumerate(firsts)])
         return ca.reshape(early, m * block, j), ca.reshape(late, m * block, j)
-
-    def _block_map(self, at_once: int) -> ca.Function:
-        """State and delivered values after a block of samples, from the commands that arrive in them.
-
-        Dead bands are left out: commands inside them make the leg miss its end, which the caller finds.
-
-        Args:
-            at_once: steps of the simulation taken as one, under the mean of what the actuators deliver.
-        """
-        m, count = len(self.limits), len(self.lagging)
-        x, d, h = ca.SX.sym("x", 6), ca.SX.sym("d", count), ca.SX.sym("h")
-        early, late = ca.SX.sym("early", m * self.block), ca.SX.sym("late", m * self.block)
-        lagged: dict[int, Any] = {int(i): d[k] for k, i in enumerate(self.lagging)}
-        given: list[list[Any]] = []
-        for sample in range(self.block):
-            start, after = early[sample * m : (sample + 1) * m], late[sample * m : (sample + 1) * m]
-            given += [
-                [
-                    _mixed(through.means[step], lagged.get(i, 0.0), start[i], after[i]) + through.offset
-                    for i, through in enumerate(self.maps)
-                ]
-                for step in range(SUBSTEPS)
-            ]
-            lagged = {i: _mixed(self.maps[i].end, value, start[i], after[i]) for i, value in lagged.items()}
-        state: tuple[Any, ...] = tuple(ca.vertsplit(x))
-        for first in range(0, len(given), at_once):
-            together = given[first : first + at_once]
-            mean = [sum(values) / len(together) for values in zip(*together, strict=True)]
-            state = rk4_step(self._rates(mean), state, len(together) * h / SUBSTEPS)
-        delivered = ca.vertcat(*[lagged[int(i)] for i in self.lagging]) if count else ca.SX(0, 1)
-        return ca.Function("block", [x, d, early, late, h], [ca.vertcat(*state), delivered])
-
-    def _rates(self, given: list[Any]) -> Callable[[tuple[Any, ...]], tuple[Any, ...]]:
-        current, wind = self.environment.current_to.tolist(), self.environment.wind_to.tolist()
-        model = self.vessel.model
-        return lambda state: motion_rates(model, state, given, current_to=current, wind_to=wind, ops=CASADI)
 
     def _current_b(self, heading: ca.MX) -> Any:
         """(2, j) current ahead and to starboard at headings (1, j); 0 in still water."""
@@ -252,11 +226,63 @@ class Program:
         return replace(problem, states=states, inputs=inputs), float(values[-1])
 
 
-def _lagrangian_hessian(nlp: dict[str, Any]) -> ca.Function:
-    """Upper triangle of the Hessian of the Lagrangian of a nonlinear program, as `nlpsol` takes it."""
-    oracle = ca.Function("nlp", [nlp["x"], nlp["p"]], [nlp["f"], nlp["g"]], ["x", "p"], ["f", "g"])
-    arguments = ["x", "p", "lam:f", "lam:g"]
-    return oracle.factory("nlp_hess_l", arguments, ["triu:hess:gamma:x:x"], {"gamma": ["f", "g"]})
+@dataclass(frozen=True)
+class BlockMap:
+    """The map over a block of samples: state and what lagging actuators deliver, from these and the commands between.
+
+    Its argument (n,) holds the state (6,), what lagging actuators deliver (c,), the earlier and the later commands that
+    arrive in each sample (m block,) each, and the sample time. Dead bands are left out: commands inside them make the
+    leg miss its end, which the caller finds.
+
+    Attributes:
+        value: argument -> (6 + c,).
+        jacobian: argument -> (6 + c, n).
+        hessian: argument, weights (6 + c,) -> (n, n) of the weighted sum.
+    """
+
+    value: ca.Function
+    jacobian: ca.Function
+    hessian: ca.Function
+
+
+@lru_cache(maxsize=LEGS.programs)
+def block_map(vessel: Vessel, environment: Environment, block: int) -> BlockMap:
+    """The map over so many samples of a vessel in an environment's mean current and wind, with its derivatives."""
+    responses, m = vessel.responses, len(vessel.limits)
+    maps = [sample_map(x, sample_time_s=vessel.sample_time_s, substeps=SUBSTEPS) for x in responses]
+    lagging = [index for index, response in enumerate(responses) if response.lag_s > 0]
+    x, d, h = ca.SX.sym("x", 6), ca.SX.sym("d", len(lagging)), ca.SX.sym("h")
+    early, late = ca.SX.sym("early", m, block), ca.SX.sym("late", m, block)
+    state: tuple[Any, ...] = tuple(ca.vertsplit(x))
+    lagged: dict[int, Any] = dict(zip(lagging, ca.vertsplit(d), strict=True)) if lagging else {}
+    current, wind = environment.current_to.tolist(), environment.wind_to.tolist()
+    for sample in range(block):
+        start, after = early[:, sample], late[:, sample]
+        for step in range(SUBSTEPS):
+            given = [
+                _mixed(through.means[step], lagged.get(i, 0.0), start[i], after[i]) + through.offset
+                for i, through in enumerate(maps)
+            ]
+            rates = partial(_rates, vessel, given, current, wind)
+            state = rk4_step(rates, state, h / SUBSTEPS)
+        lagged = {i: _mixed(maps[i].end, value, start[i], after[i]) for i, value in lagged.items()}
+    argument = ca.vertcat(x, d, ca.vec(early), ca.vec(late), h)
+    value = ca.vertcat(*state, *lagged.values())
+    weights = ca.SX.sym("weights", value.numel())
+    return BlockMap(
+        value=ca.Function("block", [argument], [value]),
+        jacobian=ca.Function("block_jacobian", [argument], [ca.jacobian(value, argument)]),
+        hessian=ca.Function("block_hessian", [argument, weights], [ca.hessian(ca.dot(weights, value), argument)[0]]),
+    )
+
+
+def _rates(vessel: Vessel, given: list[Any], current: Any, wind: Any, state: tuple[Any, ...]) -> tuple[Any, ...]:
+    return motion_rates(vessel.model, state, given, current_to=current, wind_to=wind, ops=CASADI)
+
+
+def _repeated(block: ca.Function, count: int) -> ca.Sparsity:
+    """Sparsity of a block-diagonal matrix of the function's results."""
+    return ca.diagcat(*[block.sparsity_out(0)] * count)
 
 
 def _mixed(weights: Array, start: Any, early: Any, late: Any) -> Any:

@@ -23,8 +23,7 @@ class Tuning:
         smallness: weight of squared commands: decides between commands that give the same force.
         nodes: numbers of nodes tried while the time is free.
         settled: miss of what lagging actuators deliver at the end, relative to the largest.
-        coarse_steps: of the simulation that are taken as one in coarse maps.
-        iterations: of IPOPT at most; legs that exist are found in fewer.
+        iterations: of IPOPT at most.
         programs: nonlinear programs kept built.
         guess_nodes: of first guesses of agile legs.
         transition_nodes: of optimised transitions at most.
@@ -58,8 +57,7 @@ class Tuning:
     smallness: float = 1e-4
     nodes: tuple[int, ...] = (12, 18, 24, 32, 44, 60, 80, 110, 160)
     settled: float = 1e-4
-    coarse_steps: int = 2
-    iterations: int = 80
+    iterations: int = 100
     programs: int = 24
     guess_nodes: int = 40
     transition_nodes: int = 24
