@@ -14,7 +14,15 @@ from expdesign.vessel.actuators import (
 )
 from expdesign.vessel.environment import CALM, STEADY, Environment, Variation
 from expdesign.vessel.expressions import NUMPY, SCALAR, Operators
-from expdesign.vessel.inverse import allocate, direct_terms, force_matrix, required_force, within_limits
+from expdesign.vessel.inverse import (
+    allocate,
+    allocate_each,
+    direct_terms,
+    force_matrix,
+    required_force,
+    within_limits,
+    within_limits_each,
+)
 from expdesign.vessel.model import VesselModel
 from expdesign.vessel.roll import Roll
 from expdesign.vessel.sensors import CENTRAL, SENSORS, Mounting, Sensors
@@ -45,6 +53,7 @@ __all__ = [
     "Vessel",
     "VesselModel",
     "allocate",
+    "allocate_each",
     "column_name",
     "direct_terms",
     "force_matrix",
@@ -55,4 +64,5 @@ __all__ = [
     "stem",
     "structure_terms",
     "within_limits",
+    "within_limits_each",
 ]

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
+from expdesign.conventions import OUTPUTS
 from expdesign.errors import InputError
 from expdesign.values import Array, readonly
 from expdesign.vessel.actuators import Actuator
@@ -31,33 +32,34 @@ def required_force(model: VesselModel, velocity: Array, acceleration: Array) -> 
             f"term {direct[0]}: desired velocities need a model whose inputs are "
             f"{', '.join(FORCE_SIGNALS)}; use families with commands"
         )
-    motion = dict(zip(("u", "v", "r"), np.moveaxis(velocity, -1, 0), strict=True))
+    motion = dict(zip(OUTPUTS, np.moveaxis(velocity, -1, 0), strict=True))
     signals = motion | {"u_q": motion["u"], "v_q": motion["v"], SHOAL: 0.0}
 
-    def response(force: Array) -> Array:
-        table = signals | dict(zip(FORCE_SIGNALS, force, strict=True))
-        totals: dict[str, Any] = dict.fromkeys(("u", "v", "r"), np.zeros(velocity.shape[:-1]))
+    def response(force: Sequence[float]) -> Array:
+        table, totals = signals | dict(zip(FORCE_SIGNALS, force, strict=True)), np.zeros((3, *velocity.shape[:-1]))
         for term, expression, value in _acting(model):
-            totals[term.equation] = totals[term.equation] + value * expression.evaluate(table, NUMPY)
-        return np.stack(list(totals.values()), axis=-1) / model.time_scale_s
+            totals[OUTPUTS.index(term.equation)] += value * expression.evaluate(table, NUMPY)
+        return np.moveaxis(totals / model.time_scale_s, 0, -1)
 
-    free = response(np.zeros(3))
+    free = response((0.0, 0.0, 0.0))
     if _same_push_at_any_speed(model):  # one small inverse instead of one for every velocity
         return np.asarray((acceleration - free) @ _inverse_at_rest(model).T, dtype=float)
     gain = np.stack([response(unit) - free for unit in np.eye(3)], axis=-1)  # (..., 3 outputs, 3 forces)
     return np.asarray((np.linalg.pinv(gain) @ (acceleration - free)[..., None])[..., 0], dtype=float)
 
 
+@lru_cache(maxsize=16)
 def _same_push_at_any_speed(model: VesselModel) -> bool:
     """Whether no term multiplies a force by a motion."""
     forces = {*FORCE_SIGNALS}
     return not any(forces & {*x.signals} and {*x.signals} - forces for _, x, _ in _acting(model))
 
 
-def _acting(model: VesselModel) -> list[tuple[Term, Expression, float]]:
+@lru_cache(maxsize=16)
+def _acting(model: VesselModel) -> tuple[tuple[Term, Expression, float], ...]:
     """Terms with their expressions and parameters, those left out that do nothing."""
     rows = zip(model.terms, model.expressions, model.parameters.tolist(), strict=True)
-    return [(term, expression, value) for term, expression, value in rows if value != 0.0]
+    return tuple((term, expression, value) for term, expression, value in rows if value != 0.0)
 
 
 @lru_cache(maxsize=16)
@@ -80,6 +82,7 @@ def _push_at_rest(model: VesselModel) -> Array:
     return np.stack([response(unit) - response(np.zeros(3)) for unit in np.eye(3)], axis=-1)
 
 
+@lru_cache(maxsize=16)
 def direct_terms(model: VesselModel) -> tuple[str, ...]:
     """Terms that read actuator signals themselves instead of the generalised force they give, as "X_n reads n1"."""
     seen = {*MOTION_SIGNALS, *FORCE_SIGNALS}
@@ -141,6 +144,15 @@ def allocate(
     return np.stack(rows, axis=-2)
 
 
+def allocate_each(actuators: tuple[Actuator, ...], force: Array, *, near: Array) -> Array:
+    """Commands (n, m) within limits for the generalised forces (n, 3) on n ships, whatever stands before.
+
+    As `allocate` for one row; azimuths keep as near as they can to the angles of `near` (n, m).
+    """
+    desired = _desired_commands(actuators, force @ _inverse_force_matrix(actuators).T, near)
+    return _reached(_bounds(actuators, 1.0), desired, None)
+
+
 def within_limits(actuators: tuple[Actuator, ...], values: Array, *, sample_time_s: float, before: Array) -> Array:
     """The commands (..., k, m) nearest to the desired ones within limits and rates, after commands (..., m)."""
     bounds = _bounds(actuators, sample_time_s)
@@ -151,11 +163,17 @@ def within_limits(actuators: tuple[Actuator, ...], values: Array, *, sample_time
     return np.stack(rows, axis=-2)
 
 
+def within_limits_each(actuators: tuple[Actuator, ...], values: Array, *, sample_time_s: float, before: Array) -> Array:
+    """The commands (n, m) of n ships nearest to the desired ones within limits and rates, one sample after `before`."""
+    return _reached(_bounds(actuators, sample_time_s), values, before)
+
+
+@lru_cache(maxsize=16)
 def _bounds(actuators: tuple[Actuator, ...], sample_time_s: float) -> tuple[Array, Array, Array]:
     """(m,) lowest, highest command and largest change from sample to sample."""
     limits = [limit for actuator in actuators for limit in actuator.limits]
     low, high, rate = (np.array([getattr(limit, name) for limit in limits]) for name in ("low", "high", "rate"))
-    return low, high, rate * sample_time_s
+    return readonly(low), readonly(high), readonly(rate * sample_time_s)
 
 
 def _reached(bounds: tuple[Array, Array, Array], desired: Array, last: Array | None) -> Array:
@@ -181,21 +199,48 @@ def _desired_commands(actuators: tuple[Actuator, ...], row: Array, last: Array |
             parts += [row[..., taken + index] for index in range(len(actuator.limits))]
         taken += {"azimuth": 2, "rudder": 0}.get(actuator.kind, len(actuator.limits))
         place += len(actuator.limits)
-    return np.stack(parts, axis=-1)
+    return np.moveaxis(np.array(parts), 0, -1)
 
 
 WAYS_ROUND = np.array([(half, turns) for half in (0.0, math.pi) for turns in (-1.0, 0.0, 1.0)]).T
 """Thrust ahead or reversed, and whole turns around the nearest angle: (2, 6)."""
-HALVES = np.array([(half, 0.0) for half in (0.0, math.pi)]).T
-"""The same where no limit keeps an angle from the nearest turn: (2, 2)."""
 
 
-def _polar(ahead: Array, side: Array, reference: Array, actuator: Actuator) -> list[Array]:
+def _polar(ahead: Array, side: Array, reference: Array, actuator: Actuator) -> tuple[Array, Array]:
     """Propeller speed and angle that come closest to a thrust within limits, by the shortest turn."""
+    angles = actuator.limits[1]
+    desired, bearing = np.sqrt(ahead * ahead + side * side), np.arctan2(side, ahead)
+    turned = _turned if math.isfinite(angles.high - angles.low) else _turned_freely
+    speed, angle = turned(desired, bearing, reference, actuator)
+    still = desired < 1e-9
+    return np.where(still, 0.0, speed), np.where(still, reference, angle)
+
+
+def _turned_freely(desired: Array, bearing: Array, reference: Array, actuator: Actuator) -> tuple[Array, Array]:
+    """Speed and angle of an azimuth without stops: ahead or reversed, whichever is nearer or gives more."""
+    low, high = actuator.limits[0].low, actuator.limits[0].high
+    away = (reference - bearing) / math.pi
+    halves = np.rint(away)
+    if low != -high:
+        ahead, reversed_ = _missed(desired, desired, low, high), _missed(desired, -desired, low, high)
+        even, odd = 2.0 * np.rint(away / 2.0), 2.0 * np.rint((away - 1.0) / 2.0) + 1.0
+        halves = np.where(ahead < reversed_, even, np.where(reversed_ < ahead, odd, halves))
+    backwards = halves != 2.0 * np.rint(halves / 2.0)
+    speed = np.minimum(np.maximum(np.where(backwards, -desired, desired), low), high)
+    return speed, bearing + math.pi * halves
+
+
+def _missed(desired: Array, signed: Array, low: float, high: float) -> Array:
+    """Share of a thrust that the limits of its speed leave out."""
+    short = np.abs(signed - np.minimum(np.maximum(signed, low), high))
+    return np.asarray(np.round(short / np.maximum(desired, 1e-9), 9))
+
+
+def _turned(desired: Array, bearing: Array, reference: Array, actuator: Actuator) -> tuple[Array, Array]:
+    """Speed and angle of an azimuth with stops."""
     speeds, angles = actuator.limits
-    halves, turns = WAYS_ROUND if math.isfinite(angles.high - angles.low) else HALVES
-    desired, bearing = np.hypot(ahead, side), np.arctan2(side, ahead)
-    base = bearing[..., None] + halves  # (..., 6 or 2)
+    halves, turns = WAYS_ROUND
+    base = bearing[..., None] + halves  # (..., 6)
     whole = np.round((reference[..., None] - base) / (2 * math.pi))
     base = base + 2 * math.pi * (whole + turns)
     angle = np.minimum(np.maximum(base, angles.low), angles.high)
@@ -205,8 +250,4 @@ def _polar(ahead: Array, side: Array, reference: Array, actuator: Actuator) -> l
     short = np.round(missed / np.maximum(desired[..., None], 1e-9), 9)
     turn = np.where(short <= short.min(axis=-1, keepdims=True), np.abs(angle - reference[..., None]), np.inf)
     best = np.argmin(turn, axis=-1)[..., None]
-    still = desired < 1e-9
-    return [
-        np.where(still, 0.0, np.take_along_axis(speed, best, -1)[..., 0]),
-        np.where(still, reference, np.take_along_axis(angle, best, -1)[..., 0]),
-    ]
+    return np.take_along_axis(speed, best, -1)[..., 0], np.take_along_axis(angle, best, -1)[..., 0]

@@ -9,7 +9,7 @@ import numpy as np
 
 from expdesign.conventions import wrap_angle
 from expdesign.values import Array
-from expdesign.vessel import Vessel, allocate, required_force
+from expdesign.vessel import Vessel, allocate_each, required_force
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -64,11 +64,15 @@ class ForceController:
         """(n, m) desired actuator values."""
         through, states, reference = demand.through, demand.states, demand.reference
         c, s = np.cos(states[:, 2]), np.sin(states[:, 2])
-        ahead, abeam = through[:, 0] * c + through[:, 1] * s, through[:, 1] * c - through[:, 0] * s
         turn = wrap_angle(reference[:, 2] - states[:, 2]) / (2.0 * self.answer_s)
         fastest = self.turn_rate_radps
-        desired = np.column_stack([ahead, abeam, np.clip(reference[:, 5] + turn, -fastest, fastest)])
+        desired = np.array(
+            [
+                through[:, 0] * c + through[:, 1] * s,
+                through[:, 1] * c - through[:, 0] * s,
+                np.minimum(np.maximum(reference[:, 5] + turn, -fastest), fastest),
+            ]
+        ).T
         acceleration = (desired - demand.moving) / self.answer_s - demand.unexplained
         force = required_force(self.vessel.model, demand.moving, acceleration)
-        sample_s = self.vessel.sample_time_s
-        return allocate(self.vessel.actuators, force[:, None], sample_time_s=sample_s, near=demand.near)[:, 0]
+        return allocate_each(self.vessel.actuators, force, near=demand.near)

@@ -8,7 +8,7 @@ explain: weather, and parameters that are not the nominal ones.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -18,7 +18,7 @@ from expdesign.plan.control.ships import Capability
 from expdesign.plan.control.tuning import CONTROL
 from expdesign.simulation import Environment
 from expdesign.values import Array, seal
-from expdesign.vessel import Vessel, within_limits
+from expdesign.vessel import Vessel, VesselModel, within_limits_each
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -36,9 +36,31 @@ class Reference:
 
     def at(self, sample: Array) -> Array:
         """(n, 6) at fractional samples (n,)."""
-        first = np.clip(np.floor(sample).astype(int), 0, len(self.states) - 2)
-        share = np.clip(sample - first, 0.0, 1.0)[:, None]
-        return np.asarray(self.states[first] * (1 - share) + self.states[first + 1] * share)
+        return self._between(self._rows, sample)
+
+    def velocity_at(self, sample: Array) -> Array:
+        """(n, 3) velocity over ground at fractional samples (n,)."""
+        return self._between(self._rows[3:], sample)
+
+    @cached_property
+    def _rows(self) -> Array:
+        """(6, k + 1) states."""
+        return np.ascontiguousarray(self.states.T)
+
+    def _between(self, rows: Array, sample: Array) -> Array:
+        """(n, ...) values of rows (..., k + 1) at fractional samples (n,)."""
+        first = np.minimum(np.maximum(np.floor(sample), 0.0), len(self.states) - 2.0)
+        share, index = np.minimum(np.maximum(sample - first, 0.0), 1.0), first.astype(int)
+        before, after = rows.take(index, axis=1), rows.take(index + 1, axis=1)
+        before *= 1.0 - share
+        after *= share
+        before += after
+        return before.T
+
+    @cached_property
+    def _steps_m(self) -> Array:
+        """(k,) distances from sample to sample."""
+        return lengths(np.diff(self.states[:, :2], axis=0))
 
     def pace(self, sample: Array, states: Array, reach_m: float) -> Array:
         """(n,) samples to move on by: one, less where a ship (n, 6) has fallen behind by some of `reach_m`."""
@@ -52,22 +74,27 @@ class Reference:
             states: where ships are.
             step_m: least distance that counts as one sample's, for references that hardly move.
         """
-        row = np.clip(sample.astype(int), 0, len(self.states) - 2)
-        step = np.maximum(np.hypot(*(self.states[row + 1, :2] - self.states[row, :2]).T), step_m)
-        return np.asarray(np.clip(-self._behind_m(sample, states) / step, CONTROL.pace_least, CONTROL.pace_most))
+        step = np.maximum(self._steps_m.take(sample.astype(int), mode="clip"), step_m)
+        pace = -self._behind_m(sample, states) / step
+        return np.minimum(np.maximum(pace, CONTROL.pace_least), CONTROL.pace_most)
 
     def _behind_m(self, sample: Array, states: Array) -> Array:
         """(n,) how far ships (n, 6) are behind the reference at samples (n,), along its course [m]."""
         desired = self.at(sample)
-        along = over_ground(desired)
-        speed = np.hypot(*along.T) + 1e-9
-        return np.asarray(((desired[:, :2] - states[:, :2]) * along).sum(axis=1) / speed)
+        along, off = over_ground(desired), desired[:, :2] - states[:, :2]
+        return np.asarray((off[:, 0] * along[:, 0] + off[:, 1] * along[:, 1]) / (lengths(along) + 1e-9))
 
 
 def over_ground(states: Array) -> Array:
     """(n, 2) velocities to north and east of states (n, 6)."""
     c, s = np.cos(states[:, 2]), np.sin(states[:, 2])
-    return np.stack([states[:, 3] * c - states[:, 4] * s, states[:, 3] * s + states[:, 4] * c], axis=1)
+    return np.array([states[:, 3] * c - states[:, 4] * s, states[:, 3] * s + states[:, 4] * c]).T
+
+
+def lengths(vectors: Array) -> Array:
+    """(n,) lengths of vectors (n, 2)."""
+    north, east = vectors.T
+    return np.sqrt(north * north + east * east)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -119,20 +146,30 @@ class Helmsman:
             through=self._velocity_through_water(desired, states),
             states=states,
             moving=self._in_body(states),
-            unexplained=(0.0 if unexplained is None else unexplained) - self._turning_current(states),
+            unexplained=self._beyond_model(unexplained, states),
             near=before if near is None else near,
         )
         return self._commanded(self.controller.commands(demand), before, delivered)
 
+    def _beyond_model(self, unexplained: Array | None, states: Array) -> Array:
+        """(n, 3) acceleration beyond that of still water: what is unexplained, and the turning mean current."""
+        if unexplained is None or self._current:
+            return np.asarray((0.0 if unexplained is None else unexplained) - self._turning_current(states))
+        return unexplained
+
     def _commanded(self, rows: Array, before: Array, delivered: Array | None) -> Array:
         """(n, m) commands within limits and rates for desired values (n, m); lagging actuators are commanded more."""
-        if delivered is not None:
+        if delivered is not None and self._lags:
             delay_s, lag_s, offset, gain = self._lead
             stay = np.exp(-delay_s / np.maximum(lag_s, 1e-9))
             due = before + (delivered - offset - before) * stay  # when what is commanded now begins to count
             rows = np.where(lag_s > 0, due + gain * (rows - due), rows)
         actuators, sample_s = self.vessel.actuators, self.vessel.sample_time_s
-        return np.asarray(within_limits(actuators, rows[:, None], sample_time_s=sample_s, before=before)[:, 0])
+        return within_limits_each(actuators, rows, sample_time_s=sample_s, before=before)
+
+    @cached_property
+    def _lags(self) -> bool:
+        return any(response.lag_s > 0 for response in self.vessel.responses)
 
     @cached_property
     def _lead(self) -> tuple[Array, Array, Array, Array]:
@@ -154,37 +191,58 @@ class Helmsman:
         """
         old, new = self._in_body(before), self._in_body(states)
         moving = tuple(((old + new) / 2).T)
-        predicted = self.vessel.model.accelerations(moving, moving[:2], tuple(delivered.T))
-        known = np.column_stack([np.broadcast_to(part, len(estimate)) for part in predicted])
-        known -= self._turning_current((before + states) / 2)
+        predicted = self._model.accelerations(moving, moving[:2], tuple(delivered.T))
+        known = np.empty((3, len(estimate))).T
+        for column, part in enumerate(predicted):
+            known[:, column] = part
+        if self._current:
+            known -= self._turning_current((before + states) / 2)
         share = min(1.0, self.vessel.sample_time_s / (CONTROL.learning * self.answer_s))
         return np.asarray(estimate + share * ((new - old) / self.vessel.sample_time_s - known - estimate))
+
+    @cached_property
+    def _model(self) -> VesselModel:
+        """The nominal model without the terms that do nothing."""
+        model, acting = self.vessel.model, self.vessel.model.parameters != 0.0
+        return replace(
+            model,
+            terms=tuple(term for term, acts in zip(model.terms, acting, strict=True) if acts),
+            parameters=model.parameters[acting],
+            parameter_std=model.parameter_std[acting],
+        )
 
     def _velocity_through_water(self, desired: Array, states: Array) -> Array:
         """(n, 2) desired velocity through water to north and east: the reference's, and some towards it."""
         back = (desired[:, :2] - states[:, :2]) / (CONTROL.track_lead * self.answer_s)
         most = CONTROL.catch_up * self.ship.transit_speed_mps
-        back *= np.minimum(1.0, most / np.maximum(np.hypot(*back.T), 1e-12))[:, None]
-        steady = over_ground(desired) - self.environment.current_to
-        fastest, speed = self.ship.transit_speed_mps, np.hypot(*steady.T)
+        back *= np.minimum(1.0, most / np.maximum(lengths(back), 1e-12))[:, None]
+        steady = over_ground(desired)
+        if self._current:
+            steady -= self.environment.current_to
+        fastest, speed = self.ship.transit_speed_mps, lengths(steady)
         limit = np.where(speed > 1.001 * fastest, 1.02 * speed, fastest)
         through = steady + back
-        return np.asarray(through * np.minimum(1.0, limit / np.maximum(np.hypot(*through.T), 1e-12))[:, None])
+        return np.asarray(through * np.minimum(1.0, limit / np.maximum(lengths(through), 1e-12))[:, None])
 
     def _turning_current(self, states: Array) -> Array:
         """(n, 3) rate at which the mean current changes in the b-frames of turning ships (n, 6) [m/s2].
 
         The model gives the rate of the velocity over ground: that through water has the opposite of this more.
         """
-        if not self.environment.current_to.any():
+        if not self._current:
             return np.zeros((len(states), 3))
         u_c, v_c, _ = (states[:, 3:] - self._in_body(states)).T
-        return np.column_stack([states[:, 5] * v_c, -states[:, 5] * u_c, 0.0 * u_c])
+        return np.array([states[:, 5] * v_c, -states[:, 5] * u_c, 0.0 * u_c]).T
 
     def _in_body(self, states: Array) -> Array:
         """(n, 3) velocities through water from those over ground."""
-        north, east = self.environment.current_to
-        if not (north or east):
+        if not self._current:
             return states[:, 3:]
+        north, east = self.environment.current_to
         c, s = np.cos(states[:, 2]), np.sin(states[:, 2])
-        return np.asarray(states[:, 3:] - np.column_stack([north * c + east * s, east * c - north * s, 0.0 * c]))
+        return np.asarray(states[:, 3:] - np.array([north * c + east * s, east * c - north * s, 0.0 * c]).T)
+
+    @cached_property
+    def _current(self) -> bool:
+        """Whether the forecast has a mean current."""
+        return bool(self.environment.current_to.any())
