@@ -8,6 +8,7 @@ result is that of a plain simulation to rounding.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -59,18 +60,30 @@ class RatesProgram:
         self._places = tape.needed(results)
         self._rested, self._held = self._split()
         self._own = len(model.terms) if theta.ndim == 2 else 0
-        codes, rows, constants = self._laid_out([result.place for result in results])
+        self._codes, rows, self._constants = self._laid_out([result.place for result in results])
+        self._engine = engine
         memory = np.zeros((rows, runs))
-        for row, number in constants.items():
+        for row, number in self._constants.items():
             memory[row] = number
         if self._own:
             memory[self._first : self._first + self._own] = theta.T
+        self._take(memory)
+
+    def part(self, runs: np.ndarray) -> RatesProgram:
+        """The same for some of the runs (k,), by index."""
+        some = copy(self)
+        some._take(self._memory.take(runs, axis=1))
+        return some
+
+    def _take(self, memory: Array) -> None:
+        """Use memory (rows, n)."""
+        self._memory, self._table = memory, np.zeros((0, 0, 0))
         self._state, self.sea = memory[: self._states], memory[self._states : self._out]
         self._results = memory[self._out : self._first]
         self.air: Array | None = None
         first = self._first + self._own
-        self._current, self._table = memory[first : first + len(self._held)], np.zeros((0, 0, 0))
-        self._run = prepared(codes, memory, constants, engine)
+        self._current = memory[first : first + len(self._held)]
+        self._run = prepared(self._codes, memory, self._constants, self._engine)
 
     def hold(self, inputs: Array) -> None:
         """Take delivered inputs (k, m, n); or of fewer runs, 1 or a divisor of n, that the others repeat in turn."""

@@ -4,7 +4,7 @@ from expdesign.plan.control.acceleration_limits import LegEnd, SpeedChanges, lea
 from expdesign.plan.control.capability import capability
 from expdesign.plan.control.helm_capability import full_ahead, stopped
 from expdesign.plan.control.ships import AgileShip, Capability, DubinsShip, HelmShip, arc_spare_m
-from expdesign.plan.control.tracking import Helmsman, Reference, over_ground
+from expdesign.plan.control.tracking import Helmsman, Reference, lengths, over_ground
 from expdesign.plan.control.tuning import CONTROL
 
 __all__ = [
@@ -22,6 +22,7 @@ __all__ = [
     "full_ahead",
     "least_loss",
     "leg_end",
+    "lengths",
     "over_ground",
     "stopped",
     "to_work_s",

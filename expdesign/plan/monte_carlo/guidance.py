@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from expdesign.plan.control import CONTROL, Helmsman, Reference
+from expdesign.plan.control import CONTROL, Helmsman, Reference, lengths
 from expdesign.plan.legs import LegWater, nearest_turns
 from expdesign.plan.monte_carlo.go_around import GoAroundPaths
 from expdesign.plan.monte_carlo.procedure import ABORT_CAUSES, Tolerances, planned_stretch, run_up, under_way
@@ -75,27 +75,39 @@ class Guidance:
         reach_m = np.clip(length_m / 5, self._within.position_m / 2, helm.vessel.length_m)
         self._followers = PathFollowers(helm, runs_up.states[0], n, reach_m=float(reach_m))
         self.doing = np.where(sailing, TRACKING, OUT)
-        self._sample, self._end, self._most = np.zeros(n), np.full(n, planned.arrival), np.full(n, self._first - 1)
-        self.go_arounds, self.samples = np.zeros(n, dtype=int), np.zeros(n, dtype=int)
+        self._at, self._end, self._most = np.zeros(n), np.full(n, planned.arrival), np.full(n, self._first - 1)
+        self.go_arounds, self.samples, self._sample = np.zeros(n, dtype=int), np.zeros(n, dtype=int), 0
         self._abort_cause = np.full(n, ABORT_CAUSES.index("time"))
-        self._spent, self._limit = np.zeros(n), np.full(n, self._allowed(len(track)))
+        self._deadline = np.full(n, self._allowed(len(track)))
 
     def sail(self, fleet: Fleet, unexplained: Array) -> Approach:
         """Until every ship has begun or aborted, from the estimates of unexplained acceleration so far (n, 3)."""
-        poses = [fleet.states[:, :3]]
-        self._rejoin(fleet.states)
-        while (moving := self._decided(fleet)).any():
-            before, desired = fleet.states, self._next(fleet.states)
-            near = self._near(fleet.given)
-            commands = self._helm.commands(
-                desired, before, fleet.given, unexplained=unexplained, near=near, delivered=fleet.delivered
+        poses, unexplained = [fleet.states[:, :3]], unexplained.copy()
+        ships = np.arange(len(self.doing))
+        part, estimate = fleet, unexplained
+        self._rejoin(ships, fleet.states)
+        while True:
+            self._decide(ships, part)
+            sails = self.doing[ships] < BEGUN
+            if not sails.all():
+                fleet.rejoin(part, ships)
+                self.samples[ships[~sails]] = self._sample
+                unexplained[ships] = estimate
+                ships = ships[sails]
+                part, estimate = fleet.part(ships), unexplained[ships]
+            if not len(ships):
+                break
+            before = part.states
+            desired, near = self._next(ships, before), self._near(ships, part.given)
+            part.advance(
+                self._helm.commands(
+                    desired, before, part.given, unexplained=estimate, near=near, delivered=part.delivered
+                )
             )
-            fleet.advance(commands, moving)
-            estimate = self._helm.unexplained(unexplained, before, fleet.states, fleet.delivered)
-            unexplained = np.where(moving[:, None], estimate, unexplained)
-            self.samples += moving
-            self._spent += moving
-            poses.append(fleet.states[:, :3])
+            estimate = self._helm.unexplained(estimate, before, part.states, part.delivered)
+            self._sample += 1
+            poses.append(poses[-1].copy())
+            poses[-1][ships] = part.states[:, :3]
         return Approach(
             poses=np.array(poses),
             begun=self.doing == BEGUN,
@@ -105,44 +117,60 @@ class Guidance:
             unexplained=unexplained,
         )
 
-    def _decided(self, fleet: Fleet) -> np.ndarray:
-        """Decide what every ship does next; (n,) whether it sails on."""
-        states, late = fleet.states, self._spent > self._limit
-        self.doing[fleet.lost & (self.doing < BEGUN)] = ABORTED
-        on = self.doing == TRACKING
-        passed, good = self._at_start(states)
-        self.doing[on & passed & good] = BEGUN
-        worst = 0 if self._last else self._within.used(states, self._desired).argmax(axis=1)
-        self._abort_cause = np.where(on & passed, worst, np.where(late, ABORT_CAUSES.index("time"), self._abort_cause))
-        self.doing[(self.doing == RETURNING) & late] = ABORTED
-        self._run_up((self.doing == RETURNING) & self._followers.arrived(states))
-        self._go_around(on & (self.doing == TRACKING) & (passed | late), states)
-        return np.asarray(self.doing < BEGUN)
+    def _decide(self, ships: np.ndarray, part: Fleet) -> None:
+        """Decide what ships under way (k,) do next."""
+        states, late = part.states, self._sample > self._deadline[ships]
+        self.doing[ships[part.lost]] = ABORTED
+        on = self.doing[ships] == TRACKING
+        passed = self._passed(ships, states, on)
+        self._abort_cause[ships[late]] = ABORT_CAUSES.index("time")
+        if not on.all():
+            back = self.doing[ships] == RETURNING
+            self.doing[ships[back & late]] = ABORTED
+            back &= ~late
+            self._run_up(ships[back][self._followers.arrived(ships[back], states[back])])
+        over = on & (passed | late)
+        if over.any():
+            over &= self.doing[ships] == TRACKING
+            self._go_around(ships[over], states[over])
 
-    def _at_start(self, states: Array) -> tuple[np.ndarray, np.ndarray]:
-        """(n,) whether a ship is as near to the start as it will get this time, and whether it may begin there."""
-        shares, at_end = self._within.used(states, self._desired), self._sample >= self._end
-        used = shares.max(axis=1)
+    def _passed(self, ships: np.ndarray, states: Array, on: np.ndarray) -> np.ndarray:
+        """(k,) whether ships on a reference are as near to the start as this time; those in tolerance begin."""
+        early = 1.0 if self._moves and not self._last else 0.0
+        passed = on & (self._at[ships] >= self._end[ships] - early)
+        if passed.any():
+            some = ships[passed]
+            shares = self._within.used(states[passed], self._desired)
+            there, good = self._at_start(some, states[passed], shares)
+            self.doing[some[there & good]] = BEGUN
+            self._abort_cause[some[there]] = 0 if self._last else shares.argmax(axis=1)[there]
+            passed[passed] = there
+        return passed
+
+    def _at_start(self, ships: np.ndarray, states: Array, shares: Array) -> tuple[np.ndarray, np.ndarray]:
+        """(k,) whether a ship gets no nearer to the start this time, and whether it may begin there.
+
+        Args:
+            ships: (k,) whose reference is there.
+            states: (k, 6) of these.
+            shares: (k, 4) of the tolerances that they use up.
+        """
+        used, waited = shares.max(axis=1), self._sample > self._deadline[ships] - self._waiting / 2
         if self._last:
-            there = (
-                np.hypot(*(states[:, :2] - self._desired[:2]).T)
-                <= MONTE_CARLO.arrived_hulls * self._helm.vessel.length_m
-            )
-            waits = self._helm.ship.keeps_station & (self._spent <= self._limit - self._waiting / 2)
-            return at_end & (there | ~waits), there
+            there = lengths(states[:, :2] - self._desired[:2]) <= MONTE_CARLO.arrived_hulls * self._helm.vessel.length_m
+            return there | waited | (not self._helm.ship.keeps_station), there
         if not self._moves:
-            waited = self._spent > self._limit - self._waiting / 2
-            return at_end & ((used <= MONTE_CARLO.standstill_share) | ((used <= 1.0) & waited)), used <= 1.0
-        gone_by = (self._sample >= self._most) | (shares[:, 0] > 1.0)
-        return (self._sample >= self._end - 1.0) & ((used <= 1.0) | gone_by), used <= 1.0
+            return (used <= MONTE_CARLO.standstill_share) | ((used <= 1.0) & waited), used <= 1.0
+        gone_by = (self._at[ships] >= self._most[ships]) | (shares[:, 0] > 1.0)
+        return (used <= 1.0) | gone_by, used <= 1.0
 
     def _run_up(self, ships: np.ndarray) -> None:
         self.doing[ships] = TRACKING
-        self._sample[ships], self._end[ships] = self._first, self._arrival
-        self._most[ships], self._spent[ships] = len(self._reference.states) - 1, 0
-        self._limit[ships] = self._allowed(self._arrival - self._first)
+        self._at[ships], self._end[ships] = self._first, self._arrival
+        self._most[ships] = len(self._reference.states) - 1
+        self._deadline[ships] = self._sample + self._allowed(self._arrival - self._first)
 
-    def _rejoin(self, states: Array) -> None:
+    def _rejoin(self, ships: np.ndarray, states: Array) -> None:
         """Ships too far off to return within the leg's time, or without a clear return to it, go around at once."""
         first, helm = self._reference.states[0, :2], self._helm
         off_m = np.hypot(*(states[:, :2] - first).T)
@@ -155,7 +183,7 @@ class Guidance:
         if len(some):
             clear = np.array([self._tree.holds(self._return_to_leg(states[ship, :2])) for ship in some])
             off[some] = ~clear | ((off_m[some] > good_m) & (not self._last))
-            self._go_around(off, states)
+            self._go_around(ships[off], states[off])
 
     def _return_to_leg(self, place: Array) -> Array:
         """(k, 2) approximate track of a ship from a place back to the leg, while the reference stays abeam."""
@@ -167,23 +195,23 @@ class Guidance:
         return np.asarray((track[thinned] + left[:, None] * off)[: int((left > 0.0).sum()) + 1])
 
     def _go_around(self, ships: np.ndarray, states: Array) -> None:
-        """Start ships on return paths to the run-up; those without a path, or go-arounds left, abort."""
+        """Start ships (k,) on return paths to the run-up; those without a path, or go-arounds left, abort."""
         self.doing[ships] = ABORTED
-        some = np.flatnonzero(ships & (self.go_arounds < MONTE_CARLO.go_arounds))
-        if not len(some):
+        again = self.go_arounds[ships] < MONTE_CARLO.go_arounds
+        ships, states = ships[again], states[again]
+        if not len(ships):
             return
-        self.go_arounds[some] += 1
+        self.go_arounds[ships] += 1
         sideways = self._helm.ship.keeps_station
-        paths = self._tree.find(states[some, :2]) if sideways else [self._arcs.find(x) for x in states[some, :3]]
-        for ship, path in zip(some.tolist(), paths, strict=True):
+        paths = self._tree.find(states[:, :2]) if sideways else [self._arcs.find(x) for x in states[:, :3]]
+        for ship, path in zip(ships.tolist(), paths, strict=True):
             if path is None:
                 self._abort_cause[ship] = ABORT_CAUSES.index("no go-around path")
             else:
                 self.doing[ship] = RETURNING
                 self._followers.start(ship, path)
         sample_m = self._helm.ship.transit_speed_mps * self._helm.vessel.sample_time_s
-        self._spent[some] = 0
-        self._limit[some] = self._allowed(self._followers.length_m[some] / sample_m)
+        self._deadline[ships] = self._sample + self._allowed(self._followers.length_m[ships] / sample_m)
 
     @cached_property
     def _arcs(self) -> GoAroundPaths:
@@ -199,34 +227,47 @@ class Guidance:
     def _tree(self) -> ReturnPaths:
         return build_return_paths(self._water.narrowest_graph, self._followers.goal[:2])
 
-    def _near(self, given: Array) -> Array:
-        """(n, m) commands to whose angles azimuths keep: those of the run for ships that approach it under way."""
+    def _near(self, ships: np.ndarray, given: Array) -> Array:
+        """(k, m) commands to whose angles azimuths keep: those of the run for ships that approach it under way."""
+        if not self._moves:
+            return given
         ready = nearest_turns(self._helm.vessel, self._inputs, given)
-        return np.where((self._moves & (self.doing == TRACKING))[:, None], ready, given)
+        return np.where((self.doing[ships] == TRACKING)[:, None], ready, given)
 
-    def _next(self, states: Array) -> Array:
-        """(n, 6) desired state of each ship over the next sample; references advance."""
-        on = self.doing == TRACKING
-        desired = np.zeros((len(on), 6))
-        if (self.doing == RETURNING).any():
-            desired = self._followers.desired(states)
-        if not on.any():
-            return desired
-        pace = self._reference.abreast(self._sample, states, step_m=self._least_step_m)
-        self._sample = np.where(on, np.minimum(self._sample + pace, self._most), self._sample)
-        soon = np.minimum(self._sample + self._helm.answer_s / self._helm.vessel.sample_time_s, self._most)
-        now = self._reference.at(self._sample)
-        now[:, 3:] = self._reference.at(soon)[:, 3:]  # velocities respond with a lag: they are demanded ahead of time
-        now[:, :2] = np.where(self._steadying()[:, None], states[:, :2], now[:, :2])
-        return np.where(on[:, None], now, desired)
+    def _next(self, ships: np.ndarray, states: Array) -> Array:
+        """(k, 6) desired states of ships (k,) over the next sample; references advance."""
+        on = self.doing[ships] == TRACKING
+        if on.all():
+            return self._tracked(ships, states)
+        back = ~on
+        desired = np.empty((6, len(ships))).T
+        desired[on] = self._tracked(ships[on], states[on])
+        desired[back] = self._followers.desired(ships[back], states[back])
+        return desired
 
-    def _steadying(self) -> np.ndarray:
-        """(n,) whether a ship keeps its heading and drifts with an unknown current, to begin on the planned heading."""
+    def _tracked(self, ships: np.ndarray, states: Array) -> Array:
+        """(k, 6) states that ships on the reference desire; it advances."""
+        most = self._most[ships]
+        pace = self._reference.abreast(self._at[ships], states, step_m=self._least_step_m)
+        self._at[ships] = at = np.minimum(self._at[ships] + pace, most)
+        soon = np.minimum(at + self._helm.answer_s / self._helm.vessel.sample_time_s, most)
+        now = self._reference.at(at)
+        now[:, 3:] = self._reference.velocity_at(soon)  # velocities respond with a lag: they are demanded ahead of time
+        if self._steadies:
+            now[:, :2] = np.where(self._steadying(ships)[:, None], states[:, :2], now[:, :2])
+        return now
+
+    @property
+    def _steadies(self) -> bool:
+        """Whether ships keep their heading near the start and drift with an unknown current there."""
+        return self._moves and not self._last and not self._helm.ship.keeps_station
+
+    def _steadying(self, ships: np.ndarray) -> np.ndarray:
+        """(k,) whether ships (k,) are so near that they begin on the planned heading."""
         helm = self._helm
-        if self._last or helm.ship.keeps_station or not self._moves:
-            return np.zeros(len(self._sample), dtype=bool)
         sample_m = float(np.hypot(*self._desired[3:5])) * helm.vessel.sample_time_s
-        return np.asarray(self._end - self._sample <= MONTE_CARLO.steady_hulls * helm.vessel.length_m / sample_m)
+        near = MONTE_CARLO.steady_hulls * helm.vessel.length_m / sample_m
+        return np.asarray(self._end[ships] - self._at[ships] <= near)
 
     @property
     def _least_step_m(self) -> float:
@@ -244,10 +285,12 @@ class Guidance:
 
 def open_loop(helm: Helmsman, fleet: Fleet, values: Array, sailing: np.ndarray) -> Array:
     """(k + 1, n, 3) poses of ships under commands (k, m), limited by the rates from the standing ones on."""
-    poses = [fleet.states[:, :3]]
-    commands = values + (nearest_turns(helm.vessel, values[0], fleet.given) - values[0])[:, None]
+    ships = np.flatnonzero(sailing & ~fleet.lost)
+    part, poses = fleet.part(ships), np.repeat(fleet.states[None, :, :3], len(values) + 1, axis=0)
+    turns = nearest_turns(helm.vessel, values[0], part.given) - values[0]
     reach = np.array([limit.rate for limit in helm.vessel.limits]) * helm.vessel.sample_time_s
-    for row in commands.swapaxes(0, 1):
-        fleet.advance(np.clip(row, fleet.given - reach, fleet.given + reach), sailing)
-        poses.append(fleet.states[:, :3])
-    return np.array(poses)
+    for sample, row in enumerate(values, start=1):
+        part.advance(np.minimum(np.maximum(row + turns, part.given - reach), part.given + reach))
+        poses[sample, ships] = part.states[:, :3]
+    fleet.rejoin(part, ships)
+    return poses

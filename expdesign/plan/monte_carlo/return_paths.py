@@ -13,7 +13,7 @@ import shapely
 
 from expdesign.conventions import wrap_angle
 from expdesign.plan.chart import VisibilityGraph, first_bends, path_over, shortest_path_tree
-from expdesign.plan.control import CONTROL, Helmsman
+from expdesign.plan.control import CONTROL, Helmsman, lengths
 from expdesign.plan.monte_carlo.tuning import MONTE_CARLO
 from expdesign.values import Array
 
@@ -73,7 +73,7 @@ class PathFollowers:
         self._path: Array = np.tile(goal[:2], (ships, 2, 1))
         self._left: Array = np.zeros((ships, 2))
         self._bend: Array = np.full((ships, 2), helm.ship.transit_speed_mps)
-        self._next = np.ones(ships, dtype=int)
+        self._next, self._last = np.ones(ships, dtype=int), np.zeros(ships, dtype=int)
         self._reach_m = reach_m
         self.length_m: Array = np.zeros(ships)
 
@@ -90,6 +90,7 @@ class PathFollowers:
         self._path[ship, :count] = path
         length = np.hypot(*steps.T)
         self._left[ship, :count] = np.r_[np.cumsum(length[::-1])[::-1], 0.0]
+        self._last[ship] = (self._left[ship] <= 0.0).argmax()
         self._bend[ship] = MONTE_CARLO.bend_speed * fastest if self._helm.ship.keeps_station else fastest
         if count > 2:
             turn = np.abs(wrap_angle(np.diff(np.arctan2(steps[:, 1], steps[:, 0]))))
@@ -98,67 +99,65 @@ class PathFollowers:
             )
         self.length_m[ship] = length.sum()
 
-    def arrived(self, states: Array) -> np.ndarray:
-        """(n,) ships that have arrived and, if they keep station, are on the desired heading."""
-        helm = self._helm
-        there = np.hypot(*(states[:, :2] - self.goal[:2]).T) < self._reach_m
-        turned = np.abs(wrap_angle(states[:, 2] - self.goal[2])) < MONTE_CARLO.turned_rad
-        turned &= np.abs(states[:, 5]) < MONTE_CARLO.turned_rad / (2.0 * helm.answer_s)
+    def arrived(self, ships: np.ndarray, states: Array) -> np.ndarray:
+        """(k,) which of some ships (k,) have arrived and, if they keep station, are on the desired heading."""
+        helm, off = self._helm, states[:, :2] - self.goal[:2]
+        there = lengths(off) < self._reach_m
         if helm.ship.keeps_station:
-            return np.asarray(there & turned)
+            turned = np.abs(wrap_angle(states[:, 2] - self.goal[2])) < MONTE_CARLO.turned_rad
+            return np.asarray(there & turned & (np.abs(states[:, 5]) < MONTE_CARLO.turned_rad / (2.0 * helm.answer_s)))
         ahead = np.stack([np.cos(self.goal[2]), np.sin(self.goal[2])])
-        on_last = self._left[np.arange(len(states)), self._next] <= 0.0
-        return np.asarray(there | (on_last & ((states[:, :2] - self.goal[:2]) @ ahead > 0.0)))
+        on_last = self._left[ships, self._next[ships]] <= 0.0
+        return np.asarray(there | (on_last & (off @ ahead > 0.0)))
 
-    def desired(self, states: Array) -> Array:
-        """(n, 6) desired state of each ship: towards its path, at a speed from which it can slow down in time."""
-        helm, everyone = self._helm, np.arange(len(states))
+    def desired(self, ships: np.ndarray, states: Array) -> Array:
+        """(k, 6) desired states of some ships (k,): towards their paths, at a speed from which they slow in time."""
+        helm, keeps = self._helm, self._helm.ship.keeps_station
         length, fastest = helm.vessel.length_m, helm.ship.transit_speed_mps
-        last = (self._left <= 0.0).argmax(axis=1)
-        ahead = np.hypot(*(self._path[everyone, self._next] - states[:, :2]).T)
-        there, before = self._path[everyone, self._next], self._path[everyone, self._next - 1]
-        passed = ((there - states[:, :2]) * (there - before)).sum(axis=1) <= 0.0
-        self._next = np.where(
-            ((ahead < MONTE_CARLO.bend_hulls * length) | passed) & (self._next < last), self._next + 1, self._next
-        )
-        there, before = self._path[everyone, self._next], self._path[everyone, self._next - 1]
+        self._pass_bends(ships, states[:, :2])
+        at = self._next[ships]
+        there, before = self._path[ships, at], self._path[ships, at - 1]
         offset = there - states[:, :2]
-        ahead = np.hypot(*offset.T)
-        left = ahead + self._left[everyone, self._next]
-        brake = MONTE_CARLO.braking * helm.ship.acceleration_mps2
-        braked_m = np.maximum(ahead - MONTE_CARLO.bend_hulls * length, 0.0)
-        speed = np.sqrt(self._bend[everyone, self._next] ** 2 + 2 * brake * braked_m)
-        near = left < MONTE_CARLO.turn_hulls * length
-        lengthways = np.cos(np.arctan2(offset[:, 1], offset[:, 0]) - self.goal[2])
-        slow = np.minimum(
-            fastest * np.maximum(lengthways, MONTE_CARLO.sideways_speed), left / (CONTROL.track_lead * helm.answer_s)
-        )
-        speed = np.minimum(np.minimum(speed, fastest), np.where(near & helm.ship.keeps_station, slow, np.inf))
+        ahead = lengths(offset)
+        left = ahead + self._left[ships, at]
+        near = (left < MONTE_CARLO.turn_hulls * length) & keeps
+        speed = self._speed(ahead, self._bend[ships, at])
+        if near.any():
+            lengthways = np.cos(np.arctan2(offset[near, 1], offset[near, 0]) - self.goal[2])
+            slow = np.minimum(
+                fastest * np.maximum(lengthways, MONTE_CARLO.sideways_speed),
+                left[near] / (CONTROL.track_lead * helm.answer_s),
+            )
+            speed[near] = np.minimum(speed[near], slow)
         leg = there - before
-        leg = leg / np.maximum(np.hypot(*leg.T), 1e-9)[:, None]
-        across = offset - (offset * leg).sum(axis=1)[:, None] * leg
-        look = length if helm.ship.keeps_station else MONTE_CARLO.look_ahead_hulls * length
+        leg = leg / np.maximum(lengths(leg), 1e-9)[:, None]
+        across = offset - (offset[:, 0] * leg[:, 0] + offset[:, 1] * leg[:, 1])[:, None] * leg
+        look = length if keeps else MONTE_CARLO.look_ahead_hulls * length
         pursued = leg * look + across  # a point ahead on the path
-        if helm.ship.keeps_station:
+        if keeps:
             pursued = np.where((near | (ahead < look))[:, None], offset, pursued)
-        course = pursued / np.maximum(np.hypot(*pursued.T), 1e-9)[:, None]
+        course = pursued / np.maximum(lengths(pursued), 1e-9)[:, None]
         through = course * speed[:, None] - helm.environment.current_to
-        pointing = np.arctan2(through[:, 1], through[:, 0])
-        heading = np.where(near & helm.ship.keeps_station, self.goal[2], pointing)
-        off = np.cos(np.minimum(np.abs(wrap_angle(heading - states[:, 2])), np.pi / 2))
-        ground = (
-            course
-            * (speed * np.where(near | (not helm.ship.keeps_station), 1.0, np.maximum(off, MONTE_CARLO.bend_speed)))[
-                :, None
-            ]
-        )
+        heading = np.where(near, self.goal[2], np.arctan2(through[:, 1], through[:, 0]))
+        if keeps:
+            off = np.cos(np.minimum(np.abs(wrap_angle(heading - states[:, 2])), np.pi / 2))
+            speed = speed * np.where(near, 1.0, np.maximum(off, MONTE_CARLO.bend_speed))
+        north, east = (course * speed[:, None]).T
         c, s = np.cos(heading), np.sin(heading)
-        return np.column_stack(
-            [
-                states[:, :2],
-                heading,
-                ground[:, 0] * c + ground[:, 1] * s,
-                ground[:, 1] * c - ground[:, 0] * s,
-                np.zeros(len(states)),
-            ]
-        )
+        rows = [states[:, 0], states[:, 1], heading, north * c + east * s, east * c - north * s, np.zeros(len(ships))]
+        return np.array(rows).T
+
+    def _pass_bends(self, ships: np.ndarray, places: Array) -> None:
+        """Ships (k,) at places (k, 2) that have reached or passed a bend turn to the next one."""
+        at = self._next[ships]
+        there, before = self._path[ships, at], self._path[ships, at - 1]
+        off, leg = there - places, there - before
+        reached = lengths(off) < MONTE_CARLO.bend_hulls * self._helm.vessel.length_m
+        passed = off[:, 0] * leg[:, 0] + off[:, 1] * leg[:, 1] <= 0.0
+        self._next[ships] = at + ((reached | passed) & (at < self._last[ships]))
+
+    def _speed(self, ahead_m: Array, bend_mps: Array) -> Array:
+        """(k,) speeds from which ships can slow down to those of the bends ahead."""
+        brake = MONTE_CARLO.braking * self._helm.ship.acceleration_mps2
+        braked_m = np.maximum(ahead_m - MONTE_CARLO.bend_hulls * self._helm.vessel.length_m, 0.0)
+        return np.minimum(np.sqrt(bend_mps * bend_mps + 2 * brake * braked_m), self._helm.ship.transit_speed_mps)

@@ -6,8 +6,8 @@ that deliver as the vessel's file says. For ships that wait, only the weather go
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import partial
+from copy import copy
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -36,11 +36,40 @@ class Truths:
         seal(self, parameters="n p", current_to="n 2", wind_to="n 2")
 
 
+class Weather:
+    """Current and wind of n ships, drawn for all of them whether they move or wait.
+
+    Attributes:
+        varies: whether they change from sample to sample.
+        now: (4, n) current and wind to north and east of this sample [m/s].
+    """
+
+    def __init__(
+        self, environment: Environment, truths: Truths, *, sample_time_s: float, rng: np.random.Generator
+    ) -> None:
+        """The means; `draw` goes on to the first sample."""
+        self._rng, self._sample_time_s = rng, sample_time_s
+        self._means = (truths.current_to, truths.wind_to)
+        self._variations = (environment.current_variation, environment.wind_variation)
+        self._varied: list[Array | None] = [None, None]
+        self.varies = any(variation.std_mps > 0.0 for variation in self._variations)
+        self.now: Array = np.concatenate([mean.T for mean in self._means])
+
+    def draw(self) -> None:
+        """Go on to the next sample."""
+        for index, (variation, mean) in enumerate(zip(self._variations, self._means, strict=True)):
+            if variation.std_mps > 0.0:
+                normal, before = self._rng.standard_normal((1, *mean.shape)), self._varied[index]
+                self._varied[index] = vary(variation, normal, sample_time_s=self._sample_time_s, before=before)[0]
+                self.now[2 * index : 2 * index + 2] = (mean + self._varied[index]).T
+
+
 class Fleet:
-    """n ships and their states.
+    """n ships and their states, columns of arrays side by side in memory.
 
     Attributes:
         vessel: the nominal one.
+        weather: of all ships, also of those that the fleet is only a part of.
         states: (n, 6) pose in the n-frame and velocity over ground in the b-frame.
         given: (n, m) commands standing.
         delivered: (n, m) what the actuators gave over the last sample, on average.
@@ -67,53 +96,95 @@ class Fleet:
             rng: of the weather.
         """
         runs = len(truths.parameters)
-        self.vessel, self._rng = vessel, rng
-        self.states: Array = np.tile(state, (runs, 1))
-        self.given: Array = np.tile(standing, (runs, 1))
+        self.vessel = vessel
+        self.weather = Weather(environment, truths, sample_time_s=vessel.sample_time_s, rng=rng)
+        self.states: Array = np.repeat(state[:, None], runs, axis=1).T
+        self.given: Array = np.repeat(standing[:, None], runs, axis=1).T
+        self.delivered = self.given
         self.lost = np.zeros(runs, dtype=bool)
         self._actuators = ActuatorState.standing(
             vessel.responses, self.given.T, sample_time_s=vessel.sample_time_s, substeps=SUBSTEPS
         )
-        self.delivered = self.given.copy()
-        self._variations = (environment.current_variation, environment.wind_variation)
-        self._means = (truths.current_to, truths.wind_to)
-        self._varied: list[Array | None] = [None, None]
+        self._ships = np.arange(runs)
         self._program = RatesProgram(vessel.model, runs=runs, parameters=truths.parameters)
+        self._program.sea[...] = self.weather.now
 
-    def advance(self, commands: Array, moving: np.ndarray) -> None:
-        """One sample with commands (n, m) for the ships that move (n,); the others wait."""
-        moving = moving & ~self.lost
-        held = np.where(moving[:, None], commands, self.given)
-        given = self._actuators.mean(held.T)  # (substeps or 1, m, n)
-        self._actuators = self._actuators.after(held.T, moving)
-        self._program.sea[...] = self._weather()
+    def part(self, ships: np.ndarray) -> Fleet:
+        """Some of the ships (k,), by index, as a fleet that sails on by itself in the same weather."""
+        some = copy(self)
+        some.states, some.given, some.delivered = (_some(x, ships) for x in (self.states, self.given, self.delivered))
+        some.lost, some._ships = self.lost[ships], self._ships[ships]
+        old = self._actuators
+        past = tuple(commands[:, ships] for commands in old.past)
+        some._actuators = replace(old, values=old.values[:, ships], past=past)
+        some._program = self._program.part(ships)
+        return some
+
+    def rejoin(self, part: Fleet, ships: np.ndarray) -> None:
+        """Take over where a part (k ships, by index here) has sailed."""
+        self.states, self.given, self.delivered = (
+            _with(whole, ships, some)
+            for whole, some in (
+                (self.states, part.states),
+                (self.given, part.given),
+                (self.delivered, part.delivered),
+            )
+        )
+        self.lost[ships] = part.lost
+        old, new = self._actuators, part._actuators
+        pasts = zip(old.past, new.past, strict=True)
+        self._actuators = replace(
+            old,
+            values=_with(old.values.T, ships, new.values.T).T,
+            past=tuple(_with(whole.T, ships, some.T).T for whole, some in pasts),
+        )
+
+    def advance(self, commands: Array, moving: np.ndarray | None = None) -> None:
+        """One sample with commands (n, m); ships that are lost, or do not move (n,), wait."""
+        sails = ~self.lost if moving is None else moving & ~self.lost
+        if sails.all():
+            self._advance(commands)
+        else:
+            ships = np.flatnonzero(sails)
+            part = self.part(ships)
+            part._advance(commands[ships])
+            self.rejoin(part, ships)
+
+    def _advance(self, commands: Array) -> None:
+        given = self._actuators.mean(commands.T)  # (substeps or 1, m, n)
+        after = self._actuators.after(commands.T)
+        if self.weather.varies:
+            self.weather.draw()
+            self._program.sea[...] = self.weather.now[:, self._ships]
         self._program.hold(given)
-        state = self.states.T
-        step_s = self.vessel.sample_time_s / SUBSTEPS
+        state, step_s = self.states.T, self.vessel.sample_time_s / SUBSTEPS
         with np.errstate(over="ignore", invalid="ignore"):
             for part in range(SUBSTEPS):
                 if part < len(given):
                     self._program.select(part)
                 (state,) = rk4_step(self._rates, (state,), step_s)
             settled = np.abs(state[3:]).max(axis=0) < LARGEST_SPEED
-        self.lost |= moving & ~settled
-        moved = moving & settled
-        self.states = np.where(moved[:, None], state.T, self.states)
-        self.given = np.where(moved[:, None], held, self.given)
-        self.delivered = np.where(moved[:, None], given.mean(axis=0).T, self.delivered)
+        delivered = given[0].T if len(given) == 1 else given.mean(axis=0).T
+        if not settled.all():
+            self.lost = ~settled
+            state, commands, delivered = (
+                np.where(settled, new.T, old.T)
+                for new, old in ((state.T, self.states), (commands, self.given), (delivered, self.delivered))
+            )
+            commands, delivered = commands.T, delivered.T
+        self.states, self.given, self.delivered, self._actuators = state.T, commands, delivered, after
 
     def _rates(self, state: tuple[Array, ...]) -> tuple[Array, ...]:
         return (self._program.rates(state)[0].copy(),)
 
-    def _weather(self) -> Array:
-        """(4, n) current and wind of the next sample."""
-        rows = []
-        draw = partial(vary, sample_time_s=self.vessel.sample_time_s)
-        for index, (variation, mean) in enumerate(zip(self._variations, self._means, strict=True)):
-            if variation.std_mps == 0.0:
-                rows.append(mean.T)
-                continue
-            normal = self._rng.standard_normal((1, *mean.shape))
-            self._varied[index] = now = draw(variation, normal, before=self._varied[index])[0]
-            rows.append((mean + now).T)
-        return np.concatenate(rows)
+
+def _some(table: Array, ships: np.ndarray) -> Array:
+    """Rows (k, ...) of a table (n, ...)."""
+    return np.asarray(table.T.take(ships, axis=1).T)
+
+
+def _with(table: Array, ships: np.ndarray, rows: Array) -> Array:
+    """The table (n, ...) with other rows (k, ...) of some ships."""
+    result = table.T.copy()
+    result[:, ships] = rows.T
+    return result.T
