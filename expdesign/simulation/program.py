@@ -59,6 +59,10 @@ class RatesProgram:
         results = [value if isinstance(value, Symbol) else tape.constant(value) for value in (*rates, *air)]
         self._places = tape.needed(results)
         self._rested, self._held = self._split()
+        entries = [(place, tape.entries[place]) for place in self._places if place in self._rested]
+        self._constant = {place: entry.number for place, entry in entries if entry.name == "constant"}
+        self._inputs = [(place, int(entry.number)) for place, entry in entries if entry.name == "input"]
+        self._resting = [(place, getattr(np, x.name), x.arguments) for place, x in entries if x.arguments]
         self._own = len(model.terms) if theta.ndim == 2 else 0
         self._codes, rows, self._constants = self._laid_out([result.place for result in results])
         self._engine = engine
@@ -87,15 +91,10 @@ class RatesProgram:
 
     def hold(self, inputs: Array) -> None:
         """Take delivered inputs (k, m, n); or of fewer runs, 1 or a divisor of n, that the others repeat in turn."""
-        entries, values = self._tape.entries, dict[int, Any]()
-        for place in self._places:
-            entry = entries[place]
-            if entry.name == "constant":
-                values[place] = entry.number
-            elif entry.name == "input":
-                values[place] = inputs[:, int(entry.number)]
-            elif place in self._rested:
-                values[place] = getattr(np, entry.name)(*(values[argument] for argument in entry.arguments))
+        values = dict(self._constant)
+        values |= {place: inputs[:, index] for place, index in self._inputs}
+        for place, call, arguments in self._resting:
+            values[place] = call(*[values[argument] for argument in arguments])
         self._table = np.empty((len(inputs), len(self._held), inputs.shape[-1]))
         for index, place in enumerate(self._held):
             self._table[:, index] = values[place]
