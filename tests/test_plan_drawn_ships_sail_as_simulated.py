@@ -82,9 +82,11 @@ def test_weather_of_a_fleet_varies_with_its_size_and_memory():
         standing=still[1],
         rng=np.random.default_rng(2),
     )
-    first = fleet._weather()[:2]
+    fleet.weather.draw()
+    first = fleet.weather.now[:2].copy()
     for _ in range(9):
-        later = fleet._weather()[:2]
+        fleet.weather.draw()
+    later = fleet.weather.now[:2]
     spread = std / np.sqrt(2 * 2 * ships)
     assert abs(first.std() - std) < 4 * spread
     assert abs(later.std() - std) < 4 * spread

@@ -32,20 +32,25 @@ def required_force(model: VesselModel, velocity: Array, acceleration: Array) -> 
             f"term {direct[0]}: desired velocities need a model whose inputs are "
             f"{', '.join(FORCE_SIGNALS)}; use families with commands"
         )
-    motion = dict(zip(OUTPUTS, np.moveaxis(velocity, -1, 0), strict=True))
+    motion = {name: velocity[..., column] for column, name in enumerate(OUTPUTS)}
     signals = motion | {"u_q": motion["u"], "v_q": motion["v"], SHOAL: 0.0}
 
     def response(force: Sequence[float]) -> Array:
         table, totals = signals | dict(zip(FORCE_SIGNALS, force, strict=True)), np.zeros((3, *velocity.shape[:-1]))
         for term, expression, value in _acting(model):
             totals[OUTPUTS.index(term.equation)] += value * expression.evaluate(table, NUMPY)
-        return np.moveaxis(totals / model.time_scale_s, 0, -1)
+        return _columns(totals / model.time_scale_s)
 
     free = response((0.0, 0.0, 0.0))
     if _same_push_at_any_speed(model):  # one small inverse instead of one for every velocity
         return np.asarray((acceleration - free) @ _inverse_at_rest(model).T, dtype=float)
     gain = np.stack([response(unit) - free for unit in np.eye(3)], axis=-1)  # (..., 3 outputs, 3 forces)
     return np.asarray((np.linalg.pinv(gain) @ (acceleration - free)[..., None])[..., 0], dtype=float)
+
+
+def _columns(rows: Array) -> Array:
+    """The same (m, ...) as (..., m), in place."""
+    return rows.transpose(*range(1, rows.ndim), 0)
 
 
 @lru_cache(maxsize=16)
@@ -199,7 +204,7 @@ def _desired_commands(actuators: tuple[Actuator, ...], row: Array, last: Array |
             parts += [row[..., taken + index] for index in range(len(actuator.limits))]
         taken += {"azimuth": 2, "rudder": 0}.get(actuator.kind, len(actuator.limits))
         place += len(actuator.limits)
-    return np.moveaxis(np.array(parts), 0, -1)
+    return _columns(np.array(parts))
 
 
 WAYS_ROUND = np.array([(half, turns) for half in (0.0, math.pi) for turns in (-1.0, 0.0, 1.0)]).T

@@ -35,10 +35,15 @@ class CollisionCheck:
         Args:
             poses: (k, n, 3) sample by sample; ships that do not move are skipped.
         """
-        far = shapely.contains_xy(self._deep, poses[..., 1], poses[..., 0])  # (k, n)
-        moved = np.hypot(*np.moveaxis(np.diff(poses[..., :2], axis=0), -1, 0))
-        turned = np.diff(poses[..., 2], axis=0) != 0
-        close = ((moved > 0) | turned) & ~(far[:-1] & far[1:] & (moved < self._radius / 2))
+        moved, turned = np.diff(poses[..., :2], axis=0), np.diff(poses[..., 2], axis=0) != 0
+        moved = np.sqrt(moved[..., 0] ** 2 + moved[..., 1] ** 2)
+        sails = (moved > 0) | turned
+        concerned = np.zeros(poses.shape[:2], dtype=bool)
+        concerned[:-1] |= sails
+        concerned[1:] |= sails
+        far = np.ones(poses.shape[:2], dtype=bool)
+        far[concerned] = self._far(poses[concerned, :2])
+        close = sails & ~(far[:-1] & far[1:] & (moved < self._radius / 2))
         steps, ships = np.nonzero(close)
         place: Array = np.full((poses.shape[1], 2), np.nan)
         for first in range(0, len(steps), MONTE_CARLO.collision_chunk):
@@ -58,6 +63,29 @@ class CollisionCheck:
     def _water(self) -> shapely.MultiPolygon:
         shapely.prepare(self.area.water)
         return self.area.water
+
+    def _far(self, places: Array) -> np.ndarray:
+        """(k,) whether places (k, 2) are far from the shore: where a coarse table does not say so, one by one."""
+        far = np.zeros(len(places), dtype=bool)
+        cell_m, bounds = self._radius, np.reshape(self.area.water.bounds, (2, 2))[:, ::-1]
+        inside = ((places >= bounds[0]) & (places <= bounds[1])).all(axis=1)
+        if inside.any():
+            first = places[inside].min(axis=0)
+            cells = ((places[inside] - first) / cell_m).astype(int)
+            shape = cells.max(axis=0) + 1
+            if shape.prod() < len(cells):
+                middles = first + cell_m * (np.stack(np.indices(shape), axis=-1) + 0.5)
+                deep = shapely.contains_xy(self._deeper, middles[..., 1], middles[..., 0])
+                far[inside] = deep[cells[:, 0], cells[:, 1]]
+        far[~far] = shapely.contains_xy(self._deep, places[~far, 1], places[~far, 0])
+        return far
+
+    @cached_property
+    def _deeper(self) -> shapely.Geometry:
+        """Water round whose places a square cell as wide as the hull's radius is deep."""
+        inner = self.area.safe_water((1.05 + 0.75) * self._radius)
+        shapely.prepare(inner)
+        return inner
 
     @cached_property
     def _deep(self) -> shapely.Geometry:

@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from expdesign.conventions import whole_turns
 from expdesign.plan.control import CONTROL, Helmsman, Reference, lengths
 from expdesign.plan.legs import LegWater, nearest_turns
 from expdesign.plan.monte_carlo.go_around import GoAroundPaths
@@ -68,6 +69,7 @@ class Guidance:
         after_m = 0.0 if last else max(MONTE_CARLO.past_start_hulls * helm.vessel.length_m, within.position_m)
         n, planned, runs_up = len(sailing), planned_stretch(helm, track, after_m), run_up(helm, water, track, after_m)
         self._helm, self._water, self._inputs, self._last = helm, water, inputs, last
+        self._free = np.array(helm.vessel.turns_freely, dtype=float)
         self._desired, self._moves, self._within = track[-1], under_way(helm, track[-1]), within
         self._reference = Reference(states=np.concatenate([planned.states, runs_up.states]))
         self._first, self._arrival = len(planned.states), len(planned.states) + runs_up.arrival
@@ -231,7 +233,7 @@ class Guidance:
         """(k, m) commands to whose angles azimuths keep: those of the run for ships that approach it under way."""
         if not self._moves:
             return given
-        ready = nearest_turns(self._helm.vessel, self._inputs, given)
+        ready = self._inputs + whole_turns(given - self._inputs) * self._free
         return np.where((self.doing[ships] == TRACKING)[:, None], ready, given)
 
     def _next(self, ships: np.ndarray, states: Array) -> Array:
