@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable
 from functools import lru_cache
 
 import numpy as np
@@ -35,7 +35,7 @@ def required_force(model: VesselModel, velocity: Array, acceleration: Array) -> 
     motion = {name: velocity[..., column] for column, name in enumerate(OUTPUTS)}
     signals = motion | {"u_q": motion["u"], "v_q": motion["v"], SHOAL: 0.0}
 
-    def response(force: Sequence[float]) -> Array:
+    def response(force: Iterable[float]) -> Array:
         table, totals = signals | dict(zip(FORCE_SIGNALS, force, strict=True)), np.zeros((3, *velocity.shape[:-1]))
         for term, expression, value in _acting(model):
             totals[OUTPUTS.index(term.equation)] += value * expression.evaluate(table, NUMPY)

@@ -76,7 +76,7 @@ class Reference:
         """
         step = np.maximum(self._steps_m.take(sample.astype(int), mode="clip"), step_m)
         pace = -self._behind_m(sample, states) / step
-        return np.minimum(np.maximum(pace, CONTROL.pace_least), CONTROL.pace_most)
+        return np.asarray(np.minimum(np.maximum(pace, CONTROL.pace_least), CONTROL.pace_most))
 
     def _behind_m(self, sample: Array, states: Array) -> Array:
         """(n,) how far ships (n, 6) are behind the reference at samples (n,), along its course [m]."""
@@ -94,7 +94,7 @@ def over_ground(states: Array) -> Array:
 def lengths(vectors: Array) -> Array:
     """(n,) lengths of vectors (n, 2)."""
     north, east = vectors.T
-    return np.sqrt(north * north + east * east)
+    return np.asarray(np.sqrt(north * north + east * east))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

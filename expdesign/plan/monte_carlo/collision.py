@@ -74,7 +74,7 @@ class CollisionCheck:
             cells = ((places[inside] - first) / cell_m).astype(int)
             shape = cells.max(axis=0) + 1
             if shape.prod() < len(cells):
-                middles = first + cell_m * (np.stack(np.indices(shape), axis=-1) + 0.5)
+                middles = first + cell_m * (np.moveaxis(np.indices(shape), 0, -1) + 0.5)
                 deep = shapely.contains_xy(self._deeper, middles[..., 1], middles[..., 0])
                 far[inside] = deep[cells[:, 0], cells[:, 1]]
         far[~far] = shapely.contains_xy(self._deep, places[~far, 1], places[~far, 0])

@@ -147,7 +147,7 @@ class Guidance:
             self.doing[some[there & good]] = BEGUN
             self._abort_cause[some[there]] = 0 if self._last else shares.argmax(axis=1)[there]
             passed[passed] = there
-        return passed
+        return np.asarray(passed)
 
     def _at_start(self, ships: np.ndarray, states: Array, shares: Array) -> tuple[np.ndarray, np.ndarray]:
         """(k,) whether a ship gets no nearer to the start this time, and whether it may begin there.

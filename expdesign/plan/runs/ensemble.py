@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from expdesign.simulation import ActuatorState, Environment, rk4_step
+from expdesign.simulation import ActuatorState, Environment
 from expdesign.simulation.environment import vary
 from expdesign.simulation.program import RatesProgram
 from expdesign.simulation.run import LARGEST_SPEED, SUBSTEPS
@@ -60,8 +60,9 @@ class Weather:
         for index, (variation, mean) in enumerate(zip(self._variations, self._means, strict=True)):
             if variation.std_mps > 0.0:
                 normal, before = self._rng.standard_normal((1, *mean.shape)), self._varied[index]
-                self._varied[index] = vary(variation, normal, sample_time_s=self._sample_time_s, before=before)[0]
-                self.now[2 * index : 2 * index + 2] = (mean + self._varied[index]).T
+                varied = vary(variation, normal, sample_time_s=self._sample_time_s, before=before)[0]
+                self.now[2 * index : 2 * index + 2] = (mean + varied).T
+                self._varied[index] = varied
 
 
 class Fleet:
@@ -142,6 +143,8 @@ class Fleet:
     def advance(self, commands: Array, moving: np.ndarray | None = None) -> None:
         """One sample with commands (n, m); ships that are lost, or do not move (n,), wait."""
         sails = ~self.lost if moving is None else moving & ~self.lost
+        if not sails.any():
+            return
         if sails.all():
             self._advance(commands)
         else:
@@ -162,7 +165,7 @@ class Fleet:
             for part in range(SUBSTEPS):
                 if part < len(given):
                     self._program.select(part)
-                (state,) = rk4_step(self._rates, (state,), step_s)
+                state = self._program.rk4(state, step_s)
             settled = np.abs(state[3:]).max(axis=0) < LARGEST_SPEED
         delivered = given[0].T if len(given) == 1 else given.mean(axis=0).T
         if not settled.all():
@@ -173,9 +176,6 @@ class Fleet:
             )
             commands, delivered = commands.T, delivered.T
         self.states, self.given, self.delivered, self._actuators = state.T, commands, delivered, after
-
-    def _rates(self, state: tuple[Array, ...]) -> tuple[Array, ...]:
-        return (self._program.rates(state)[0].copy(),)
 
 
 def _some(table: Array, ships: np.ndarray) -> Array:
