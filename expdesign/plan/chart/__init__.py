@@ -7,6 +7,7 @@ from expdesign.plan.chart.goal_distance import (
     first_bends,
     path_over,
     shortest_path_tree,
+    taut_bends,
 )
 from expdesign.plan.chart.visibility_graph import (
     VisibilityGraph,
@@ -30,4 +31,5 @@ __all__ = [
     "shortest_path_tree",
     "sight_lines",
     "simplified",
+    "taut_bends",
 ]

@@ -13,6 +13,7 @@ import shapely
 from scipy.ndimage import distance_transform_edt, map_coordinates
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
+from scipy.spatial.distance import cdist
 
 from expdesign.plan.chart.clearance_grid import ClearanceField
 from expdesign.plan.chart.tuning import CHART
@@ -76,17 +77,15 @@ def build_goal_distance(graph: VisibilityGraph, field: ClearanceField, goal: Arr
     """
     nodes, distance, next_node = shortest_path_tree(graph, goal)
     grid = field.thinned(CHART.table_cells)
-    shape = grid.clearance_m.shape
     cells = grid.centre(np.arange(grid.clearance_m.size))
     wet = np.flatnonzero(shapely.contains_xy(graph.water, cells[:, 1], cells[:, 0]))
-    reached = np.flatnonzero(np.isfinite(distance))
-    if not len(wet):
-        return None
-    length, bend = _tabled(graph, cells[wet], nodes[reached], distance[reached])
     table, first = np.full(grid.clearance_m.size, np.inf), np.full(grid.clearance_m.size, len(nodes) - 1)
-    table[wet], first[wet] = length, reached[bend]
+    for some in np.array_split(wet, len(wet) // CHART.table_chunk + 1):
+        total = cdist(cells[some], nodes) + distance
+        table[some], first[some] = taut_bends(graph, cells[some], nodes, next_node, total)
     if not np.isfinite(table).any():
         return None
+    shape = grid.clearance_m.shape
     filled, first = _filled(table.reshape(shape), first.reshape(shape), grid.cell_m)
     return GoalDistance(graph=graph, field=grid, distance_m=filled, first_bend=first, nodes=nodes, next_node=next_node)
 
@@ -115,41 +114,61 @@ def path_over(node: int, nodes: Array, next_node: np.ndarray) -> list[Array]:
     return chain
 
 
-def _tabled(graph: VisibilityGraph, points: Array, nodes: Array, distance: Array) -> tuple[Array, np.ndarray]:
-    """`first_bends` in parts, to save memory."""
-    length, bend = np.full(len(points), np.inf), np.zeros(len(points), dtype=int)
-    for first in range(0, len(points), CHART.table_chunk):
-        part = slice(first, first + CHART.table_chunk)
-        length[part], bend[part] = first_bends(graph, points[part], nodes, distance)
-    return length, bend
-
-
 def first_bends(graph: VisibilityGraph, points: Array, nodes: Array, distance: Array) -> tuple[Array, np.ndarray]:
     """(k,) length of the shortest path from each point, infinite where there is none, and the node of its first bend.
 
-    Nodes are tested for sight in order of path length over them.
+    Args:
+        graph: of the water.
+        points: (k, 2).
+        nodes, distance: (n, 2) places and the lengths of the paths from there.
     """
-    total = np.hypot(*np.moveaxis(points[:, None] - nodes, -1, 0)) + distance
-    length, bend = np.full(len(points), np.inf), np.zeros(len(points), dtype=int)
-    order = _best_first(total, min(CHART.first_corners, len(nodes)))
-    left = np.arange(len(points))
-    for k in range(len(nodes)):
-        if k == CHART.first_corners:
-            order = np.zeros((len(points), len(nodes)), dtype=int)
-            order[left] = np.argsort(total[left], axis=1)
-        node = order[left, k]
-        seen = shapely.covers(graph.water, sight_lines(points[left], nodes[node]))
-        length[left[seen]], bend[left[seen]] = total[left[seen], node[seen]], node[seen]
-        left = left[~seen]
-        if not len(left):
-            break
-    return length, bend
+    total = cdist(points, nodes) + distance
+    bend = _nearest_seen(graph, points, nodes, total)
+    return _chosen(total, bend), bend.clip(0)
 
 
-def _best_first(total: Array, count: int) -> np.ndarray:
-    """(k, count) columns of the least totals, in order."""
-    few = np.argpartition(total, count - 1, axis=1)[:, :count]
-    return np.asarray(np.take_along_axis(few, np.argsort(np.take_along_axis(total, few, 1), axis=1), 1))
+def taut_bends(
+    graph: VisibilityGraph, points: Array, nodes: Array, next_node: np.ndarray, total: Array
+) -> tuple[Array, np.ndarray]:
+    """(k,) least cost of paths from each point, infinite where there is none, and the node of its first bend.
+
+    Nodes at which a shortest path may bend are tested for sight first, the others only where none of them is seen.
+
+    Args:
+        graph: of the water.
+        points: (k, 2).
+        nodes, next_node: (n, 2) corners of the graph, the goal last, and the node (n,) after each.
+        total: (k, n) cost of the paths from the points that bend at the nodes first.
+    """
+    taut = np.isfinite(total)
+    corners = np.flatnonzero(taut[:, :-1].any(axis=0))
+    taut[:, corners] &= graph.bends(points, corners, nodes[next_node[corners]])
+    likely = np.flatnonzero(taut.any(axis=0))
+    found = _nearest_seen(graph, points, nodes[likely], np.where(taut[:, likely], total[:, likely], np.inf))
+    bend = np.where(found < 0, -1, likely[found])
+    left = np.flatnonzero(bend < 0)
+    left = left[shapely.intersects_xy(graph.water, points[left, 1], points[left, 0])]
+    bend[left] = _nearest_seen(graph, points[left], nodes, total[left])
+    return _chosen(total, bend), bend.clip(0)
+
+
+def _chosen(total: Array, node: np.ndarray) -> Array:
+    """(k,) totals of nodes, infinite for none."""
+    return np.where(node < 0, np.inf, total[np.arange(len(node)), node])
+
+
+def _nearest_seen(graph: VisibilityGraph, points: Array, nodes: Array, total: Array) -> np.ndarray:
+    """(k,) the node of least finite total (k, n) in sight of each point, -1 for none."""
+    found, rows, left = np.full(len(points), -1), np.arange(len(points)), total.copy()
+    while len(rows):
+        node = left.argmin(axis=1)
+        some = np.isfinite(left[np.arange(len(rows)), node])
+        rows, left, node = rows[some], left[some], node[some]
+        seen = shapely.covers(graph.water, sight_lines(points[rows], nodes[node]))
+        found[rows[seen]] = node[seen]
+        left[np.arange(len(rows)), node] = np.inf
+        rows, left = rows[~seen], left[~seen]
+    return found
 
 
 def _filled(table: Array, bend: np.ndarray, cell_m: float) -> tuple[Array, np.ndarray]:

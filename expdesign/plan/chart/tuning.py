@@ -16,9 +16,9 @@ class Tuning:
         corners_coarse, coarse: corners accepted once the tolerance is so many times the one asked for: water that
             shrinks further loses its narrow passages.
         slit_m: growth of the water before lines of sight are tested, as a path may touch the shore.
+        taut: share of the water's size by which a path may miss a corner that it bends at.
         table_cells: of the table of distances to the goal.
         table_chunk: cells of that table processed at a time.
-        first_corners: of shortest path length that are tested for sight first; the others only where none is seen.
     """
 
     grid_cells: int = 3_000_000
@@ -27,9 +27,9 @@ class Tuning:
     corners_coarse: int = 2500
     coarse: float = 16.0
     slit_m: float = 1e-3
+    taut: float = 1e-3
     table_cells: int = 60_000
-    table_chunk: int = 4000
-    first_corners: int = 20
+    table_chunk: int = 1000
 
 
 CHART = Tuning()

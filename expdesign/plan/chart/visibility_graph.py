@@ -28,11 +28,13 @@ class VisibilityGraph:
     Attributes:
         water: polygons (east, north), grown by `Tuning.slit_m`.
         corners: (n, 2) north/east of the corners that stick out into the water.
+        beside: (n, 2, 2) the corners before and after each along the shore.
         lengths: (n, n) sparse distances between corners in sight of each other.
     """
 
     water: shapely.MultiPolygon
     corners: Array
+    beside: Array
     lengths: csr_matrix
 
     def shortest(self, start: Array, end: Array) -> Array | None:
@@ -99,6 +101,24 @@ class VisibilityGraph:
         apart = np.hypot(*(nodes - point).T) > 0
         return np.flatnonzero(shapely.covers(self.water, lines) | ~apart)
 
+    def bends(self, points: Array, corners: np.ndarray, ahead: Array) -> np.ndarray:
+        """(k, n) whether a shortest path from a point (k, 2) may bend at a corner (n,), on to a place (n, 2).
+
+        Such a path is taut: it turns towards the obstacle, which lies on one side of both its lines. Lines may miss
+        this by `Tuning.taut` of the water's size, as paths may touch the shore.
+        """
+        place = self.corners[corners]
+        directions = np.concatenate([ahead[:, None], self.beside[corners]], axis=1) - place[:, None]  # (n, 3, 2)
+        directions /= np.maximum(np.hypot(directions[..., :1], directions[..., 1:]), 1e-12)
+        side = np.sign(_cross(directions[:, :1], directions[:, 1:]).sum(axis=1))
+        west, south, east, north = self.water.bounds
+        spare_m = CHART.taut * float(np.hypot(north - south, east - west))
+        found = np.ones((len(points), len(corners)), dtype=bool)
+        for k in range(3):
+            normal = side[:, None] * np.stack([-directions[:, k, 1], directions[:, k, 0]], axis=1)
+            found &= points @ normal.T >= (place * normal).sum(axis=1) - spare_m
+        return found
+
 
 def build_visibility_graph(water: shapely.Geometry) -> VisibilityGraph:
     """The visibility graph of a water polygon with at most some hundreds of corners."""
@@ -113,7 +133,7 @@ def build_visibility_graph(water: shapely.Geometry) -> VisibilityGraph:
     tail, head = tail[seen], head[seen]
     away = np.hypot(*(corners[tail] - corners[head]).T)
     lengths = coo_matrix((away, (tail, head)), shape=(len(corners), len(corners))).tocsr()
-    return VisibilityGraph(water=grown, corners=corners, lengths=lengths)
+    return VisibilityGraph(water=grown, corners=corners, beside=np.stack([before, after], axis=1), lengths=lengths)
 
 
 def simplified(water: shapely.MultiPolygon, *, grow: bool, tolerance_m: float) -> shapely.MultiPolygon:
