@@ -191,13 +191,17 @@ def _halved(cells: Array, cell_m: float, half_rad: float) -> Array:
 
 def _near_corners(track: Track, cells: Array, corners: Array, farther_m: float) -> Array:
     """Those cells in which some corner may be in the convex hull of the track."""
-    slack_m, reach_m = farther_m + track.drift_m, BOUNDS.sides_margin * float(track.hull_m.max())
-    c, s, near = np.cos(cells[:, 2]), np.sin(cells[:, 2]), np.zeros(len(cells), dtype=bool)
+    slack_m = farther_m + track.drift_m
+    reach_m = BOUNDS.sides_margin * float(track.hull_m.max()) + slack_m
+    (north, east), c, s = cells[:, :2].T.copy(), np.cos(cells[:, 2]), np.sin(cells[:, 2])
+    near, left = np.zeros(len(cells), dtype=bool), np.arange(len(cells))
     for corner in corners:
-        some = np.flatnonzero(~near & (np.abs(cells[:, :2] - corner).max(axis=1) <= reach_m + slack_m))
-        away = corner - cells[some, :2]
-        ahead, starboard = c[some] * away[:, 0] + s[some] * away[:, 1], c[some] * away[:, 1] - s[some] * away[:, 0]
+        to_north, to_east = corner[0] - north[left], corner[1] - east[left]
+        reached = np.flatnonzero((np.abs(to_north) <= reach_m) & (np.abs(to_east) <= reach_m))
+        some, to_north, to_east = left[reached], to_north[reached], to_east[reached]
+        ahead, starboard = c[some] * to_north + s[some] * to_east, c[some] * to_east - s[some] * to_north
         near[some] = (SIDES @ np.stack([ahead, starboard]) <= track.hull_m[:, None] + slack_m).all(axis=0)
+        left = left[~near[left]]
     return cells[near]
 
 

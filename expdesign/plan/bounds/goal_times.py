@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import shapely
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from expdesign.plan.bounds.displacement import Headway
 from expdesign.plan.bounds.tuning import BOUNDS
-from expdesign.plan.chart import VisibilityGraph, sight_lines
+from expdesign.plan.chart import VisibilityGraph, taut_bends
 from expdesign.values import Array
 
 
@@ -23,12 +22,14 @@ class GoalTimes:
         graph: of the water.
         headway: of legs.
         nodes, seconds: (n, 2) corners, the goal last, and the least time from each.
+        next_node: (n,) on the path from each; the goal's is itself.
     """
 
     graph: VisibilityGraph
     headway: Headway
     nodes: Array
     seconds: Array
+    next_node: np.ndarray
 
     def at(self, points: Array) -> Array:
         """(k,) least time from points (k, 2), infinite where no path leads to the goal or a point is ashore."""
@@ -40,17 +41,7 @@ class GoalTimes:
 
     def _at(self, points: Array) -> Array:
         total = self.headway.seconds(self.nodes - points[:, None]) + self.seconds
-        order, found, left = np.argsort(total, axis=1), np.full(len(points), np.inf), np.arange(len(points))
-        for rank in range(len(self.nodes)):
-            node = order[left, rank]
-            leads = np.isfinite(total[left, node])
-            left, node = left[leads], node[leads]
-            if not len(left):
-                break
-            seen = shapely.covers(self.graph.water, sight_lines(points[left], self.nodes[node]))
-            found[left[seen]] = total[left[seen], node[seen]]
-            left = left[~seen]
-        return found
+        return taut_bends(self.graph, points, self.nodes, self.next_node, total)[0]
 
 
 def goal_times(graph: VisibilityGraph, goal: Array, headway: Headway) -> GoalTimes:
@@ -61,4 +52,6 @@ def goal_times(graph: VisibilityGraph, goal: Array, headway: Headway) -> GoalTim
     tail, head = np.r_[rows, columns, seen], np.r_[columns, rows, np.full(len(seen), n)]
     cost = headway.seconds(nodes[head] - nodes[tail]) + 1e-12
     backwards = coo_matrix((cost, (head, tail)), shape=(n + 1, n + 1)).tocsr()
-    return GoalTimes(graph=graph, headway=headway, nodes=nodes, seconds=dijkstra(backwards, indices=n))
+    seconds, after = dijkstra(backwards, indices=n, return_predecessors=True)
+    next_node = np.where(after < 0, np.arange(n + 1), after)
+    return GoalTimes(graph=graph, headway=headway, nodes=nodes, seconds=seconds, next_node=next_node)

@@ -44,7 +44,7 @@ class Tuning:
     track_samples: int = 13
     sides: int = 24
     sides_margin: float = 1.01
-    lookup_chunk: int = 50_000
+    lookup_chunk: int = 1_000
     order_states: int = 20_000
 
 
