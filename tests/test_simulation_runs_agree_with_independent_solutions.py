@@ -11,6 +11,7 @@ from design_case import one_line, structured, vessel
 from expdesign.errors import Diverged, InputError
 from expdesign.signals import Commands
 from expdesign.simulation import Environment, simulate, simulate_many
+from expdesign.simulation.run import FEW_RUNS
 from expdesign.vessel import Vessel
 
 SHIP = vessel("azimuth-30m-true")
@@ -79,9 +80,10 @@ def test_integrators_converge_at_their_order(integrator: str, order: int, subste
     assert np.log2(first / second) == pytest.approx(order, abs=0.2)
 
 
-def test_many_runs_at_once_are_the_single_runs():
+@pytest.mark.parametrize("count", [5, FEW_RUNS + 1])
+def test_many_runs_at_once_are_the_single_runs(count: int):
     rng = np.random.default_rng(3)
-    commands, count = random_commands(60), 5
+    commands = random_commands(60)
     pose, velocity = rng.standard_normal((count, 3)), rng.uniform(0, 1, (count, 3)) * (1, 0.3, 0.05)
     current, wind = 0.3 * rng.standard_normal((count, 2)), 5 * rng.standard_normal((count, 2))
     theta = SHIP.model.parameters * rng.uniform(0.8, 1.2, (count, 18))
@@ -99,12 +101,13 @@ def test_many_runs_at_once_are_the_single_runs():
         np.testing.assert_allclose(together[:, index], states(alone), rtol=1e-11, atol=1e-12)
 
 
-def test_a_run_that_diverges_is_missing_and_leaves_the_others_alone():
+@pytest.mark.parametrize("count", [3, FEW_RUNS + 1])
+def test_a_run_that_diverges_is_missing_and_leaves_the_others_alone(count: int):
     commands = random_commands(60)
-    theta = np.tile(SHIP.model.parameters, (3, 1))
+    theta = np.tile(SHIP.model.parameters, (count, 1))
     theta[1, SHIP.model.names.index("X_abs_u_u")] = 5.0
-    rest = {"pose": np.zeros((3, 3)), "velocity": np.zeros((3, 3)), "current_to": np.zeros((3, 2)),
-            "wind_to": np.zeros((3, 2))}  # fmt: skip
+    rest = {"pose": np.zeros((count, 3)), "velocity": np.zeros((count, 3)), "current_to": np.zeros((count, 2)),
+            "wind_to": np.zeros((count, 2))}  # fmt: skip
     together = simulate_many(SHIP, commands, **rest, parameters=theta)
     assert np.isnan(together[:, 1]).all()
     np.testing.assert_allclose(together[:, 0], states(simulate(SHIP, commands)), rtol=1e-11, atol=1e-12)

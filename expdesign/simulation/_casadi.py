@@ -38,7 +38,16 @@ class CompiledIntegrator:
         self._functions = compiled_steps(structure, integrator)
         self._states, self._parameters = model.states, np.array(model.parameters)
 
-    def states(self, start: Array, delivered: Array, *, sea: Array, sample_time_s: float, substeps: int) -> Array:
+    def states(
+        self,
+        start: Array,
+        delivered: Array,
+        *,
+        sea: Array,
+        sample_time_s: float,
+        substeps: int,
+        parameters: Array | None = None,
+    ) -> Array:
         """States at every sample; not-a-numbers and infinities where the motion diverges.
 
         Args:
@@ -47,6 +56,7 @@ class CompiledIntegrator:
             sea: (k, 4), or (1, 4) where steady: n-frame current and wind to north and east [m/s].
             sample_time_s: time between samples [s].
             substeps: integrator steps per sample.
+            parameters: (p,) in the model's own form; None for the model's.
 
         Returns:
             (k + 1, 6 or 8), the start first.
@@ -56,17 +66,18 @@ class CompiledIntegrator:
         drive[..., :inputs], drive[..., inputs:] = delivered, sea[:, None]
         result = np.empty((samples * substeps + 1, self._states))
         result[0] = start
-        self._fill(result, drive.reshape(samples * substeps, inputs + 4), sample_time_s / substeps)
+        theta = self._parameters if parameters is None else np.array(parameters, dtype=float)
+        self._fill(result, drive.reshape(samples * substeps, inputs + 4), theta, sample_time_s / substeps)
         return result[::substeps]
 
-    def _fill(self, result: Array, drive: Array, step_s: float) -> None:
+    def _fill(self, result: Array, drive: Array, parameters: Array, step_s: float) -> None:
         """Write the states (k + 1, n) after the first, for drives (k, m + 4) over each step."""
         length_s, done = np.array([step_s]), 0
         for length, function in self._functions.items():
             if done + length > len(drive):
                 continue
             buffer, run = function.buffer()
-            buffer.set_arg(2, self._parameters.data)
+            buffer.set_arg(2, parameters.data)
             buffer.set_arg(3, length_s.data)
             while done + length <= len(drive):
                 end = done + length

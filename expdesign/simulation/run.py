@@ -11,10 +11,12 @@ from expdesign.simulation.environment import CALM, Environment, WeatherSeries, w
 from expdesign.simulation.motion import begun, rk4_step
 from expdesign.simulation.program import STATES, RatesProgram, march
 from expdesign.values import Array
-from expdesign.vessel import Vessel
+from expdesign.vessel import Vessel, VesselModel
 
 SUBSTEPS = 2
 """Runge-Kutta steps per sample; a step is at most a fifth of the fastest time constant of the reference vessels."""
+FEW_RUNS = 50
+"""Up to so many runs are quicker one by one than by an operation on all of them at a time."""
 LARGEST_SPEED = 1e3
 """Speeds [m/s, rad/s] beyond this mean that the model is unstable."""
 
@@ -138,18 +140,69 @@ def simulate_many(
         commanded, sample_time_s = commands.transpose(1, 2, 0), vessel.sample_time_s
     before = None if standing is None else np.asarray(standing, dtype=float).T.reshape(commanded.shape[1], -1)
     given = deliver(vessel.responses, commanded, sample_time_s=sample_time_s, substeps=substeps, standing=before)
-    runs = len(pose)
-    program = RatesProgram(vessel.model, runs=runs, parameters=parameters)
-    weather = [np.broadcast_to(item, (len(commanded), runs, 2)) for item in (current_to, wind_to)]
-    sea = np.concatenate(weather, axis=-1).swapaxes(1, 2)  # (k, 4, n)
-    start, result = np.array(begun(vessel.model, (*pose.T, *velocity.T))), np.empty((len(commanded) + 1, runs, STATES))
+    weather = [np.broadcast_to(item, (len(commanded), len(pose), 2)) for item in (current_to, wind_to)]
+    states = _one_by_one if len(pose) <= FEW_RUNS else _together
+    result = states(
+        vessel.model,
+        np.array(begun(vessel.model, (*pose.T, *velocity.T))),
+        given,
+        sea=np.concatenate(weather, axis=-1).swapaxes(1, 2),
+        parameters=parameters,
+        sample_time_s=sample_time_s,
+        substeps=substeps,
+    )
+    settled = np.abs(result[..., 3:]).max(axis=(0, 2)) < LARGEST_SPEED
+    result[:, ~settled] = np.nan
+    return result
+
+
+def _one_by_one(
+    model: VesselModel,
+    start: Array,
+    given: Array,
+    *,
+    sea: Array,
+    parameters: Array,
+    sample_time_s: float,
+    substeps: int,
+) -> Array:
+    """(k + 1, n, 6) states by compiled steps, from starts (6 or 8, n), inputs (k, s, m, n or 1) and seas (k, 4, n)."""
+    from expdesign.simulation._casadi import compiled_integrator  # CasADi is loaded when a motion is integrated
+
+    compiled = compiled_integrator(model, "rk4")
+    inputs = np.broadcast_to(given, (*given.shape[:3], len(parameters)))
+    runs = [
+        compiled.states(
+            start[:, run],
+            inputs[..., run],
+            sea=sea[..., run],
+            sample_time_s=sample_time_s,
+            substeps=substeps,
+            parameters=theta,
+        )
+        for run, theta in enumerate(parameters)
+    ]
+    return np.stack(runs, axis=1)[..., :STATES]
+
+
+def _together(
+    model: VesselModel,
+    start: Array,
+    given: Array,
+    *,
+    sea: Array,
+    parameters: Array,
+    sample_time_s: float,
+    substeps: int,
+) -> Array:
+    """The same by operations on all runs at once."""
+    program = RatesProgram(model, runs=len(parameters), parameters=parameters)
+    result = np.empty((len(sea) + 1, len(parameters), STATES))
     states = march(program, given, start, step=rk4_step, step_s=sample_time_s / substeps, substeps=substeps)
     with np.errstate(over="ignore", invalid="ignore"):
         for row, state, now in zip(result, states, (*sea, sea[-1:]), strict=True):
             row[...] = state[:STATES].T
             program.sea[...] = now
-    settled = np.abs(result[..., 3:]).max(axis=(0, 2)) < LARGEST_SPEED
-    result[:, ~settled] = np.nan
     return result
 
 
