@@ -81,7 +81,7 @@ class HelmController:
     def _drive(self, speed: Array, moving: Array, angle: Array, unexplained: Array) -> Array:
         """(n,) engine orders by which the nominal model comes to the desired speed in the time of a hull length."""
         given = self.approach.helm.rows(ORDERS[:, None], angle)  # (o, n, m)
-        motion = tuple(np.broadcast_to(column, given.shape[:2]) for column in moving.T)
+        motion = tuple(moving.T)
         predicted = self.vessel.model.accelerations(motion, motion[:2], tuple(np.moveaxis(given, -1, 0)))[0]
         gains = np.maximum.accumulate(np.broadcast_to(predicted, given.shape[:2]), axis=0)
         desired = (speed - moving[:, 0]) / self._pace_s - unexplained
