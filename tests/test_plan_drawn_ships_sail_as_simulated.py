@@ -70,6 +70,28 @@ def test_ships_that_wait_stay_as_they_are_and_go_on_as_if_they_had_not_waited():
     np.testing.assert_allclose(fleet.states[1], fleet.states[0])
 
 
+@pytest.mark.parametrize("name", RESPONSES)
+def test_a_part_of_a_fleet_sails_as_it_would_in_the_whole(name):
+    vessel, rng = slow(RESPONSES[name]), np.random.default_rng(0)
+    values = np.cumsum(rng.normal(0, [0.5, 0.05, 0.5, 0.05], (20, 4, 4)), axis=0)
+    wavering = Environment(current_variation=Variation(std_mps=0.3, correlation_s=20.0))
+    whole, parted = (
+        Fleet(
+            vessel, wavering, truths(vessel, 4), state=np.zeros(6), standing=np.zeros(4), rng=np.random.default_rng(7)
+        )
+        for _ in range(2)
+    )
+    some = np.array([3, 1])
+    part = parted.part(some)
+    for row in values:
+        whole.advance(row)
+        part.advance(row[some])
+    parted.rejoin(part, some)
+    np.testing.assert_allclose(parted.states[some], whole.states[some], rtol=1e-12)
+    np.testing.assert_allclose(parted.delivered[some], whole.delivered[some], rtol=1e-12)
+    np.testing.assert_array_equal(parted.states[[0, 2]], 0.0)
+
+
 def test_weather_of_a_fleet_varies_with_its_size_and_memory():
     vessel, ships, std, memory_s = ship(), 2000, 0.3, 20.0
     wavering = Environment(current_variation=Variation(std_mps=std, correlation_s=memory_s))

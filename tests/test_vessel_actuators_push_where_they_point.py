@@ -197,6 +197,25 @@ def test_azimuths_come_as_close_to_the_thrust_as_limits_let_them(
         assert math.cos(got[1] - command[1]) == pytest.approx(1.0, abs=1e-12)
 
 
+@pytest.mark.parametrize("low", [-10.0, -4.0, 0.0])
+def test_an_azimuth_without_stops_finds_what_trying_all_half_turns_finds(low: float):
+    rng, halves = np.random.default_rng(6), np.arange(-9, 10)
+    for wish, near in zip(rng.normal(0.0, 8.0, (200, 2)), rng.uniform(-9.0, 9.0, 200), strict=True):
+        (got,) = allocate(
+            (azimuth(speed=Limit(low=low, high=10.0)),),
+            np.array([[*wish, 0.0]]),
+            sample_time_s=1.0,
+            near=np.array([0.0, near]),
+        )
+        desired = np.hypot(*wish)
+        speeds = np.clip(np.where(halves % 2 == 0, desired, -desired), low, 10.0)
+        angles = np.arctan2(wish[1], wish[0]) + np.pi * halves
+        given = speeds[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        missed = np.round(np.hypot(*(given - wish).T), 6)
+        turns = np.where(missed <= missed.min(), np.abs(angles - near), np.inf)
+        np.testing.assert_allclose(got, [speeds[turns.argmin()], angles[turns.argmin()]], atol=1e-9)
+
+
 def test_limits_that_hold_nothing_are_refused():
     for wrong in ({"low": 1.0, "high": 1.0}, {"low": 2.0, "high": 1.0}, {"rate": 0.0}, {"low": math.nan}):
         with pytest.raises(InputError):

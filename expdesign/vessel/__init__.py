@@ -15,13 +15,12 @@ from expdesign.vessel.actuators import (
 from expdesign.vessel.environment import CALM, STEADY, Environment, Variation
 from expdesign.vessel.expressions import NUMPY, SCALAR, Operators
 from expdesign.vessel.inverse import (
+    Allocator,
     allocate,
-    allocate_each,
     direct_terms,
     force_matrix,
     required_force,
     within_limits,
-    within_limits_each,
 )
 from expdesign.vessel.model import VesselModel
 from expdesign.vessel.roll import Roll
@@ -41,6 +40,7 @@ __all__ = [
     "STRUCTURES",
     "TERMS",
     "Actuator",
+    "Allocator",
     "Environment",
     "Limit",
     "Mounting",
@@ -53,7 +53,6 @@ __all__ = [
     "Vessel",
     "VesselModel",
     "allocate",
-    "allocate_each",
     "column_name",
     "direct_terms",
     "force_matrix",
@@ -64,5 +63,4 @@ __all__ = [
     "stem",
     "structure_terms",
     "within_limits",
-    "within_limits_each",
 ]

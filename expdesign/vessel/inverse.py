@@ -149,15 +149,6 @@ def allocate(
     return np.stack(rows, axis=-2)
 
 
-def allocate_each(actuators: tuple[Actuator, ...], force: Array, *, near: Array) -> Array:
-    """Commands (n, m) within limits for the generalised forces (n, 3) on n ships, whatever stands before.
-
-    As `allocate` for one row; azimuths keep as near as they can to the angles of `near` (n, m).
-    """
-    desired = _desired_commands(actuators, force @ _inverse_force_matrix(actuators).T, near)
-    return _reached(_bounds(actuators, 1.0), desired, None)
-
-
 def within_limits(actuators: tuple[Actuator, ...], values: Array, *, sample_time_s: float, before: Array) -> Array:
     """The commands (..., k, m) nearest to the desired ones within limits and rates, after commands (..., m)."""
     bounds = _bounds(actuators, sample_time_s)
@@ -168,9 +159,24 @@ def within_limits(actuators: tuple[Actuator, ...], values: Array, *, sample_time
     return np.stack(rows, axis=-2)
 
 
-def within_limits_each(actuators: tuple[Actuator, ...], values: Array, *, sample_time_s: float, before: Array) -> Array:
-    """The commands (n, m) of n ships nearest to the desired ones within limits and rates, one sample after `before`."""
-    return _reached(_bounds(actuators, sample_time_s), values, before)
+class Allocator:
+    """`allocate` and `within_limits` for n ships at once, sample by sample."""
+
+    def __init__(self, actuators: tuple[Actuator, ...], *, sample_time_s: float) -> None:
+        """Of these actuators, in command order."""
+        self._actuators, self._bounds = actuators, _bounds(actuators, sample_time_s)
+        self._inverse = _inverse_force_matrix(actuators).T
+
+    def commands(self, force: Array, *, near: Array) -> Array:
+        """(n, m) commands within limits for generalised forces (n, 3), whatever stands before.
+
+        Azimuths keep as near as they can to the angles of `near` (n, m).
+        """
+        return _reached(self._bounds, _desired_commands(self._actuators, force @ self._inverse, near), None)
+
+    def within_limits(self, values: Array, *, before: Array) -> Array:
+        """(n, m) commands nearest to the desired ones within limits and rates, one sample after others (n, m)."""
+        return _reached(self._bounds, values, before)
 
 
 @lru_cache(maxsize=16)
@@ -215,7 +221,7 @@ def _polar(ahead: Array, side: Array, reference: Array, actuator: Actuator) -> t
     """Propeller speed and angle that come closest to a thrust within limits, by the shortest turn."""
     angles = actuator.limits[1]
     desired, bearing = np.sqrt(ahead * ahead + side * side), np.arctan2(side, ahead)
-    turned = _turned if math.isfinite(angles.high - angles.low) else _turned_freely
+    turned = _turned_freely if math.isinf(angles.low) and math.isinf(angles.high) else _turned
     speed, angle = turned(desired, bearing, reference, actuator)
     still = desired < 1e-9
     return np.where(still, 0.0, speed), np.where(still, reference, angle)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 
 from expdesign.conventions import wrap_angle
 from expdesign.values import Array
-from expdesign.vessel import Vessel, allocate_each, required_force
+from expdesign.vessel import Allocator, Vessel, required_force
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -75,4 +76,8 @@ class ForceController:
         ).T
         acceleration = (desired - demand.moving) / self.answer_s - demand.unexplained
         force = required_force(self.vessel.model, demand.moving, acceleration)
-        return allocate_each(self.vessel.actuators, force, near=demand.near)
+        return self._allocator.commands(force, near=demand.near)
+
+    @cached_property
+    def _allocator(self) -> Allocator:
+        return Allocator(self.vessel.actuators, sample_time_s=self.vessel.sample_time_s)

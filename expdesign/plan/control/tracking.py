@@ -18,7 +18,7 @@ from expdesign.plan.control.ships import Capability
 from expdesign.plan.control.tuning import CONTROL
 from expdesign.simulation import Environment
 from expdesign.values import Array, seal
-from expdesign.vessel import Vessel, VesselModel, within_limits_each
+from expdesign.vessel import Allocator, Vessel, VesselModel
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -164,8 +164,11 @@ class Helmsman:
             stay = np.exp(-delay_s / np.maximum(lag_s, 1e-9))
             due = before + (delivered - offset - before) * stay  # when what is commanded now begins to count
             rows = np.where(lag_s > 0, due + gain * (rows - due), rows)
-        actuators, sample_s = self.vessel.actuators, self.vessel.sample_time_s
-        return within_limits_each(actuators, rows, sample_time_s=sample_s, before=before)
+        return self._allocator.within_limits(rows, before=before)
+
+    @cached_property
+    def _allocator(self) -> Allocator:
+        return Allocator(self.vessel.actuators, sample_time_s=self.vessel.sample_time_s)
 
     @cached_property
     def _lags(self) -> bool:

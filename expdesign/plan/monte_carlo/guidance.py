@@ -183,18 +183,24 @@ class Guidance:
         off = (self.doing == TRACKING) & (off_m > self._within.position_m)
         some = np.flatnonzero(off)
         if len(some):
-            clear = np.array([self._tree.holds(self._return_to_leg(states[ship, :2])) for ship in some])
+            clear = self._tree.hold(*self._returns_to_leg(states[some, :2]))
             off[some] = ~clear | ((off_m[some] > good_m) & (not self._last))
             self._go_around(ships[off], states[off])
 
-    def _return_to_leg(self, place: Array) -> Array:
-        """(k, 2) approximate track of a ship from a place back to the leg, while the reference stays abeam."""
+    def _returns_to_leg(self, places: Array) -> tuple[Array, np.ndarray]:
+        """Approximate tracks of ships from places (k, 2) back to the leg, while the reference stays abeam.
+
+        Returns:
+            (j, 2) points of all tracks, one track after the other, and (j,) the ship of each.
+        """
         track, helm = self._reference.states[: self._first, :2], self._helm
-        off = place - track[0]
-        return_s = float(np.hypot(*off)) / (CONTROL.catch_up * helm.ship.transit_speed_mps)
-        thinned = np.unique(np.r_[np.arange(0, self._first, MONTE_CARLO.rejoin_samples), self._first - 1])
-        left = np.maximum(0.0, 1.0 - thinned * helm.vessel.sample_time_s / return_s)
-        return np.asarray((track[thinned] + left[:, None] * off)[: int((left > 0.0).sum()) + 1])
+        off = places - track[0]
+        return_s = lengths(off) / (CONTROL.catch_up * helm.ship.transit_speed_mps)
+        thinned = np.unique([*range(0, self._first, MONTE_CARLO.rejoin_samples), self._first - 1])
+        left = np.maximum(0.0, 1.0 - thinned * helm.vessel.sample_time_s / return_s[:, None])  # (k, samples)
+        points = track[thinned] + left[..., None] * off[:, None]
+        ships, samples = np.nonzero(np.arange(len(thinned)) <= (left > 0.0).sum(axis=1)[:, None])
+        return points[ships, samples], ships
 
     def _go_around(self, ships: np.ndarray, states: Array) -> None:
         """Start ships (k,) on return paths to the run-up; those without a path, or go-arounds left, abort."""

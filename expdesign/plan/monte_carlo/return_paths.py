@@ -52,6 +52,10 @@ class ReturnPaths:
         """Whether a path (k, 2) stays in the water."""
         return bool(shapely.covers(self.graph.water, shapely.LineString(path[:, ::-1])))
 
+    def hold(self, points: Array, paths: np.ndarray) -> np.ndarray:
+        """(k,) whether paths stay in the water, from all their points (j, 2) and the path of each point (j,)."""
+        return np.asarray(shapely.covers(self.graph.water, shapely.linestrings(points[:, ::-1], indices=paths)))
+
 
 def build_return_paths(graph: VisibilityGraph, place: Array) -> ReturnPaths:
     """The tree of shortest paths to a place (2,)."""
