@@ -53,6 +53,11 @@ class Chain:
     bends: tuple[Array, ...]
     legs_s: Array
 
+    def around(self, i: int, j: int) -> tuple[bytes, ...]:
+        """All that decides whether runs i to j can be moved: from the run before them to the one after."""
+        near = self.poses[max(i - 1, 0) : j + 2], self.legs_s[i : j + 2], *self.bends[i : j + 2]
+        return tuple(part.tobytes() for part in near)
+
 
 def polished(space: SearchSpace, runs: Sequence[int], poses: Array, ends: ChainEnds) -> Array:
     """(n, 3) better poses for the same runs in the same order.
@@ -66,10 +71,16 @@ def polished(space: SearchSpace, runs: Sequence[int], poses: Array, ends: ChainE
     legs = _Legs(space=space, ends=ends)
     chain = legs.measured(np.asarray(runs), poses)
     blocks = [(i, j) for i in range(len(runs)) for j in range(i, len(runs))]
+    in_vain: dict[tuple[int, int], tuple[bytes, ...]] = {}
     for _ in range(SEARCH.sweeps):
         before = chain
         for i, j in blocks:
-            chain = legs.moved(chain, i, j)
+            if in_vain.get((i, j)) == (around := chain.around(i, j)):
+                continue
+            moved = legs.moved(chain, i, j)
+            if moved is chain:
+                in_vain[i, j] = around
+            chain = moved
         if chain is before:
             break
         chain = legs.measured(chain.runs, chain.poses)
