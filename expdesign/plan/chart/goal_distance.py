@@ -44,9 +44,8 @@ class GoalDistance:
 
     def to_goal(self, points: Array) -> Array:
         """(...,) length of the path to the goal from (..., 2) points [m]."""
-        cells = np.moveaxis((points - self.field.origin) / self.field.cell_m, -1, 0)
-        inside = [np.clip(cell, 0, size - 1) for cell, size in zip(cells, self.distance_m.shape, strict=True)]
-        return np.asarray(map_coordinates(self.distance_m, inside, order=1, mode="nearest"))
+        cells = [(points[..., k] - self.field.origin[k]) / self.field.cell_m for k in (0, 1)]
+        return np.asarray(map_coordinates(self.distance_m, cells, order=1, mode="nearest"))
 
     def path(self, point: Array) -> Array:
         """(k, 2) shortest path from a point to the goal."""

@@ -56,11 +56,14 @@ class SpeedChanges:
     def _followed(self, speed: float, time_s: Array, rates: Array, sign: float) -> Array:
         # a step may lead into the next band: the larger rate of both counts
         further = np.c_[rates[:, 1:], rates[:, -1:]] if sign > 0 else np.c_[rates[:, :1], rates[:, :-1]]
-        rates, step_s, top = np.maximum(rates, further), float(time_s[1] - time_s[0]), float(self.edges_mps[-1])
-        speeds = [min(speed, top)]
+        step_s, top, bands = float(time_s[1] - time_s[0]), float(self.edges_mps[-1]), rates.shape[1]
+        changes = (sign * np.maximum(rates, further) * step_s).tolist()
+        now = min(speed, top)
+        speeds = [now]
         for stage in np.searchsorted(self.until_s, time_s[1:], side="left").tolist():
-            band = min(int(speeds[-1] / top * rates.shape[1]), rates.shape[1] - 1)
-            speeds.append(min(max(speeds[-1] + sign * float(rates[stage, band]) * step_s, 0.0), top))
+            now += changes[stage][min(int(now / top * bands), bands - 1)]
+            now = 0.0 if now < 0.0 else min(now, top)
+            speeds.append(now)
         return np.array(speeds)
 
 

@@ -1,6 +1,6 @@
 """Local planners: how each kind of ship gets from one state to another."""
 
-from expdesign.plan.local_planner.arcs import arc_end, moved
+from expdesign.plan.local_planner.arcs import arc_end, moved, run_ends
 from expdesign.plan.local_planner.factory import local_planner
 from expdesign.plan.local_planner.protocol import (
     LegEnds,
@@ -27,4 +27,5 @@ __all__ = [
     "local_planner",
     "moved",
     "pairs_of",
+    "run_ends",
 ]

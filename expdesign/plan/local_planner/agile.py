@@ -76,16 +76,17 @@ class AgilePlanner:
         """The space with the transitions of these pairs tried."""
         return with_transitions(space, self.ship, self.times, pairs, trials)
 
-    def successors(self, space: SearchSpace, plans: PartialPlans) -> Successors:
+    def successors(self, space: SearchSpace, plans: PartialPlans) -> list[Successors]:
         """Transitions, straight legs, and points of the path to the goal."""
-        points, found = path_points(space, plans.pose, LOCAL.agile_path_stretches), []
+        points = path_points(space, plans.pose, LOCAL.agile_path_stretches)
+        found: list[Successors] = []
         for q in plans.wanted:
             able = plans.able(q)
             alike = plans.alike(able)
-            found.append(self._transitions(space, plans, able, q, alike))
+            found += self._transitions(space, plans, able, q, alike)
             found.append(self._straights(space, plans, able, q, alike))
             found.append(self._on_path(space, plans, able, q, points))
-        return Successors.joined(found)
+        return found
 
     def leg_s(self, space: SearchSpace, ends: LegEnds, froms: Array, tos: Array, bends: Array) -> Array:
         """(n,) time of legs straight on, or along the path with bends [s]."""
@@ -163,7 +164,7 @@ class AgilePlanner:
 
     def _transitions(
         self, space: SearchSpace, plans: PartialPlans, able: np.ndarray, q: int, alike: Alike
-    ) -> Successors:
+    ) -> list[Successors]:
         """Runs near the end of the one before, placed and headed as suits the transition."""
         found, entry = [], np.array(space.footprints[q].entry_mps)
         for (last, exit_mps), where in alike.items():
@@ -176,7 +177,7 @@ class AgilePlanner:
                 step = step + longer * np.column_stack([np.cos(step[:, 2]), np.sin(step[:, 2]), 0 * leg_s])
                 leg_s = self.times.step_s(step, np.array(exit_mps), entry) + space.more_s(last, q)
             found.append(_stepped(space, plans, q, able[where], step, leg_s))
-        return Successors.joined(found)
+        return found
 
     def _straights(self, space: SearchSpace, plans: PartialPlans, able: np.ndarray, q: int, alike: Alike) -> Successors:
         """Straight legs to all sides, the run with any heading."""
@@ -215,7 +216,7 @@ class AgilePlanner:
         more_s = np.array([space.more_s(last, q) for last in range(-1, len(space.footprints))])
         leg_s += more_s[plans.last[parent] + 1, None]
         start = np.column_stack([np.repeat(place, len(turns), axis=0), heading.ravel()])
-        return on_paths(q, plans.pose, np.repeat(parent, len(turns)), start, leg_s.ravel())
+        return on_paths(space, q, plans.pose, np.repeat(parent, len(turns)), start, leg_s.ravel())
 
 
 def _stepped(
@@ -231,15 +232,19 @@ def _stepped(
         step: (m, 3) or (b, m, 3) ahead m, to starboard m, turn rad.
         leg_s: (m,) or (b, m) time.
     """
-    start = moved(plans.pose[able, None], step)
-    start[..., :2] += leg_s[..., None] * space.current_to
+    pose, run = plans.pose[able, None], space.footprints[q]
+    start, end = moved(pose, step), moved(pose, moved(step, run.displacement))
+    if space.current_to.any():
+        start[..., :2] += leg_s[..., None] * space.current_to
+        end[..., :2] += (leg_s[..., None] + run.duration_s) * space.current_to
     b, m, _ = start.shape
     return Successors(
         departure=plans.pose,
         parent=np.repeat(able, m),
-        primitive=np.full(b * m, q),
+        primitive=np.broadcast_to(q, b * m),
         start=start.reshape(-1, 3),
+        end=end.reshape(-1, 3),
         leg_s=np.broadcast_to(leg_s, (b, m)).ravel(),
-        turn=np.full(b * m, np.nan),
-        straight=np.ones(b * m, dtype=bool),
+        turn=np.broadcast_to(np.nan, b * m),
+        straight=np.broadcast_to(True, b * m),
     )

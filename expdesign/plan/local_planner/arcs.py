@@ -37,14 +37,16 @@ def arc_successors(space: SearchSpace, departures: Departures, able: np.ndarray,
     departure = np.repeat(pose[able], count, axis=0)
     turns, straight = np.tile(turn, len(able)), np.tile(extra, len(able)) + np.repeat(run_up_m, count)
     sail_s = (radius * np.abs(turns) + straight) / space.ship.transit_speed_mps
+    start = arc_end(departure, turns, straight, radius)
     return Successors(
         departure=pose,
         parent=np.repeat(able, count),
-        primitive=np.full(len(turns), q),
-        start=arc_end(departure, turns, straight, radius),
+        primitive=np.broadcast_to(q, len(turns)),
+        start=start,
+        end=run_ends(space, q, start),
         leg_s=sail_s + np.repeat(departures.wait_s[able], count),
         turn=turns,
-        straight=np.zeros(len(turns), dtype=bool),
+        straight=np.broadcast_to(False, len(turns)),
     )
 
 
@@ -70,20 +72,23 @@ def path_successors(
     length_m = points.along_m[parent, point] + turning_radius_m * (np.abs(offset) + first)
     start = np.column_stack([points.place[parent, point], points.direction_rad[parent, point] + offset])
     leg_s = length_m / space.ship.transit_speed_mps + departures.wait_s[parent]
-    return on_paths(q, departures.pose, parent, start, leg_s)
+    return on_paths(space, q, departures.pose, parent, start, leg_s)
 
 
-def on_paths(q: int, departure: Array, parent: np.ndarray, start: Array, leg_s: Array) -> Successors:
+def on_paths(
+    space: SearchSpace, q: int, departure: Array, parent: np.ndarray, start: Array, leg_s: Array
+) -> Successors:
     """Successors by paths that keep their clearance by construction, after plans that depart from poses (b, 3)."""
     n = len(parent)
     return Successors(
         departure=departure,
         parent=parent,
-        primitive=np.full(n, q),
+        primitive=np.broadcast_to(q, n),
         start=start,
+        end=run_ends(space, q, start),
         leg_s=leg_s,
-        turn=np.full(n, np.nan),
-        straight=np.zeros(n, dtype=bool),
+        turn=np.broadcast_to(np.nan, n),
+        straight=np.broadcast_to(False, n),
     )
 
 
@@ -151,6 +156,14 @@ def between(start: Array, end: Array, spacing_m: float) -> Array:
     """(k, 2) places on the straight line between two poses (3,)."""
     count = int(np.ceil(np.hypot(*(end - start)[:2]) / spacing_m)) + 1
     return np.linspace(start[:2], end[:2], count + 1)
+
+
+def run_ends(space: SearchSpace, primitive: np.ndarray | int, start: Array) -> Array:
+    """(n, 3) poses at the ends of runs (n,), or of one run, that begin at poses (n, 3)."""
+    end = moved(start, np.array([item.displacement for item in space.footprints])[primitive])
+    lasting_s = np.array([item.duration_s for item in space.footprints])[primitive]
+    end[:, :2] += space.current_to * lasting_s[..., None]
+    return end
 
 
 def all_round(count: int) -> Array:

@@ -58,7 +58,7 @@ class DubinsPlanner:
         """The space itself."""
         return space
 
-    def successors(self, space: SearchSpace, plans: PartialPlans) -> Successors:
+    def successors(self, space: SearchSpace, plans: PartialPlans) -> list[Successors]:
         """Arcs, and stretches of the path to the goal."""
         points, radius_m, found = path_points(space, plans.pose, LOCAL.path_stretches), self.ship.turning_radius_m, []
         for q in plans.wanted:
@@ -67,7 +67,7 @@ class DubinsPlanner:
             departures = Departures(pose=plans.pose, wait_s=change_s)
             found.append(arc_successors(space, departures, able, q, run_up_m))
             found.append(path_successors(space, departures, able, q, points, turning_radius_m=radius_m))
-        return Successors.joined(found)
+        return found
 
     def leg_s(self, space: SearchSpace, ends: LegEnds, froms: Array, tos: Array, bends: Array) -> Array:
         """(n,) time of the Dubins curve, or of the path with bends where that is longer [s]."""

@@ -73,11 +73,11 @@ class HelmPlanner:
         """The space itself."""
         return space
 
-    def successors(self, space: SearchSpace, plans: PartialPlans) -> Successors:
+    def successors(self, space: SearchSpace, plans: PartialPlans) -> list[Successors]:
         """Arcs and stretches of the path to the goal, in the time that changes of speed and turns take."""
         departures = self._departures(space, plans)
         points = path_points(space, departures.pose, LOCAL.path_stretches)
-        return Successors.joined([self._to_run(space, plans, q, departures, points) for q in plans.wanted])
+        return [self._to_run(space, plans, q, departures, points) for q in plans.wanted]
 
     def _to_run(
         self, space: SearchSpace, plans: PartialPlans, q: int, departures: Departures, points: PathPoints

@@ -155,8 +155,8 @@ class Successors:
         departure: (b, 3) pose from which the leg of each partial plan is checked for clearance.
         parent: (n,) index of the partial plan.
         primitive: (n,) index of the run to do next.
-        start: (n, 3) where the run begins.
-        leg_s: (n,) time to get there.
+        start, end: (n, 3) where the run begins, and where it ends.
+        leg_s: (n,) time to get to its start.
         turn: (n,) angle of the arc that leads there, before a straight; nan for others.
         straight: (n,) whether a straight line leads there.
     """
@@ -165,9 +165,13 @@ class Successors:
     parent: np.ndarray
     primitive: np.ndarray
     start: Array
+    end: Array
     leg_s: Array
     turn: Array
     straight: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.parent)
 
     def __getitem__(self, rows: np.ndarray) -> Successors:
         return replace(self, **{name: vars(self)[name][rows] for name in _COLUMNS})
@@ -177,8 +181,16 @@ class Successors:
         """All rows of several sets that continue the same partial plans."""
         return replace(parts[0], **{name: np.concatenate([vars(part)[name] for part in parts]) for name in _COLUMNS})
 
+    @classmethod
+    def chosen(cls, parts: Sequence[Successors], rows: np.ndarray) -> Successors:
+        """Rows (n,) of several sets, as if these were joined."""
+        firsts = np.cumsum([0, *map(len, parts)])
+        part_of = np.searchsorted(firsts, rows, side="right") - 1
+        found = cls.joined([part[rows[part_of == k] - firsts[k]] for k, part in enumerate(parts)])
+        return found[np.argsort(np.argsort(part_of, kind="stable"))]
 
-_COLUMNS = ("parent", "primitive", "start", "leg_s", "turn", "straight")
+
+_COLUMNS = ("parent", "primitive", "start", "end", "leg_s", "turn", "straight")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -238,8 +250,8 @@ class LocalPlanner(Protocol):
     def with_transitions(self, space: SearchSpace, pairs: Sequence[Pair], trials: TransitionTrials) -> SearchSpace:
         """The space with the transitions of these pairs tried."""
 
-    def successors(self, space: SearchSpace, plans: PartialPlans) -> Successors:
-        """Placements of every run that is left after each partial plan."""
+    def successors(self, space: SearchSpace, plans: PartialPlans) -> list[Successors]:
+        """Placements of every run that is left after each partial plan, each set with one run."""
 
     def leg_s(self, space: SearchSpace, ends: LegEnds, froms: Array, tos: Array, bends: Array) -> Array:
         """(n,) time of legs between poses (n or 1, 3) along a path with bends (b, 2) [s]."""

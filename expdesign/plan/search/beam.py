@@ -17,7 +17,7 @@ from expdesign.errors import NoPlan
 from expdesign.plan.local_planner import PartialPlans, SearchSpace, Successors
 from expdesign.plan.search.heuristic import OrdersAhead, orders_ahead, path_exceeds_displacement
 from expdesign.plan.search.local_search import ChainEnds, measured_s, polished
-from expdesign.plan.search.successors import clear_successors, run_ends
+from expdesign.plan.search.successors import clear_successors
 from expdesign.plan.search.tuning import SEARCH
 from expdesign.plan.values import Placement
 from expdesign.values import Array
@@ -93,18 +93,15 @@ def _advance(space: SearchSpace, beam: PartialPlans, width: int, ahead: OrdersAh
     """The best partial plans with one more run each."""
     found = space.planner.successors(space, beam)
     left = beam.left[:, None] - np.eye(len(space.footprints), dtype=int)  # (b, q, q) after each next run
-    end = run_ends(space, found.primitive, found.start)
-    cost_s = beam.cost_s[found.parent] + found.leg_s
-    kept = _select(space, found, end, left, cost_s + _rest_s(space, found, end, left, ahead), width)
-    if not len(kept):
+    chosen = _select(space, found, left, _totals_s(space, beam, found, left, ahead), width)
+    if not len(chosen):
         raise NoPlan(_what_blocks(space, beam))
-    chosen = found[kept]
     return PartialPlans(
-        pose=end[kept],
+        pose=chosen.end,
         exit_mps=np.array([space.footprints[q].exit_mps for q in chosen.primitive]),
         last=chosen.primitive,
         left=left[chosen.parent, chosen.primitive],
-        cost_s=cost_s[kept],
+        cost_s=beam.cost_s[chosen.parent] + chosen.leg_s,
         history=tuple(
             (*beam.history[parent], (int(q), start))
             for parent, q, start in zip(chosen.parent, chosen.primitive, chosen.start, strict=True)
@@ -112,48 +109,57 @@ def _advance(space: SearchSpace, beam: PartialPlans, width: int, ahead: OrdersAh
     )
 
 
-def _rest_s(space: SearchSpace, found: Successors, end: Array, left: np.ndarray, ahead: OrdersAhead) -> Array:
-    """(n,) repositioning time left after successors that end at poses (n, 3) [s].
+def _totals_s(
+    space: SearchSpace, beam: PartialPlans, found: Sequence[Successors], left: np.ndarray, ahead: OrdersAhead
+) -> Array:
+    """(n,) least repositioning time of plans that go on with successors, of which runs (b, q, q) are left [s].
 
-    At least that of the path to the goal less the displacement of the runs left (b, q, q), and what their order loses.
+    After them at least that of the path to the goal less the displacement of the runs left, and what their order loses.
     """
     speed_mps = space.ship.transit_speed_mps
     made_good_m = left @ np.array([run.displacement_m for run in space.footprints])
     lost_s = ahead.seconds(left.clip(0), np.arange(len(space.footprints)))
-    helped_m = (space.goal[:2] - end[:, :2]) @ space.current_to / speed_mps
-    next_run = found.parent, found.primitive
-    ahead_m = space.goal_distance.to_goal(end[:, :2]) - made_good_m[next_run] - helped_m
-    return np.asarray(np.clip(ahead_m, 0.0, None) / speed_mps + lost_s[next_run])
+    totals = []
+    for part in found:
+        next_run, place = (part.parent, part.primitive), part.end[:, :2]
+        helped_m = (space.goal[:2] - place) @ space.current_to / speed_mps
+        ahead_m = space.goal_distance.to_goal(place) - made_good_m[next_run] - helped_m
+        rest_s = np.clip(ahead_m, 0.0, None) / speed_mps + lost_s[next_run]
+        totals.append(beam.cost_s[part.parent] + part.leg_s + rest_s)
+    return np.concatenate(totals)
 
 
 def _select(
-    space: SearchSpace, found: Successors, end: Array, left: np.ndarray, total_s: Array, width: int
-) -> np.ndarray:
-    """Indices of the best successors whose leg and run are clear, at most one for each kind of place and remainder."""
+    space: SearchSpace, found: Sequence[Successors], left: np.ndarray, totals_s: Array, width: int
+) -> Successors:
+    """The best successors whose leg and run are clear, at most one for each kind of place and remainder."""
     kept: list[int] = []
     seen: set[tuple[int, ...]] = set()
-    for some in _in_order(total_s, SEARCH.checked_at_once):
-        clear = some[clear_successors(space, found[some])]
-        places = np.rint(end[clear, :2] / (SEARCH.cell_hulls * space.hull_m)).astype(int)
-        headings = np.rint(wrap_angle(end[clear, 2]) / SEARCH.heading_rad).astype(int)
-        remainders = left[found.parent[clear], found.primitive[clear]]
-        for index, key in zip(clear, np.column_stack([places, headings, remainders]).tolist(), strict=True):
-            if (kind := tuple(key)) not in seen:
+    for rows in _in_order(totals_s, SEARCH.checked_at_once):
+        some = Successors.chosen(found, rows)
+        clear = clear_successors(space, some)
+        some, rows = some[clear], rows[clear]
+        places = np.rint(some.end[:, :2] / (SEARCH.cell_hulls * space.hull_m)).astype(int)
+        headings = np.rint(wrap_angle(some.end[:, 2]) / SEARCH.heading_rad).astype(int)
+        kinds = np.column_stack([places, headings, left[some.parent, some.primitive]])
+        for row, kind in zip(rows.tolist(), map(tuple, kinds.tolist()), strict=True):
+            if kind not in seen:
                 seen.add(kind)
-                kept.append(int(index))
+                kept.append(row)
         if len(kept) >= width:
             break
-    return np.array(kept[:width], dtype=int)
+    return Successors.chosen(found, np.array(kept[:width], dtype=int))
 
 
 def _in_order(values: Array, at_once: int) -> Iterator[np.ndarray]:
-    """Indices of finite values, the least first and equals as they come, about so many at once."""
+    """Indices of finite values, the least first and equals as they come, so many at once."""
     left = np.flatnonzero(np.isfinite(values))
     while len(left):
-        count = min(at_once, len(left))
+        count = min(SEARCH.sorted_at_once, len(left))
         among = values[left] <= np.partition(values[left], count - 1)[count - 1]
         some = left[among]
-        yield some[np.argsort(values[some], kind="stable")]
+        order = some[np.argsort(values[some], kind="stable")]
+        yield from (order[first : first + at_once] for first in range(0, len(order), at_once))
         left = left[~among]
 
 

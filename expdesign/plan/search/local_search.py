@@ -16,8 +16,8 @@ import shapely
 
 from expdesign.conventions import wrap_angle
 from expdesign.plan.chart import sight_lines
-from expdesign.plan.local_planner import LegEnds, Pair, SearchSpace
-from expdesign.plan.search.successors import run_ends, runs_clear
+from expdesign.plan.local_planner import LegEnds, Pair, SearchSpace, run_ends
+from expdesign.plan.search.successors import runs_clear
 from expdesign.plan.search.tuning import SEARCH
 from expdesign.values import Array
 

@@ -1,25 +1,17 @@
-"""Where runs end, and whether successors of partial plans keep their clearances on the grid."""
+"""Whether successors of partial plans keep their clearances on the grid."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from expdesign.plan.local_planner import SearchSpace, Successors, arc_end, moved
+from expdesign.plan.local_planner import SearchSpace, Successors, arc_end, run_ends
 from expdesign.values import Array
-
-
-def run_ends(space: SearchSpace, primitive: np.ndarray, start: Array) -> Array:
-    """(n, 3) poses at the ends of runs (n,) of the space's primitives that begin at poses (n, 3)."""
-    steps = np.array([item.displacement for item in space.footprints])[primitive]
-    end = moved(start, steps)
-    end[:, :2] += space.current_to * np.array([item.duration_s for item in space.footprints])[primitive][:, None]
-    return end
 
 
 def clear_successors(space: SearchSpace, found: Successors) -> np.ndarray:
     """(n,) whether legs, runs and their ends keep their margins on the grid."""
     start, turn = found.start, found.turn
-    clear = _ends_clear(space, found.primitive, start)
+    clear = _ends_clear(space, start, found.end)
     arcs = np.flatnonzero(clear & ~np.isnan(turn))
     clear[arcs] = _arcs_clear(space, found.departure[found.parent[arcs]], turn[arcs], start[arcs])
     lines = np.flatnonzero(clear & found.straight)
@@ -31,12 +23,13 @@ def clear_successors(space: SearchSpace, found: Successors) -> np.ndarray:
 
 def runs_clear(space: SearchSpace, primitive: np.ndarray, start: Array) -> np.ndarray:
     """(n,) whether runs (n,) from poses (n, 3) and their ends keep their margins on the grid."""
-    return np.asarray(_ends_clear(space, primitive, start) & _hulls_clear(space, primitive, start))
+    ends_clear = _ends_clear(space, start, run_ends(space, primitive, start))
+    return np.asarray(ends_clear & _hulls_clear(space, primitive, start))
 
 
-def _ends_clear(space: SearchSpace, primitive: np.ndarray, start: Array) -> np.ndarray:
+def _ends_clear(space: SearchSpace, start: Array, end: Array) -> np.ndarray:
     clear = (space.field.at(start[:, :2]) >= space.leg_margin_m) & ~space.is_refused(start)
-    return np.asarray(clear & (space.field.at(run_ends(space, primitive, start)[:, :2]) >= space.leg_margin_m))
+    return np.asarray(clear & (space.field.at(end[:, :2]) >= space.leg_margin_m))
 
 
 def _hulls_clear(space: SearchSpace, primitive: np.ndarray, start: Array) -> np.ndarray:

@@ -12,7 +12,7 @@ class Tuning:
     Attributes:
         beam_width: partial plans kept.
         polished_orders: orders of runs of which the best plan is polished; the best one then counts.
-        checked_at_once: successors checked for clearance at a time.
+        checked_at_once, sorted_at_once: successors checked for clearance at a time, and sorted.
         cell_hulls, heading_rad: places of which one successor is kept: their size in hull lengths, and in heading.
         shift_hulls, turn_deg: steps of the local search, and with each a turn.
         sweeps: over all blocks of runs at most.
@@ -31,7 +31,8 @@ class Tuning:
 
     beam_width: int = 400
     polished_orders: int = 6
-    checked_at_once: int = 4096
+    checked_at_once: int = 1024
+    sorted_at_once: int = 8192
     cell_hulls: float = 2.0
     heading_rad: float = 0.4
     shift_hulls: tuple[float, ...] = (8.0, 4.0, 2.0, 1.0, 0.5, 0.25, 0.125, 0.0625)
