@@ -17,6 +17,7 @@ def clear_successors(space: SearchSpace, found: Successors) -> np.ndarray:
     lines = np.flatnonzero(clear & found.straight)
     clear[lines] = _lines_clear(space, found.departure[found.parent[lines]], start[lines])
     left = np.flatnonzero(clear)
+    left = left[~_surely_clear(space, found.primitive[left], start[left])]
     clear[left] = _hulls_clear(space, found.primitive[left], start[left])
     return clear
 
@@ -32,16 +33,32 @@ def _ends_clear(space: SearchSpace, start: Array, end: Array) -> np.ndarray:
     return np.asarray(clear & (space.field.at(end[:, :2]) >= space.leg_margin_m))
 
 
+def _surely_clear(space: SearchSpace, primitive: np.ndarray, start: Array) -> np.ndarray:
+    """Whether the clearance in the middle of runs is enough for all their discs."""
+    found = np.zeros(len(start), dtype=bool)
+    for q in np.unique(primitive):
+        some, item = np.flatnonzero(primitive == q), space.footprints[q]
+        middle = (item.discs.min(axis=0) + item.discs.max(axis=0)) / 2
+        reach_m = np.hypot(*(item.discs - middle).T) + np.hypot(*space.current_to) * item.times_s
+        enough_m = float((reach_m + item.room_m).max()) + np.sqrt(2.0) * space.field.cell_m
+        found[some] = space.field.at(_places(start[some], middle)) >= enough_m
+    return found
+
+
 def _hulls_clear(space: SearchSpace, primitive: np.ndarray, start: Array) -> np.ndarray:
     clear = np.ones(len(start), dtype=bool)
     for q in np.unique(primitive):
-        some = np.flatnonzero(primitive == q)
-        item = space.footprints[q]
-        c, s = np.cos(start[some, 2])[:, None], np.sin(start[some, 2])[:, None]
-        north = start[some, :1] + c * item.discs[:, 0] - s * item.discs[:, 1] + space.current_to[0] * item.times_s
-        east = start[some, 1:2] + s * item.discs[:, 0] + c * item.discs[:, 1] + space.current_to[1] * item.times_s
-        clear[some] = (space.field.at(np.stack([north, east], axis=-1)) >= item.room_m).all(axis=1)
+        some, item = np.flatnonzero(primitive == q), space.footprints[q]
+        places = _places(start[some, None], item.discs) + item.times_s[:, None] * space.current_to
+        clear[some] = (space.field.at(places) >= item.room_m).all(axis=1)
     return clear
+
+
+def _places(pose: Array, points: Array) -> Array:
+    """(..., 2) places of points (..., 2) forward and to starboard of poses (..., 3)."""
+    c, s = np.cos(pose[..., 2]), np.sin(pose[..., 2])
+    north = pose[..., 0] + c * points[..., 0] - s * points[..., 1]
+    return np.stack([north, pose[..., 1] + s * points[..., 0] + c * points[..., 1]], axis=-1)
 
 
 def _arcs_clear(space: SearchSpace, pose: Array, turn: Array, start: Array) -> np.ndarray:
