@@ -13,7 +13,8 @@ IFAC Proc. 17 (1984), 1603-1608.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Hashable
+from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from typing import Any
 
@@ -44,7 +45,7 @@ class Program:
         self._build()
 
     def _build(self) -> None:
-        j, m, block = self.nodes, len(self.limits), block_map(self.vessel, self.environment, self.block)
+        j, m, block = self.nodes, len(self.limits), self._blocks
         x, u, h = ca.MX.sym("x", 6, j + 1), ca.MX.sym("u", m, j + 1), ca.MX.sym("h")
         d, past = ca.MX.sym("d", len(self.lagging), j + 1), ca.MX.sym("past", m, self.memory)
         path, circle, displacement_value = (
@@ -67,6 +68,7 @@ class Program:
             rows += [step - reach, -step - reach]
         through = x[3:5, 1:-1] - self._current_b(x[2, 1:-1])
         others = ca.vertcat(*rows, ca.sum1(through**2).T, (through[0, :] * x[5, 1:-1]).T)
+        constraints = ca.vertcat(motion, others)
         cost = (
             LEGS.smoothness * ca.sumsqr(ca.diff(u, 1, 1))
             + LEGS.smallness * ca.sumsqr(u) / j
@@ -75,30 +77,43 @@ class Program:
         if self.free:
             cost = cost + h * j * self.block / unit_s
         parameters = ca.vertcat(ca.vec(path), circle, displacement_value, unit_s, arm, ca.vec(past))
-        constraints = ca.vertcat(motion, others)
 
-        # the chain rule through the constant matrices that give the map's arguments, and what it must arrive at
-        placed = ca.evalf(ca.jacobian(ca.vec(arguments), variables))
-        arrived = ca.evalf(ca.jacobian(ca.vec(given[:, 1:]), variables))
-        slopes = ca.sparsity_cast(block.jacobian.map(j)(arguments), _repeated(block.jacobian, j))
-        jacobian = ca.vertcat(
-            ca.mtimes(ca.diag(ca.DM(scale)), ca.mtimes(slopes, placed) - arrived), ca.jacobian(others, variables)
-        )
-        of_cost, of_rows = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", constraints.numel())
-        of_motion, of_others = ca.vertsplit(of_rows, [0, motion.numel(), constraints.numel()])
-        weights = ca.reshape(ca.DM(scale) * of_motion, -1, j)
-        bends = ca.sparsity_cast(block.hessian.map(j)(arguments, weights), _repeated(block.hessian, j))
-        hessian = ca.mtimes(placed.T, ca.mtimes(bends, placed))
-        hessian += ca.hessian(of_cost * cost + ca.dot(of_others, others), variables)[0]
-
+        variables_and_parameters = [variables, parameters]
+        weights, jacobian, hessian = self._derivatives(variables, arguments, given[:, 1:], scale, cost, others)
         options: dict[str, Any] = {"print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}
         options |= {"ipopt.max_iter": LEGS.iterations, "ipopt.constr_viol_tol": 1e-9, "ipopt.acceptable_iter": 0}
         options |= {"ipopt.tol": 1e-5 if self.free else 1e-7}
-        both = [variables, parameters]
-        options["jac_g"] = ca.Function("nlp_jac_g", both, [constraints, jacobian])
-        options["hess_lag"] = ca.Function("nlp_hess_l", [*both, of_cost, of_rows], [ca.triu(hessian)])
+        options["jac_g"] = ca.Function("nlp_jac_g", variables_and_parameters, [constraints, jacobian])
+        options["hess_lag"] = ca.Function("nlp_hess_l", variables_and_parameters + weights, [ca.triu(hessian)])
         nlp: Any = {"x": variables, "p": parameters, "f": cost, "g": constraints}
         self.solver = ca.nlpsol("leg", "ipopt", nlp, options)
+
+    def _derivatives(
+        self, variables: ca.MX, arguments: ca.MX, arrivals: ca.MX, scale: Array, cost: ca.MX, others: ca.MX
+    ) -> tuple[list[ca.MX], ca.MX, ca.MX]:
+        """Weights of cost and constraints, Jacobian of the constraints, Hessian of the weighted sum.
+
+        Arguments of the maps, and what they must arrive at, are linear in the variables: the chain rule takes two
+        constant matrices.
+        """
+        block, j = self._blocks, self.nodes
+        of_arguments, of_arrivals = (
+            ca.evalf(ca.jacobian(ca.vec(linear), variables)) for linear in (arguments, arrivals)
+        )
+        slopes = ca.sparsity_cast(block.jacobian.map(j)(arguments), _repeated(block.jacobian, j))
+        motion = ca.mtimes(ca.diag(ca.DM(scale)), ca.mtimes(slopes, of_arguments) - of_arrivals)
+        cost_weight, weights = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", len(scale) + others.numel())
+        motion_weights, other_weights = ca.vertsplit(weights, [0, len(scale), weights.numel()])
+        per_map = ca.reshape(ca.DM(scale) * motion_weights, -1, j)
+        bends = ca.sparsity_cast(block.hessian.map(j)(arguments, per_map), _repeated(block.hessian, j))
+        hessian = ca.mtimes(of_arguments.T, ca.mtimes(bends, of_arguments))
+        hessian += ca.hessian(cost_weight * cost + ca.dot(other_weights, others), variables)[0]
+        return [cost_weight, weights], ca.vertcat(motion, ca.jacobian(others, variables)), hessian
+
+    @property
+    def _blocks(self) -> BlockMap:
+        """The map from node to node."""
+        return _block_map(_ship(self.vessel, self.environment), self.block)
 
     @property
     def _rated(self) -> np.ndarray:
@@ -246,8 +261,9 @@ class BlockMap:
 
 
 @lru_cache(maxsize=LEGS.programs)
-def block_map(vessel: Vessel, environment: Environment, block: int) -> BlockMap:
+def _block_map(ship: _Ship, block: int) -> BlockMap:
     """The map over so many samples of a vessel in an environment's mean current and wind, with its derivatives."""
+    vessel, environment = ship.vessel, ship.environment
     responses, m = vessel.responses, len(vessel.limits)
     maps = [sample_map(x, sample_time_s=vessel.sample_time_s, substeps=SUBSTEPS) for x in responses]
     lagging = [index for index, response in enumerate(responses) if response.lag_s > 0]
@@ -291,7 +307,27 @@ def _mixed(weights: Array, start: Any, early: Any, late: Any) -> Any:
     return sum(parts[1:], parts[0]) if parts else 0.0
 
 
-@lru_cache(maxsize=LEGS.programs)
+@dataclass(frozen=True)
+class _Ship:
+    """A vessel in an environment's means; equal where its equations of motion are, in another process, too."""
+
+    content: tuple[Hashable, ...]
+    vessel: Vessel = field(compare=False)
+    environment: Environment = field(compare=False)
+
+
+def _ship(vessel: Vessel, environment: Environment) -> _Ship:
+    model = vessel.model
+    equations = model.terms, model.form, model.sample_time_s, model.parameters.tobytes(), model.actuators
+    weather = environment.current_to.tobytes(), environment.wind_to.tobytes()
+    return _Ship((equations, weather, vessel.length_m, vessel.sample_time_s), vessel, environment)
+
+
 def program(vessel: Vessel, environment: Environment, nodes: int, block: int, free_time: bool) -> Program:
     """The program of a size, built once and kept."""
-    return Program(vessel, environment, nodes, block, free_time)
+    return _program(_ship(vessel, environment), nodes, block, free_time)
+
+
+@lru_cache(maxsize=LEGS.programs)
+def _program(ship: _Ship, nodes: int, block: int, free_time: bool) -> Program:
+    return Program(ship.vessel, ship.environment, nodes, block, free_time)

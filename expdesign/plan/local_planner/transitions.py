@@ -13,6 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 import shapely
+from joblib import Parallel, delayed
 
 from expdesign.conventions import wrap_angle
 from expdesign.dictionary import Primitive
@@ -37,18 +38,37 @@ def pairs_of(placements: Sequence[Placement], last: str = "") -> list[Pair]:
 def with_transitions(
     space: SearchSpace, ship: AgileShip, times: LegTimes, pairs: Sequence[Pair], trials: TransitionTrials
 ) -> SearchSpace:
-    """The same space with transitions of pairs that had none, as far as the budget goes."""
+    """The same space with transitions of pairs that had none, as far as the budget goes.
+
+    Each is optimised on its own, by as many processes as `joblib.parallel_config` says. Their work is counted in the
+    order of the pairs, so the result does not depend on the number of processes.
+    """
     water, tried = _open(trials.water), dict(space.tried)
-    for pair in pairs:
+    fresh = [pair for pair in pairs if pair not in tried] if not trials.budget.exhausted else []
+    tasks = (_desired_leg(space, pair, trials, water, times) for pair in fresh)
+    work = Parallel(return_as="generator")
+    for pair, (found, spent_s) in zip(fresh, work(delayed(_optimised)(*task, ship) for task in tasks), strict=False):
         if trials.budget.exhausted:
             break
-        if pair not in tried:
-            course, turn = _desired(space, pair, trials.start)
-            task = replace(_task(pair, trials.primitives, water, course, turn), budget=trials.budget)
-            worth = trials.made_good * np.array([np.cos(course), np.sin(course)]) / times.speed_mps
-            found = free_leg(task, water, ship, worth)
-            tried[pair] = None if found is None else _tried(space, times, pair, *found)
+        tried[pair] = None if found is None else _tried(space, times, pair, *found)
+        trials.budget.spent_s += spent_s
     return replace(space, tried=tried)
+
+
+def _desired_leg(
+    space: SearchSpace, pair: Pair, trials: TransitionTrials, water: LegWater, times: LegTimes
+) -> tuple[LegTask, LegWater, Array]:
+    """The task of a transition, its water, and the value of displacement."""
+    course, turn = _desired(space, pair, trials.start)
+    worth = trials.made_good * np.array([np.cos(course), np.sin(course)]) / times.speed_mps
+    return _task(pair, trials.primitives, water, course, turn), water, worth
+
+
+def _optimised(
+    task: LegTask, water: LegWater, worth: Array, ship: AgileShip
+) -> tuple[tuple[float, Array] | None, float]:
+    """Time and end of a transition, or None, and the work it took."""
+    return free_leg(task, water, ship, worth), task.budget.spent_s
 
 
 def _tried(space: SearchSpace, times: LegTimes, pair: Pair, seconds: float, step: Array) -> TriedTransition:
