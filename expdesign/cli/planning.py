@@ -12,12 +12,12 @@ from expdesign.cli.options import Jobs, Out, OutBesidePlan, OutWhatIf, PlanFile,
 
 
 @command("run")
-def run(scenario: ScenarioFile, out: Out = None, seed: Seed = 0) -> Asked:
+def run(scenario: ScenarioFile, out: Out = None, jobs: Jobs = 0, seed: Seed = 0) -> Asked:
     """Do everything: score, durations, plan, verification, route files, report.
 
     Example: expdesign run scenarios/helsinki.toml
     """
-    return ask("run", scenario, out, seed=seed)
+    return ask("run", scenario, out, jobs=jobs, seed=seed)
 
 
 @command("score")

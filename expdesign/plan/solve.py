@@ -1,14 +1,19 @@
-"""The planner: place the runs, sail them, verify the plan, estimate its risk; replan with more room if that fails."""
+"""The planner: place the runs, sail them, verify the plan, estimate its risk; replan with more room if that fails.
+
+Independent work is done by as many processes as `joblib.parallel_config` says.
+"""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 import numpy as np
+from joblib import Parallel, delayed
 
 from expdesign.errors import NoPlan
 from expdesign.plan.assembly import PlanRoom, leg_water, plan_room, search_space
 from expdesign.plan.bounds import reposition_bound_s
+from expdesign.plan.control import Capability
 from expdesign.plan.legs import LegWater
 from expdesign.plan.monte_carlo import (
     Trials,
@@ -40,15 +45,19 @@ def plan_trial(problem: PlanProblem, *, progress: Progress = silent) -> Plan:
     for attempt in range(PLAN.replans + 1):
         before_s = budget.spent_s
         sailed = sail_all(problem, room, progress, stated=water, budget=budget)
-        progress("verifying", 0.85)
-        verification = _verified(problem, water, sailed)
-        progress("sailing drawn trials", 0.9)
+        progress("verifying and sailing drawn trials", 0.85)
         # random streams independent of planning and of earlier attempts
         rng = np.random.default_rng((problem.seed, PLAN.trials_stream, attempt))
-        risk, trials = estimate_risk(water, sailed, rng=rng, draws=trials_needed(confidence))
+        verification, (risk, trials), bound_s = Parallel()(
+            [
+                delayed(_verified)(problem, water, sailed),
+                delayed(estimate_risk)(water, sailed, rng=rng, draws=trials_needed(confidence)),
+                delayed(_bound_s)(problem, water.ship),
+            ]
+        )
         failed = failed_chance_constraint(risk, trials, sailed.legs, problem.area, confidence=confidence)
         if not failed:
-            return _plan(problem, water, sailed, verification=verification, risk=risk)
+            return _plan(problem, sailed, verification=verification, risk=risk, bound_s=bound_s)
         budget.sailed(int(trials.samples.max(axis=1).sum()))
         _check_worth_replanning(problem, risk, failed, budget, attempt=attempt, before_s=before_s)
         room = _wider(problem, room, trials, sailed.legs, failed)
@@ -113,12 +122,9 @@ def _replanning(progress: Progress) -> Progress:
     return lambda activity, share: progress(f"with more room: {activity}", max(share, 0.9))
 
 
-def _plan(
-    problem: PlanProblem, water: LegWater, sailed: SailedTrial, *, verification: Verification, risk: RiskEstimate
-) -> Plan:
-    """The plan with its bound and its efficiencies."""
-    placed, realised = realised_efficiencies(problem.vessel, problem.design, problem.environment, sailed)
-    bound_s = reposition_bound_s(
+def _bound_s(problem: PlanProblem, ship: Capability) -> float:
+    """Least repositioning time of any plan of the problem's runs."""
+    return reposition_bound_s(
         problem.vessel,
         problem.area,
         problem.environment,
@@ -126,9 +132,16 @@ def _plan(
         primitives=problem.primitives,
         repeats=problem.repeats,
         ends=(problem.start, problem.goal),
-        transit_mps=water.ship.transit_speed_mps,
-        yaw_rate_radps=water.ship.spot_rate_radps + water.ship.yaw_rate_radps,
+        transit_mps=ship.transit_speed_mps,
+        yaw_rate_radps=ship.spot_rate_radps + ship.yaw_rate_radps,
     )
+
+
+def _plan(
+    problem: PlanProblem, sailed: SailedTrial, *, verification: Verification, risk: RiskEstimate, bound_s: float
+) -> Plan:
+    """The plan with its bound and its efficiencies."""
+    placed, realised = realised_efficiencies(problem.vessel, problem.design, problem.environment, sailed)
     return Plan(
         area=problem.area,
         commands=sailed.commands,

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from expdesign.export import words
 from expdesign.export.cards.card import BLANKS, build_card, card_groups
 from expdesign.export.pages import page_templates
-from expdesign.export.pages.figures import report_style
+from expdesign.export.pages.figures import drawn
 from expdesign.export.report import tables
 from expdesign.export.report.content import ReportContent, primitive_runs
 from expdesign.export.report.figures.chart import chart
@@ -21,9 +23,8 @@ def cards_html(content: ReportContent) -> str:
     """
     require_verified(content.plan)
     runs = primitive_runs(content.plan)
-    with report_style():
-        cards = [build_card(content, group) for group in card_groups(content, runs)]
-        overview = chart(content)
+    cards = drawn([partial(build_card, content, group) for group in card_groups(content, runs)])
+    overview = drawn([partial(chart, content)])[0]
     page = page_templates("expdesign.export.cards").get_template("cards.html")
     return page.render(
         content=content,

@@ -8,11 +8,12 @@ from __future__ import annotations
 import io
 import re
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import matplotlib
+from joblib import Parallel, delayed
 from markupsafe import Markup, escape
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
@@ -30,6 +31,7 @@ PIXELS_PER_INCH = 120.0
 LAND, WATER, FORBIDDEN = "#e9d8a6", "#e6f2fa", "#d4d4d4"
 
 LONGEST_NAME = 32
+Drawn = TypeVar("Drawn")
 
 SETTINGS: dict[Any, Any] = {
     "svg.fonttype": "none",
@@ -53,6 +55,16 @@ def report_style() -> Iterator[None]:
         # text stays text in the page, so the reader's fonts draw what matplotlib's font lacks
         warnings.filterwarnings("ignore", message="Glyph .* missing from font")
         yield
+
+
+def drawn(figures: Sequence[Callable[[], Drawn]]) -> list[Drawn]:
+    """Results of functions that draw, in report style, by as many processes as `joblib.parallel_config` says."""
+    return list(Parallel()(delayed(_in_style)(figure) for figure in figures))
+
+
+def _in_style(figure: Callable[[], Drawn]) -> Drawn:
+    with report_style():
+        return figure()
 
 
 def new_figure(width_in: float, height_in: float, *, arranged: bool = True) -> Figure:

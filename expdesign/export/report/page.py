@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 from expdesign.export import words
 from expdesign.export.pages import page_templates
-from expdesign.export.pages.figures import report_style
+from expdesign.export.pages.figures import drawn
 from expdesign.export.report import criteria, tables
 from expdesign.export.report.checks import checks, conditions
 from expdesign.export.report.content import ReportContent, primitive_runs
@@ -87,18 +89,21 @@ def report_html(content: ReportContent) -> str:
 
 
 def _figures(content: ReportContent, after: Expected) -> dict[str, object]:
-    hull = content.vessel.hull_b
-    with report_style():
-        return {
-            "chart": chart(content),
-            "durations": durations_figure(content),
-            "information": information_figure(content),
-            "timeline": timeline_figure(content.plan),
-            "uncertainty": uncertainty_figure(content, after) if measures_velocity(content) else "",
-            "primitives": [
-                primitive_figure(item.primitive, hull, number=number) for number, item in enumerate(content.information)
-            ],
-        }
+    figures: dict[str, Callable[[], str]] = {
+        "chart": partial(chart, content),
+        "durations": partial(durations_figure, content),
+        "information": partial(information_figure, content),
+        "timeline": partial(timeline_figure, content.plan),
+    }
+    if measures_velocity(content):
+        figures["uncertainty"] = partial(uncertainty_figure, content, after)
+    primitives: list[Callable[[], str]] = [
+        partial(primitive_figure, item.primitive, content.vessel.hull_b, number=number)
+        for number, item in enumerate(content.information)
+    ]
+    results: list[str] = drawn([*figures.values(), *primitives])
+    named = dict(zip(figures, results, strict=False))
+    return {"uncertainty": "", **named, "primitives": results[len(figures) :]}
 
 
 def _origin(content: ReportContent) -> str:

@@ -14,10 +14,24 @@ from expdesign.workflows.steps.design_tables import design_summary
 from expdesign.workflows.steps.grown import growth_summary, ready
 from expdesign.workflows.steps.planned import check_plannable, plan_summary, planned
 from expdesign.workflows.steps.trial_files import built_route, report_content, trial_files
+from expdesign.workflows.steps.workers import workers
 
 
-def run(scenario: Path, out: Path | None, *, seed: int = 0, progress: Progress = silent) -> Outcome:
-    """The main job: score, durations, plan, verification, route files and report, into `out` or runs/<scenario>."""
+def run(scenario: Path, out: Path | None, *, seed: int = 0, jobs: int = 1, progress: Progress = silent) -> Outcome:
+    """The main job: score, durations, plan, verification, route files and report, into `out` or runs/<scenario>.
+
+    Args:
+        scenario: the scenario file.
+        out: folder.
+        seed: of everything drawn.
+        jobs: processes; 0 for one per core. The results do not depend on it.
+        progress: of the command.
+    """
+    with workers(jobs):
+        return _run(scenario, out, seed, progress)
+
+
+def _run(scenario: Path, out: Path | None, seed: int, progress: Progress) -> Outcome:
     case = loaded(scenario, progress)
     check_plannable(case)
     information, growth = ready(case, seed=seed, progress=within(progress, 0.02, 0.1))

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from joblib import Parallel, delayed, parallel_config
+from joblib import Parallel, delayed
 
 from expdesign import __version__
 from expdesign.durations import DurationDesign, efficiencies
@@ -26,6 +24,7 @@ from expdesign.workflows.outcome import Outcome, TextTable
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.grown import ready
 from expdesign.workflows.steps.planned import plan_summary, planned
+from expdesign.workflows.steps.workers import workers
 
 WHOLE_RUNS = "repeats"
 
@@ -66,7 +65,7 @@ def whatif(
         if names.count(name) > 1:
             raise InputError(f"the name {name!r} is given to {names.count(name)} cases, expected different names")
     done: dict[int, Case] = {}
-    with _workers(scheduler, jobs):
+    with workers(jobs, scheduler=scheduler):
         work = Parallel(return_as="generator_unordered")
         tasks = (delayed(_case)(index, case, changes, with_plan, seed) for index, (case, changes) in enumerate(cases))
         for index, found in work(tasks):
@@ -84,29 +83,6 @@ def whatif(
     written = write_files(out or Path("runs") / f"{base.name}-whatif", files)
     progress("done", 1.0)
     return Outcome(files=written, summary=_summary(content), tables=_tables(content))
-
-
-@contextmanager
-def _workers(scheduler: str | None, jobs: int) -> Iterator[None]:
-    """Where joblib does the work: processes here, or the workers of a Dask scheduler.
-
-    Raises:
-        InputError: Dask is not installed, or no scheduler answers.
-    """
-    if scheduler is None:
-        with parallel_config(backend="loky", n_jobs=jobs or os.cpu_count() or 1):
-            yield
-        return
-    try:
-        from distributed import Client
-    except ImportError:
-        raise InputError("--scheduler needs Dask, expected the extra: pip install 'expdesign[cluster]'") from None
-    try:
-        client = Client(scheduler, timeout="4s")
-    except (OSError, TimeoutError, ValueError) as error:
-        raise InputError(f"--scheduler {scheduler}: no scheduler answers there ({error})") from None
-    with client, parallel_config(backend="dask", n_jobs=-1):
-        yield
 
 
 def _case(index: int, case: Scenario, changes: tuple[str, ...], with_plan: bool, seed: int) -> tuple[int, Case]:
