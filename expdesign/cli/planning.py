@@ -54,13 +54,14 @@ def plan(
         Path | None,
         typer.Option("--durations", metavar="FILE", help="A durations.json made before. Default: computed now."),
     ] = None,
+    jobs: Jobs = 0,
     seed: Seed = 0,
 ) -> Asked:
     """Plan one trajectory that runs the chosen manoeuvres in allowed water, and verify it.
 
     Writes plan.json, track.csv and commands.csv.
     """
-    return ask("plan", scenario, out, durations=durations, seed=seed)
+    return ask("plan", scenario, out, durations=durations, jobs=jobs, seed=seed)
 
 
 @command("export")

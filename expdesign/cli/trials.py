@@ -107,6 +107,7 @@ def replan(
         ),
     ] = None,
     out: Out = None,
+    jobs: Jobs = 0,
     seed: Seed = 0,
 ) -> Asked:
     """Plan the rest of a trial, from the present position, with a model updated from the data.
@@ -124,5 +125,6 @@ def replan(
         vessel=vessel,
         remaining_s=remaining,
         interest=interest or (),
+        jobs=jobs,
         seed=seed,
     )

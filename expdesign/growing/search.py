@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import qmc
 
 from expdesign.dictionary import PrimitiveSpec
 from expdesign.dictionary.batch import excite_many
@@ -100,6 +99,8 @@ class Archive:
 
 def pool_of(spaces: Sequence[FamilySpace], measure: Measure, *, pool: int, seed: int) -> tuple[Archive, ...]:
     """Quasi-random candidates of every family, `pool` or the next power of two of each."""
+    from scipy.stats import qmc  # slow to import
+
     points = []
     for number, space in enumerate(spaces):
         count = max(TUNING.fewest_closed_loop, pool // TUNING.closed_loop_share) if space.family.closed_loop else pool

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.signal import lfilter
 
 from expdesign.signals import Commands
 from expdesign.values import Array, seal
@@ -146,6 +145,8 @@ def _signals(through: SampleMap, command: Array, before: Any) -> tuple[Array, Ar
     """Delivered value at each sample (k + 1, ...), and the earlier and later command (k, ...) that act in between."""
     effective = past_deadband(command, through.deadband)
     first = np.broadcast_to(past_deadband(np.asarray(before, dtype=float), through.deadband), command.shape[1:])
+    from scipy.signal import lfilter  # slow to import, and most ships have no lagging actuators
+
     count = len(command)
     history = np.concatenate([np.repeat(first[None], min(through.lateness, count) + 1, axis=0), effective])
     early, late = history[:count], history[1 : count + 1]

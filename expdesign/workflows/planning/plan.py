@@ -12,17 +12,34 @@ from expdesign.workflows.steps.case import loaded, written
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.grown import ready
 from expdesign.workflows.steps.planned import check_plannable, plan_files, plan_summary, planned
+from expdesign.workflows.steps.workers import workers
 
 
 def plan(
-    scenario: Path, out: Path | None, *, durations: Path | None = None, seed: int = 0, progress: Progress = silent
+    scenario: Path,
+    out: Path | None,
+    *,
+    durations: Path | None = None,
+    seed: int = 0,
+    jobs: int = 1,
+    progress: Progress = silent,
 ) -> Outcome:
-    """One verified trajectory with the runs of a durations file, or of the optimal durations."""
+    """One verified trajectory with the runs of a durations file, or of the optimal durations.
+
+    Args:
+        scenario: the scenario file.
+        out: folder.
+        durations: a durations.json made before.
+        seed: of everything drawn.
+        jobs: processes; 0 for one per core. The results do not depend on it.
+        progress: of the command.
+    """
     case = loaded(scenario, progress)
     check_plannable(case)
     information, _ = ready(case, seed=seed, progress=within(progress, 0.02, 0.1))
     design = designed(case, information, seed=seed)
     if durations is not None:
         design = with_repeats(design, load_repeats(durations, names=design.problem.names))
-    result = planned(case, information, design, seed=seed, progress=within(progress, 0.1, 0.95))
+    with workers(jobs):
+        result = planned(case, information, design, seed=seed, progress=within(progress, 0.1, 0.95))
     return written(case, out, plan_files(case, result), plan_summary(result), progress)

@@ -30,6 +30,7 @@ from expdesign.workflows.steps.known import data_parts, expected_std, in_recorde
 from expdesign.workflows.steps.planned import plan_summary, planned
 from expdesign.workflows.steps.present import PresentState, present_state, rest_of, weather_for_rest
 from expdesign.workflows.steps.trial_files import built_route, report_content, trial_files
+from expdesign.workflows.steps.workers import workers
 
 VESSEL_FILE = "vessel-used.toml"
 
@@ -43,6 +44,7 @@ def replan(
     remaining_s: float | None = None,
     interest: Sequence[str] = (),
     seed: int = 0,
+    jobs: int = 1,
     progress: Progress = silent,
 ) -> Outcome:
     """Plan the rest of a trial from the ship's present position, with the results of `run`.
@@ -55,6 +57,7 @@ def replan(
         remaining_s: informative time left; the scenario's less the time of the data when None.
         interest: parameters that the rest is to be best for, by criterion D_s; the scenario's criterion when empty.
         seed: of all chance.
+        jobs: processes; 0 for one per core. The results do not depend on it.
         progress: of the command.
 
     Raises:
@@ -69,7 +72,8 @@ def replan(
         case, information, stated_std=_stated(state.first.vessel), seed=seed, progress=within(progress, 0.12, 0.15)
     )
     _check_runs(design)
-    plan = planned(case, information, design, seed=seed, progress=within(progress, 0.15, 0.85))
+    with workers(jobs):
+        plan = planned(case, information, design, seed=seed, progress=within(progress, 0.15, 0.85))
     progress("writing routes, run cards and report", 0.85)
     known = known_of(replace(state, notes=(*state.notes, *notes)), case, design, plan)
     route = built_route(case, plan)
@@ -90,8 +94,9 @@ def replan(
             },
         ),
     )
-    files = {
-        **trial_files(case, growth, content, route),
+    with workers(jobs):
+        files = trial_files(case, growth, content, route)
+    files |= {
         VESSEL_FILE: vessel_toml(state.ship, comments=[f"The rest of trial {case.name!r} is planned with it.",
                                                        f"Its model is {state.origin}."]),
         "replan.json": replan_json(known),
