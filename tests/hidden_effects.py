@@ -8,7 +8,9 @@ weather, from the same state, and measured with the same noise; every effect is 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cache
 
+import casadi as ca
 import numpy as np
 
 TUG = {
@@ -132,7 +134,7 @@ def sail(trials: list[Trial], orders: np.ndarray, step_s: float, weather: Weathe
     n, b, k, m = orders.shape
     e = {name: np.array([t.effects.get(name, 0.0) for t in trials])[:, None] for name in EFFECTS}
     th = {name: np.array([t.parameters[name] for t in trials])[:, None] for name in SHIPS[ship]}
-    present = {name for name, values in e.items() if values.any()}
+    present = frozenset(name for name, values in e.items() if values.any())
     mask, small = (  # (n, 1, m)
         np.stack([(e[name].astype(int) >> j) & 1 for j in range(m)], axis=-1).astype(bool)
         for name in ("acts_on", "dead_on")
@@ -152,6 +154,8 @@ def sail(trials: list[Trial], orders: np.ndarray, step_s: float, weather: Weathe
                   np.zeros((n, b)), np.zeros((n, b))])  # fmt: skip
     held = orders[:, :, 0].copy()
     out = {name: np.zeros((n, b, k)) for name in ("north", "east", "heading", "u", "v", "r", "u_q", "v_q")}
+    advance = runge_kutta(ship, present, h).map(n * b)
+    constants = ca.DM(_lanes(np.stack([np.broadcast_to(v, (n, b)) for v in (*th.values(), *e.values())])))
     rows = np.arange(n)[:, None, None], np.arange(b)[None, :, None], np.arange(m)[None, None, :]
     for i in range(k):
         for part in range(SUBSTEPS):
@@ -174,14 +178,9 @@ def sail(trials: list[Trial], orders: np.ndarray, step_s: float, weather: Weathe
             shoal = np.zeros((n, b)) if depth is None else 2.5 / depth[:, :, i]
             after = (t + k * step_s * np.arange(b) >= e["change_s"]) & (e["change_s"] > 0)
             current, wind = mean_c + vary_c, mean_w + vary_w
-
-            def rates(x, acting=acting, shoal=shoal, after=after, current=current, wind=wind):
-                return _rates(ship, x, acting, th, e, present, shoal, after, current, wind)
-
-            k1 = rates(x)
-            k2 = rates(x + h / 2 * k1)
-            k3 = rates(x + h / 2 * k2)
-            x = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + rates(x + h * k3))
+            moved = advance(_lanes(x), _lanes(np.moveaxis(acting, -1, 0)), constants, _lanes(shoal[None]),
+                            _lanes(np.broadcast_to(after, (1, n, b))), _lanes(current), _lanes(wind))  # fmt: skip
+            x = np.array(moved).reshape(8, n, b)
             x[3:] = np.clip(x[3:], -MOST, MOST)  # ships made unstable, which nobody looks at any further
             vary_c = fade_c * vary_c + weather.current_std * np.sqrt(1 - fade_c**2) * rng.standard_normal((2, 1, b))
             vary_w = fade_w * vary_w + weather.wind_std * np.sqrt(1 - fade_w**2) * rng.standard_normal((2, 1, b))
@@ -195,40 +194,64 @@ EFFECTS = (
 )  # fmt: skip
 
 
+def _lanes(values: np.ndarray) -> np.ndarray:
+    """(a, n b) of (a, n, b)."""
+    return np.ascontiguousarray(values, dtype=float).reshape(len(values), -1)
+
+
+@cache
+def runge_kutta(ship: str, present: frozenset[str], h: float) -> ca.Function:
+    """A step of one trial and batch, compiled: (x, acting, constants, shoal, after, current, wind) to the next x."""
+    names = ("x", "acting", "constants", "shoal", "after", "current", "wind")
+    sizes = (8, len(INPUTS[ship]), len(SHIPS[ship]) + len(EFFECTS), 1, 1, 2, 2)
+    given = [ca.SX.sym(name, size) for name, size in zip(names, sizes, strict=True)]
+    x, acting, constants, *sea = given
+    values = ca.vertsplit(constants)
+    th, e = dict(zip(SHIPS[ship], values, strict=False)), dict(zip(EFFECTS, values[len(SHIPS[ship]) :], strict=True))
+
+    def rates(state: ca.SX) -> ca.SX:
+        return ca.vertcat(*_rates(ship, ca.vertsplit(state), ca.vertsplit(acting), th, e, present, *sea))
+
+    k1 = rates(x)
+    k2 = rates(x + h / 2 * k1)
+    k3 = rates(x + h / 2 * k2)
+    return ca.Function("step", given, [x + h / 6 * (k1 + 2 * k2 + 2 * k3 + rates(x + h * k3))])
+
+
 def _rates(ship, x, acting, th, e, present, shoal, after, current, wind):
     _, _, psi, u, v, r, phi, p = x
-    c, s = np.cos(psi), np.sin(psi)
+    c, s = ca.cos(psi), ca.sin(psi)
     ur, vr = u - (c * current[0] + s * current[1]), v - (c * current[1] - s * current[0])
     gain, damp, heavy = 1 + e["gain"], 1 + e["shallow_damping"] * shoal, 1 + e["shallow_inertia"] * shoal
     if "change_s" in present:
-        gain = gain * np.where(after, 1 + e["change_gain"], 1.0)
-        damp = np.where(after, 1 + e["change_damping"], 1.0) * damp
+        gain = gain * (1 + after * e["change_gain"])
+        damp = (1 + after * e["change_damping"]) * damp
     if ship == "coaster":
-        n, rudder = acting[..., 0], acting[..., 1] + e["angle_offset"]
-        push, side, turn = np.abs(n) * n, ur * np.abs(ur) * rudder, ur * np.abs(ur) * rudder
-        fx = th["X_nn"] * push + th["X_dd"] * ur * np.abs(ur) * rudder * rudder
+        n, rudder = acting[0], acting[1] + e["angle_offset"]
+        push, side, turn = ca.fabs(n) * n, ur * ca.fabs(ur) * rudder, ur * ca.fabs(ur) * rudder
+        fx = th["X_nn"] * push + th["X_dd"] * ur * ca.fabs(ur) * rudder * rudder
         fy, fn = th["Y_rud"] * side, th["N_rud"] * turn
         kx = e["kappa"] * ur * push
         fn = fn + e["asymmetry"] * push
     else:
         if ship == "tug":
-            n1, a1, n2, a2 = np.moveaxis(acting, -1, 0)
+            n1, a1, n2, a2 = acting
             a1, a2 = a1 + e["angle_offset"], a2 + e["angle_offset"]
-            tx, ty = n1 * np.cos(a1) + n2 * np.cos(a2), n1 * np.sin(a1) + n2 * np.sin(a2)
-            tn = 9 * n1 * np.sin(a1) - 9 * n2 * np.sin(a2)
+            tx, ty = n1 * ca.cos(a1) + n2 * ca.cos(a2), n1 * ca.sin(a1) + n2 * ca.sin(a2)
+            tn = 9 * n1 * ca.sin(a1) - 9 * n2 * ca.sin(a2)
         else:
-            tx, ty, tn = np.moveaxis(acting, -1, 0)
+            tx, ty, tn = acting
         tn = tn + e["asymmetry"] * tx
         fx, fy, fn = th["X_mu"] * tx, th["Y_mu"] * ty, th["N_mu"] * tn
         kx = (th.get("X_kappa", 0.0) + e["kappa"]) * ur * tx
     if ship == "tug":
         uq, vq = u - (c * wind[0] + s * wind[1]), v - (c * wind[1] - s * wind[0])
-        fx = fx + th["W_abs_u_u"] * np.abs(uq) * uq
-        fy = fy + th["W_abs_v_v"] * np.abs(vq) * vq
+        fx = fx + th["W_abs_u_u"] * ca.fabs(uq) * uq
+        fy = fy + th["W_abs_v_v"] * ca.fabs(vq) * vq
         fn = fn + th["W_uv"] * uq * vq
-    dx = th["X_u"] * ur + th["X_abs_u_u"] * np.abs(ur) * ur
-    dy = th["Y_v"] * vr + th.get("Y_abs_v_v", 0.0) * np.abs(vr) * vr + th.get("Y_abs_v_r", 0.0) * np.abs(vr) * r
-    dn = th["N_r"] * r + th.get("N_abs_v_v", 0.0) * np.abs(vr) * vr + th.get("N_abs_v_r", 0.0) * np.abs(vr) * r
+    dx = th["X_u"] * ur + th["X_abs_u_u"] * ca.fabs(ur) * ur
+    dy = th["Y_v"] * vr + th.get("Y_abs_v_v", 0.0) * ca.fabs(vr) * vr + th.get("Y_abs_v_r", 0.0) * ca.fabs(vr) * r
+    dn = th["N_r"] * r + th.get("N_abs_v_v", 0.0) * ca.fabs(vr) * vr + th.get("N_abs_v_r", 0.0) * ca.fabs(vr) * r
     dn = dn + th["N_uv"] * ur * vr
     extra = {"X": 0.0, "Y": 0.0, "N": 0.0}
     for name, term in TERMS.items():
@@ -238,13 +261,13 @@ def _rates(ship, x, acting, th, e, present, shoal, after, current, wind):
     dv = th["Y_ur"] * ur * r + (damp * dy + gain * fy + extra["Y"]) / (1 + e["load_v"]) / heavy
     dr = (damp * dn + gain * fn + extra["N"]) / (1 + e["load_r"]) / heavy
     if "roll_period_s" not in present:
-        return np.stack([u * c - v * s, u * s + v * c, r, du, dv, dr, p, np.zeros_like(p)])
-    w0 = 2 * np.pi / np.where(e["roll_period_s"] > 0, e["roll_period_s"], 1.0)
+        return u * c - v * s, u * s + v * c, r, du, dv, dr, p, 0.0
     on = e["roll_period_s"] > 0
+    w0 = 2 * np.pi / ca.if_else(on, e["roll_period_s"], 1.0)
     side = dv + u * r  # the hull leans against the acceleration of the water it pushes
-    dp = np.where(on, -2 * e["roll_damping"] * w0 * p - w0**2 * phi + w0**2 * side, 0.0)
+    dp = on * (-2 * e["roll_damping"] * w0 * p - w0**2 * phi + w0**2 * side)
     dv, dr = dv + e["roll_sway"] * phi, dr + e["roll_yaw"] * phi
-    return np.stack([u * c - v * s, u * s + v * c, r, du, dv, dr, p, dp])
+    return u * c - v * s, u * s + v * c, r, du, dv, dr, p, dp
 
 
 def measure(true: dict[str, np.ndarray], step_s: float, sensors: Sensors, rng: np.random.Generator,

@@ -83,7 +83,8 @@ def svg(figure: Figure, *, key: str, label: str) -> Markup:
         label: what it shows, for those who cannot see it.
     """
     target = io.StringIO()
-    figure.savefig(target, format="svg", facecolor="none", metadata={"Date": None, "Creator": None})
+    figure.set_facecolor("none")
+    FigureCanvasSVG(figure).print_svg(target, metadata={"Date": None, "Creator": None})  # savefig would draw it twice
     text = target.getvalue()
     text = text[text.index("<svg") :].strip()
     text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
