@@ -13,6 +13,7 @@ from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.diagnosis.vessel_file.result_names import public_name
 from expdesign.export.diagnosis_page import diagnosis_html, diagnosis_json
+from expdesign.export.diagnosis_page import figures as diagnosis_figures
 from expdesign.export.diagnosis_page.suspects import has_sign, is_force, suspected, suspected_force
 
 ALONE = ("u", "v", "r", "n1", "a1", "n2", "a2", "u_q", "v_q", "heading", "time", "run")
@@ -161,7 +162,8 @@ def test_two_findings_of_one_cause_have_a_picture_each(clean):
     assert page.index("Missing acceleration") < page.index('id="finding1"')
 
 
-def test_data_too_short_for_the_residuals_are_noted(clean):
+def test_data_too_short_for_the_residuals_are_noted(clean, monkeypatch):
+    monkeypatch.setattr(diagnosis_figures, "svg", lambda *_, **__: "")  # only the words are read
     short = replace(
         clean.residuals,
         acceleration=clean.residuals.acceleration[:5],
@@ -173,6 +175,7 @@ def test_data_too_short_for_the_residuals_are_noted(clean):
 
 
 @pytest.mark.parametrize(("names", "words"), [(("run",), "This variable"), (("run", "heading"), "These 2 variables")])
-def test_one_variable_is_not_called_several(clean, names, words):
+def test_one_variable_is_not_called_several(clean, names, words, monkeypatch):
+    monkeypatch.setattr(diagnosis_figures, "svg", lambda *_, **__: "")  # only the words are read
     some = replace(clean.residuals, variables={name: clean.residuals.variables[name] for name in names})
     assert f"{words}</summary>" in diagnosis_html(replace(clean, residuals=some), command="", version="")

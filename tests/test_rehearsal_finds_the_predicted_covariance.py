@@ -7,6 +7,7 @@ import pytest
 from expdesign.dictionary import build_dictionary
 from expdesign.errors import NotInformative
 from expdesign.information.expected import TrialPart, expected_covariance
+from expdesign.rehearsal import validation
 from expdesign.rehearsal.validation import Rehearsal, heading_rad, trial_parts, validate
 from expdesign.scenario import load_vessel
 from expdesign.scenario.dictionaries.dictionary_file import load_dictionary
@@ -159,7 +160,8 @@ def test_headings_of_any_consecutive_runs_are_spread_evenly():
         assert abs(part.sum()) < 1.6
 
 
-def test_any_number_of_processes_and_any_interruption_give_the_same():
+def test_any_number_of_processes_and_any_interruption_give_the_same(monkeypatch):
+    monkeypatch.setattr(validation, "TUNING", replace(validation.TUNING, chunk_trials=3))
     rehearsal = Rehearsal(
         truth=QUIET,
         nominal=NOMINAL,
@@ -169,7 +171,7 @@ def test_any_number_of_processes_and_any_interruption_give_the_same():
         environment=CURRENT,
         parameters=NAMES,
         integrator="euler",
-        trials=22,
+        trials=4,
     )
     kept: dict[str, np.ndarray] = {}
     whole = validate(rehearsal, keep=kept.__setitem__)

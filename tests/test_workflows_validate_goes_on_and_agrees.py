@@ -18,8 +18,18 @@ MODEL_SHIP, TRUE = SCENARIOS / "model-ship.toml", SCENARIOS / "vessels" / "model
 OPTIONS = {"truth": TRUE, "trials": 4, "integrator": "euler", "jobs": 1}
 
 
-def test_an_interrupted_call_goes_on_and_gives_the_same(tmp_path):
-    whole = workflows.validate_design(MODEL_SHIP, tmp_path / "whole", **OPTIONS)
+@pytest.fixture
+def whole(made_once) -> dict[str, Path]:
+    """Files of an uninterrupted call, by name."""
+
+    def made(folder: Path) -> list[str]:
+        return [path.name for path in workflows.validate_design(MODEL_SHIP, folder, **OPTIONS).files]
+
+    folder, names = made_once("validated", made)
+    return {name: folder / name for name in names}
+
+
+def test_an_interrupted_call_goes_on_and_gives_the_same(tmp_path, whole):
 
     def stop(what: str, share: float) -> None:
         if what == "simulating trials" and share > 0.3:
@@ -32,13 +42,12 @@ def test_an_interrupted_call_goes_on_and_gives_the_same(tmp_path):
     resumed = workflows.validate_design(MODEL_SHIP, tmp_path / "parts", **OPTIONS)
     assert [path.name for path in resumed.files] == ["validation.json", "validation.html"]
     assert sorted(path.name for path in (tmp_path / "parts").iterdir()) == ["validation.html", "validation.json"]
-    assert resumed.files[0].read_text("utf-8") == whole.files[0].read_text("utf-8")
+    assert resumed.files[0].read_text("utf-8") == whole["validation.json"].read_text("utf-8")
 
 
-def test_the_page_shows_what_the_file_holds(tmp_path):
-    outcome = workflows.validate_design(MODEL_SHIP, tmp_path, **OPTIONS)
-    content = json.loads(outcome.files[0].read_text("utf-8"))
-    page = outcome.files[1].read_text("utf-8")
+def test_the_page_shows_what_the_file_holds(whole):
+    content = json.loads(whole["validation.json"].read_text("utf-8"))
+    page = whole["validation.html"].read_text("utf-8")
     assert set(content["designs"]) == {"optimised", "equal shares", "random"}
     for design in content["designs"].values():
         for entry in design["parameters"].values():

@@ -19,6 +19,7 @@ import numpy as np
 from scipy.fft import dct, idct
 
 from expdesign.assessment.runs import RunCheck
+from expdesign.assessment.tuning import TUNING
 from expdesign.conventions import OUTPUTS
 from expdesign.estimation.regression import inputs_of, model_for
 from expdesign.estimation.replay import Compiled, Integration, Stretches, compiled
@@ -26,15 +27,6 @@ from expdesign.estimation.values import Estimate
 from expdesign.signals import Batch, Record
 from expdesign.values import Array, seal
 from expdesign.vessel import VesselModel
-
-SLOW_S = 20.0
-"""Periods longer than this [s], or than 40 samples, count as slow."""
-AHEAD_S = 30.0
-"""Prediction horizon from measured states [s]."""
-UNSTABLE = 5.0
-"""Growth of an error over a run above which the ship is unstable."""
-CANCELLING = 2.0
-"""Share of the squared misfit above which its parts nearly cancel, so that their sizes have no meaning."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -47,7 +39,7 @@ class Limits:
         parameters: (n,) squared misfit expected from the parameters' covariance, over the actual one.
         ceiling_percent: (n,) lower bound on the fit with measurement noise alone: the noise is estimated by third
             differences, which also contain motion that is fast at the sample time.
-        ahead_rms: (n,) of predictions `AHEAD_S` ahead from measured velocities [m/s, rad/s].
+        ahead_rms: (n,) of predictions `Tuning.ahead_s` ahead from measured velocities [m/s, rad/s].
         ahead_share: (n,) the same over the standard deviation of the measured output.
         growth: how many times an error of the first velocity is larger at the end of the run, at worst.
         duration_s: of the run.
@@ -71,7 +63,7 @@ class Limits:
     @property
     def unstable(self) -> bool:
         """Whether errors grow by themselves."""
-        return self.growth > UNSTABLE
+        return self.growth > TUNING.unstable_growth
 
     @property
     def doubling_s(self) -> float:
@@ -164,16 +156,16 @@ def _one_step(stretches: Stretches) -> Compiled:
 
 
 def _slow_part(values: Array, sample_time_s: float) -> Array:
-    """The part with periods over `SLOW_S` or 40 samples; a cosine transform is not periodic at the ends."""
+    """The part with periods over `Tuning.slow_s` or 40 samples; a cosine transform is not periodic at the ends."""
     spectrum = dct(values, axis=0, norm="ortho")
-    period_s = max(SLOW_S, 40 * sample_time_s)
+    period_s = max(TUNING.slow_s, 40 * sample_time_s)
     spectrum[int(2 * len(values) * sample_time_s / period_s) + 1 :] = 0.0
     return np.asarray(idct(spectrum, axis=0, norm="ortho"))
 
 
 def _ahead(stretches: Stretches, values: Array, measured: Array, sample_time_s: float) -> Array:
     """(n,) RMS of predictions from measured states, over windows that lie end to end; the run when it is shorter."""
-    length = min(len(measured), round(AHEAD_S / sample_time_s) + 1)
+    length = min(len(measured), round(TUNING.ahead_s / sample_time_s) + 1)
     firsts = np.arange(0, len(measured) - length + 1, max(1, length - 1))
     rows = firsts + np.arange(length)[:, None]
     windows = compiled(replace(stretches, drive=stretches.drive[:, 0][rows]))
@@ -195,9 +187,12 @@ def _whole(values: Array) -> Array:
 def sentence(limits: Limits, run: RunCheck) -> str:
     """The causes of misfit of a run in words and numbers."""
     ahead = _listed(limits, 100 * limits.ahead_share)
-    tail = f"The {AHEAD_S:g} s prediction from measured velocities has an error of {ahead} of the standard deviation."
+    tail = (
+        f"The {TUNING.ahead_s:g} s prediction from measured velocities has an error of {ahead} of the standard "
+        "deviation."
+    )
     if not np.isfinite(limits.ahead_rms).all():
-        tail = f"Even the {AHEAD_S:g} s prediction from measured velocities diverges."
+        tail = f"Even the {TUNING.ahead_s:g} s prediction from measured velocities diverges."
     if run.problem:
         return f"The simulation diverges. {tail}"
     if limits.unstable:
@@ -211,13 +206,13 @@ def sentence(limits: Limits, run: RunCheck) -> str:
     worst = int(np.nanargmin(run.fit_percent))
     causes = (
         ("a constant unmodelled force", limits.constant[worst]),
-        (f"slow forces (periods over {SLOW_S:g} s)", limits.slow[worst]),
+        (f"slow forces (periods over {TUNING.slow_s:g} s)", limits.slow[worst]),
         ("fast forces and measurement noise", limits.quick[worst]),
     )
     if not np.isfinite([share for _, share in causes]).all():
         return tail
     parts = ", ".join(f"{round(100 * share)} % from {what}" for what, share in sorted(causes, key=lambda c: -c[1]))
-    if max(abs(share) for _, share in causes) > CANCELLING:
+    if max(abs(share) for _, share in causes) > TUNING.cancelling_share:
         parts = "large parts of opposite sign that nearly cancel, so no single cause can be named"
     doubt = limits.parameters[worst]
     uncertain = f" Parameter uncertainty explains {f'{100 * doubt:.0f} %' if not doubt >= 1 else 'all of it'}."

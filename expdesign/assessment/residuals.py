@@ -7,15 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from expdesign.assessment.tuning import TUNING
 from expdesign.estimation.methods import method_named
 from expdesign.estimation.regression import Integers, build_layout, build_regression, model_for
 from expdesign.estimation.values import Estimate
 from expdesign.signals import Record
 from expdesign.values import Array, frozen_set, seal
 from expdesign.vessel import VesselModel
-
-LAGS = 60
-"""Longest lag of the autocorrelation, in samples."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -83,7 +81,7 @@ def one_step(
     )
 
 
-def autocorrelation(residuals: Array, batch: Integers, step: Integers, *, lags: int = LAGS) -> Array:
+def autocorrelation(residuals: Array, batch: Integers, step: Integers, *, lags: int = TUNING.lags) -> Array:
     """(lags + 1, n) mean products of residuals so many samples apart over the mean square; 0 where no pair exists."""
     power = (residuals**2).mean(axis=0)
     power = np.where(power > 0, power, 1.0)

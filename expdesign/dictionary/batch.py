@@ -9,7 +9,8 @@ import numpy as np
 
 from expdesign.dictionary.build import desired_commands, desired_velocities, family, follow
 from expdesign.dictionary.spec import PrimitiveSpec
-from expdesign.dictionary.trim import STEADY, lost
+from expdesign.dictionary.trim import lost
+from expdesign.dictionary.tuning import TUNING
 from expdesign.errors import InputError, NoAnswer
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel, within_limits
@@ -66,6 +67,6 @@ def excite_many(vessel: Vessel, specs: Sequence[PrimitiveSpec]) -> ExcitedRuns:
         rows = np.array(list(desired))
         references = np.array(list(desired.values()))
         before, followed = follow(vessel, references)
-        possible[rows] = lost(vessel, references[:, 0], before) <= STEADY
+        possible[rows] = lost(vessel, references[:, 0], before) <= TUNING.steady_change
         velocity[rows], entry[rows], commands[rows] = references[:, 0], before, followed
     return ExcitedRuns(possible=possible, velocity=velocity, entry_inputs=entry, commands=commands)

@@ -9,7 +9,8 @@ import numpy as np
 from expdesign.dictionary.families import FAMILIES
 from expdesign.dictionary.primitive import Primitive
 from expdesign.dictionary.spec import Excitation, Family, PrimitiveSpec
-from expdesign.dictionary.trim import STEADY, drift, lost, motion_text, reach_text, trim
+from expdesign.dictionary.trim import drift, lost, motion_text, reach_text, trim
+from expdesign.dictionary.tuning import TUNING
 from expdesign.errors import InputError, SpeedOutOfReach, UnknownName, Unreachable
 from expdesign.signals import Commands
 from expdesign.simulation import simulate
@@ -83,7 +84,7 @@ def excitation(vessel: Vessel, spec: PrimitiveSpec) -> Excitation:
         return Excitation(velocity=desired.velocity, inputs=desired.inputs, commands=values)
     velocities = desired_velocities(vessel, spec)
     inputs, values = follow(vessel, velocities)
-    if lost(vessel, velocities[0], inputs) > STEADY:
+    if lost(vessel, velocities[0], inputs) > TUNING.steady_change:
         raise Unreachable(_not_held(vessel, velocities[0]))
     return Excitation(velocity=velocities[0], inputs=inputs, commands=values)
 

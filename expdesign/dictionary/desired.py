@@ -8,11 +8,9 @@ import numpy as np
 
 from expdesign.dictionary.build import family
 from expdesign.dictionary.primitive import Primitive
+from expdesign.dictionary.tuning import TUNING
 from expdesign.errors import InputError
 from expdesign.values import Array
-
-LARGEST_DEVIATION = 0.1
-"""Deviation, as a share of the largest desired speed or yaw rate, above which a primitive is reported."""
 
 
 def desired_motion(primitive: Primitive) -> Array | None:
@@ -39,5 +37,5 @@ def deviation(primitive: Primitive) -> float:
 
 
 def deviating(primitives: Sequence[Primitive]) -> tuple[Primitive, ...]:
-    """Primitives that deviate from the desired motion by more than `LARGEST_DEVIATION`."""
-    return tuple(item for item in primitives if deviation(item) > LARGEST_DEVIATION)
+    """Primitives that deviate from the desired motion by more than `Tuning.reported_deviation`."""
+    return tuple(item for item in primitives if deviation(item) > TUNING.reported_deviation)

@@ -5,16 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import least_squares
 
+from expdesign.dictionary.tuning import TUNING
 from expdesign.errors import Unreachable
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, Vessel, allocate, direct_terms, required_force
-
-STEADY = 1e-6
-"""Largest relative change of speed per sample of a steady state."""
-SHARES = (0.9, 0.75, 0.5, 0.25, 0.1, 0.03, 0.01)
-"""Where the search for the largest share of a velocity that can be held begins."""
-STARTS = (0.05, 0.4, 0.9)
-"""Shares of full thrust that the search for commands of a direct model starts from."""
 
 
 def trim(vessel: Vessel, velocity: Array) -> Array:
@@ -36,7 +30,7 @@ def drift(vessel: Vessel, velocity: Array, inputs: Array) -> Array:
 
 
 def lost(vessel: Vessel, velocity: Array, inputs: Array) -> Array:
-    """(...) share of its speed that the vessel loses or gains per sample; `STEADY` at most where the state is held."""
+    """(...) change of speed per sample, relative; `Tuning.steady_change` at most in a steady state."""
     change = np.abs(drift(vessel, velocity, inputs)).max(axis=-1) * vessel.sample_time_s
     return np.asarray(change / np.maximum(1e-9, np.abs(velocity).max(axis=-1)))
 
@@ -48,7 +42,7 @@ def hold(vessel: Vessel, velocity: Array) -> Array:
         Unreachable: the actuators cannot.
     """
     inputs = trim(vessel, velocity)
-    if lost(vessel, velocity, inputs) > STEADY:
+    if lost(vessel, velocity, inputs) > TUNING.steady_change:
         raise Unreachable(
             f"the actuators cannot hold its entry state {motion_text(velocity)}; {reach_text(vessel, velocity)}"
         )
@@ -59,11 +53,11 @@ def held_share(vessel: Vessel, velocity: Array) -> float:
     """The largest share of a velocity (3,), in steps down from all of it, that the actuators hold; 0 for none."""
 
     def holds(share: float) -> bool:
-        return bool(lost(vessel, share * velocity, trim(vessel, share * velocity)) <= STEADY)
+        return bool(lost(vessel, share * velocity, trim(vessel, share * velocity)) <= TUNING.steady_change)
 
     if holds(1.0):
         return 1.0
-    high, low = 1.0, next((share for share in SHARES if holds(share)), 0.0)
+    high, low = 1.0, next((share for share in TUNING.share_starts if holds(share)), 0.0)
     while low and high - low > 1e-4 * low:
         middle = (low + high) / 2
         low, high = (middle, high) if holds(middle) else (low, middle)
@@ -98,7 +92,7 @@ def _direct_trim(vessel: Vessel, velocity: Array) -> Array:
         return np.asarray(np.r_[drift(vessel, velocity, share * scale) / free, 1e-9 * share])
 
     ahead = np.array([name.startswith(("n", "tau_x")) for name in vessel.model.inputs])
-    tries = [np.clip(start * np.sign(velocity[0]) * ahead, low + 1e-9, high - 1e-9) for start in STARTS]
+    tries = [np.clip(start * np.sign(velocity[0]) * ahead, low + 1e-9, high - 1e-9) for start in TUNING.thrust_starts]
     found = [least_squares(excess, start, bounds=(low, high), xtol=1e-15, ftol=1e-15, gtol=1e-15) for start in tries]
     best: Array = min(found, key=lambda item: float(item.cost)).x
     return np.asarray(best * scale)

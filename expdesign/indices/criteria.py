@@ -10,12 +10,11 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from expdesign.indices.tuning import TUNING
 from expdesign.indices.values import Circle, Stop, ZigZag
 
 LEAST_LENGTH_M = 100.0
 DEGREE = math.pi / 180.0
-NEAR = 2.0 * DEGREE
-"""Largest deviation of helm and heading of a 10/10 or 20/20 zig-zag from the nominal angles."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,5 +108,5 @@ def indices_of(trial: Circle | ZigZag | Stop) -> dict[str, float | None]:
 
 
 def _is(trial: ZigZag, degrees: float) -> bool:
-    near_heading = abs(trial.heading_rad - degrees * DEGREE) < NEAR
-    return near_heading and abs(trial.helm_rad - degrees * DEGREE) < NEAR
+    near_heading = abs(trial.heading_rad - degrees * DEGREE) < TUNING.zigzag_deviation_rad
+    return near_heading and abs(trial.helm_rad - degrees * DEGREE) < TUNING.zigzag_deviation_rad

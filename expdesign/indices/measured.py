@@ -15,6 +15,7 @@ import numpy as np
 from expdesign.errors import InputError
 from expdesign.indices.read import read_circle, read_stop, read_zigzag
 from expdesign.indices.steered_run import SteeredRun, orders
+from expdesign.indices.tuning import TUNING
 from expdesign.indices.values import Circle, Stop, ZigZag
 from expdesign.signals import Batch
 from expdesign.simulation import Helm
@@ -22,8 +23,6 @@ from expdesign.values import Array
 from expdesign.vessel import Vessel
 
 LEAST_HELM_RAD = math.radians(2.0)
-SLOW = 0.05
-"""Speed by the root of the length [m^0.5 s^-1] (a Froude number of 0.016) below which a ship is not under way."""
 TURNED_RAD = math.radians(80.0)
 
 
@@ -169,7 +168,7 @@ def _approach(run: SteeredRun, order_s: float) -> tuple[float, float]:
 
 
 def _slow(run: SteeredRun) -> float:
-    return SLOW * math.sqrt(run.length_m)
+    return TUNING.under_way * math.sqrt(run.length_m)
 
 
 def _astern(run: SteeredRun) -> float | None:

@@ -26,16 +26,15 @@ from expdesign.errors import InputError, NoAnswer
 from expdesign.estimation.methods import Settings, estimate
 from expdesign.estimation.solve import Weighting
 from expdesign.information.expected import TrialPart, expected_covariance
-from expdesign.information.tuning import TUNING
+from expdesign.information.tuning import TUNING as INFORMATION_TUNING
 from expdesign.progress import Progress, silent
+from expdesign.rehearsal.tuning import TUNING
 from expdesign.signals import Batch, Record
 from expdesign.simulation import CALM, Environment, simulate_ensemble
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
 
-CHUNK = 20
-"""Trials in one chunk."""
 RANDOM = "random"
 GOLDEN_ANGLE_RAD = np.pi * (3.0 - 5.0**0.5)
 """From the heading of one run to that of the next."""
@@ -176,8 +175,8 @@ def validate(
 def _tasks(rehearsal: Rehearsal) -> Iterator[tuple[str, str, int, int]]:
     """(key, design, chunk number, trials in it)."""
     for name in rehearsal.designs:
-        for number, first in enumerate(range(0, rehearsal.trials, CHUNK)):
-            yield f"{name}/{number}", name, number, min(CHUNK, rehearsal.trials - first)
+        for number, first in enumerate(range(0, rehearsal.trials, TUNING.chunk_trials)):
+            yield f"{name}/{number}", name, number, min(TUNING.chunk_trials, rehearsal.trials - first)
 
 
 def _chunk(rehearsal: Rehearsal, key: str, design: str, number: int, trials: int) -> tuple[str, Array]:
@@ -318,7 +317,7 @@ def trial_parts(
     In wind or current, information depends on the heading; unknown headings are then replaced by `Tuning.headings`
     evenly spread ones.
     """
-    count = 1 if environment.isotropic else TUNING.headings
+    count = 1 if environment.isotropic else INFORMATION_TUNING.headings
     return tuple(
         TrialPart(
             commands=primitive.commands,

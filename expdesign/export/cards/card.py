@@ -10,10 +10,11 @@ import numpy as np
 
 from expdesign.export import words
 from expdesign.export.cards.chart import run_chart
-from expdesign.export.cards.danger import FARTHEST_M, Danger, look_out
+from expdesign.export.cards.danger import Danger, look_out
 from expdesign.export.cards.orders import columns_of, order_columns, order_rows, orders_notes, run_orders
 from expdesign.export.report.content import ReportContent, Run, relative_information
 from expdesign.export.report.tables import settings_sentence
+from expdesign.export.tuning import TUNING
 from expdesign.plan.values import Plan
 from expdesign.vessel import column_name
 
@@ -21,14 +22,6 @@ STEADY_HEADING_RAD = math.radians(3.0)
 
 
 STEADY_SPEED_SHARE, STEADY_SPEED_MPS = 0.1, 0.1
-
-
-MOST_RUNS = 3
-"""Runs on one sheet."""
-
-
-NAMED_PARAMETERS = 4
-"""Parameters named in the purpose of a run."""
 
 
 BLANKS = ("Start (UTC)", "Wind, from", "Sea state; current, to", "Depth", "File")
@@ -81,7 +74,7 @@ def card_groups(content: ReportContent, runs: Sequence[Run]) -> list[list[Run]]:
     return [
         [group[index] for index in part]
         for group in groups
-        for part in np.array_split(np.arange(len(group)), math.ceil(len(group) / MOST_RUNS))
+        for part in np.array_split(np.arange(len(group)), math.ceil(len(group) / TUNING.runs_per_sheet))
     ]
 
 
@@ -126,7 +119,7 @@ def _together(runs: list[list[tuple[str, str]]]) -> list[tuple[str, tuple[str, .
 
 def _purpose(content: ReportContent, index: int) -> str:
     share = relative_information(content)[index]
-    order = np.argsort(-share, kind="stable")[:NAMED_PARAMETERS]
+    order = np.argsort(-share, kind="stable")[: TUNING.named_parameters]
     named = [f"{content.parameters[k]} ({words.percent(float(share[k]))})" for k in order.tolist() if share[k] > 0]
     listed = ", ".join(named)
     return f"{listed}: information in per cent of the most informative manoeuvre for each" if named else "none"
@@ -199,7 +192,11 @@ def _danger(danger: Danger, first: int, step: float) -> list[tuple[str, str]]:
 
 
 def _reach(distance_m: float) -> str:
-    return f"over {words.distance(FARTHEST_M)}" if distance_m >= FARTHEST_M else words.distance(distance_m)
+    return (
+        f"over {words.distance(TUNING.farthest_danger_m)}"
+        if distance_m >= TUNING.farthest_danger_m
+        else words.distance(distance_m)
+    )
 
 
 def _room(content: ReportContent, room_m: tuple[float, float]) -> list[tuple[str, str]]:

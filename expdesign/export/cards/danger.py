@@ -8,10 +8,10 @@ import numpy as np
 import shapely
 
 from expdesign.conventions import to_n_frame
+from expdesign.export.tuning import TUNING
 from expdesign.values import Array
 from expdesign.vessel.hull import swept_area
 
-FARTHEST_M = 5000.0
 DIRECTIONS = {"ahead": 0.0, "starboard": np.pi / 2, "port": -np.pi / 2}
 
 
@@ -20,7 +20,8 @@ class Danger:
     """Least distances over a run.
 
     Attributes:
-        ahead_m, port_m, starboard_m: from the hull along straight lines to forbidden water, `FARTHEST_M` at most [m].
+        ahead_m, port_m, starboard_m: from the hull along straight lines to forbidden water, at most
+            `Tuning.farthest_danger_m` [m].
         nearest_m: from the hull in any direction [m].
         nearest_sample: when.
         room_m: (length, width) of the smallest rectangle around the swept area of the hull [m].
@@ -58,8 +59,8 @@ def _ray(pose: Array, start_b: Array, turn_rad: float, forbidden: shapely.Geomet
     """Least distance along the lines of sight [m]."""
     begin = np.array([to_n_frame(start_b, one) for one in pose])
     bearing = pose[:, 2] + turn_rad
-    end = begin + FARTHEST_M * np.stack([np.cos(bearing), np.sin(bearing)], axis=1)
+    end = begin + TUNING.farthest_danger_m * np.stack([np.cos(bearing), np.sin(bearing)], axis=1)
     rays = shapely.linestrings(np.stack([begin[:, ::-1], end[:, ::-1]], axis=1))
     hits = shapely.intersection(rays, forbidden)
     away = shapely.distance(hits, shapely.points(begin[:, ::-1]))
-    return float(np.min(np.where(np.isnan(away), FARTHEST_M, away)))
+    return float(np.min(np.where(np.isnan(away), TUNING.farthest_danger_m, away)))

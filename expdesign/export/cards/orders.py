@@ -7,17 +7,10 @@ import math
 import numpy as np
 
 from expdesign.export.report.content import ReportContent, Run
+from expdesign.export.tuning import TUNING
 from expdesign.plan.values import Leg
 from expdesign.values import Array
 from expdesign.vessel import Vessel, stem
-
-TOLERANCE = 0.02
-"""Largest error of the condensed orders, as a share of the range of each signal; larger where `MOST_ROWS` is "
-"reached."""
-
-
-MOST_ROWS = 48
-
 
 UNITS = {"n": ("rpm", 60.0), "a": ("deg", 180.0 / math.pi), "rudder": ("deg", 180.0 / math.pi)}
 
@@ -33,9 +26,9 @@ def condensed(values: Array) -> tuple[list[int], float]:
     span = np.ptp(values, axis=0)
     scaled = (values - values.min(axis=0)) / np.where(span > 1e-9, span, np.inf)
     kept = [0, len(values) - 1] if len(values) > 1 else [0]
-    while len(kept) < min(MOST_ROWS, len(values)):
+    while len(kept) < min(TUNING.most_order_rows, len(values)):
         worst, place = _worst(scaled, kept)
-        if worst <= TOLERANCE:
+        if worst <= TUNING.order_tolerance:
             break
         kept = sorted({*kept, place})
     return kept, _worst(scaled, kept)[0] if len(kept) < len(values) else 0.0
@@ -79,10 +72,6 @@ LONG, WIDE = 12, 5
 """Number of rows above which the orders use several columns, and cells per row up to which there are three."""
 
 
-HASTE_S = 10.0
-"""Mean time between orders below which they are too fast to be called out."""
-
-
 TURN = 2 * math.pi
 
 
@@ -113,7 +102,7 @@ def orders_notes(content: ReportContent, leg: Leg, rows: list[tuple[str, ...]], 
         "by at "
         f"most {100 * missed:.0f} % of the range of each order. {' '.join(signs)}".rstrip()
     ]
-    if every < HASTE_S:
+    if every < TUNING.called_order_s:
         notes.append(
             f"One order every {every:.2g} s is too fast to be called out. Let the control system execute "
             "commands.csv, and use these rows to monitor it."

@@ -11,15 +11,12 @@ from expdesign.diagnosis.accuracy import Dependence, dependence
 from expdesign.export.diagnosis_page.suspects import DEGREES, has_sign, is_force, suspected, suspected_force
 from expdesign.export.estimate_page.figures import AXES, thinned
 from expdesign.export.pages.figures import BLUE, GREY, VERMILION, light_grid, new_figure, short, svg
+from expdesign.export.tuning import TUNING
 from expdesign.values import Array
 from expdesign.vessel import column_name
 
 BINS, FEWEST = 16, 15
 """Groups of samples, at most, and samples of each, at least."""
-MOST_SPREADS = 3.0
-"""Errors beyond so many standard deviations of the measurements are not drawn: the simulation has diverged."""
-VISIBLE = 0.01
-"""Probability that any panel is coloured if nothing depends on anything."""
 ACCELERATION_AXES = {
     "u": ("u [mm/s\N{SUPERSCRIPT TWO}]", 1000.0),
     "v": ("v [mm/s\N{SUPERSCRIPT TWO}]", 1000.0),
@@ -78,7 +75,7 @@ def growth_figure(found: Diagnosis) -> str:
         axes.minorticks_off()
         spread = factor * float(np.nanstd(found.windows.measured[..., OUTPUTS.index(output)]))
         _, top = axes.get_ylim()
-        axes.set_ylim(0.0, min(top, MOST_SPREADS * spread) if spread > 0 else top)
+        axes.set_ylim(0.0, min(top, TUNING.most_spreads * spread) if spread > 0 else top)
         axes.set_title(f"error of {label}")
         axes.set_xlabel("time since the start [s]")
         light_grid(axes)
@@ -136,7 +133,7 @@ def residual_figures(found: Diagnosis) -> list[tuple[bool, str]]:
         for name, values in residuals.variables.items()
         if np.ptp(values) > 0
     }
-    clear = VISIBLE / sum(len(items) for items in tests.values())
+    clear = TUNING.coloured_by_chance / sum(len(items) for items in tests.values())
     limits = [1.15 * max(float(np.abs(items[i].mean).max() + items[i].std.max()) for items in tests.values())
               for i in range(len(residuals.outputs))]  # fmt: skip
     ranked = sorted(tests, key=lambda name: min(item.p_value for item in tests[name]))

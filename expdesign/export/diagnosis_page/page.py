@@ -29,11 +29,9 @@ from expdesign.export.diagnosis_page.wording import cause_title, estimate_words
 from expdesign.export.files import plus_minus
 from expdesign.export.pages import page_templates
 from expdesign.export.pages.figures import report_style
+from expdesign.export.tuning import TUNING
 
-SHOWN = 4
-"""Stretches of data drawn."""
 NO_NUMBER = "\N{EN DASH}"
-SMALLEST_P_VALUE = 1e-12
 
 
 def diagnosis_html(found: Diagnosis, *, command: str, version: str) -> str:
@@ -80,7 +78,7 @@ def drawn(found: Diagnosis) -> list[int]:
     error = np.nan_to_num(found.windows.measured - found.simulated_before)[..., :3]
     scale = np.maximum(np.nanstd(found.windows.measured[..., :3], axis=(0, 1)), 1e-12)
     size = np.clip((error / scale) ** 2, 0, 1e6).sum(axis=(1, 2))
-    return [int(index) for index in np.sort(np.argsort(-size)[:SHOWN])]
+    return [int(index) for index in np.sort(np.argsort(-size)[: TUNING.drawn_stretches])]
 
 
 def _stretch(found: Diagnosis, index: int) -> str:
@@ -145,7 +143,7 @@ def _fit(value: float) -> str:
 
 def _p_value(p_value: float) -> str:
     """Two digits; very small ones depend on the shape of the noise, so only a bound is given."""
-    return f"< {SMALLEST_P_VALUE:g}" if p_value < SMALLEST_P_VALUE else f"{p_value:.2g}"
+    return f"< {TUNING.smallest_p_value:g}" if p_value < TUNING.smallest_p_value else f"{p_value:.2g}"
 
 
 def _data(found: Diagnosis) -> str:

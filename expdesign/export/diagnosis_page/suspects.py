@@ -10,14 +10,13 @@ from numpy.typing import NDArray
 from expdesign.diagnosis import Diagnosis, Finding
 from expdesign.diagnosis.model import ExtendedModel, ahead_force, ahead_force_text, group_columns
 from expdesign.diagnosis.vessel_file import extended_model
+from expdesign.export.tuning import TUNING
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, column_name, generalised_force
 from expdesign.vessel.expressions import parse_expression
 from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS, SHOAL
 
 DEGREES = float(np.degrees(1.0))
-CHANGED = 0.2
-"""Change of inputs, summed in units of their standard deviations, that counts as one."""
 SQUARED = "\N{SUPERSCRIPT TWO}"
 SPEEDS = {"u": ("u [m/s]", 1.0), "v": ("v [m/s]", 1.0), "r": ("r [\N{DEGREE SIGN}/s]", DEGREES)}
 RATES = {
@@ -108,7 +107,7 @@ def _since_change(found: Diagnosis, columns: list[int]) -> tuple[Array, str]:
     scale = np.maximum(np.std(inputs.reshape(-1, inputs.shape[-1]), axis=0), 1e-12)
     change = np.zeros(inputs.shape[:2])
     change[:, 1:] = np.abs(np.diff(inputs, axis=1) / scale).sum(axis=2)
-    return _since(np.asarray(change > CHANGED)) * windows.sample_s, "time since the input changed [s]"
+    return _since(np.asarray(change > TUNING.changed_inputs)) * windows.sample_s, "time since the input changed [s]"
 
 
 def _since(events: NDArray[np.bool_]) -> Array:

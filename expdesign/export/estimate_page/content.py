@@ -5,10 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from expdesign.assessment import Assessed, Assessment
+from expdesign.export.tuning import TUNING
 from expdesign.vessel import Vessel
-
-DRAWN = 3
-"""Largest number of methods in the figures of runs."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -32,4 +30,4 @@ class EstimateContent:
         """The methods whose simulations are drawn: the one in the vessel file, then those that simulate most runs."""
         others = [item for item in self.found.methods if item is not self.found.best]
         others.sort(key=lambda item: sum(bool(run.problem) for run in item.runs))
-        return (self.found.best, *others)[:DRAWN]
+        return (self.found.best, *others)[: TUNING.drawn_methods]

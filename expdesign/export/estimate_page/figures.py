@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from expdesign.assessment import Assessed, RunCheck
 from expdesign.conventions import OUTPUTS
 from expdesign.export.pages.figures import BLUE, GREY, LINES, light_grid, new_figure, plain, svg
+from expdesign.export.tuning import TUNING
 from expdesign.values import Array
 
 AXES = {
@@ -16,10 +17,6 @@ AXES = {
     "r": ("r [\N{DEGREE SIGN}/s]", float(np.degrees(1.0))),
 }
 """Output -> label of its axis and factor to the unit shown."""
-POINTS = 500
-"""Points per line: more cannot be told apart at this size."""
-ROOM = 0.6
-"""Share of the measured range that is shown beyond it; simulations that leave it are cut off."""
 
 
 def run_figure(index: int, methods: tuple[Assessed, ...]) -> str:
@@ -47,7 +44,7 @@ def _draw_output(axes: Axes, output: str, checks: list[RunCheck], names: list[st
             simulated = factor * check.simulated[:, column]
             axes.plot(*thinned(batch.time_s, simulated), color=colour, linewidth=1.0, label=plain(f"simulated, {name}"))
     low, high = np.nanmin(measured), np.nanmax(measured)
-    room = ROOM * (high - low) or 1.0
+    room = TUNING.shown_beyond * (high - low) or 1.0
     bottom, top = axes.get_ylim()
     axes.set_ylim(max(bottom, low - room), min(top, high + room))
     axes.set_ylabel(label, fontsize=9)
@@ -55,8 +52,8 @@ def _draw_output(axes: Axes, output: str, checks: list[RunCheck], names: list[st
 
 
 def thinned(time: Array, values: Array) -> tuple[Array, Array]:
-    """At most about `POINTS` points that keep the highest and the lowest of every stretch."""
-    stretch = -(-2 * len(values) // POINTS)
+    """At most about `Tuning.line_points` points that keep the highest and the lowest of every stretch."""
+    stretch = -(-2 * len(values) // TUNING.line_points)
     if stretch < 3:
         return time, values
     kept = []

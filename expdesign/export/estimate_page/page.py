@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from expdesign.assessment import Assessed, Assessment, sentence
-from expdesign.assessment.limits import AHEAD_S
+from expdesign.assessment.tuning import TUNING as ASSESSMENT_TUNING
 from expdesign.export import words
 from expdesign.export.estimate_page.advice import advice, conditions, summary
 from expdesign.export.estimate_page.content import EstimateContent
@@ -14,6 +14,7 @@ from expdesign.export.estimate_page.figures import autocorrelation_figure, inter
 from expdesign.export.files import fit_table, motion_words, plus_minus
 from expdesign.export.pages import page_templates
 from expdesign.export.pages.figures import report_style
+from expdesign.export.tuning import TUNING
 
 FACTOR = 1.959964
 """Standard deviations to either side that hold 95 % of a normal distribution."""
@@ -58,7 +59,7 @@ def estimate_html(content: EstimateContent) -> str:
         motion=motion_words(found),
         limits=limit_rows(found),
         why=[sentence(limits, run) for limits, run in zip(found.limits, found.best.runs, strict=True)],
-        ahead_s=AHEAD_S,
+        ahead_s=ASSESSMENT_TUNING.ahead_s,
         methods=methods,
         explained=[(item.name, item.explained, item.correlation) for item in methods],
         conditions=conditions(content),
@@ -126,14 +127,11 @@ def limit_rows(found: Assessment) -> list[tuple[str, ...]]:
     return rows
 
 
-DIES_OUT = 1e-3
-
-
 def _growth(factor: float) -> str:
     """Growth of an initial error; "" where it is not known."""
     if not math.isfinite(factor):
         return ""
-    return "decays" if factor < DIES_OUT else f"\N{MULTIPLICATION SIGN}{words.significant(factor, 2)}"
+    return "decays" if factor < TUNING.fast_decay else f"\N{MULTIPLICATION SIGN}{words.significant(factor, 2)}"
 
 
 def _percent(value: float) -> str:

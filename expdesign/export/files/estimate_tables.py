@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from expdesign.assessment import Assessed, Assessment, RunCheck, sentence
-from expdesign.assessment.limits import AHEAD_S
+from expdesign.assessment.tuning import TUNING as ASSESSMENT_TUNING
 from expdesign.estimation.excitation import Breach
 from expdesign.export import words
 
@@ -29,8 +29,8 @@ def unstable_warning(found: Assessment) -> tuple[str, ...]:
     worst = max(limits.growth for limits in found.limits if limits.unstable)
     return (
         f"The ship is unstable under the recorded inputs in {', '.join(runs)}: with this estimate an initial error of "
-        f"a simulation grows up to {worst:.2g}-fold. Judge these runs by the {AHEAD_S:g} s prediction. Output error "
-        "needs a horizon (--horizon) with them.",
+        f"a simulation grows up to {worst:.2g}-fold. Judge these runs by the {ASSESSMENT_TUNING.ahead_s:g} s "
+        "prediction. Output error needs a horizon (--horizon) with them.",
     )
 
 

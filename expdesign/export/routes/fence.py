@@ -10,13 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
+from expdesign.export.tuning import TUNING
 from expdesign.sea_area import LocalFrame, eroded
 from expdesign.values import Array
 
 DECIMALS = 7
-MARGIN = 0.1
-"""Of the track's extent, kept around it."""
-HALVINGS = 12
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,10 +44,10 @@ def build_fence(
     """
     line = shapely.LineString(points[:, ::-1])
     west, south, east, north = line.bounds
-    margin = MARGIN * max(east - west, north - south) + 4 * (clearance_m + beam_m)
+    margin = TUNING.fence_margin * max(east - west, north - south) + 4 * (clearance_m + beam_m)
     near = shapely.intersection(water, shapely.box(west - margin, south - margin, east + margin, north + margin))
     slack = max(clearance_m, 0.1) / 2
-    for _ in range(HALVINGS):
+    for _ in range(TUNING.fence_halvings):
         found = _simplified(near, line, inset_m=beam_m / 2 + slack, slack_m=slack)
         if found is not None:
             degrees = _in_degrees(found, frame)

@@ -9,12 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from expdesign.export.files import finite, strict_json
+from expdesign.export.tuning import TUNING
 from expdesign.rehearsal import Rehearsal, Validated
 
-AGREES = 0.10
-"""Largest relative difference of standard deviations that counts as agreement, apart from sampling error."""
-BIASED = 0.5
-"""Bias over standard deviation beyond which an estimator does not count as consistent."""
 ERROR_LIMIT = 1.5
 """Normalised error below which the thesis calls a trial good."""
 
@@ -47,13 +44,13 @@ def chance(result: Validated) -> float:
 
 def off_theory(result: Validated) -> list[str]:
     """Parameters whose observed and predicted standard deviations differ significantly; none without a prediction."""
-    allowed = AGREES + 2.0 * chance(result)
+    allowed = TUNING.agreeing_std + 2.0 * chance(result)
     return _named(result, np.abs(result.found / result.theory - 1.0) > allowed)
 
 
 def biased(result: Validated) -> list[str]:
     """Parameters with a significant bias relative to their standard deviation."""
-    allowed = BIASED + 2.0 / np.sqrt(len(result.estimates))
+    allowed = TUNING.biased + 2.0 / np.sqrt(len(result.estimates))
     return _named(result, np.abs(result.bias) > allowed * result.found)
 
 
@@ -86,8 +83,8 @@ def _judged(result: Validated) -> Iterator[str]:
     off, shifted = off_theory(result), biased(result)
     if np.isfinite(result.theory).all() and not off:
         yield (
-            f"{result.design.capitalize()}: every observed standard deviation is within {AGREES:.0%} of the predicted "
-            f"one, apart from a sampling error of {2 * chance(result):.0%}."
+            f"{result.design.capitalize()}: every observed standard deviation is within {TUNING.agreeing_std:.0%} of "
+            f"the predicted one, apart from a sampling error of {2 * chance(result):.0%}."
         )
     if off:
         yield f"{result.design.capitalize()}: predicted and observed standard deviations differ for {', '.join(off)}."

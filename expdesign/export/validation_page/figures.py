@@ -5,11 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from expdesign.export.pages.figures import BLUE, GREY, LINES, VERMILION, light_grid, new_figure, plain, svg
+from expdesign.export.tuning import TUNING
 from expdesign.export.validation_page.content import ERROR_LIMIT, chance
 from expdesign.rehearsal import Validated
-
-WIDE = 10.0
-"""Ratio of the ends of an axis above which it has fewer ticks."""
 
 
 def error_figure(results: tuple[Validated, ...]) -> str:
@@ -64,7 +62,7 @@ def spread_figure(result: Validated) -> str:
 
 def _ticks(low: float, high: float) -> list[float]:
     """Round ratios on a logarithmic axis."""
-    wide = high / low > WIDE
+    wide = high / low > TUNING.wide_axis
     ladder = (1.0, 2.0, 5.0) if wide else (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)
     decades = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
     ticks = [step * 10.0**decade for decade in decades for step in ladder]

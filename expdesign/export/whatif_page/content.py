@@ -8,10 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.export.files import strict_json
+from expdesign.export.tuning import TUNING
 from expdesign.values import Array
-
-NOTICED = 0.02
-"""Relative differences below this are not reported."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -135,7 +133,7 @@ def _sentences(content: WhatIfContent, case: Case) -> Iterator[str]:
 
 def _accuracy(first: Case, case: Case, against: Against) -> str:
     minutes, needed = case.informative_s / 60, against.same_accuracy_s / 60
-    if abs(against.accuracy - 1) < NOTICED:
+    if abs(against.accuracy - 1) < TUNING.noticed:
         scenario = f"the scenario in {first.informative_s / 60:.1f} min"
         return f"In {minutes:.1f} min it collects the same information as {scenario}."
     return (
@@ -146,11 +144,11 @@ def _accuracy(first: Case, case: Case, against: Against) -> str:
 
 def _parameters(against: Against) -> Iterator[str]:
     ratios = np.array(against.ratios)
-    if np.abs(ratios - 1).max() < NOTICED:
+    if np.abs(ratios - 1).max() < TUNING.noticed:
         yield "No standard deviation changes by more than 2 %."
         return
     best, worst = int(ratios.argmin()), int(ratios.argmax())
-    if ratios.max() / ratios.min() < 1 + 2 * NOTICED:
+    if ratios.max() / ratios.min() < 1 + 2 * TUNING.noticed:
         yield f"All standard deviations are about {np.median(ratios):.2f} times those of the scenario."
         return
     yield (

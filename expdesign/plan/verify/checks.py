@@ -14,20 +14,13 @@ import shapely
 from expdesign.conventions import wrap_angle
 from expdesign.dictionary import Primitive
 from expdesign.plan.values import Leg, SailedTrial, Verification
+from expdesign.plan.verify.tuning import TUNING
 from expdesign.sea_area import SeaArea
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import Environment, simulate, to_body
-from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, Vessel
 from expdesign.vessel.hull import hull_polygons
-
-FINE_SUBSTEPS = 10 * SUBSTEPS
-"""Integrator steps per sample of the re-simulation: ten times as many as in planning."""
-ENTRY_TOLERANCE = 0.02
-"""Largest deviation of a run's entry velocity, relative to the vessel's speed in the plan."""
-SPEED_TOLERANCE = 0.03
-"""Share by which legs may exceed their stated speed, or that of their faster end: plans limit it at some samples."""
 
 
 def verify_plan(
@@ -65,7 +58,7 @@ def verify_plan(
         pose=trajectory.pose[0],
         velocity=trajectory.velocity[0],
         environment=environment,
-        substeps=FINE_SUBSTEPS,
+        substeps=TUNING.fine_substeps,
     )
     clearance = np.minimum(*(hull_clearance(area, track, vessel.hull_b) for track in (trajectory, again)))
     worst = int(np.argmin(clearance))
@@ -158,14 +151,14 @@ def _end_problems(
     """Deviations of the plan's ends from start and goal, at rest through the water."""
     problems = []
     fastest = np.hypot(*trajectory.velocity[:, :2].T).max(), np.abs(trajectory.velocity[:, 2]).max()
-    slow, steady = ENTRY_TOLERANCE * np.array(fastest) + 1e-9
+    slow, steady = TUNING.entry_tolerance * np.array(fastest) + 1e-9
     for name, pose, index in (("start", start, 0), ("goal", goal, -1)):
         place, velocity = trajectory.pose[index], trajectory.velocity[index]
         off_m = float(np.hypot(*(place - pose)[:2]))
         turned = abs(float(wrap_angle(place[2] - pose[2])))
         u_c, v_c = to_body(environment.current_to, place[2], NUMPY)
         moving, turning = float(np.hypot(velocity[0] - u_c, velocity[1] - v_c)), abs(float(velocity[2]))
-        if off_m > vessel.length_m / 30 or turned > ENTRY_TOLERANCE or moving > slow or turning > steady:
+        if off_m > vessel.length_m / 30 or turned > TUNING.entry_tolerance or moving > slow or turning > steady:
             problems.append(
                 f"the {which}plan is {off_m:.2f} m and {turned:.3f} rad off the {name}, at {moving:.3f} m/s through "
                 f"the water and turning at {turning:.4f} rad/s"
@@ -245,7 +238,7 @@ def _entry_problems(
         if leg.kind == "primitive":
             u_c, v_c = to_body(environment.current_to, trajectory.pose[leg.first, 2], NUMPY)
             off = trajectory.velocity[leg.first] - [u_c, v_c, 0.0] - primitives[leg.name].entry_velocity
-            if (np.abs(off) > ENTRY_TOLERANCE * scale).any():
+            if (np.abs(off) > TUNING.entry_tolerance * scale).any():
                 share = np.abs(off / scale).max()
                 problems.append(f"{leg.name!r} at sample {leg.first} begins {share:.1%} off its entry")
     return problems
@@ -263,7 +256,7 @@ def _speed_problems(
     for leg in legs:
         sailed = speed[leg.first : leg.last + 1]
         allowed = max(transit_mps, sailed[0], sailed[-1])
-        if leg.kind != "primitive" and sailed.max() > (1.0 + SPEED_TOLERANCE) * allowed:
+        if leg.kind != "primitive" and sailed.max() > (1.0 + TUNING.speed_tolerance) * allowed:
             at_s = (leg.first + int(sailed.argmax())) * trajectory.sample_time_s
             problems.append(
                 f"the {which}leg to {leg.name!r} goes {sailed.max():.3g} m/s through the water at {at_s:.0f} s, "

@@ -14,16 +14,14 @@ import numpy as np
 
 from expdesign.dictionary.families.motions.shapes import envelope
 from expdesign.dictionary.spec import Family, Setting
+from expdesign.dictionary.tuning import TUNING
 from expdesign.values import Array
-
-TONES = 4
-"""Sines for each of the three velocities."""
 
 
 def _sum_of_sines(time_s: Array, *, period_s: float, first: int) -> Array:
     """Largest modulus 1, harmonics first, first + 3, ... of a period."""
-    place = np.arange(TONES)
-    phase = -np.pi * place * (place + 1) / TONES
+    place = np.arange(TUNING.tones)
+    phase = -np.pi * place * (place + 1) / TUNING.tones
     angles = 2 * np.pi * (first + 3 * place)[:, None] * time_s / period_s + phase[:, None]
     wave = np.sin(angles).sum(axis=0) * envelope(time_s, length_s=period_s / 12)
     return np.asarray(wave / max(float(np.abs(wave).max()), 1e-12))

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from expdesign.dictionary.tuning import TUNING
 from expdesign.errors import InputError
 from expdesign.values import Array
-
-LEAST_SWING = 0.5
-"""Least amplitude to both sides of a wave before it is scaled to amplitude 1."""
 
 
 def ramp(time_s: Array, *, start_s: float = 0.0, length_s: float) -> Array:
@@ -36,7 +34,7 @@ def flat_wave(time_s: Array, *, period_s: float) -> Array:
     fade = envelope(time_s, length_s=period_s / 12)
     weights = np.r_[0.5, np.ones(len(time_s) - 2), 0.5]
     centred = fade * (wave - weights @ (fade * wave) / max(weights @ fade, 1e-300))
-    if not (centred.max() > LEAST_SWING and centred.min() < -LEAST_SWING):
+    if not (centred.max() > TUNING.least_swing and centred.min() < -TUNING.least_swing):
         raise InputError(
             f"period_s is {period_s:g}, expected a full swing within duration_s = {time_s[-1]:g} and several samples "
             f"of {time_s[1]:g} s within a swing"

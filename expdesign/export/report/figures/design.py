@@ -8,9 +8,7 @@ from matplotlib.axes import Axes
 from expdesign.durations import DurationDesign
 from expdesign.export.pages.figures import BLUE, GREY, PRIMITIVE, light_grid, new_figure, short, svg
 from expdesign.export.report.content import ReportContent, relative_information
-
-USED = 1e-6
-"""Time fractions below this count as none."""
+from expdesign.export.tuning import TUNING
 
 
 def durations_figure(content: ReportContent) -> str:
@@ -31,7 +29,7 @@ def _draw_times(axes: Axes, design: DurationDesign) -> None:
     rows = np.arange(len(design.problem.names))
     whole = np.array(design.repeats) * design.problem.run_s / 60
     axes.barh(rows, whole, height=0.62, color=PRIMITIVE, alpha=0.75, label="in whole runs")
-    used, optimal = design.fractions > USED, design.durations_s / 60
+    used, optimal = design.fractions > TUNING.least_fraction, design.durations_s / 60
     axes.plot(optimal[used], rows[used], "D", color="white", markeredgecolor="black", label="optimal", markersize=6)
     for row, (length, count) in enumerate(zip(whole, design.repeats, strict=True)):
         beyond = max(length, optimal[row])
@@ -45,7 +43,7 @@ def _draw_times(axes: Axes, design: DurationDesign) -> None:
 
 def _draw_sensitivities(axes: Axes, design: DurationDesign) -> None:
     rows = np.arange(len(design.problem.names))
-    used, bound = design.fractions > USED, design.certificate.level
+    used, bound = design.fractions > TUNING.least_fraction, design.certificate.level
     net = design.sensitivities - design.certificate.prices
     axes.axvline(bound, color="black", linewidth=1.2, label=f"bound {bound:.4g}")
     axes.hlines(rows, min(0.0, bound), net, color=GREY, linewidth=0.8)

@@ -9,13 +9,10 @@ import shapely
 
 from expdesign.errors import NoPlan
 from expdesign.export.report.content import ReportContent
+from expdesign.export.tuning import TUNING
 from expdesign.plan.runs import dispersion_m
 from expdesign.values import Array
 from expdesign.vessel.hull import covering_discs, hull_polygons
-
-SEED = 0
-"""Random seed of the picture; the planner uses other random numbers."""
-PIECES = 40
 
 
 def footprints(content: ReportContent) -> list[shapely.Geometry]:
@@ -36,7 +33,7 @@ def footprints(content: ReportContent) -> list[shapely.Geometry]:
                     content.environment,
                     centres_m=centres,
                     confidence=content.confidence,
-                    rng=np.random.default_rng(SEED),
+                    rng=np.random.default_rng(TUNING.footprint_seed),
                 )
             except NoPlan:
                 radii[leg.name] = None
@@ -48,7 +45,7 @@ def footprints(content: ReportContent) -> list[shapely.Geometry]:
 
 def _covered(pose: Array, radius: Array, hull_b: Array) -> shapely.Geometry:
     count = min(len(pose), len(radius))
-    chosen = np.unique(np.linspace(0, count - 1, PIECES).round().astype(int))
+    chosen = np.unique(np.linspace(0, count - 1, TUNING.footprint_pieces).round().astype(int))
     grown = shapely.buffer(hull_polygons(pose[chosen], hull_b), radius[chosen], quad_segs=4)
     spans = [shapely.union_all(pair).convex_hull for pair in pairwise(grown)]
     return shapely.union_all(spans)

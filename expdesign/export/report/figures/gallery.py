@@ -9,9 +9,9 @@ from expdesign.conventions import to_n_frame
 from expdesign.dictionary.desired import desired_motion
 from expdesign.dictionary.primitive import Primitive
 from expdesign.export.pages.figures import BLACK, BLUE, GREEN, GREY, PRIMITIVE, light_grid, new_figure, svg
+from expdesign.export.tuning import TUNING
 from expdesign.values import Array
 
-HULLS = 5
 LEAST_SPAN = {"u [m/s]": 0.2, "v [m/s]": 0.2, "r [\N{DEGREE SIGN}/s]": 0.2}
 """Axes show at least this much, so that rounding errors do not look like motion."""
 
@@ -50,7 +50,8 @@ def primitive_figure(primitive: Primitive, hull_b: Array, *, number: int) -> str
 
 def _draw_path(axes: Axes, pose: Array, hull_b: Array) -> None:
     axes.plot(pose[:, 1], pose[:, 0], color=PRIMITIVE, linewidth=1.6)
-    hulls = [to_n_frame(hull_b, pose[sample]) for sample in np.linspace(0, len(pose) - 1, HULLS).round().astype(int)]
+    samples = np.linspace(0, len(pose) - 1, TUNING.hulls).round().astype(int)
+    hulls = [to_n_frame(hull_b, pose[sample]) for sample in samples]
     for corners in hulls:
         axes.fill(corners[:, 1], corners[:, 0], facecolor="none", edgecolor=GREY, linewidth=0.8)
     axes.plot(pose[0, 1], pose[0, 0], "o", color=GREEN, markersize=6)

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from expdesign.conventions import KNOTS_PER_MPS
 from expdesign.export.pages.figures import LINES, PRIMITIVE, light_grid, new_figure, plain, short, svg
 from expdesign.export.report.content import primitive_runs
+from expdesign.export.tuning import TUNING
 from expdesign.plan.values import Plan
 from expdesign.values import Array
 from expdesign.vessel import stem
@@ -24,8 +25,6 @@ class _Panel:
     values: Array
 
 
-NUMBER_GAP = 0.022
-"""Of the width, between the numbers of runs."""
 GROUPS = {
     "n": ("propeller speed [rev/s]", 1.0),
     "a": ("azimuth angle [\N{DEGREE SIGN}]", float(np.degrees(1.0))),
@@ -110,7 +109,7 @@ def _number_runs(axes: Axes, plan: Plan) -> None:
     for run in primitive_runs(plan):
         leg = plan.legs[run.leg]
         middle = (leg.first + leg.last) / 2 * minutes
-        if middle - last < NUMBER_GAP * plan.commands.duration_s / 60:
+        if middle - last < TUNING.number_gap * plan.commands.duration_s / 60:
             continue  # numbers of runs too short to be told apart here
         last = middle
         axes.annotate(

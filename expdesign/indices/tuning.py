@@ -1,0 +1,24 @@
+"""The tuning constants of the manoeuvring indices, in one place."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tuning:
+    """Constants that were chosen, not derived.
+
+    Attributes:
+        zigzag_deviation_rad: largest deviation of helm and heading of a 10/10 or 20/20 zig-zag from the nominal angles
+            [rad].
+        under_way: speed by the root of the length [m^0.5/s] (a Froude number of 0.016) below which a ship is not under
+            way.
+    """
+
+    zigzag_deviation_rad: float = math.radians(2.0)
+    under_way: float = 0.05
+
+
+TUNING = Tuning()
