@@ -101,6 +101,20 @@ def test_many_runs_at_once_are_the_single_runs(count: int):
         np.testing.assert_allclose(together[:, index], states(alone), rtol=1e-11, atol=1e-12)
 
 
+@pytest.mark.parametrize("acting", [(), ("X_mu",), ("X_u", "X_mu", "Y_v", "Y_ur", "Y_mu", "N_uv", "N_mu")])
+def test_many_runs_with_parameters_of_zero_are_the_single_runs(acting: tuple[str, ...]):
+    count, commands, model = FEW_RUNS + 1, random_commands(20), SHIP.model
+    theta = np.tile(np.where(np.isin(model.names, acting), model.parameters, 0.0), (count, 1))
+    theta[1, model.names.index("X_mu")] *= 1.1
+    start = {key: np.tile(value, (count, 1)) for key, value in START.items()}
+    sea = {"current_to": np.tile(SEA.current_to, (count, 1)), "wind_to": np.tile(SEA.wind_to, (count, 1))}
+    together = simulate_many(SHIP, commands, **start, **sea, parameters=theta)
+    for index in (0, 1):
+        ship = replace(SHIP, model=model.with_parameters(theta[index]))
+        alone = simulate(ship, commands, **START, environment=SEA)
+        np.testing.assert_allclose(together[:, index], states(alone), rtol=1e-11, atol=1e-12)
+
+
 @pytest.mark.parametrize("count", [3, FEW_RUNS + 1])
 def test_a_run_that_diverges_is_missing_and_leaves_the_others_alone(count: int):
     commands = random_commands(60)

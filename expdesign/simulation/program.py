@@ -53,24 +53,27 @@ class RatesProgram:
         tape = self._tape
         state, sea = tape.given("state", self._states), tape.given("sea", 4)
         inputs = tape.given("input", len(model.inputs))
-        values = theta.tolist() if theta.ndim == 1 else tape.given("parameter", len(model.terms))
+        own = np.ptp(np.atleast_2d(theta), axis=0) != 0.0  # parameters in which runs differ
+        given = iter(tape.given("parameter", int(own.sum())))
+        known = np.atleast_2d(theta)[0].tolist()
+        values = [next(given) if differs else value for differs, value in zip(own, known, strict=True)]
         rates = motion_rates(model, state, inputs, current_to=sea[:2], wind_to=sea[2:], ops=SYMBOLIC, parameters=values)
         _, air = relative_velocity(state, sea[:2], sea[2:], SYMBOLIC)
         results = [value if isinstance(value, Symbol) else tape.constant(value) for value in (*rates, *air)]
         self._places = tape.needed(results)
-        self._rested, self._held = self._split()
+        self._rested, self._held = self._split(results)
         entries = [(place, tape.entries[place]) for place in self._places if place in self._rested]
         self._constant = {place: entry.number for place, entry in entries if entry.name == "constant"}
         self._inputs = [(place, int(entry.number)) for place, entry in entries if entry.name == "input"]
         self._resting = [(place, getattr(np, x.name), x.arguments) for place, x in entries if x.arguments]
-        self._own = len(model.terms) if theta.ndim == 2 else 0
+        self._own = int(own.sum())
         self._codes, rows, self._constants = self._laid_out([result.place for result in results])
         self._engine = engine
         memory = np.zeros((rows, runs))
         for row, number in self._constants.items():
             memory[row] = number
         if self._own:
-            memory[self._first : self._first + self._own] = theta.T
+            memory[self._first : self._first + self._own] = theta.T[own]
         self._take(memory)
 
     def part(self, runs: np.ndarray) -> RatesProgram:
@@ -131,14 +134,15 @@ class RatesProgram:
         total *= step_s / 6.0
         return np.asarray(state + total)
 
-    def _split(self) -> tuple[set[int], list[int]]:
-        """Places that rest on inputs and constants alone, and those among them that the motion reads."""
+    def _split(self, results: list[Symbol]) -> tuple[set[int], list[int]]:
+        """Places that rest on inputs and constants alone, and those among them that the motion reads or results are."""
         entries, rested = self._tape.entries, set[int]()
         for place in self._places:
             entry = entries[place]
             if entry.name in ("input", "constant") or (entry.arguments and rested.issuperset(entry.arguments)):
                 rested.add(place)
         read = {argument for place in self._places if place not in rested for argument in entries[place].arguments}
+        read |= {result.place for result in results}
         return rested, sorted(place for place in rested & read if entries[place].name != "constant")
 
     def _laid_out(self, results: list[int]) -> tuple[Array, int, dict[int, float]]:

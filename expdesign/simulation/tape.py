@@ -63,6 +63,8 @@ class Tape:
         for value, other in zip(values, reversed(operands), strict=True):
             if len(values) == 2 and value == NEUTRAL.get(name):
                 return other
+            if name == "multiply" and value == ZERO:
+                return self.constant(0.0)
         places = tuple(operand.place for operand in operands)
         return self._symbol(Entry(name, places if name == "subtract" else tuple(sorted(places))))
 
@@ -84,7 +86,8 @@ class Tape:
         return Symbol(self, self._places[entry])
 
 
-NEUTRAL = {"add": Entry("constant", (), 0.0), "multiply": Entry("constant", (), 1.0)}
+ZERO = Entry("constant", (), 0.0)
+NEUTRAL = {"add": ZERO, "multiply": Entry("constant", (), 1.0)}
 """Operations that change nothing."""
 
 
