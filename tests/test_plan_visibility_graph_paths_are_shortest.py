@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 import shapely
 
+from expdesign.plan.chart import goal_distance
 from expdesign.plan.chart.clearance_grid import clearance_field
-from expdesign.plan.chart.goal_distance import build_goal_distance
+from expdesign.plan.chart.goal_distance import build_goal_distance, first_bends, shortest_path_tree, taut_bends
 from expdesign.plan.chart.visibility_graph import build_visibility_graph, polyline_length, simplified
 from plan_case import area, leg_water
 
@@ -92,3 +93,30 @@ def test_tabulated_distances_and_their_paths_agree_with_the_visibility_graph(see
     np.testing.assert_allclose(table.to_goal(points), exact, atol=3 * table.field.cell_m)
     lengths = [polyline_length(table.path(point)) for point in points]
     np.testing.assert_allclose(lengths, exact, atol=3 * table.field.cell_m)
+    for path, point in zip(table.paths(points), points, strict=True):
+        assert polyline_length(path) == pytest.approx(polyline_length(table.path(point)))
+        np.testing.assert_allclose(path[[0, -1]], [point, goal])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_taut_corners_give_the_same_lengths_as_all_corners(seed):
+    graph, goal = build_visibility_graph(rocks(seed)), np.array([440.0, 460.0])
+    nodes, distance, next_node = shortest_path_tree(graph, goal)
+    points = np.random.default_rng(seed).uniform(-520, 520, (400, 2))  # some ashore, some off the chart
+    total = np.hypot(*np.moveaxis(points[:, None] - nodes, -1, 0)) + distance
+    length, _ = taut_bends(graph, points, nodes, next_node, total)
+    expected, _ = first_bends(graph, points, nodes, distance)
+    assert np.isinf(expected).any()
+    assert np.isfinite(expected).any()
+    np.testing.assert_allclose(length, expected, rtol=1e-9)
+
+
+def test_few_lines_of_sight_are_tested_for_each_cell(monkeypatch):
+    water, lines = rocks(0), []
+    sight_lines = goal_distance.sight_lines
+    monkeypatch.setattr(goal_distance, "sight_lines", lambda a, b: lines.append(len(a)) or sight_lines(a, b))
+    field = clearance_field(area(water), resolution_m=4.0)
+    table = build_goal_distance(build_visibility_graph(water), field, np.array([440.0, 460.0]))
+    cells = table.field.centre(np.arange(table.field.clearance_m.size))
+    wet = shapely.contains_xy(table.graph.water, cells[:, 1], cells[:, 0])
+    assert wet.sum() <= sum(lines) <= 3 * wet.sum()

@@ -1,0 +1,71 @@
+"""The beam search: successors in order of their time, equals as they come, and each path looked up once."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+
+from expdesign.plan.chart import GoalDistance
+from expdesign.plan.local_planner import PartialPlans, SearchSpace, Successors
+from expdesign.plan.search import place_runs
+from expdesign.plan.search.beam import _in_order
+from expdesign.plan.search.successors import clear_successors, runs_clear
+from expdesign.plan.search.tuning import SEARCH
+from plan_case import leg_water, primitive, space_of
+
+START = np.array([0.0, -400.0, 0.0])
+
+
+@pytest.fixture(scope="module")
+def space() -> SearchSpace:
+    sea = leg_water(shapely.box(-600, -600, 600, 600).difference(shapely.box(-60, -200, 60, 40)))
+    return space_of(sea, primitive(sea.vessel), np.array([0.0, 400.0, 0.0]))
+
+
+def begun(space: SearchSpace) -> PartialPlans:
+    """No run done, two to go."""
+    return PartialPlans(
+        pose=START[None],
+        exit_mps=np.zeros(1),
+        last=np.array([-1]),
+        left=np.array([[2]]),
+        cost_s=np.zeros(1),
+        history=((),),
+    )
+
+
+def test_order_is_that_of_a_stable_sort_whatever_is_checked_at_once():
+    values = np.random.default_rng(0).integers(0, 500, 3 * SEARCH.sorted_at_once).astype(float)
+    values[::7] = np.inf
+    expected = np.argsort(values, kind="stable")[: np.isfinite(values).sum()]
+    for at_once in (1000, len(values)):
+        np.testing.assert_array_equal(np.concatenate(list(_in_order(values, at_once))), expected)
+
+
+def test_paths_are_looked_up_once_for_each_run(space, monkeypatch):
+    asked, paths = [], GoalDistance.paths
+    monkeypatch.setattr(GoalDistance, "paths", lambda self, points: asked.append(len(points)) or paths(self, points))
+    assert len(place_runs(space, [3], start=START, width=20)) == 3
+    assert len(asked) == 3
+    assert max(asked) <= 20
+
+
+def test_rows_chosen_from_several_sets_are_those_of_the_joined_set(space):
+    parts = space.planner.successors(space, begun(space))
+    joined = Successors.joined(parts)
+    rows = np.random.default_rng(0).permutation(len(joined))[:300]
+    chosen, expected = Successors.chosen(parts, rows), joined[rows]
+    for name in ("parent", "primitive", "start", "end", "leg_s"):
+        np.testing.assert_array_equal(getattr(chosen, name), getattr(expected, name))
+
+
+@pytest.mark.parametrize("current", [np.zeros(2), np.array([0.4, -0.2])])
+def test_runs_that_are_clear_by_one_look_are_clear_disc_by_disc(space, current):
+    drifting = replace(space, current_to=current)
+    found = Successors.joined(space.planner.successors(drifting, begun(space)))
+    clear = clear_successors(drifting, found)
+    assert 0 < clear.sum() < len(found)
+    assert runs_clear(drifting, found.primitive[clear], found.start[clear]).all()
