@@ -70,9 +70,9 @@ def _comparison(content: ValidationContent) -> Iterator[str]:
     for other in others:
         ratio = float(np.exp(np.mean(np.log(other.found / best.found))))
         yield (
-            f"{best.design.capitalize()} against {other.design}: the standard deviations of {other.design} are "
-            f"{ratio:.2f} times as large (geometric mean). The median normalised errors are "
-            f"{np.median(best.errors):.3g} and {np.median(other.errors):.3g}."
+            f"{best.design.capitalize()} against {other.design}: standard deviations of the second are {ratio:.2f} "
+            f"times as large (geometric mean). The median normalised errors are {np.median(best.errors):.3g} and "
+            f"{np.median(other.errors):.3g}."
         )
 
 

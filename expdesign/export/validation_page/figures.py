@@ -21,7 +21,7 @@ def error_figure(results: tuple[Validated, ...]) -> str:
     axes.set_xscale("log")
     low, high = axes.get_xlim()
     if low < ERROR_LIMIT < high:
-        axes.axvline(ERROR_LIMIT, color=GREY, linewidth=0.8, linestyle="--", label=f"{ERROR_LIMIT:g}")
+        axes.axvline(ERROR_LIMIT, color=GREY, linewidth=0.8, linestyle="--", label=f"good below {ERROR_LIMIT:g}")
     axes.xaxis.set_major_formatter("{x:g}")
     axes.set_xlabel("root mean square of (estimate \N{MINUS SIGN} truth) / |truth| over the parameters")
     axes.set_ylabel("trials below [%]")

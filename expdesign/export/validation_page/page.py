@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from expdesign.estimation.methods import method_named
 from expdesign.export.pages import page_templates
 from expdesign.export.pages.figures import report_style
 from expdesign.export.validation_page.content import ERROR_LIMIT, ValidationContent, judgements
@@ -28,6 +29,7 @@ def validation_html(content: ValidationContent) -> str:
             designs=[_design_row(content, item) for item in content.results],
             tables=[(item.design, _parameter_rows(item)) for item in content.results],
             predicted=predicted,
+            estimator=method_named(content.rehearsal.method).title,
             figures=figures,
         )
     )
