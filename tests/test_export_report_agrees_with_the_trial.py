@@ -14,6 +14,7 @@ from lxml import etree
 import export_case as case
 from expdesign.durations import MEAN_SUBTRACTIONS, build_durations, solve_durations
 from expdesign.export import build_route, words
+from expdesign.export.pages.figures import new_figure, round_ticks
 from expdesign.export.report import page as report_page
 from expdesign.export.report import report_html
 from expdesign.export.report.checks import least_charted_depth
@@ -184,6 +185,18 @@ def test_labels_keep_apart_and_inside_when_there_is_room() -> None:
     assert apart.min() >= 4.0
     assert placed.min() >= 2.0
     assert placed.max() <= 98.0
+
+
+@pytest.mark.parametrize("ends", [(0.98, 1.01), (0.13, 0.47), (0.6, 2.9), (0.07, 8.0), (1e-7, 1e4)])
+def test_logarithmic_axes_show_a_few_plain_numbers(ends: tuple[float, float]) -> None:
+    axes = new_figure(8.0, 3.0).subplots()
+    axes.set_xscale("log")
+    axes.set_xlim(*ends)
+    round_ticks(axes)
+    shown = [float(label.get_text()) for label in axes.get_xticklabels()]
+    assert 2 <= len(shown) <= 12
+    assert shown == pytest.approx(list(axes.get_xticks()), rel=5e-3)
+    assert len(axes.get_xticklabels(minor=True)) == 0
 
 
 @pytest.mark.parametrize("span", [1e-4, 0.7, 1.0, 3.3, 47.0, 9.99e5])

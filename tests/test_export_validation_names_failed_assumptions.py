@@ -67,7 +67,7 @@ def told(plan: Rehearsal, *, spread: float, noisy: tuple[str, ...] = ()) -> str:
 
 def test_where_predictions_hold_no_assumption_is_blamed():
     said = told(rehearsal(environment=CURRENT, integrator="rk4"), spread=1.0, noisy=("tau01",))
-    assert "every observed standard deviation is within 10% of the predicted one" in said
+    assert "every observed standard deviation is within 10 % of the predicted one" in said
     assert "ssumption" not in said
 
 

@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from typing import Any, Literal, TypeVar
 
 import matplotlib
+import numpy as np
 from joblib import Parallel, delayed
 from markupsafe import Markup, escape
 from matplotlib.axes import Axes
@@ -20,6 +21,7 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 from expdesign.export.formats.format import xml_text
+from expdesign.export.tuning import TUNING
 
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
 YELLOW, BLUE, VERMILION, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
@@ -112,3 +114,18 @@ def light_grid(axes: Axes, axis: Literal["both", "x", "y"] = "both") -> None:
     """Thin lines behind the data."""
     axes.grid(visible=True, axis=axis, color="#dddddd", linewidth=0.6)
     axes.set_axisbelow(True)
+
+
+def round_ticks(axes: Axes) -> None:
+    """Round numbers on a logarithmic x axis: fewer of them, the more decades it spans; both ends of a short one."""
+    low, high = axes.get_xlim()
+    decades = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
+    ladder: tuple[float, ...] = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)
+    if high / low > TUNING.wide_axis:
+        ladder = (1.0, 2.0, 5.0) if high / low < TUNING.wide_axis**3 else (1.0,)
+    ticks = [step * 10.0**decade for decade in decades for step in ladder if low <= step * 10.0**decade <= high]
+    if len(ticks) < 2:
+        ticks = [low, high]
+    axes.set_xticks(ticks, [f"{tick:.3g}" for tick in ticks])
+    axes.minorticks_off()
+    axes.set_xlim(low, high)

@@ -83,8 +83,9 @@ def _judged(result: Validated) -> Iterator[str]:
     off, shifted = off_theory(result), biased(result)
     if np.isfinite(result.theory).all() and not off:
         yield (
-            f"{result.design.capitalize()}: every observed standard deviation is within {TUNING.agreeing_std:.0%} of "
-            f"the predicted one, apart from a sampling error of {2 * chance(result):.0%}."
+            f"{result.design.capitalize()}: every observed standard deviation is within "
+            f"{100 * TUNING.agreeing_std:g} % of the predicted one, apart from a sampling error of "
+            f"{200 * chance(result):.0f} %."
         )
     if off:
         yield f"{result.design.capitalize()}: predicted and observed standard deviations differ for {', '.join(off)}."

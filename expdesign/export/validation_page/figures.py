@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from expdesign.export.pages.figures import BLUE, GREY, LINES, VERMILION, light_grid, new_figure, plain, svg
-from expdesign.export.tuning import TUNING
+from expdesign.export.pages.figures import BLUE, GREY, LINES, VERMILION, light_grid, new_figure, plain, round_ticks, svg
 from expdesign.export.validation_page.content import ERROR_LIMIT, chance
 from expdesign.rehearsal import Validated
 
@@ -22,7 +21,7 @@ def error_figure(results: tuple[Validated, ...]) -> str:
     low, high = axes.get_xlim()
     if low < ERROR_LIMIT < high:
         axes.axvline(ERROR_LIMIT, color=GREY, linewidth=0.8, linestyle="--", label=f"good below {ERROR_LIMIT:g}")
-    axes.xaxis.set_major_formatter("{x:g}")
+    round_ticks(axes)
     axes.set_xlabel("root mean square of (estimate \N{MINUS SIGN} truth) / |truth| over the parameters")
     axes.set_ylabel("trials below [%]")
     axes.set_ylim(0, 101)
@@ -50,20 +49,8 @@ def spread_figure(result: Validated) -> str:
     axes.set_yticks(rows, names)
     axes.invert_yaxis()
     axes.set_xscale("log")
-    low, high = axes.get_xlim()
-    axes.set_xticks(_ticks(low, high), [f"{tick:g}" for tick in _ticks(low, high)])
-    axes.minorticks_off()
-    axes.set_xlim(low, high)
+    round_ticks(axes)
     axes.set_xlabel("standard deviation, observed / predicted")
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, fontsize=9)
     light_grid(axes, "x")
     return svg(figure, key="spread", label="Observed over predicted standard deviation of each parameter")
-
-
-def _ticks(low: float, high: float) -> list[float]:
-    """Round ratios on a logarithmic axis."""
-    wide = high / low > TUNING.wide_axis
-    ladder = (1.0, 2.0, 5.0) if wide else (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)
-    decades = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
-    ticks = [step * 10.0**decade for decade in decades for step in ladder]
-    return [tick for tick in ticks if low <= tick <= high]

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from matplotlib.axes import Axes
 
-from expdesign.export.pages.figures import LINES, REPOSITION, VERMILION, light_grid, new_figure, plain, svg
+from expdesign.export.pages.figures import LINES, REPOSITION, VERMILION, light_grid, new_figure, plain, round_ticks, svg
 from expdesign.export.whatif_page.content import WhatIfContent
 
 
@@ -45,22 +44,15 @@ def ratio_figure(content: WhatIfContent) -> str | None:
     axes.set_yticks(range(len(names)), [plain(name) for name in names])
     axes.invert_yaxis()
     axes.set_xscale("log")
-    ticks = [tick for tick in (0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5, 10) if _within(axes, tick)]
-    axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
-    axes.minorticks_off()
+    round_ticks(axes)
     axes.set_xlabel("expected standard deviation / that of the scenario")
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=9)
     light_grid(axes, "x")
     return svg(figure, key="ratios", label="Expected standard deviation of each parameter over that of the scenario")
 
 
-def _within(axes: Axes, value: float) -> bool:
-    low, high = axes.get_xlim()
-    return low <= value <= high
-
-
 def runs_figure(content: WhatIfContent) -> str:
-    """Minutes of each primitive in every case."""
+    """Whole runs of each primitive in every case."""
     cases = [case for case in content.cases if not case.problem]
     names = list(dict.fromkeys(name for case in cases for name in case.runs))
     table = np.array([[case.runs.get(name, 0) for name in names] for case in cases])

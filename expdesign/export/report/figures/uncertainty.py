@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from expdesign.export.pages.figures import BLACK, BLUE, GREY, PRIMITIVE, light_grid, new_figure, short, svg
+from expdesign.export.pages.figures import BLACK, BLUE, GREY, PRIMITIVE, light_grid, new_figure, round_ticks, short, svg
 from expdesign.export.report.content import ReportContent
 from expdesign.export.report.parameters import Expected
 from expdesign.values import Array
@@ -29,7 +29,7 @@ def uncertainty_figure(content: ReportContent, found: Expected) -> str:
     axes.invert_yaxis()
     axes.set_xlabel("standard deviation, % of the parameter (of its prior standard deviation where the value is 0)")
     axes.xaxis.label.set_fontsize(9)
-    axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    round_ticks(axes)
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=9)
     light_grid(axes, "x")
     return svg(figure, key="uncertainty", label="Standard deviation of every parameter before and after the trial")
