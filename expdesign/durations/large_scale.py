@@ -14,6 +14,7 @@ converging to D-optimal designs of experiments, Ann. Statist. 1 (1973), 342-352.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -110,7 +111,8 @@ class _Pool:
         count, d = len(rows), rows.shape[2]
         flat = rows.reshape(-1, d)
         known = np.zeros((d, d)) if prior is None else prior
-        T = whitening((flat.T @ flat)[None] / count, known)
+        total = sum((some.T @ np.copy(some) for some in _chunks(flat)), np.zeros((d, d)))
+        T = whitening(total[None] / count, known)
         return _Pool(rows, T, T @ known @ T.T)
 
     @property
@@ -127,11 +129,14 @@ class _Pool:
         """(q,) trace(M^-1 B_q) of every candidate for a whitened M (d, d)."""
         count, r, d = self.rows.shape
         flat, A = self.rows.reshape(-1, d), (root(M) @ self.T).T
-        found = np.empty(count * r)
-        for first in range(0, count * r, TUNING.chunk):
-            some = flat[first : first + TUNING.chunk] @ A
-            np.einsum("ij,ij->i", some, some, out=found[first : first + TUNING.chunk])
-        return found if r == 1 else found.reshape(count, r).sum(axis=1)
+        squares = [np.einsum("ij,ij->i", white, white) for white in (some @ A for some in _chunks(flat))]
+        return np.asarray(np.concatenate(squares).reshape(count, r).sum(axis=1))
+
+
+def _chunks(flat: Array) -> Iterator[Array]:
+    """Rows of (c, d), so many at a time that their product with (d, d) takes one thread and stays in the cache."""
+    length = max(1, TUNING.one_thread // flat.shape[1] ** 2)
+    return (flat[first : first + length] for first in range(0, len(flat), length))
 
 
 def _set_size(dimension: int) -> int:

@@ -32,7 +32,7 @@ class Tuning:
         centring_steps: most Newton steps for one barrier weight.
         most_sets: working sets.
         barrier_fraction: fractions below this are removed from the solution of the barrier method.
-        chunk: rows of a pass that are handled together, so that they stay in the processor's cache.
+        one_thread: multiplications in a matrix product up to which OpenBLAS uses one thread.
         indefinite: eigenvalues below minus this are not rounding.
         regular_set: least eigenvalue of a first working set.
         starts: random starts of a local search.
@@ -70,7 +70,7 @@ class Tuning:
     centring_steps: int = 60
     most_sets: int = 60
     barrier_fraction: float = 1e-7
-    chunk: int = 16384
+    one_thread: int = 260_000
     indefinite: float = 1e-9
     regular_set: float = 1e-8
     starts: int = 20

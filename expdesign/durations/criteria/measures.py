@@ -12,11 +12,13 @@ subgradients).
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 
+from expdesign.durations.tuning import TUNING
 from expdesign.values import Array, seal
 
 
@@ -75,9 +77,17 @@ def root(M: Array) -> Array:
 
 
 def gram(parts: Array) -> Array:
-    """(c, c) inner products of (c, ...)."""
+    """(c, c) inner products of (c, ...), in blocks small enough for one thread: on busy cores threads only wait."""
     flat = parts.reshape(len(parts), -1)
-    return np.asarray(flat @ flat.T)
+    other = flat.copy()  # a matrix times its own transpose has a product of its own, with threads at any size
+    size = max(1, math.isqrt(TUNING.one_thread // flat.shape[1]))
+    products = np.empty((len(flat), len(flat)))
+    for i in range(0, len(flat), size):
+        for j in range(0, i + 1, size):
+            block = flat[i : i + size] @ other[j : j + size].T
+            products[i : i + size, j : j + size] = block
+            products[j : j + size, i : i + size] = block.T
+    return products
 
 
 @dataclass(frozen=True, eq=False)
