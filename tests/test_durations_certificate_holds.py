@@ -84,8 +84,9 @@ def random_problem(draw: int) -> DurationProblem:
     return duration_problem(matrices, means=outputs)
 
 
-@pytest.mark.parametrize("draw", range(200))
+@pytest.mark.parametrize("draw", [*range(80), *(pytest.param(n, marks=pytest.mark.slow) for n in range(80, 200))])
 def test_random_problems_are_certified(draw: int):
+    """A kind of problem that is one in thirty fails the first 80 with a probability of 93 per cent."""
     assert certificate(solved(random_problem(draw))) < CERTIFICATE
 
 
