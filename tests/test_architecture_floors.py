@@ -54,7 +54,7 @@ FLOORS = {
         ("problem", "timeline"),
         ("legs",),
         ("local_planner",),
-        ("bounds",),
+        ("bounds", "legs_ahead"),
         ("search", "monte_carlo"),
         ("assembly",),
         ("sailing",),

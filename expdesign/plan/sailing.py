@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from expdesign.dictionary import Primitive
 from expdesign.errors import NoPlan
 from expdesign.plan.assembly import PlanRoom
 from expdesign.plan.legs import LegTask, LegWater, last_state, nearest_turns
+from expdesign.plan.legs_ahead import LegAhead, legs_ahead
 from expdesign.plan.local_planner import LocalPlanner, SearchSpace
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.search import PlacementSearch, placement_search
@@ -45,15 +48,16 @@ def sail_all(
         progress("placing runs", _share(problem, left))
         placed = _placed(search, space, left, voyage.line, stuck)
         proof, spent_s = proof or placed.lattice, budget.spent_s
+        legs = voyage.legs_ahead(placed.runs)
         for placement in placed.runs:
             spent_s = budget.spent_s
-            if stuck := voyage.sail_run(placement):
+            if stuck := voyage.sail_run(placement, next(legs)):
                 space = space.refusing(voyage.line.last, placement)
                 break
             left[placement.primitive] -= 1
             progress(f"sailing {placement.primitive}", _share(problem, left))
         else:
-            if voyage.sail_home():
+            if voyage.sail_home(next(legs)):
                 return replace(voyage.sailed, lattice=proof and replace(proof, refused=failures.tries))
             undone = voyage.undo_run()
             space, stuck = space.refusing(voyage.line.last, undone), "no leg leads from the last run to the goal"
@@ -120,18 +124,28 @@ class _Voyage:
         vessel = self.problem.vessel
         return self.line.joined(sample_time_s=vessel.sample_time_s, names=vessel.model.inputs)
 
-    def sail_run(self, placement: Placement) -> str:
+    def legs_ahead(self, placements: Sequence[Placement]) -> Iterator[LegAhead]:
+        """Legs to runs, in this order, and on to the goal, as far as can be known now."""
+        runs = [self._primitive(placement) for placement in placements]
+        entries = [self._entry(placement, run) for placement, run in zip(placements, runs, strict=True)]
+        ends = [*zip(entries, (run.entry_inputs for run in runs), strict=True), self._stop]
+        tasks = [self._task(*self._now, *ends[0], stretches=0)]
+        for number, (entry, run, end) in enumerate(zip(entries, runs, ends[1:], strict=True), start=1):
+            values = run.commands.values
+            left = self.water.states(entry, values, run.entry_inputs[None])[-1]
+            tasks.append(self._task(left, values[-1], values, *end, stretches=2 * number))
+        return legs_ahead(self.planner, self.water, tasks)
+
+    def sail_run(self, placement: Placement, ahead: LegAhead) -> str:
         """Sail to a placement and do its run; "" on success, else what failed."""
-        problem, water, line = self.problem, self.water, self.line
-        primitive = next(item for item in problem.used if item.name == placement.primitive)
-        entry = problem.under_way(placement.pose, primitive.entry_velocity)
-        lat, lon = problem.area.frame.to_degrees(placement.pose[:2])
+        water, line, primitive = self.water, self.line, self._primitive(placement)
+        lat, lon = self.problem.area.frame.to_degrees(placement.pose[:2])
         where = f"{primitive.name!r} near {lat:.5f}, {lon:.5f}"
-        leg = self._leg(entry, primitive.entry_inputs)
+        leg = self._leg(self._entry(placement, primitive), primitive.entry_inputs, ahead)
         if leg is None:
             return f"no leg leads to {where}"
         track = water.sail(line.state, leg, line.given)
-        turned = nearest_turns(problem.vessel, primitive.entry_inputs, leg[-1]) - primitive.entry_inputs
+        turned = nearest_turns(self.problem.vessel, primitive.entry_inputs, leg[-1]) - primitive.entry_inputs
         values = primitive.commands.values + turned
         run = water.sail(last_state(track), values, water.remembered(np.concatenate([line.given, leg])))
         if not self.stated.holds(run.pose):
@@ -140,9 +154,9 @@ class _Voyage:
         line.sail("primitive", primitive.name, values, run)
         return ""
 
-    def sail_home(self) -> bool:
+    def sail_home(self, ahead: LegAhead) -> bool:
         """Sail the last leg; False where none is found."""
-        leg = self._leg(self.problem.at_rest(self.problem.goal), self._rest)
+        leg = self._leg(*self._stop, ahead)
         if leg is not None:
             self.line.sail("reposition", GOAL, leg, self.water.sail(self.line.state, leg, self.line.given))
         return leg is not None
@@ -153,25 +167,58 @@ class _Voyage:
             raise NoPlan("no leg leads from the start to the goal")
         return self.line.undo_run()
 
-    def _leg(self, end: Array, end_inputs: Array) -> Array | None:
-        """Commands (k, m) from where the timeline ends, or None."""
-        water, line = self.water, self.line
-        start, wait = line.state, line.begin_inputs[None]
-        late_start = not line.stretches and not water.prompt
-        if late_start:  # what lagging actuators deliver before the first sample depends on the commands before it
-            start = last_state(water.sail(start, wait, wait))
-        task = LegTask(
+    def _leg(self, end: Array, end_inputs: Array, ahead: LegAhead) -> Array | None:
+        """Commands (k, m) from where the timeline ends, or None: those found ahead, where they arrive from there."""
+        self.budget.spent_s += ahead.spent_s
+        if ahead.commands is None:
+            return None
+        task = self._task(*self._now, end, end_inputs, stretches=0)
+        leg = ahead.fitted(task, self.water)
+        if leg is None:
+            leg = self.planner.leg(task, self.water)
+            self.budget.spent_s += task.budget.spent_s
+        return np.concatenate([self._wait, leg]) if leg is not None else None
+
+    def _task(
+        self, start: Array, start_inputs: Array, given: Array, end: Array, end_inputs: Array, *, stretches: int
+    ) -> LegTask:
+        """A leg to be found so many stretches after those sailed."""
+        return LegTask(
             start=start,
             end=end,
-            start_inputs=line.inputs,
+            start_inputs=start_inputs,
             end_inputs=end_inputs,
-            seed=self.problem.seed + len(line.stretches) + 1,
-            before=water.remembered(line.given),
+            seed=self.problem.seed + len(self.line.stretches) + stretches + 1,
+            before=self.water.remembered(given),
             budget=WorkBudget(most_s=PLAN.leg_s),
         )
-        leg = self.planner.leg(task, water)
-        self.budget.spent_s += task.budget.spent_s
-        return np.concatenate([wait, leg]) if late_start and leg is not None else leg
+
+    @property
+    def _now(self) -> tuple[Array, Array, Array]:
+        """State and commands standing as the next leg begins, and all commands before it."""
+        wait, line = self._wait, self.line
+        start = last_state(self.water.sail(line.state, wait, wait)) if len(wait) else line.state
+        return start, line.inputs, line.given
+
+    @property
+    def _wait(self) -> Array:
+        """(0 or 1, m) commands before the first leg of a ship with slow actuators.
+
+        What they deliver before the first sample depends on the commands before it.
+        """
+        late_start = not self.line.stretches and not self.water.prompt
+        return self.line.begin_inputs[None] if late_start else np.zeros((0, len(self._rest)))
+
+    @property
+    def _stop(self) -> tuple[Array, Array]:
+        """State at the goal and the commands there."""
+        return self.problem.at_rest(self.problem.goal), self._rest
+
+    def _primitive(self, placement: Placement) -> Primitive:
+        return next(item for item in self.problem.used if item.name == placement.primitive)
+
+    def _entry(self, placement: Placement, primitive: Primitive) -> Array:
+        return self.problem.under_way(placement.pose, primitive.entry_velocity)
 
     @property
     def _rest(self) -> Array:

@@ -7,12 +7,13 @@ from expdesign.plan.legs.escape_check import check_ends
 from expdesign.plan.legs.helm import helm_leg
 from expdesign.plan.legs.recovery import displaced, recover
 from expdesign.plan.legs.tuning import LEGS
-from expdesign.plan.legs.water import LegTask, LegWater, last_state, leg_speed_mps, nearest_turns
+from expdesign.plan.legs.water import LegTask, LegWater, acceptable, last_state, leg_speed_mps, nearest_turns
 
 __all__ = [
     "LEGS",
     "LegTask",
     "LegWater",
+    "acceptable",
     "agile_leg",
     "check_ends",
     "curved_leg",

@@ -83,6 +83,13 @@ class LegWater:
         shapely.prepare(safe)
         return safe
 
+    def __setstate__(self, state: dict[str, object]) -> None:
+        """Prepare the shapes again, which is lost between processes."""
+        self.__dict__.update(state)
+        for name in ("safe", "_open"):
+            if name in state:
+                shapely.prepare(state[name])
+
     @property
     def _safe_margin_m(self) -> float:
         turned = 2.0 * self.ship.yaw_rate_radps * self.vessel.sample_time_s  # runs turn faster than legs

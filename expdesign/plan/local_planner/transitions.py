@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 import shapely
-from joblib import Parallel, delayed
+from joblib import Parallel, delayed, effective_n_jobs
 
 from expdesign.conventions import wrap_angle
 from expdesign.dictionary import Primitive
@@ -45,9 +45,9 @@ def with_transitions(
     """
     water, tried = _open(trials.water), dict(space.tried)
     fresh = [pair for pair in pairs if pair not in tried] if not trials.budget.exhausted else []
-    tasks = (_desired_leg(space, pair, trials, water, times) for pair in fresh)
-    work = Parallel(return_as="generator")
-    for pair, (found, spent_s) in zip(fresh, work(delayed(_optimised)(*task, ship) for task in tasks), strict=False):
+    tasks = [_desired_leg(space, pair, trials, water, times) for pair in fresh]
+    work = Parallel(return_as="generator")(delayed(_optimised)(*task, ship) for task in tasks)
+    for pair, (found, spent_s) in zip(fresh, work if effective_n_jobs() == 1 else list(work), strict=False):
         if trials.budget.exhausted:
             break
         tried[pair] = None if found is None else _tried(space, times, pair, *found)

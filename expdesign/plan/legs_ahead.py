@@ -1,0 +1,57 @@
+"""Legs found before the runs between them are sailed: each from where the run before it ends if it begins as planned.
+
+So the legs of a placement do not wait for each other, and processes share them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from joblib import Parallel, delayed, effective_n_jobs
+
+from expdesign.conventions import whole_turns
+from expdesign.plan.legs import LegTask, LegWater, acceptable, nearest_turns
+from expdesign.plan.local_planner import LocalPlanner
+from expdesign.values import Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LegAhead:
+    """A leg found ahead.
+
+    Attributes:
+        task: as it was expected.
+        commands: (k, m), or None where there is no leg.
+        spent_s: work that it took.
+    """
+
+    task: LegTask
+    commands: Array | None
+    spent_s: float
+
+    def fitted(self, task: LegTask, water: LegWater) -> Array | None:
+        """The commands for the task as it has become, azimuths shifted by whole turns; None where they miss its end."""
+        if self.commands is None or np.array_equal(task.start, self.task.start):
+            return self.commands
+        expected = self.task.start_inputs
+        values = self.commands + nearest_turns(water.vessel, expected, task.start_inputs) - expected
+        heading = water.states(task.start, values, task.past)[-1, 2]
+        end = np.r_[task.end[:2], task.end[2] + whole_turns(heading - task.end[2]), task.end[3:]]
+        return values if acceptable(task.start, end, water, values, task.past) else None
+
+
+def legs_ahead(planner: LocalPlanner, water: LegWater, tasks: Iterable[LegTask]) -> Iterator[LegAhead]:
+    """The legs of tasks, in order, by as many processes as `joblib.parallel_config` says.
+
+    One process finds each leg when it is asked for. Several find all of them before the first is returned: what they
+    are sent must not change meanwhile.
+    """
+    legs: Iterator[LegAhead] = Parallel(return_as="generator")(delayed(_ahead)(planner, water, task) for task in tasks)
+    return legs if effective_n_jobs() == 1 else iter(list(legs))
+
+
+def _ahead(planner: LocalPlanner, water: LegWater, task: LegTask) -> LegAhead:
+    commands = planner.leg(task, water)
+    return LegAhead(task=task, commands=commands, spent_s=task.budget.spent_s)
