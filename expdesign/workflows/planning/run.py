@@ -27,7 +27,7 @@ def run(scenario: Path, out: Path | None, *, seed: int = 0, jobs: int = 1, progr
         jobs: processes; 0 for one per core. The results do not depend on it.
         progress: of the command.
     """
-    with workers(jobs):
+    with workers(jobs, warm=True):
         return _run(scenario, out, seed, progress)
 
 

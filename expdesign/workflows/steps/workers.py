@@ -3,28 +3,33 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
-from joblib import parallel_config
+from joblib import Parallel, delayed, effective_n_jobs, parallel_config
 
 from expdesign.errors import InputError
 
 
 @contextmanager
-def workers(jobs: int, *, scheduler: str | None = None) -> Iterator[None]:
+def workers(jobs: int, *, scheduler: str | None = None, warm: bool = False) -> Iterator[None]:
     """Work of `joblib.Parallel` in this block is shared among processes.
 
     Args:
         jobs: processes; 0 for one per core, 1 for this one alone.
         scheduler: address of a Dask scheduler whose workers do the work instead.
+        warm: let processes load the planner and the report while this one goes on.
 
     Raises:
         InputError: Dask is not installed, or no scheduler answers.
     """
     if scheduler is None:
         with parallel_config(backend="loky", n_jobs=jobs or os.cpu_count() or 1):
-            yield
+            starting = _starting() if warm else ()
+            try:
+                yield
+            finally:
+                list(starting)
         return
     try:
         from distributed import Client
@@ -36,3 +41,14 @@ def workers(jobs: int, *, scheduler: str | None = None) -> Iterator[None]:
         raise InputError(f"--scheduler {scheduler}: no scheduler answers there ({error})") from None
     with client, parallel_config(backend="dask", n_jobs=-1):
         yield
+
+
+def _starting() -> Iterable[None]:
+    """Lets processes, where there are several, load what they will need; to be read to its end."""
+    count = effective_n_jobs()
+    return Parallel(return_as="generator")(delayed(_load)() for _ in range(count)) if count > 1 else ()
+
+
+def _load() -> None:
+    import expdesign.export.report
+    import expdesign.plan.solve  # noqa: F401
