@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from collections.abc import Callable
 from pathlib import Path
 
+from counted_work import counted_work
 from expdesign import workflows
 from scenario_files import spoil
 
@@ -31,6 +33,15 @@ def example_run(made_once: Callable, name: str, *, whole: bool = False) -> tuple
 
     def run(folder: Path) -> list[str]:
         scenario = copied(folder.with_name(f"{folder.name}-scenario"), name, {} if whole else SHORTER[name])
-        return [path.name for path in workflows.run(scenario, folder, seed=1).files]
+        with counted_work() as (counts, progress):
+            files = [path.name for path in workflows.run(scenario, folder, seed=1, progress=progress).files]
+        folder.with_name(f"{folder.name}-work.json").write_text(json.dumps(counts), encoding="utf-8")
+        return files
 
     return made_once(f"{name}-whole" if whole else name, run)
+
+
+def example_work(made_once: Callable, name: str) -> dict[str, dict[str, int]]:
+    """How much was done by phase and by kind of work while the short example was planned."""
+    folder, _ = example_run(made_once, name)
+    return json.loads(folder.with_name(f"{folder.name}-work.json").read_text(encoding="utf-8"))

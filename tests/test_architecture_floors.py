@@ -13,7 +13,7 @@ ROOT = Path(expdesign.__file__).parent
 
 FLOORS = {
     "": (
-        ("errors", "interruptions", "lazy", "progress"),
+        ("errors", "interruptions", "lazy", "processes", "progress"),
         ("conventions", "values"),
         ("signals", "sea_area"),
         ("vessel",),

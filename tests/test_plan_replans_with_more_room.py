@@ -54,7 +54,7 @@ def attempts(monkeypatch):
 
     checked = solve.failed_chance_constraint
     monkeypatch.setattr(solve, "failed_chance_constraint", noted)
-    monkeypatch.setattr(solve, "_plan", lambda problem, water, sailed, **rest: sailed.trajectory)
+    monkeypatch.setattr(solve, "_plan", lambda problem, sailed, **rest: sailed.trajectory)
     return found
 
 

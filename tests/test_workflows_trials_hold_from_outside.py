@@ -152,7 +152,7 @@ def test_same_seed_same_files_another_seed_another_measurement(result, tmp_path)
 
 
 @pytest.mark.parametrize("result", ["story"], indirect=True)
-def test_a_plan_follows_edited_durations_and_is_the_same_for_the_same_seed(result, tmp_path):
+def test_a_plan_follows_edited_durations_and_is_the_same_by_any_number_of_processes(result, tmp_path):
     _, folder, *_ = result
     content = json.loads((folder / "durations.json").read_text())
     once = "zigzag-speed-0.8"
@@ -161,8 +161,8 @@ def test_a_plan_follows_edited_durations_and_is_the_same_for_the_same_seed(resul
     edited = tmp_path / "durations.json"
     edited.write_text(json.dumps(content))
     first, again = tmp_path / "first", tmp_path / "again"
-    for out in (first, again):
-        workflows.plan(SCENARIOS / "story.toml", out, durations=edited, seed=1)
+    for out, jobs in ((first, 1), (again, 2)):
+        workflows.plan(SCENARIOS / "story.toml", out, durations=edited, seed=1, jobs=jobs)
     legs = json.loads((first / "plan.json").read_text())["legs"]
     assert [leg["name"] for leg in legs if leg["kind"] == "primitive"] == [once]
     for name in ("plan.json", "track.csv", "commands.csv"):

@@ -99,7 +99,8 @@ def _with_transitions(problem: PlanProblem, water: LegWater, space: SearchSpace,
         budget=WorkBudget(most_s=PLAN.transitions_s),
     )
     for number in range(planner.transition_trials):
-        progress("trying transitions between runs", 0.01 * (number + 1))
+        tried = PLAN.share_measured + number / planner.transition_trials * (PLAN.share_tried - PLAN.share_measured)
+        progress("trying transitions between runs", tried)
         try:
             placements = place_runs(space, counts, start=problem.start, width=PLAN.transition_beam, orders=0)
         except NoPlan:  # the main search keeps more, and says what is impossible

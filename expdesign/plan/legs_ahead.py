@@ -9,11 +9,11 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from joblib import Parallel, delayed, effective_n_jobs
 
 from expdesign.conventions import whole_turns
 from expdesign.plan.legs import LegTask, LegWater, acceptable, nearest_turns
 from expdesign.plan.local_planner import LocalPlanner
+from expdesign.processes import in_order
 from expdesign.values import Array
 
 
@@ -43,13 +43,8 @@ class LegAhead:
 
 
 def legs_ahead(planner: LocalPlanner, water: LegWater, tasks: Iterable[LegTask]) -> Iterator[LegAhead]:
-    """The legs of tasks, in order, by as many processes as `joblib.parallel_config` says.
-
-    One process finds each leg when it is asked for. Several find all of them before the first is returned: what they
-    are sent must not change meanwhile.
-    """
-    legs: Iterator[LegAhead] = Parallel(return_as="generator")(delayed(_ahead)(planner, water, task) for task in tasks)
-    return legs if effective_n_jobs() == 1 else iter(list(legs))
+    """The legs of tasks, in order."""
+    return in_order(_ahead, (planner, water), ((task,) for task in tasks))
 
 
 def _ahead(planner: LocalPlanner, water: LegWater, task: LegTask) -> LegAhead:

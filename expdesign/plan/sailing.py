@@ -45,7 +45,7 @@ def sail_all(
     space, left, stuck, proof = room.space, problem.repeats, "", None
     search, failures = placement_search(problem.settings), _Failures(problem.settings.time_budget_s)
     while True:
-        progress("placing runs", _share(problem, left))
+        progress("placing runs", _share(problem, left, PLAN.share_tried))
         placed = _placed(search, space, left, voyage.line, stuck)
         proof, spent_s = proof or placed.lattice, budget.spent_s
         legs = voyage.legs_ahead(placed.runs)
@@ -55,7 +55,7 @@ def sail_all(
                 space = space.refusing(voyage.line.last, placement)
                 break
             left[placement.primitive] -= 1
-            progress(f"sailing {placement.primitive}", _share(problem, left))
+            progress(f"sailing {placement.primitive}", _share(problem, left, PLAN.share_placed))
         else:
             if voyage.sail_home(next(legs)):
                 return replace(voyage.sailed, lattice=proof and replace(proof, refused=failures.tries))
@@ -65,9 +65,9 @@ def sail_all(
         failures.count(placed.work_s + budget.spent_s - spent_s, stuck)
 
 
-def _share(problem: PlanProblem, left: dict[str, int]) -> float:
+def _share(problem: PlanProblem, left: dict[str, int], first: float) -> float:
     total = sum(problem.repeats.values())
-    return 0.05 + 0.8 * (total - sum(left.values())) / max(total, 1)
+    return first + (PLAN.share_sailed - first) * (total - sum(left.values())) / max(total, 1)
 
 
 def _placed(

@@ -1,19 +1,16 @@
-"""The planner: place the runs, sail them, verify the plan, estimate its risk; replan with more room if that fails.
-
-Independent work is done by as many processes as `joblib.parallel_config` says.
-"""
+"""The planner: place the runs, sail them, verify the plan, estimate its risk; replan with more room if that fails."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
-from joblib import Parallel, delayed
 
 from expdesign.errors import NoPlan
 from expdesign.plan.assembly import PlanRoom, leg_water, plan_room, search_space
 from expdesign.plan.bounds import reposition_bound_s
-from expdesign.plan.control import Capability
 from expdesign.plan.legs import LegWater
 from expdesign.plan.monte_carlo import (
     Trials,
@@ -29,7 +26,8 @@ from expdesign.plan.tuning import PLAN
 from expdesign.plan.values import Leg, Plan, RiskEstimate, SailedTrial, Verification
 from expdesign.plan.verify import realised_efficiencies, verify_plan
 from expdesign.plan.work_budget import WorkBudget
-from expdesign.progress import Progress, silent
+from expdesign.processes import in_order
+from expdesign.progress import Progress, silent, within
 
 
 def plan_trial(problem: PlanProblem, *, progress: Progress = silent) -> Plan:
@@ -45,24 +43,30 @@ def plan_trial(problem: PlanProblem, *, progress: Progress = silent) -> Plan:
     for attempt in range(PLAN.replans + 1):
         before_s = budget.spent_s
         sailed = sail_all(problem, room, progress, stated=water, budget=budget)
-        progress("verifying and sailing drawn trials", 0.85)
+        progress("verifying", PLAN.share_sailed)
+        checks = in_order(_check, (problem, water, sailed), ((_verified,), (_bound_s,)))
         # random streams independent of planning and of earlier attempts
         rng = np.random.default_rng((problem.seed, PLAN.trials_stream, attempt))
-        verification, (risk, trials), bound_s = Parallel()(
-            [
-                delayed(_verified)(problem, water, sailed),
-                delayed(estimate_risk)(water, sailed, rng=rng, draws=trials_needed(confidence)),
-                delayed(_bound_s)(problem, water.ship),
-            ]
+        verification = next(checks)
+        risk, trials = estimate_risk(
+            water,
+            sailed,
+            rng=rng,
+            draws=trials_needed(confidence),
+            progress=within(progress, PLAN.share_sailed, 1.0),
         )
         failed = failed_chance_constraint(risk, trials, sailed.legs, problem.area, confidence=confidence)
         if not failed:
-            return _plan(problem, sailed, verification=verification, risk=risk, bound_s=bound_s)
+            return _plan(problem, sailed, verification=verification, risk=risk, bound_s=next(checks))
         budget.sailed(int(trials.samples.max(axis=1).sum()))
         _check_worth_replanning(problem, risk, failed, budget, attempt=attempt, before_s=before_s)
         room = _wider(problem, room, trials, sailed.legs, failed)
         progress = _replanning(progress)
     raise AssertionError("the last plan is returned or refused")
+
+
+def _check(problem: PlanProblem, water: LegWater, sailed: SailedTrial, check: Callable[..., Any]) -> Any:
+    return check(problem, water, sailed)
 
 
 def _verified(problem: PlanProblem, water: LegWater, sailed: SailedTrial) -> Verification:
@@ -122,8 +126,9 @@ def _replanning(progress: Progress) -> Progress:
     return lambda activity, share: progress(f"with more room: {activity}", max(share, 0.9))
 
 
-def _bound_s(problem: PlanProblem, ship: Capability) -> float:
+def _bound_s(problem: PlanProblem, water: LegWater, sailed: SailedTrial) -> float:
     """Least repositioning time of any plan of the problem's runs."""
+    ship = water.ship
     return reposition_bound_s(
         problem.vessel,
         problem.area,

@@ -22,6 +22,8 @@ class Tuning:
         clock_budgets: time budgets by the clock after which a search that is stuck ends, whatever its counted work.
         iteration_s: one iteration of the optimiser for each sample of a leg, on a machine of 2020 [s].
         sample_s: one sample of some hundred drawn ships there [s].
+        share_measured, share_tried, share_placed, share_sailed: of a plan's time on average, on two cores, after which
+            the water is measured, transitions are tried, runs are placed, and everything is sailed.
         many_aborted: share of drawn trials aborted above which a warning leads the report.
     """
 
@@ -36,6 +38,10 @@ class Tuning:
     clock_budgets: float = 5.0
     iteration_s: float = 2e-4
     sample_s: float = 2.5e-3
+    share_measured: float = 0.15
+    share_tried: float = 0.35
+    share_placed: float = 0.5
+    share_sailed: float = 0.65
     many_aborted: float = 0.2
 
 

@@ -14,7 +14,6 @@ from typing import Any, Literal, TypeVar
 
 import matplotlib
 import numpy as np
-from joblib import Parallel, delayed
 from markupsafe import Markup, escape
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
@@ -22,6 +21,7 @@ from matplotlib.figure import Figure
 
 from expdesign.export.formats.format import xml_text
 from expdesign.export.tuning import TUNING
+from expdesign.processes import in_order
 
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
 YELLOW, BLUE, VERMILION, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
@@ -60,8 +60,8 @@ def report_style() -> Iterator[None]:
 
 
 def drawn(figures: Sequence[Callable[[], Drawn]]) -> list[Drawn]:
-    """Results of functions that draw, in report style, by as many processes as `joblib.parallel_config` says."""
-    return list(Parallel()(delayed(_in_style)(figure) for figure in figures))
+    """Results of functions that draw, in report style."""
+    return list(in_order(_in_style, (), ((figure,) for figure in figures)))
 
 
 def _in_style(figure: Callable[[], Drawn]) -> Drawn:

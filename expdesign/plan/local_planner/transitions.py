@@ -13,7 +13,6 @@ from itertools import pairwise
 
 import numpy as np
 import shapely
-from joblib import Parallel, delayed, effective_n_jobs
 
 from expdesign.conventions import wrap_angle
 from expdesign.dictionary import Primitive
@@ -25,6 +24,7 @@ from expdesign.plan.local_planner.protocol import Pair, SearchSpace, TransitionT
 from expdesign.plan.local_planner.tuning import LOCAL
 from expdesign.plan.runs import Footprint
 from expdesign.plan.values import Placement
+from expdesign.processes import in_order
 from expdesign.sea_area import as_multipolygon
 from expdesign.simulation import CALM
 from expdesign.values import Array
@@ -40,32 +40,33 @@ def with_transitions(
 ) -> SearchSpace:
     """The same space with transitions of pairs that had none, as far as the budget goes.
 
-    Each is optimised on its own, by as many processes as `joblib.parallel_config` says. Their work is counted in the
-    order of the pairs, so the result does not depend on the number of processes.
+    Each is optimised on its own. Their work is counted in the order of the pairs, so the result does not depend on the
+    number of processes.
     """
     water, tried = _open(trials.water), dict(space.tried)
-    fresh = [pair for pair in pairs if pair not in tried] if not trials.budget.exhausted else []
-    tasks = [_desired_leg(space, pair, trials, water, times) for pair in fresh]
-    work = Parallel(return_as="generator")(delayed(_optimised)(*task, ship) for task in tasks)
-    for pair, (found, spent_s) in zip(fresh, work if effective_n_jobs() == 1 else list(work), strict=False):
+    fresh = [pair for pair in pairs if pair not in tried]
+    tasks = (_desired_leg(space, pair, trials, times, water) for pair in fresh)
+    results = in_order(_optimised, (water, ship), tasks)
+    for pair in fresh:
         if trials.budget.exhausted:
             break
+        found, spent_s = next(results)
         tried[pair] = None if found is None else _tried(space, times, pair, *found)
         trials.budget.spent_s += spent_s
     return replace(space, tried=tried)
 
 
 def _desired_leg(
-    space: SearchSpace, pair: Pair, trials: TransitionTrials, water: LegWater, times: LegTimes
-) -> tuple[LegTask, LegWater, Array]:
-    """The task of a transition, its water, and the value of displacement."""
+    space: SearchSpace, pair: Pair, trials: TransitionTrials, times: LegTimes, water: LegWater
+) -> tuple[LegTask, Array]:
+    """The task of a transition, and the value of displacement."""
     course, turn = _desired(space, pair, trials.start)
     worth = trials.made_good * np.array([np.cos(course), np.sin(course)]) / times.speed_mps
-    return _task(pair, trials.primitives, water, course, turn), water, worth
+    return _task(pair, trials.primitives, water, course, turn), worth
 
 
 def _optimised(
-    task: LegTask, water: LegWater, worth: Array, ship: AgileShip
+    water: LegWater, ship: AgileShip, task: LegTask, worth: Array
 ) -> tuple[tuple[float, Array] | None, float]:
     """Time and end of a transition, or None, and the work it took."""
     return free_leg(task, water, ship, worth), task.budget.spent_s

@@ -18,6 +18,7 @@ from expdesign.plan.monte_carlo.procedure import ABORT_CAUSES
 from expdesign.plan.monte_carlo.trials import Trials, sail_trials
 from expdesign.plan.monte_carlo.tuning import MONTE_CARLO
 from expdesign.plan.values import Leg, LegOutcome, RiskEstimate, SailedTrial
+from expdesign.progress import Progress, silent
 from expdesign.sea_area import SeaArea
 from expdesign.signals import Trajectory
 from expdesign.values import Array
@@ -35,12 +36,13 @@ def estimate_risk(
     *,
     rng: np.random.Generator,
     draws: int = MONTE_CARLO.trials,
+    progress: Progress = silent,
 ) -> tuple[RiskEstimate, Trials]:
     """Estimate the risk of a plan by drawn trials.
 
     The shares' standard errors are sqrt(p (1 - p) / draws).
     """
-    trials = sail_trials(water, sailed, draws=draws, rng=rng)
+    trials = sail_trials(water, sailed, draws=draws, rng=rng, progress=progress)
     commands, trajectory, legs = sailed.commands, sailed.trajectory, sailed.legs
     within, sample_s = trials.within[0], commands.sample_time_s
     gone, done = int(trials.left.any(axis=0).sum()), trials.completed

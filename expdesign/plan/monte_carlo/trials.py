@@ -18,6 +18,7 @@ from expdesign.plan.monte_carlo.procedure import Tolerances, tolerances
 from expdesign.plan.runs import Fleet, draw_truths
 from expdesign.plan.values import SailedTrial
 from expdesign.plan.verify import hull_clearance
+from expdesign.progress import Progress, silent
 from expdesign.values import Array
 
 
@@ -59,6 +60,7 @@ def sail_trials(
     *,
     draws: int,
     rng: np.random.Generator,
+    progress: Progress = silent,
 ) -> Trials:
     """Sail drawn trials of a plan.
 
@@ -67,6 +69,7 @@ def sail_trials(
         sailed: the plan.
         draws: number of trials.
         rng: of all draws.
+        progress: by the planned time of legs.
     """
     vessel, track, legs, commands = water.vessel, sailed.states, sailed.legs, sailed.commands
     helm = Helmsman(vessel=vessel, environment=water.environment, ship=water.ship)
@@ -79,6 +82,7 @@ def sail_trials(
     go_arounds, samples, abort_cause = (np.zeros(shape, dtype=int) for _ in range(3))
     used, place = np.full(shape, np.nan), np.full((*shape, 2), np.nan)
     for index, leg in enumerate(legs):
+        progress("sailing drawn trials", leg.first / len(commands))
         values = commands.values[leg.first : leg.last]
         if leg.kind == "primitive":
             used[index] = np.where(sailing, within[index].used(fleet.states, track[leg.first]).max(axis=1), np.nan)

@@ -27,18 +27,18 @@ def run(scenario: Path, out: Path | None, *, seed: int = 0, jobs: int = 1, progr
         jobs: processes; 0 for one per core. The results do not depend on it.
         progress: of the command.
     """
-    with workers(jobs, warm=True):
+    with workers(jobs):
         return _run(scenario, out, seed, progress)
 
 
 def _run(scenario: Path, out: Path | None, seed: int, progress: Progress) -> Outcome:
     case = loaded(scenario, progress)
     check_plannable(case)
-    information, growth = ready(case, seed=seed, progress=within(progress, 0.02, 0.1))
-    design = designed(case, information, seed=seed, progress=within(progress, 0.1, 0.13))
+    information, growth = ready(case, seed=seed, progress=within(progress, 0.02, 0.06))
+    design = designed(case, information, seed=seed, progress=within(progress, 0.06, 0.08))
     compared = efficiencies(design)
-    plan = planned(case, information, design, seed=seed, progress=within(progress, 0.14, 0.85))
-    progress("writing routes, run cards and report", 0.85)
+    plan = planned(case, information, design, seed=seed, progress=within(progress, 0.08, 0.9))
+    progress("writing routes, run cards and report", 0.9)
     route = built_route(case, plan)
     content = replace(report_content(case, information, design, plan, seed), compared=compared, route=route)
     files = trial_files(case, growth, content, route)

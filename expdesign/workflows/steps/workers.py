@@ -4,32 +4,33 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 from joblib import Parallel, delayed, effective_n_jobs, parallel_config
 
 from expdesign.errors import InputError
+from expdesign.processes import leaving_interruptions
 
 
 @contextmanager
-def workers(jobs: int, *, scheduler: str | None = None, warm: bool = False) -> Iterator[None]:
-    """Work of `joblib.Parallel` in this block is shared among processes.
+def workers(jobs: int, *, scheduler: str | None = None) -> Iterator[None]:
+    """Work of `joblib.Parallel` in this block is shared among processes, which load the planner meanwhile.
 
     Args:
         jobs: processes; 0 for one per core, 1 for this one alone.
         scheduler: address of a Dask scheduler whose workers do the work instead.
-        warm: let processes load the planner and the report while this one goes on.
 
     Raises:
         InputError: Dask is not installed, or no scheduler answers.
     """
     if scheduler is None:
         with parallel_config(backend="loky", n_jobs=jobs or os.cpu_count() or 1):
-            starting = _starting() if warm else ()
+            starting = _starting()
             try:
                 yield
             finally:
-                list(starting)
+                with suppress(Exception):  # interrupted while they start
+                    list(starting)
         return
     try:
         from distributed import Client
@@ -45,8 +46,12 @@ def workers(jobs: int, *, scheduler: str | None = None, warm: bool = False) -> I
 
 def _starting() -> Iterable[None]:
     """Lets processes, where there are several, load what they will need; to be read to its end."""
-    count = effective_n_jobs()
-    return Parallel(return_as="generator")(delayed(_load)() for _ in range(count)) if count > 1 else ()
+    count = effective_n_jobs(None)
+    if count == 1:
+        return ()
+    with leaving_interruptions():
+        loading: Iterable[None] = Parallel(return_as="generator")(delayed(_load)() for _ in range(count))
+        return loading
 
 
 def _load() -> None:
