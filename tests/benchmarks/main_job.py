@@ -2,7 +2,7 @@
 
 Run from anywhere with the package installed: ``python tests/benchmarks/main_job.py``. Besides seconds, which depend on
 the machine, each time is given as a multiple of a fixed loop of plain Python timed in the same run. Processor seconds
-count the job's own work, whatever else the machine does meanwhile.
+count the work of all processes of the job, whatever else the machine does meanwhile; memory is that of the largest.
 """
 
 from __future__ import annotations
