@@ -33,12 +33,15 @@ def in_order(
     both = cloudpickle.dumps((function, shared))
     copies = [cloudpickle.dumps(task) for task in tasks]
     with leaving_interruptions():
-        return _waited_for(Parallel(return_as="generator")(delayed(_done)(both, task) for task in copies))
+        results = _waited_for(Parallel(return_as="generator")(delayed(_done)(both, task) for task in copies))
+    next(results)
+    return results
 
 
-def _waited_for(results: Iterator[Result]) -> Iterator[Result]:
-    """The same results; joblib would end the processes where some are left."""
+def _waited_for(results: Iterator[Any]) -> Iterator[Any]:
+    """None, from which on work is waited for, and the same results; joblib would end the processes with some left."""
     try:
+        yield None
         for result in results:  # noqa: UP028 - `yield from` would close them
             yield result
     except GeneratorExit:

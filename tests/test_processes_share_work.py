@@ -28,6 +28,7 @@ def test_others_work_on_copies_and_what_is_not_read_does_no_harm():
         numbers[:] = 7.0
         np.testing.assert_array_equal(next(results), [0.0, 1.0, 2.0])
         results.close()
+        in_order(truediv, (numbers,), [(1.0,), (2.0,)])  # never read
         assert list(in_order(add, (1,), [(1,), (2,)])) == [2, 3]
 
 

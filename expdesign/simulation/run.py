@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from expdesign.errors import Diverged, InputError
@@ -141,69 +143,72 @@ def simulate_many(
     before = None if standing is None else np.asarray(standing, dtype=float).T.reshape(commanded.shape[1], -1)
     given = deliver(vessel.responses, commanded, sample_time_s=sample_time_s, substeps=substeps, standing=before)
     weather = [np.broadcast_to(item, (len(commanded), len(pose), 2)) for item in (current_to, wind_to)]
-    states = _one_by_one if len(pose) <= FEW_RUNS else _together
-    result = states(
-        vessel.model,
-        np.array(begun(vessel.model, (*pose.T, *velocity.T))),
-        given,
+    runs = _Runs(
+        model=vessel.model,
+        start=np.array(begun(vessel.model, (*pose.T, *velocity.T))),
+        given=given,
         sea=np.concatenate(weather, axis=-1).swapaxes(1, 2),
         parameters=parameters,
         sample_time_s=sample_time_s,
         substeps=substeps,
     )
+    result = runs.one_by_one() if len(pose) <= FEW_RUNS else runs.together()
     settled = np.abs(result[..., 3:]).max(axis=(0, 2)) < LARGEST_SPEED
     result[:, ~settled] = np.nan
     return result
 
 
-def _one_by_one(
-    model: VesselModel,
-    start: Array,
-    given: Array,
-    *,
-    sea: Array,
-    parameters: Array,
-    sample_time_s: float,
-    substeps: int,
-) -> Array:
-    """(k + 1, n, 6) states by compiled steps, from starts (6 or 8, n), inputs (k, s, m, n or 1) and seas (k, 4, n)."""
-    from expdesign.simulation._casadi import compiled_integrator  # CasADi is loaded when a motion is integrated
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Runs:
+    """Runs to be integrated.
 
-    compiled = compiled_integrator(model, "rk4")
-    inputs = np.broadcast_to(given, (*given.shape[:3], len(parameters)))
-    runs = [
-        compiled.states(
-            start[:, run],
-            inputs[..., run],
-            sea=sea[..., run],
-            sample_time_s=sample_time_s,
-            substeps=substeps,
-            parameters=theta,
-        )
-        for run, theta in enumerate(parameters)
-    ]
-    return np.stack(runs, axis=1)[..., :STATES]
+    Attributes:
+        model: their structure.
+        start: (6 or 8, n) states.
+        given: (k, substeps or 1, m, n or 1) delivered inputs.
+        sea: (k, 4, n) current and wind.
+        parameters: (n, p).
+        sample_time_s, substeps: between samples, and integrator steps in one.
+    """
 
+    model: VesselModel
+    start: Array
+    given: Array
+    sea: Array
+    parameters: Array
+    sample_time_s: float
+    substeps: int
 
-def _together(
-    model: VesselModel,
-    start: Array,
-    given: Array,
-    *,
-    sea: Array,
-    parameters: Array,
-    sample_time_s: float,
-    substeps: int,
-) -> Array:
-    """The same by operations on all runs at once."""
-    program = RatesProgram(model, runs=len(parameters), parameters=parameters)
-    result = np.empty((len(sea) + 1, len(parameters), STATES))
-    states = march(program, given, start, step=rk4_step, step_s=sample_time_s / substeps, substeps=substeps)
-    with np.errstate(over="ignore", invalid="ignore"):
-        for row, state, now in zip(result, states, (*sea, sea[-1:]), strict=True):
-            row[...] = state[:STATES].T
-            program.sea[...] = now
-    return result
+    def one_by_one(self) -> Array:
+        """(k + 1, n, 6) states by compiled steps, the quicker way for few runs."""
+        from expdesign.simulation._casadi import compiled_integrator  # CasADi is loaded when a motion is integrated
+
+        compiled = compiled_integrator(self.model, "rk4")
+        inputs = np.broadcast_to(self.given, (*self.given.shape[:3], len(self.parameters)))
+        runs = [
+            compiled.states(
+                self.start[:, run],
+                inputs[..., run],
+                sea=self.sea[..., run],
+                sample_time_s=self.sample_time_s,
+                substeps=self.substeps,
+                parameters=theta,
+            )
+            for run, theta in enumerate(self.parameters)
+        ]
+        return np.stack(runs, axis=1)[..., :STATES]
+
+    def together(self) -> Array:
+        """The same by operations on all runs at once."""
+        program = RatesProgram(self.model, runs=len(self.parameters), parameters=self.parameters)
+        result = np.empty((len(self.sea) + 1, len(self.parameters), STATES))
+        step_s = self.sample_time_s / self.substeps
+        states = march(program, self.given, self.start, step=rk4_step, step_s=step_s, substeps=self.substeps)
+        with np.errstate(over="ignore", invalid="ignore"):
+            for row, state, now in zip(result, states, (*self.sea, self.sea[-1:]), strict=True):
+                row[...] = state[:STATES].T
+                program.sea[...] = now
+        return result
 
 
 def _check_inputs(vessel: Vessel, commands: Commands) -> None:

@@ -43,6 +43,8 @@ def with_transitions(
     Each is optimised on its own. Their work is counted in the order of the pairs, so the result does not depend on the
     number of processes.
     """
+    if trials.budget.exhausted:
+        return space
     water, tried = _open(trials.water), dict(space.tried)
     fresh = [pair for pair in pairs if pair not in tried]
     tasks = (_desired_leg(space, pair, trials, times, water) for pair in fresh)

@@ -28,9 +28,11 @@ def workers(jobs: int, *, scheduler: str | None = None) -> Iterator[None]:
             starting = _starting()
             try:
                 yield
-            finally:
-                with suppress(Exception):  # interrupted while they start
+            except BaseException:
+                with suppress(Exception):  # of processes interrupted while they start: what ended the work counts
                     list(starting)
+                raise
+            list(starting)
         return
     try:
         from distributed import Client
