@@ -67,6 +67,8 @@ def _rows(summary: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str
         label = f"{prefix}{(stem if unit else key).replace('_', ' ')}"
         if isinstance(value, Mapping):
             yield from _rows(value, f"{label}, ")
+        elif key.endswith("remarks") and isinstance(value, (list, tuple)):
+            yield from ((label if number == 0 else "", str(line)) for number, line in enumerate(value))
         else:
             yield label, _text(value) if value is None else f"{_text(value)} {unit}".rstrip()
 

@@ -34,7 +34,11 @@ class ChartTable(Table):
     depth_property: Text | None = Field(
         default=None, description="the property that holds the depth of a GeoJSON area [m], instead of depth_layers"
     )
-    hazard_margin_m: Positive = Field(default=25.0, description="the distance kept from dangers in an S-57 cell [m]")
+    danger_layers: list[Text] | None = Field(
+        default=None,
+        description="the GeoJSON layers of dangers; when not given, all features whose layer or properties name one",
+    )
+    hazard_margin_m: Positive = Field(default=25.0, description="the distance kept from points of danger [m]")
     air_draught_m: Positive | None = Field(
         default=None, description="the ship's height above water [m]; when not given, bridges and cables are closed"
     )

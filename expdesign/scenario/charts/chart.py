@@ -70,18 +70,37 @@ def read_layers(features: tuple[Feature, ...], names: Iterable[str], *, near_lon
     layers: dict[str, list[shapely.Polygon]] = {name: [] for name in names}
     repairs: Counter[str] = Counter()
     for feature in features:
-        for rings in polygon_rings(feature.geometry, feature.entry) if feature.layer in layers else ():
-            shell, *holes = _continuous([_ring(ring, feature.entry, repairs) for ring in rings], feature.entry)
-            middle = float(shell[:, 0].mean())
-            near_lon_deg = middle if near_lon_deg is None else near_lon_deg
-            turn = np.array([360.0 * round((near_lon_deg - middle) / 360), 0.0])
-            repairs[MOVED] += bool(turn[0])
-            polygon = shapely.Polygon(shell + turn, [hole + turn for hole in holes])
-            layers[feature.layer] += _valid(polygon, feature.entry, repairs)
+        if feature.layer in layers:
+            polygons = feature_polygons(feature.geometry, feature.entry, near_lon_deg, repairs)
+            layers[feature.layer] += polygons
+            if near_lon_deg is None and polygons:
+                near_lon_deg = float(shapely.get_coordinates(polygons[0].exterior)[:, 0].mean())
     if not any(layers.values()):
         raise InputError(f"holds no polygon in the layers {', '.join(layers)}, expected at least one")
     notes = tuple(f"{count} {what}" for what, count in repairs.items() if count)
     return Chart(layers={name: tuple(polygons) for name, polygons in layers.items()}, notes=notes)
+
+
+def feature_polygons(
+    geometry: object, entry: Entry, near_lon_deg: float | None, repairs: Counter[str]
+) -> list[shapely.Polygon]:
+    """The valid polygons of a geometry; counts repairs.
+
+    Args:
+        geometry: in GeoJSON.
+        entry: names the feature.
+        near_lon_deg: longitudes are counted within half a turn of it; of the first polygon where None.
+        repairs: grows.
+    """
+    polygons: list[shapely.Polygon] = []
+    for rings in polygon_rings(geometry, entry):
+        shell, *holes = _continuous([_ring(ring, entry, repairs) for ring in rings], entry)
+        middle = float(shell[:, 0].mean())
+        near_lon_deg = middle if near_lon_deg is None else near_lon_deg
+        turn = np.array([360.0 * round((near_lon_deg - middle) / 360), 0.0])
+        repairs[MOVED] += bool(turn[0])
+        polygons += _valid(shapely.Polygon(shell + turn, [hole + turn for hole in holes]), entry, repairs)
+    return polygons
 
 
 def place_text(lat_deg: float, lon_deg: float) -> str:
@@ -92,16 +111,7 @@ def place_text(lat_deg: float, lon_deg: float) -> str:
 
 def _ring(positions: Any, entry: Entry, repairs: Counter[str]) -> Array:
     """One closed ring (k, 2) of longitude, latitude without repeated points."""
-    positions = positions if isinstance(positions, list) else [positions]
-    strange = [position for position in positions or [[]] if not _is_position(position)]
-    if strange:
-        found = str(strange[0])[:60]
-        raise entry.error(f"has {found} where a position [longitude, latitude] of numbers is expected")
-    ring = np.array([position[:2] for position in positions], dtype=float)
-    wrong = (np.abs(ring[:, 1]) > 90) | (ring[:, 0] < -180) | (ring[:, 0] > 360)
-    if wrong.any():
-        lon, lat = ring[wrong][0]
-        raise entry.error(f"has the position [{lon:g}, {lat:g}], expected [longitude, latitude] in degrees")
+    ring = positions_of(positions, entry)[:, :2]
     kept = np.concatenate([[True], (np.diff(ring, axis=0) != 0).any(axis=1)])
     repairs[REPEATED] += int(np.count_nonzero(~kept))
     ring = ring[kept]
@@ -112,6 +122,34 @@ def _ring(positions: Any, entry: Entry, repairs: Counter[str]) -> Array:
     if corners < 3:
         raise entry.error(f"has a ring with {corners} different corners, expected at least 3")
     return ring
+
+
+def positions_of(positions: Any, entry: Entry) -> Array:
+    """(k, 2) longitude, latitude of a list of positions, or (k, 3) where all have a third coordinate.
+
+    Raises:
+        FileError: one is no position, or out of range.
+    """
+    positions = positions if isinstance(positions, list) else [positions]
+    strange = [position for position in positions or [[]] if not _is_position(position)]
+    if strange:
+        found = str(strange[0])[:60]
+        raise entry.error(f"has {found} where a position [longitude, latitude] of numbers is expected")
+    size = 3 if all(len(position) > 2 and _is_position(position[1:]) for position in positions) else 2
+    points = np.array([position[:size] for position in positions], dtype=float)
+    wrong = (np.abs(points[:, 1]) > 90) | (points[:, 0] < -180) | (points[:, 0] > 360)
+    if wrong.any():
+        lon, lat = points[wrong][0, :2]
+        raise entry.error(f"has the position [{lon:g}, {lat:g}], expected [longitude, latitude] in degrees")
+    return points
+
+
+def continuous_line(points: Array, near_lon_deg: float) -> Array:
+    """The points (k, 2 or 3) of a line without jumps of a full turn, within half a turn of a longitude."""
+    moved = points.copy()
+    moved[:, 0] = np.unwrap(points[:, 0], period=360.0)
+    moved[:, 0] += 360.0 * np.round((near_lon_deg - moved[:, 0].mean()) / 360)
+    return moved
 
 
 def _is_position(position: object) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +11,9 @@ import shapely
 from expdesign.errors import FileError, InputError, NoPlan
 from expdesign.scenario.charts.area_tables import AreaTable, ChartTable
 from expdesign.scenario.charts.chart import Chart, read_layers
-from expdesign.scenario.charts.geojson import LAYER_OF_BARE_POLYGONS, Feature, read_features
+from expdesign.scenario.charts.dangers import ShipRules, closed_water
+from expdesign.scenario.charts.geojson import LAYER_OF_BARE_POLYGONS, POLYGON_TYPES, Feature, read_features
+from expdesign.scenario.charts.geojson_dangers import dangers, kind_of, not_used
 from expdesign.scenario.charts.metres import Box, around, in_metres
 from expdesign.scenario.charts.zones import ChartZones, OpenChart, rule_text
 from expdesign.scenario.tables import LARGEST, Entry, shown
@@ -22,22 +24,32 @@ def open_geojson(file: AreaTable, *, draught_m: float, given: Box | None, entry:
     """The chart that an area file names with `chart.geojson`."""
     path = _chart_path(file.chart, entry)
     features = read_features(path, layer_property=file.chart.layer_property)
-    features, depths = _with_depths(features, file.chart, entry)
-    chart = _read_chart(file.chart, features, depths, given, entry)
+    charted = [feature for feature in features if _is_area(feature) or not kind_of(feature, file.chart)]
+    areas, depths = _with_depths(charted, file.chart, entry)
+    unused = [area for area, before in zip(areas, charted, strict=True) if not kind_of(before, file.chart)]
+    chart = _read_chart(file.chart, features, areas, depths, given, entry)
+    objects = dangers(features, file.chart, (chart.extent[0] + chart.extent[2]) / 2)
+    rules = ShipRules(
+        needed_m=rule_text(file.depth, draught_m)[0],
+        margin_m=file.chart.hazard_margin_m,
+        air_draught_m=file.chart.air_draught_m,
+    )
 
     def zones(box: Box, frame: LocalFrame) -> ChartZones:
         deep, rule = _deep_water(file, depths, draught_m, entry)
+        found = closed_water(objects, rules, around(box), frame)
         return ChartZones(
-            land=_layer_union(chart, file.chart.land_layers, box, frame),
+            land=shapely.union(_layer_union(chart, file.chart.land_layers, box, frame), found.solid),
             deep=None if deep is None else _deep_union(file.chart, chart, deep, depths, box, frame),
-            closed=shapely.MultiPolygon(),
+            closed=found.closed,
             depths=tuple(
                 (depths[name], _layer_union(chart, [name], box, frame))
                 for name in sorted(depths, key=depths.__getitem__)
             ),
             depth_rule=rule,
             notes=(
-                *(f"{path.name}: {note}" for note in (*_assumed(features, file.chart), *chart.notes)),
+                *(f"{path.name}: {note}" for note in (*_assumed(areas, file.chart), *chart.notes, *found.notes)),
+                *(f"{path.name}: {note}" for note in not_used(unused, {*file.chart.land_layers, *depths})),
                 *_beyond_chart(box, chart, deep),
             ),
         )
@@ -56,12 +68,12 @@ def _chart_path(chart: ChartTable, entry: Entry) -> Path:
 
 
 def _with_depths(
-    features: tuple[Feature, ...], chart: ChartTable, entry: Entry
+    features: Sequence[Feature], chart: ChartTable, entry: Entry
 ) -> tuple[tuple[Feature, ...], dict[str, float]]:
     """The features, those with a depth among their properties in a layer of that depth; and layers with their depth."""
     key = chart.depth_property
     if key is None:
-        return features, dict(chart.depth_layers or {})
+        return tuple(features), dict(chart.depth_layers or {})
     depths: dict[str, float] = {}
     sorted_out = []
     for feature in features:
@@ -84,15 +96,23 @@ def _assumed(features: tuple[Feature, ...], chart: ChartTable) -> tuple[str, ...
     return (f"no feature names its {chart.layer_property}, so {land} count as land",) if land and some else ()
 
 
+def _is_area(feature: Feature) -> bool:
+    return feature.geometry["type"] in POLYGON_TYPES
+
+
 def _read_chart(
-    table: ChartTable, features: tuple[Feature, ...], depths: Mapping[str, float], given: Box | None, entry: Entry
+    table: ChartTable,
+    features: tuple[Feature, ...],
+    areas: tuple[Feature, ...],
+    depths: Mapping[str, float],
+    given: Box | None,
+    entry: Entry,
 ) -> Chart:
-    """The layers that the file names."""
-    known = sorted({feature.layer for feature in features})
-    _check_layers(table, known, entry)
+    """The layers of areas that the file names."""
+    _check_layers(table, sorted({feature.layer for feature in features}), entry)
     layers = dict.fromkeys((*table.land_layers, *depths))
     try:
-        return read_layers(features, layers, near_lon_deg=None if given is None else (given[0] + given[2]) / 2)
+        return read_layers(areas, layers, near_lon_deg=None if given is None else (given[0] + given[2]) / 2)
     except FileError:
         raise
     except InputError as error:
@@ -109,6 +129,11 @@ def _check_layers(chart: ChartTable, known: list[str], entry: Entry) -> None:
             raise entry.at("depth_layers").unknown(name, known)
         if name in chart.land_layers:
             raise entry.at("depth_layers").at(name).error("is also a land layer, expected one or the other")
+    for index, name in enumerate(chart.danger_layers or [], start=1):
+        if name not in known:
+            raise entry.at("danger_layers").item(index).unknown(name, known)
+        if name in chart.land_layers or name in (chart.depth_layers or {}):
+            raise entry.at("danger_layers").item(index).error(f"is {shown(name)}, also a layer of land or depth")
 
 
 def _deep_water(

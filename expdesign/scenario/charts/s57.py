@@ -20,21 +20,12 @@ import pyogrio
 import shapely
 from pyogrio.errors import DataSourceError
 
+from expdesign.scenario.charts.dangers import BUOYS, CLEARANCES, DANGERS, OVERHEAD, SOLID, UNSURVEYED, ChartedObject
 from expdesign.scenario.tables import Entry
 
 OPTIONS = {"UPDATES": "APPLY", "SPLIT_MULTIPOINT": "YES", "ADD_SOUNDG_DEPTH": "YES"}
 DEPTHS = ("DEPARE", "DRGARE")
 """Areas with a least depth DRVAL1: natural and dredged."""
-SOLID = (
-    *("LNDARE", "SLCONS", "PONTON", "HULKES", "FLODOC", "DRYDOC", "GATCON", "DAMCON", "DYKCON", "CAUSWY", "LOGPON"),
-    *("MORFAC", "PILPNT", "OFSPLF", "PYLONS", "BCNCAR", "BCNISD", "BCNLAT", "BCNSAW", "BCNSPP", "MARCUL", "FSHFAC"),
-)
-"""Obstacles at any depth: land, works, moored and floating structures, piles, beacons."""
-BUOYS = ("BOYCAR", "BOYINB", "BOYISD", "BOYLAT", "BOYSAW", "BOYSPP", "LITFLT", "LITVES", "ICEARE", "WEDKLP")
-DANGERS = {"OBSTRN": "VALSOU", "WRECKS": "VALSOU", "UWTROC": "VALSOU", "SOUNDG": "DEPTH"}
-"""Dangers and the attribute with their depth; where it is empty they count as at the surface."""
-OVERHEAD = ("BRIDGE", "CBLOHD", "PIPOHD", "CONVYR")
-CLEARANCES = ("VERCLR", "VERCCL", "VERCSA")
 KEEP_OUT = {"7": "entry prohibited", "8": "entry restricted", "14": "area to be avoided"}
 """Values of the attribute RESTRN that keep a trial out."""
 WGS84, METRES = 2, 1
@@ -52,44 +43,20 @@ DATUMS = {
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Feature57:
-    """One charted object.
-
-    Attributes:
-        kind: its object class, e.g. "WRECKS".
-        geometry: any, coordinates (longitude, latitude) [deg].
-        depth_m: least depth below the sounding datum; nan where not stated or meaningless.
-        clearance_m: height below it of what crosses overhead; nan where not stated.
-        why: what keeps a trial out of a restricted area, else "".
-    """
-
-    kind: str
-    geometry: shapely.Geometry
-    depth_m: float = np.nan
-    clearance_m: float = np.nan
-    why: str = ""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
 class Cell:
     """The features of a cell that limit where a ship may go.
 
     Attributes:
-        features: of the classes in `DEPTHS`, `SOLID`, `BUOYS`, `DANGERS`, `OVERHEAD`, and restricted areas.
+        features: of the classes in `DEPTHS`, `SOLID`, `BUOYS`, `DANGERS`, `OVERHEAD`, `UNSURVEYED`; restricted areas.
         notes: edition, updates, datum, scale, and repairs.
     """
 
-    features: tuple[Feature57, ...]
+    features: tuple[ChartedObject, ...]
     notes: tuple[str, ...]
 
-    def of(self, *kinds: str) -> tuple[Feature57, ...]:
+    def of(self, *kinds: str) -> tuple[ChartedObject, ...]:
         """The features of some classes."""
         return tuple(feature for feature in self.features if feature.kind in kinds and not feature.why)
-
-    @property
-    def restricted(self) -> tuple[Feature57, ...]:
-        """Areas that are closed by regulation."""
-        return tuple(feature for feature in self.features if feature.why)
 
     @property
     def extent(self) -> tuple[float, float, float, float]:
@@ -155,8 +122,8 @@ def _columns(path: Path, layer: str) -> tuple[dict[str, Any], Any]:
     return dict(zip(meta["fields"], fields, strict=True)), geometry
 
 
-def _features(path: Path, layer: str, repaired: list[str]) -> Iterator[Feature57]:
-    wanted = {*DEPTHS, *SOLID, *BUOYS, *DANGERS, *OVERHEAD}
+def _features(path: Path, layer: str, repaired: list[str]) -> Iterator[ChartedObject]:
+    wanted = {*DEPTHS, *SOLID, *BUOYS, *DANGERS, *OVERHEAD, UNSURVEYED}
     if layer in ("DSID", "C_AGGR", "C_ASSO"):
         return
     columns, raw = _columns(path, layer)
@@ -180,9 +147,9 @@ def _features(path: Path, layer: str, repaired: list[str]) -> Iterator[Feature57
             "clearance_m": min((height for height in heights if not np.isnan(height)), default=np.nan),
         }
         if layer in wanted:
-            yield Feature57(**found)
+            yield ChartedObject(**found)
         if why:
-            yield Feature57(**found, why=why)
+            yield ChartedObject(**found, why=why)
 
 
 def _keep_out(codes: Any) -> str:

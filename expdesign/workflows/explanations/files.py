@@ -23,6 +23,13 @@ VESSELS = (
     "noise. Signals are numbered by kind in the order of the file: n1, a1 of the first thruster, rudder1 of the first "
     "rudder."
 )
+AREAS = (
+    "Allowed water is inside the bounds and deep enough, and is neither land, danger nor a no-go zone. Dangers in a "
+    "GeoJSON chart are rocks, wrecks, shoals, obstructions, soundings, unsurveyed areas, buoys, beacons and bridges, as "
+    "points, lines or areas. They are known by their layer, or by a property kind, type, class, natural or "
+    "seamark:type, in English or as an object class of S-57. A property depth_m, depth or VALSOU states their least "
+    "depth [m]; without one they count as at the surface. Results name every layer that is not used."
+)
 
 
 def scenario_topic() -> Topic:
@@ -54,8 +61,7 @@ def dictionary_topic() -> Topic:
 
 def area_topic() -> Topic:
     """Keys of an area file."""
-    text = "Allowed water is inside the bounds and deep enough, and is neither land, danger nor a no-go zone."
-    return Topic(name="area", title="Area files", text=text, sections=_by_table(AreaTable))
+    return Topic(name="area", title="Area files", text=AREAS, sections=_by_table(AreaTable))
 
 
 def _with_more(section: Section, model: type[Table]) -> Section:

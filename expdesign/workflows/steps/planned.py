@@ -90,6 +90,7 @@ def plan_summary(plan: Plan) -> dict[str, object]:
         "leave_water_probability": plan.leave_water_probability,
         **_risk_summary(plan.risk),
         "design_efficiency_realised": plan.design_efficiency_realised,
+        **({"chart_remarks": list(plan.area.notes)} if plan.area.notes else {}),
     }
 
 

@@ -1,0 +1,166 @@
+"""Dangers of GeoJSON charts by layer or property: rocks, wrecks, shoals, obstructions, unsurveyed areas, buoys.
+
+Names of object classes of S-57 are understood as they are, other names word by word.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Container, Iterable, Iterator, Mapping
+from typing import Any
+
+import numpy as np
+import shapely
+
+from expdesign.scenario.charts.area_tables import ChartTable
+from expdesign.scenario.charts.chart import continuous_line, feature_polygons, positions_of
+from expdesign.scenario.charts.dangers import BUOYS, CLEARANCES, DANGERS, OVERHEAD, SOLID, UNSURVEYED, ChartedObject
+from expdesign.scenario.charts.geojson import POLYGON_TYPES, Feature
+from expdesign.scenario.tables import LARGEST, Entry
+
+CLASSES = (*SOLID, *BUOYS, *DANGERS, *OVERHEAD, UNSURVEYED)
+WORDS = {
+    **dict.fromkeys(("rock", "reef", "boulder", "skerry", "skerries", "pinnacle"), "UWTROC"),
+    **dict.fromkeys(("wreck", "shipwreck"), "WRECKS"),
+    **dict.fromkeys(("shoal", "obstruction", "obstructed", "foul", "snag", "danger", "dangerous", "hazard"), "OBSTRN"),
+    "sounding": "SOUNDG",
+    **dict.fromkeys(("unsurveyed", "uncharted", "unsounded"), UNSURVEYED),
+    "buoy": "BOYSPP",
+    "beacon": "BCNSPP",
+    **dict.fromkeys(("pile", "dolphin", "pylon"), "PILPNT"),
+    "bridge": "BRIDGE",
+}
+"""Words for dangers and obstacles, and their object class."""
+KIND_KEYS = ("kind", "type", "class", "category", "object", "feature", "acronym", "natural", "hazard", "seamark:type")
+"""Properties that may say what a feature is."""
+CLASS_OF_KEY = {"catwrk": "WRECKS", "catobs": "OBSTRN", "valsou": "OBSTRN"}
+"""Attributes that only dangers have."""
+NUMBERS = {86: "OBSTRN", 129: "SOUNDG", 153: "UWTROC", 154: UNSURVEYED, 159: "WRECKS"}
+"""Numbers of object classes, attribute OBJL."""
+DEPTH_KEYS = ("depth_m", "depth", "least_depth_m", "least_depth", "valsou", "drval1")
+
+
+def kind_of(feature: Feature, table: ChartTable) -> str:
+    """The object class of a danger or obstacle; "" for other features and for those that the file uses otherwise.
+
+    Areas in land layers are land. Layers named in `danger_layers` hold dangers of whatever kind. Points and lines with
+    a depth are soundings and depth contours.
+    """
+    area = feature.geometry["type"] in POLYGON_TYPES
+    land = feature.layer in table.land_layers
+    if area and land:
+        return ""
+    if table.danger_layers is not None:
+        return (_said(feature) or "OBSTRN") if feature.layer in table.danger_layers else ""
+    named = land or feature.layer in (table.depth_layers or {})
+    spot = not area and table.depth_property is not None and feature.properties.get(table.depth_property) is not None
+    return _said(feature) or ("" if named else _class(feature.layer)) or ("SOUNDG" if spot else "")
+
+
+def dangers(features: tuple[Feature, ...], table: ChartTable, near_lon_deg: float) -> tuple[ChartedObject, ...]:
+    """The dangers and obstacles among features.
+
+    Args:
+        features: of one file.
+        table: of the area file.
+        near_lon_deg: longitudes are counted within half a turn of it.
+
+    Raises:
+        FileError: naming the feature whose positions are wrong.
+    """
+    kinds = [(feature, kind_of(feature, table)) for feature in features]
+    return tuple(
+        ChartedObject(
+            kind=kind,
+            geometry=geometry,
+            depth_m=_depth(feature, kind, table, geometry),
+            clearance_m=_least(feature, tuple(name.lower() for name in CLEARANCES)),
+        )
+        for feature, kind in kinds
+        if kind
+        for geometry in _geometries(feature.geometry, feature.entry, near_lon_deg)
+    )
+
+
+def not_used(features: Iterable[Feature], used: Container[str]) -> tuple[str, ...]:
+    """One line for each layer of features, and kind in it, that is not used.
+
+    Args:
+        features: that are no dangers.
+        used: layers whose areas are used.
+    """
+    left = [item for item in features if not (item.layer in used and item.geometry["type"] in POLYGON_TYPES)]
+    counts = Counter((item.layer, _kind_words(item), item.geometry["type"]) for item in left)
+    return tuple(
+        f"not used: {count} {geometry} in layer {layer!r}{kind and f' of {kind}'}"
+        for (layer, kind, geometry), count in counts.items()
+    )
+
+
+def _said(feature: Feature) -> str:
+    """The object class that the properties of a feature state, or ""."""
+    properties = {key.lower(): value for key, value in feature.properties.items() if value is not None}
+    number = properties.get("objl")
+    if type(number) in (int, float) and number in NUMBERS:
+        return NUMBERS[int(number)]
+    stated = (_class(value) for key in KIND_KEYS if isinstance(value := properties.get(key), str))
+    return next(filter(None, stated), "") or next((CLASS_OF_KEY[key] for key in CLASS_OF_KEY if key in properties), "")
+
+
+def _kind_words(feature: Feature) -> str:
+    """What the properties say of a feature, e.g. "kind 'tree'", or ""."""
+    for key, value in feature.properties.items():
+        if key.lower() in KIND_KEYS and isinstance(value, str):
+            return f"{key} {value[:40]!r}"
+    return ""
+
+
+def _class(name: str) -> str:
+    """The object class of a name, or ""."""
+    if name.upper() in CLASSES:
+        return name.upper()
+    words = (word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+", name))
+    return next((WORDS[found] for word in words for found in (word, word.removesuffix("s")) if found in WORDS), "")
+
+
+def _depth(feature: Feature, kind: str, table: ChartTable, geometry: shapely.Geometry) -> float:
+    """The least depth that is stated; nan for none. Soundings may state it as a third coordinate, if positive."""
+    keys = (*DEPTH_KEYS, *([table.depth_property.lower()] if table.depth_property else []))
+    stated = _least(feature, keys)
+    if np.isnan(stated) and kind == "SOUNDG" and geometry.has_z:
+        depth = float(shapely.get_coordinates(geometry, include_z=True)[:, 2].min())
+        return depth if depth > 0 else np.nan
+    return stated
+
+
+def _least(feature: Feature, keys: tuple[str, ...]) -> float:
+    """The least number among properties; nan where there is none, or where one of them is no number."""
+    found = [_number(value) for key, value in feature.properties.items() if key.lower() in keys and value is not None]
+    return min(found) if found and not np.isnan(found).any() else np.nan
+
+
+def _number(value: object) -> float:
+    try:
+        number = float(value) if isinstance(value, (int, float, str)) and not isinstance(value, bool) else np.nan
+    except (ValueError, OverflowError):
+        return np.nan
+    return number if abs(number) < LARGEST else np.nan
+
+
+def _geometries(geometry: Mapping[str, Any], entry: Entry, near_lon_deg: float) -> Iterator[shapely.Geometry]:
+    """The parts of a geometry, checked; those that are not polygons with their third coordinate, if all have one."""
+    kind, repairs = geometry.get("type"), Counter[str]()
+    if kind == "GeometryCollection":
+        parts = geometry.get("geometries")
+        for part in parts if isinstance(parts, list) else []:
+            if isinstance(part, dict):
+                yield from _geometries(part, entry, near_lon_deg)
+    elif kind in ("Polygon", "MultiPolygon"):
+        yield from feature_polygons(geometry, entry, near_lon_deg, repairs)
+    else:
+        content = geometry.get("coordinates")
+        for part in [content] if kind in ("Point", "LineString") else content if isinstance(content, list) else [None]:
+            points = positions_of([part] if kind in ("Point", "MultiPoint") else part, entry)
+            points = continuous_line(points, near_lon_deg)
+            yield shapely.Point(points[0]) if len(points) == 1 else shapely.LineString(points)
