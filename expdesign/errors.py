@@ -6,13 +6,16 @@ status 2 and `NoAnswer` into exit status 3.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from difflib import get_close_matches
 from pathlib import Path
 
 
 class ExpdesignError(Exception):
-    """Base of every error that the package raises on purpose."""
+    """Base of every error that the package raises on purpose; it comes from other processes as it was raised there."""
+
+    def __reduce__(self) -> tuple[Callable[..., object], tuple[object, ...], dict[str, object]]:
+        return _remade, (type(self), self.args), vars(self)
 
 
 class InputError(ExpdesignError):
@@ -85,6 +88,11 @@ class NotInformative(NoAnswer):
 
 class NoPlan(NoAnswer):
     """No trajectory satisfies the limits; the message names the place or the primitive."""
+
+
+def _remade(kind: type[ExpdesignError], arguments: tuple[object, ...]) -> ExpdesignError:
+    """An error with a message that is already made."""
+    return kind.__new__(kind, *arguments)
 
 
 def nearest(name: str, known: Iterable[str]) -> str | None:

@@ -13,7 +13,8 @@ ROOT = Path(expdesign.__file__).parent
 
 FLOORS = {
     "": (
-        ("errors", "interruptions", "lazy", "processes", "progress"),
+        ("errors", "interruptions", "lazy", "progress"),
+        ("processes",),
         ("conventions", "values"),
         ("signals", "sea_area"),
         ("vessel",),
@@ -81,6 +82,7 @@ EXCEPTIONS = {("__main__", "cli")}  # `python -m` is nothing but the command lin
 IMPORTERS = {
     "cvxpy": ("durations/_cvxpy.py",),
     "ompl": ("plan/legs/_ompl.py",),
+    "distributed": ("processes/_dask.py",),
     "casadi": (
         "simulation/_casadi.py",
         "estimation/replay/_casadi.py",

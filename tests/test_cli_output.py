@@ -34,7 +34,15 @@ ESTIMATE = {
     "tests": (),
 }
 PLAIN = {"departure": None, "tolerance_m": None}
-REPLAN = {"jobs": 0, "data": (Path("d.csv"),), "vessel": None, "remaining_s": None, "interest": (), "seed": 0}
+REPLAN = {
+    "jobs": 0,
+    "scheduler": None,
+    "data": (Path("d.csv"),),
+    "vessel": None,
+    "remaining_s": None,
+    "interest": (),
+    "seed": 0,
+}
 COMMANDS = ("run", "score", "durations", "plan", "export", "simulate", "estimate", "replan")
 
 
@@ -73,16 +81,21 @@ def workflows(monkeypatch: pytest.MonkeyPatch) -> Workflows:
 @pytest.mark.parametrize(
     ("typed", "name", "arguments", "options"),
     [
-        ("run a.toml", "run", (Path("a.toml"), None), {"seed": 0, "jobs": 0}),
-        ("run a.toml --out o --seed 7 --jobs 1", "run", (Path("a.toml"), Path("o")), {"seed": 7, "jobs": 1}),
+        ("run a.toml", "run", (Path("a.toml"), None), {"seed": 0, "jobs": 0, "scheduler": None}),
+        (
+            "run a.toml --out o --seed 7 --jobs 1",
+            "run",
+            (Path("a.toml"), Path("o")),
+            {"seed": 7, "jobs": 1, "scheduler": None},
+        ),
         ("score --seed 1 a.toml", "score", (Path("a.toml"), None), {"seed": 1}),
         ("durations a.toml", "durations", (Path("a.toml"), None), {"seed": 0, "grow": False}),
-        ("plan a.toml", "plan", (Path("a.toml"), None), {"seed": 0, "jobs": 0, "durations": None}),
+        ("plan a.toml", "plan", (Path("a.toml"), None), {"seed": 0, "jobs": 0, "scheduler": None, "durations": None}),
         (
             "plan a.toml --durations d.json",
             "plan",
             (Path("a.toml"), None),
-            {"seed": 0, "jobs": 0, "durations": Path("d.json")},
+            {"seed": 0, "jobs": 0, "scheduler": None, "durations": Path("d.json")},
         ),
         ("export p.json --format rtz gpx", "export", (Path("p.json"), None), {"formats": ("rtz", "gpx"), **PLAIN}),
         (
@@ -128,6 +141,7 @@ def workflows(monkeypatch: pytest.MonkeyPatch) -> Workflows:
                 "remaining_s": 300.0,
                 "interest": ("Y_v", "N_r"),
                 "jobs": 0,
+                "scheduler": None,
                 "seed": 0,
             },
         ),

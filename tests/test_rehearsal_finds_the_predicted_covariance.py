@@ -7,6 +7,7 @@ import pytest
 from expdesign.dictionary import build_dictionary
 from expdesign.errors import NotInformative
 from expdesign.information.expected import TrialPart, expected_covariance
+from expdesign.processes import local_processes
 from expdesign.rehearsal import validation
 from expdesign.rehearsal.validation import Rehearsal, heading_rad, trial_parts, validate
 from expdesign.scenario import load_vessel
@@ -177,7 +178,8 @@ def test_any_number_of_processes_and_any_interruption_give_the_same(monkeypatch)
     whole = validate(rehearsal, keep=kept.__setitem__)
     half = {key: rows for key, rows in kept.items() if key.endswith("/0")}
     assert 0 < len(half) < len(kept)
-    resumed = validate(rehearsal, jobs=2, done=half)
+    with local_processes(2):
+        resumed = validate(rehearsal, done=half)
     for one, other in zip(whole, resumed, strict=True):
         assert np.array_equal(one.estimates, other.estimates)
         assert np.array_equal(one.stated, other.stated)

@@ -106,21 +106,3 @@ def test_two_of_one_name_and_none_at_all_are_refused(tmp_path):
         workflows.whatif(MODEL_SHIP, [], tmp_path, jobs=1)
     with pytest.raises(FileError, match="does not exist"):
         workflows.whatif(MODEL_SHIP, [tmp_path / "none.toml"], tmp_path, jobs=1)
-
-
-@pytest.mark.optional
-def test_the_same_call_runs_on_a_cluster(tmp_path):
-    import distributed
-
-    half = variant(tmp_path, "half", "[design]\ntotal_s = 225.0\n")
-    here = cases(workflows.whatif(MODEL_SHIP, [half], tmp_path / "here", jobs=1))
-    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None, processes=True) as cluster:
-        there = cases(workflows.whatif(MODEL_SHIP, [half], tmp_path / "there", scheduler=cluster.scheduler_address))
-    assert there == here
-
-
-@pytest.mark.optional
-def test_no_scheduler_is_one_line(tmp_path):
-    path = variant(tmp_path, "same", "[design]\n")
-    with pytest.raises(InputError, match="no scheduler answers there"):
-        workflows.whatif(MODEL_SHIP, [path], tmp_path, scheduler="tcp://127.0.0.1:9")

@@ -33,9 +33,16 @@ def parse_seed(text: str) -> int:
     Raises:
         InputError: not a whole number of 0 or more.
     """
-    if not str(text).isdecimal():
-        raise InputError(f"--seed is {text}, expected a whole number of 0 or more")
-    return int(text)
+    return _count("--seed", text)
+
+
+def parse_jobs(text: str) -> int:
+    """The number of processes, 0 for one per core.
+
+    Raises:
+        InputError: not a whole number of 0 or more.
+    """
+    return _count("--jobs", text)
 
 
 def check_out(out: Path | None) -> Path | None:
@@ -52,6 +59,12 @@ def check_out(out: Path | None) -> Path | None:
     if not os.access(there, os.W_OK | os.X_OK):
         raise InputError(f"--out {out}: no permission to write in {there}")
     return out
+
+
+def _count(option: str, text: str) -> int:
+    if not str(text).isdecimal():
+        raise InputError(f"{option} is {text}, expected a whole number of 0 or more")
+    return int(text)
 
 
 def _looks_like_value(text: str) -> bool:

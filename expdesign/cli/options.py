@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from expdesign.cli.arguments import check_out, parse_seed
+from expdesign.cli.arguments import check_out, parse_jobs, parse_seed
 
 
 def out_option(default: str) -> object:
@@ -41,7 +41,13 @@ Seed = Annotated[
     int,
     typer.Option("--seed", parser=parse_seed, metavar="N", help="Seed of all random numbers; same seed, same result."),
 ]
-Jobs = Annotated[int, typer.Option("--jobs", metavar="N", help="Number of processes; 0 for one per core.")]
+Jobs = Annotated[
+    int, typer.Option("--jobs", parser=parse_jobs, metavar="N", help="Number of processes; 0 for one per core.")
+]
+Scheduler = Annotated[
+    str | None,
+    typer.Option("--scheduler", metavar="ADDRESS", help="Dask scheduler to compute on instead, e.g. tcp://host:8786."),
+]
 Fixed = Annotated[
     list[str] | None,
     typer.Option("--fixed", metavar="NAME ...", help="Parameters kept at the vessel file's values."),

@@ -8,16 +8,16 @@ from typing import Annotated
 import typer
 
 from expdesign.cli.app import Asked, ask, command
-from expdesign.cli.options import Jobs, Out, OutBesidePlan, OutWhatIf, PlanFile, ScenarioFile, Seed
+from expdesign.cli.options import Jobs, Out, OutBesidePlan, OutWhatIf, PlanFile, ScenarioFile, Scheduler, Seed
 
 
 @command("run")
-def run(scenario: ScenarioFile, out: Out = None, jobs: Jobs = 0, seed: Seed = 0) -> Asked:
+def run(scenario: ScenarioFile, out: Out = None, jobs: Jobs = 0, scheduler: Scheduler = None, seed: Seed = 0) -> Asked:
     """Do everything: score, durations, plan, verification, route files, report.
 
     Example: expdesign run scenarios/helsinki.toml
     """
-    return ask("run", scenario, out, jobs=jobs, seed=seed)
+    return ask("run", scenario, out, jobs=jobs, scheduler=scheduler, seed=seed)
 
 
 @command("score")
@@ -55,13 +55,14 @@ def plan(
         typer.Option("--durations", metavar="FILE", help="A durations.json made before. Default: computed now."),
     ] = None,
     jobs: Jobs = 0,
+    scheduler: Scheduler = None,
     seed: Seed = 0,
 ) -> Asked:
     """Plan one trajectory that runs the chosen manoeuvres in allowed water, and verify it.
 
     Writes plan.json, track.csv and commands.csv.
     """
-    return ask("plan", scenario, out, durations=durations, jobs=jobs, seed=seed)
+    return ask("plan", scenario, out, durations=durations, jobs=jobs, scheduler=scheduler, seed=seed)
 
 
 @command("export")
@@ -118,10 +119,7 @@ def whatif(
         bool, typer.Option("--plan", help="Also plan the trials, to compare repositioning; takes minutes each.")
     ] = False,
     jobs: Jobs = 0,
-    scheduler: Annotated[
-        str | None,
-        typer.Option("--scheduler", metavar="ADDRESS", help="Dask scheduler to compute on, e.g. tcp://host:8786."),
-    ] = None,
+    scheduler: Scheduler = None,
     out: OutWhatIf = None,
     seed: Seed = 0,
 ) -> Asked:

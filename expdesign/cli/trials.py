@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from expdesign.cli.app import Asked, ask, command
-from expdesign.cli.options import Jobs, Out, OutBesidePlan, PlanFile, ScenarioFile, Seed
+from expdesign.cli.options import Jobs, Out, OutBesidePlan, PlanFile, ScenarioFile, Scheduler, Seed
 
 
 @command("simulate")
@@ -51,6 +51,7 @@ def validate(
         ),
     ] = "rk4",
     jobs: Jobs = 0,
+    scheduler: Scheduler = None,
     out: Out = None,
     seed: Seed = 0,
 ) -> Asked:
@@ -67,6 +68,7 @@ def validate(
         method=method,
         integrator=integrator,
         jobs=jobs,
+        scheduler=scheduler,
         seed=seed,
     )
 
@@ -108,6 +110,7 @@ def replan(
     ] = None,
     out: Out = None,
     jobs: Jobs = 0,
+    scheduler: Scheduler = None,
     seed: Seed = 0,
 ) -> Asked:
     """Plan the rest of a trial, from the present position, with a model updated from the data.
@@ -126,5 +129,6 @@ def replan(
         remaining_s=remaining,
         interest=interest or (),
         jobs=jobs,
+        scheduler=scheduler,
         seed=seed,
     )

@@ -19,7 +19,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from joblib import Parallel, delayed
 
 from expdesign.dictionary import Primitive
 from expdesign.errors import InputError, NoAnswer
@@ -27,6 +26,7 @@ from expdesign.estimation.methods import Settings, estimate
 from expdesign.estimation.solve import Weighting
 from expdesign.information.expected import TrialPart, expected_covariance
 from expdesign.information.tuning import TUNING as INFORMATION_TUNING
+from expdesign.processes import as_finished
 from expdesign.progress import Progress, silent
 from expdesign.rehearsal.tuning import TUNING
 from expdesign.signals import Batch, Record
@@ -144,16 +144,14 @@ def equal_runs(primitives: Sequence[Primitive], total_s: float) -> tuple[int, ..
 def validate(
     rehearsal: Rehearsal,
     *,
-    jobs: int = 1,
     done: Mapping[str, Array] | None = None,
     keep: Callable[[str, Array], None] = lambda key, rows: None,
     progress: Progress = silent,
 ) -> tuple[Validated, ...]:
-    """Validate every design of a rehearsal.
+    """Validate every design of a rehearsal; processes share the chunks of trials.
 
     Args:
         rehearsal: the designs and ships.
-        jobs: processes; a `joblib.parallel_config` around the call chooses another backend.
         done: rows of chunks from an earlier, interrupted call with the same rehearsal.
         keep: called with the key and rows of each finished chunk.
         progress: of the trials.
@@ -164,8 +162,7 @@ def validate(
     rows = dict(done or {})
     tasks = [task for task in _tasks(rehearsal) if task[0] not in rows]
     total = len(tasks) + len(rows)
-    work = Parallel(n_jobs=jobs, return_as="generator_unordered")
-    for key, found in work(delayed(_chunk)(rehearsal, *task) for task in tasks):
+    for key, found in as_finished(_chunk, (rehearsal,), tasks):
         rows[key] = found
         keep(key, found)
         progress("simulating trials", len(rows) / total)

@@ -22,6 +22,7 @@ def plan(
     durations: Path | None = None,
     seed: int = 0,
     jobs: int = 1,
+    scheduler: str | None = None,
     progress: Progress = silent,
 ) -> Outcome:
     """One verified trajectory with the runs of a durations file, or of the optimal durations.
@@ -32,6 +33,7 @@ def plan(
         durations: a durations.json made before.
         seed: of everything drawn.
         jobs: processes; 0 for one per core. The results do not depend on it.
+        scheduler: address of a Dask scheduler whose workers share the work instead.
         progress: of the command.
     """
     case = loaded(scenario, progress)
@@ -40,6 +42,6 @@ def plan(
     design = designed(case, information, seed=seed)
     if durations is not None:
         design = with_repeats(design, load_repeats(durations, names=design.problem.names))
-    with workers(jobs):
+    with workers(jobs, scheduler=scheduler):
         result = planned(case, information, design, seed=seed, progress=within(progress, 0.1, 0.95))
     return written(case, out, plan_files(case, result), plan_summary(result), progress)

@@ -17,7 +17,15 @@ from expdesign.workflows.steps.trial_files import built_route, report_content, t
 from expdesign.workflows.steps.workers import workers
 
 
-def run(scenario: Path, out: Path | None, *, seed: int = 0, jobs: int = 1, progress: Progress = silent) -> Outcome:
+def run(
+    scenario: Path,
+    out: Path | None,
+    *,
+    seed: int = 0,
+    jobs: int = 1,
+    scheduler: str | None = None,
+    progress: Progress = silent,
+) -> Outcome:
     """The main job: score, durations, plan, verification, route files and report, into `out` or runs/<scenario>.
 
     Args:
@@ -25,9 +33,10 @@ def run(scenario: Path, out: Path | None, *, seed: int = 0, jobs: int = 1, progr
         out: folder.
         seed: of everything drawn.
         jobs: processes; 0 for one per core. The results do not depend on it.
+        scheduler: address of a Dask scheduler whose workers share the work instead.
         progress: of the command.
     """
-    with workers(jobs):
+    with workers(jobs, scheduler=scheduler):
         return _run(scenario, out, seed, progress)
 
 

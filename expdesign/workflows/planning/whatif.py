@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from joblib import Parallel, delayed
 
 from expdesign import __version__
 from expdesign.durations import DurationDesign, efficiencies
@@ -16,6 +15,7 @@ from expdesign.export.whatif_page import Case, WhatIfContent, explanations, what
 from expdesign.export.whatif_page.page import table_header, table_row
 from expdesign.information import PrimitiveInformation, estimated_parameters
 from expdesign.information.expected import expected_covariance
+from expdesign.processes import as_finished
 from expdesign.progress import Progress, silent
 from expdesign.rehearsal import trial_parts
 from expdesign.scenario import Scenario, load_scenario, load_variant
@@ -66,9 +66,8 @@ def whatif(
             raise InputError(f"the name {name!r} is given to {names.count(name)} cases, expected different names")
     done: dict[int, Case] = {}
     with workers(jobs, scheduler=scheduler):
-        work = Parallel(return_as="generator_unordered")
-        tasks = (delayed(_case)(index, case, changes, with_plan, seed) for index, (case, changes) in enumerate(cases))
-        for index, found in work(tasks):
+        tasks = ((index, *case) for index, case in enumerate(cases))
+        for index, found in as_finished(_case, (with_plan, seed), tasks):
             done[index] = found
             progress(f"{found.name} is done", 0.95 * len(done) / len(cases))
     content = WhatIfContent(
@@ -85,7 +84,7 @@ def whatif(
     return Outcome(files=written, summary=_summary(content), tables=_tables(content))
 
 
-def _case(index: int, case: Scenario, changes: tuple[str, ...], with_plan: bool, seed: int) -> tuple[int, Case]:
+def _case(with_plan: bool, seed: int, index: int, case: Scenario, changes: tuple[str, ...]) -> tuple[int, Case]:
     """One case, computed without progress, because it may run in another process."""
     try:
         information, _ = ready(case, seed=seed)

@@ -45,6 +45,7 @@ def replan(
     interest: Sequence[str] = (),
     seed: int = 0,
     jobs: int = 1,
+    scheduler: str | None = None,
     progress: Progress = silent,
 ) -> Outcome:
     """Plan the rest of a trial from the ship's present position, with the results of `run`.
@@ -58,6 +59,7 @@ def replan(
         interest: parameters that the rest is to be best for, by criterion D_s; the scenario's criterion when empty.
         seed: of all chance.
         jobs: processes; 0 for one per core. The results do not depend on it.
+        scheduler: address of a Dask scheduler whose workers share the work instead.
         progress: of the command.
 
     Raises:
@@ -72,7 +74,7 @@ def replan(
         case, information, stated_std=_stated(state.first.vessel), seed=seed, progress=within(progress, 0.12, 0.15)
     )
     _check_runs(design)
-    with workers(jobs):
+    with workers(jobs, scheduler=scheduler):
         plan = planned(case, information, design, seed=seed, progress=within(progress, 0.15, 0.85))
     progress("writing routes, run cards and report", 0.85)
     known = known_of(replace(state, notes=(*state.notes, *notes)), case, design, plan)
@@ -94,7 +96,7 @@ def replan(
             },
         ),
     )
-    with workers(jobs):
+    with workers(jobs, scheduler=scheduler):
         files = trial_files(case, growth, content, route)
     files |= {
         VESSEL_FILE: vessel_toml(state.ship, comments=[f"The rest of trial {case.name!r} is planned with it.",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -23,6 +22,7 @@ from expdesign.workflows.command_text import command_text
 from expdesign.workflows.outcome import Outcome, TextTable
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.grown import ready
+from expdesign.workflows.steps.workers import workers
 
 OPTIMISED, EQUAL = "optimised", "equal shares"
 INTEGRATORS = ("rk4", "euler")
@@ -37,6 +37,7 @@ def validate_design(
     method: str = "iv",
     integrator: str = "rk4",
     jobs: int = 0,
+    scheduler: str | None = None,
     seed: int = 0,
     progress: Progress = silent,
 ) -> Outcome:
@@ -71,9 +72,8 @@ def validate_design(
     )
     folder = out or Path("runs") / case.name
     done, keep, forget = _chunk_store(folder / f".validation-{joblib.hash(_identity(rehearsal))}")
-    results = validate(
-        rehearsal, jobs=jobs or os.cpu_count() or 1, done=done, keep=keep, progress=within(progress, 0.05, 0.95)
-    )
+    with workers(jobs, scheduler=scheduler, load=None):
+        results = validate(rehearsal, done=done, keep=keep, progress=within(progress, 0.05, 0.95))
     content = ValidationContent(
         scenario=case.name,
         rehearsal=rehearsal,

@@ -1,0 +1,233 @@
+"""Work on the workers of a Dask scheduler; the only importer of `distributed`.
+
+What tasks share is the result of a task itself: where the worker that holds it dies, the scheduler makes it again from
+what it was given. Data scattered among workers would be lost, and with them the work.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+import traceback
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from queue import Empty, SimpleQueue
+from typing import Any
+from uuid import uuid4
+
+import cloudpickle
+
+from expdesign.errors import InputError
+from expdesign.processes.sharing import done
+from expdesign.processes.tuning import CLUSTER
+
+try:
+    from distributed import Client, Future, KilledWorker
+except ImportError:
+    raise InputError("--scheduler needs Dask, expected the extra: pip install 'expdesign[cluster]'") from None
+
+COMPARED = ("casadi", "clarabel", "cvxpy", "numba", "numpy", "ompl", "scipy", "shapely")
+"""Packages that results may depend on, besides our own: workers have the versions that are here."""
+LOGGERS = ("distributed", "distributed.client", "distributed.batched", "distributed.core", "distributed.comm")
+"""They tell of lost connections, each in its own words."""
+ONE_AT_A_TIME = threading.Lock()
+"""Held by the task of this process: solvers and their random numbers are not made for threads."""
+
+
+@contextmanager
+def connected(address: str) -> Iterator[Cluster]:
+    """The workers of a scheduler, which are checked; work that is left after the block is called off.
+
+    Raises:
+        InputError: no scheduler answers, or its workers cannot do the work.
+    """
+    with _quiet_loggers():
+        try:
+            client = Client(address, timeout=CLUSTER.connect_s, set_as_default=False)
+        except (OSError, ValueError) as error:
+            raise InputError(f"--scheduler {address}: no scheduler answers there ({error})") from None
+        try:
+            yield Cluster(client, address)
+        finally:
+            client.close(timeout=CLUSTER.connect_s)
+
+
+class Cluster:
+    """A scheduler and its workers.
+
+    Args:
+        client: connected to it.
+        address: of the scheduler, as it was given.
+
+    Raises:
+        InputError: there are no workers, or they have other versions than this process.
+    """
+
+    def __init__(self, client: Client, address: str) -> None:
+        self._client, self._address = client, address
+        self._call, versions = _sent_by_value()
+        self._expected = versions(COMPARED)
+        self._idle_since: float | None = None
+        self._check_workers(versions)
+
+    def results(self, both: bytes, tasks: Sequence[bytes], *, ordered: bool) -> Iterator[Any]:
+        """Results of `done(both, task)`; tasks are submitted now. One whose worker dies is done by another."""
+        work = self._submitted(both, tasks)
+        finished: SimpleQueue[int] = SimpleQueue()
+        for number, future in work.items():
+            future.add_done_callback(lambda _, number=number: finished.put(number))
+        outcomes = self._finished(work, finished)
+        return map(_result, _in_order(outcomes) if ordered else (outcome for _, outcome in outcomes))
+
+    def _submitted(self, both: bytes, tasks: Sequence[bytes]) -> dict[int, Future[Any]]:
+        name, expected = uuid4().hex, self._expected["expdesign"]
+        try:
+            shared = self._client.submit(bytes, both, key=f"shared-{name}")
+            return {
+                number: self._client.submit(self._call, expected, shared, task, key=f"task-{name}-{number}")
+                for number, task in enumerate(tasks)
+            }
+        except (OSError, RuntimeError):
+            raise self._lost() from None
+
+    def _finished(self, work: dict[int, Future[Any]], finished: SimpleQueue[int]) -> Iterator[tuple[int, bytes]]:
+        """Numbers and outcomes of tasks, as they are finished."""
+        while work:
+            try:
+                number = finished.get(timeout=CLUSTER.look_s)
+            except Empty:
+                self._look()
+            else:
+                yield number, self._outcome(work.pop(number))
+
+    def _outcome(self, future: Future[Any]) -> bytes:
+        """What the worker sent; where that is lost with the worker, the work is done again."""
+        while True:
+            try:
+                worker, version, outcome = future.result(timeout=CLUSTER.answer_s)
+            except TimeoutError:
+                self._look()
+            except KilledWorker:
+                raise self._error("several workers died of the same task; they may lack memory") from None
+            except Exception:
+                raise self._lost() from None
+            else:
+                self._check(worker, {"expdesign": version})
+                return bytes(outcome)
+
+    def _look(self) -> None:
+        """Raise InputError where the scheduler does not answer, or has been without workers for long."""
+        try:
+            scheduler = self._client.scheduler
+            assert scheduler is not None
+            found = self._client.sync(scheduler.identity, callback_timeout=CLUSTER.answer_s)
+        except Exception:
+            raise self._lost() from None
+        now = time.monotonic()
+        self._idle_since = None if found["workers"] else self._idle_since or now
+        if self._idle_since is not None and now - self._idle_since > CLUSTER.idle_s:
+            raise self._error(f"there have been no workers for {CLUSTER.idle_s:g} s, and work is left")
+
+    def _check_workers(self, versions: Callable[[Sequence[str]], dict[str, str]]) -> None:
+        try:
+            self._client.wait_for_workers(1, timeout=CLUSTER.answer_s)
+            found = self._client.run(versions, COMPARED)
+        except TimeoutError:
+            raise self._error("there are no workers, expected some (dask worker ADDRESS)") from None
+        except Exception as error:
+            raise self._error(f"the workers do not answer ({type(error).__name__})") from None
+        for worker in sorted(found):
+            self._check(worker, found[worker])
+
+    def _check(self, worker: str, versions: dict[str, str]) -> None:
+        for package, version in versions.items():
+            if version != self._expected[package]:
+                raise self._error(
+                    f"worker {worker} has {package} {version}, expected {self._expected[package]}, as it is here"
+                )
+
+    def _lost(self) -> InputError:
+        return self._error("the connection was lost before the work was done")
+
+    def _error(self, problem: str) -> InputError:
+        return InputError(f"--scheduler {self._address}: {problem}")
+
+
+def outcome_of(both: bytes, task: bytes) -> bytes:
+    """Result and error of a task, pickled; for workers."""
+    with ONE_AT_A_TIME:
+        try:
+            return bytes(cloudpickle.dumps((done(both, task), None)))
+        except Exception as error:
+            error.add_note("".join(traceback.format_exception(error)))
+            return bytes(cloudpickle.dumps((None, error)))
+
+
+def _result(outcome: bytes) -> Any:
+    result, error = cloudpickle.loads(outcome)
+    if error is not None:
+        raise error
+    return result
+
+
+def _in_order(numbered: Iterable[tuple[int, bytes]]) -> Iterator[bytes]:
+    waiting: dict[int, bytes] = {}
+    following = 0
+    for number, outcome in numbered:
+        waiting[number] = outcome
+        while following in waiting:
+            yield waiting.pop(following)
+            following += 1
+
+
+def _sent_by_value() -> tuple[Callable[..., tuple[str, str, bytes]], Callable[[Sequence[str]], dict[str, str]]]:
+    """What workers call for a task, and for the versions of packages.
+
+    Functions inside a function are sent by value: a worker may have another version of this package, or none.
+    """
+
+    def versions(packages: Sequence[str]) -> dict[str, str]:
+        import platform
+        from importlib.metadata import PackageNotFoundError, version
+
+        found = {"python": ".".join(platform.python_version_tuple()[:2]), "expdesign": own_version()}
+        for package in packages:
+            try:
+                found[package] = version(package)
+            except PackageNotFoundError:
+                found[package] = "none"
+        return found
+
+    def own_version() -> str:
+        try:
+            from expdesign import __version__
+        except ImportError:
+            return "none"
+        return __version__
+
+    def call(expected: str, both: bytes, task: bytes) -> tuple[str, str, bytes]:
+        from distributed import get_worker
+
+        found = own_version()
+        if found != expected:
+            return get_worker().address, found, b""
+        from expdesign.processes._dask import outcome_of
+
+        return get_worker().address, found, outcome_of(both, task)
+
+    return call, versions
+
+
+@contextmanager
+def _quiet_loggers() -> Iterator[None]:
+    """What happens to a connection is told once, as an error of ours."""
+    loggers = [logging.getLogger(name) for name in LOGGERS]
+    levels = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        for logger, level in zip(loggers, levels, strict=True):
+            logger.setLevel(level)

@@ -1,0 +1,126 @@
+"""Independent work, shared among processes of this machine or the workers of a Dask scheduler.
+
+Results are the same wherever tasks are done: a task takes all that it depends on, its random numbers too, as arguments.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import cloudpickle
+from joblib import Parallel, delayed, effective_n_jobs, parallel_config
+
+if TYPE_CHECKING:
+    from expdesign.processes._dask import Cluster
+
+Result = TypeVar("Result")
+
+_CLUSTER: ContextVar[Cluster | None] = ContextVar("_CLUSTER", default=None)
+"""Where `on_cluster` shares the work of a block."""
+
+
+def in_order(
+    function: Callable[..., Result], shared: tuple[Any, ...], tasks: Iterable[tuple[Any, ...]]
+) -> Iterator[Result]:
+    """Results of `function(*shared, *task)`, in the order of the tasks.
+
+    One process works on a task when its result is asked for. Several begin at once, on copies made now: what changes
+    here later does not reach them. Where results are not read to their end, the work under way is waited for; that of
+    a cluster is called off.
+
+    Args:
+        function: of a module.
+        shared: arguments that all tasks share; unpacked once in each process.
+        tasks: the others.
+    """
+    return _results(function, shared, tasks, ordered=True)
+
+
+def as_finished(
+    function: Callable[..., Result], shared: tuple[Any, ...], tasks: Iterable[tuple[Any, ...]]
+) -> Iterator[Result]:
+    """The results of `in_order`, those first that are finished first."""
+    return _results(function, shared, tasks, ordered=False)
+
+
+@contextmanager
+def local_processes(count: int) -> Iterator[None]:
+    """Work of this block is shared among so many processes of this machine."""
+    with parallel_config(backend="loky", n_jobs=count):
+        yield
+
+
+@contextmanager
+def on_cluster(scheduler: str) -> Iterator[None]:
+    """Work of this block is shared among the workers of a Dask scheduler.
+
+    Raises:
+        InputError: Dask is not installed, no scheduler answers, it has no workers or those of another version, or it
+            or all of them are lost; the message says which.
+    """
+    from expdesign.processes._dask import connected
+
+    with connected(scheduler) as cluster:
+        before = _CLUSTER.set(cluster)
+        try:
+            yield
+        finally:
+            _CLUSTER.reset(before)
+
+
+def _results(
+    function: Callable[..., Result], shared: tuple[Any, ...], tasks: Iterable[tuple[Any, ...]], *, ordered: bool
+) -> Iterator[Result]:
+    cluster = _CLUSTER.get()
+    if cluster is None and effective_n_jobs(None) == 1:
+        return (function(*shared, *task) for task in tasks)
+    both = cloudpickle.dumps((function, shared))
+    copies = [cloudpickle.dumps(task) for task in tasks]
+    if cluster is not None:
+        return cluster.results(both, copies, ordered=ordered)
+    with leaving_interruptions():
+        work = Parallel(return_as="generator" if ordered else "generator_unordered")
+        results = _waited_for(work(delayed(done)(both, task) for task in copies))
+    next(results)
+    return results
+
+
+def _waited_for(results: Iterator[Any]) -> Iterator[Any]:
+    """None, from which on work is waited for, and the same results; joblib would end the processes with some left."""
+    try:
+        yield None
+        for result in results:  # noqa: UP028 - `yield from` would close them
+            yield result
+    except GeneratorExit:
+        list(results)
+        raise
+
+
+@contextmanager
+def leaving_interruptions() -> Iterator[None]:
+    """Processes started in this block ignore Ctrl-C: the one they work for ends them."""
+    if threading.current_thread() is not threading.main_thread():  # others may not change it
+        yield
+        return
+    handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+
+
+def done(both: bytes, task: bytes) -> Any:
+    """The result of a task, from a function with its shared arguments and from the task's own, all pickled."""
+    function, shared = _unpacked(both)
+    return function(*shared, *cloudpickle.loads(task))
+
+
+@lru_cache(maxsize=2)
+def _unpacked(both: bytes) -> Any:
+    return cloudpickle.loads(both)
