@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 import json
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 
 import gpxpy
@@ -19,10 +20,11 @@ from lxml import etree
 
 from expdesign import workflows
 from expdesign.dictionary import build_dictionary
-from expdesign.export import FORMATS, build_route, plan_json, planned_track, route_files, track_csv
+from expdesign.export import FORMATS, build_bridge_route, build_route, plan_json, planned_track, route_files, track_csv
 from expdesign.export.formats.check import check_route_file
 from expdesign.export.formats.mission import NAV_WAYPOINT
 from expdesign.export.routes import read_plan
+from expdesign.export.routes.corridor import corridor, sides_needed
 from expdesign.plan.values import Leg, Plan, Verification
 from expdesign.scenario import Scenario, load_scenario
 from expdesign.signals import Trajectory
@@ -85,10 +87,12 @@ def short(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
     plan = stand_in(case)
     about = {"scenario": case.name, "vessel": case.vessel, "environment": case.environment}
     track = planned_track(plan, clearance_m=case.plan.clearance_m, **about)
-    route = build_route(track, safe_water=case.area.water)
-    for name, content in route_files(route, [known.name for known in FORMATS]).items():
-        (folder / name).write_bytes(content)
-    (folder / "track.csv").write_text(track_csv(plan))
+    for build, place in ((build_bridge_route, folder), (build_route, folder / "fine")):
+        route = build(track, safe_water=case.area.water)
+        place.mkdir(exist_ok=True)
+        for name, content in route_files(route, [known.name for known in FORMATS]).items():
+            (place / name).write_bytes(content)
+        (place / "track.csv").write_text(track_csv(plan))
     (folder / "plan.json").write_text(plan_json(plan, clearance_m=case.plan.clearance_m, **about))
     return case, folder
 
@@ -98,6 +102,7 @@ def look_at(case: Scenario, folder: Path) -> None:
     obey_their_schemas(folder)
     obey_their_guides(folder)
     bring_the_track_back(case, folder)
+    leave_room_to_the_shore(case, folder)
 
 
 def obey_their_schemas(folder: Path) -> None:
@@ -136,13 +141,30 @@ def bring_the_track_back(case: Scenario, folder: Path) -> None:
         assert shapely.distance(points, line).max() <= xtd_m, known.name
 
 
+def leave_room_to_the_shore(case: Scenario, folder: Path) -> None:
+    """The corridor of every leg lies in the allowed water, and holds the track of the leg's time."""
+    table, track = rows(folder / "route.csv"), rows(folder / "track.csv")
+    points = np.array([(float(row["north_m"]), float(row["east_m"])) for row in track])
+    times = np.array([float(row["time_s"]) for row in track])
+    for one, two in pairwise(table):
+        start, end = (np.array([float(row["north_m"]), float(row["east_m"])]) for row in (one, two))
+        sides = float(two["xtd_port_m"]), float(two["xtd_starboard_m"])
+        assert case.area.water.covers(corridor(start, end, sides))
+        sailed = (times >= float(one["time_s"])) & (times <= float(two["time_s"]) + float(two["stay_s"]))
+        needed = sides_needed(points[sailed], start, end)
+        assert needed[0] <= sides[0] + 1e-3
+        assert needed[1] <= sides[1] + 1e-3
+
+
 def rows(path: Path) -> list[dict[str, str]]:
     with path.open(newline="") as file:
         return list(csv.DictReader(file))
 
 
 def test_files_are_valid_in_the_water_and_near_the_track(short: tuple[Scenario, Path]) -> None:
-    look_at(*short)
+    case, folder = short
+    look_at(case, folder)
+    look_at(case, folder / "fine")
 
 
 @pytest.mark.filterwarnings("ignore")

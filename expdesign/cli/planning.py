@@ -87,17 +87,24 @@ def export(
         typer.Option(
             "--tolerance-m",
             metavar="D",
-            help="Largest distance between track and legs [m]. Default: a third of the clearance, at most half the "
-            "beam.",
+            help="With --fine, which it implies: the largest distance between track and legs [m]. Default: a third of "
+            "the clearance, at most half the beam.",
         ),
     ] = None,
+    name: Annotated[
+        str | None,
+        typer.Option("--name", metavar="NAME", help="Of the route and its files; an ECDIS lists it. Default: route."),
+    ] = None,
+    fine: Annotated[
+        bool, typer.Option("--fine", help="Follow the track in every turn, instead of one leg for each run.")
+    ] = False,
     out: OutBesidePlan = None,
 ) -> Asked:
-    """Write a plan as route files for chart systems and autopilots.
+    """Write a plan as route files for chart systems and autopilots: a leg for each run, and the ways between them.
 
     Example: expdesign export runs/helsinki/plan.json --format rtz gpx
     """
-    return ask("export", plan, out, formats=formats, departure=departure, tolerance_m=tolerance)
+    return ask("export", plan, out, formats=formats, departure=departure, tolerance_m=tolerance, fine=fine, name=name)
 
 
 @command("check-route")

@@ -24,7 +24,15 @@ if TYPE_CHECKING:
     )
     from expdesign.export.folder import write_files
     from expdesign.export.formats import FORMATS, STANDARD, Format, find_format, route_files
-    from expdesign.export.routes import PlannedTrack, Route, Waypoint, build_route, planned_track, read_plan
+    from expdesign.export.routes import (
+        PlannedTrack,
+        Route,
+        Waypoint,
+        build_bridge_route,
+        build_route,
+        planned_track,
+        read_plan,
+    )
 
 __all__ = [
     "FORMATS",
@@ -33,6 +41,7 @@ __all__ = [
     "PlannedTrack",
     "Route",
     "Waypoint",
+    "build_bridge_route",
     "build_route",
     "commands_csv",
     "dictionary_json",
@@ -79,6 +88,14 @@ if not TYPE_CHECKING:
             ),
             "folder": ("write_files",),
             "formats": ("FORMATS", "STANDARD", "Format", "find_format", "route_files"),
-            "routes": ("PlannedTrack", "Route", "Waypoint", "build_route", "planned_track", "read_plan"),
+            "routes": (
+                "PlannedTrack",
+                "Route",
+                "Waypoint",
+                "build_bridge_route",
+                "build_route",
+                "planned_track",
+                "read_plan",
+            ),
         },
     )

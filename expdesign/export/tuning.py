@@ -37,6 +37,19 @@ class Tuning:
         named_parameters: parameters named in the purpose of a run.
         farthest_danger_m: distance up to which the nearest danger is stated [m].
         compared_points: points on each leg where a route is compared with the track.
+        waypoint_spacing: least distance between waypoints of the route for the bridge, in ship lengths.
+        stop_radius: farthest that the ship goes from a waypoint it stays at, in ship lengths.
+        corridor: cross-track distance where the water has room for it, in ship lengths.
+        corridor_halvings: of the step from the corridor that is needed to the one that is wanted.
+        named_letters: of a manoeuvre's name in the name of a waypoint.
+        most_mixed_runs: runs in one leg.
+        stop_cost: of each ship length that the ship goes from a waypoint it stays at, in legs.
+        mixed_cost: of each run in a leg beyond the first, in legs.
+        divided_cost: of a waypoint inside a run, in legs.
+        wide_way_cost, wide_run_cost: of each ship length of cross-track distance, in legs.
+        way_in_run_cost: of each ship length between runs that is sailed in the leg of a run, in legs.
+        near_cost: of two waypoints that are too near to each other, in legs.
+        dry_cost: of a corridor that leaves the water, in legs.
         fence_margin: room around the track, as a share of its extent, that the fence may cover.
         fence_halvings: of the slack by which the fence is simplified, until it keeps to the water.
         noticed: relative differences below this are not reported.
@@ -66,6 +79,20 @@ class Tuning:
     named_parameters: int = 4
     farthest_danger_m: float = 5000.0
     compared_points: int = 17
+    waypoint_spacing: float = 2.0
+    stop_radius: float = 2.5
+    corridor: float = 1.0
+    corridor_halvings: int = 6
+    named_letters: int = 24
+    most_mixed_runs: int = 2
+    stop_cost: float = 1.5
+    mixed_cost: float = 10.0
+    divided_cost: float = 5.0
+    wide_way_cost: float = 1.0
+    wide_run_cost: float = 0.3
+    way_in_run_cost: float = 0.4
+    near_cost: float = 50.0
+    dry_cost: float = 1000.0
     fence_margin: float = 0.1
     fence_halvings: int = 12
     noticed: float = 0.02

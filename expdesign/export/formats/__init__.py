@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from expdesign.errors import UnknownName
 from expdesign.export.formats import ardupilot, geojson, gpx, kml, qgc, route_csv, rtz
-from expdesign.export.formats.format import Format
+from expdesign.export.formats.format import Format, named_file
 from expdesign.export.routes import Route
 
 FORMATS: tuple[Format, ...] = (
@@ -42,7 +42,7 @@ def route_files(route: Route, formats: Sequence[str]) -> dict[str, bytes]:
         UnknownName: a format that does not exist; nothing is written then.
     """
     chosen = [find_format(name) for name in formats]
-    return {known.file_name: known.write(route) for known in chosen}
+    return {named_file(known.file_name, route): known.write(route) for known in chosen}
 
 
 __all__ = ["FORMATS", "STANDARD", "Format", "find_format", "route_files"]

@@ -45,6 +45,17 @@ def _in_xml(code: int) -> bool:
 
 
 def leg_sentence(waypoint: Waypoint) -> str:
-    """Motion of the ship on the leg to the waypoint."""
+    """Motion of the ship on the leg to the waypoint, and what it does there."""
     what = "primitive" if waypoint.leg_kind == "primitive" else "reposition to"
-    return f"leg {waypoint.leg}, {what} {waypoint.leg_name}"
+    held = f"; stay here for {waypoint.held}" if waypoint.held else ""
+    return f"leg {waypoint.leg}, {what} {waypoint.leg_name}{held}"
+
+
+def corridor_sentence(waypoint: Waypoint) -> str:
+    """How far from the leg to the waypoint the track goes."""
+    return f"keep within {waypoint.xtd_port_m:.0f} m to port and {waypoint.xtd_starboard_m:.0f} m to starboard"
+
+
+def named_file(file_name: str, route: Route) -> str:
+    """The file name of a format for a route with a name of its own."""
+    return file_name.replace(ROUTE_NAME, route.name, 1)

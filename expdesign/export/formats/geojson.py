@@ -39,6 +39,8 @@ def _line(leg: int, chords: list[tuple[Waypoint, Waypoint]]) -> dict[str, Any]:
         "name": end.leg_name,
         "start_time_s": chords[0][0].time_s + chords[0][0].stay_s,
         "end_time_s": end.time_s,
+        "xtd_port_m": max(chord[1].xtd_port_m for chord in chords),
+        "xtd_starboard_m": max(chord[1].xtd_starboard_m for chord in chords),
     }
     return {"type": "Feature", "geometry": _geometry(positions), "properties": properties}
 
@@ -50,7 +52,10 @@ def _point(route: Route, waypoint: Waypoint) -> dict[str, Any]:
         "stay_s": waypoint.stay_s,
         "speed_mps": waypoint.speed_mps,
         "xtd_m": route.xtd_m,
+        "xtd_port_m": waypoint.xtd_port_m,
+        "xtd_starboard_m": waypoint.xtd_starboard_m,
         "leg": waypoint.leg,
+        "runs_here": waypoint.held,
     }
     geometry = {"type": "Point", "coordinates": list(_position(waypoint))}
     return {"type": "Feature", "geometry": geometry, "properties": properties}

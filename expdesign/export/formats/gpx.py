@@ -9,8 +9,15 @@ from __future__ import annotations
 from lxml import etree
 
 from expdesign.conventions import KNOTS_PER_MPS, METRES_PER_NAUTICAL_MILE
-from expdesign.export.formats.format import Format, degrees, leg_sentence, route_file, xml_text
-from expdesign.export.routes import Route, Waypoint
+from expdesign.export.formats.format import (
+    Format,
+    corridor_sentence,
+    degrees,
+    leg_sentence,
+    route_file,
+    xml_text,
+)
+from expdesign.export.routes import ROUTE_NAME, Route, Waypoint
 
 GPX = "http://www.topografix.com/GPX/1/1"
 OPENCPN = "http://www.opencpn.org"
@@ -20,7 +27,7 @@ def write(route: Route) -> bytes:
     """One route; points carry times only when the departure is fixed."""
     root = etree.Element(f"{{{GPX}}}gpx", nsmap={None: GPX, "opencpn": OPENCPN}, version="1.1", creator="expdesign")
     line = etree.SubElement(root, f"{{{GPX}}}rte")
-    _text(line, "name", route.name)
+    _text(line, "name", route.scenario if route.name == ROUTE_NAME else route.name)
     _text(line, "desc", f"{route.scenario}, {route.vessel}; manoeuvres are executed with commands.csv")
     extensions = etree.SubElement(line, f"{{{GPX}}}extensions")
     _extension(extensions, "planned_speed", f"{route.speed_mps * KNOTS_PER_MPS:.3f}")
@@ -39,10 +46,11 @@ def _add_point(line: etree._Element, route: Route, waypoint: Waypoint) -> None:
     if time is not None:
         _text(point, "time", time)
     _text(point, "name", waypoint.name)
-    _text(point, "desc", leg_sentence(waypoint))
+    _text(point, "desc", f"{leg_sentence(waypoint)}; {corridor_sentence(waypoint)}")
     _text(point, "type", "WPT")
     extensions = etree.SubElement(point, f"{{{GPX}}}extensions")
-    _extension(extensions, "arrival_radius", f"{route.xtd_m / METRES_PER_NAUTICAL_MILE:.4f}")
+    radius_m = min(waypoint.xtd_port_m, waypoint.xtd_starboard_m)
+    _extension(extensions, "arrival_radius", f"{radius_m / METRES_PER_NAUTICAL_MILE:.4f}")
     speed = etree.SubElement(extensions, f"{{{OPENCPN}}}rte_properties")
     speed.set("planned_speed", f"{waypoint.speed_mps * KNOTS_PER_MPS:.3f}")
 

@@ -9,7 +9,7 @@ from itertools import groupby, pairwise
 
 from lxml import etree
 
-from expdesign.export.formats.format import Format, degrees, leg_sentence, route_file, xml_text
+from expdesign.export.formats.format import Format, corridor_sentence, degrees, leg_sentence, route_file, xml_text
 from expdesign.export.formats.geojson import crosses_antimeridian, cut_at_antimeridian
 from expdesign.export.routes import Route, Waypoint
 
@@ -56,7 +56,7 @@ def _add_leg(folder: etree._Element, chords: list[tuple[Waypoint, Waypoint]]) ->
 
 def _add_point(folder: etree._Element, route: Route, waypoint: Waypoint) -> None:
     place = _placemark(folder, waypoint.name)
-    _text(place, "description", leg_sentence(waypoint))
+    _text(place, "description", f"{leg_sentence(waypoint)}; {corridor_sentence(waypoint)}")
     time = route.utc(waypoint.time_s)
     if time is not None:
         _text(_add(place, "TimeStamp"), "when", time)
@@ -66,6 +66,8 @@ def _add_point(folder: etree._Element, route: Route, waypoint: Waypoint) -> None
         ("stay_s", f"{waypoint.stay_s:.10g}"),
         ("speed_mps", f"{waypoint.speed_mps:.4f}"),
         ("xtd_m", f"{route.xtd_m:.4f}"),
+        ("xtd_port_m", f"{waypoint.xtd_port_m:.4f}"),
+        ("xtd_starboard_m", f"{waypoint.xtd_starboard_m:.4f}"),
     ):
         _text(_add(data, "Data", name=key), "value", value)
     _text(_add(place, "Point"), "coordinates", _coordinates([(waypoint.lon_deg, waypoint.lat_deg)]))

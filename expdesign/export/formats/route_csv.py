@@ -21,6 +21,9 @@ COLUMNS = (
     "leg",
     "leg_kind",
     "leg_name",
+    "xtd_port_m",
+    "xtd_starboard_m",
+    "runs_here",
 )
 
 
@@ -44,6 +47,9 @@ def write(route: Route) -> bytes:
                 point.leg,
                 point.leg_kind,
                 point.leg_name,
+                f"{point.xtd_port_m:.4f}",
+                f"{point.xtd_starboard_m:.4f}",
+                point.held,
             )
         )
     return text.getvalue().encode()

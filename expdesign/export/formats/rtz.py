@@ -16,7 +16,7 @@ from lxml import etree
 
 from expdesign.conventions import KNOTS_PER_MPS, METRES_PER_NAUTICAL_MILE
 from expdesign.errors import InputError
-from expdesign.export.formats.format import Format, degrees, leg_sentence, route_file, xml_text
+from expdesign.export.formats.format import Format, degrees, leg_sentence, named_file, route_file, xml_text
 from expdesign.export.routes import Route, Waypoint
 
 SPACE = "http://www.cirm.org/RTZ/{}/{}"
@@ -43,11 +43,11 @@ def rtz_writer(version: str, file_name: str) -> Callable[[Route], bytes]:
 def _written(route: Route, version: str, file_name: str) -> bytes:
     space = SPACE.format(*version.split("."))
     root = etree.Element(f"{{{space}}}route", nsmap={None: space}, version=version)
-    names = {"routeName": Path(file_name).stem, "vesselName": xml_text(route.vessel)}
+    names = {"routeName": Path(named_file(file_name, route)).stem, "vesselName": xml_text(route.vessel)}
     _add(root, "routeInfo", **names, routeAuthor="expdesign", routeStatus="trial plan, to be checked on board")
     waypoints = _add(root, "waypoints")
     for number, waypoint in enumerate(route.waypoints, start=1):
-        _add_waypoint(waypoints, number, waypoint, route)
+        _add_waypoint(waypoints, number, waypoint)
     manual = _add(_add(_add(root, "schedules"), "schedule", id="1", name=xml_text(route.scenario)), "manual")
     element = "sheduleElement" if version == "1.0" else "scheduleElement"
     for number, waypoint in enumerate(route.waypoints, start=1):
@@ -61,13 +61,15 @@ def _written(route: Route, version: str, file_name: str) -> bytes:
     return content
 
 
-def _add_waypoint(parent: etree._Element, number: int, waypoint: Waypoint, route: Route) -> None:
+def _add_waypoint(parent: etree._Element, number: int, waypoint: Waypoint) -> None:
     element = _add(parent, "waypoint", id=str(number), revision="0", name=waypoint.name)
     _add(element, "position", lat=degrees(waypoint.lat_deg), lon=degrees(waypoint.lon_deg))
     if number > 1:
-        xtd = f"{route.xtd_m / METRES_PER_NAUTICAL_MILE:.4f}"
+        port, starboard = (
+            f"{side / METRES_PER_NAUTICAL_MILE:.4f}" for side in (waypoint.xtd_port_m, waypoint.xtd_starboard_m)
+        )
         sentence = xml_text(leg_sentence(waypoint))
-        _add(element, "leg", starboardXTD=xtd, portsideXTD=xtd, geometryType="Loxodrome", legInfo=sentence)
+        _add(element, "leg", starboardXTD=starboard, portsideXTD=port, geometryType="Loxodrome", legInfo=sentence)
 
 
 def _schedule(route: Route, waypoint: Waypoint, version: str, *, first: bool) -> dict[str, str]:

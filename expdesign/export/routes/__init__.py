@@ -1,9 +1,10 @@
-"""The plan as a route: chords of the track, corridor, fence."""
+"""The plan as a route: chords of the track, few legs for the bridge, corridor, fence."""
 
+from expdesign.export.routes.build import build_bridge_route, build_route
 from expdesign.export.routes.fence import build_fence
 from expdesign.export.routes.planned import PlannedTrack, planned_track, require_verified
 from expdesign.export.routes.read_plan import read_plan
-from expdesign.export.routes.route import DEGREE_DECIMALS, ROUTE_NAME, Route, Waypoint, build_route
+from expdesign.export.routes.route import DEGREE_DECIMALS, ROUTE_NAME, Route, Waypoint
 
 __all__ = [
     "DEGREE_DECIMALS",
@@ -11,6 +12,7 @@ __all__ = [
     "PlannedTrack",
     "Route",
     "Waypoint",
+    "build_bridge_route",
     "build_fence",
     "build_route",
     "planned_track",

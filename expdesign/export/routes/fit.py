@@ -37,7 +37,12 @@ class RouteFit:
     @property
     def largest_m(self) -> float:
         """Bound on the distance of the track from the leg, for a rhumb line or a great circle [m]."""
-        return self.cross_track_m + max(self.loxodrome_m, self.orthodrome_m)
+        return self.cross_track_m + self.curved_m
+
+    @property
+    def curved_m(self) -> float:
+        """Bound on the distance of a rhumb line or a great circle from the straight leg [m]."""
+        return max(self.loxodrome_m, self.orthodrome_m)
 
 
 def fit_route(

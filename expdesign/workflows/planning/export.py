@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
 from expdesign.errors import InputError
 from expdesign.export import (
     FORMATS,
+    build_bridge_route,
     build_route,
     find_format,
     route_files,
     write_files,
 )
-from expdesign.export.routes import read_plan
+from expdesign.export.routes import ROUTE_NAME, read_plan
 from expdesign.progress import Progress, silent
 from expdesign.workflows.outcome import Outcome
 
@@ -26,15 +29,27 @@ def export(
     formats: Sequence[str],
     departure: str | None = None,
     tolerance_m: float | None = None,
+    fine: bool = False,
+    name: str | None = None,
     progress: Progress = silent,
 ) -> Outcome:
-    """Route files of a plan made before, into `out` or beside it; with times where a departure is given."""
+    """Route files of a plan made before, into `out` or beside it; with times where a departure is given.
+
+    The route and its files are called `name`, or "route". The route has few legs, or follows the track in every turn
+    where `fine` or a tolerance is given.
+    """
     if not formats:
         raise InputError(f"no route format is named; there are {', '.join(item.name for item in FORMATS)}")
-    for name in formats:
-        find_format(name)
+    for known in formats:
+        find_format(known)
+    called = _name(name)
     progress("reading the plan", 0.1)
-    route = build_route(read_plan(plan), departure=_departure(departure), tolerance_m=tolerance_m)
+    track, starts = read_plan(plan), _departure(departure)
+    if fine or tolerance_m is not None:
+        route = build_route(track, departure=starts, tolerance_m=tolerance_m)
+    else:
+        route = build_bridge_route(track, departure=starts)
+    route = replace(route, name=called)
     files = write_files(out or plan.parent, route_files(route, tuple(dict.fromkeys(formats))))
     summary = {
         "waypoints": len(route.waypoints),
@@ -44,6 +59,14 @@ def export(
         "legs_in_allowed_water": route.fit.in_water,
     }
     return Outcome(files=files, summary=summary)
+
+
+def _name(text: str | None) -> str:
+    if text is None:
+        return ROUTE_NAME
+    if not re.fullmatch(r"[0-9A-Za-z][0-9A-Za-z._-]{0,62}", text):
+        raise InputError(f"--name is {text!r}, expected up to 63 letters, digits, dots, dashes and underscores")
+    return text
 
 
 def _departure(text: str | None) -> datetime | None:

@@ -9,7 +9,7 @@ from expdesign.durations import DurationDesign
 from expdesign.export import (
     STANDARD,
     Route,
-    build_route,
+    build_bridge_route,
     durations_json,
     planned_track,
     route_files,
@@ -40,7 +40,7 @@ def trial_files(case: Scenario, growth: Growth | None, content: ReportContent, r
 
 
 def built_route(case: Scenario, plan: Plan) -> Route:
-    """The plan as waypoints, its legs measured against the track and the chart."""
+    """The plan as few waypoints, its legs measured against the track and the chart."""
     track = planned_track(
         plan,
         scenario=case.name,
@@ -48,7 +48,7 @@ def built_route(case: Scenario, plan: Plan) -> Route:
         environment=case.environment,
         clearance_m=case.plan.clearance_m,
     )
-    return build_route(track, safe_water=case.area.water)
+    return build_bridge_route(track, safe_water=case.area.water)
 
 
 def report_content(
