@@ -16,7 +16,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.fft import dct, idct
+import scipy
 
 from expdesign.assessment.runs import RunCheck
 from expdesign.assessment.tuning import TUNING
@@ -157,10 +157,10 @@ def _one_step(stretches: Stretches) -> Compiled:
 
 def _slow_part(values: Array, sample_time_s: float) -> Array:
     """The part with periods over `Tuning.slow_s` or 40 samples; a cosine transform is not periodic at the ends."""
-    spectrum = dct(values, axis=0, norm="ortho")
+    spectrum = scipy.fft.dct(values, axis=0, norm="ortho")
     period_s = max(TUNING.slow_s, 40 * sample_time_s)
     spectrum[int(2 * len(values) * sample_time_s / period_s) + 1 :] = 0.0
-    return np.asarray(idct(spectrum, axis=0, norm="ortho"))
+    return np.asarray(scipy.fft.idct(spectrum, axis=0, norm="ortho"))
 
 
 def _ahead(stretches: Stretches, values: Array, measured: Array, sample_time_s: float) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import least_squares
+import scipy
 
 from expdesign.dictionary.tuning import TUNING
 from expdesign.errors import Unreachable
@@ -93,6 +93,9 @@ def _direct_trim(vessel: Vessel, velocity: Array) -> Array:
 
     ahead = np.array([name.startswith(("n", "tau_x")) for name in vessel.model.inputs])
     tries = [np.clip(start * np.sign(velocity[0]) * ahead, low + 1e-9, high - 1e-9) for start in TUNING.thrust_starts]
-    found = [least_squares(excess, start, bounds=(low, high), xtol=1e-15, ftol=1e-15, gtol=1e-15) for start in tries]
+    found = [
+        scipy.optimize.least_squares(excess, start, bounds=(low, high), xtol=1e-15, ftol=1e-15, gtol=1e-15)
+        for start in tries
+    ]
     best: Array = min(found, key=lambda item: float(item.cost)).x
     return np.asarray(best * scale)

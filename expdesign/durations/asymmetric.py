@@ -11,7 +11,7 @@ Math. 13 (1951), 383-385; F. Ljungberg, doctoral thesis, Linköping University, 
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import minimize
+import scipy
 
 from expdesign.durations.concave import symmetric_part, unit_scaling
 from expdesign.durations.limits import Polytope
@@ -59,7 +59,7 @@ def improved(problem: DurationProblem, polytope: Polytope, start: Array | None, 
 
     found = [start] if start is not None else []
     for w in starts:
-        answer = minimize(
+        answer = scipy.optimize.minimize(
             minus,
             w,
             jac=True,

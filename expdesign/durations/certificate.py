@@ -19,8 +19,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
-from scipy.optimize import linprog
+import scipy
 
 from expdesign.durations.concave import ConcaveProblem
 from expdesign.durations.criteria.models import Tangent
@@ -159,8 +158,8 @@ def sensitivities(matrices: Array, fractions: Array) -> Array:
     Raises:
         numpy.linalg.LinAlgError: B(w) is not positive definite.
     """
-    factor = cho_factor(np.tensordot(fractions, matrices, axes=1))
-    inverse = cho_solve(factor, np.eye(matrices.shape[1]))
+    factor = scipy.linalg.cho_factor(np.tensordot(fractions, matrices, axes=1))
+    inverse = scipy.linalg.cho_solve(factor, np.eye(matrices.shape[1]))
     return np.asarray(np.einsum("ij,qji->q", inverse, matrices))
 
 
@@ -249,7 +248,9 @@ def _dual(
     bounds = [*zip(polytope.least, np.maximum(polytope.most, polytope.least), strict=True), (None, None)]
     whole = np.r_[np.ones(len(w)), 0.0][None]
     options = {"primal_feasibility_tolerance": TUNING.lp_tolerance, "dual_feasibility_tolerance": TUNING.lp_tolerance}
-    answer = linprog(np.r_[np.zeros(len(w)), -1.0], A, b, whole, [1.0], bounds, method="highs", options=options)
+    answer = scipy.optimize.linprog(
+        np.r_[np.zeros(len(w)), -1.0], A, b, whole, [1.0], bounds, method="highs", options=options
+    )
     dual = np.zeros(len(b)) if answer.status else np.maximum(-answer.ineqlin.marginals, 0.0)
     mixture = np.full(count, 1.0 / count)
     if worst and dual[:models].sum() > 0:

@@ -18,8 +18,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
 from expdesign.durations.criteria.measures import gram, root
 from expdesign.durations.criteria.models import whitening
@@ -194,7 +194,7 @@ def _centred(pool: _Pool, parts: Array, w: Array, barrier: float) -> Array:
         white = T @ parts @ T.T
         slope = w * np.trace(white, axis1=1, axis2=2) + barrier
         curvature = w[:, None] * gram(white) * w + barrier * np.eye(len(w))
-        free, price = cho_solve(cho_factor(curvature), np.stack([slope, w], axis=1)).T
+        free, price = scipy.linalg.cho_solve(scipy.linalg.cho_factor(curvature), np.stack([slope, w], axis=1)).T
         relative = free - (w @ free) / (w @ price) * price
         decrement = float(relative @ curvature @ relative)
         length = min(1.0, 0.99 / max(float(-relative.min()), 1e-300))

@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.optimize import linprog
+import scipy
 
 from expdesign.durations.tuning import TUNING
 from expdesign.errors import InputError, NoAnswer, UnknownName
@@ -113,7 +113,7 @@ class Polytope:
         sum_row = np.r_[np.ones(len(free)), 0.0][None]
         bounds = [(None, None)] * len(free) + [(None, 1.0)]
         goal = np.r_[np.zeros(len(free)), -1.0]
-        answer = linprog(goal, A, b, sum_row, [1.0], bounds, method="highs")
+        answer = scipy.optimize.linprog(goal, A, b, sum_row, [1.0], bounds, method="highs")
         if answer.status != 0 or answer.x[-1] <= TUNING.loosening:
             return None
         return np.asarray(answer.x[:-1])
@@ -138,7 +138,9 @@ class Polytope:
         bounds = np.stack([self.least, np.maximum(self.most, self.least)], axis=1)
         total = np.clip(1.0, self.least.sum(), self.most.sum())
         ones = np.ones((1, len(self.least)))
-        answer = linprog(np.zeros(len(self.least)), self.rows, self.limits, ones, [total], bounds, method="highs")
+        answer = scipy.optimize.linprog(
+            np.zeros(len(self.least)), self.rows, self.limits, ones, [total], bounds, method="highs"
+        )
         return bool(answer.status == 0)
 
     def loosened(self) -> Polytope:

@@ -8,8 +8,7 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
-from scipy.optimize import brentq
+import scipy
 
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import Helm
@@ -47,10 +46,12 @@ class SteeredRun:
         seal(self, time_s="k", pose="k 3", velocity="k 3", order_time_s="j", helm_rad="j", drive="j")
 
     @cached_property
-    def _motion(self) -> CubicHermiteSpline:
+    def _motion(self) -> scipy.interpolate.CubicHermiteSpline:
         c, s = np.cos(self.pose[:, 2]), np.sin(self.pose[:, 2])
         u, v, r = self.velocity.T
-        return CubicHermiteSpline(self.time_s, self.pose, np.stack([u * c - v * s, u * s + v * c, r], axis=1))
+        return scipy.interpolate.CubicHermiteSpline(
+            self.time_s, self.pose, np.stack([u * c - v * s, u * s + v * c, r], axis=1)
+        )
 
     def at(self, time_s: float) -> Array:
         """(3,) pose at a time within the run."""
@@ -94,7 +95,7 @@ def crossing(curve: Curve, low: float, high: float) -> float:
     first, last = curve(low), curve(high)
     if first * last > 0:
         return low if abs(first) < abs(last) else high
-    return float(brentq(curve, low, high, xtol=1e-9))
+    return float(scipy.optimize.brentq(curve, low, high, xtol=1e-9))
 
 
 def steered_run(

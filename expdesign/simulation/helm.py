@@ -14,7 +14,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq, root
+import scipy
 
 from expdesign.errors import InputError, SpeedOutOfReach, UnknownName
 from expdesign.simulation.actuation import past_deadband
@@ -233,7 +233,7 @@ def service_speed(vessel: Vessel, *, thrusters: str = "stern") -> float:
     gains = [gain(speed) for speed in grid.tolist()]
     for low, high, before, after in zip(grid[:-1], grid[1:], gains[:-1], gains[1:], strict=True):
         if before > 0 >= after:
-            return float(brentq(gain, low, high, xtol=1e-12))
+            return float(scipy.optimize.brentq(gain, low, high, xtol=1e-12))
     raise InputError(
         f"vessel {vessel.name!r}: the model has no steady speed below {FASTEST_MPS:g} m/s at 85 % power: "
         f"du/dt is {gains[0]:.3g} m/s2 at rest; give the approach speed"
@@ -261,7 +261,7 @@ def _engine_order(helm: Helm, speed: float) -> float:
         raise InputError(f"{named}: it gains {idle:.3g} m/s2 without thrust; choose another speed")
     if idle * full >= 0:
         return 0.0 if abs(idle) <= abs(full) else 1.0
-    return float(brentq(gain, 0.0, 1.0, xtol=1e-14))
+    return float(scipy.optimize.brentq(gain, 0.0, 1.0, xtol=1e-14))
 
 
 def _fastest(helm: Helm, below: float) -> float:
@@ -273,7 +273,7 @@ def _fastest(helm: Helm, below: float) -> float:
     grid = np.linspace(below, 0.0, 101)
     for high, low in pairwise(grid.tolist()):
         if gain(low) > 0:
-            return float(brentq(gain, low, high, xtol=1e-12))
+            return float(scipy.optimize.brentq(gain, low, high, xtol=1e-12))
     return 0.0
 
 
@@ -287,7 +287,7 @@ def _balance(helm: Helm, speed: float, drive: float) -> tuple[float, float, floa
         surge, sway, yaw = helm.acceleration((speed, x[2] if sways else 0.0, 0.0), x[0], x[1])
         return [surge, yaw, sway] if sways else [surge, yaw]
 
-    found = root(excess, [drive, 0.0, 0.0][: 3 if sways else 2], tol=1e-14)
+    found = scipy.optimize.root(excess, [drive, 0.0, 0.0][: 3 if sways else 2], tol=1e-14)
     if max(map(abs, excess(found.x))) > STEADY * speed or not 0 <= found.x[0] <= 1:
         raise InputError(f"vessel {helm.vessel.name!r} has no helm that holds a straight course at {speed:g} m/s")
     return float(found.x[0]), float(found.x[2]) if sways else 0.0, float(found.x[1])

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import f
+import scipy
 
 from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.accuracy.simulated_fit import clipped
@@ -108,7 +108,7 @@ def dependence(found: Residuals, output: str, name: str) -> Dependence:
     freedom, rest = len(mean) - 1, max(effective_count - len(mean), 1.0)
     return Dependence(
         middle=x @ share, mean=mean, std=np.sqrt(np.diag(covariance)),
-        p_value=float(f.sf(apart @ inverse @ apart / freedom, freedom, rest)) if freedom else 1.0,
+        p_value=float(scipy.stats.f.sf(apart @ inverse @ apart / freedom, freedom, rest)) if freedom else 1.0,
     )  # fmt: skip
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import lfilter
+import scipy
 
 from expdesign.diagnosis.data.tuning import TUNING
 from expdesign.values import Array
@@ -57,9 +57,9 @@ def _filtered(values: Array, taps: Array) -> Array:
     """Filtered along the last axis; nan only where a tap falls on a nan."""
     missing = ~np.isfinite(values)
     if not missing.any():
-        return np.asarray(lfilter(taps, NO_FEEDBACK, values, axis=-1))
-    result = lfilter(taps, NO_FEEDBACK, np.where(missing, 0.0, values), axis=-1)
-    touched = lfilter(np.ones(len(taps)), NO_FEEDBACK, missing.astype(float), axis=-1) > 0.5
+        return np.asarray(scipy.signal.lfilter(taps, NO_FEEDBACK, values, axis=-1))
+    result = scipy.signal.lfilter(taps, NO_FEEDBACK, np.where(missing, 0.0, values), axis=-1)
+    touched = scipy.signal.lfilter(np.ones(len(taps)), NO_FEEDBACK, missing.astype(float), axis=-1) > 0.5
     return np.where(touched, np.nan, result)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import convolve1d
+import scipy
 
 from expdesign.diagnosis.data import Windows, averaging_half_width
 from expdesign.diagnosis.model import ExtendedModel, mean_wind
@@ -87,7 +87,7 @@ def _averaged(values: Array, finer: int, rows_per_step: int) -> Array:
         return values
     taps = np.zeros(2 * half * apart + 1)
     taps[::apart] = 1.0 / (2 * half + 1)
-    return np.asarray(convolve1d(values, taps, axis=0, mode="nearest"))
+    return np.asarray(scipy.ndimage.convolve1d(values, taps, axis=0, mode="nearest"))
 
 
 def _wind(ship: ExtendedModel, windows: Windows) -> tuple[Array, Array]:

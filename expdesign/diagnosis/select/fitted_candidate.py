@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
+import scipy
 
 from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.data import Windows
@@ -40,7 +40,9 @@ class FittedCandidate:
     @property
     def p_value(self) -> float:
         """Of the likelihood ratio test, adjusted for multiple tests."""
-        return min(1.0, self.multiplicity * float(chi2.sf(max(self.likelihood_gain, 0.0), max(1, len(self.keys)))))
+        return min(
+            1.0, self.multiplicity * float(scipy.stats.chi2.sf(max(self.likelihood_gain, 0.0), max(1, len(self.keys))))
+        )
 
     def with_gain(self, likelihood_gain: float) -> FittedCandidate:
         """The same with another gain at the same price."""

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
+import scipy
 
 from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.fit import Fit, build_sensitivities, effect_disturbances, information
@@ -82,7 +82,7 @@ def score_tests(
         root = vectors / np.sqrt(values)
         z = root.T @ (scores.s[index] / size)
         statistic = float(z @ z)
-        p_value = float(chi2.sf(statistic, len(index)))
+        p_value = float(scipy.stats.chi2.sf(statistic, len(index)))
         tests.append(ScoreTest(candidate=candidate, statistic=statistic, p_value=p_value, step=(root @ z) / size))
         roots.append((index, root / size[:, None]))
     if tests and rng is not None:
@@ -132,7 +132,7 @@ def _effective_tests(
         largest[key] = np.maximum(largest[key], statistic) if key in largest else statistic
     smallest: dict[str, Array] = {}
     for (cause, freedom), statistic in largest.items():
-        p_values = chi2.sf(statistic, freedom)
+        p_values = scipy.stats.chi2.sf(statistic, freedom)
         smallest[cause] = np.minimum(smallest[cause], p_values) if cause in smallest else p_values
     own = {cause: _inflation(p_values) for cause, p_values in smallest.items()}
     every = _inflation(np.min([own[cause] * p_values for cause, p_values in smallest.items()], axis=0))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
+import scipy
 
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.fit import Fit, continuing, fit, log_likelihood_gain
@@ -69,7 +69,7 @@ def redundant_step(steps: list[Step], windows: Windows) -> int | None:
         if reduced is None:
             continue
         lost, count = log_likelihood_gain(reduced, whole, whole), len(_own_effects(step))
-        p_value = step.chosen.multiplicity * float(chi2.sf(max(lost, 0.0), max(1, count)))
+        p_value = step.chosen.multiplicity * float(scipy.stats.chi2.sf(max(lost, 0.0), max(1, count)))
         if p_value > TUNING.level or lost < TUNING.price * count:
             return index
     return None
@@ -129,4 +129,4 @@ def wald_p_value(chosen: FittedCandidate, last: Fit) -> float:
         statistic, freedom = statistic + (difference / error) ** 2, freedom + 1
     if not np.isfinite(statistic):  # without a standard error nothing is significant
         return 1.0
-    return float(chi2.sf(statistic, freedom)) if freedom else 0.0
+    return float(scipy.stats.chi2.sf(statistic, freedom)) if freedom else 0.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
+import scipy
 
 from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.fit import Fit
@@ -68,7 +68,7 @@ def _grid_search(base: Fit, candidate: Candidate) -> tuple[str, float, float]:
         place = int(np.argmax(statistics))
         best = float(tried[place])
         width = float(np.min(np.diff(tried))) if len(tried) > 1 else 0.0
-        inside = tried[statistics > statistics.max() - chi2.isf(TUNING.level, 1)]
+        inside = tried[statistics > statistics.max() - scipy.stats.chi2.isf(TUNING.level, 1)]
         std = max(float(np.ptp(inside)) / 4.0, width / 3.5)
         low, high = tried[max(place - 1, 0)], tried[min(place + 1, len(tried) - 1)]
         values = tuple(np.linspace(low, high, TUNING.refined_grid).tolist())

@@ -27,8 +27,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import nnls
-from scipy.signal import lfilter
+import scipy
 
 from expdesign.estimation.noise.timeline import spread
 from expdesign.estimation.regression import Integers
@@ -96,8 +95,8 @@ def filtered(index: int, memories: Array, W: Array) -> Array:
         result[:-1] -= W[1:]
         return result
     keep = np.exp(-1.0 / memories[index - 2])
-    past = lfilter([1.0], [1.0, -keep], W, axis=0)
-    return np.asarray(past + lfilter([1.0], [1.0, -keep], W[::-1], axis=0)[::-1] - W)
+    past = scipy.signal.lfilter([1.0], [1.0, -keep], W, axis=0)
+    return np.asarray(past + scipy.signal.lfilter([1.0], [1.0, -keep], W[::-1], axis=0)[::-1] - W)
 
 
 def score_covariance(
@@ -194,7 +193,7 @@ def _most_likely(ordinates: Array, shapes: Array, count: Array, parts: int) -> t
     expected = shapes[0] + shapes[1]
     for _ in range(TUNING.spectrum_iterations):
         weight = np.sqrt(count) / expected
-        variances, _ = nnls((shapes * weight).T, ordinates * weight, maxiter=100 * parts)
+        variances, _ = scipy.optimize.nnls((shapes * weight).T, ordinates * weight, maxiter=100 * parts)
         expected = np.maximum(variances @ shapes, 1e-9 * np.max(variances @ shapes))
     return variances, float(count @ (np.log(expected) + ordinates / expected))
 

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from scipy.signal import lfilter
+import scipy
 
 from expdesign.estimation.noise.timeline import Timeline
 from expdesign.estimation.regression import batch_slices
@@ -68,8 +68,8 @@ def innovations(Z: Array, eps: Array, colour: Colour) -> tuple[Array, Array]:
     known ever better (a Kalman filter, written as sums); without it the ends of batches would be missing from sums.
     """
     a, c = colour.a, colour.c
-    n = lfilter([1.0, -a], [1.0, c], eps)
-    zeta = lfilter([1.0, c], [1.0, -a], Z[::-1], axis=0)[::-1]
+    n = scipy.signal.lfilter([1.0, -a], [1.0, c], eps)
+    zeta = scipy.signal.lfilter([1.0, c], [1.0, -a], Z[::-1], axis=0)[::-1]
     left = np.power(-c, np.arange(len(eps)))  # of x in n
     known = 1.0 / max((a + c) ** 2 / (1.0 - a**2), 1e-12) + np.cumsum(left**2)
     before = known - left**2
@@ -97,7 +97,7 @@ def fitted_colour(series: Sequence[Array], present: Sequence[Array]) -> Colour:
 
 
 def _fitted(series: Sequence[Array], present: Sequence[Array], c: float) -> tuple[float, Colour]:
-    filtered = [lfilter([1.0], [1.0, c], rows) * ones for rows, ones in zip(series, present, strict=True)]
+    filtered = [scipy.signal.lfilter([1.0], [1.0, c], rows) * ones for rows, ones in zip(series, present, strict=True)]
     power = sum(float(x @ x) for x in filtered)
     crossed = sum(float(x[1:] @ x[:-1]) for x in filtered)
     a = float(np.clip(crossed / power, -TUNING.slowest_pole, TUNING.slowest_pole)) if power > 0 else 0.0

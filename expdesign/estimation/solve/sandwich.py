@@ -24,7 +24,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtri
+import scipy
 
 from expdesign.estimation.noise import (
     Components,
@@ -100,7 +100,7 @@ class _Terms:
             even += level * shares.sum(axis=0)
             changing += squares @ shares
             chance += ((squares - level) ** 2).mean() * ((shares - shares.mean(axis=0)) ** 2).sum(axis=0)
-        clear = changing - even > -ndtri(TUNING.white_test_level / len(even)) * np.sqrt(chance)
+        clear = changing - even > -scipy.special.ndtri(TUNING.white_test_level / len(even)) * np.sqrt(chance)
         return np.where(clear, np.divide(changing, even, out=np.ones_like(even), where=even > 0), 1.0)
 
     def _led(self, scores: Array) -> Array:

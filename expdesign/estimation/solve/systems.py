@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse.csgraph import connected_components
+import scipy
 
 from expdesign.estimation.regression import Integers, Regression, batch_slices, subtract_mean
 from expdesign.estimation.solve.null_space import NullSpace, null_space
@@ -57,7 +57,7 @@ def occupied(rows: Array) -> Array:
 def split(regression: Regression, uses: Array, mean: str) -> tuple[System, ...]:
     """Parts that share neither parameters nor outputs; `uses` (n, p) is nonzero where a parameter acts on an output."""
     held = (uses > 0).astype(int)
-    count, labels = connected_components(held.T @ held, directed=False)
+    count, labels = scipy.sparse.csgraph.connected_components(held.T @ held, directed=False)
     columns = [np.flatnonzero(labels == label) for label in range(count)]
     parts = batch_slices(regression.batch_of)
     return tuple(

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
 
 from expdesign.conventions import to_n_frame
 from expdesign.export.pages.figures import BLACK, GREEN, PRIMITIVE, REPOSITION, new_figure, svg
@@ -15,6 +15,9 @@ from expdesign.export.report.figures.labels import place_labels
 from expdesign.export.report.figures.position_axes import draw_position_ticks, draw_scale_and_north
 from expdesign.plan.values import Leg
 from expdesign.values import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 WIDTH_IN, HEIGHT_IN = 3.6, 3.6
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from matplotlib.axes import Axes
 
 from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis import Diagnosis
@@ -14,6 +15,9 @@ from expdesign.export.pages.figures import BLUE, GREY, VERMILION, light_grid, ne
 from expdesign.export.tuning import TUNING
 from expdesign.values import Array
 from expdesign.vessel import column_name
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 BINS, FEWEST = 16, 15
 """Groups of samples, at most, and samples of each, at least."""

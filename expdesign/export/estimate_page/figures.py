@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from matplotlib.axes import Axes
 
 from expdesign.assessment import Assessed, RunCheck
 from expdesign.conventions import OUTPUTS
 from expdesign.export.pages.figures import BLUE, GREY, LINES, light_grid, new_figure, plain, svg
 from expdesign.export.tuning import TUNING
 from expdesign.values import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 AXES = {
     "u": ("u [m/s]", 1.0),

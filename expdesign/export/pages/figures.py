@@ -10,18 +10,18 @@ import re
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
-import matplotlib
 import numpy as np
 from markupsafe import Markup, escape
-from matplotlib.axes import Axes
-from matplotlib.backends.backend_svg import FigureCanvasSVG
-from matplotlib.figure import Figure
 
 from expdesign.export.formats.format import xml_text
 from expdesign.export.tuning import TUNING
 from expdesign.processes import in_order
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
 YELLOW, BLUE, VERMILION, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
@@ -53,6 +53,8 @@ SETTINGS: dict[Any, Any] = {
 @contextmanager
 def report_style() -> Iterator[None]:
     """Figures of the report are drawn inside this block; settings are as before after it."""
+    import matplotlib  # here and below: what only reads files does not wait for it
+
     with matplotlib.rc_context(SETTINGS), warnings.catch_warnings():
         # text stays text in the page, so the reader's fonts draw what matplotlib's font lacks
         warnings.filterwarnings("ignore", message="Glyph .* missing from font")
@@ -71,6 +73,9 @@ def _in_style(figure: Callable[[], Drawn]) -> Drawn:
 
 def new_figure(width_in: float, height_in: float, *, arranged: bool = True) -> Figure:
     """An empty figure that owes nothing to any window system; its axes are arranged, unless they are given places."""
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+    from matplotlib.figure import Figure
+
     figure = Figure(figsize=(width_in, height_in), layout="constrained" if arranged else None)
     FigureCanvasSVG(figure)
     return figure
@@ -84,6 +89,8 @@ def svg(figure: Figure, *, key: str, label: str) -> Markup:
         key: makes the ids of this figure unique in the page.
         label: what it shows, for those who cannot see it.
     """
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
     target = io.StringIO()
     figure.set_facecolor("none")
     FigureCanvasSVG(figure).print_svg(target, metadata={"Date": None, "Creator": None})  # savefig would draw it twice

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import dijkstra
+import scipy
 
 from expdesign.plan.bounds.displacement import Headway
 from expdesign.plan.bounds.tuning import BOUNDS
@@ -51,7 +50,7 @@ def goal_times(graph: VisibilityGraph, goal: Array, headway: Headway) -> GoalTim
     seen = graph.sees(goal, nodes[:n])
     tail, head = np.r_[rows, columns, seen], np.r_[columns, rows, np.full(len(seen), n)]
     cost = headway.seconds(nodes[head] - nodes[tail]) + 1e-12
-    backwards = coo_matrix((cost, (head, tail)), shape=(n + 1, n + 1)).tocsr()
-    seconds, after = dijkstra(backwards, indices=n, return_predecessors=True)
+    backwards = scipy.sparse.coo_matrix((cost, (head, tail)), shape=(n + 1, n + 1)).tocsr()
+    seconds, after = scipy.sparse.csgraph.dijkstra(backwards, indices=n, return_predecessors=True)
     next_node = np.where(after < 0, np.arange(n + 1), after)
     return GoalTimes(graph=graph, headway=headway, nodes=nodes, seconds=seconds, next_node=next_node)

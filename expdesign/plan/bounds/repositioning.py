@@ -33,8 +33,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+import scipy
 import shapely
-from scipy.optimize import linear_sum_assignment
 
 from expdesign.dictionary import Primitive
 from expdesign.plan.bounds.branch_and_bound import time_saved_s
@@ -174,6 +174,6 @@ def least_losses(losses: Array, counts: Sequence[int]) -> float:
     table = cheapest_orders(losses[1:, :-1], losses[1:, -1], counts)
     if table is None:
         every = np.repeat(np.repeat(losses, [1, *counts], axis=0), [*counts, 1], axis=1)
-        return float(every[linear_sum_assignment(every)].sum())
+        return float(every[scipy.optimize.linear_sum_assignment(every)].sum())
     one_less = len(table) - 1 - place_values(counts)
     return float((losses[0, :-1] + table[one_less, np.arange(len(counts))]).min())

@@ -5,10 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 import shapely
-from scipy.ndimage import distance_transform_edt, label
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import dijkstra
 
 from expdesign.plan.chart.tuning import CHART
 from expdesign.sea_area import SeaArea
@@ -80,7 +78,7 @@ def clearance_field(area: SeaArea, *, resolution_m: float) -> ClearanceField:
         np.rint((shore[:, 1] - norths[0]) / cell).astype(int), np.rint((shore[:, 0] - easts[0]) / cell).astype(int)
     ] = False
     free[[0, -1], :] = free[:, [0, -1]] = False
-    distance = np.asarray(distance_transform_edt(free)) * cell - cell / 2
+    distance = np.asarray(scipy.ndimage.distance_transform_edt(free)) * cell - cell / 2
     return ClearanceField(origin=np.array([norths[0], easts[0]]), cell_m=cell, clearance_m=distance.clip(0.0))
 
 
@@ -95,10 +93,13 @@ def narrowest_passage(field: ClearanceField, start: Array, goal: Array) -> tuple
     eight = np.ones((3, 3))
     while high - low > field.cell_m / 4:
         middle = (low + high) / 2
-        regions, _ = label(field.clearance_m >= middle, structure=eight)
+        regions, _ = scipy.ndimage.label(field.clearance_m >= middle, structure=eight)
         low, high = (middle, high) if regions[a] == regions[b] else (low, middle)
-    regions, _ = label(field.clearance_m >= high, structure=eight)
-    apart = sum(distance_transform_edt(regions != regions[end]) if regions[end] else 0.0 * regions for end in (a, b))
+    regions, _ = scipy.ndimage.label(field.clearance_m >= high, structure=eight)
+    apart = sum(
+        scipy.ndimage.distance_transform_edt(regions != regions[end]) if regions[end] else 0.0 * regions
+        for end in (a, b)
+    )
     path = _path(field, start, goal, low - field.cell_m)
     return low, path[int(np.argmin(apart[field.index(path)]))]
 
@@ -117,8 +118,10 @@ def _path(fine: ClearanceField, start: Array, goal: Array, clearance_m: float) -
         heads.append(b[both])
         lengths.append(np.full(int(both.sum()), np.hypot(step_row, step_column)))
     ends = np.concatenate(tails), np.concatenate(heads)
-    graph = coo_matrix((np.concatenate(lengths), ends), shape=(numbers.size, numbers.size)).tocsr()
-    before = dijkstra(graph, directed=False, indices=int(numbers[field.index(goal)]), return_predecessors=True)[1]
+    graph = scipy.sparse.coo_matrix((np.concatenate(lengths), ends), shape=(numbers.size, numbers.size)).tocsr()
+    before = scipy.sparse.csgraph.dijkstra(
+        graph, directed=False, indices=int(numbers[field.index(goal)]), return_predecessors=True
+    )[1]
     cells = [int(numbers[field.index(start)])]
     while (after := int(before[cells[-1]])) >= 0:
         cells.append(after)

@@ -9,11 +9,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy
 import shapely
-from scipy.ndimage import distance_transform_edt, map_coordinates
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import dijkstra
-from scipy.spatial.distance import cdist
 
 from expdesign.plan.chart.clearance_grid import ClearanceField
 from expdesign.plan.chart.tuning import CHART
@@ -45,7 +42,7 @@ class GoalDistance:
     def to_goal(self, points: Array) -> Array:
         """(...,) length of the path to the goal from (..., 2) points [m]."""
         cells = [(points[..., k] - self.field.origin[k]) / self.field.cell_m for k in (0, 1)]
-        return np.asarray(map_coordinates(self.distance_m, cells, order=1, mode="nearest"))
+        return np.asarray(scipy.ndimage.map_coordinates(self.distance_m, cells, order=1, mode="nearest"))
 
     def path(self, point: Array) -> Array:
         """(k, 2) shortest path from a point to the goal."""
@@ -80,7 +77,7 @@ def build_goal_distance(graph: VisibilityGraph, field: ClearanceField, goal: Arr
     wet = np.flatnonzero(shapely.contains_xy(graph.water, cells[:, 1], cells[:, 0]))
     table, first = np.full(grid.clearance_m.size, np.inf), np.full(grid.clearance_m.size, len(nodes) - 1)
     for some in np.array_split(wet, len(wet) // CHART.table_chunk + 1):
-        total = cdist(cells[some], nodes) + distance
+        total = scipy.spatial.distance.cdist(cells[some], nodes) + distance
         table[some], first[some] = taut_bends(graph, cells[some], nodes, next_node, total)
     if not np.isfinite(table).any():
         return None
@@ -98,8 +95,10 @@ def shortest_path_tree(graph: VisibilityGraph, goal: Array) -> tuple[Array, Arra
     seen = seen[seen < n]
     rows, columns = graph.lengths.nonzero()
     data = np.r_[graph.lengths.data, np.hypot(*(nodes[seen] - inside).T)] + 1e-12
-    edges = coo_matrix((data, (np.r_[rows, np.full(len(seen), n)], np.r_[columns, seen])), shape=(n + 1, n + 1))
-    distance, before = dijkstra(edges.tocsr(), directed=False, indices=n, return_predecessors=True)
+    edges = scipy.sparse.coo_matrix(
+        (data, (np.r_[rows, np.full(len(seen), n)], np.r_[columns, seen])), shape=(n + 1, n + 1)
+    )
+    distance, before = scipy.sparse.csgraph.dijkstra(edges.tocsr(), directed=False, indices=n, return_predecessors=True)
     next_node = np.where(before < 0, np.arange(n + 1), before)
     return nodes, distance + float(np.hypot(*(inside - goal))), next_node
 
@@ -121,7 +120,7 @@ def first_bends(graph: VisibilityGraph, points: Array, nodes: Array, distance: A
         points: (k, 2).
         nodes, distance: (n, 2) places and the lengths of the paths from there.
     """
-    total = cdist(points, nodes) + distance
+    total = scipy.spatial.distance.cdist(points, nodes) + distance
     bend = _nearest_seen(graph, points, nodes, total)
     return _chosen(total, bend), bend.clip(0)
 
@@ -173,5 +172,5 @@ def _nearest_seen(graph: VisibilityGraph, points: Array, nodes: Array, total: Ar
 def _filled(table: Array, bend: np.ndarray, cell_m: float) -> tuple[Array, np.ndarray]:
     """Cells without a path get that of the nearest cell with one, and the distance to it."""
     missing = ~np.isfinite(table)
-    away, (rows, columns) = distance_transform_edt(missing, return_indices=True)
+    away, (rows, columns) = scipy.ndimage.distance_transform_edt(missing, return_indices=True)
     return table[rows, columns] + cell_m * away, bend[rows, columns]

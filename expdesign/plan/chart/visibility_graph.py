@@ -12,9 +12,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 import shapely
-from scipy.sparse import coo_matrix, csr_matrix
-from scipy.sparse.csgraph import dijkstra
 
 from expdesign.plan.chart.tuning import CHART
 from expdesign.sea_area import as_multipolygon
@@ -35,7 +34,7 @@ class VisibilityGraph:
     water: shapely.MultiPolygon
     corners: Array
     beside: Array
-    lengths: csr_matrix
+    lengths: scipy.sparse.csr_matrix
 
     def shortest(self, start: Array, end: Array) -> Array | None:
         """(k, 2) the shortest path between two points (2,), or None where the water does not connect them.
@@ -83,8 +82,8 @@ class VisibilityGraph:
         once = np.unique(tail * (n + 2) + head)  # the ends may see each other twice
         tail, head = once // (n + 2), once % (n + 2)
         data = cost(nodes[head] - nodes[tail]) + 1e-12
-        graph = coo_matrix((data, (tail, head)), shape=(n + 2, n + 2)).tocsr()
-        least, before = dijkstra(graph, indices=n, return_predecessors=True)
+        graph = scipy.sparse.coo_matrix((data, (tail, head)), shape=(n + 2, n + 2)).tocsr()
+        least, before = scipy.sparse.csgraph.dijkstra(graph, indices=n, return_predecessors=True)
         return nodes, least, before
 
     def nearest(self, point: Array) -> Array:
@@ -132,7 +131,7 @@ def build_visibility_graph(water: shapely.Geometry) -> VisibilityGraph:
     seen = shapely.covers(grown, sight_lines(corners[tail], corners[head])) if len(tail) else np.zeros(0, dtype=bool)
     tail, head = tail[seen], head[seen]
     away = np.hypot(*(corners[tail] - corners[head]).T)
-    lengths = coo_matrix((away, (tail, head)), shape=(len(corners), len(corners))).tocsr()
+    lengths = scipy.sparse.coo_matrix((away, (tail, head)), shape=(len(corners), len(corners))).tocsr()
     return VisibilityGraph(water=grown, corners=corners, beside=np.stack([before, after], axis=1), lengths=lengths)
 
 

@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import root
+import scipy
 
 from expdesign.conventions import OUTPUTS
 from expdesign.plan.control.tuning import CONTROL
@@ -88,7 +88,7 @@ def _solved(approach: Approach, angle: float, motion: Array) -> SteadyTurn | Non
         rates = approach.helm.acceleration((whole[0], whole[1], whole[2]), approach.drive, helm_rad)
         return np.asarray(np.array(rates)[used] * pace_s / scale)
 
-    share = root(excess, motion[used] / scale, tol=1e-12).x
+    share = scipy.optimize.root(excess, motion[used] / scale, tol=1e-12).x
     whole = np.zeros(3)
     whole[used] = share * scale
     turns = whole[0] > 0 and whole[2] * angle > 0

@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.special import betaincinv
+import scipy
 
 from expdesign.plan.legs import LegWater
 from expdesign.plan.monte_carlo.procedure import ABORT_CAUSES
@@ -75,7 +75,7 @@ def upper_limit(count: int, trials: int, *, confidence: float = MONTE_CARLO.uppe
 
     Source: C. J. Clopper and E. S. Pearson, Biometrika 26 (1934), 404-413.
     """
-    return 1.0 if count >= trials else float(betaincinv(count + 1, trials - count, confidence))
+    return 1.0 if count >= trials else float(scipy.special.betaincinv(count + 1, trials - count, confidence))
 
 
 def failed_chance_constraint(

@@ -21,8 +21,7 @@ from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import dijkstra
+import scipy
 
 from expdesign.errors import InputError, NoPlan
 from expdesign.progress import Progress, silent
@@ -48,8 +47,8 @@ class LatticeProblem:
         start, goal: poses.
     """
 
-    moves: csr_array
-    runs: tuple[csr_array, ...]
+    moves: scipy.sparse.csr_array
+    runs: tuple[scipy.sparse.csr_array, ...]
     counts: Counters
     start: int
     goal: int
@@ -138,7 +137,7 @@ class _Edges:
     costs: Array
 
     @classmethod
-    def of(cls, matrix: csr_array) -> _Edges:
+    def of(cls, matrix: scipy.sparse.csr_array) -> _Edges:
         tails = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr))
         return cls(tails=tails, heads=matrix.indices, costs=matrix.data)
 
@@ -166,7 +165,7 @@ def _quantum(problem: LatticeProblem) -> float:
 
 def _costs_to_go(problem: LatticeProblem, edges: tuple[_Edges, ...]) -> list[Array]:
     """[m] -> (n,) least cost from every pose to the goal with m runs of whatever kind in between."""
-    back = csr_array(problem.moves.T)
+    back = scipy.sparse.csr_array(problem.moves.T)
     goal = np.full(back.shape[0], np.inf)
     goal[problem.goal] = 0.0
     layers = [_settled(back, goal)[0]]
@@ -179,16 +178,16 @@ def _costs_to_go(problem: LatticeProblem, edges: tuple[_Edges, ...]) -> list[Arr
     return layers
 
 
-def _reduced(moves: csr_array, heuristic: Array) -> csr_array:
+def _reduced(moves: scipy.sparse.csr_array, heuristic: Array) -> scipy.sparse.csr_array:
     """Costs plus the heuristic's growth along them; moves from or to where no goal can be reached are left out."""
     edges = _Edges.of(moves)
     useful = np.isfinite(heuristic[edges.tails]) & np.isfinite(heuristic[edges.heads])
     rows, columns = edges.tails[useful], edges.heads[useful]
     costs = edges.costs[useful] + heuristic[columns] - heuristic[rows]
-    return csr_array((np.maximum(costs, 0.0), (rows, columns)), shape=moves.shape)
+    return scipy.sparse.csr_array((np.maximum(costs, 0.0), (rows, columns)), shape=moves.shape)
 
 
-def _settled(graph: csr_array, entry: Array, limit: float = np.inf) -> tuple[Array, np.ndarray]:
+def _settled(graph: scipy.sparse.csr_array, entry: Array, limit: float = np.inf) -> tuple[Array, np.ndarray]:
     """Least costs (n,) when poses can be entered at a cost, and each pose's predecessor, n for the entry itself.
 
     Entries of zero are edges here: SciPy's graph routines keep what a sparse matrix stores.
@@ -198,7 +197,7 @@ def _settled(graph: csr_array, entry: Array, limit: float = np.inf) -> tuple[Arr
     if not len(open_poses):
         return np.full(n, np.inf), np.full(n, -1)
     lowest = float(entry[open_poses].min())
-    extended = csr_array(
+    extended = scipy.sparse.csr_array(
         (
             np.concatenate([graph.data, entry[open_poses] - lowest]),
             np.concatenate([graph.indices, open_poses.astype(graph.indices.dtype)]),
@@ -206,7 +205,7 @@ def _settled(graph: csr_array, entry: Array, limit: float = np.inf) -> tuple[Arr
         ),
         shape=(n + 1, n + 1),
     )
-    costs, before = dijkstra(extended, indices=n, return_predecessors=True, limit=limit - lowest)
+    costs, before = scipy.sparse.csgraph.dijkstra(extended, indices=n, return_predecessors=True, limit=limit - lowest)
     return cast(Array, costs[:n] + lowest), before[:n]
 
 
@@ -236,7 +235,7 @@ class _Layers:
     problem: LatticeProblem
     edges: tuple[_Edges, ...]
     to_go: list[Array]
-    graphs: list[csr_array]
+    graphs: list[scipy.sparse.csr_array]
     limit: float
 
     def search(self, width: int | None, most_states: float, progress: Progress) -> _Found:

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_array
+import scipy
 
 from expdesign.plan.local_planner import LegEnds, SearchSpace, moved
 from expdesign.plan.runs import Footprint
@@ -60,7 +60,7 @@ def build_lattice(lattice: Lattice, counts: Sequence[int], departure: Departure)
     )
 
 
-def _matrix(lattice: Lattice, entries: Sequence[Array]) -> csr_array:
+def _matrix(lattice: Lattice, entries: Sequence[Array]) -> scipy.sparse.csr_array:
     """Sparse matrix of edges; of several between two poses the cheapest."""
     tails, heads, seconds = np.concatenate([np.zeros((3, 0)), *entries], axis=1)
     order = np.lexsort((seconds, heads, tails))
@@ -68,7 +68,7 @@ def _matrix(lattice: Lattice, entries: Sequence[Array]) -> csr_array:
     first = np.r_[True, (np.diff(tails) != 0) | (np.diff(heads) != 0)][: len(tails)]
     size = lattice.size + 2
     ends = tails[first].astype(np.int32), heads[first].astype(np.int32)
-    return csr_array((seconds[first], ends), shape=(size, size))
+    return scipy.sparse.csr_array((seconds[first], ends), shape=(size, size))
 
 
 def _straights(lattice: Lattice) -> Iterator[Array]:

@@ -12,8 +12,7 @@ Optimization 4 (1994) 626-636 (the smoother as a least-squares problem).
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import cho_solve_banded, cholesky_banded
-from scipy.optimize import minimize_scalar
+import scipy
 
 from expdesign.records.tuning import TUNING
 from expdesign.values import Array
@@ -45,7 +44,9 @@ def _likeliest_ratio(values: Array, noise_std: float | None) -> float:
     grid = np.arange(TUNING.log10_ratios[0], TUNING.log10_ratios[1] + 0.5)
     best = float(grid[np.argmin([cost(exponent) for exponent in grid])])
     bounds = (max(best - 1.0, TUNING.log10_ratios[0]), min(best + 1.0, TUNING.log10_ratios[1]))
-    return float(10.0 ** minimize_scalar(cost, bounds=bounds, method="bounded", options={"xatol": 0.02}).x)
+    return float(
+        10.0 ** scipy.optimize.minimize_scalar(cost, bounds=bounds, method="bounded", options={"xatol": 0.02}).x
+    )
 
 
 def _minus_log_likelihood(values: Array, ratio: float, noise_std: float | None) -> float:
@@ -64,8 +65,10 @@ def _solve(values: Array, ratio: float) -> tuple[Array, float, float]:
     line = values[0] + np.linspace(0.0, 1.0, count)[:, None] * (values[-1] - values[0])
     rest = np.zeros((count, 2, signals))
     rest[:, 0] = values - line
-    factor = cholesky_banded(_matrix(count, ratio), check_finite=False)
-    state = cho_solve_banded((factor, False), rest.reshape(2 * count, signals), check_finite=False).reshape(rest.shape)
+    factor = scipy.linalg.cholesky_banded(_matrix(count, ratio), check_finite=False)
+    state = scipy.linalg.cho_solve_banded(
+        (factor, False), rest.reshape(2 * count, signals), check_finite=False
+    ).reshape(rest.shape)
     kick = np.stack([np.diff(state[:, 0], axis=0) - state[:-1, 1], np.diff(state[:, 1], axis=0)])
     misfit = np.sum((rest[:, 0] - state[:, 0]) ** 2) + np.einsum("ikm,ij,jkm->", kick, WEIGHT, kick) / ratio
     state[:, 0] += line

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 
 from expdesign.errors import Diverged, NoAnswer
 from expdesign.signals import Commands, Trajectory
@@ -146,7 +146,7 @@ def _share_left(
         return None
     if left(1.0) > 0:
         return 1.0
-    return 0.0 if left(0.0) <= 0 else float(brentq(left, 0.0, 1.0, xtol=1e-12))
+    return 0.0 if left(0.0) <= 0 else float(scipy.optimize.brentq(left, 0.0, 1.0, xtol=1e-12))
 
 
 def _stepped(vessel: Vessel, given: Array, state: Array, step_s: float, until_s: float) -> Array:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from expdesign.durations import efficiencies
 from expdesign.progress import Progress, silent, within
+from expdesign.scenario import Scenario
 from expdesign.workflows.outcome import Outcome
 from expdesign.workflows.steps.case import loaded, written
 from expdesign.workflows.steps.design_problem import designed
@@ -36,13 +37,13 @@ def run(
         scheduler: address of a Dask scheduler whose workers share the work instead.
         progress: of the command.
     """
-    with workers(jobs, scheduler=scheduler):
-        return _run(scenario, out, seed, progress)
-
-
-def _run(scenario: Path, out: Path | None, seed: int, progress: Progress) -> Outcome:
     case = loaded(scenario, progress)
     check_plannable(case)
+    with workers(jobs, scheduler=scheduler):
+        return _run(case, out, seed, progress)
+
+
+def _run(case: Scenario, out: Path | None, seed: int, progress: Progress) -> Outcome:
     information, growth = ready(case, seed=seed, progress=within(progress, 0.02, 0.06))
     design = designed(case, information, seed=seed, progress=within(progress, 0.06, 0.08))
     compared = efficiencies(design)

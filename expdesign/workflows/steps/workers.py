@@ -16,6 +16,9 @@ def load_planner() -> None:
     """Import what plans and reports need."""
     import expdesign.export.report
     import expdesign.plan.solve  # noqa: F401
+    from expdesign.export.pages.figures import new_figure
+
+    new_figure(1.0, 1.0)  # loads what figures are drawn with
 
 
 @contextmanager

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
-from matplotlib.axes import Axes
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch, PathPatch
-from matplotlib.path import Path as Outline
 
 from expdesign.conventions import to_n_frame
 from expdesign.export.pages.figures import (
@@ -32,6 +29,11 @@ from expdesign.export.report.figures.position_axes import draw_position_ticks, d
 from expdesign.plan.values import Plan
 from expdesign.sea_area import SeaArea, as_multipolygon, eroded
 from expdesign.values import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch, PathPatch
 
 WIDTH_IN = 8.0
 KINDS = {"reposition": (REPOSITION, 1.3), "primitive": (PRIMITIVE, 2.4)}
@@ -100,6 +102,9 @@ def depth_colour(number: int, count: int) -> str:
 
 
 def _patch(geometry: shapely.Geometry, **style: object) -> PathPatch:
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path as Outline
+
     rings = [ring for polygon in as_multipolygon(geometry).geoms for ring in (polygon.exterior, *polygon.interiors)]
     outlines = [Outline(np.asarray(ring.coords)[:, :2], closed=True) for ring in rings]
     return PathPatch(Outline.make_compound_path(*outlines) if outlines else Outline(np.zeros((0, 2))), **style)
@@ -152,6 +157,9 @@ def _draw_runs(axes: Axes, plan: Plan, *, metres_per_inch: float) -> None:
 
 
 def _legend(content: ReportContent) -> Sequence[Line2D | Patch]:
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
     reposition, primitive = KINDS["reposition"], KINDS["primitive"]
     clearance = f"{content.clearance_m:g} m from forbidden water"
     covered = f"hull area with {100 * content.confidence:g} % probability"

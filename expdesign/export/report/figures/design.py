@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from matplotlib.axes import Axes
 
 from expdesign.durations import DurationDesign
 from expdesign.export.pages.figures import BLUE, GREY, PRIMITIVE, light_grid, new_figure, short, svg
 from expdesign.export.report.content import ReportContent, relative_information
 from expdesign.export.tuning import TUNING
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
 def durations_figure(content: ReportContent) -> str:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from matplotlib.axes import Axes
 
 from expdesign.conventions import to_n_frame
 from expdesign.dictionary.desired import desired_motion
@@ -11,6 +12,9 @@ from expdesign.dictionary.primitive import Primitive
 from expdesign.export.pages.figures import BLACK, BLUE, GREEN, GREY, PRIMITIVE, light_grid, new_figure, svg
 from expdesign.export.tuning import TUNING
 from expdesign.values import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 LEAST_SPAN = {"u [m/s]": 0.2, "v [m/s]": 0.2, "r [\N{DEGREE SIGN}/s]": 0.2}
 """Axes show at least this much, so that rounding errors do not look like motion."""

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
 
 from expdesign.export import words
 from expdesign.export.pages.figures import BLACK
 from expdesign.sea_area import LocalFrame
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 STEPS = (1.0, 2.0, 5.0, 10.0)
 

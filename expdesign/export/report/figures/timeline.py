@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
 
 from expdesign.conventions import KNOTS_PER_MPS
 from expdesign.export.pages.figures import LINES, PRIMITIVE, light_grid, new_figure, plain, short, svg
@@ -14,6 +14,9 @@ from expdesign.export.tuning import TUNING
 from expdesign.plan.values import Plan
 from expdesign.values import Array
 from expdesign.vessel import stem
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True)
