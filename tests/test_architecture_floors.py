@@ -14,7 +14,7 @@ ROOT = Path(expdesign.__file__).parent
 FLOORS = {
     "": (
         ("errors", "interruptions", "lazy", "progress"),
-        ("processes",),
+        ("input_files", "processes"),
         ("conventions", "values"),
         ("signals", "sea_area"),
         ("vessel",),

@@ -53,7 +53,9 @@ def check_out(out: Path | None) -> Path | None:
     """
     if out is None:
         return None
-    there = next(path for path in (out, *out.absolute().parents) if path.exists())
+    there = next(path for path in (out, *out.absolute().parents) if path.exists() or path.is_symlink())
+    if there.is_symlink() and not there.exists():
+        raise InputError(f"--out {out}: {there} is a link to {there.readlink()}, which does not exist")
     if not there.is_dir():
         raise InputError(f"--out {out}: {there} is a file, expected a folder")
     if not os.access(there, os.W_OK | os.X_OK):

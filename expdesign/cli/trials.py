@@ -10,6 +10,8 @@ import typer
 from expdesign.cli.app import Asked, ask, command
 from expdesign.cli.options import Jobs, Out, OutBesidePlan, PlanFile, ScenarioFile, Scheduler, Seed
 
+MOST_TRIALS = 100_000
+
 
 @command("simulate")
 def simulate(
@@ -38,7 +40,9 @@ def validate(
         Path | None,
         typer.Option("--truth", metavar="VESSEL.toml", help="The true ship. Default: the scenario's own vessel."),
     ] = None,
-    trials: Annotated[int, typer.Option("--trials", metavar="N", help="Simulated trials of each design.")] = 100,
+    trials: Annotated[
+        int, typer.Option("--trials", metavar="N", max=MOST_TRIALS, help="Simulated trials of each design.")
+    ] = 100,
     method: Annotated[str, typer.Option("--method", metavar="M", help="Estimator; see expdesign explain methods.")] = (
         "iv"
     ),

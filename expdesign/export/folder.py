@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import uuid
 from collections.abc import Callable, Iterator, Mapping
@@ -12,6 +13,9 @@ from pathlib import Path
 
 from expdesign.errors import FileError
 from expdesign.interruptions import interruptions_wait
+
+REMAINS = re.compile(r"\..+\.(\d+)-[0-9a-f]{12}\.(?:new|old)")
+"""Names of temporary files, with the process that writes them."""
 
 
 @dataclass(frozen=True)
@@ -67,16 +71,39 @@ def write_files(folder: Path, files: Mapping[str, str | bytes]) -> tuple[Path, .
     Raises:
         FileError: the folder or a file cannot be written.
     """
-    mark = uuid.uuid4().hex[:12]
+    mark = f"{os.getpid()}-{uuid.uuid4().hex[:12]}"
     slots = [_slot(folder, name, mark) for name in files]
     contents = [content.encode() if isinstance(content, str) else content for content in files.values()]
     with interruptions_wait() as stop_here, _made(folder):
+        _clear_remains(folder)
         try:
             _write_beside(slots, contents, stop_here)
             _put_in_place(slots)
         except OSError as error:
             raise FileError(folder, "", f"cannot be written: {error.strerror or error}") from None
     return tuple(slot.target for slot in slots)
+
+
+def _clear_remains(folder: Path) -> None:
+    """Remove the temporary files of processes that were killed while they wrote here."""
+    for path in folder.glob(".*.[no][el][wd]"):
+        found = REMAINS.fullmatch(path.name)
+        if found and not _runs(int(found[1])):
+            with suppress(OSError):
+                path.unlink()
+
+
+def _runs(process: int) -> bool:
+    """Whether there is a process of this number; where that cannot be asked without harm, there may be."""
+    if os.name != "posix":
+        return True
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):
+        return True
+    return True
 
 
 def _slot(folder: Path, name: str, mark: str) -> _Slot:
@@ -120,7 +147,8 @@ def _made(folder: Path) -> Iterator[None]:
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except FileExistsError:
-            raise FileError(folder, "", "is a file, expected a folder") from None
+            what = "is a link to nothing" if folder.is_symlink() and not folder.exists() else "is a file"
+            raise FileError(folder, "", f"{what}, expected a folder") from None
         except OSError as error:
             raise FileError(folder, "", f"cannot be made: {error.strerror or error}") from None
         yield

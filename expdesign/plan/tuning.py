@@ -10,6 +10,7 @@ class Tuning:
     """Work budgets, replanning and warnings.
 
     Attributes:
+        most_runs: runs in one plan.
         trials_stream: random stream of the drawn trials, apart from other draws of the same seed.
         replans: plans made after the first one, each with more room where drawn trials of the one before left the
             water.
@@ -27,6 +28,7 @@ class Tuning:
         many_aborted: share of drawn trials aborted above which a warning leads the report.
     """
 
+    most_runs: int = 1000
     trials_stream: int = 1
     replans: int = 2
     widening: float = 1.4

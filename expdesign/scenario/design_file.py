@@ -31,6 +31,9 @@ class BudgetTable(Table):
     )
 
 
+LONGEST_TOTAL_S = 1e6
+
+
 class DesignTable(Table):
     """`[design]`."""
 
@@ -123,6 +126,9 @@ def design_settings(table: DesignTable, vessel: Vessel, primitives: tuple[str, .
     if table.total_s < vessel.sample_time_s:
         least = f"at least the vessel's sample_time_s = {vessel.sample_time_s:g}"
         raise entry.at("total_s").error(f"is {shown(table.total_s)}, expected {least}")
+    if table.total_s > LONGEST_TOTAL_S:
+        most = f"at most {LONGEST_TOTAL_S:.0f}, eleven days"
+        raise entry.at("total_s").error(f"is {shown(table.total_s)}, expected {most}")
     estimated = tuple(name for name in names if name not in table.fixed_parameters)
     _check_list(table.interest, estimated, entry.at("interest"))
     _check_keys(table.parameter_units, estimated, entry.at("parameter_units"))

@@ -7,6 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from expdesign.errors import FileError, nearest
+from expdesign.input_files import check_ends
+
+EXPECTED = "a durations.json as expdesign durations and expdesign run write it"
 
 
 def load_repeats(path: Path | str, *, names: Sequence[str]) -> tuple[int, ...]:
@@ -15,13 +18,14 @@ def load_repeats(path: Path | str, *, names: Sequence[str]) -> tuple[int, ...]:
     Raises:
         FileError: the file is missing or not of that kind, or names an unknown primitive.
     """
+    check_ends(Path(path), EXPECTED)
     try:
         entries = json.loads(Path(path).read_text(encoding="utf-8"))["primitives"]
         repeats = {entry["name"]: entry["repeats"] for entry in entries}
     except OSError as error:
         raise FileError(path, "", f"cannot be read: {error.strerror}") from None
     except (ValueError, KeyError, TypeError, RecursionError):
-        raise FileError(path, "primitives", "expected a durations.json: a list of {name, repeats, ...}") from None
+        raise FileError(path, "primitives", f"expected {EXPECTED}: a list of {{name, repeats, ...}}") from None
     if len(repeats) < len(entries):
         raise FileError(path, "primitives", "names a primitive twice")
     for name, count in repeats.items():

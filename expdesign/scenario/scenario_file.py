@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
+from expdesign.errors import FileError
 from expdesign.plan.values import PlannerName, PlanSettings
 from expdesign.scenario.berth import berth_problem
 from expdesign.scenario.charts import Latitude, Longitude, load_area
@@ -115,7 +116,23 @@ def load_scenario(path: Path | str) -> Scenario:
         NoPlan: the area holds no allowed water.
     """
     entry = Entry(Path(path))
-    return build_scenario(read_toml(entry.path), entry)
+    content = read_toml(entry.path)
+    if _is_variant(content):
+        raise FileError(
+            entry.path,
+            "",
+            "has only some keys of a scenario, as variants have; expected a whole scenario, or the variant after its "
+            f"scenario: expdesign whatif SCENARIO.toml {entry.path}",
+        )
+    return build_scenario(content, entry)
+
+
+def _is_variant(content: Mapping[str, Any]) -> bool:
+    """Whether most of what a scenario cannot do without is missing, and the rest is a scenario's."""
+    files = content.get("scenario", {})
+    needed = [isinstance(files, Mapping) and name in files for name in ("vessel", "dictionary", "area")]
+    needed += [name in content for name in ("design", "start", "goal")]
+    return bool(content) and set(content) <= set(ScenarioFile.model_fields) and sum(needed) <= 2
 
 
 def build_scenario(content: Mapping[str, Any], entry: Entry) -> Scenario:

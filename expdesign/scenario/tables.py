@@ -17,6 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic_core import ErrorDetails
 
 from expdesign.errors import FileError, nearest
+from expdesign.input_files import check_ends
 
 LARGEST = 1e12
 """Largest accepted number, far beyond any length, time or speed of a trial."""
@@ -96,6 +97,7 @@ def read_text(path: Path, kind: str) -> str:
     Raises:
         FileError: missing, a directory, unreadable or not UTF-8.
     """
+    check_ends(path, f"a {kind} file")
     try:
         return path.read_bytes().decode("utf-8-sig")
     except FileNotFoundError:

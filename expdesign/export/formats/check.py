@@ -8,7 +8,8 @@ Source: IEC 61174, annex on the route plan exchange format; GPX 1.1 schema (Topo
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
 from itertools import pairwise
 from pathlib import Path
@@ -18,6 +19,7 @@ from lxml import etree
 from expdesign.errors import FileError
 from expdesign.export.formats.gpx import GPX
 from expdesign.export.formats.rtz import LARGEST_FILE, SPACE, VERSIONS
+from expdesign.input_files import check_ends
 
 CHILDREN = {
     "route": ("routeInfo", "waypoints", "schedules", "extensions"),
@@ -63,6 +65,7 @@ def check_route_file(path: Path) -> list[str]:
     checks = {".rtz": check_rtz, ".gpx": check_gpx}
     if path.suffix.lower() not in checks:
         raise FileError(path, "", f"has the ending {path.suffix or 'none'}, expected .rtz or .gpx")
+    check_ends(path, "an RTZ or GPX file")
     try:
         content = path.read_bytes()
     except OSError as error:
@@ -115,9 +118,11 @@ def _rtz_problems(root: etree._Element, file_stem: str, size: int) -> Iterator[s
         yield from _in_order(info, "validityPeriodStart", "validityPeriodStop")
     waypoints = root.findall(f"{{{space}}}waypoints/{{{space}}}waypoint")
     yield from _waypoints(waypoints, space, version)
-    ids = [waypoint.get("id") for waypoint in waypoints]
+    places: dict[str | None, int] = {}
+    for number, waypoint in enumerate(waypoints):
+        places.setdefault(waypoint.get("id"), number)
     for schedule in root.iterfind(f"{{{space}}}schedules/{{{space}}}schedule/*"):
-        yield from _schedule(schedule, space, ids)
+        yield from _schedule(schedule, places)
 
 
 def _structure(element: etree._Element, space: str) -> Iterator[str]:
@@ -161,18 +166,19 @@ def _waypoints(waypoints: list[etree._Element], space: str, version: str) -> Ite
         position = waypoint.find(f"{{{space}}}position")
         if position is None or None in (position.get("lat"), position.get("lon")):
             yield f"waypoint {number} has no position with lat and lon"
-    for one in dict.fromkeys(one for one in ids if one is not None and ids.count(one) > 1):
-        yield f"waypoint id {one} is given {ids.count(one)} times, expected once"
+    for one, times in Counter(one for one in ids if one is not None).items():
+        if times > 1:
+            yield f"waypoint id {one} is given {times} times, expected once"
 
 
-def _schedule(schedule: etree._Element, space: str, ids: list[str | None]) -> Iterator[str]:
+def _schedule(schedule: etree._Element, places: Mapping[str | None, int]) -> Iterator[str]:
     elements = [e for e in schedule.iterchildren(etree.Element) if etree.QName(e).localname.endswith("heduleElement")]
     named = [element.get("waypointId") for element in elements]
     for one in named:
-        if one not in ids:
+        if one not in places:
             yield f"schedule refers to waypoint {one}, which is not in the route"
-    places = [ids.index(one) for one in named if one in ids]
-    if any(two <= one for one, two in pairwise(places)):
+    order = [places[one] for one in named if one in places]
+    if any(two <= one for one, two in pairwise(order)):
         yield "schedule does not follow the order of the waypoints"
     texts = [text for e in elements for key in ("eta", "etd") if (text := e.get(key)) is not None]
     known = [(text, moment) for text in texts if (moment := _moment(text)) is not None]

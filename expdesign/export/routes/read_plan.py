@@ -16,6 +16,7 @@ from expdesign.errors import FileError
 from expdesign.export.routes.fence import Fence
 from expdesign.export.routes.plan_schema import PlanFile, environment_of
 from expdesign.export.routes.planned import PlannedTrack
+from expdesign.input_files import check_ends
 from expdesign.plan.values import Leg
 from expdesign.sea_area import LocalFrame
 from expdesign.signals import Commands, Trajectory
@@ -23,6 +24,9 @@ from expdesign.values import Array
 from expdesign.vessel import column_name
 
 TRACK_COLUMNS = ("time_s", *POSE_COLUMNS, *VELOCITY_COLUMNS, "leg", "lat_deg", "lon_deg")
+
+
+EXPECTED = "a plan.json as expdesign plan and expdesign run write it"
 
 
 STATE_TOLERANCE = 1e-5
@@ -73,14 +77,21 @@ def _parse(path: Path) -> PlanFile:
         return PlanFile.model_validate_json(_text(path))
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
+        if first["type"] == "json_invalid" or not first["loc"]:
+            raise FileError(
+                path, "", f"invalid JSON, expected {EXPECTED} ({first['msg'].removeprefix('Invalid JSON: ')})"
+            ) from None
         problem = first["msg"][:1].lower() + first["msg"][1:]
         found = first.get("input")
-        if isinstance(found, str | int | float | bool) and first["type"] != "json_invalid":
+        if isinstance(found, str | int | float | bool):
             problem = f"is {found!r}: {problem}"
+        if first["type"] == "missing":
+            problem = f"is missing, expected {EXPECTED}"
         raise FileError(path, ".".join(str(part) for part in first["loc"]), problem) from None
 
 
 def _text(path: Path) -> str:
+    check_ends(path, "a file as expdesign run writes it")
     try:
         return path.read_text(encoding="utf-8")
     except FileNotFoundError:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from expdesign.errors import FileError
+from expdesign.input_files import check_ends
 
 SEPARATORS = {";": "';'", "\t": "tabs", "|": "'|'"}
 SPREADSHEET = b"PK\x03\x04"
@@ -55,6 +56,7 @@ def _one_line(name: str) -> str:
 
 
 def _text(path: Path) -> str:
+    check_ends(path, "a CSV file")
     try:
         content = path.read_bytes()
         if content.startswith(SPREADSHEET):

@@ -20,6 +20,7 @@ import pyogrio
 import shapely
 from pyogrio.errors import DataSourceError
 
+from expdesign.input_files import check_ends
 from expdesign.scenario.charts.dangers import BUOYS, CLEARANCES, DANGERS, OVERHEAD, SOLID, UNSURVEYED, ChartedObject
 from expdesign.scenario.tables import Entry
 
@@ -74,6 +75,7 @@ def read_cell(path: Path) -> Cell:
     Raises:
         FileError: no S-57 cell, not in WGS84 and metres, an update is missing or did not apply, or no depths in it.
     """
+    check_ends(path, "an S-57 cell")
     entry = Entry(path)
     updates = _updates(path, entry)
     try:

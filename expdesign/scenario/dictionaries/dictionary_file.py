@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import product
@@ -153,7 +154,7 @@ def _values(value: object, entry: Entry) -> list[float]:
     for number in values:
         if type(number) not in (int, float) or not abs(number) < 1e300:
             raise entry.error(f"is {shown(number)}, expected a finite number or a list of them")
-    repeats = [number for number in values if values.count(number) > 1]
+    repeats = [number for number, times in Counter(values).items() if times > 1]
     if repeats:
         raise entry.error(f"has {shown(float(repeats[0]))} more than once, expected different values")
     return [float(number) for number in values]

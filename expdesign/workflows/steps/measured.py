@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from expdesign.estimation.regression import with_depth
+from expdesign.input_files import check_ends
 from expdesign.records import load_records
 from expdesign.signals import Record
 from expdesign.vessel import Vessel, column_name
@@ -34,6 +35,7 @@ def measured(data: Sequence[Path], vessel: Vessel, *, velocity: str = "auto") ->
 
 def _header(path: Path) -> set[str]:
     """Names in the first row; empty where the file cannot be read, of which the reader will complain."""
+    check_ends(path, "a CSV file")
     try:
         with path.open(encoding="utf-8-sig") as file:
             return {cell.strip(' "') for cell in re.split("[,;\t]", file.readline().strip())}

@@ -14,6 +14,7 @@ from expdesign.export import (
 from expdesign.information import PrimitiveInformation
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import plan_trial
+from expdesign.plan.tuning import PLAN
 from expdesign.plan.values import LatticeProof, Plan, RiskEstimate
 from expdesign.progress import Progress, silent
 from expdesign.scenario import Scenario
@@ -37,9 +38,15 @@ def plan_problem(
     """The planning problem of a scenario, with a dictionary and its durations.
 
     Raises:
-        InputError: plans cannot be made for the vessel.
+        InputError: plans cannot be made for the vessel, or the design has more runs than a plan can have.
     """
     check_plannable(case)
+    runs = sum(design.repeats)
+    if runs > PLAN.most_runs:
+        raise InputError(
+            f"the design has {runs} runs, expected at most {PLAN.most_runs} in one plan: shorten design.total_s or "
+            "lengthen the manoeuvres"
+        )
     return PlanProblem(
         vessel=case.vessel,
         area=case.area,

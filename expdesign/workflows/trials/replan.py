@@ -159,7 +159,7 @@ def _summary(known: Known) -> dict[str, object]:
     return {
         "data_s": known.sailed_s,
         "remaining_s": known.remaining_s,
-        "remaining": "as stated" if known.remaining_stated else "design.total_s less the time of the data",
+        "remaining_time_is": "as stated" if known.remaining_stated else "design.total_s less the time of the data",
         "model": known.model,
         "weather": known.weather,
         "current_to_north_mps": float(known.environment.current_to[0]),
