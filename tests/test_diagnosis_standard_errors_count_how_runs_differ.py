@@ -25,10 +25,12 @@ def mean_of_runs(rng: np.random.Generator, *, runs: int = RUNS, apart: float = A
         values=values, starts=np.zeros((3, runs, SAMPLES, 4)), error=error, numbers=1, spacing_s=10.0
     )
     noise = Noise(filters=np.ones((4, 1)), std=np.array([NOISE, np.inf, np.inf, np.inf]))
-    m = marginalised(gram_matrices(sensitivities, noise), sensitivities, noise)
+    grams = gram_matrices(sensitivities, noise)
+    m = marginalised(grams, sensitivities, noise)
     return Fit(
         ship=None, keys=("mean",), free_count=1, covariance=np.linalg.inv(m.A), starts=np.zeros((runs, 3)), noise=noise,
-        cost=0.0, linear=None, sensitivities=sensitivities, precision=np.zeros(1), step=np.zeros(1), converged=True,
+        cost=0.0, linear=None, sensitivities=sensitivities, grams=grams, precision=np.zeros(1), step=np.zeros(1),
+        converged=True,
     )  # type: ignore[arg-type]  # fmt: skip
 
 

@@ -10,9 +10,6 @@ import scipy
 from expdesign.diagnosis.data.tuning import TUNING
 from expdesign.values import Array
 
-NO_FEEDBACK = np.array([1.0, 0.0])
-"""With one coefficient instead of two SciPy takes a path through Python loops."""
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Noise:
@@ -21,8 +18,8 @@ class Noise:
     Attributes:
         filters: (4, p + 1) whitening filters, the first tap one.
         std: (4,) of the whitened remainder; infinite for channels that are not measured.
-        wander_mps: standard deviation of the varying current [m/s].
-        wander_time_s: its correlation time [s].
+        current_std_mps: standard deviation of the random current [m/s].
+        current_time_s: its correlation time [s].
     """
 
     filters: Array
@@ -42,25 +39,34 @@ def white_noise(std: Array) -> Noise:
 
 
 def whitened(values: Array, noise: Noise) -> Array:
-    """(..., w, s - p, 4) filtered and in units of the remainder's standard deviation; nan where a tap is nan."""
+    """(..., w, s - p, 4) filtered and in units of the remainder's standard deviation; nan where a tap is nan.
+
+    Channels that are not measured are zero, or nan where they are nan. Channels lie apart in memory.
+    """
     p = noise.order
-    result = np.empty((*values.shape[:-2], values.shape[-2] - p, values.shape[-1]))
+    result = np.empty((4, *values.shape[:-2], values.shape[-2] - p))
     for channel, (taps, std) in enumerate(zip(noise.filters, noise.std, strict=True)):
         if np.isfinite(std):
-            result[..., channel] = _filtered(values[..., channel], taps / std)[..., p:]
+            result[channel] = _filtered(values[..., channel], taps / std)[..., p:]
         else:
-            result[..., channel] = 0.0 * values[..., p:, channel]
-    return result
+            result[channel] = 0.0 * values[..., p:, channel]
+    return np.moveaxis(result, 0, -1)
 
 
 def _filtered(values: Array, taps: Array) -> Array:
     """Filtered along the last axis; nan only where a tap falls on a nan."""
     missing = ~np.isfinite(values)
     if not missing.any():
-        return np.asarray(scipy.signal.lfilter(taps, NO_FEEDBACK, values, axis=-1))
-    result = scipy.signal.lfilter(taps, NO_FEEDBACK, np.where(missing, 0.0, values), axis=-1)
-    touched = scipy.signal.lfilter(np.ones(len(taps)), NO_FEEDBACK, missing.astype(float), axis=-1) > 0.5
-    return np.where(touched, np.nan, result)
+        return _convolved(values, taps)
+    result = _convolved(np.where(missing, 0.0, values), taps)
+    return np.where(_convolved(missing.astype(float), np.ones(len(taps))) > 0.5, np.nan, result)
+
+
+def _convolved(values: Array, taps: Array) -> Array:
+    """Each value and those before it, times the taps; zero before the first."""
+    return np.asarray(
+        scipy.ndimage.correlate1d(values, taps[::-1], axis=-1, mode="constant", origin=(len(taps) - 1) // 2)
+    )
 
 
 def fit_ar_noise(remainder: Array, *, order: int | None = None) -> Noise:

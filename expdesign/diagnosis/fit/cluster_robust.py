@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from expdesign.diagnosis.fit.fit import Fit
-from expdesign.diagnosis.fit.gram_matrices import information
+from expdesign.diagnosis.fit.gram_matrices import marginalised
 from expdesign.diagnosis.fit.tuning import TUNING
 from expdesign.values import Array
 
@@ -37,7 +37,7 @@ def cluster_robust(found: Fit, run: Array) -> Fit:
 
 def cluster_covariance(found: Fit, run: Array) -> Array:
     """(c, c) sandwich covariance from the scatter of the runs' scores; priors keep their own variance."""
-    m = information(found.sensitivities, found.noise)
+    m = marginalised(found.grams, found.sensitivities, found.noise)
     names = np.unique(run)
     scores = np.stack([m.each[run == name].sum(axis=0) for name in names])
     scores = scores - scores.mean(axis=0)

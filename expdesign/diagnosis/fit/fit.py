@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.diagnosis.data import Noise
-from expdesign.diagnosis.fit.gram_matrices import information
+from expdesign.diagnosis.fit.gram_matrices import GramMatrices, gram_matrices, marginalised
 from expdesign.diagnosis.fit.linear_model import Sensitivities
 from expdesign.diagnosis.fit.tuning import TUNING
 from expdesign.diagnosis.model import ExtendedModel
@@ -27,7 +27,7 @@ class Fit:
         starts: (w, n) initial states.
         noise: of the remainder.
         cost: weighted squared error at the end, while fitting.
-        linear, sensitivities: at the end.
+        linear, sensitivities: at the end; grams: of the sensitivities, under the noise.
         precision: (c,) of the effects' priors.
         step: (c,) to the optimum of the linear model.
         converged: a further step would not lower the cost noticeably.
@@ -42,6 +42,7 @@ class Fit:
     cost: float
     linear: LinearisedMotion
     sensitivities: Sensitivities
+    grams: GramMatrices
     precision: Array
     step: Array
     converged: bool
@@ -107,7 +108,8 @@ def values_of(ship: ExtendedModel, keys: tuple[str, ...]) -> Array:
 
 def profile_cost(found: Fit, noise: Noise) -> float:
     """Twice the negative log likelihood under some noise, minimised over the effects of the linear model."""
-    m = information(found.sensitivities, noise)
+    grams = found.grams if noise is found.noise else gram_matrices(found.sensitivities, noise)
+    m = marginalised(grams, found.sensitivities, noise)
     now = values_of(found.ship, found.keys)
     score = m.s - found.precision * now
     best = score @ np.linalg.lstsq(m.A + np.diag(found.precision), score, rcond=None)[0] if len(now) else 0.0

@@ -8,7 +8,7 @@ import numpy as np
 
 from expdesign.diagnosis.data import Noise, Windows
 from expdesign.diagnosis.fit.fit import Fit, FitOptions, prior_precision, uncertain_keys, values_of
-from expdesign.diagnosis.fit.gram_matrices import information, initial_state_steps
+from expdesign.diagnosis.fit.gram_matrices import gram_matrices, information, marginalised
 from expdesign.diagnosis.fit.linear_model import Sensitivities, sensitivities_to
 from expdesign.diagnosis.fit.noise_estimation import Prior, estimate_noise
 from expdesign.diagnosis.fit.step_limits import after_step
@@ -89,7 +89,8 @@ def _linearised(problem: _Problem, ship: ExtendedModel, starts: Array, motion: M
 
 def _weighted(problem: _Problem, point: _Point | Fit, noise: Noise) -> Fit:
     """Cost, covariance and the next step under some noise."""
-    m = information(point.sensitivities, noise)
+    grams = gram_matrices(point.sensitivities, noise)
+    m = marginalised(grams, point.sensitivities, noise)
     now = values_of(point.ship, problem.keys)
     score = m.s - problem.precision * now
     A = m.A + np.diag(problem.precision)
@@ -105,6 +106,7 @@ def _weighted(problem: _Problem, point: _Point | Fit, noise: Noise) -> Fit:
         cost=m.quadratic + float(problem.precision @ now**2),
         linear=point.linear,
         sensitivities=point.sensitivities,
+        grams=grams,
         precision=problem.precision,
         step=covariance @ score,
         converged=gain < TUNING.converged_below,
@@ -113,7 +115,8 @@ def _weighted(problem: _Problem, point: _Point | Fit, noise: Noise) -> Fit:
 
 def _noise(problem: _Problem, point: _Point | Fit, guess: Noise | None) -> Noise:
     prior = Prior(precision=problem.precision, now=values_of(point.ship, problem.keys))
-    return estimate_noise(point.sensitivities, prior, guess, ar_order=problem.options.ar_order)
+    grams = point.grams if isinstance(point, Fit) else None
+    return estimate_noise(point.sensitivities, prior, guess, grams, ar_order=problem.options.ar_order)
 
 
 def _with_noise_refitted(problem: _Problem, found: Fit) -> Fit:
@@ -125,7 +128,8 @@ def _line_search(problem: _Problem, best: Fit) -> Fit | None:
     """The fit after a step, halved until the cost rises no more than allowed; None if no share of it achieves that."""
     held = problem.options.fixed_weights
     limit = best.cost + TUNING.allowed_rise
-    start_step = _resized(_start_step(best), best.ship.states)
+    effects = np.broadcast_to(best.step, (len(best.starts), len(best.step)))
+    start_step = _resized(best.grams.initial_state_steps(effects), best.ship.states)
     for share in 0.5 ** np.arange(TUNING.halvings + 1):
         ship = best.ship.with_effects(after_step(best.ship, best.keys, share * best.step))
         starts = best.starts + share * start_step
@@ -137,13 +141,6 @@ def _line_search(problem: _Problem, best: Fit) -> Fit | None:
         if ahead is not None and (held or ahead.cost <= limit):
             return ahead
     return None
-
-
-def _start_step(best: Fit) -> Array:
-    """(w, 3) change of the initial velocities that goes with the step of the effects."""
-    found = best.sensitivities
-    rest = found.error - np.tensordot(best.step, found.values[: found.numbers], axes=(0, 0))
-    return initial_state_steps(found, rest, best.noise)
 
 
 def _cost_with_weights_of(problem: _Problem, best: Fit, ship: ExtendedModel, error: Array) -> float:

@@ -5,6 +5,7 @@ These small matrices suffice for steps, covariances, score tests and likelihoods
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from expdesign.diagnosis.data import Noise, random_current_covariance, whitened
 from expdesign.diagnosis.fit.linear_model import Sensitivities
+from expdesign.diagnosis.fit.tuning import TUNING
 from expdesign.values import Array
 
 
@@ -21,48 +23,65 @@ class GramMatrices:
 
     Attributes:
         XX: (w, c, c); Xe: (w, c); ee: (w,).
+        effect_starts: (w, 3, c) initial velocities that imitate each sensitivity best.
+        error_starts: (w, 3) those that imitate the error best.
     """
 
     XX: Array
     Xe: Array
     ee: Array
+    effect_starts: Array
+    error_starts: Array
+
+    def initial_state_steps(self, effects: Array) -> Array:
+        """(w, 3) change of the initial velocities that explains most of the error left by steps (w, z) of effects."""
+        imitated = self.effect_starts[..., : effects.shape[1]]
+        return np.asarray(self.error_starts - np.einsum("wnz,wz->wn", imitated, effects))
 
 
 def gram_matrices(found: Sensitivities, noise: Noise) -> GramMatrices:
     """Whiten, leave out samples that are not measured, project the initial states out."""
-    e, S, seen = _whitened_starts(found, found.error, noise)
-    w = len(e)
-    X = (whitened(found.values, noise) * seen).reshape(len(found.values), w, e.shape[1])
-    SS = np.swapaxes(S, 1, 2) @ S
-    scale = np.trace(SS, axis1=1, axis2=2)[:, None, None] / SS.shape[1]
-    SS = SS + (1e-9 * scale + 1e-12) * np.eye(SS.shape[1])
-    XX, Xe, ee = [], [], []
-    for index in range(w):
-        A, b, B = X[:, index], e[index], S[index]
-        AB = A @ B
-        half = np.linalg.solve(SS[index], np.column_stack([AB.T, B.T @ b]))
-        XX.append(A @ A.T - AB @ half[:, :-1])
-        Xe.append(A @ b - AB @ half[:, -1])
-        ee.append(b @ b - (B.T @ b) @ half[:, -1])
-    return GramMatrices(XX=np.array(XX), Xe=np.array(Xe), ee=np.array(ee))
+    e, seen = _whitened_error(found.error, noise)
+    parts = [whitened(values, noise) * seen for values in (found.starts, found.values)]
+    G = _gram(np.concatenate([np.moveaxis(rows, -1, 0) for rows in (*parts, e[None])], axis=1))
+    n = len(found.starts)
+    SS = G[:, :n, :n]
+    scale = np.trace(SS, axis1=1, axis2=2)[:, None, None] / n
+    half = np.linalg.solve(SS + (1e-9 * scale + 1e-12) * np.eye(n), G[:, :n, n:])
+    rest = G[:, n:, n:] - np.swapaxes(G[:, :n, n:], 1, 2) @ half
+    return GramMatrices(
+        XX=rest[:, :-1, :-1],
+        Xe=rest[:, :-1, -1],
+        ee=rest[:, -1, -1],
+        effect_starts=half[..., :-1],
+        error_starts=half[..., -1],
+    )
 
 
-def _whitened_starts(found: Sensitivities, error: Array, noise: Noise) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """(w, rows) whitened error, (w, rows, 3) sensitivities to initial velocities, and (w, s, 4) whether it is measured.
-
-    The first two are zero where nothing is measured.
-    """
+def _whitened_error(error: Array, noise: Noise) -> tuple[Array, NDArray[np.bool_]]:
+    """(w, s, 4) whitened error, zero where nothing is measured, and whether it is measured."""
     rows = whitened(error, noise)
     seen = np.isfinite(rows)
-    w = len(rows)
-    S = np.moveaxis((whitened(found.starts, noise) * seen).reshape(len(found.starts), w, -1), 0, -1)
-    return np.where(seen, rows, 0.0).reshape(w, -1), S, seen
+    return np.where(seen, rows, 0.0), seen
 
 
-def initial_state_steps(found: Sensitivities, error: Array, noise: Noise) -> Array:
-    """(w, 3) change of the initial velocities that explains most of an error (w, s, 4)."""
-    e, S, _ = _whitened_starts(found, error, noise)
-    return np.stack([np.linalg.lstsq(B, b, rcond=None)[0] for B, b in zip(S, e, strict=True)])
+def _gram(rows: Array) -> Array:
+    """(w, m, m) inner products of (4, m, w, s), in blocks small enough for one thread: on busy cores threads only wait.
+
+    A matrix times its own transpose would take threads at any size, so one of the two is a copy.
+    """
+    m, w, s = rows.shape[1:]
+    result = np.zeros((w, m, m))
+    tiles = [slice(low, low + TUNING.tile) for low in range(0, m, TUNING.tile)]
+    for channel, low in itertools.product(range(len(rows)), range(0, s, TUNING.tile)):
+        block = np.swapaxes(rows[channel, :, :, low : low + TUNING.tile], 0, 1)
+        other = np.swapaxes(block, 1, 2).copy()
+        for number, tile in enumerate(tiles):
+            for earlier in tiles[: number + 1]:
+                result[:, tile, earlier] += block[:, tile] @ other[..., earlier]
+    for tile, earlier in itertools.combinations(reversed(tiles), 2):
+        result[:, earlier, tile] = np.swapaxes(result[:, tile, earlier], 1, 2)
+    return result
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -11,7 +11,6 @@ from expdesign.diagnosis.fit.gram_matrices import (
     GramMatrices,
     current_prior,
     gram_matrices,
-    initial_state_steps,
     marginalised,
 )
 from expdesign.diagnosis.fit.linear_model import Sensitivities
@@ -32,21 +31,24 @@ class Prior:
     now: Array
 
 
-def estimate_noise(found: Sensitivities, prior: Prior, noise: Noise | None, *, ar_order: int | None) -> Noise:
+def estimate_noise(
+    found: Sensitivities, prior: Prior, noise: Noise | None, grams: GramMatrices | None = None, *, ar_order: int | None
+) -> Noise:
     """Noise of the remainder after the best linear response.
 
     Args:
         found: sensitivities and error.
         prior: of the estimated effects.
         noise: a first guess; without one the estimate takes a few passes from white noise.
+        grams: of the sensitivities under the first guess, if they are known.
         ar_order: of the autoregressions, or None to choose it.
     """
     passes = 1
     if noise is None:
         size = channel_std(found.error)
-        noise, passes = white_noise(np.where(size > 0, size, np.inf)), TUNING.first_noise_passes
-    for _ in range(passes):
-        grams = gram_matrices(found, noise)
+        noise, passes, grams = white_noise(np.where(size > 0, size, np.inf)), TUNING.first_noise_passes, None
+    for number in range(passes):
+        grams = gram_matrices(found, noise) if grams is None or number else grams
         noise = _estimate_random_current(grams, found, noise, prior)
         ar_noise = fit_ar_noise(_remainder(grams, found, noise, prior), order=ar_order)
         noise = replace(ar_noise, current_std_mps=noise.current_std_mps, current_time_s=noise.current_time_s)
@@ -81,12 +83,13 @@ def _remainder(grams: GramMatrices, found: Sensitivities, noise: Noise, prior: P
     c = found.numbers
     score = m.s - prior.precision * prior.now
     step = np.linalg.lstsq(m.A + np.diag(prior.precision), score, rcond=None)[0] if c else np.zeros(0)
-    rest = found.error - np.tensordot(step, found.values[:c], axes=(0, 0))
+    effects = np.broadcast_to(step, (len(grams.Xe), c))
     if noise.current_std_mps > 0 and found.knot_count:
         ZZ = grams.XX[:, c:, c:] + np.linalg.inv(current_prior(found, noise))
         b = np.linalg.solve(ZZ, (grams.Xe[:, c:] - grams.XX[:, c:, :c] @ step)[..., None])[..., 0]
         normal = np.random.default_rng(0).standard_normal((*b.shape, 1))
         b = b + np.linalg.solve(np.swapaxes(np.linalg.cholesky(ZZ), 1, 2), normal)[..., 0]
-        rest = rest - np.einsum("wz,zwsn->wsn", b, found.values[c:])
-    starts = initial_state_steps(found, rest, noise)
-    return np.asarray(rest - np.einsum("wn,nwsk->wsk", starts, found.starts))
+        effects = np.concatenate([effects, b], axis=1)
+    starts = grams.initial_state_steps(effects)
+    explained = np.einsum("wc,cwsn->wsn", effects, found.values[: effects.shape[1]])
+    return np.asarray(found.error - explained - np.einsum("wn,nwsk->wsk", starts, found.starts))

@@ -19,7 +19,8 @@ class Tuning:
         current_times_s: correlation times of the random current that are tried [s].
         knot_spacing_s: of the random current, at least [s].
         most_knots: of the random current in a window.
-        largest_sensitivity: beyond it the model counts as unstable.
+        tile: edge of blocks of matrix products; for up to 64 x 64 x 64 multiplications OpenBLAS uses one thread.
+    largest_sensitivity: beyond it the model counts as unstable.
         smallest_factor_change: factors of inertia, thrust and gyro stay above one plus this.
         largest_ratio: times and widths change by this factor in a step, at most.
         fewest_runs: for cluster-robust standard errors.
@@ -37,6 +38,7 @@ class Tuning:
     current_times_s: tuple[float, ...] = (60.0, 150.0, 400.0, 1000.0)
     knot_spacing_s: float = 20.0
     most_knots: int = 24
+    tile: int = 64
     largest_sensitivity: float = 1e30
     smallest_factor_change: float = -0.8
     largest_ratio: float = 3.0
