@@ -15,7 +15,7 @@ from expdesign.diagnosis.fit.cross_validation import (
 )
 from expdesign.diagnosis.fit.fit import Fit, FitOptions, continuing, log_likelihood_gain, profile_cost
 from expdesign.diagnosis.fit.gauss_newton import fit
-from expdesign.diagnosis.fit.gram_matrices import information
+from expdesign.diagnosis.fit.gram_matrices import gram_matrices, information
 from expdesign.diagnosis.fit.linear_model import (
     build_sensitivities,
     difference_step,
@@ -35,6 +35,7 @@ __all__ = [
     "difference_step",
     "effect_disturbances",
     "fit",
+    "gram_matrices",
     "held_out_gain",
     "information",
     "log_likelihood_gain",

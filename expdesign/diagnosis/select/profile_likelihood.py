@@ -13,7 +13,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from expdesign.diagnosis.fit import Fit, continuing, fit, log_likelihood_gain, profile_cost, sensitivities_to
+from expdesign.diagnosis.fit import (
+    Fit,
+    continuing,
+    fit,
+    gram_matrices,
+    log_likelihood_gain,
+    profile_cost,
+    sensitivities_to,
+)
 from expdesign.diagnosis.motion import linearise, simulate_windows
 from expdesign.diagnosis.select.fitted_candidate import FittedCandidate
 from expdesign.diagnosis.select.tuning import TUNING
@@ -76,4 +84,6 @@ def _cost(found: Fit, key: str, value: float) -> float:
     sensitivities = sensitivities_to(linear, found.keys)
     if sensitivities.unbounded:
         return np.inf
-    return profile_cost(replace(found, ship=ship, linear=linear, sensitivities=sensitivities), found.noise)
+    grams = gram_matrices(sensitivities, found.noise)
+    moved = replace(found, ship=ship, linear=linear, sensitivities=sensitivities, grams=grams)
+    return profile_cost(moved, found.noise)
