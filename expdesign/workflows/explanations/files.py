@@ -25,7 +25,7 @@ VESSELS = (
 )
 AREAS = (
     "Allowed water is inside the bounds and deep enough, and is neither land, danger nor a no-go zone. Dangers in a "
-    "GeoJSON chart are rocks, wrecks, shoals, obstructions, soundings, unsurveyed areas, buoys, beacons and bridges, as "
+    "GeoJSON chart are rocks, wrecks, shoals, obstructions, soundings, unsurveyed areas, buoys, beacons and bridges: "
     "points, lines or areas. They are known by their layer, or by a property kind, type, class, natural or "
     "seamark:type, in English or as an object class of S-57. A property depth_m, depth or VALSOU states their least "
     "depth [m]; without one they count as at the surface. Results name every layer that is not used."
