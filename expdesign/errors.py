@@ -90,6 +90,10 @@ class NoPlan(NoAnswer):
     """No trajectory satisfies the limits; the message names the place or the primitive."""
 
 
+class NoRoom(NoPlan):
+    """The water looked at has no path, or no place for a run; more of the chart may have one."""
+
+
 def _remade(kind: type[ExpdesignError], arguments: tuple[object, ...]) -> ExpdesignError:
     """An error with a message that is already made."""
     return kind.__new__(kind, *arguments)

@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
 
-from expdesign.errors import NoPlan
-from expdesign.plan.chart import ClearanceField, build_goal_distance, clearance_field, narrowest_passage
-from expdesign.plan.control import capability
+from expdesign.errors import NoPlan, NoRoom
+from expdesign.plan.chart import (
+    ClearanceField,
+    build_goal_distance,
+    clearance_field,
+    connects,
+    narrowest_passage,
+    reachable,
+    resolved,
+)
+from expdesign.plan.control import Capability, capability
 from expdesign.plan.legs import LegWater
 from expdesign.plan.local_planner import LocalPlanner, SearchSpace, TransitionTrials, local_planner, pairs_of
 from expdesign.plan.problem import PlanProblem
@@ -18,6 +27,7 @@ from expdesign.plan.search import path_exceeds_displacement, place_runs, placeme
 from expdesign.plan.tuning import PLAN
 from expdesign.plan.work_budget import WorkBudget
 from expdesign.progress import Progress
+from expdesign.sea_area import SeaArea
 from expdesign.vessel.hull import covering_discs
 
 
@@ -48,16 +58,45 @@ def plan_room(problem: PlanProblem, water: LegWater, progress: Progress) -> Plan
     return PlanRoom(water=water, space=space)
 
 
-def leg_water(problem: PlanProblem) -> LegWater:
-    """Vessel, weather and water that all legs of the problem share."""
-    ship = capability(problem.vessel, problem.settings, current_mps=float(np.hypot(*problem.environment.current_to)))
+def waters(problem: PlanProblem, ship: Capability) -> Iterator[SeaArea]:
+    """Parts of the chart to plan in, each larger than the one before, the last with all that can be reached.
+
+    The first is what the ship reaches in the time of the runs at its top speed, or less, where the clearance grid would
+    become too coarse: where empty or unreachable water surrounds a trial, its extent makes no difference.
+    """
+    ends = problem.ends
+    whole = reachable(problem.area, ends, np.inf)
+    runs_s = sum(problem.repeats[item.name] * item.duration_s for item in problem.used)
+    area, reach_m = resolved(whole, ends, top_mps(problem, ship) * runs_s, hull_m=problem.vessel.length_m)
+    while area is not whole:
+        if connects(area, ends):
+            yield area
+        reach_m *= PLAN.wider_reach
+        area = reachable(whole, ends, reach_m)
+    yield whole
+
+
+def top_mps(problem: PlanProblem, ship: Capability) -> float:
+    """Largest speed over ground of runs, and of the ship ahead."""
+    runs = [float(np.hypot(*item.trajectory.velocity[:, :2].T).max()) for item in problem.used]
+    return max([ship.top_speed_mps, *runs]) + problem.current_mps
+
+
+def ship_on_legs(problem: PlanProblem) -> Capability:
+    """What the vessel can do on legs."""
+    ship = capability(problem.vessel, problem.settings, current_mps=problem.current_mps)
     # the lateral acceleration that runs reach is accepted on legs
     turns = [item.trajectory.velocity[:, 0] * item.trajectory.velocity[:, 2] for item in problem.used]
     lateral = max([ship.lateral_mps2, *(float(np.abs(turn).max()) for turn in turns)])
+    return replace(ship, lateral_mps2=lateral)
+
+
+def leg_water(problem: PlanProblem, ship: Capability) -> LegWater:
+    """Vessel, weather and water that all legs of the problem share."""
     return LegWater(
         vessel=problem.vessel,
         environment=problem.environment,
-        ship=replace(ship, lateral_mps2=lateral),
+        ship=ship,
         area=problem.area,
         clearance_m=problem.settings.clearance_m,
         field=clearance_field(problem.area, resolution_m=problem.vessel.length_m / 8),
@@ -74,7 +113,7 @@ def search_space(problem: PlanProblem, water: LegWater, planner: LocalPlanner) -
     margin = water.leg_margin_m + grid.cell_m / 2
     goal_distance = build_goal_distance(water.narrowest_graph, grid, problem.goal[:2])
     if goal_distance is None or not water.candidate_paths(problem.start[:2], problem.goal[:2]):
-        raise NoPlan(_no_path(problem, grid, margin))
+        raise NoRoom(_no_path(problem, grid, margin))
     return SearchSpace(
         footprints=_footprints(problem, grid),
         frame=problem.area.frame,

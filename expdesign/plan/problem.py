@@ -50,6 +50,16 @@ class PlanProblem:
         """Primitives that are run."""
         return tuple(item for item in self.primitives if self.repeats[item.name])
 
+    @property
+    def ends(self) -> Array:
+        """(2, 2) positions of start and goal."""
+        return np.stack([self.start[:2], self.goal[:2]])
+
+    @property
+    def current_mps(self) -> float:
+        """Speed of the forecast's mean current."""
+        return float(np.hypot(*self.environment.current_to))
+
     def under_way(self, pose: Array, velocity: Array) -> Array:
         """(6,) state at a pose with a velocity (3,) through the forecast's mean current."""
         u_c, v_c = to_body(self.environment.current_to, pose[2], NUMPY)

@@ -77,7 +77,9 @@ def _placed(
     try:
         return search.place(space, counts, start=line.state[:3], exit_mps=float(line.state[3]), last=line.last)
     except NoPlan as error:
-        raise NoPlan(f"{error}; before that, {stuck}" if stuck else str(error)) from None
+        if not stuck:
+            raise
+        raise NoPlan(f"{error}; before that, {stuck}") from None
 
 
 class _Failures:

@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from expdesign.errors import NoPlan
-from expdesign.plan.assembly import PlanRoom, leg_water, plan_room, search_space
+from expdesign.errors import NoPlan, NoRoom
+from expdesign.plan.assembly import PlanRoom, leg_water, plan_room, search_space, ship_on_legs, top_mps, waters
 from expdesign.plan.bounds import reposition_bound_s
+from expdesign.plan.chart import reachable
+from expdesign.plan.control import Capability
 from expdesign.plan.legs import LegWater
 from expdesign.plan.monte_carlo import (
     Trials,
@@ -28,6 +30,7 @@ from expdesign.plan.verify import realised_efficiencies, verify_plan
 from expdesign.plan.work_budget import WorkBudget
 from expdesign.processes import in_order
 from expdesign.progress import Progress, silent, within
+from expdesign.sea_area import SeaArea
 
 
 def plan_trial(problem: PlanProblem, *, progress: Progress = silent) -> Plan:
@@ -36,15 +39,27 @@ def plan_trial(problem: PlanProblem, *, progress: Progress = silent) -> Plan:
     Raises:
         NoPlan: no path, no room, or no dynamically feasible leg; the message names what and where.
     """
+    ship, refused = ship_on_legs(problem), NoRoom("the chart has no water")
+    for area in waters(problem, ship):
+        try:
+            return _planned(problem, area, ship, progress)
+        except NoRoom as error:
+            refused = error
+    raise refused
+
+
+def _planned(whole: PlanProblem, area: SeaArea, ship: Capability, progress: Progress) -> Plan:
+    """The trial planned in a part of the water, checked with all of it."""
     progress("measuring the water", 0.0)
-    water, confidence = leg_water(problem), problem.settings.confidence
+    problem = replace(whole, area=area)
+    water, confidence = leg_water(problem, ship), problem.settings.confidence
     room = plan_room(problem, water, progress)
     budget = WorkBudget(most_s=PLAN.replan_budgets * problem.settings.time_budget_s)
     for attempt in range(PLAN.replans + 1):
         before_s = budget.spent_s
         sailed = sail_all(problem, room, progress, stated=water, budget=budget)
         progress("verifying", PLAN.share_sailed)
-        checks = in_order(_check, (problem, water, sailed), ((_verified,), (_bound_s,)))
+        checks = in_order(_check, (whole, water, sailed), ((_verified,), (_bound_s,)))
         # random streams independent of planning and of earlier attempts
         rng = np.random.default_rng((problem.seed, PLAN.trials_stream, attempt))
         verification = next(checks)
@@ -57,7 +72,7 @@ def plan_trial(problem: PlanProblem, *, progress: Progress = silent) -> Plan:
         )
         failed = failed_chance_constraint(risk, trials, sailed.legs, problem.area, confidence=confidence)
         if not failed:
-            return _plan(problem, sailed, verification=verification, risk=risk, bound_s=next(checks))
+            return _plan(whole, sailed, verification=verification, risk=risk, bound_s=next(checks))
         budget.sailed(int(trials.samples.max(axis=1).sum()))
         _check_worth_replanning(problem, risk, failed, budget, attempt=attempt, before_s=before_s)
         room = _wider(problem, room, trials, sailed.legs, failed)
@@ -128,10 +143,12 @@ def _replanning(progress: Progress) -> Progress:
 
 def _bound_s(problem: PlanProblem, water: LegWater, sailed: SailedTrial) -> float:
     """Least repositioning time of any plan of the problem's runs."""
-    ship = water.ship
+    ship, ends_s = water.ship, float(sailed.trajectory.time_s[-1])
+    # plans that lead farther take longer than this one
+    area = reachable(problem.area, problem.ends, PLAN.bound_reach * top_mps(problem, ship) * ends_s)
     return reposition_bound_s(
         problem.vessel,
-        problem.area,
+        area,
         problem.environment,
         clearance_m=problem.settings.clearance_m,
         primitives=problem.primitives,

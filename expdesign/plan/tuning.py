@@ -16,11 +16,14 @@ class Tuning:
             water.
         widening: factor on a run's room then; legs get the same share of a hull length more clearance.
         replan_budgets: time budgets of counted work within which a replan must be expected to end.
+        wider_reach: factor on the part of the chart that is planned in where the one before had no room.
         transition_beam: partial plans kept in the searches that choose the transitions to optimise.
         transitions_s: work budget of optimising transitions; the others keep the rule for leg times [s].
         failure_s: least cost of a failed placement [s].
         leg_s: work budget of one leg [s].
         clock_budgets: time budgets by the clock after which a search that is stuck ends, whatever its counted work.
+        bound_reach: share of the distance that the plan's time allows at top speed, beyond start and goal, from which
+            a plan cannot return in that time; half, and some for speeds that legs begin and end with.
         iteration_s: one iteration of the optimiser for each sample of a leg, on a machine of 2020 [s].
         sample_s: one sample of some hundred drawn ships there [s].
         share_measured, share_tried, share_placed, share_sailed: of a plan's time on average, on two cores, after which
@@ -33,11 +36,13 @@ class Tuning:
     replans: int = 2
     widening: float = 1.4
     replan_budgets: float = 2.0
+    wider_reach: float = 4.0
     transition_beam: int = 100
     transitions_s: float = 30.0
     failure_s: float = 2.0
     leg_s: float = 40.0
     clock_budgets: float = 5.0
+    bound_reach: float = 0.6
     iteration_s: float = 2e-4
     sample_s: float = 2.5e-3
     share_measured: float = 0.15

@@ -9,6 +9,7 @@ from expdesign.plan.chart.goal_distance import (
     shortest_path_tree,
     taut_bends,
 )
+from expdesign.plan.chart.reachable import connects, reachable, resolved
 from expdesign.plan.chart.visibility_graph import (
     VisibilityGraph,
     build_visibility_graph,
@@ -24,10 +25,13 @@ __all__ = [
     "build_goal_distance",
     "build_visibility_graph",
     "clearance_field",
+    "connects",
     "first_bends",
     "narrowest_passage",
     "path_over",
     "polyline_length",
+    "reachable",
+    "resolved",
     "shortest_path_tree",
     "sight_lines",
     "simplified",

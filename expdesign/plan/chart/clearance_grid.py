@@ -59,6 +59,12 @@ class ClearanceField:
         return self.origin + self.cell_m * np.stack([rows, columns], axis=-1)
 
 
+def grid_cell_m(area: SeaArea, resolution_m: float) -> float:
+    """Spacing of the grid over an area [m]."""
+    west, south, east, north = area.water.bounds
+    return max(resolution_m, float(np.sqrt((east - west) * (north - south) / CHART.grid_cells)))
+
+
 def clearance_field(area: SeaArea, *, resolution_m: float) -> ClearanceField:
     """Clearance of every cell of a grid over the allowed water, by an exact distance transform.
 
@@ -67,7 +73,7 @@ def clearance_field(area: SeaArea, *, resolution_m: float) -> ClearanceField:
         resolution_m: desired spacing; coarser where the area would need more than `Tuning.grid_cells`.
     """
     west, south, east, north = area.water.bounds
-    cell = max(resolution_m, float(np.sqrt((east - west) * (north - south) / CHART.grid_cells)))
+    cell = grid_cell_m(area, resolution_m)
     norths = np.arange(south - cell, north + 2 * cell, cell)
     easts = np.arange(west - cell, east + 2 * cell, cell)
     shapely.prepare(area.water)

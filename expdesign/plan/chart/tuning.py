@@ -11,6 +11,9 @@ class Tuning:
 
     Attributes:
         grid_cells: of the clearance grid at most; a larger area gets a coarser grid.
+        fine_hulls: spacing of that grid in hull lengths above which a smaller part of the chart is planned in.
+        kept: share of the extent of the water, from which on nothing is left out for being unreachable.
+        least_reach_hulls: hull lengths that this part reaches from start and goal at least.
         routing_cells: of the grid on which the narrowest passage is located.
         corners: of a simplified water at most; more would make the graph slow.
         corners_coarse, coarse: corners accepted once the tolerance is so many times the one asked for: water that
@@ -22,6 +25,9 @@ class Tuning:
     """
 
     grid_cells: int = 3_000_000
+    fine_hulls: float = 0.25
+    kept: float = 0.9
+    least_reach_hulls: float = 60.0
     routing_cells: int = 400_000
     corners: int = 700
     corners_coarse: int = 2500

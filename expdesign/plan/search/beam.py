@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from expdesign.conventions import wrap_angle
-from expdesign.errors import NoPlan
+from expdesign.errors import NoRoom
 from expdesign.plan.local_planner import PartialPlans, SearchSpace, Successors
 from expdesign.plan.search.heuristic import OrdersAhead, orders_ahead, path_exceeds_displacement
 from expdesign.plan.search.local_search import ChainEnds, measured_s, polished
@@ -62,7 +62,7 @@ def place_runs(
     final_s = beam.cost_s + space.planner.to_goal_s(space, beam)
     best = int(np.argmin(final_s))
     if not np.isfinite(final_s[best]):
-        raise NoPlan("no path to the goal from where the last run ends")
+        raise NoRoom("no path to the goal from where the last run ends")
     runs, poses = _chain(beam, best)
     if orders:
         ends = ChainEnds(start=start, exit_mps=exit_mps, last=names.index(last) if last else -1)
@@ -95,7 +95,7 @@ def _advance(space: SearchSpace, beam: PartialPlans, width: int, ahead: OrdersAh
     left = beam.left[:, None] - np.eye(len(space.footprints), dtype=int)  # (b, q, q) after each next run
     chosen = _select(space, found, left, _totals_s(space, beam, found, left, ahead), width)
     if not len(chosen):
-        raise NoPlan(_what_blocks(space, beam))
+        raise NoRoom(_what_blocks(space, beam))
     return PartialPlans(
         pose=chosen.end,
         exit_mps=np.array([space.footprints[q].exit_mps for q in chosen.primitive]),
