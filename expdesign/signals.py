@@ -92,6 +92,8 @@ class Batch:
         depth_m: (k,) water depth, or None.
         derived: those of u, v, r that are known to be derived from pose, not measured.
         first_row: row of the first sample in its file (the header is row 1), 0 when not from a file.
+        interpolated: (k, 3) 1 where a velocity lies between the readings of its sensor, 0 where it is one; None where
+            all are readings.
     """
 
     name: str
@@ -104,9 +106,12 @@ class Batch:
     depth_m: Array | None = None
     derived: tuple[str, ...] = ()
     first_row: int = 0
+    interpolated: Array | None = None
 
     def __post_init__(self) -> None:
-        shapes = {"inputs": "k m", "velocity": "k 3", "pose": "k 3", "wind": "k 2", "depth_m": "k"}
+        shapes = {
+            "inputs": "k m", "velocity": "k 3", "pose": "k 3", "wind": "k 2", "depth_m": "k", "interpolated": "k 3",
+        }  # fmt: skip
         seal(self, **{name: shape for name, shape in shapes.items() if getattr(self, name) is not None})
         if self.inputs.shape[1] != len(self.input_names):
             raise InputError(f"Batch has {self.inputs.shape[1]} input columns for the names {self.input_names}")

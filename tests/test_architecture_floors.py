@@ -19,6 +19,7 @@ FLOORS = {
         ("signals", "sea_area"),
         ("vessel",),
         ("simulation", "records"),
+        ("reduction",),
         ("dictionary", "estimation", "indices"),
         ("information", "diagnosis", "assessment"),
         ("durations",),

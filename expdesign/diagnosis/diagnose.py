@@ -28,6 +28,7 @@ from expdesign.diagnosis.values import Diagnosis, Finding
 from expdesign.diagnosis.vessel_file import extend, extended_model
 from expdesign.errors import Diverged
 from expdesign.progress import Progress, silent, within
+from expdesign.reduction import with_reduced_wind
 from expdesign.signals import Record
 from expdesign.vessel import Vessel
 
@@ -57,6 +58,7 @@ def diagnose(
         Diverged: the model in use cannot be simulated over the data.
     """
     progress("simulating the model in use", 0.0)
+    record = with_reduced_wind(record, vessel.sensors)
     ship = extended_model(vessel, record)
     windows = stable_windows(ship, record)
     check_excitation(ship, windows)

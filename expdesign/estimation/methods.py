@@ -204,9 +204,11 @@ def _estimate(method: Method, layout: Layout, rows: Rows, refined: Refined) -> E
 
 
 def _statistics(regression: Regression, solution: Solution, left_out: int) -> Residuals:
-    eps = solution.residuals - solution.residuals.mean(axis=0)
+    used = regression.Phi.any(axis=2) | (solution.residuals != 0)  # output error has zeros where nothing is measured
+    count = np.maximum(used.sum(axis=0), 1)
+    eps = np.where(used, solution.residuals - solution.residuals.sum(axis=0) / count, 0.0)
     joined = (np.diff(regression.step_of) == 1) & (np.diff(regression.batch_of) == 0)
-    power = (eps**2).mean(axis=0)
+    power = (eps**2).sum(axis=0) / count
     pairs = (eps[1:] * eps[:-1])[joined]
     correlation = pairs.mean(axis=0) / np.where(power > 0, power, 1.0) if len(pairs) else np.zeros_like(power)
     return Residuals(

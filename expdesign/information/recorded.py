@@ -10,19 +10,19 @@ Source: F. Ljungberg, doctoral thesis, Linköping University, 7.3 and (7.50)-(7.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from expdesign.errors import InputError
-from expdesign.estimation.regression import build_layout, build_regression, inputs_of, model_for
+from expdesign.estimation.regression import build_layout, build_regression, model_for
 from expdesign.estimation.replay import InstrumentModel, Integration, build_replay
 from expdesign.information.moments import MEAN_SUBTRACTIONS
+from expdesign.reduction import with_delivered_inputs
 from expdesign.signals import Record
-from expdesign.simulation import deliver
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array, seal
-from expdesign.vessel import IDEAL, VesselModel
+from expdesign.vessel import VesselModel
 
 REGRESSORS = ("measured", "simulated")
 
@@ -73,7 +73,7 @@ def recorded_information(
     inform about it.
 
     Args:
-        record: measured data.
+        record: measured data, with commands as inputs.
         model: nominal; its simulation gives the instruments.
         parameters: p names; all others are fixed.
         predictor: name in `estimation.predictors.PREDICTORS` without nuisance regressors, "basic" or "basic-wind".
@@ -87,7 +87,7 @@ def recorded_information(
     if regressors not in REGRESSORS:
         raise InputError(f"regressors is {regressors!r}, expected one of {', '.join(REGRESSORS)}")
     driven = model_for(model, record)
-    record = _as_delivered(driven, record)
+    record = with_delivered_inputs(record, driven)
     fixed = tuple(name for name in driven.names if name not in parameters)
     layout = build_layout(driven, record, predictor=predictor, fixed=fixed)
     if layout.nuisance:
@@ -118,22 +118,6 @@ def recorded_information(
             )
         )
     return tuple(found)
-
-
-def _as_delivered(model: VesselModel, record: Record) -> Record:
-    """The record with the mean delivered input of each sample."""
-    responses = [response for actuator in model.actuators for response in actuator.responses]
-    if all(response == IDEAL for response in responses):
-        return record
-    batches = [
-        replace(
-            batch,
-            input_names=model.inputs,
-            inputs=deliver(responses, inputs_of(model, batch), sample_time_s=batch.sample_time_s)[:, 0],
-        )
-        for batch in record.batches
-    ]
-    return replace(record, batches=tuple(batches))
 
 
 def _padded(values: Array, place: list[int], count: int, *, both: bool = False) -> Array:

@@ -28,6 +28,7 @@ from expdesign.information.expected import TrialPart, expected_covariance
 from expdesign.information.tuning import TUNING as INFORMATION_TUNING
 from expdesign.processes import as_finished
 from expdesign.progress import Progress, silent
+from expdesign.reduction import at_reference_point, with_delivered_inputs
 from expdesign.rehearsal.tuning import TUNING
 from expdesign.signals import Batch, Record
 from expdesign.simulation import CALM, Environment, simulate_ensemble
@@ -216,8 +217,8 @@ def _drawn(weather: Environment, rng: np.random.Generator) -> Environment:
 def _sailed(
     rehearsal: Rehearsal, runs: Sequence[int], weather: Environment, trials: int, rng: np.random.Generator
 ) -> list[Record]:
-    """Measured data of every trial, one batch for each whole run."""
-    batches: list[list[Batch]] = []
+    """Data of every trial, one batch for each whole run, reduced by what is stated of the nominal ship."""
+    batches: list[tuple[Batch, ...]] = []
     for primitive, count in zip(rehearsal.primitives, runs, strict=True):
         for repeat in range(count):
             ensemble = simulate_ensemble(
@@ -233,8 +234,13 @@ def _sailed(
                 substeps=1 if rehearsal.integrator == "euler" else SUBSTEPS,
             )
             name = f"{primitive.name} {repeat + 1}"
-            batches.append([replace(ensemble.batch(trial), name=name) for trial in range(trials)])
-    return [Record(batches=tuple(rows)) for rows in zip(*batches, strict=True)]
+            rows = Record(batches=tuple(replace(ensemble.batch(trial), name=name) for trial in range(trials)))
+            rows = with_delivered_inputs(rows, rehearsal.nominal.model, standing=primitive.entry_inputs)
+            batches.append(rows.batches)
+    return [
+        at_reference_point(Record(batches=tuple(rows)), rehearsal.nominal.sensors)
+        for rows in zip(*batches, strict=True)
+    ]
 
 
 def heading_rad(number: int) -> float:

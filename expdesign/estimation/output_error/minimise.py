@@ -114,9 +114,9 @@ def _with_covariance(problem: Problem, layout: Layout, values: Array, starts: Ar
 
 
 def _places(problem: Problem) -> tuple[Integers, Integers, Integers]:
-    """Batch, sample and index of every complete row, in the order of time."""
+    """Batch, sample and index of every row with a measured output, in the order of time; the others are zero in it."""
     length, count = problem.measured.shape[:2]
-    whole = np.isfinite(problem.measured).all(axis=2).ravel()
+    whole = np.isfinite(problem.measured).any(axis=2).ravel()
     batch = np.broadcast_to(problem.batch, (length, count)).ravel()
     step = (problem.first + np.arange(length)[:, None]).ravel()
     order = np.lexsort((step, batch))

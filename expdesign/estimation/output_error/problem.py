@@ -112,7 +112,7 @@ def build_problem(layout: Layout, record: Record, fitting: Fitting, samples: int
                 substeps=fitting.integration.substeps,
             )
         ),
-        measured=stacked([batch.velocity[:, states] for batch in record.batches], fill=False),
+        measured=stacked([_read(batch)[:, states] for batch in record.batches], fill=False),
         weights=weights,
         batch=np.array([number for number, _ in cuts]),
         first=np.array([first for _, first in cuts]),
@@ -128,6 +128,11 @@ def _firsts(count: int, samples: int) -> range:
 def _end(first: int, samples: int, count: int) -> int:
     """End of a stretch: no remainder shorter than half a stretch is left."""
     return count if first + samples + (samples + 1) // 2 > count else first + samples
+
+
+def _read(batch: Batch) -> Array:
+    """(k, 3) velocities, nan where they are interpolated between readings."""
+    return batch.velocity if batch.interpolated is None else np.where(batch.interpolated > 0, np.nan, batch.velocity)
 
 
 def _drive(layout: Layout, batch: Batch) -> Array:

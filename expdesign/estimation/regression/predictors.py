@@ -26,6 +26,7 @@ import numpy as np
 
 from expdesign.conventions import OUTPUTS
 from expdesign.errors import InputError, NotInformative, UnknownName
+from expdesign.estimation.regression.intervals import mean_between_readings
 from expdesign.estimation.regression.nuisance import Nuisance, batch_signs, headings, nuisance_regressors, symbolic
 from expdesign.estimation.regression.polynomial import Algebra
 from expdesign.estimation.regression.regression import Integers, Regression
@@ -217,6 +218,8 @@ def build_regression(layout: Layout, record: Record) -> Rows:
         signs = batch_signs(layout.nuisance, table)
         Phi = layout.rows(table, signs, used=slice(0, -1), scale=ratio)
         y = np.diff(batch.velocity[:, states], axis=0) - ratio * layout.known(table)[:-1]
+        if batch.interpolated is not None:
+            Phi, y = (mean_between_readings(part, batch.interpolated[:, states]) for part in (Phi, y))
         whole = np.flatnonzero(np.isfinite(Phi).all(axis=(1, 2)) & np.isfinite(y).all(axis=1))
         parts.append((Phi, y) if len(whole) == len(y) else (Phi[whole], y[whole]))
         used.append(whole)

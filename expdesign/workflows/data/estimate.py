@@ -25,7 +25,7 @@ from expdesign.progress import Progress, silent, within
 from expdesign.scenario import load_vessel
 from expdesign.workflows.command_text import command_text
 from expdesign.workflows.outcome import Outcome, TextTable
-from expdesign.workflows.steps.measured import measured
+from expdesign.workflows.steps.measured import reduced_data
 
 
 def estimate(
@@ -61,8 +61,8 @@ def estimate(
         horizon_s=horizon_s,
         constant=constant,
     )
-    record = measured(data, ship, velocity=velocity)
-    apart = measured(tests, ship, velocity=velocity) if tests else NO_TESTS
+    record = reduced_data(data, ship, velocity=velocity)
+    apart = reduced_data(tests, ship, velocity=velocity) if tests else NO_TESTS
     found = assess(ship, record, options, tests=apart, progress=within(progress, 0.1, 0.8))
     progress("drawing the report", 0.8)
     command = command_text(

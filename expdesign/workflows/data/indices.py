@@ -13,6 +13,7 @@ from expdesign.export.indices_form import Held, IndicesContent, indices_html, in
 from expdesign.indices import StandardResults, ZigZag, measured_trial, standard_results
 from expdesign.indices.measured import Found
 from expdesign.progress import Progress, silent
+from expdesign.reduction import at_reference_point
 from expdesign.scenario import load_vessel
 from expdesign.vessel import Vessel
 from expdesign.workflows.command_text import command_text
@@ -44,6 +45,7 @@ def indices(
         raise InputError(f"--scale is {scale:g}, expected ship length by model length, 1 or more")
     progress("reading the vessel", 0.0)
     ship = load_vessel(vessel)
+    _check_place(ship, antenna_forward_m)
     seen, notes = _measured(data, ship, antenna_forward_m, progress)
     progress("simulating the model's standard trials", 0.6)
     found, why_not = _simulated(ship, speed_mps, needed=not data)
@@ -77,6 +79,15 @@ def indices(
     return Outcome(files=written, summary=_summary(content), tables=_tables(content))
 
 
+def _check_place(ship: Vessel, forward_m: float) -> None:
+    stated = [place.forward_m for place in (ship.sensors.position, ship.sensors.velocity) if place.forward_m]
+    if forward_m and stated:
+        raise InputError(
+            f"--antenna-forward-m is {forward_m:g}, expected none where the vessel file states a sensor's place, "
+            f"{stated[0]:g} m"
+        )
+
+
 def _measured(
     data: Sequence[Path], ship: Vessel, forward_m: float, progress: Progress
 ) -> tuple[tuple[Found, ...], tuple[str, ...]]:
@@ -85,7 +96,7 @@ def _measured(
     notes: list[str] = []
     for number, path in enumerate(data):
         progress(f"reading {path.name}", 0.6 * number / len(data))
-        record = measured([path], ship)
+        record = at_reference_point(measured([path], ship), ship.sensors)
         seen += [measured_trial(ship, batch, reference_forward_m=forward_m) for batch in record.batches]
         notes += record.notes
     return tuple(seen), tuple(notes)

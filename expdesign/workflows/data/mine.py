@@ -18,6 +18,7 @@ from expdesign.export.files import record_csv
 from expdesign.information import estimated_parameters
 from expdesign.information.recorded import BatchInformation, recorded_information
 from expdesign.progress import Progress, silent
+from expdesign.reduction import at_reference_point
 from expdesign.scenario import load_vessel
 from expdesign.signals import Batch, Record
 from expdesign.vessel import VesselModel
@@ -63,7 +64,8 @@ def mine(
     windy = all(batch.wind is not None for batch in record.batches)
     names, unseen = _parameters(ship.model, fixed, windy=windy)
     progress("simulating the runs", 0.2)
-    batches = recorded_information(record, ship.model, names, predictor="basic-wind" if windy else "basic")
+    seen = at_reference_point(record, ship.sensors, smoothed=velocity == "smoothed")
+    batches = recorded_information(seen, ship.model, names, predictor="basic-wind" if windy else "basic")
     _need_every_parameter(batches, names)
     progress("choosing among them", 0.6)
     subset = best_subset(batches, names, size=keep, mean_subtraction=mean)

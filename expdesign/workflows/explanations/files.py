@@ -21,7 +21,7 @@ VARIANTS = (
 VESSELS = (
     "Forward, starboard and clockwise are positive, counted from amidships. What is left out is ideal: no lag, no "
     "noise. Signals are numbered by kind in the order of the file: n1, a1 of the first thruster, rudder1 of the first "
-    "rudder."
+    "rudder. Simulations act on lags, dead times and sensor faults; estimates undo them in the data first."
 )
 AREAS = (
     "Allowed water is inside the bounds and deep enough, and is neither land, danger nor a no-go zone. Dangers in a "

@@ -51,7 +51,8 @@ def methods_topic() -> Topic:
         "ls, least squares, suits quiet sensors and is biased by noise in the velocities. iv, instrumental variables "
         "from a simulation, stays right with noisy velocities as long as nothing inside a modulus changes its sign. "
         "oe, output error, makes the simulation error least, and is the most accurate where only sensors disturb. "
-        "'augmented' also estimates an unknown current; 'air' uses the measured wind; 'wind' does both."
+        "'augmented' also estimates an unknown current; 'air' uses the measured wind; 'wind' does both. All use data "
+        "from which stated lags and sensor faults are undone."
     )
     entries = tuple(Explained(name=method.name, meaning=method.title) for method in METHODS)
     return _list("methods", "Estimators of expdesign estimate and validate", entries, text)
@@ -122,7 +123,9 @@ def data_topic() -> Topic:
     text = (
         "A CSV file with one header row; the unit is the end of a column's name. Needed are time, the inputs of the "
         "vessel's model, and velocities or a pose to derive them from (--velocity). A gap of more than 1.5 sample "
-        "times starts a new batch. Unusual data are reported; wrong data are refused with their rows."
+        "times starts a new batch. Unusual data are reported; wrong data are refused with their rows. Inputs are "
+        "commands and the rest is as the sensors measured it: lags, delays, places and faults that the vessel file "
+        "states are undone, and notes say so."
     )
     return _list("data", "Columns of measured data", entries, text)
 

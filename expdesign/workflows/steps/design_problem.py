@@ -23,6 +23,7 @@ from expdesign.information.outcome_gradients import outcome_gradients
 from expdesign.information.prior import equation_noise, score_prior, stated_information
 from expdesign.information.recorded import pooled, recorded_information
 from expdesign.progress import Progress, silent, within
+from expdesign.reduction import at_reference_point
 from expdesign.scenario import Scenario
 from expdesign.scenario.values import BudgetSettings
 from expdesign.values import Array
@@ -206,7 +207,7 @@ def _prior(case: Scenario, parameters: tuple[str, ...], stated: Mapping[str, flo
         known[index], noise[index] = [std[name] for name in own], equation_noise(case.vessel, own)
         prior += stated_information(known, noise, dimension=dimension, samples=samples)
     if settings.prior_data:
-        record = measured(settings.prior_data, case.vessel)
+        record = at_reference_point(measured(settings.prior_data, case.vessel), case.vessel.sensors)
         batches = recorded_information(
             record,
             model,

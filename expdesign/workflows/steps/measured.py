@@ -9,6 +9,7 @@ from pathlib import Path
 from expdesign.estimation.regression import with_depth
 from expdesign.input_files import check_ends
 from expdesign.records import load_records
+from expdesign.reduction import reduced
 from expdesign.signals import Record
 from expdesign.vessel import Vessel, column_name
 from expdesign.vessel.structures import FORCE_SIGNALS
@@ -31,6 +32,11 @@ def measured(data: Sequence[Path], vessel: Vessel, *, velocity: str = "auto") ->
         outputs=vessel.model.outputs,
     )
     return with_depth(record, vessel.draught_m) if vessel.model.reads_depth else record
+
+
+def reduced_data(data: Sequence[Path], vessel: Vessel, *, velocity: str = "auto") -> Record:
+    """Measured data of a vessel, reduced by what its file states of actuators and sensors."""
+    return reduced(measured(data, vessel, velocity=velocity), vessel, smoothed=velocity == "smoothed")
 
 
 def _header(path: Path) -> set[str]:

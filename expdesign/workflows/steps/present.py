@@ -15,6 +15,7 @@ from expdesign.errors import Diverged, FileError, InputError, NoAnswer, UnknownN
 from expdesign.information import estimated_parameters
 from expdesign.progress import Progress, silent
 from expdesign.records import Fix, last_fix
+from expdesign.reduction import reduced
 from expdesign.scenario import Scenario, load_scenario, load_vessel
 from expdesign.scenario.berth import berth_problem
 from expdesign.signals import Record
@@ -84,7 +85,9 @@ def present_state(
     notes: tuple[str, ...] = ()
     if vessel is None:
         fixed, prior_counts = first.design.fixed_parameters, first.design.prior == "parameter_std"
-        ship, origin, notes = updated(ship, record, fixed=fixed, prior_counts=prior_counts, progress=progress)
+        seen = reduced(record, ship)
+        ship, origin, notes = updated(ship, seen, fixed=fixed, prior_counts=prior_counts, progress=progress)
+        notes = (*seen.notes[len(record.notes) :], *notes)
     return PresentState(
         first=first,
         data=tuple(data),

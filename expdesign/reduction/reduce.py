@@ -1,0 +1,135 @@
+"""Records reduced: to the reference point, with delivered inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from expdesign.errors import InputError
+from expdesign.reduction.remarks import remarks
+from expdesign.reduction.sensors import Told, shrinkage, undone
+from expdesign.reduction.tuning import TUNING
+from expdesign.signals import Batch, Record
+from expdesign.simulation import deliver
+from expdesign.values import Array
+from expdesign.vessel import IDEAL, Response, Sensors, Vessel, VesselModel
+
+
+def reduced(record: Record, vessel: Vessel, *, smoothed: bool = False) -> Record:
+    """The record of the reference point, with the inputs that the actuators deliver.
+
+    Args:
+        record: as measured, with commands as inputs.
+        vessel: what its file states of actuators and sensors.
+        smoothed: whether velocities from the pose are smoothed, rather than central differences.
+
+    Returns:
+        The record itself where actuators are ideal and sensors exact but for their noise. Otherwise batches that lack
+        the samples which a delayed sensor has not yet shown, with a note for everything that was undone.
+
+    Raises:
+        InputError: no batch is left.
+    """
+    return at_reference_point(with_delivered_inputs(record, vessel.model), vessel.sensors, smoothed=smoothed)
+
+
+def with_delivered_inputs(record: Record, model: VesselModel, *, standing: Array | None = None) -> Record:
+    """The record with the mean delivered value of every input over each sample.
+
+    Inputs that are no commands of the model's actuators stay as they are.
+
+    Args:
+        record: with commands as inputs.
+        model: whose actuators respond.
+        standing: (m,) commands held for long before each batch; None for its first ones.
+    """
+    responses = {
+        signal: response
+        for actuator in model.actuators
+        for signal, response in zip(actuator.signals, actuator.responses, strict=True)
+        if response != IDEAL
+    }
+    if not responses or not record.batches:
+        return record
+    names = [name for name in record.batches[0].input_names if name in responses]
+    if not names:
+        note = "The inputs in the data are forces; the responses that the vessel file states are of other signals."
+        return replace(record, notes=(*record.notes, note))
+    batches = tuple(_delivered(batch, responses, standing) for batch in record.batches)
+    note = (
+        f"As the vessel file states, {', '.join(names)} answer commands with lags, dead times, dead bands or offsets; "
+        "what they deliver is used."
+    )
+    return replace(record, batches=batches, notes=(*record.notes, note))
+
+
+def _delivered(batch: Batch, responses: Mapping[str, Response], standing: Array | None) -> Batch:
+    own = [responses.get(name, IDEAL) for name in batch.input_names]
+    inputs = deliver(own, batch.inputs, sample_time_s=batch.sample_time_s, standing=standing)[:, 0]
+    return replace(batch, inputs=inputs)
+
+
+def at_reference_point(record: Record, sensors: Sensors, *, smoothed: bool = False) -> Record:
+    """The record with stated faults of sensors undone; arguments and errors as of `reduced`."""
+    if not _faulty(sensors):
+        return record
+    told = [Told(batch, sensors, smoothed) for batch in record.batches]
+    kept = [cut for item in told if (cut := _without_ends(item.batch, undone(item))) is not None]
+    if not kept:
+        raise InputError(
+            f"no batch is longer than the delays of the vessel's sensors by {TUNING.shortest_batch} samples or more, "
+            "expected such a batch"
+        )
+    notes = list(dict.fromkeys(remark for item in told for remark in remarks(item)))
+    if len(kept) < len(told):
+        notes.append(f"{len(told) - len(kept)} batches too short for the delays of the sensors are left out.")
+    return replace(record, batches=tuple(kept), notes=(*record.notes, *notes))
+
+
+def with_reduced_wind(record: Record, sensors: Sensors) -> Record:
+    """The record as measured, but for the wind: measured velocity less wind is the air's velocity over ground.
+
+    For models of the sensors themselves, which compare velocities as measured.
+    """
+    return replace(record, batches=tuple(_with_wind(batch, sensors) for batch in record.batches))
+
+
+def _with_wind(batch: Batch, sensors: Sensors) -> Batch:
+    if batch.wind is None or not _faulty(sensors):
+        return batch
+    there = undone(Told(batch, sensors, smoothed=False))
+    assert there.wind is not None  # as it was measured
+    return replace(batch, wind=batch.velocity[:, :2] - (there.velocity[:, :2] - there.wind))
+
+
+NOISE = ("position_m", "heading_rad", "velocity_mps", "yaw_rate_radps", "wind_mps", "wind_angle_rad", "wind_sensor")
+"""What leaves expectations as they are, but for a vane's shrinkage."""
+
+
+def _faulty(sensors: Sensors) -> bool:
+    noise: dict[str, Any] = {name: getattr(sensors, name) for name in NOISE}
+    return shrinkage(sensors) < 1.0 or sensors != Sensors(**noise)
+
+
+def _without_ends(before: Batch, after: Batch) -> Batch | None:
+    """The batch without the ends at which velocity or wind was measured and is not known at the reference point."""
+    lost = _lost(before.velocity, after.velocity)
+    if before.wind is not None and after.wind is not None:
+        lost = lost | _lost(before.wind, after.wind)
+    known = np.flatnonzero(~lost)
+    if len(known) < TUNING.shortest_batch:
+        return None
+    part = slice(int(known[0]), int(known[-1]) + 1)
+    if part == slice(0, len(after)):
+        return after
+    names = ("inputs", "velocity", "pose", "wind", "depth_m", "interpolated")
+    rows: dict[str, Any] = {name: values[part] for name in names if (values := getattr(after, name)) is not None}
+    return replace(after, first_row=after.first_row and after.first_row + part.start, **rows)
+
+
+def _lost(before: Array, after: Array) -> NDArray[np.bool_]:
+    return np.asarray((np.isfinite(before) & ~np.isfinite(after)).any(axis=1))

@@ -1,0 +1,158 @@
+"""Sensors undone: pose, velocity and wind at the ship's reference point and at the time of their sample.
+
+Source: F. Ljungberg, doctoral thesis, Linköping University, (5.39)-(5.50), for wind sensors and the shrinkage of a
+vane's components; T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control (2011), (2.28), for places.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from expdesign.conventions import OUTPUTS
+from expdesign.records import central_difference, smoothed_velocity
+from expdesign.reduction.readings import Readings, readings
+from expdesign.signals import Batch
+from expdesign.values import Array
+from expdesign.vessel import Mounting, Sensors
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Told:
+    """A batch with what is stated of the sensors that measured it.
+
+    Attributes:
+        batch: as measured.
+        sensors: as stated.
+        smoothed: whether velocities from the pose are smoothed, rather than central differences.
+    """
+
+    batch: Batch
+    sensors: Sensors
+    smoothed: bool
+
+    @property
+    def grid(self) -> Array:
+        """(k,) times of the samples [samples]."""
+        return np.arange(len(self.batch), dtype=float)
+
+    def readings(self, name: str, values: Array) -> tuple[Readings, bool]:
+        """Those of one sensor; see `readings`."""
+        return readings(values, getattr(self.sensors, name), sample_time_s=self.batch.sample_time_s)
+
+    def in_time(self, name: str, values: Array) -> tuple[Array, Mask]:
+        """(k, c) at the samples' own times, and (k,) whether a sample is the nearest to a reading."""
+        if prompt(getattr(self.sensors, name)) or not measured(values):
+            return values, np.ones(len(values), dtype=bool)
+        found, _ = self.readings(name, values)
+        return found.at(self.grid), found.shown(len(self.grid))
+
+
+def undone(told: Told) -> Batch:
+    """The batch of the reference point, of the same samples; nan where no reading shows a sample's own time."""
+    batch = told.batch
+    pose = None if batch.pose is None else _pose(told, batch.pose)
+    velocity, read = _velocity(told, pose)
+    wind = None if batch.wind is None else _wind(told, batch.wind, velocity, pose)
+    interpolated = None if read.all() else 1.0 - read
+    return replace(batch, pose=pose, velocity=velocity, wind=wind, interpolated=interpolated)
+
+
+def measured(values: Array) -> bool:
+    """Whether any number is there."""
+    return bool(np.isfinite(values).any())
+
+
+def prompt(mounting: Mounting) -> bool:
+    """Whether every sample is measured at its own time."""
+    return not (mounting.delay_s or mounting.interval_s)
+
+
+def off_centre(mounting: Mounting) -> bool:
+    """Whether a sensor is not at the reference point."""
+    return bool(mounting.forward_m or mounting.starboard_m)
+
+
+def shrinkage(sensors: Sensors) -> float:
+    """E cos(e) = exp(-variance / 2), by which Gaussian noise e on a vane's angle shrinks the wind's components."""
+    return float(np.exp(-(sensors.wind_angle_rad**2) / 2.0)) if sensors.wind_sensor == "vane" else 1.0
+
+
+def _pose(told: Told, pose: Array) -> Array:
+    heading, _ = told.in_time("heading", pose[:, 2:])
+    position, _ = told.in_time("position", pose[:, :2])
+    psi, place = heading[:, 0] - told.sensors.heading_bias_rad, told.sensors.position
+    if off_centre(place):
+        arm = np.broadcast_to((place.forward_m, place.starboard_m), position.shape)
+        position = position - turned(arm, psi)
+    return np.column_stack([position, psi])
+
+
+def _velocity(told: Told, pose: Array | None) -> tuple[Array, Array]:
+    """(k, 3) velocities over ground, and (k, 3) one where they are read and zero where they are interpolated."""
+    batch, sensors = told.batch, told.sensors
+    derived = _derived(told, pose)
+    r, r_read = told.in_time("yaw_rate", batch.velocity[:, 2:])
+    r = r / sensors.yaw_rate_scale
+    if "r" in batch.derived:
+        r, r_read = derived[:, 2:], np.ones(len(batch), dtype=bool)
+    uv, uv_read = told.in_time("velocity", batch.velocity[:, :2])
+    if measured(uv[:, 0]) and measured(uv[:, 1]):
+        uv = turned(uv, np.full(len(uv), sensors.velocity_angle_rad))
+    uv = _at_centre(uv, sensors.velocity, r[:, 0])
+    uv_read = uv_read & r_read if off_centre(sensors.velocity) else uv_read
+    velocity, read = np.column_stack([uv, r]), np.column_stack([uv_read, uv_read, r_read]).astype(float)
+    for index, name in enumerate(OUTPUTS[:2]):
+        if name in batch.derived:
+            velocity[:, index], read[:, index] = derived[:, index], 1.0
+    return velocity, read
+
+
+def _derived(told: Told, pose: Array | None) -> Array:
+    """(k, 3) velocities of the batch, derived from the pose again where that has changed and any came from it."""
+    batch = told.batch
+    if not batch.derived or pose is None or np.array_equal(pose, batch.pose, equal_nan=True):  # type: ignore[arg-type]
+        return batch.velocity
+    seen = np.flatnonzero(np.isfinite(pose if "u" in batch.derived else pose[:, 2:]).all(axis=1))
+    result = np.full_like(batch.velocity, np.nan)
+    if len(seen) < 4:
+        return result
+    part, noise = slice(int(seen[0]), int(seen[-1]) + 1), told.sensors.heading_rad
+    if told.smoothed:
+        result[part] = smoothed_velocity(pose[part], batch.sample_time_s, heading_std_rad=noise or None)
+    else:
+        inside = slice(part.start + 1, part.stop - 1)
+        result[inside] = central_difference(pose[part], batch.sample_time_s, heading_std_rad=noise)
+    return result
+
+
+def _wind(told: Told, wind: Array, velocity: Array, pose: Array | None) -> Array:
+    """Relative wind; between readings the air's velocity over ground is interpolated, which turns less than the ship.
+
+    Where no heading is measured, the relative wind is.
+    """
+    place, wind = told.sensors.wind, wind / shrinkage(told.sensors)
+    if prompt(place) or pose is None or not measured(pose[:, 2]):
+        return _at_centre(told.in_time("wind", wind)[0], place, velocity[:, 2])
+    found, _ = told.readings("wind", wind)
+    then = Readings(0.0, 1.0, np.column_stack([velocity, pose[:, 2]])).at(found.times)
+    relative = _at_centre(found.values, place, then[:, 2])
+    air = Readings(found.first, found.interval, turned(then[:, :2] - relative, then[:, 3])).at(told.grid)
+    return np.asarray(velocity[:, :2] - turned(air, -pose[:, 2]))
+
+
+def _at_centre(uv: Array, place: Mounting, r: Array) -> Array:
+    """Velocities (k, 2) of the reference point, from those of a place; the same where no yaw rate is measured."""
+    if not (off_centre(place) and measured(r)):
+        return uv
+    return np.stack([uv[:, 0] + r * place.starboard_m, uv[:, 1] - r * place.forward_m], axis=-1)
+
+
+def turned(vectors: Array, angle: Array) -> Array:
+    """(k, 2) turned clockwise by angles (k,): from the b-frame to the n-frame for headings."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.stack([c * vectors[:, 0] - s * vectors[:, 1], s * vectors[:, 0] + c * vectors[:, 1]], axis=-1)

@@ -1,0 +1,221 @@
+"""What the vessel file states of actuators and sensors is undone before parameters are estimated."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation_case import MERGED, NOMINAL, TRUE
+from expdesign.errors import InputError
+from expdesign.estimation.methods import Settings, estimate
+from expdesign.estimation.replay import Integration
+from expdesign.reduction import at_reference_point, reduced, with_reduced_wind
+from expdesign.reduction.readings import readings
+from expdesign.signals import Batch, Commands, Record
+from expdesign.simulation import CALM, Environment, measure, simulate, simulate_ensemble
+from expdesign.vessel import Mounting, Response, Sensors, Vessel
+from measured_trials import tug_commands
+
+WIND = Environment(wind_to=np.array([4.0, -3.0]))
+COMMANDS = tug_commands(400)
+TIMED, TWICE = Mounting(delay_s=2.0, interval_s=3.0), Mounting(delay_s=2.0, interval_s=2.0)
+
+
+def ship(*responses: Response, **sensors: object) -> Vessel:
+    """The 30 m ship without noise, stating responses of each thruster's speed and angle, and faults of its sensors."""
+    actuators = tuple(replace(one, responses=responses) for one in TRUE.model.actuators)
+    return replace(TRUE, model=replace(TRUE.model, actuators=actuators), sensors=Sensors(**sensors))
+
+
+LAG = Response(lag_s=3.0), Response(lag_s=2.0)
+FAULTS = {
+    "lag": ship(*LAG),
+    "dead time": ship(Response(delay_s=2.0), Response(delay_s=1.3)),
+    "dead band and offset": ship(Response(), Response(deadband=0.5, offset=0.05)),
+    "place of the log": ship(velocity=Mounting(forward_m=6.0, starboard_m=2.0)),
+    "axes of the log": ship(velocity_angle_rad=0.05),
+    "scale and bias": ship(yaw_rate_scale=1.1, heading_bias_rad=0.1),
+    "late log": ship(velocity=Mounting(delay_s=2.0)),
+    "late gyro": ship(yaw_rate=Mounting(delay_s=1.0), velocity=Mounting(forward_m=6.0)),
+    "wind": ship(wind=replace(TIMED, forward_m=8.0, starboard_m=-1.0), heading=Mounting(delay_s=1.0)),
+}
+HELD = ship(*LAG, velocity=TWICE, yaw_rate=Mounting(interval_s=2.0))
+ALL = ship(
+    Response(lag_s=3.0, delay_s=1.0), Response(lag_s=2.0, deadband=0.3, offset=0.03),
+    heading_bias_rad=0.05, velocity_angle_rad=0.05, yaw_rate_scale=1.1, position=Mounting(forward_m=5.0, delay_s=1.0),
+    heading=Mounting(delay_s=1.0), velocity=replace(TWICE, forward_m=6.0, starboard_m=2.0),
+    yaw_rate=Mounting(delay_s=1.0), wind=replace(TIMED, forward_m=8.0),
+)  # fmt: skip
+
+
+def sailed(
+    vessel: Vessel, *, weather: Environment = CALM, integrator: str = "rk4", commands: Commands = COMMANDS
+) -> Batch:
+    """One run of a vessel as her sensors measure it, one integrator step per sample."""
+    motion = simulate(
+        vessel, commands, velocity=(1.7, 0.7, 0.0), environment=weather, substeps=1, integrator=integrator
+    )
+    seen = measure(vessel, commands, motion, environment=weather, rng=np.random.default_rng(0))
+    pose = np.stack([seen["north_m"], seen["east_m"], np.unwrap(seen["heading_rad"])], axis=1)
+    return Batch(
+        name="run", sample_time_s=commands.sample_time_s, input_names=commands.names, inputs=commands.values,
+        velocity=np.stack([seen["u_mps"], seen["v_mps"], seen["r_radps"]], axis=1), pose=pose,
+        wind=np.stack([seen["wind_u_mps"], seen["wind_v_mps"]], axis=1),
+    )  # fmt: skip
+
+
+def largest_error(batch: Batch, vessel: Vessel, method: str, settings: Settings) -> float:
+    """Of a parameter, relative to the truth."""
+    found = estimate(reduced(Record(batches=(batch,)), vessel), NOMINAL, method=method, settings=settings)
+    values = dict(zip(TRUE.model.names, TRUE.model.parameters.tolist(), strict=True))
+    merged = {name: values[MERGED[name]] for name in MERGED if MERGED[name] not in found.names}
+    truth = np.array([values[name] + merged.get(name, 0.0) for name in found.names])
+    return float(np.abs(found.values / truth - 1.0).max())
+
+
+CONTINUOUS = Settings(integration=Integration("rk4", 1), quadrature="trapezoid")
+
+
+@pytest.mark.parametrize("fault", [*FAULTS, "held", "all"])
+def test_output_error_finds_every_parameter_exactly(fault: str):
+    vessel = {**FAULTS, "held": HELD, "all": ALL}[fault]
+    assert largest_error(sailed(vessel), vessel, "oe", CONTINUOUS) < 1e-6
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize("method", ["ls-air", "iv-air"])
+def test_regressions_in_wind_find_every_parameter_exactly(fault: str, method: str):
+    """Euler's map, for which regressions are exact: a fault that is undone leaves no error in any row."""
+    batch = sailed(FAULTS[fault], weather=WIND, integrator="euler")
+    assert largest_error(batch, FAULTS[fault], method, Settings()) < 1e-6
+
+
+@pytest.mark.parametrize("method", ["ls", "iv"])
+@pytest.mark.parametrize("vessel", [HELD, ALL], ids=["held", "all"])
+def test_regressions_from_readings_that_are_held_are_right_within_one_per_cent(method: str, vessel: Vessel):
+    """Regressors between readings are interpolated, which leaves an error of their second differences."""
+    batch = sailed(vessel, integrator="euler", commands=tug_commands(2000))
+    assert largest_error(batch, vessel, method, Settings()) < 0.01
+
+
+def test_what_is_not_stated_is_not_touched():
+    record = Record(batches=(sailed(TRUE),))
+    assert reduced(record, TRUE) is record
+
+
+def test_a_signal_between_readings_is_within_the_stated_error():
+    """3/128 h**4 max|d4x/dt4| inside, 1/24 of it at the ends, for a delay that is no whole number of samples."""
+    for omega, delay, interval in ((0.3, 0.5, 0.0), (0.2, 2.3, 0.0), (0.1, 1.7, 3.0), (0.1, 0.0, 2.5)):
+        taken = np.arange(400.0) - delay
+        if interval:
+            taken = np.floor(taken / interval + 1e-9) * interval
+        found, as_stated = readings(
+            np.sin(omega * taken)[:, None], Mounting(delay_s=delay, interval_s=interval), sample_time_s=1.0
+        )
+        assert as_stated
+        grid = np.arange(10.0, 390.0)
+        bound = 3 / 128 * (omega * max(interval, 1.0)) ** 4
+        error = np.abs(found.at(grid)[:, 0] - np.sin(omega * grid))
+        assert error.max() <= bound * (1 + 1e-9)
+        assert error.max() > bound / 3  # the bound is close
+
+
+@pytest.mark.parametrize("first", [0, 1, 2, 3, 4])
+def test_the_time_of_the_readings_is_found_wherever_the_data_begin(first: int):
+    time = np.arange(first, 200.0)
+    shown = np.floor((time - 1.0) / 5.0) * 5.0  # taken every 5 samples, 1 late
+    found, as_stated = readings(np.cos(0.01 * shown)[:, None], Mounting(delay_s=1.0, interval_s=5.0), sample_time_s=1.0)
+    assert as_stated
+    np.testing.assert_allclose(found.values[:, 0], np.cos(0.01 * (first + found.times)), atol=1e-12)
+
+
+def test_a_signal_that_is_not_held_as_stated_counts_as_read_at_every_sample():
+    values = np.random.default_rng(0).standard_normal((100, 1))
+    found, as_stated = readings(values, Mounting(interval_s=4.0), sample_time_s=1.0)
+    assert not as_stated
+    np.testing.assert_array_equal(found.at(np.arange(100.0)), values)
+
+
+def test_velocities_from_the_pose_are_of_the_reference_point():
+    """Differences of the antenna's pose, turned by a compass with a bias, against differences of the ship's own."""
+    faulty = ship(position=Mounting(forward_m=5.0, delay_s=2.0), heading=Mounting(delay_s=2.0), heading_bias_rad=0.1)
+    one, other = (from_pose(sailed(vessel)) for vessel in (faulty, ship()))
+    seen = reduced(Record(batches=(one,)), faulty).batches[0]
+    np.testing.assert_allclose(seen.velocity, other.velocity[1 : 1 + len(seen)], atol=1e-9)
+    np.testing.assert_allclose(seen.pose, other.pose[1 : 1 + len(seen)], atol=1e-9)
+
+
+def from_pose(batch: Batch) -> Batch:
+    from expdesign.records import central_difference
+
+    assert batch.pose is not None
+    return replace(
+        batch, velocity=central_difference(batch.pose, batch.sample_time_s), pose=batch.pose[1:-1],
+        inputs=batch.inputs[1:-1], wind=None, derived=("u", "v", "r"),
+    )  # fmt: skip
+
+
+def test_winds_for_a_diagnosis_give_the_air_over_ground():
+    vessel = replace(ALL, sensors=replace(ALL.sensors, velocity=Mounting(forward_m=6.0, delay_s=1.0)))
+    batch = sailed(vessel, weather=WIND)
+    seen = with_reduced_wind(Record(batches=(batch,)), vessel.sensors).batches[0]
+    np.testing.assert_array_equal(seen.velocity, batch.velocity)
+    air = seen.velocity[:, :2] - seen.wind
+    known = np.isfinite(air).all(axis=1)
+    assert known.mean() > 0.95
+    np.testing.assert_allclose(np.hypot(*air[known].T), 5.0, rtol=1e-9)
+
+
+def test_remarks_say_what_was_undone():
+    record = reduced(Record(batches=(sailed(ALL, weather=WIND),)), ALL)
+    for words in (
+        "n1, a1, n2, a2 answer commands", "positions are 1 s late", "velocities are measured 6 m forward and 2 m to",
+        "velocities are 2 s late; they are moved to their own time, and velocities are read every 2 s",
+        "0.05 rad is taken off the headings", "axes 0.05 rad to starboard", "the yaw rate is divided by 1.1",
+        "winds are measured 8 m forward",
+    ):  # fmt: skip
+        assert sum(words in note for note in record.notes) == 1, words
+
+
+def test_delays_longer_than_the_data_are_refused():
+    late = Sensors(velocity=Mounting(delay_s=500.0))
+    with pytest.raises(InputError, match="no batch is longer than the delays"):
+        at_reference_point(Record(batches=(sailed(TRUE),)), late)
+
+
+NOISE = {"velocity_mps": 0.03, "yaw_rate_radps": 0.002}
+
+
+def coverage(vessel: Vessel, *, trials: int, seed: int) -> np.ndarray:
+    """(t,) share of parameters whose interval of 95 % holds the truth, in each trial of 600 s."""
+    rng = np.random.default_rng(seed)
+    inputs = np.stack([tug_commands(600, seed=seed + trial).values for trial in range(trials)], axis=1)
+    many = simulate_ensemble(vessel, inputs, runs=trials, environment=CALM, rng=rng, velocity=(1.7, 0.7, 0.0))
+    held = []
+    for trial in range(trials):
+        found = estimate(reduced(Record(batches=(many.batch(trial),)), vessel), TRUE.model, method="iv")
+        values = dict(zip(TRUE.model.names, TRUE.model.parameters.tolist(), strict=True))
+        truth = [values[name] + (values[MERGED[name]] if name in MERGED else 0.0) for name in found.names]
+        held.append(np.mean(np.abs(found.values - truth) < 1.96 * found.std))
+    return np.array(held)
+
+
+def check_coverage(trials: int) -> None:
+    """With every fault as without any: the difference is within four of its standard errors over trials."""
+    sensors = replace(ALL.sensors, **NOISE)
+    faulty, faultless = (
+        coverage(vessel, trials=trials, seed=7)
+        for vessel in (replace(ALL, sensors=sensors), ship(*ALL.responses[:2], **NOISE))
+    )
+    error = np.hypot(faulty.std(ddof=1), faultless.std(ddof=1)) / np.sqrt(trials)
+    assert abs(faulty.mean() - faultless.mean()) < 4 * error
+    assert faulty.mean() > 0.8
+
+
+def test_intervals_cover_as_often_as_without_faults():
+    check_coverage(12)
+
+
+@pytest.mark.slow
+def test_intervals_cover_as_often_as_without_faults_in_many_trials():
+    check_coverage(150)
