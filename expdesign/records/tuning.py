@@ -10,6 +10,8 @@ class Tuning:
     """Thresholds that separate data from errors in data.
 
     Attributes:
+        read_bytes: bytes read at once while a file is checked to be text.
+        block_rows: rows held as text at once.
         gap_sample_times: interval, in sample times, above which a new batch starts.
         gap_share: share of intervals that may be gaps before the sampling counts as irregular.
         jitter_share: largest deviation of an interval from the sample time, as a share of it.
@@ -34,6 +36,8 @@ class Tuning:
         sideways_ratio: sway over surge (root mean square) above which the axes of the pose are questioned.
     """
 
+    read_bytes: int = 1 << 20
+    block_rows: int = 4096
     gap_sample_times: float = 1.5
     gap_share: float = 0.2
     jitter_share: float = 0.25

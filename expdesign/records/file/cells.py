@@ -1,48 +1,81 @@
-"""Text of a CSV file: header and cells, before any of them means anything."""
+"""Text of a CSV file: header and cells, before any of them means anything.
+
+The file is read in blocks of rows, so that memory is needed for the numbers only and not for their texts.
+"""
 
 from __future__ import annotations
 
+import codecs
 import csv
-import io
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 from expdesign.errors import FileError
 from expdesign.input_files import check_ends
+from expdesign.records.tuning import TUNING
 
 SEPARATORS = {";": "';'", "\t": "tabs", "|": "'|'"}
 SPREADSHEET = b"PK\x03\x04"
 LONGEST_SHOWN = 30
+FIRST_ROW = 2
 
 
 @dataclass(frozen=True, kw_only=True)
 class Cells:
-    """The cells of one file, all rows as wide as the header.
+    """A comma-separated file whose header was read.
 
     Attributes:
         path: the file.
         header: names in row 1, on one line, without surrounding blanks.
-        columns: for each name the texts of rows 2, 3, ...
     """
 
     path: Path
     header: tuple[str, ...]
-    columns: tuple[tuple[str, ...], ...]
+
+    def blocks(self) -> Iterator[tuple[int, list[tuple[str, ...]]]]:
+        """Row of the first cell, and the texts of each column, block by block.
+
+        Raises:
+            FileError: no data, or rows of another width than the header; after the last block.
+        """
+        width, row, wrong = len(self.header), FIRST_ROW, _WrongWidths(len(self.header))
+        for rows in _row_blocks(self.path):
+            whole = [cells for cells in rows if len(cells) == width]
+            if len(whole) < len(rows):
+                wrong.add(row, rows)
+            if whole:
+                yield row, list(zip(*whole, strict=True))
+            row += len(rows)
+        wrong.check(self.path, rows=row - FIRST_ROW)
+
+    def text(self, row: int, column: int) -> str:
+        """The text of one cell."""
+        for first, columns in self.blocks():
+            if row < first + len(columns[column]):
+                return columns[column][row - first]
+        raise IndexError(row)
 
 
 def read_cells(path: Path) -> Cells:
-    """Read a comma-separated file.
+    """Read the header of a comma-separated file, and check that all of it is text.
 
     Raises:
-        FileError: unreadable, not UTF-8, empty, no header, another separator, or rows of another width.
+        FileError: unreadable, not UTF-8, empty, no header, or another separator.
     """
-    rows = _rows(path, _text(path))
-    header = tuple(_one_line(name) for name in rows[0])
+    check_ends(path, "a CSV file")
+    with _readable(path):
+        _check_text(path)
+        _check_first_line(path)
+        with _rows(path) as rows:
+            first = next(rows)
+    if not first:
+        raise FileError(path, "row 1", "is empty, expected the header")
+    header = tuple(_one_line(name) for name in first)
     _check_header(path, header)
-    if len(rows) == 1:
-        raise FileError(path, "", "has a header but no data, expected one row per sample")
-    _check_widths(path, header, rows)
-    return Cells(path=path, header=header, columns=tuple(zip(*rows[1:], strict=True)))
+    return Cells(path=path, header=header)
 
 
 def shown(text: str) -> str:
@@ -55,41 +88,85 @@ def _one_line(name: str) -> str:
     return "".join(letter if letter.isprintable() else "?" for letter in " ".join(name.split()))[: 2 * LONGEST_SHOWN]
 
 
-def _text(path: Path) -> str:
-    check_ends(path, "a CSV file")
+@contextmanager
+def _readable(path: Path) -> Iterator[None]:
+    """Errors of reading a file as one line."""
     try:
-        content = path.read_bytes()
-        if content.startswith(SPREADSHEET):
-            raise FileError(path, "", "is a spreadsheet or archive, expected CSV text")
-        return content.decode("utf-8-sig")
+        yield
+        return
     except FileNotFoundError:
         problem = "does not exist, expected a CSV file"
     except IsADirectoryError:
         problem = "is a directory, expected a CSV file"
-    except UnicodeDecodeError as error:
-        problem = f"is not UTF-8 text (byte 0x{error.object[error.start]:02x} at offset {error.start})"
     except (OSError, ValueError) as error:
         problem = f"cannot be read: {getattr(error, 'strerror', None) or error}"
     raise FileError(path, "", problem)
 
 
-def _rows(path: Path, text: str) -> list[list[str]]:
-    if not text.strip():
+def _check_text(path: Path) -> None:
+    """Raise for an archive, for what is not UTF-8, and for a file of blanks."""
+    decoder, blank, offset = codecs.getincrementaldecoder("utf-8")(), True, 0
+    with path.open("rb") as file:
+        while True:
+            piece = file.read(TUNING.read_bytes)
+            if not offset and piece.startswith(SPREADSHEET):
+                raise FileError(path, "", "is a spreadsheet or archive, expected CSV text")
+            waiting = len(decoder.getstate()[0])
+            try:
+                text = decoder.decode(piece, final=not piece)
+            except UnicodeDecodeError as error:
+                place = offset - waiting + error.start
+                byte = error.object[error.start]
+                raise FileError(path, "", f"is not UTF-8 text (byte 0x{byte:02x} at offset {place})") from None
+            blank = blank and not text.lstrip("\N{ZERO WIDTH NO-BREAK SPACE}").strip()
+            offset += len(piece)
+            if not piece:
+                break
+    if blank:
         raise FileError(path, "", "is empty, expected a header row and one row per sample")
-    if text.lstrip().startswith(("#", "%")):
+
+
+def _check_first_line(path: Path) -> None:
+    """Raise for a comment before the header, and for other separators than commas."""
+    with path.open(encoding="utf-8-sig") as file:
+        lines = (line for line in file if line.strip("\r\n"))
+        first = next(lines)
+        words = first if first.strip() else next(line for line in lines if line.strip())
+    if words.lstrip().startswith(("#", "%")):
         raise FileError(path, "row 1", "is a comment, expected the header with names such as time_s")
-    _check_separator(path, text.lstrip("\r\n").partition("\n")[0])
-    rows: list[list[str]] = []
+    _check_separator(path, first.rstrip("\n"))
+
+
+@contextmanager
+def _rows(path: Path) -> Iterator[Iterator[list[str]]]:
+    with path.open(encoding="utf-8-sig") as file:
+        yield _readable_rows(path, csv.reader(file, strict=True))
+
+
+def _readable_rows(path: Path, reader: Iterator[list[str]]) -> Iterator[list[str]]:
+    row = 0
     try:
-        rows.extend(csv.reader(io.StringIO(text, newline=None), strict=True))
+        for row, cells in enumerate(reader, start=1):
+            yield cells
     except csv.Error as error:
         problem = f"is not readable CSV ({error}), expected numbers between commas, without quotes"
-        raise FileError(path, f"row {len(rows) + 1}", problem) from None
-    while not rows[-1]:
-        rows.pop()
-    if not rows[0]:
-        raise FileError(path, "row 1", "is empty, expected the header")
-    return rows
+        raise FileError(path, f"row {row + 1}", problem) from None
+
+
+def _row_blocks(path: Path) -> Iterator[list[list[str]]]:
+    """Rows 2, 3, ... without the empty ones at the end."""
+    empty = 0
+    with _readable(path), _rows(path) as rows:
+        next(rows)
+        while block := list(islice(rows, TUNING.block_rows)):
+            before, empty = empty, 0
+            while block and not block[-1]:
+                block.pop()
+                empty += 1
+            if block:
+                yield [[]] * before + block
+            else:
+                empty += before
 
 
 def _check_separator(path: Path, line: str) -> None:
@@ -112,16 +189,30 @@ def _check_header(path: Path, header: tuple[str, ...]) -> None:
         seen[name] = column
 
 
-def _check_widths(path: Path, header: tuple[str, ...], rows: list[list[str]]) -> None:
-    width = len(header)
-    wrong = [number for number, row in enumerate(rows, start=1) if len(row) != width]
-    if not wrong:
-        return
-    found = len(rows[wrong[0] - 1])
-    more = f"; {len(wrong) - 1} more rows differ too" if len(wrong) > 1 else ""
-    hint = ": decimal commas?" if len(wrong) == len(rows) - 1 and found > width else ""
-    cells = {0: "is empty", 1: "has 1 cell"}.get(found, f"has {found} cells")
-    raise FileError(path, f"row {wrong[0]}", f"{cells}, expected {width} cells as in the header{more}{hint}")
+class _WrongWidths:
+    """Rows that are not as wide as the header: the first of them, and how many there are."""
+
+    def __init__(self, width: int) -> None:
+        self.width, self.count, self.row, self.found = width, 0, 0, 0
+
+    def add(self, first_row: int, rows: list[list[str]]) -> None:
+        """Look at the rows of a block."""
+        for row, cells in enumerate(rows, start=first_row):
+            if len(cells) != self.width:
+                if not self.count:
+                    self.row, self.found = row, len(cells)
+                self.count += 1
+
+    def check(self, path: Path, *, rows: int) -> None:
+        """Raise for a file of so many rows of data, if there are none or one was wrong."""
+        if not rows:
+            raise FileError(path, "", "has a header but no data, expected one row per sample")
+        if not self.count:
+            return
+        more = f"; {self.count - 1} more rows differ too" if self.count > 1 else ""
+        hint = ": decimal commas?" if self.count == rows and self.found > self.width else ""
+        cells = {0: "is empty", 1: "has 1 cell"}.get(self.found, f"has {self.found} cells")
+        raise FileError(path, f"row {self.row}", f"{cells}, expected {self.width} cells as in the header{more}{hint}")
 
 
 def _is_number(text: str) -> bool:

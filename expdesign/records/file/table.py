@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,13 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from expdesign.errors import FileError
-from expdesign.records.file.cells import Cells, read_cells, shown
+from expdesign.records.file.cells import FIRST_ROW, Cells, read_cells, shown
 from expdesign.records.file.choice import Inputs, Sources, choose_columns
 from expdesign.records.file.names import Source, is_input
 from expdesign.records.tuning import TUNING
 from expdesign.values import Array
 
-FIRST_ROW = 2
 MISSING = ("", "na", "n/a", "nan", "-nan", "null", "none")
 OPTIONAL = (("wind_u_mps", "wind_v_mps"), ("wind_speed_mps", "wind_angle_rad"), ("depth_m",))
 
@@ -90,8 +89,8 @@ def read_table(path: Path, *, inputs: Inputs | None) -> Table:
         FileError: unreadable, columns missing, cells that are no numbers, infinite, or missing inside the data.
     """
     cells = read_cells(path)
-    sources, notes = choose_columns(path, cells.header, inputs=inputs)
-    columns = {name: _numbers(cells, source) for name, source in sources.items()}
+    sources, notes = _choose(cells, inputs)
+    columns = _read_columns(cells, sources)
     table = Table(path=path, header=cells.header, columns=columns, sources=sources, notes=notes)
     return _without_missing(_without_empty_columns(table), cells)
 
@@ -106,42 +105,82 @@ def rows_in_words(rows: NDArray[np.int_]) -> str:
     )
 
 
-def _numbers(cells: Cells, source: Source) -> Array:
-    """One column in SI units; missing cells are nan."""
-    texts = cells.columns[source.column]
+class _Numbers:
+    """One column in SI units, taken block by block; missing cells are nan."""
+
+    def __init__(self, source: Source) -> None:
+        self.source = source
+        self.parts: list[Array] = []
+        self.wrong: tuple[int, str] | None = None
+        self.underscored: tuple[int, str] | None = None
+
+    def add(self, first_row: int, texts: Sequence[str]) -> None:
+        """Take the cells of a block; the first that is no number is kept for the message."""
+        try:
+            values = np.fromiter(map(float, texts), dtype=float, count=len(texts))
+        except ValueError:
+            values = np.array([self._number(row, text) for row, text in enumerate(texts, start=first_row)])
+        if self.underscored is None and "_" in "".join(texts):
+            self.underscored = next((row, text) for row, text in enumerate(texts, start=first_row) if "_" in text)
+        self.parts.append(values)
+
+    def _number(self, row: int, text: str) -> float:
+        if text.strip().lower() in MISSING:
+            return np.nan
+        try:
+            return float(text)
+        except ValueError:
+            self.wrong = self.wrong or (row, text)
+            return np.nan
+
+    def values(self, path: Path) -> Array:
+        """All of them.
+
+        Raises:
+            FileError: one is no number, infinite, or larger than any measurement.
+        """
+        source = self.source
+        if found := self.wrong or self.underscored:
+            raise _not_a_number(path, source, *found)
+        values = np.concatenate(self.parts)
+        self.parts.clear()
+        huge = np.abs(values) > TUNING.largest_number
+        if huge.any():
+            rows = rows_in_words(np.flatnonzero(huge) + FIRST_ROW)
+            found_value = "infinite" if np.isinf(values).any() else f"{values[int(np.argmax(huge))]:.6g}"
+            expected = f"expected finite numbers up to {TUNING.largest_number:g}"
+            raise FileError(path, source.header, f"is {found_value} in {rows}, {expected}")
+        if source.factor != 1.0:
+            values *= source.factor
+        return values
+
+
+def _read_columns(cells: Cells, sources: Sources) -> dict[str, Array]:
+    """The chosen columns; the whole file is looked at before the first cell is complained of."""
+    taken = {name: _Numbers(source) for name, source in sources.items()}
+    for first_row, texts in cells.blocks():
+        for column in taken.values():
+            column.add(first_row, texts[column.source.column])
+    return {name: column.values(cells.path) for name, column in taken.items()}
+
+
+def _choose(cells: Cells, inputs: Inputs | None) -> tuple[Sources, tuple[str, ...]]:
+    """The columns that are used; rows that cannot be read go before names that do not fit."""
     try:
-        values = np.array(list(map(float, texts)))
-    except ValueError:
-        values = np.array([_number(cells, source, row, text) for row, text in enumerate(texts, start=FIRST_ROW)])
-    if "_" in "".join(texts):
-        row, text = next((row, text) for row, text in enumerate(texts, start=FIRST_ROW) if "_" in text)
-        raise _not_a_number(cells, source, row, text)
-    huge = np.abs(values) > TUNING.largest_number
-    if huge.any():
-        rows = rows_in_words(np.flatnonzero(huge) + FIRST_ROW)
-        found = "infinite" if np.isinf(values).any() else f"{values[int(np.argmax(huge))]:.6g}"
-        raise FileError(
-            cells.path, source.header, f"is {found} in {rows}, expected finite numbers up to {TUNING.largest_number:g}"
-        )
-    return values * source.factor if source.factor != 1.0 else values
+        return choose_columns(cells.path, cells.header, inputs=inputs)
+    except FileError:
+        for _ in cells.blocks():
+            pass
+        raise
 
 
-def _number(cells: Cells, source: Source, row: int, text: str) -> float:
-    if text.strip().lower() in MISSING:
-        return np.nan
-    try:
-        return float(text)
-    except ValueError:
-        raise _not_a_number(cells, source, row, text) from None
-
-
-def _not_a_number(cells: Cells, source: Source, row: int, text: str) -> FileError:
+def _not_a_number(path: Path, source: Source, row: int, text: str) -> FileError:
     expected = "a number"
     if re.fullmatch(r"\s*-?\d+,\d+\s*", text):
         expected = "a number with a decimal point"
     elif source.name == "time_s" and ":" in text:
         expected = "seconds as one number"
-    return FileError(cells.path, source.header, f"is {shown(text)} in row {row}, expected {expected}")
+    return FileError(path, source.header, f"is {shown(text)} in row {row}, expected {expected}")
 
 
 def _without_empty_columns(table: Table) -> Table:
@@ -178,7 +217,7 @@ def _check_inside(table: Table, cells: Cells, name: str, missing: Mask, kept: sl
         problem = f"holds no number in {table.rows(missing)}, more than half of the file; expected one in every row"
         raise table.error(name, problem)
     if inside.any():
-        text = cells.columns[table.sources[name].column][int(np.argmax(inside))].strip()
+        text = cells.text(int(np.argmax(inside)) + FIRST_ROW, table.sources[name].column).strip()
         found = f"is {shown(text)}" if text else "is empty"
         raise table.error(name, f"{found} in {table.rows(inside)}, expected a number in every row")
 
