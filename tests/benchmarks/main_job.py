@@ -1,61 +1,128 @@
-"""Time and memory of the main job on the example scenarios, and how good its plans are.
+"""Processor seconds of the main job by phase, release by release, beside a fixed baseline measured in the same run.
 
-Run from anywhere with the package installed: ``python tests/benchmarks/main_job.py``. Besides seconds, which depend on
-the machine, each time is given as a multiple of a fixed loop of plain Python timed in the same run. Processor seconds
-count the work of all processes of the job, whatever else the machine does meanwhile; memory is that of the largest.
+``python tests/benchmarks/main_job.py [SCENARIO.toml ...]``, by default all examples; each is run by a process of its
+own. The phases are those of `counted_work`, after the start of Python. Seconds count all processes of the job, whatever
+else the machine does meanwhile; work that other processes have begun ahead counts where it is done. The last column but
+one is the sum in multiples of the baseline (`baseline.py`), by which machines compare; memory is that of the largest
+process.
 """
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
+import resource
 import subprocess
 import sys
 import tempfile
-import time
+from collections import defaultdict
+from dataclasses import dataclass
+from datetime import date
 from pathlib import Path
 
-SCENARIOS = Path(__file__).parents[2] / "scenarios"
+from baseline import Baseline, measured_baseline
+
+ROOT = Path(__file__).parents[2]
+SCENARIOS = ROOT / "scenarios"
+PHASES = ("start", "design", "water", "transitions", "placing and legs", "checks", "files")
 
 
-def baseline_s() -> float:
-    """Processor seconds for ten million additions in plain Python, best of three."""
-    times = []
-    for _ in range(3):
-        began = time.process_time()
-        total = 0
-        for number in range(10_000_000):
-            total += number
-        times.append(time.process_time() - began)
-    return min(times)
+@dataclass(frozen=True)
+class MainJob:
+    """What a run took and gave.
+
+    Attributes:
+        phase_s: processor seconds of each phase.
+        peak_mib: memory of the largest process.
+        summary: key numbers of the plan.
+    """
+
+    phase_s: dict[str, float]
+    peak_mib: float
+    summary: dict[str, float]
 
 
-def main_job(scenario: Path) -> tuple[float, float, float, dict[str, float]]:
-    """Wall and processor seconds, peak memory of this job [MiB] and the summary of one run."""
+def main_job(scenario: Path) -> MainJob:
+    """A scenario run by a fresh process."""
+    command = [sys.executable, __file__, "--measure", str(scenario)]
+    return MainJob(**json.loads(subprocess.run(command, stdout=subprocess.PIPE, check=True).stdout))
+
+
+def measured(scenario: Path) -> MainJob:
+    """A scenario run by this process, which has done nothing else."""
+    sys.path.insert(0, str(ROOT / "tests"))
+    import counted_work
+    from expdesign import workflows
+
+    spent: dict[str, float] = defaultdict(float)
+    seen = {"s": 0.0, "phase": "start"}
+
+    def reach(phase: str) -> None:
+        now = processor_s()
+        spent[seen["phase"]] += now - seen["s"]
+        seen.update(s=now, phase=phase)
+
+    def progress(activity: str, share: float) -> None:
+        reach(counted_work.PHASES.get(activity.removeprefix("with more room: "), seen["phase"]))
+
     with tempfile.TemporaryDirectory() as folder:
-        command = [sys.executable, "-m", "expdesign", "run", str(scenario), "--out", folder]
-        began = time.perf_counter()
-        with subprocess.Popen([*command, "--json", "--quiet"], stdout=subprocess.PIPE) as process:
-            output = process.stdout.read()
-            _, status, usage = os.wait4(process.pid, 0)
-            process.returncode = os.waitstatus_to_exitcode(status)
-        if process.returncode:
-            raise SystemExit(f"{scenario}: exit status {process.returncode}")
-        busy_s = usage.ru_utime + usage.ru_stime
-        return time.perf_counter() - began, busy_s, usage.ru_maxrss / 1024, json.loads(output)["summary"]
+        run = workflows.run
+        reach("design")
+        outcome = run(scenario, Path(folder), jobs=0, progress=progress)
+        reach("files")
+    usage = [resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return MainJob(phase_s=dict(spent), peak_mib=max(usage) / 1024, summary=dict(outcome.summary))
+
+
+def processor_s() -> float:
+    """Processor seconds so far of this process and all that it has started, those that ended included."""
+    ended = resource.getrusage(resource.RUSAGE_CHILDREN)
+    own = resource.getrusage(resource.RUSAGE_SELF)
+    running = sum(ticks for _, ticks in _descendants(os.getpid()))
+    return own.ru_utime + own.ru_stime + ended.ru_utime + ended.ru_stime + running / os.sysconf("SC_CLK_TCK")
+
+
+def _descendants(process: int) -> list[tuple[int, int]]:
+    """Living descendants and their clock ticks, with those of their own children that ended (Linux)."""
+    parents: dict[int, list[tuple[int, int]]] = defaultdict(list)
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            values = path.read_text("utf-8").rpartition(")")[2].split()
+        except (FileNotFoundError, ProcessLookupError):
+            continue
+        parents[int(values[1])].append((int(path.parent.name), sum(map(int, values[11:15]))))
+    found, waiting = [], [process]
+    while waiting:
+        children = parents[waiting.pop()]
+        found += children
+        waiting += [child for child, _ in children]
+    return found
+
+
+def row(scenario: Path, baseline: Baseline) -> str:
+    """One line of the table."""
+    from expdesign import __version__
+
+    job = main_job(scenario)
+    total_s = sum(job.phase_s.values())
+    phases = " | ".join(f"{job.phase_s.get(phase, 0.0):.1f}" for phase in PHASES)
+    return (
+        f"| {__version__} ({date.today()}) | {scenario.stem} | {phases} | {total_s:.1f} | {baseline.numpy_s:.2f} + "
+        f"{baseline.ipopt_s:.2f} | {total_s / baseline.total_s:.0f} | {job.peak_mib:.0f} MiB |"
+    )
 
 
 if __name__ == "__main__":
-    unit_s = baseline_s()
-    print(f"baseline loop {unit_s:.2f} s of processor time\n")
-    print(
-        "| scenario | wall | processor | x baseline | peak memory | informative | repositioning | bound | clearance |"
-    )
-    print("|---|---|---|---|---|---|---|---|---|")
-    for name in ("helsinki", "model-ship"):
-        wall_s, busy_s, peak_mib, facts = main_job(SCENARIOS / f"{name}.toml")
-        print(
-            f"| {name} | {wall_s:.0f} s | {busy_s:.0f} s | {busy_s / unit_s:.0f} | {peak_mib:.0f} MiB "
-            f"| {facts['informative_s']:.0f} s | {facts['repositioning_s']:.0f} s "
-            f"| {facts['repositioning_bound_s']:.0f} s | {facts['least_clearance_m']:.1f} m |"
-        )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenarios", nargs="*", type=Path, default=sorted(SCENARIOS.glob("*.toml")))
+    parser.add_argument("--measure", type=Path, help="print the numbers of one scenario, run in this process, as JSON")
+    chosen = parser.parse_args()
+    if chosen.measure:
+        print(json.dumps(vars(measured(chosen.measure))))
+    else:
+        names = (*PHASES, "all [s]", "NumPy + IPOPT [s]", "x baseline", "memory")
+        print("| version | scenario |", " | ".join(names), "|")
+        print("|---" * (2 + len(names)) + "|")
+        for scenario in chosen.scenarios:
+            print(row(scenario, measured_baseline()), flush=True)

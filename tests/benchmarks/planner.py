@@ -1,9 +1,9 @@
-"""Plans of every example scenario: how good, how long, how much memory.
+"""Plans of every example scenario: how good they are.
 
 Run from anywhere with the package installed: ``python tests/benchmarks/planner.py [SCENARIO.toml ...]``, by default all
 of `scenarios/`. One row each: whether the plan is verified, least clearance, repositioning time, its lower bound and
 their ratio, the time in percent of the informative time, the repositioning time of the lattice planner by its own rule
-with its proved bound and the share of it that the plan takes, processor seconds and peak memory of the whole job.
+with its proved bound and the share of it that the plan takes. What the plans cost is in `main_job.py`.
 
 With ``--charts FOLDER`` two real charts with depths are planned on instead, those of them that the folder holds: half
 an hour of trials of the 30 m ship, 2.5 m draught, through the sounds of Alesund (`aalesund.geojson`) and out of
@@ -24,7 +24,7 @@ from expdesign.plan.local_planner import local_planner
 from expdesign.plan.search.lattice_search import LatticeSearch
 from expdesign.scenario import load_scenario
 from expdesign.workflows import plan_problem
-from main_job import SCENARIOS, baseline_s, main_job
+from main_job import SCENARIOS, main_job
 
 SEABED = ", ".join(f"seabed{depth}m = {depth}" for depth in (0, 5, 10, 20, 50, 100, 200, 350))
 CHARTS = {
@@ -89,17 +89,16 @@ def lattice_s(scenario: Path) -> tuple[float, float] | None:
     return None if proof is None else (proof.cost_s, proof.lower_bound_s)
 
 
-def row(scenario: Path, unit_s: float) -> str:
+def row(scenario: Path) -> str:
     """One line of the table."""
-    wall_s, busy_s, peak_mib, facts = main_job(scenario)
+    facts = main_job(scenario).summary
     lattice = lattice_s(scenario)
     spent_s, bound_s = facts["repositioning_s"], facts["repositioning_bound_s"]
     beside = "no plan | -" if lattice is None else f"{lattice[0]:.0f} s ({lattice[1]:.0f}) | {spent_s / lattice[0]:.2f}"
     ratio = f"{spent_s / bound_s:.2f}" if bound_s > 0.1 * facts["informative_s"] else "-"
     return (
         f"| {scenario.stem} | {facts['verified']} | {facts['least_clearance_m']:.1f} m | {spent_s:.0f} s "
-        f"| {bound_s:.0f} s | {ratio} | {spent_s / facts['informative_s']:.0%} | {beside} | {wall_s:.0f} s "
-        f"| {busy_s:.0f} s | {busy_s / unit_s:.0f} | {peak_mib:.0f} MiB |"
+        f"| {bound_s:.0f} s | {ratio} | {spent_s / facts['informative_s']:.0%} | {beside} |"
     )
 
 
@@ -109,14 +108,12 @@ if __name__ == "__main__":
     parser.add_argument("--charts", type=Path)
     wished = parser.parse_args()
     examples = [] if wished.charts else sorted(SCENARIOS.glob("*.toml"))
-    unit = baseline_s()
-    print(f"baseline loop {unit:.2f} s of processor time\n")
     print(
         "| scenario | verified | clearance | repositioning | bound | ratio | of informative | lattice (bound) "
-        "| of lattice | wall | processor | x baseline | memory |"
+        "| of lattice |"
     )
-    print("|---" * 13 + "|")
+    print("|---" * 9 + "|")
     with tempfile.TemporaryDirectory() as written:
         extra = [] if wished.charts is None else list(charted(wished.charts, Path(written)))
         for scenario in [*(wished.scenarios or examples), *extra]:
-            print(row(scenario, unit), flush=True)
+            print(row(scenario), flush=True)

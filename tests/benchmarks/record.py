@@ -1,7 +1,8 @@
 """Runs a benchmark and records what it prints in the README beside it.
 
 ``python tests/benchmarks/record.py planner [ARGUMENT ...]``: the section `planner` is replaced by the benchmark's
-description, the command, the machine, and the output. A path outside the project is recorded as FOLDER. Nothing is
+description, the command, the machine, and the output. Tables whose rows begin with a version keep those of earlier
+releases, and of cases that were not measured again. A path outside the project is recorded as FOLDER. Nothing is
 recorded of a benchmark that fails.
 """
 
@@ -21,6 +22,8 @@ from pathlib import Path
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 README = HERE / "README.md"
+VERSION_ROW = re.compile(r"^\| (\d[\w.]*) \([^|]*\) \| ([^|]*) \|.*\n", flags=re.MULTILINE)
+"""`| 0.1.0 (2026-01-31) | case | ...`: a row of a table that is kept by release."""
 
 
 def measured(script: Path, arguments: list[str]) -> str:
@@ -63,8 +66,16 @@ def recorded(readme: str, name: str, text: str) -> str:
     """The README with one section replaced, or added in alphabetical order."""
     head, *sections = re.split(r"^(?=## )", readme, flags=re.MULTILINE)
     kept = {part.split("\n", 1)[0]: part.rstrip() + "\n" for part in sections}
-    kept[f"## {name}"] = text
+    kept[f"## {name}"] = with_earlier_rows(text, kept.get(f"## {name}", ""))
     return "\n".join([head.rstrip() + "\n", *(kept[title] for title in sorted(kept))])
+
+
+def with_earlier_rows(new: str, old: str) -> str:
+    """A section whose table of versions keeps the old rows of other versions and cases, before its own."""
+    measured_now = {row.group(1, 2) for row in VERSION_ROW.finditer(new)}
+    kept = [row.group() for row in VERSION_ROW.finditer(old) if row.group(1, 2) not in measured_now]
+    first = VERSION_ROW.search(new)
+    return new if first is None else new[: first.start()] + "".join(kept) + new[first.start() :]
 
 
 if __name__ == "__main__":
