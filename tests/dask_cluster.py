@@ -15,10 +15,11 @@ ROOT = Path(__file__).parents[1]
 
 @dataclass(frozen=True)
 class LocalCluster:
-    """Where the scheduler listens, and its process."""
+    """Where the scheduler listens, and the processes."""
 
     address: str
     scheduler: subprocess.Popen
+    workers: tuple[subprocess.Popen, ...]
 
 
 @contextmanager
@@ -49,7 +50,7 @@ def local_cluster(workers: int, *, first: Path = ROOT, allowed_failures: int = 3
         for _ in range(workers):
             processes.append(started("worker", address, "--nthreads", "1", "--no-nanny"))
             next(line for line in processes[-1].stderr if "Starting established connection" in line)
-        yield LocalCluster(address=address, scheduler=processes[0])
+        yield LocalCluster(address=address, scheduler=processes[0], workers=tuple(processes[1:]))
     finally:
         for process in processes:
             process.kill()

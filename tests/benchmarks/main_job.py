@@ -59,7 +59,7 @@ def measured(scenario: Path) -> MainJob:
     seen = {"s": 0.0, "phase": "start"}
 
     def reach(phase: str) -> None:
-        now = processor_s()
+        now = processor_s(os.getpid())
         spent[seen["phase"]] += now - seen["s"]
         seen.update(s=now, phase=phase)
 
@@ -75,29 +75,21 @@ def measured(scenario: Path) -> MainJob:
     return MainJob(phase_s=dict(spent), peak_mib=max(usage) / 1024, summary=dict(outcome.summary))
 
 
-def processor_s() -> float:
-    """Processor seconds so far of this process and all that it has started, those that ended included."""
-    ended = resource.getrusage(resource.RUSAGE_CHILDREN)
-    own = resource.getrusage(resource.RUSAGE_SELF)
-    running = sum(ticks for _, ticks in _descendants(os.getpid()))
-    return own.ru_utime + own.ru_stime + ended.ru_utime + ended.ru_stime + running / os.sysconf("SC_CLK_TCK")
-
-
-def _descendants(process: int) -> list[tuple[int, int]]:
-    """Living descendants and their clock ticks, with those of their own children that ended (Linux)."""
-    parents: dict[int, list[tuple[int, int]]] = defaultdict(list)
+def processor_s(process: int) -> float:
+    """Processor seconds so far of a process and all that it has started, those that ended included (Linux)."""
+    ticks, children = {}, defaultdict(list)
     for path in Path("/proc").glob("[0-9]*/stat"):
         try:
             values = path.read_text("utf-8").rpartition(")")[2].split()
         except (FileNotFoundError, ProcessLookupError):
             continue
-        parents[int(values[1])].append((int(path.parent.name), sum(map(int, values[11:15]))))
-    found, waiting = [], [process]
-    while waiting:
-        children = parents[waiting.pop()]
-        found += children
-        waiting += [child for child, _ in children]
-    return found
+        number = int(path.parent.name)
+        ticks[number] = sum(map(int, values[11:15]))
+        children[int(values[1])].append(number)
+    family = [process]
+    for member in family:  # grows meanwhile
+        family += children[member]
+    return sum(ticks.get(member, 0) for member in family) / os.sysconf("SC_CLK_TCK")
 
 
 def row(scenario: Path, baseline: Baseline) -> str:

@@ -1,0 +1,167 @@
+"""Work shared among the workers of a Dask scheduler: what it gains, what it sends, and what a hundred would gain.
+
+``python tests/benchmarks/cluster.py [--small]``: `whatif --plan` with four cases, `validate`, and ten thousand drawn
+trials of a plan are done by this process, then by one and by two workers of one thread. Results are compared.
+
+Speed-ups are by processor seconds, whatever else the machine does: those of this process alone over the sum of what
+this process still does and what the busiest worker does, its imports included. Wall times stand beside. `outside tasks`
+is what no worker can take; without it, speed-up by any number of workers is at most the inverse (Amdahl). For a hundred
+workers the time is that, and the longest task or a hundredth of all. Bytes are those of arguments and results, pickled:
+shared ones pass the scheduler once, tasks and results once each. Waiting for messages is not counted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import cloudpickle
+import numpy as np
+
+from main_job import ROOT, SCENARIOS, processor_s
+
+sys.path.insert(0, str(ROOT / "tests"))
+from dask_cluster import LocalCluster, local_cluster
+from expdesign import workflows
+from expdesign.plan.assembly import leg_water
+from expdesign.plan.monte_carlo import estimate_risk
+from expdesign.processes import on_cluster, sharing
+from expdesign.scenario import load_scenario
+
+MANY = 100
+"""Workers on paper."""
+MIB = 2**20
+
+
+@dataclass
+class Tasks:
+    """Processor seconds and bytes of tasks done by this process."""
+
+    seconds: list[float] = field(default_factory=list)
+    shared_bytes: int = 0
+    sent_bytes: list[int] = field(default_factory=list)
+    returned_bytes: list[int] = field(default_factory=list)
+
+
+@contextmanager
+def observed() -> Iterator[Tasks]:
+    """What would be shared in this block is done here, one task after the other, and measured."""
+    found, inside = Tasks(), False
+
+    def results(function: Callable, shared: tuple, tasks: Iterable[tuple], *, ordered: bool) -> Iterator[Any]:
+        nonlocal inside
+        if inside:
+            yield from (function(*shared, *task) for task in tasks)
+            return
+        found.shared_bytes += len(cloudpickle.dumps((function, shared)))
+        for task in tasks:
+            found.sent_bytes.append(len(cloudpickle.dumps(task)))
+            began, inside = time.process_time(), True
+            try:
+                result = function(*shared, *task)
+            finally:
+                inside = False
+            found.seconds.append(time.process_time() - began)
+            found.returned_bytes.append(len(cloudpickle.dumps(result)))
+            yield result
+
+    usual, sharing._results = sharing._results, results
+    try:
+        yield found
+    finally:
+        sharing._results = usual
+
+
+def on_workers(work: Callable[[], Any], count: int) -> tuple[Any, float, float]:
+    """The result, processor seconds of this process and of the busiest worker together, and wall seconds."""
+    with local_cluster(count) as cluster:
+        before = _worker_s(cluster)
+        began, wall = time.process_time(), time.perf_counter()
+        with on_cluster(cluster.address):
+            result = work()
+        own, passed = time.process_time() - began, time.perf_counter() - wall
+        busiest = max(after - first for after, first in zip(_worker_s(cluster), before, strict=True))
+    return result, own + busiest, passed
+
+
+def _worker_s(cluster: LocalCluster) -> list[float]:
+    return [processor_s(worker.pid) for worker in cluster.workers]
+
+
+def row(name: str, work: Callable[[], Any]) -> tuple[str, str]:
+    """Lines of both tables."""
+    wall, began = time.perf_counter(), time.process_time()
+    with observed() as tasks:
+        expected = work()
+    alone, wall = time.process_time() - began, time.perf_counter() - wall
+    runs = [on_workers(work, count) for count in (1, 2)]
+    assert all(result == expected for result, *_ in runs)
+    gains = " | ".join(f"{alone / spent:.2f} ({wall / passed:.2f})" for _, spent, passed in runs)
+    shared, serial = sum(tasks.seconds), alone - sum(tasks.seconds)
+    many = alone / (serial + max(shared / MANY, max(tasks.seconds, default=0.0)))
+    sent, returned = (np.mean(some or [0]) / MIB for some in (tasks.sent_bytes, tasks.returned_bytes))
+    through = (tasks.shared_bytes + sum(tasks.sent_bytes) + sum(tasks.returned_bytes)) / MIB
+    return (
+        f"| {name} | {alone:.0f} s | {len(tasks.seconds)} | {gains} |",
+        f"| {name} | {serial / alone:.1%} | {alone / max(serial, 1e-9):.0f} | {max(tasks.seconds, default=0):.1f} s "
+        f"| {many:.1f} | {tasks.shared_bytes / MIB:.2f} | {sent:.3f} | {returned:.3f} | {through:.1f} |",
+    )
+
+
+def cases(folder: Path, small: bool) -> list[Path]:
+    """Variants of the story with less time."""
+    found = []
+    for total_s in (240.0, 300.0, 360.0)[: 1 if small else 3]:
+        found.append(folder / f"{total_s:.0f}.toml")
+        found[-1].write_text(f"[design]\ntotal_s = {total_s}\n", "utf-8")
+    return found
+
+
+def works(folder: Path, small: bool) -> Iterator[tuple[str, Callable[[], Any]]]:
+    """Names of what is measured, and functions that do it."""
+    story = SCENARIOS / "story.toml"
+
+    def written(command: Callable, file: str) -> Any:
+        command(folder / "out")
+        return json.loads((folder / "out" / file).read_text("utf-8"))
+
+    variants = cases(folder, small)
+    whatif = partial(workflows.whatif, story, variants, with_plan=True, jobs=1)
+    validate = partial(workflows.validate_design, SCENARIOS / "model-ship.toml", trials=20 if small else 100, jobs=1)
+    yield f"`whatif --plan`, {1 + len(variants)} cases", partial(written, whatif, "whatif.json")
+    yield f"`validate`, {20 if small else 100} trials of each design", partial(written, validate, "validation.json")
+    case = load_scenario(story)
+    information = workflows.scored(case)
+    design = workflows.designed(case, information)
+    water = leg_water(workflows.plan_problem(case, information, design))
+    sailed = workflows.planned(case, information, design).sailed
+
+    def drawn() -> Any:
+        return estimate_risk(water, sailed, draws=2000 if small else 10_000, rng=np.random.default_rng(1))[0]
+
+    yield f"{2000 if small else 10_000} drawn trials", drawn
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--small", action="store_true", help="fewer of everything")
+    chosen = parser.parse_args()
+    with tempfile.TemporaryDirectory() as place:
+        lines = [row(name, work) for name, work in works(Path(place), chosen.small)]
+    print("| work | alone | tasks | speed-up by 1 worker (wall) | by 2 workers (wall) |")
+    print("|---|---|---|---|---|", *(first for first, _ in lines), sep="\n")
+    print("\nOn paper; bytes in MiB:\n")
+    print(
+        f"| work | outside tasks | speed-up at most | longest task | speed-up by {MANY} workers | shared | a task "
+        "| its result | through the scheduler |"
+    )
+    print("|---" * 9 + "|", *(second for _, second in lines), sep="\n")
