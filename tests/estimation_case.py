@@ -9,11 +9,13 @@ import numpy as np
 from expdesign.dictionary import build_dictionary
 from expdesign.errors import NoAnswer
 from expdesign.estimation.methods import estimate
+from expdesign.estimation.values import Estimate
+from expdesign.processes import in_order
 from expdesign.rehearsal.validation import Rehearsal, Validated, validate
 from expdesign.scenario import load_vessel
 from expdesign.scenario.dictionaries.dictionary_file import load_dictionary
 from expdesign.signals import Batch, Record
-from expdesign.simulation import Environment, Variation, simulate_ensemble
+from expdesign.simulation import Ensemble, Environment, Variation, simulate_ensemble
 from expdesign.vessel import Sensors, Vessel
 
 ROOT = Path(__file__).parent.parent
@@ -79,26 +81,34 @@ def errors_and_std(
     """
     rng = np.random.default_rng(seed)
     errors, std, failed = [], [], 0
-    for batch in drawn_trials(trials, samples, weather, rng):
-        try:
-            found = estimate(Record(batches=(batch,)), NOMINAL, method=method)
-        except NoAnswer:
+    for found in estimated_trials(trials, samples, method, weather, rng):
+        if found is None:
             failed += 1
             continue
+        names = found.names
         failed += (stopped := any("Refinement stopped" in warning for warning in found.warnings))
         if not stopped:
             errors.append(found.values - truth(found.names))
             std.append(found.std)
-    return found.names, np.array(errors), np.array(std), failed
+    return names, np.array(errors), np.array(std), failed
 
 
-def drawn_trials(trials: int, samples: int, weather: Environment, rng: np.random.Generator) -> Iterator[Batch]:
-    """Measured trials, simulated fifty at a time."""
+def estimated_trials(
+    trials: int, samples: int, method: str, weather: Environment, rng: np.random.Generator
+) -> Iterator[Estimate | None]:
+    """Estimates of measured trials, simulated fifty at a time, and None for trials that give none."""
     for first in range(0, trials, 50):
         runs = min(50, trials - first)
         inputs = np.stack([commands(samples, rng) for _ in range(runs)], axis=1)
         many = simulate_ensemble(TRUE, inputs, runs=runs, environment=weather, rng=rng, velocity=(1.7, 0.7, 0.0))
-        yield from (many.batch(run) for run in range(runs))
+        yield from in_order(_estimated, (method, many), ((run,) for run in range(runs)))
+
+
+def _estimated(method: str, trials: Ensemble, run: int) -> Estimate | None:
+    try:
+        return estimate(Record(batches=(trials.batch(run),)), NOMINAL, method=method)
+    except NoAnswer:
+        return None
 
 
 SHORT_RUNS = (2, 1, 0, 0, 0, 4, 0, 2, 0, 0, 3)

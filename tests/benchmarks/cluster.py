@@ -1,7 +1,7 @@
 """Work shared among the workers of a Dask scheduler: what it gains, what it sends, and what a hundred would gain.
 
-``python tests/benchmarks/cluster.py [--small]``: `whatif --plan` with four cases, `validate`, and ten thousand drawn
-trials of a plan are done by this process, then by one and by two workers of one thread. Results are compared.
+``python tests/benchmarks/cluster.py``: `whatif --plan` with three cases, `validate`, and ten thousand drawn trials of a
+plan are done by this process, then by one and by two workers of one thread. Results are compared.
 
 Speed-ups are by processor seconds, whatever else the machine does: those of this process alone over the sum of what
 this process still does and what the busiest worker does, its imports included. Wall times stand beside. `outside tasks`
@@ -12,7 +12,6 @@ shared ones pass the scheduler once, tasks and results once each. Waiting for me
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 import tempfile
@@ -39,6 +38,8 @@ from expdesign.scenario import load_scenario
 
 MANY = 100
 """Workers on paper."""
+TRIALS, DRAWS = 40, 10_000
+"""Of each design, and of a plan."""
 MIB = 2**20
 
 
@@ -117,16 +118,16 @@ def row(name: str, work: Callable[[], Any]) -> tuple[str, str]:
     )
 
 
-def cases(folder: Path, small: bool) -> list[Path]:
+def cases(folder: Path) -> list[Path]:
     """Variants of the story with less time."""
     found = []
-    for total_s in (240.0, 300.0, 360.0)[: 1 if small else 3]:
+    for total_s in (240.0, 300.0):
         found.append(folder / f"{total_s:.0f}.toml")
         found[-1].write_text(f"[design]\ntotal_s = {total_s}\n", "utf-8")
     return found
 
 
-def works(folder: Path, small: bool) -> Iterator[tuple[str, Callable[[], Any]]]:
+def works(folder: Path) -> Iterator[tuple[str, Callable[[], Any]]]:
     """Names of what is measured, and functions that do it."""
     story = SCENARIOS / "story.toml"
 
@@ -134,11 +135,11 @@ def works(folder: Path, small: bool) -> Iterator[tuple[str, Callable[[], Any]]]:
         command(folder / "out")
         return json.loads((folder / "out" / file).read_text("utf-8"))
 
-    variants = cases(folder, small)
+    variants = cases(folder)
     whatif = partial(workflows.whatif, story, variants, with_plan=True, jobs=1)
-    validate = partial(workflows.validate_design, SCENARIOS / "model-ship.toml", trials=20 if small else 100, jobs=1)
+    validate = partial(workflows.validate_design, SCENARIOS / "model-ship.toml", trials=TRIALS, jobs=1)
     yield f"`whatif --plan`, {1 + len(variants)} cases", partial(written, whatif, "whatif.json")
-    yield f"`validate`, {20 if small else 100} trials of each design", partial(written, validate, "validation.json")
+    yield f"`validate`, {TRIALS} trials of each design", partial(written, validate, "validation.json")
     case = load_scenario(story)
     information = workflows.scored(case)
     design = workflows.designed(case, information)
@@ -146,17 +147,14 @@ def works(folder: Path, small: bool) -> Iterator[tuple[str, Callable[[], Any]]]:
     sailed = workflows.planned(case, information, design).sailed
 
     def drawn() -> Any:
-        return estimate_risk(water, sailed, draws=2000 if small else 10_000, rng=np.random.default_rng(1))[0]
+        return estimate_risk(water, sailed, draws=DRAWS, rng=np.random.default_rng(1))[0]
 
-    yield f"{2000 if small else 10_000} drawn trials", drawn
+    yield f"{DRAWS} drawn trials", drawn
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--small", action="store_true", help="fewer of everything")
-    chosen = parser.parse_args()
     with tempfile.TemporaryDirectory() as place:
-        lines = [row(name, work) for name, work in works(Path(place), chosen.small)]
+        lines = [row(name, work) for name, work in works(Path(place))]
     print("| work | alone | tasks | speed-up by 1 worker (wall) | by 2 workers (wall) |")
     print("|---|---|---|---|---|", *(first for first, _ in lines), sep="\n")
     print("\nOn paper; bytes in MiB:\n")

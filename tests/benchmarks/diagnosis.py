@@ -1,6 +1,7 @@
 """How often the diagnosis is right: a campaign over ships, manoeuvres, effects, sizes and seeds, all drawn.
 
-``nice python tests/benchmarks/diagnosis.py [--trials 60] [--part known] [--jobs 2] [--seed 1] [--ship barge]``
+``nice python tests/benchmarks/diagnosis.py [--trials 60] [--part known] [--seed 1] [--ship barge]``, shared
+among two processes (`--jobs`), or `--scheduler ADDRESS`.
 
 Data come from `hidden_effects`, which shares no code with the package. An effect is drawn, then enlarged until it costs
 the model with the generator's own parameters 5 points of simulated fit or more (mean over u, v, r). Parts:
@@ -27,11 +28,12 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from joblib import Parallel, delayed
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 import hidden_effects as sea
 from diagnosis_trials import NAMES, PARTS, tried
+from expdesign.processes import as_finished
+from shared_work import add_sharing, shared_work
 
 
 def share(count: int, total: int) -> str:
@@ -152,7 +154,7 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--trials", type=int, default=2 * len(NAMES))
     parser.add_argument("--part", choices=(*PARTS, "all"), default="all")
-    parser.add_argument("--jobs", type=int, default=2)
+    add_sharing(parser, jobs=2)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--ship", choices=tuple(sea.SHIPS))
     parser.add_argument("--first", type=int, default=0, help="number of the first trial")
@@ -165,15 +167,16 @@ def main() -> None:
             if some := [row for row in rows if row["part"] == part]:
                 report(part, some)
         return
-    for part in PARTS if chosen.part == "all" else (chosen.part,):
-        work = (delayed(tried)(part, number, chosen.seed, chosen.ship) for number in range(chosen.first, chosen.trials))
-        rows = []
-        for row in Parallel(n_jobs=chosen.jobs, return_as="generator_unordered")(work):
-            rows.append(row)
-            if chosen.log:
-                with chosen.log.open("a") as file:
-                    file.write(json.dumps(row) + "\n")
-        report(part, rows)
+    with shared_work(chosen):
+        for part in PARTS if chosen.part == "all" else (chosen.part,):
+            tasks = ((part, number, chosen.seed, chosen.ship) for number in range(chosen.first, chosen.trials))
+            rows = []
+            for row in as_finished(tried, (), tasks):
+                rows.append(row)
+                if chosen.log:
+                    with chosen.log.open("a") as file:
+                        file.write(json.dumps(row) + "\n")
+            report(part, rows)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """How often 95 % intervals hold the truth, parameter by parameter, and why not more or less often.
 
-``python tests/benchmarks/estimation_coverage.py [--trials 1000] [--case iv-augmented]``: every trial has its own input
+``python tests/benchmarks/estimation_coverage.py [--trials 1000] [--case iv-augmented]``, shared among
+processes or workers by `--jobs` or `--scheduler`: every trial has its own input
 (but for short batches), sensor noise, which enters through the regressors, and current. Cases:
 
 - iv, iv-augmented: one batch of `--samples` samples, white current, for iv-augmented around a mean;
@@ -21,6 +22,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from estimation_case import CALM_CURRENT, STEADY_CURRENT, WANDERING_CURRENT, errors_and_std, many_short_batches
+from shared_work import add_sharing, shared_work
 
 LONG = {
     "iv": ("iv", CALM_CURRENT),
@@ -45,8 +47,10 @@ def main() -> None:
     parser.add_argument("--samples", type=int, default=4000)
     parser.add_argument("--case", choices=(*LONG, "short"), default="iv-augmented")
     parser.add_argument("--seed", type=int, default=31)
+    add_sharing(parser)
     chosen = parser.parse_args()
-    names, errors, std, failed = tried(chosen.case, chosen.trials, chosen.samples, chosen.seed)
+    with shared_work(chosen):
+        names, errors, std, failed = tried(chosen.case, chosen.trials, chosen.samples, chosen.seed)
     actual = errors.std(axis=0, ddof=1)
     covered = (np.abs(errors) < 1.96 * std).mean(axis=0)
     centred = errors - errors.mean(axis=0)

@@ -1,9 +1,9 @@
 """Whole trials of drawn ships in drawn weather: how many leave allowed water or are aborted, and what time it costs.
 
 Run with the package installed: ``python tests/benchmarks/safety.py [DRAWS] [SCENARIO.toml ...]``, by default 500 draws
-of all examples. One draw is one trial, sailed by the procedure of `expdesign.plan.monte_carlo.procedure`; the
-hull is looked at against the chart at every step, of runs, of legs and of ways round alike. The draws are others than
-the plan's own.
+of all examples; `--jobs` and `--scheduler` share them. One draw is one trial, sailed by the procedure of
+`expdesign.plan.monte_carlo.procedure`; the hull is looked at against the chart at every step, of runs, of legs and of
+ways round alike. The draws are others than the plan's own.
 
 Each scenario is sailed three times: in the weather it forecasts; with current and wind that besides wander slowly
 (Gauss-Markov, `WANDERING`), which the plan knew nothing of; and *without go-arounds*: every run begins wherever the
@@ -12,7 +12,7 @@ ship is. The last shows what the procedure is worth. A table in Markdown ends th
 
 from __future__ import annotations
 
-import sys
+import argparse
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -28,10 +28,12 @@ from expdesign.plan.monte_carlo import trials
 from expdesign.plan.monte_carlo.procedure import Tolerances
 from expdesign.plan.monte_carlo.risk import estimate_risk, upper_limit
 from expdesign.plan.values import RiskEstimate
+from expdesign.processes import in_order
 from expdesign.scenario import load_scenario
 from expdesign.scenario.values import Scenario
 from expdesign.simulation import Environment, Variation
 from expdesign.workflows import plan_problem
+from shared_work import add_sharing, shared_work
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 WANDERING = 1.0, 300.0
@@ -85,32 +87,37 @@ def row(name: str, kind: str, found: RiskEstimate, planned_s: float) -> str:
     )
 
 
-def report(path: str, draws: int) -> list[str]:
-    """Plan a scenario, sail it, print what happens leg by leg; the lines of the table."""
+def report(draws: int, path: Path) -> tuple[list[str], list[str]]:
+    """Plan a scenario and sail it: the lines of the table, and what happens leg by leg."""
     case = load_scenario(path)
     information = workflows.scored(case)
     plan = workflows.planned(case, information, workflows.designed(case, information))
     calm = water_of(case, plan)
     wanders = replace(calm, environment=wandering(case.environment))
     kinds = {"as forecast": (calm, True), "wandering": (wanders, True), "without go-arounds": (calm, False)}
-    rows = []
+    rows, told = [], []
     for seed, (kind, (water, breaks)) in enumerate(kinds.items(), start=7):
         found = sailed(water, plan, draws=draws, breaks=breaks, rng=np.random.default_rng(seed))
         rows.append(row(case.name, kind, found, plan.commands.duration_s))
-        print(rows[-1], *found.reasons, sep="\n  ", flush=True)
+        told.append("\n  ".join([rows[-1], *found.reasons]))
         for leg, sails in zip(plan.legs, found.legs, strict=True):
-            print(
+            told.append(
                 f"    {leg.kind:10s} {leg.name:28s} left {sails.left:6.2%} aborted {sails.aborted:6.2%} "
-                f"go-arounds {sails.go_arounds:4.2f} takes {sails.median_s:7.1f} s, {sails.most_s:7.1f} s in 95 %",
-                flush=True,
+                f"go-arounds {sails.go_arounds:4.2f} takes {sails.median_s:7.1f} s, {sails.most_s:7.1f} s in 95 %"
             )
-    return rows
+    return rows, told
 
 
 if __name__ == "__main__":
-    number = int(sys.argv[1]) if len(sys.argv) > 1 else 500
-    lines = [
-        line for path in sys.argv[2:] or sorted(map(str, SCENARIOS.glob("*.toml"))) for line in report(path, number)
-    ]
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("draws", nargs="?", type=int, default=500)
+    parser.add_argument("scenarios", nargs="*", type=Path, default=sorted(SCENARIOS.glob("*.toml")))
+    add_sharing(parser)
+    chosen = parser.parse_args()
+    lines = []
+    with shared_work(chosen):
+        for rows, told in in_order(report, (chosen.draws,), ((path,) for path in chosen.scenarios)):
+            lines += rows
+            print(*told, sep="\n", flush=True)
     print("\n| scenario | weather | left water (95 %) | aborted | plan | extra time, median | extra time, 95 % |")
     print("|---|---|---|---|---|---|---|", *lines, sep="\n")

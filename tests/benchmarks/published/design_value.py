@@ -39,6 +39,7 @@ import json
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -46,6 +47,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.progress import Progress as Bar
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
 from adaptive import SCENARIOS
 from adaptive_monte_carlo import Segment, drawn, separate_runs, shared_out, voyages
 from design_value_page import DesignErrors, StudyTable, design_value_html
@@ -53,10 +55,12 @@ from expdesign.dictionary import Primitive, PrimitiveSpec, build_dictionary, bui
 from expdesign.export import write_files
 from expdesign.growing import optimum
 from expdesign.information import score_primitives
+from expdesign.processes import in_order
 from expdesign.scenario import load_dictionary, load_vessel
 from expdesign.simulation import CALM, simulate_ensemble
 from expdesign.values import Array
 from expdesign.vessel import Sensors, Vessel
+from shared_work import add_sharing, shared_work
 
 Progress = Callable[[str, float], None]
 ERROR_LIMIT, NORM_LIMIT = 1.5, 0.15
@@ -244,9 +248,10 @@ def study(*, runs: int, seed: int, progress: Progress) -> Iterator[tuple[StudyTa
     kinds = cases()
     yield shares_table(kinds[0]), []
     for place, case in enumerate(kinds):
+        tried = in_order(partial(try_design, runs=runs, seed=seed), (case,), ((design,) for design in DESIGNS))
         for number, design in enumerate(DESIGNS):
             progress(f"{case.name}: {design}", (place + number / len(DESIGNS)) / len(kinds))
-            found.setdefault(case.name, []).append(try_design(case, design, runs=runs, seed=seed))
+            found.setdefault(case.name, []).append(next(tried))
         if place == 0:
             yield main_table(found[case.name]), found[case.name]
             yield parameter_table(case, found[case.name]), []
@@ -281,13 +286,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--runs", type=int, default=500, help="simulated trials of each design (published: 500)")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--out", type=Path, help="folder for design-value.html and design-value.json")
+    add_sharing(parser)
     chosen = parser.parse_args(arguments)
     if chosen.runs < 2:
         parser.error(f"--runs is {chosen.runs}, expected 2 or more")
     console = Console(highlight=False, markup=False, soft_wrap=True)
     tables: list[StudyTable] = []
     to_draw: list[DesignErrors] = []
-    with Bar(console=Console(stderr=True), transient=True) as bar:
+    with shared_work(chosen), Bar(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("", total=1.0)
         try:
             for table, errors in study(

@@ -28,6 +28,8 @@ import numpy as np
 
 from expdesign.errors import NoAnswer
 from expdesign.estimation.methods import Settings, estimate
+from expdesign.estimation.values import Estimate
+from expdesign.processes import in_order
 from expdesign.progress import Progress, silent
 from expdesign.signals import Record
 from expdesign.simulation import Ensemble, Environment, Variation, simulate_ensemble
@@ -217,14 +219,12 @@ def estimate_all(case: str, trials: Ensemble, estimator: str, *, progress: Progr
 
     The wind is white from sample to sample, so only the measured wind itself can be an instrument for it.
     """
-    model, settings = nominal(ship().model), Settings(wind="measured")
     found, failed = [], 0
-    for run in range(trials.runs):
-        record = Record(batches=(trials.batch(run),))
-        try:
-            found.append(estimate(record, model, method=ESTIMATORS[estimator], settings=settings))
-        except NoAnswer:
+    for run, item in enumerate(in_order(_estimated, (trials, estimator), ((run,) for run in range(trials.runs)))):
+        if item is None:
             failed += 1
+        else:
+            found.append(item)
         progress(f"{case}, {estimator}", (run + 1) / trials.runs)
     if not found:
         raise NoAnswer(f"{estimator} gives no estimate in any run of {case}")
@@ -239,6 +239,15 @@ def estimate_all(case: str, trials: Ensemble, estimator: str, *, progress: Progr
         std=np.array([item.std / scale for item in settled]).reshape(-1, len(names)),
         unsettled=failed + len(found) - len(settled),
     )
+
+
+def _estimated(trials: Ensemble, estimator: str, run: int) -> Estimate | None:
+    """The estimate of one run; None where there is none."""
+    model, settings = nominal(ship().model), Settings(wind="measured")
+    try:
+        return estimate(Record(batches=(trials.batch(run),)), model, method=ESTIMATORS[estimator], settings=settings)
+    except NoAnswer:
+        return None
 
 
 def reference(names: Sequence[str]) -> tuple[Array, Array]:

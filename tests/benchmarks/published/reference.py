@@ -12,17 +12,20 @@ import argparse
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from rich.console import Console
 from rich.progress import Progress as Bar
 from rich.table import Table
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
 import fir_example
 import manoeuvring
 import scalar_system
 from manoeuvring import EQUATIONS, Case, Outcome, Progress
 from published_tables import TABLES
+from shared_work import add_sharing, shared_work
 
 SAMPLES = 5000
 OFFSETS = (0.0, 1.0, 2.5, 5.0, 10.0)
@@ -148,10 +151,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--sets", type=int, default=5, help="inputs of the 3-DOF study")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--part", choices=tuple(PARTS), action="append", help="default: all")
+    add_sharing(parser)
     chosen = parser.parse_args(arguments)
     size = Size(runs=chosen.runs, sets=chosen.sets, seed=chosen.seed)
     console = Console()
-    with Bar(console=Console(stderr=True), transient=True) as bar:
+    with shared_work(chosen), Bar(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("", total=1.0)
         try:
             for name in chosen.part or PARTS:
