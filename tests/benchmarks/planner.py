@@ -19,7 +19,7 @@ from pathlib import Path
 
 from expdesign import workflows
 from expdesign.errors import NoPlan
-from expdesign.plan.assembly import leg_water, search_space
+from expdesign.plan.assembly import leg_water, search_space, ship_on_legs
 from expdesign.plan.local_planner import local_planner
 from expdesign.plan.search.lattice_search import LatticeSearch
 from expdesign.scenario import load_scenario
@@ -79,7 +79,7 @@ def lattice_s(scenario: Path) -> tuple[float, float] | None:
     case = load_scenario(scenario)
     information = workflows.scored(case)
     problem = plan_problem(case, information, workflows.designed(case, information))
-    water = leg_water(problem)
+    water = leg_water(problem, ship_on_legs(problem))
     space = search_space(problem, water, local_planner(water, problem.used))
     counts = [problem.repeats[item.name] for item in space.footprints]
     try:
