@@ -6,10 +6,15 @@ import numpy as np
 import pytest
 import shapely
 
-from expdesign.plan.chart import goal_distance
 from expdesign.plan.chart.clearance_grid import clearance_field
 from expdesign.plan.chart.goal_distance import build_goal_distance, first_bends, shortest_path_tree, taut_bends
-from expdesign.plan.chart.visibility_graph import build_visibility_graph, polyline_length, simplified
+from expdesign.plan.chart.visibility_graph import (
+    VisibilityGraph,
+    build_visibility_graph,
+    polyline_length,
+    sight_lines,
+    simplified,
+)
 from plan_case import area, leg_water
 
 OPEN = shapely.box(-500, -500, 500, 500)
@@ -111,10 +116,18 @@ def test_taut_corners_give_the_same_lengths_as_all_corners(seed):
     np.testing.assert_allclose(length, expected, rtol=1e-9)
 
 
+def test_points_are_joined_where_the_whole_line_between_them_is_water():
+    graph, rng = build_visibility_graph(rocks(1)), np.random.default_rng(1)
+    a, b = rng.uniform(-480, 480, (2, 500, 2))
+    joined = graph.joins(a, b)
+    np.testing.assert_array_equal(joined, shapely.covers(graph.water, sight_lines(a, b)))
+    assert 0 < joined.sum() < len(joined)
+
+
 def test_few_lines_of_sight_are_tested_for_each_cell(monkeypatch):
     water, lines = rocks(0), []
-    sight_lines = goal_distance.sight_lines
-    monkeypatch.setattr(goal_distance, "sight_lines", lambda a, b: lines.append(len(a)) or sight_lines(a, b))
+    joins = VisibilityGraph.joins
+    monkeypatch.setattr(VisibilityGraph, "joins", lambda graph, a, b: lines.append(len(a)) or joins(graph, a, b))
     field = clearance_field(area(water), resolution_m=4.0)
     table = build_goal_distance(build_visibility_graph(water), field, np.array([440.0, 460.0]))
     cells = table.field.centre(np.arange(table.field.clearance_m.size))

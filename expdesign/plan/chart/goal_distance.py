@@ -14,7 +14,7 @@ import shapely
 
 from expdesign.plan.chart.clearance_grid import ClearanceField
 from expdesign.plan.chart.tuning import CHART
-from expdesign.plan.chart.visibility_graph import VisibilityGraph, sight_lines
+from expdesign.plan.chart.visibility_graph import VisibilityGraph
 from expdesign.values import Array
 
 
@@ -162,7 +162,7 @@ def _nearest_seen(graph: VisibilityGraph, points: Array, nodes: Array, total: Ar
         node = left.argmin(axis=1)
         some = np.isfinite(left[np.arange(len(rows)), node])
         rows, left, node = rows[some], left[some], node[some]
-        seen = shapely.covers(graph.water, sight_lines(points[rows], nodes[node]))
+        seen = graph.joins(points[rows], nodes[node])
         found[rows[seen]] = node[seen]
         left[np.arange(len(rows)), node] = np.inf
         rows, left = rows[~seen], left[~seen]

@@ -19,6 +19,7 @@ class Tuning:
         corners_coarse, coarse: corners accepted once the tolerance is so many times the one asked for: water that
             shrinks further loses its narrow passages.
         slit_m: growth of the water before lines of sight are tested, as a path may touch the shore.
+        glances: shares of a line of sight at which it is tested first.
         taut: share of the water's size by which a path may miss a corner that it bends at.
         table_cells: of the table of distances to the goal.
         table_chunk: cells of that table processed at a time.
@@ -33,6 +34,7 @@ class Tuning:
     corners_coarse: int = 2500
     coarse: float = 16.0
     slit_m: float = 1e-3
+    glances: tuple[float, ...] = (0.5, 0.75, 0.25, 0.9, 0.1, 0.625, 0.375)
     taut: float = 1e-3
     table_cells: int = 60_000
     table_chunk: int = 1000

@@ -100,6 +100,16 @@ class VisibilityGraph:
         apart = np.hypot(*(nodes - point).T) > 0
         return np.flatnonzero(shapely.covers(self.water, lines) | ~apart)
 
+    def joins(self, a: Array, b: Array) -> np.ndarray:
+        """(n,) whether points (n, 2) are in sight of each other: first some places between, then the whole lines."""
+        seen = np.arange(len(a))
+        for share in CHART.glances:
+            north, east = ((1.0 - share) * a[seen] + share * b[seen]).T
+            seen = seen[shapely.intersects_xy(self.water, east, north)]
+        found = np.zeros(len(a), dtype=bool)
+        found[seen] = shapely.covers(self.water, sight_lines(a[seen], b[seen]))
+        return found
+
     def bends(self, points: Array, corners: np.ndarray, ahead: Array) -> np.ndarray:
         """(k, n) whether a shortest path from a point (k, 2) may bend at a corner (n,), on to a place (n, 2).
 
