@@ -15,6 +15,7 @@ FLOORS = {
     "": (
         ("errors", "interruptions", "lazy", "progress"),
         ("input_files", "processes"),
+        ("memory",),
         ("conventions", "values"),
         ("signals", "sea_area"),
         ("vessel",),

@@ -48,6 +48,14 @@ Scheduler = Annotated[
     str | None,
     typer.Option("--scheduler", metavar="ADDRESS", help="Dask scheduler to compute on instead, e.g. tcp://host:8786."),
 ]
+NoCache = Annotated[
+    bool,
+    typer.Option(
+        "--no-cache",
+        help="Neither read nor keep results of earlier commands, as with EXPDESIGN_CACHE=off. That variable may also "
+        "name the folder for them. Default: ~/.cache/expdesign, at most 256 MiB.",
+    ),
+]
 Fixed = Annotated[
     list[str] | None,
     typer.Option("--fixed", metavar="NAME ...", help="Parameters kept at the vessel file's values."),

@@ -8,16 +8,23 @@ from typing import Annotated
 import typer
 
 from expdesign.cli.app import Asked, ask, command
-from expdesign.cli.options import Jobs, Out, OutBesidePlan, OutWhatIf, PlanFile, ScenarioFile, Scheduler, Seed
+from expdesign.cli.options import Jobs, NoCache, Out, OutBesidePlan, OutWhatIf, PlanFile, ScenarioFile, Scheduler, Seed
 
 
 @command("run")
-def run(scenario: ScenarioFile, out: Out = None, jobs: Jobs = 0, scheduler: Scheduler = None, seed: Seed = 0) -> Asked:
+def run(
+    scenario: ScenarioFile,
+    out: Out = None,
+    jobs: Jobs = 0,
+    scheduler: Scheduler = None,
+    no_cache: NoCache = False,
+    seed: Seed = 0,
+) -> Asked:
     """Do everything: score, durations, plan, verification, route files, report.
 
     Example: expdesign run scenarios/helsinki.toml
     """
-    return ask("run", scenario, out, jobs=jobs, scheduler=scheduler, seed=seed)
+    return ask("run", scenario, out, jobs=jobs, scheduler=scheduler, cache=not no_cache, seed=seed)
 
 
 @command("score")
@@ -56,13 +63,16 @@ def plan(
     ] = None,
     jobs: Jobs = 0,
     scheduler: Scheduler = None,
+    no_cache: NoCache = False,
     seed: Seed = 0,
 ) -> Asked:
     """Plan one trajectory that runs the chosen manoeuvres in allowed water, and verify it.
 
     Writes plan.json, track.csv and commands.csv.
     """
-    return ask("plan", scenario, out, durations=durations, jobs=jobs, scheduler=scheduler, seed=seed)
+    return ask(
+        "plan", scenario, out, durations=durations, jobs=jobs, scheduler=scheduler, cache=not no_cache, seed=seed
+    )
 
 
 @command("export")
@@ -127,6 +137,7 @@ def whatif(
     ] = False,
     jobs: Jobs = 0,
     scheduler: Scheduler = None,
+    no_cache: NoCache = False,
     out: OutWhatIf = None,
     seed: Seed = 0,
 ) -> Asked:
@@ -136,4 +147,14 @@ def whatif(
 
     Example: expdesign whatif scenarios/helsinki.toml scenarios/variants/half-an-hour.toml
     """
-    return ask("whatif", scenario, variants, out, with_plan=plan, jobs=jobs, scheduler=scheduler, seed=seed)
+    return ask(
+        "whatif",
+        scenario,
+        variants,
+        out,
+        with_plan=plan,
+        jobs=jobs,
+        scheduler=scheduler,
+        cache=not no_cache,
+        seed=seed,
+    )

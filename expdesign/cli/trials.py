@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from expdesign.cli.app import Asked, ask, command
-from expdesign.cli.options import Jobs, Out, OutBesidePlan, PlanFile, ScenarioFile, Scheduler, Seed
+from expdesign.cli.options import Jobs, NoCache, Out, OutBesidePlan, PlanFile, ScenarioFile, Scheduler, Seed
 
 MOST_TRIALS = 100_000
 
@@ -115,6 +115,7 @@ def replan(
     out: Out = None,
     jobs: Jobs = 0,
     scheduler: Scheduler = None,
+    no_cache: NoCache = False,
     seed: Seed = 0,
 ) -> Asked:
     """Plan the rest of a trial, from the present position, with a model updated from the data.
@@ -134,5 +135,6 @@ def replan(
         interest=interest or (),
         jobs=jobs,
         scheduler=scheduler,
+        cache=not no_cache,
         seed=seed,
     )

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.conventions import whole_turns
+from expdesign.memory import in_order, recalled
 from expdesign.plan.legs import LegTask, LegWater, acceptable, nearest_turns
 from expdesign.plan.local_planner import LocalPlanner
-from expdesign.processes import in_order
 from expdesign.values import Array
 
 
@@ -44,9 +44,14 @@ class LegAhead:
 
 def legs_ahead(planner: LocalPlanner, water: LegWater, tasks: Iterable[LegTask]) -> Iterator[LegAhead]:
     """The legs of tasks, in order."""
-    return in_order(_ahead, (planner, water), ((task,) for task in tasks))
+    return in_order(_found, (planner, water), ((task,) for task in tasks))
 
 
-def _ahead(planner: LocalPlanner, water: LegWater, task: LegTask) -> LegAhead:
+def leg_found(planner: LocalPlanner, water: LegWater, task: LegTask) -> LegAhead:
+    """The leg of a task."""
+    return recalled(_found, planner, water, task)
+
+
+def _found(planner: LocalPlanner, water: LegWater, task: LegTask) -> LegAhead:
     commands = planner.leg(task, water)
     return LegAhead(task=task, commands=commands, spent_s=task.budget.spent_s)

@@ -12,7 +12,7 @@ from expdesign.dictionary import Primitive
 from expdesign.errors import NoPlan
 from expdesign.plan.assembly import PlanRoom
 from expdesign.plan.legs import LegTask, LegWater, last_state, nearest_turns
-from expdesign.plan.legs_ahead import LegAhead, legs_ahead
+from expdesign.plan.legs_ahead import LegAhead, leg_found, legs_ahead
 from expdesign.plan.local_planner import LocalPlanner, SearchSpace
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.search import PlacementSearch, placement_search
@@ -177,8 +177,9 @@ class _Voyage:
         task = self._task(*self._now, end, end_inputs, stretches=0)
         leg = ahead.fitted(task, self.water)
         if leg is None:
-            leg = self.planner.leg(task, self.water)
-            self.budget.spent_s += task.budget.spent_s
+            found = leg_found(self.planner, self.water, task)
+            leg = found.commands
+            self.budget.spent_s += found.spent_s
         return np.concatenate([self._wait, leg]) if leg is not None else None
 
     def _task(

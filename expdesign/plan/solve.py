@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from expdesign.errors import NoPlan, NoRoom
+from expdesign.memory import in_order
 from expdesign.plan.assembly import PlanRoom, leg_water, plan_room, search_space, ship_on_legs, top_mps, waters
 from expdesign.plan.bounds import reposition_bound_s
 from expdesign.plan.chart import reachable
@@ -28,7 +29,6 @@ from expdesign.plan.tuning import PLAN
 from expdesign.plan.values import Leg, Plan, RiskEstimate, SailedTrial, Verification
 from expdesign.plan.verify import realised_efficiencies, verify_plan
 from expdesign.plan.work_budget import WorkBudget
-from expdesign.processes import in_order
 from expdesign.progress import Progress, silent, within
 from expdesign.sea_area import SeaArea
 

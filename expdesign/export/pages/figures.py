@@ -17,7 +17,7 @@ from markupsafe import Markup, escape
 
 from expdesign.export.formats.format import xml_text
 from expdesign.export.tuning import TUNING
-from expdesign.processes import in_order
+from expdesign.memory import in_order
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.conventions import wrap_angle
+from expdesign.memory import recalled
 from expdesign.plan.control.tuning import CONTROL
 from expdesign.simulation import Environment
 from expdesign.values import Array, seal
@@ -106,7 +107,7 @@ def leg_end(
     edges = np.linspace(0.0, top_mps, CONTROL.speed_bands + 1)
     until_s, boxes = _boxes(vessel, inputs)
     wind = float(np.hypot(*(environment.wind_to - environment.current_to)))
-    found = [_most(vessel, boxes, edges, wind, yaw_rate_radps, sign) for sign in (1.0, -1.0)]
+    found = [recalled(_most, vessel, boxes, edges, wind, yaw_rate_radps, sign) for sign in (1.0, -1.0)]
     least = 1e-3 * max(rate.max() for rate in found)  # a band that nothing passes through costs much, but not all
     faster, slower = (CONTROL.rate_margin * np.maximum(rate, least) for rate in found)
     changes = SpeedChanges(edges_mps=edges, until_s=until_s, faster_mps2=faster, slower_mps2=slower)

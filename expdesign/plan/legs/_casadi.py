@@ -83,6 +83,7 @@ class Program:
         options: dict[str, Any] = {"print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}
         options |= {"ipopt.max_iter": LEGS.iterations, "ipopt.constr_viol_tol": 1e-9, "ipopt.acceptable_iter": 0}
         options |= {"ipopt.tol": 1e-5 if self.free else 1e-7}
+        options |= {"ipopt.mumps_pivot_order": 0}  # minimum degree: by far the least work for chains of samples
         options["jac_g"] = ca.Function("nlp_jac_g", variables_and_parameters, [constraints, jacobian])
         options["hess_lag"] = ca.Function("nlp_hess_l", variables_and_parameters + weights, [ca.triu(hessian)])
         nlp: Any = {"x": variables, "p": parameters, "f": cost, "g": constraints}

@@ -242,10 +242,15 @@ def _problem(task: LegTask, water: LegWater, ship: AgileShip, line: Line, turn: 
 
 
 def _circle(water: LegWater, line: Line, arm: float, margin_m: float) -> Array | None:
-    """A circle of free water that leaves the discs of a hull on a short line room to turn, or None."""
+    """A circle of free water that leaves the discs of a hull on a short line room to turn, or None.
+
+    Its radius is infinite where the shore is as far off as a corridor is wide: such legs do not depend on the chart.
+    """
     middle = line.at(np.array([line.length_m / 2]))[0, :2]
     radius = float(water.field.at(middle)) - margin_m
     needed = float(np.hypot(*(line.points - middle).T).max()) + arm + water.vessel.length_m / 3
+    if radius >= needed + LEGS.corridor_hulls * water.vessel.length_m:
+        radius = np.inf
     return np.r_[middle, radius] if radius >= needed else None
 
 

@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from expdesign.memory import recalled
 from expdesign.plan.legs._casadi import program
 from expdesign.plan.legs.problem import LegProblem
 from expdesign.plan.legs.tuning import LEGS
@@ -49,6 +50,17 @@ def solve_leg(problem: LegProblem) -> Array | None:
     time. Where commands that would give the guessed motion lead nowhere, evenly changing ones often do. The answer is
     for the caller to check by simulation.
     """
+    values, problem.budget.spent_s = recalled(_solved, problem)
+    return values
+
+
+def _solved(problem: LegProblem) -> tuple[Array | None, float]:
+    """Commands of a leg, or None, and the work spent after it."""
+    values = _fastest_and_smooth(problem)
+    return values, problem.budget.spent_s
+
+
+def _fastest_and_smooth(problem: LegProblem) -> Array | None:
     sample_s = problem.vessel.sample_time_s
     for guess, stretch in ((problem, 1.0), (_even(problem), 1.0), (problem, 1.6), (problem, 3.0)):
         guess_s = stretch * problem.duration_s

@@ -16,6 +16,7 @@ import shapely
 
 from expdesign.conventions import wrap_angle
 from expdesign.dictionary import Primitive
+from expdesign.memory import in_order
 from expdesign.plan.chart import clearance_field
 from expdesign.plan.control import AgileShip
 from expdesign.plan.legs import LegTask, LegWater, free_leg
@@ -24,7 +25,6 @@ from expdesign.plan.local_planner.protocol import Pair, SearchSpace, TransitionT
 from expdesign.plan.local_planner.tuning import LOCAL
 from expdesign.plan.runs import Footprint
 from expdesign.plan.values import Placement
-from expdesign.processes import in_order
 from expdesign.sea_area import as_multipolygon
 from expdesign.simulation import CALM
 from expdesign.values import Array

@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from expdesign.durations import with_repeats
+from expdesign.memory import remembering, user_memory
 from expdesign.progress import Progress, silent, within
-from expdesign.scenario import load_repeats
+from expdesign.scenario import Scenario, load_repeats
 from expdesign.workflows.outcome import Outcome
 from expdesign.workflows.steps.case import loaded, written
 from expdesign.workflows.steps.design_problem import designed
@@ -23,6 +24,7 @@ def plan(
     seed: int = 0,
     jobs: int = 1,
     scheduler: str | None = None,
+    cache: bool = True,
     progress: Progress = silent,
 ) -> Outcome:
     """One verified trajectory with the runs of a durations file, or of the optimal durations.
@@ -34,14 +36,19 @@ def plan(
         seed: of everything drawn.
         jobs: processes; 0 for one per core. The results do not depend on it.
         scheduler: address of a Dask scheduler whose workers share the work instead.
+        cache: read what is remembered, and remember what is computed. The results do not depend on it.
         progress: of the command.
     """
     case = loaded(scenario, progress)
     check_plannable(case)
+    with remembering(user_memory() if cache else None), workers(jobs, scheduler=scheduler):
+        return _plan(case, out, durations, seed, progress)
+
+
+def _plan(case: Scenario, out: Path | None, durations: Path | None, seed: int, progress: Progress) -> Outcome:
     information, _ = ready(case, seed=seed, progress=within(progress, 0.02, 0.1))
     design = designed(case, information, seed=seed)
     if durations is not None:
         design = with_repeats(design, load_repeats(durations, names=design.problem.names))
-    with workers(jobs, scheduler=scheduler):
-        result = planned(case, information, design, seed=seed, progress=within(progress, 0.1, 0.95))
+    result = planned(case, information, design, seed=seed, progress=within(progress, 0.1, 0.95))
     return written(case, out, plan_files(case, result), plan_summary(result), progress)

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from expdesign.durations import efficiencies
+from expdesign.memory import recalled, remembering, user_memory
 from expdesign.progress import Progress, silent, within
 from expdesign.scenario import Scenario
 from expdesign.workflows.outcome import Outcome
@@ -25,6 +26,7 @@ def run(
     seed: int = 0,
     jobs: int = 1,
     scheduler: str | None = None,
+    cache: bool = True,
     progress: Progress = silent,
 ) -> Outcome:
     """The main job: score, durations, plan, verification, route files and report, into `out` or runs/<scenario>.
@@ -35,18 +37,19 @@ def run(
         seed: of everything drawn.
         jobs: processes; 0 for one per core. The results do not depend on it.
         scheduler: address of a Dask scheduler whose workers share the work instead.
+        cache: read what is remembered, and remember what is computed. The results do not depend on it.
         progress: of the command.
     """
     case = loaded(scenario, progress)
     check_plannable(case)
-    with workers(jobs, scheduler=scheduler):
+    with remembering(user_memory() if cache else None), workers(jobs, scheduler=scheduler):
         return _run(case, out, seed, progress)
 
 
 def _run(case: Scenario, out: Path | None, seed: int, progress: Progress) -> Outcome:
     information, growth = ready(case, seed=seed, progress=within(progress, 0.02, 0.06))
     design = designed(case, information, seed=seed, progress=within(progress, 0.06, 0.08))
-    compared = efficiencies(design)
+    compared = recalled(efficiencies, design)
     plan = planned(case, information, design, seed=seed, progress=within(progress, 0.08, 0.9))
     progress("writing routes, run cards and report", 0.9)
     route = built_route(case, plan)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +17,7 @@ from expdesign.export.whatif_page import Case, WhatIfContent, explanations, what
 from expdesign.export.whatif_page.page import table_header, table_row
 from expdesign.information import PrimitiveInformation, estimated_parameters
 from expdesign.information.expected import expected_covariance
+from expdesign.memory import Memory, recalled, remembering, user_memory
 from expdesign.processes import as_finished
 from expdesign.progress import Progress, silent
 from expdesign.rehearsal import trial_parts
@@ -37,6 +40,7 @@ def whatif(
     with_plan: bool = False,
     jobs: int = 0,
     scheduler: str | None = None,
+    cache: bool = True,
     seed: int = 0,
     progress: Progress = silent,
 ) -> Outcome:
@@ -51,6 +55,7 @@ def whatif(
         with_plan: plan the trials, too.
         jobs: processes; 0 for one per core.
         scheduler: address of a Dask scheduler whose workers carry the work instead.
+        cache: read what is remembered, and remember what is computed. The results do not depend on it.
         seed: of everything drawn.
         progress: of the cases.
     """
@@ -65,9 +70,14 @@ def whatif(
         if names.count(name) > 1:
             raise InputError(f"the name {name!r} is given to {names.count(name)} cases, expected different names")
     done: dict[int, Case] = {}
-    with workers(jobs, scheduler=scheduler):
-        tasks = ((index, *case) for index, case in enumerate(cases))
-        for index, found in as_finished(_case, (with_plan, seed), tasks):
+    memory = user_memory() if cache else None
+    with remembering(memory), workers(jobs, scheduler=scheduler):
+        tasks = [(index, *case) for index, case in enumerate(cases)]
+        shared = with_plan, seed, memory
+        ahead = int(with_plan and memory is not None and scheduler is None)  # the others share what it finds
+        for index, found in chain(
+            (_case(*shared, *task) for task in tasks[:ahead]), _as_finished(shared, tasks[ahead:])
+        ):
             done[index] = found
             progress(f"{found.name} is done", 0.95 * len(done) / len(cases))
     content = WhatIfContent(
@@ -84,18 +94,30 @@ def whatif(
     return Outcome(files=written, summary=_summary(content), tables=_tables(content))
 
 
-def _case(with_plan: bool, seed: int, index: int, case: Scenario, changes: tuple[str, ...]) -> tuple[int, Case]:
+def _as_finished(shared: tuple[Any, ...], tasks: Sequence[tuple[Any, ...]]) -> Iterator[tuple[int, Case]]:
+    """Cases as they are finished; begun when the first is asked for."""
+    yield from as_finished(_case, shared, tasks)
+
+
+def _case(
+    with_plan: bool, seed: int, memory: Memory | None, index: int, case: Scenario, changes: tuple[str, ...]
+) -> tuple[int, Case]:
     """One case, computed without progress, because it may run in another process."""
+    with remembering(memory):
+        return index, _computed(case, changes, with_plan, seed)
+
+
+def _computed(case: Scenario, changes: tuple[str, ...], with_plan: bool, seed: int) -> Case:
     try:
         information, _ = ready(case, seed=seed)
         design = designed(case, information, seed=seed)
         plan = dict(plan_summary(planned(case, information, design, seed=seed))) if with_plan else {}
         if plan:
             plan["trial_s"] = float(str(plan["informative_s"])) + float(str(plan["repositioning_s"]))
-        return index, _described(case, changes, information, design, plan)
+        return _described(case, changes, information, design, plan)
     except NoAnswer as error:
         empty = np.zeros((0, 0))
-        return index, Case(
+        return Case(
             name=case.name, changes=changes, problem=str(error), runs={}, efficiencies={}, plan={}, covariance=empty
         )
 
@@ -116,7 +138,7 @@ def _described(
         environment=case.environment,
         mean_subtraction=case.design.mean_subtraction,
     )
-    compared = {item.criterion: item.of[WHOLE_RUNS] for item in efficiencies(design) if WHOLE_RUNS in item.of}
+    compared = {item.criterion: item.of[WHOLE_RUNS] for item in recalled(efficiencies, design) if WHOLE_RUNS in item.of}
     return Case(
         name=case.name,
         changes=changes,

@@ -12,6 +12,7 @@ from expdesign.export import (
     track_csv,
 )
 from expdesign.information import PrimitiveInformation
+from expdesign.memory import recalled
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import plan_trial
 from expdesign.plan.tuning import PLAN
@@ -29,7 +30,7 @@ def planned(
     progress: Progress = silent,
 ) -> Plan:
     """The verified trial of a scenario."""
-    return plan_trial(plan_problem(case, information, design, seed=seed), progress=progress)
+    return recalled(plan_trial, plan_problem(case, information, design, seed=seed), progress=progress)
 
 
 def plan_problem(

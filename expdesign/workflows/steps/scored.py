@@ -4,26 +4,48 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from expdesign.dictionary import build_dictionary
+from expdesign.dictionary import PrimitiveSpec, build_dictionary
 from expdesign.export import (
     dictionary_json,
 )
 from expdesign.information import PrimitiveInformation, estimated_parameters, score_primitives
+from expdesign.memory import recalled
 from expdesign.progress import Progress, silent
 from expdesign.scenario import Scenario
+from expdesign.vessel import Environment, Vessel
 
 
 def scored(case: Scenario, *, progress: Progress = silent) -> tuple[PrimitiveInformation, ...]:
     """Information of every primitive of a scenario."""
+    return recalled(
+        _scored,
+        case.vessel,
+        case.dictionary,
+        case.environment,
+        case.design.fixed_parameters,
+        case.design.mean_subtraction,
+        progress=progress,
+    )
+
+
+def _scored(
+    vessel: Vessel,
+    dictionary: Sequence[PrimitiveSpec],
+    environment: Environment,
+    fixed_parameters: tuple[str, ...],
+    mean_subtraction: str,
+    *,
+    progress: Progress,
+) -> tuple[PrimitiveInformation, ...]:
     progress("simulating the dictionary", 0.0)
-    primitives = build_dictionary(case.vessel, case.dictionary)
+    primitives = build_dictionary(vessel, dictionary)
     progress("scoring the dictionary", 0.5)
     return score_primitives(
-        case.vessel,
+        vessel,
         primitives,
-        environment=case.environment,
-        fixed_parameters=case.design.fixed_parameters,
-        mean_subtraction=case.design.mean_subtraction,
+        environment=environment,
+        fixed_parameters=fixed_parameters,
+        mean_subtraction=mean_subtraction,
     )
 
 

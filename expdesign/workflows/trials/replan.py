@@ -16,6 +16,7 @@ from expdesign.errors import NoAnswer
 from expdesign.export import vessel_toml, write_files
 from expdesign.export.files import Known, replan_json
 from expdesign.information import estimated_parameters
+from expdesign.memory import recalled, remembering, user_memory
 from expdesign.plan.values import Plan
 from expdesign.progress import Progress, silent, within
 from expdesign.scenario import Scenario
@@ -46,6 +47,7 @@ def replan(
     seed: int = 0,
     jobs: int = 1,
     scheduler: str | None = None,
+    cache: bool = True,
     progress: Progress = silent,
 ) -> Outcome:
     """Plan the rest of a trial from the ship's present position, with the results of `run`.
@@ -60,6 +62,7 @@ def replan(
         seed: of all chance.
         jobs: processes; 0 for one per core. The results do not depend on it.
         scheduler: address of a Dask scheduler whose workers share the work instead.
+        cache: read what is remembered, and remember what is computed. The results do not depend on it.
         progress: of the command.
 
     Raises:
@@ -68,36 +71,43 @@ def replan(
     """
     progress("reading scenario and data", 0.0)
     state = present_state(scenario, data, vessel=vessel, remaining_s=remaining_s, progress=within(progress, 0.02, 0.08))
+    words = command_text(
+        "replan",
+        [scenario],
+        {
+            "--data": tuple(data),
+            "--vessel": vessel,
+            "--remaining": remaining_s,
+            "--interest": tuple(interest),
+            "--seed": seed,
+        },
+    )
+    with remembering(user_memory() if cache else None), workers(jobs, scheduler=scheduler):
+        return _replanned(state, out, words, interest=interest, seed=seed, progress=progress)
+
+
+def _replanned(
+    state: PresentState, out: Path | None, words: str, *, interest: Sequence[str], seed: int, progress: Progress
+) -> Outcome:
+    """Plan the rest and write it; `words` are the command."""
     case, notes = rest_of(state, interest=interest)
     information, growth = ready(case, seed=seed, progress=within(progress, 0.08, 0.12))
     design = designed(
         case, information, stated_std=_stated(state.first.vessel), seed=seed, progress=within(progress, 0.12, 0.15)
     )
     _check_runs(design)
-    with workers(jobs, scheduler=scheduler):
-        plan = planned(case, information, design, seed=seed, progress=within(progress, 0.15, 0.85))
+    plan = planned(case, information, design, seed=seed, progress=within(progress, 0.15, 0.85))
     progress("writing routes, run cards and report", 0.85)
     known = known_of(replace(state, notes=(*state.notes, *notes)), case, design, plan)
     route = built_route(case, plan)
     content = replace(
         report_content(case, information, design, plan, seed),
-        compared=efficiencies(design),
+        compared=recalled(efficiencies, design),
         route=route,
         known=known,
-        command=command_text(
-            "replan",
-            [scenario],
-            {
-                "--data": tuple(data),
-                "--vessel": vessel,
-                "--remaining": remaining_s,
-                "--interest": tuple(interest),
-                "--seed": seed,
-            },
-        ),
+        command=words,
     )
-    with workers(jobs, scheduler=scheduler):
-        files = trial_files(case, growth, content, route)
+    files = trial_files(case, growth, content, route)
     files |= {
         VESSEL_FILE: vessel_toml(state.ship, comments=[f"The rest of trial {case.name!r} is planned with it.",
                                                        f"Its model is {state.origin}."]),
