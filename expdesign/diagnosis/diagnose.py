@@ -14,6 +14,7 @@ from expdesign.diagnosis.conclusions import (
     note_on_random_current,
     note_on_unconverged,
     notes_on_data,
+    notes_on_found_again,
     notes_on_rejected,
     unit_name,
     verdict,
@@ -72,8 +73,9 @@ def diagnose(
     order = sorted(range(len(findings)), key=lambda index: -findings[index].gain)
     steps = [chosen.kept.steps[index] for index in order]
     ranked = tuple(findings[index] for index in order)
-    final = chosen.kept.last.ship if steps else ship
-    extended, not_written = extend(vessel, final, _standard_errors(chosen.kept.last) if steps else {})
+    refined = steps or ship.stated_std
+    final = chosen.kept.last.ship if refined else ship
+    extended, not_written = extend(vessel, final, _standard_errors(chosen.kept) if refined else {})
     before = accuracy(ship, record)
     return Diagnosis(
         vessel=vessel,
@@ -162,11 +164,13 @@ def _notes_on_selection(chosen: _Selected, ship: ExtendedModel, windows: Windows
     if chosen.kept.first.keys:
         unfitted = cross_validate(None, ship, windows, silent)
         notes += note_on_nuisance(unfitted, chosen.held[0], seed)
+    notes += notes_on_found_again(chosen.kept)
     return (*notes, *note_on_unconverged(chosen.held), *note_on_random_current(chosen.kept.last.noise))
 
 
-def _standard_errors(found: Fit) -> dict[str, float]:
-    return {key: found.std(key) for key in found.keys}
+def _standard_errors(found: Selection) -> dict[str, float]:
+    profiled = [step.chosen.profiled for step in found.steps if step.chosen.profiled is not None]
+    return {key: found.last.std(key) for key in found.last.keys} | dict(profiled)
 
 
 def _smallest_p_values(found: Selection) -> tuple[tuple[str, float], ...]:

@@ -26,7 +26,7 @@ from expdesign.vessel.model import VesselModel
 from expdesign.vessel.roll import Roll
 from expdesign.vessel.sensors import CENTRAL, SENSORS, Mounting, Sensors
 from expdesign.vessel.structures import STRUCTURES, TERMS, Term, structure_terms
-from expdesign.vessel.vessel import Vessel
+from expdesign.vessel.vessel import Vessel, std_keys
 
 __all__ = [
     "CALM",
@@ -60,6 +60,7 @@ __all__ = [
     "limit_keys",
     "required_force",
     "response_keys",
+    "std_keys",
     "stem",
     "structure_terms",
     "within_limits",

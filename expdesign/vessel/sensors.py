@@ -34,6 +34,14 @@ class Mounting:
                 raise InputError(f"mounting.{name} is {value:g}, expected a finite number, not negative for times")
 
 
+FAULTS = (
+    "heading_bias_rad",
+    "velocity_angle_rad",
+    "yaw_rate_scale",
+    *(f"{name}_{axis}_m" for name in ("position", "velocity", "wind") for axis in ("forward", "starboard")),
+    *(f"{name}_delay_s" for name in SENSORS),
+)
+"""Errors of sensors that a diagnosis estimates, as vessel files call them."""
 CENTRAL = Mounting()
 """At the origin of the b-frame, at once, every sample."""
 

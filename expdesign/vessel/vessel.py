@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 
-from expdesign.errors import InputError
+from expdesign.errors import InputError, UnknownName
 from expdesign.values import Array
 from expdesign.vessel.actuators import Actuator, Limit, Response
 from expdesign.vessel.environment import CALM, Environment
 from expdesign.vessel.model import VesselModel
-from expdesign.vessel.sensors import EXACT, Sensors
+from expdesign.vessel.sensors import EXACT, FAULTS, Sensors
+
+
+def std_keys(actuators: Sequence[Actuator]) -> tuple[str, ...]:
+    """Names of what may have a standard deviation: the faults of sensors, and e.g. "n1_lag_s" of actuator signals."""
+    signals = [signal for actuator in actuators for signal in actuator.signals]
+    return (*FAULTS, *(f"{signal}_{field.name}" for signal in signals for field in fields(Response)))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,6 +32,7 @@ class Vessel:
         model: structure, parameters, actuators.
         sensors: what they add to the truth.
         environment: weather that came with the model, e.g. from a diagnosis; calm when nothing is known.
+        std: standard deviations of what actuators and sensors state, by `std_keys`; known exactly where there is none.
     """
 
     name: str
@@ -35,12 +43,16 @@ class Vessel:
     model: VesselModel
     sensors: Sensors = EXACT
     environment: Environment = CALM
+    std: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name in ("length_m", "beam_m", "draught_m", "sample_time_s"):
             value = getattr(self, name)
             if not 0 < value < np.inf:
                 raise InputError(f"vessel.{name} is {value:g}, expected more than 0")
+        for name in self.std:
+            if name not in std_keys(self.actuators):
+                raise UnknownName("standard deviation", name, known=std_keys(self.actuators))
 
     @property
     def actuators(self) -> tuple[Actuator, ...]:

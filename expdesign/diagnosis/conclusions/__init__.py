@@ -6,6 +6,7 @@ from expdesign.diagnosis.conclusions.notes import (
     note_on_random_current,
     note_on_unconverged,
     notes_on_data,
+    notes_on_found_again,
     notes_on_rejected,
 )
 from expdesign.diagnosis.conclusions.verdict import (
@@ -31,6 +32,7 @@ __all__ = [
     "note_on_random_current",
     "note_on_unconverged",
     "notes_on_data",
+    "notes_on_found_again",
     "notes_on_rejected",
     "unit_name",
     "verdict",

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from expdesign.diagnosis.causes.words import rounded
 from expdesign.diagnosis.conclusions.verdict import missing_effect
 from expdesign.diagnosis.data import Noise, Windows, missing_wind_share
 from expdesign.diagnosis.fit import HeldOut, held_out_gain
 from expdesign.diagnosis.select import SELECTION_TUNING, Selection
+from expdesign.diagnosis.vessel_file import public_name
 from expdesign.signals import Record
 from expdesign.vessel import Vessel
 
@@ -74,6 +76,20 @@ def notes_on_rejected(found: Selection, kept: Selection, unit: str) -> tuple[str
         for step in found.steps
         if id(step.chosen.candidate) not in names
     )
+
+
+def notes_on_found_again(kept: Selection) -> tuple[str, ...]:
+    """What the vessel file states with a standard deviation, beside what both it and the data say."""
+    last = kept.last
+    named = {key for step in kept.steps for key in step.chosen.keys}
+    notes = []
+    for key, std in last.ship.stated_std.items():
+        if key in last.keys and key not in named:
+            name, factor, offset, unit = public_name(key, last.ship)
+            values = ((last.ship.stated[key], std), (last.value(key), last.std(key)))
+            before, after = (rounded(offset + factor * value, abs(factor) * error) for value, error in values)
+            notes.append(f"Found again and refined: {name}, {before} {unit} in the vessel file, is {after} {unit}.")
+    return tuple(notes)
 
 
 def note_on_nuisance(unfitted: HeldOut, fitted: HeldOut, seed: int) -> tuple[str, ...]:

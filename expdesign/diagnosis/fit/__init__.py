@@ -13,7 +13,7 @@ from expdesign.diagnosis.fit.cross_validation import (
     on_common_units,
     validation_units,
 )
-from expdesign.diagnosis.fit.fit import Fit, FitOptions, continuing, log_likelihood_gain, profile_cost
+from expdesign.diagnosis.fit.fit import Fit, FitOptions, continuing, deviations_of, log_likelihood_gain, profile_cost
 from expdesign.diagnosis.fit.gauss_newton import fit
 from expdesign.diagnosis.fit.gram_matrices import gram_matrices, information
 from expdesign.diagnosis.fit.linear_model import (
@@ -32,6 +32,7 @@ __all__ = [
     "cluster_robust",
     "continuing",
     "cross_validate",
+    "deviations_of",
     "difference_step",
     "effect_disturbances",
     "fit",

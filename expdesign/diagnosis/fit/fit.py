@@ -89,28 +89,32 @@ def continuing(found: Fit, *, steps: int = TUNING.steps) -> FitOptions:
 
 
 def uncertain_keys(ship: ExtendedModel) -> tuple[str, ...]:
-    """Parameters with a standard deviation in the vessel file."""
-    model = ship.model
-    return tuple(f"theta:{n}" for n, std in zip(model.names, model.parameter_std, strict=True) if std > 0)
+    """What has a standard deviation in the vessel file: parameters, and states of water, actuators and sensors."""
+    return tuple(key for key, std in _prior_std(ship).items() if std > 0)
 
 
 def prior_precision(ship: ExtendedModel, keys: tuple[str, ...]) -> Array:
-    """(c,) of effects: 1 / std^2 of uncertain parameters, else zero."""
-    model = ship.model
-    std = {f"theta:{n}": s for n, s in zip(model.names, model.parameter_std.tolist(), strict=True)}
+    """(c,) of effects: 1 / std^2 of those with a standard deviation in the vessel file, else zero."""
+    std = _prior_std(ship)
     return np.array([1.0 / std[key] ** 2 if std.get(key, 0.0) > 0 else 0.0 for key in keys])
 
 
-def values_of(ship: ExtendedModel, keys: tuple[str, ...]) -> Array:
-    """(c,) values of effects."""
-    return np.array([ship.get(key) for key in keys])
+def _prior_std(ship: ExtendedModel) -> dict[str, float]:
+    model = ship.model
+    parameters = {f"theta:{n}": s for n, s in zip(model.names, model.parameter_std.tolist(), strict=True)}
+    return {**parameters, **ship.stated_std}
+
+
+def deviations_of(ship: ExtendedModel, keys: tuple[str, ...]) -> Array:
+    """(c,) effects less what the vessel file states of them."""
+    return np.array([ship.get(key) - ship.stated.get(key, 0.0) for key in keys])
 
 
 def profile_cost(found: Fit, noise: Noise) -> float:
     """Twice the negative log likelihood under some noise, minimised over the effects of the linear model."""
     grams = found.grams if noise is found.noise else gram_matrices(found.sensitivities, noise)
     m = marginalised(grams, found.sensitivities, noise)
-    now = values_of(found.ship, found.keys)
+    now = deviations_of(found.ship, found.keys)
     score = m.s - found.precision * now
     best = score @ np.linalg.lstsq(m.A + np.diag(found.precision), score, rcond=None)[0] if len(now) else 0.0
     return float(m.quadratic + found.precision @ now**2 - best)

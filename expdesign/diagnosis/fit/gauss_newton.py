@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from expdesign.diagnosis.data import Noise, Windows
-from expdesign.diagnosis.fit.fit import Fit, FitOptions, prior_precision, uncertain_keys, values_of
+from expdesign.diagnosis.fit.fit import Fit, FitOptions, deviations_of, prior_precision, uncertain_keys
 from expdesign.diagnosis.fit.gram_matrices import gram_matrices, information, marginalised
 from expdesign.diagnosis.fit.linear_model import Sensitivities, sensitivities_to
 from expdesign.diagnosis.fit.noise_estimation import Prior, estimate_noise
@@ -91,7 +91,7 @@ def _weighted(problem: _Problem, point: _Point | Fit, noise: Noise) -> Fit:
     """Cost, covariance and the next step under some noise."""
     grams = gram_matrices(point.sensitivities, noise)
     m = marginalised(grams, point.sensitivities, noise)
-    now = values_of(point.ship, problem.keys)
+    now = deviations_of(point.ship, problem.keys)
     score = m.s - problem.precision * now
     A = m.A + np.diag(problem.precision)
     gain = float(score @ np.linalg.lstsq(A, score, rcond=None)[0]) if problem.keys else 0.0
@@ -114,7 +114,7 @@ def _weighted(problem: _Problem, point: _Point | Fit, noise: Noise) -> Fit:
 
 
 def _noise(problem: _Problem, point: _Point | Fit, guess: Noise | None) -> Noise:
-    prior = Prior(precision=problem.precision, now=values_of(point.ship, problem.keys))
+    prior = Prior(precision=problem.precision, now=deviations_of(point.ship, problem.keys))
     grams = point.grams if isinstance(point, Fit) else None
     return estimate_noise(point.sensitivities, prior, guess, grams, ar_order=problem.options.ar_order)
 
@@ -146,7 +146,7 @@ def _line_search(problem: _Problem, best: Fit) -> Fit | None:
 def _cost_with_weights_of(problem: _Problem, best: Fit, ship: ExtendedModel, error: Array) -> float:
     """Cost of another ship's error with the weights of the best fit so far."""
     quadratic = information(replace(best.sensitivities, error=error), best.noise).quadratic
-    return quadratic + float(problem.precision @ values_of(ship, problem.keys) ** 2)
+    return quadratic + float(problem.precision @ deviations_of(ship, problem.keys) ** 2)
 
 
 def _inverse(A: Array) -> Array:

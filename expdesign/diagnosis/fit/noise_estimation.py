@@ -24,7 +24,7 @@ class Prior:
 
     Attributes:
         precision: (c,) of the Gaussian priors around zero change; zero for effects without a prior.
-        now: (c,) the effects that the sensitivities are taken at.
+        now: (c,) the effects that the sensitivities are taken at, less what the vessel file states of them.
     """
 
     precision: Array

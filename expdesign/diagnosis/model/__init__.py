@@ -4,6 +4,7 @@ from expdesign.diagnosis.model.extended_model import ANGLE_STEMS, ROLL, Extended
 from expdesign.diagnosis.model.input_groups import RESPONSES, group_columns, input_groups, values_by_group
 from expdesign.diagnosis.model.term_library import ADVANCE_LOSS, AIR, own_advance_terms, own_air_terms, term_library
 from expdesign.diagnosis.model.terms import (
+    Effects,
     ahead_force,
     ahead_force_text,
     asymmetry_terms,
@@ -21,6 +22,7 @@ __all__ = [
     "ANGLE_STEMS",
     "RESPONSES",
     "ROLL",
+    "Effects",
     "ExtendedModel",
     "ahead_force",
     "ahead_force_text",

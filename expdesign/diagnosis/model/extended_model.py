@@ -48,7 +48,7 @@ class ExtendedModel:
         derived: those of u, v, r that the data derive from the pose, by its sensors.
         shoalest: largest draught over depth in the data, 0 where no depth is known.
         effects: key -> value; others are zero.
-        stated: effects as the vessel file states them.
+        stated: effects as the vessel file states them; stated_std: standard deviations of those that it is unsure of.
     """
 
     model: VesselModel
@@ -58,6 +58,7 @@ class ExtendedModel:
     max_draught_over_depth: float = 0.0
     effects: Effects = field(default_factory=dict)
     stated: Effects = field(default_factory=dict)
+    stated_std: Effects = field(default_factory=dict)
     scaled_terms: tuple[ScaledTerm, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -77,8 +78,11 @@ class ExtendedModel:
         return replace(self, effects=others | {key: value for key, value in self.stated.items() if key in keys})
 
     def has_found(self, prefix: str) -> bool:
-        """Whether an effect whose key begins so differs from the vessel file."""
-        return any(key.startswith(prefix) and value != self.stated.get(key) for key, value in self.effects.items())
+        """Whether an effect whose key begins so differs from the vessel file, which does not say how sure it is."""
+        return any(
+            key.startswith(prefix) and value != self.stated.get(key) and key not in self.stated_std
+            for key, value in self.effects.items()
+        )
 
     def get(self, key: str) -> float:
         """Value of an effect."""

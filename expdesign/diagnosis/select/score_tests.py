@@ -19,7 +19,7 @@ import numpy as np
 import scipy
 
 from expdesign.diagnosis.causes import Candidate
-from expdesign.diagnosis.fit import Fit, build_sensitivities, effect_disturbances, information
+from expdesign.diagnosis.fit import Fit, build_sensitivities, deviations_of, effect_disturbances, information
 from expdesign.diagnosis.select.candidate_disturbances import candidate_disturbances
 from expdesign.diagnosis.select.tuning import TUNING
 from expdesign.values import Array
@@ -107,7 +107,7 @@ def _scores(base: Fit, candidates: Sequence[Candidate]) -> _Scores:
     found = build_sensitivities(base.linear, disturbances, random_current=base.noise.current_std_mps > 0)
     m = information(found, base.noise)
     c = len(base.keys)
-    now = np.array([base.ship.get(key) for key in base.keys])
+    now = deviations_of(base.ship, base.keys)
     A, s = m.A.copy(), m.s.copy()
     own = A[:c, :c] + np.diag(base.precision)
     if c:

@@ -8,6 +8,7 @@ import numpy as np
 
 from expdesign.diagnosis.data import derived_outputs, has_heading
 from expdesign.diagnosis.model import RESPONSES, ROLL, ExtendedModel, term_library, values_by_group
+from expdesign.diagnosis.vessel_file.stated_std import stated_std
 from expdesign.errors import InputError
 from expdesign.estimation.regression import model_for
 from expdesign.signals import Batch, Record
@@ -34,6 +35,7 @@ def extended_model(vessel: Vessel, record: Record) -> ExtendedModel:
         max_draught_over_depth=max_draught_over_depth,
         effects=known,
         stated=known,
+        stated_std=stated_std(vessel, model.inputs, derived, known),
     )
 
 

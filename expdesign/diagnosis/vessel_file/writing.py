@@ -9,7 +9,8 @@ import numpy as np
 
 from expdesign.diagnosis.model import RESPONSES, ExtendedModel, group_columns, mean_wind
 from expdesign.diagnosis.vessel_file.found_terms import found_model
-from expdesign.vessel import Actuator, Response, Sensors, Vessel
+from expdesign.diagnosis.vessel_file.stated_std import found_std, with_std
+from expdesign.vessel import Actuator, Response, Sensors, Vessel, std_keys
 
 
 def extend(vessel: Vessel, ship: ExtendedModel, std: Mapping[str, float]) -> tuple[Vessel, tuple[str, ...]]:
@@ -34,12 +35,14 @@ def extend(vessel: Vessel, ship: ExtendedModel, std: Mapping[str, float]) -> tup
         weather = replace(weather, current_to=np.array([ship.get("current:north"), ship.get("current:east")]))
     if _has(ship, "wind:"):
         weather = replace(weather, wind_to=np.array(mean_wind(ship)))
+    weather = with_std(weather, std)
     return (
         replace(
             vessel,
             model=replace(model, actuators=actuators),
             sensors=_sensors(vessel.sensors, ship),
             environment=weather,
+            std=found_std(vessel, ship, std, std_keys(actuators)),
         ),
         (*missing, *more),
     )

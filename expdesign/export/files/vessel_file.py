@@ -50,6 +50,8 @@ def vessel_toml(vessel: Vessel, *, comments: Sequence[str] = ()) -> str:
     lines += _model(vessel.model)
     if vessel.sensors != Sensors():
         lines += ["", *_table("[sensors]", _sensors(vessel.sensors))]
+    if vessel.std:
+        lines += ["", *_table("[std]", vessel.std)]
     lines += _environment(vessel.environment)
     return "\n".join(lines) + "\n"
 

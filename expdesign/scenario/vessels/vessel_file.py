@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -39,6 +39,7 @@ from expdesign.vessel import (
     VesselModel,
     limit_keys,
     response_keys,
+    std_keys,
     structure_terms,
 )
 from expdesign.vessel.expressions import parse_expression
@@ -65,7 +66,16 @@ def load_vessel(path: Path | str) -> Vessel:
         model=model,
         sensors=_sensors(file.sensors),
         environment=CALM if file.environment is None else build_environment(file.environment),
+        std=_std(file.std, actuators, entry.at("std")),
     )
+
+
+def _std(given: Mapping[str, float], actuators: Sequence[Actuator], entry: Entry) -> dict[str, float]:
+    known = std_keys(actuators)
+    for name in given:
+        if name not in known:
+            raise entry.error(f"{shown(name)} is no quantity of a sensor or an actuator, {offer(name, known)}")
+    return dict(given)
 
 
 def _sensors(table: SensorsTable) -> Sensors:

@@ -244,6 +244,11 @@ class VesselTable(Table):
     sensors: SensorsTable = Field(
         default=SensorsTable(), description="the noise and faults of the sensors; without the table they are exact"
     )
+    std: dict[str, NonNegative] = Field(
+        default={},
+        description="the standard deviations of what [sensors] and [[actuators]] state, by the key of the sensor, or "
+        "by signal and quantity: heading_bias_rad, n1_lag_s, a1_delay_s, rudder1_offset; 0, for known, when not given",
+    )
     environment: EnvironmentTable | None = Field(
         default=None, description="the weather that simulations of this vessel meet and a diagnosis found"
     )
