@@ -86,7 +86,7 @@ def test_standard_deviations_are_of_what_the_vessel_has(tmp_path):
     text = vessel_toml(replace(load_vessel(TENDER), std={"n1_lag_s": 0.1}))
     file = tmp_path / "vessel.toml"
     file.write_text(text.replace("n1_lag_s", "n1_lags_s"), encoding="utf-8")
-    with pytest.raises(FileError, match="std: 'n1_lags_s' is no quantity .* 'n1_lag_s'"):
+    with pytest.raises(FileError, match=r"std: 'n1_lags_s' is no quantity .* 'n1_lag_s'"):
         load_vessel(file)
 
 

@@ -21,7 +21,7 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     outputs = situation.ship.model.outputs
     derived = set(situation.windows.derived)
     signals = [name for name in outputs if name not in derived]
-    signals += ["psi"] if derived else []
+    signals += ["psi"] if derived or (situation.windows.has_heading and "r" in outputs) else []
     signals += ["position"] if derived & {"u", "v"} else []
     found = [Candidate(cause="sensor_delay", free={f"late:{name}": 0.0}) for name in signals]
     if {"u", "v"} <= set(signals):
