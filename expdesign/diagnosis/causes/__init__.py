@@ -12,6 +12,7 @@ from expdesign.diagnosis.causes.candidate import Candidate, Cause, Situation, Va
 from expdesign.diagnosis.causes.environment import CURRENT, SHALLOW_WATER, WIND
 from expdesign.diagnosis.causes.hull import CHANGE_POINT, LOAD_CHANGE, MISSING_TERM, PARAMETERS, ROLL_COUPLING
 from expdesign.diagnosis.causes.sensors import GYRO_SCALE, HEADING_BIAS, LEVER_ARM, SENSOR_DELAY
+from expdesign.diagnosis.causes.words import rounded
 
 CAUSES: tuple[Cause, ...] = (
     PARAMETERS,
@@ -34,4 +35,4 @@ CAUSES: tuple[Cause, ...] = (
     CHANGE_POINT,
 )
 
-__all__ = ["CAUSES", "Candidate", "Cause", "Situation", "Values"]
+__all__ = ["CAUSES", "Candidate", "Cause", "Situation", "Values", "rounded"]

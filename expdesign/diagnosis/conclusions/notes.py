@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from expdesign.diagnosis.causes.words import rounded
+from expdesign.diagnosis.causes import rounded
 from expdesign.diagnosis.conclusions.verdict import missing_effect
 from expdesign.diagnosis.data import Noise, Windows, missing_wind_share
 from expdesign.diagnosis.fit import HeldOut, held_out_gain
