@@ -13,7 +13,7 @@ from expdesign.export.cards.chart import run_chart
 from expdesign.export.cards.danger import Danger, look_out
 from expdesign.export.cards.orders import columns_of, order_columns, order_rows, orders_notes, run_orders
 from expdesign.export.report.content import ReportContent, Run, relative_information
-from expdesign.export.report.tables import settings_sentence
+from expdesign.export.report.tables import settings_sentence, shown_name
 from expdesign.export.tuning import TUNING
 from expdesign.plan.values import Plan
 from expdesign.vessel import column_name
@@ -97,7 +97,7 @@ def build_card(content: ReportContent, runs: Sequence[Run]) -> Card:
     rows, missed = order_rows(vessel, run_orders(content, runs[0]), step)
     return Card(
         runs=tuple(run.number for run in runs),
-        name=legs[0].name,
+        name=shown_name(item),
         chart=run_chart(content, legs, numbers=[run.number for run in runs]),
         what=f"{item.primitive.family.replace('_', ' ')} of {lasts}; {settings_sentence(item)}",
         purpose=_purpose(content, names.index(legs[0].name)),

@@ -6,9 +6,12 @@ import math
 
 import numpy as np
 
+from expdesign.errors import ExpdesignError
 from expdesign.export.report.content import ReportContent, Run
 from expdesign.export.tuning import TUNING
+from expdesign.export.words import NB
 from expdesign.plan.values import Leg
+from expdesign.simulation import steady_ahead
 from expdesign.values import Array
 from expdesign.vessel import Vessel, stem
 
@@ -55,12 +58,32 @@ def order_rows(vessel: Vessel, values: Array, step_s: float) -> tuple[list[tuple
         step_s: between them.
     """
     kept, missed = condensed(values)
-    factors = np.array([factor for *_, factor in order_columns(vessel)])
+    columns, side = order_columns(vessel), starboard_helm(vessel)
+    factors = np.array([factor for *_, factor in columns])
     rows = []
     for index in kept:
-        shown = values[index] * factors
-        rows.append((f"{index * step_s:.4g}", *(_figure(value) for value in shown.tolist())))
+        shown = zip(columns, (values[index] * factors).tolist(), strict=True)
+        cells = (
+            _helm(value * side) if side and stem(name) == "rudder" else _figure(value) for (name, *_), value in shown
+        )
+        rows.append((f"{index * step_s:.4g}", *cells))
     return rows, missed
+
+
+def starboard_helm(vessel: Vessel) -> int:
+    """Sign of the rudder angle that turns the ship to starboard; 0 where its model does not say."""
+    if not any(stem(name) == "rudder" for name in vessel.model.inputs):
+        return 0
+    try:
+        return steady_ahead(vessel).starboard
+    except ExpdesignError:
+        return 0
+
+
+def _helm(angle_deg: float) -> str:
+    """A helm order: S 10, P 20, or 0 amidships."""
+    figure = _figure(abs(angle_deg))
+    return figure if figure == "0" else f"{'S' if angle_deg > 0 else 'P'}{NB}{figure}"
 
 
 def _figure(value: float) -> str:
@@ -96,11 +119,14 @@ def orders_notes(content: ReportContent, leg: Leg, rows: list[tuple[str, ...]], 
     """How the rows of orders of a leg are to be used; `missed` is their largest error as a share of the range."""
     step = content.plan.commands.sample_time_s
     every = (leg.last - leg.first) * step / len(rows)
-    signs = [meaning for what, meaning in SIGNS.items() if any(stem(n) == what for n in content.vessel.model.inputs)]
+    side = starboard_helm(content.vessel)
+    known = SIGNS | ({"rudder": "rudder: S turns to starboard, P to port, 0 amidships."} if side else {})
+    signs = [meaning for what, meaning in known.items() if any(stem(n) == what for n in content.vessel.model.inputs)]
     notes = [
+        *_by_heading(content, leg),
         f"Between the rows all orders change linearly. They deviate from commands.csv (one command every {step:g} s) "
         "by at "
-        f"most {100 * missed:.0f} % of the range of each order. {' '.join(signs)}".rstrip()
+        f"most {100 * missed:.0f} % of the range of each order. {' '.join(signs)}".rstrip(),
     ]
     if every < TUNING.called_order_s:
         notes.append(
@@ -108,6 +134,21 @@ def orders_notes(content: ReportContent, leg: Leg, rows: list[tuple[str, ...]], 
             "commands.csv, and use these rows to monitor it."
         )
     return notes
+
+
+def _by_heading(content: ReportContent, leg: Leg) -> list[str]:
+    """How a zig-zag that is switched by heading is ordered; nothing for other manoeuvres."""
+    spec = next((item.primitive for item in content.information if item.primitive.name == leg.name), None)
+    if spec is None or spec.family != "zigzag_heading":
+        return []
+    helm, change = (math.degrees(spec.settings[key]) for key in ("helm_rad", "heading_rad"))
+    first, other = ("S", "P") if helm > 0 else ("P", "S")
+    return [
+        f"Order by heading, not by time. From the approach course order {first} {abs(helm):.3g}. When the heading has "
+        f"changed by {change:.3g}\N{DEGREE SIGN} to that side, order {other} {abs(helm):.3g}. When it is "
+        f"{change:.3g}\N{DEGREE SIGN} to the other side of the approach course, reverse again, and so on until the run "
+        "ends. The times in the rows are those that the model needs."
+    ]
 
 
 SIGNS = {

@@ -90,7 +90,7 @@ def short_of_optimum(content: ReportContent) -> str:
     gain = math.expm1(max(design.gap, 0.0) / degree)
     if not math.isfinite(gain):
         return "not certified"
-    if gain < 1e-8:
-        return f"0.000001{words.NB}%"
+    if gain < 1e-4:
+        return f"0.01{words.NB}%"
     power = 10.0 ** (math.floor(math.log10(gain)) - 1)
     return f"{100 * math.ceil(gain / power) * power:.10f}".rstrip("0").rstrip(".") + f"{words.NB}%"

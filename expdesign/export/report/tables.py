@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from expdesign.conventions import KNOTS_PER_MPS
 from expdesign.export import words
 from expdesign.export.report.content import ReportContent, primitive_runs
 from expdesign.information.primitive_information import PrimitiveInformation
@@ -27,6 +28,7 @@ class AgendaRow:
     longitude: str
     heading: str
     speed: str
+    knots: str
 
 
 def agenda(content: ReportContent) -> list[AgendaRow]:
@@ -49,8 +51,13 @@ def _agenda_row(plan: Plan, index: int, leg: Leg, run: int | None) -> AgendaRow:
         latitude=words.latitude(lat),
         longitude=words.longitude(lon),
         heading=words.bearing(float(pose[2])),
-        speed=f"{words.number(before, 1)} \N{RIGHTWARDS ARROW} {words.number(after, 1)}",
+        speed=_from_to(before, after),
+        knots=_from_to(before * KNOTS_PER_MPS, after * KNOTS_PER_MPS),
     )
+
+
+def _from_to(before: float, after: float) -> str:
+    return f"{words.number(before, 1)} \N{RIGHTWARDS ARROW} {words.number(after, 1)}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,6 +115,18 @@ UNITS = {
     "fraction": ("of the run", 1.0),
 }
 """Ending of a setting's name -> unit shown and factor to it."""
+
+
+def shown_name(item: PrimitiveInformation) -> str:
+    """The name of a primitive with its angles in degrees: turning-circle-helm-35\N{DEGREE SIGN}."""
+    name = item.primitive.name
+    for key, value in item.primitive.settings.items():
+        unit, factor = UNITS.get(key.rpartition("_")[2], ("", 1.0))
+        text = f"{key.rpartition('_')[0].replace('_', '-')}-{value:.12g}"
+        if unit.startswith("\N{DEGREE SIGN}") and f"{name}-".find(f"-{text}-") >= 0:
+            shown = words.significant(value * factor)
+            name = f"{name}-".replace(f"-{text}-", f"-{text.removesuffix(f'{value:.12g}')}{shown}{unit}-")[:-1]
+    return name
 
 
 def settings_sentence(item: PrimitiveInformation) -> str:

@@ -10,7 +10,7 @@ import csv
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from itertools import islice
+from itertools import count, islice
 from pathlib import Path
 
 from expdesign.errors import FileError
@@ -144,13 +144,14 @@ def _rows(path: Path) -> Iterator[Iterator[list[str]]]:
 
 
 def _readable_rows(path: Path, reader: Iterator[list[str]]) -> Iterator[list[str]]:
-    row = 0
+    numbers = count(1)
     try:
-        for row, cells in enumerate(reader, start=1):
+        for cells in reader:
+            next(numbers)
             yield cells
     except csv.Error as error:
         problem = f"is not readable CSV ({error}), expected numbers between commas, without quotes"
-        raise FileError(path, f"row {row + 1}", problem) from None
+        raise FileError(path, f"row {next(numbers)}", problem) from None
 
 
 def _row_blocks(path: Path) -> Iterator[list[list[str]]]:

@@ -26,6 +26,7 @@ from expdesign.export.report.content import ReportContent, primitive_runs
 from expdesign.export.report.figures.footprints import footprints
 from expdesign.export.report.figures.labels import place_labels
 from expdesign.export.report.figures.position_axes import draw_position_ticks, draw_scale_and_north
+from expdesign.export.tuning import TUNING
 from expdesign.plan.values import Plan
 from expdesign.sea_area import SeaArea, as_multipolygon, eroded
 from expdesign.values import Array
@@ -93,6 +94,11 @@ def draw_sea(axes: Axes, area: SeaArea, box: Box, clearance_m: float) -> None:
     if clearance_m > 0:
         safe = as_multipolygon(shapely.simplify(eroded(near, clearance_m), detail))
         axes.add_patch(_patch(safe, facecolor="none", edgecolor=GREY, linewidth=0.7, linestyle=(0, (2, 2))))
+
+
+def shown_depths(count: int) -> set[int]:
+    """Numbers of the depths in the legend: few of them, the shallowest and the deepest among them."""
+    return set(np.linspace(0, count - 1, min(count, TUNING.legend_depths)).round().astype(int).tolist())
 
 
 def depth_colour(number: int, count: int) -> str:
@@ -167,6 +173,7 @@ def _legend(content: ReportContent) -> Sequence[Line2D | Patch]:
     shown = (
         Patch(facecolor=depth_colour(number, len(depths)), edgecolor="#7aa6c2", alpha=0.6, label=f"{depth:g} m or more")
         for number, (depth, _) in enumerate(depths)
+        if number in shown_depths(len(depths))
     )
     return (
         Line2D([], [], color=primitive[0], linewidth=primitive[1], label="informative run, numbered"),
@@ -176,7 +183,7 @@ def _legend(content: ReportContent) -> Sequence[Line2D | Patch]:
         Line2D([], [], color=GREEN, marker="o", linestyle="", markersize=9, label="start"),
         Line2D([], [], color=PURPLE, marker="*", linestyle="", markersize=13, label="goal"),
         Line2D([], [], color=GREY, linewidth=0.8, linestyle=(0, (2, 2)), label=clearance),
-        Patch(facecolor=WATER, edgecolor="#7aa6c2", label="allowed water"),
+        Patch(facecolor=WATER, edgecolor="#7aa6c2", label="allowed water, within the safety contour"),
         Patch(facecolor=LAND, edgecolor="#8a7440", label="land"),
         Patch(facecolor=FORBIDDEN, edgecolor=GREY, label="forbidden or uncharted"),
         *shown,
