@@ -110,7 +110,11 @@ def _check_worth_replanning(
     leaving = violates_chance_constraint(risk, problem.settings.confidence)
     expected_s = budget.spent_s + (budget.spent_s - before_s)
     if attempt == PLAN.replans or not leaving or expected_s > budget.most_s:
-        more = "; more plan.clearance_m helps" if leaving else ""
+        more = (
+            "; more plan.clearance_m may help where the water is wide enough for it, less plan.confidence accepts more"
+            if leaving
+            else ""
+        )
         raise NoPlan(f"the plan found is too risky: {failed}{more}")
 
 

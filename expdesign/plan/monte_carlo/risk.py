@@ -93,7 +93,7 @@ def failed_chance_constraint(
     return (
         ""
         if found.aborted < MONTE_CARLO.no_plan_aborted
-        else f"{found.note}; wider water or a vessel known better helps"
+        else f"{found.note}; more room, or a vessel known better, may help"
     )
 
 
