@@ -94,6 +94,8 @@ class Batch:
         first_row: row of the first sample in its file (the header is row 1), 0 when not from a file.
         interpolated: (k, 3) 1 where a velocity lies between the readings of its sensor, 0 where it is one; None where
             all are readings.
+        vane_std_rad: standard deviation of the noise on the angle of the vane that gave the wind, where the wind is
+            divided by the shrinkage that it causes; else 0.
     """
 
     name: str
@@ -107,6 +109,7 @@ class Batch:
     derived: tuple[str, ...] = ()
     first_row: int = 0
     interpolated: Array | None = None
+    vane_std_rad: float = 0.0
 
     def __post_init__(self) -> None:
         shapes = {

@@ -8,12 +8,14 @@ import pytest
 from estimation_case import MERGED, NOMINAL, TRUE
 from expdesign.errors import InputError
 from expdesign.estimation.methods import Settings, estimate
+from expdesign.estimation.regression.vane import unbiased_value
 from expdesign.estimation.replay import Integration
 from expdesign.reduction import at_reference_point, reduced, with_reduced_wind
 from expdesign.reduction.readings import readings
 from expdesign.signals import Batch, Commands, Record
 from expdesign.simulation import CALM, Environment, measure, simulate, simulate_ensemble
-from expdesign.vessel import Mounting, Response, Sensors, Vessel
+from expdesign.vessel import SCALAR, Mounting, Response, Sensors, Vessel
+from expdesign.vessel.expressions import parse_expression
 from measured_trials import tug_commands
 
 WIND = Environment(wind_to=np.array([4.0, -3.0]))
@@ -181,6 +183,39 @@ def test_delays_longer_than_the_data_are_refused():
     late = Sensors(velocity=Mounting(delay_s=500.0))
     with pytest.raises(InputError, match="no batch is longer than the delays"):
         at_reference_point(Record(batches=(sailed(TRUE),)), late)
+
+
+@pytest.mark.parametrize("text", ["v_q", "u_q*v_q", "abs(u_q)*u_q", "abs(u_q)*v_q", "u*abs(v_q)", "u*v"])
+def test_terms_of_a_vanes_wind_are_right_on_average_over_its_noise(text: str):
+    """By Gauss and Hermite's quadrature over the noise, while nothing in a modulus changes its sign."""
+    std, speed, angle = 0.1, 7.0, 0.8
+    nodes, weights = np.polynomial.hermite_e.hermegauss(9)
+    seen = angle + std * nodes
+    shrunk = np.exp(-(std**2) / 2)
+    signals = {"u": np.full(9, 2.0), "v": np.full(9, 0.5)}
+    table = signals | {"u_q": speed * np.cos(seen) / shrunk, "v_q": speed * np.sin(seen) / shrunk}
+    expression = parse_expression(text, signals=("u", "v", "u_q", "v_q"))
+    mean = np.broadcast_to(unbiased_value(expression, table, std), 9) @ weights / weights.sum()
+    exact = {"u": 2.0, "v": 0.5, "u_q": speed * np.cos(angle), "v_q": speed * np.sin(angle)}
+    assert mean == pytest.approx(expression.evaluate(exact, SCALAR), rel=1e-9)
+
+
+def test_instruments_find_wind_forces_from_a_noisy_vane():
+    """On average over trials, which without the correction they do not."""
+    vessel, trials = ship(wind_sensor="vane", wind_angle_rad=0.3), 16
+    inputs = np.stack([tug_commands(1500, seed=seed).values for seed in range(trials)], axis=1)
+    many = simulate_ensemble(
+        vessel, inputs, runs=trials, environment=WIND, rng=np.random.default_rng(1), velocity=(1.7, 0.7, 0.0)
+    )
+    place, ratios = NOMINAL.names.index("W_uv"), {True: [], False: []}
+    for trial in range(trials):
+        measured = Record(batches=(many.batch(trial),))
+        for told, values in ratios.items():
+            found = estimate(reduced(measured, vessel) if told else measured, NOMINAL, method="iv-air")
+            values.append(found.values[found.names.index("W_uv")] / TRUE.model.parameters[place] - 1.0)
+    for told, values in ratios.items():
+        error = abs(np.mean(values)) / (np.std(values, ddof=1) / np.sqrt(trials))
+        assert error < 4 if told else error > 8
 
 
 NOISE = {"velocity_mps": 0.03, "yaw_rate_radps": 0.002}

@@ -59,7 +59,8 @@ def undone(told: Told) -> Batch:
     velocity, read = _velocity(told, pose)
     wind = None if batch.wind is None else _wind(told, batch.wind, velocity, pose)
     interpolated = None if read.all() else 1.0 - read
-    return replace(batch, pose=pose, velocity=velocity, wind=wind, interpolated=interpolated)
+    vane_std = told.sensors.wind_angle_rad if told.sensors.wind_sensor == "vane" else 0.0
+    return replace(batch, pose=pose, velocity=velocity, wind=wind, interpolated=interpolated, vane_std_rad=vane_std)
 
 
 def measured(values: Array) -> bool:

@@ -6,6 +6,7 @@ from expdesign.estimation.regression.predictors import PREDICTORS, Layout, Rows,
 from expdesign.estimation.regression.regression import Integers, Regression, batch_slices, single_output
 from expdesign.estimation.regression.tables import (
     AIR,
+    VANE,
     Table,
     heading_of,
     in_depth,
@@ -21,6 +22,7 @@ __all__ = [
     "AIR",
     "MEANS",
     "PREDICTORS",
+    "VANE",
     "Integers",
     "Layout",
     "Polynomial",

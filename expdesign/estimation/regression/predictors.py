@@ -30,7 +30,8 @@ from expdesign.estimation.regression.intervals import mean_between_readings
 from expdesign.estimation.regression.nuisance import Nuisance, batch_signs, headings, nuisance_regressors, symbolic
 from expdesign.estimation.regression.polynomial import Algebra
 from expdesign.estimation.regression.regression import Integers, Regression
-from expdesign.estimation.regression.tables import AIR, Table, measured_table
+from expdesign.estimation.regression.tables import AIR, VANE, Table, measured_table
+from expdesign.estimation.regression.vane import unbiased_value
 from expdesign.signals import Batch, Record
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, VesselModel
@@ -132,7 +133,10 @@ class Layout:
         return self.model.terms[place].equation
 
     def _values(self, place: int, table: Table) -> Array:
-        return np.asarray(self.model.expressions[place].evaluate(table, NUMPY))
+        expression = self.model.expressions[place]
+        if VANE in table:
+            return unbiased_value(expression, table, float(table[VANE]))
+        return np.asarray(expression.evaluate(table, NUMPY))
 
 
 def ahead(table: Table) -> Table:

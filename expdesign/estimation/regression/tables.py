@@ -13,6 +13,8 @@ from expdesign.vessel import NUMPY, Actuator, Limit, VesselModel
 from expdesign.vessel.structures import FORCE_SIGNALS, SHOAL
 
 Table = dict[str, Array]
+VANE = "vane"
+"""Beside the signals of a table: the standard deviation of the vane's angle, where the wind is from one [rad]."""
 AIR = ("u_q", "v_q")
 
 
@@ -78,7 +80,8 @@ def measured_table(model: VesselModel, batch: Batch, *, wind_measured: bool) -> 
     if wind_measured and batch.wind is None:
         raise InputError(f"{batch.name} has no measured wind; use a predictor without wind")
     air = batch.wind if wind_measured and batch.wind is not None else batch.velocity[:, :2]
-    return signal_table(model, batch.velocity, air, heading_of(batch), inputs_of(model, batch))
+    table = signal_table(model, batch.velocity, air, heading_of(batch), inputs_of(model, batch))
+    return {**table, VANE: np.array(batch.vane_std_rad)} if wind_measured and batch.vane_std_rad else table
 
 
 def signal_table(model: VesselModel, velocity: Array, air: Array, heading: Array, inputs: Array) -> Table:

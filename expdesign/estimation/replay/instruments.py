@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from expdesign.errors import InputError, NotInformative, UnknownName
-from expdesign.estimation.regression import Integers, Layout, Rows, Table, batch_signs, heading_of, measured_table
+from expdesign.estimation.regression import VANE, Integers, Layout, Rows, Table, batch_signs, heading_of, measured_table
 from expdesign.estimation.replay.replay import Replay
 from expdesign.signals import Batch, Record
 from expdesign.simulation import to_body
@@ -97,7 +97,8 @@ class InstrumentModel:
         moved = {"u": u, "v": v, "r": r, "u_q": air[0], "v_q": air[1], "psi": psi}
         ratio = batch.sample_time_s / self.layout.model.time_scale_s
         table, signs = self.measured[index]
-        return self.layout.rows({**table, **moved}, signs, used=_run(self.rows.used[index]), scale=ratio)
+        clean = {name: values for name, values in ({**table, **moved}).items() if name != VANE}  # no noise of a vane
+        return self.layout.rows(clean, signs, used=_run(self.rows.used[index]), scale=ratio)
 
 
 def apart_from_start(rows: Rows) -> Rows:
