@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
 
 import numpy as np
 
@@ -15,7 +16,15 @@ from expdesign.errors import InputError, SpeedOutOfReach, UnknownName, Unreachab
 from expdesign.signals import Commands
 from expdesign.simulation import simulate
 from expdesign.values import Array
-from expdesign.vessel import NUMPY, Vessel, allocate, generalised_force, required_force, within_limits
+from expdesign.vessel import (
+    NUMPY,
+    Vessel,
+    allocate,
+    direct_terms,
+    generalised_force,
+    required_force,
+    within_limits,
+)
 
 __all__ = ["build_dictionary", "build_primitive", "drift", "excitation", "family", "follow", "trim"]
 
@@ -33,8 +42,13 @@ def family(name: str) -> Family:
 
 
 def build_dictionary(vessel: Vessel, specs: Iterable[PrimitiveSpec]) -> tuple[Primitive, ...]:
-    """All primitives of the specifications, in order."""
-    return tuple(build_primitive(vessel, spec) for spec in specs)
+    """All primitives of the specifications, in order; commands of desired velocities are found for many at a time."""
+    requests = tuple(specs)
+    followed = _followed(vessel, requests)
+    return tuple(
+        _simulated(vessel, spec, followed[index]) if index in followed else build_primitive(vessel, spec)
+        for index, spec in enumerate(requests)
+    )
 
 
 def build_primitive(vessel: Vessel, spec: PrimitiveSpec) -> Primitive:
@@ -54,6 +68,11 @@ def build_primitive(vessel: Vessel, spec: PrimitiveSpec) -> Primitive:
         named = f"{spec.place}: primitive {spec.name!r}" if spec.place else f"primitive {spec.name!r}"
         kind = Unreachable if isinstance(error, Unreachable | SpeedOutOfReach) else InputError
         raise kind(f"{named}: {error}") from None
+    return _simulated(vessel, spec, found)
+
+
+def _simulated(vessel: Vessel, spec: PrimitiveSpec, found: Excitation) -> Primitive:
+    """The primitive of a specification, from its commands."""
     commands = Commands(sample_time_s=vessel.sample_time_s, names=vessel.model.inputs, values=found.commands)
     return Primitive(
         name=spec.name,
@@ -63,6 +82,37 @@ def build_primitive(vessel: Vessel, spec: PrimitiveSpec) -> Primitive:
         entry_inputs=found.inputs,
         trajectory=simulate(vessel, commands, velocity=found.velocity, standing=found.inputs),
     )
+
+
+def _followed(vessel: Vessel, specs: tuple[PrimitiveSpec, ...]) -> dict[int, Excitation]:
+    """Excitation by index of the specifications with desired velocities; those that cannot be had are left out."""
+    lengths: dict[int, dict[int, Array]] = {}
+    if direct_terms(vessel.model):
+        return {}
+    for index, spec in enumerate(specs):
+        with suppress(InputError):
+            if family(spec.family).reference is not None:
+                desired = desired_velocities(vessel, spec)
+                lengths.setdefault(len(desired), {})[index] = desired
+    found: dict[int, Excitation] = {}
+    for samples, group in lengths.items():
+        if samples > 2:
+            most, items = max(1, TUNING.followed_samples // samples), list(group.items())
+            for first in range(0, len(items), most):
+                found |= _followed_together(vessel, dict(items[first : first + most]))
+    return found
+
+
+def _followed_together(vessel: Vessel, desired: dict[int, Array]) -> dict[int, Excitation]:
+    """`_followed` for velocities (k + 1, 3) of one length by index."""
+    velocities = np.array(list(desired.values()))
+    inputs, values = follow(vessel, velocities)
+    held = lost(vessel, velocities[:, 0], inputs) <= TUNING.steady_change
+    return {
+        index: Excitation(velocity=velocities[row, 0], inputs=inputs[row], commands=values[row])
+        for row, index in enumerate(desired)
+        if held[row]
+    }
 
 
 def excitation(vessel: Vessel, spec: PrimitiveSpec) -> Excitation:

@@ -16,6 +16,7 @@ class Tuning:
         reported_deviation: deviation, as a share of the largest desired speed or yaw rate, above which a primitive is
             reported.
         tones: sines for each of the three velocities.
+        followed_samples: samples of desired velocities whose commands are found at a time.
         least_swing: least amplitude to both sides of a wave before it is scaled to amplitude 1.
     """
 
@@ -24,6 +25,7 @@ class Tuning:
     thrust_starts: tuple[float, ...] = (0.05, 0.4, 0.9)
     reported_deviation: float = 0.1
     tones: int = 4
+    followed_samples: int = 300_000
     least_swing: float = 0.5
 
 
