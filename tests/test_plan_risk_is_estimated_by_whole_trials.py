@@ -14,6 +14,7 @@ import shapely
 from expdesign import workflows
 from expdesign.plan.control.tracking import Helmsman
 from expdesign.plan.legs import LegTask
+from expdesign.plan.monte_carlo import trials
 from expdesign.plan.monte_carlo.collision import CollisionCheck
 from expdesign.plan.monte_carlo.guidance import Guidance
 from expdesign.plan.monte_carlo.procedure import tolerances
@@ -79,6 +80,24 @@ def test_every_trial_has_one_outcome_and_runs_begin_within_tolerance():
     assert trials.go_arounds.max() <= MONTE_CARLO.go_arounds
     over = np.cumsum(trials.left | trials.aborted, axis=0)[:-1] > 0
     assert not trials.samples[1:][over].any()  # nothing is sailed after the end
+
+
+def test_parts_sailed_in_turn_have_streams_of_their_own_and_take_the_memory_of_one(monkeypatch):
+    _, alone = sailing(draws=10)
+    at_once = []
+
+    def drawn(vessel, environment, draws, rng):
+        at_once.append(draws)
+        return draw_truths(vessel, environment, draws, rng)
+
+    monkeypatch.setattr(trials, "MONTE_CARLO", replace(MONTE_CARLO, trials_at_once=10))
+    monkeypatch.setattr(trials, "draw_truths", drawn)
+    _, parted = sailing(draws=25)
+    assert at_once == [10, 10, 5]
+    assert parted.used.shape == (len(planned().legs), 25)
+    np.testing.assert_array_equal(parted.used[:, :10], alone.used)
+    assert np.unique(parted.samples.sum(axis=0)[parted.completed]).size > 10  # no part repeats another
+    assert not np.array_equal(parted.used[2, 10:20], alone.used[2])
 
 
 def test_an_unknown_current_causes_go_arounds_and_costs_time():

@@ -18,6 +18,8 @@ from expdesign.simulation.motion import State, integrator_step, motion_rates
 from expdesign.values import Array
 from expdesign.vessel import Actuator, Operators, Roll, Term, VesselModel
 
+SHIPS = tuple(1 << power for power in reversed(range(8)))
+"""Ships in one function."""
 CASADI = Operators(ca.fabs, ca.sin, ca.cos)
 LARGEST = 16_000
 """Instructions in one function; in longer ones a step takes as much time."""
@@ -88,6 +90,47 @@ class CompiledIntegrator:
                 done = end
 
 
+class CompiledSample:
+    """One sample of several ships, each with parameters, inputs and weather of its own."""
+
+    def __init__(self, model: VesselModel, *, rows: int, substeps: int) -> None:
+        """Of `substeps` Runge-Kutta steps, with as many `rows` of inputs, or one where they are held."""
+        structure = model.terms, model.form, model.sample_time_s, model.actuators, model.roll
+        self._functions, self._substeps = compiled_samples(structure, rows, substeps), substeps
+
+    def states(self, start: Array, delivered: Array, *, sea: Array, parameters: Array, sample_time_s: float) -> Array:
+        """(n, 6) states a sample later; not-a-numbers and infinities where the motion diverges.
+
+        Args:
+            start: (n, 6) pose and velocity; with a roll mode (n, 8).
+            delivered: (rows, m, n) inputs.
+            sea: (4, n) n-frame current and wind to north and east [m/s].
+            parameters: (n, p) in the model's own form.
+            sample_time_s: time of the sample [s].
+        """
+        rows, inputs, ships = delivered.shape
+        drive = np.empty((ships, rows, inputs + 4))
+        drive[..., :inputs], drive[..., inputs:] = delivered.transpose(2, 0, 1), sea.T[:, None]
+        begin, theta = np.ascontiguousarray(start), np.ascontiguousarray(parameters)
+        step_s, result, done = np.array([sample_time_s / self._substeps]), np.empty_like(begin), 0
+        for count, function in self._functions.items():
+            while done + count <= ships:
+                buffer, run = function.buffer()
+                for place, table in enumerate((begin, drive, theta)):
+                    buffer.set_arg(place, table[done:].data)
+                buffer.set_arg(3, step_s.data)
+                buffer.set_res(0, result[done:].data)
+                run()
+                done += count
+        return result
+
+
+@lru_cache(maxsize=64)
+def compiled_sample(model: VesselModel, *, rows: int, substeps: int) -> CompiledSample:
+    """The sample of a model, made once and kept."""
+    return CompiledSample(model, rows=rows, substeps=substeps)
+
+
 @lru_cache(maxsize=64)
 def compiled_integrator(model: VesselModel, integrator: str) -> CompiledIntegrator:
     """The integrator of a model, made once and kept."""
@@ -104,6 +147,19 @@ def compiled_steps(structure: Structure, integrator: str) -> dict[int, Any]:
     step = _step(structure, integrator)
     most = max(1, LARGEST // step.n_instructions())
     return {length: _chained(step, length) for length in (1 << power for power in reversed(range(most.bit_length())))}
+
+
+@lru_cache(maxsize=32)
+def compiled_samples(structure: Structure, rows: int, substeps: int) -> dict[int, Any]:
+    """Number of ships, largest first -> (state, drive, parameters of each, length of a step) -> states."""
+    step = _step(structure, "rk4")
+    x, theta = ca.SX.sym("x", step.size1_in(0)), ca.SX.sym("theta", step.size1_in(2))
+    drive, step_s = ca.SX.sym("drive", step.size1_in(1), rows), ca.SX.sym("step_s")
+    state = x
+    for index in range(substeps):
+        state = step(state, drive[:, index % rows], theta, step_s)
+    one = ca.Function("sample", [x, ca.vec(drive), theta, step_s], [ca.cse(state)])
+    return {count: one.map(count, [False, False, False, True], [False]) for count in SHIPS}
 
 
 def _chained(step: ca.Function, length: int) -> ca.Function:

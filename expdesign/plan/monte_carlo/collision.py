@@ -30,11 +30,24 @@ class CollisionCheck:
     def exits(self, poses: Array) -> Array:
         """(n, 2) where the hull, or what it sweeps between samples, first leaves the water; nan where never.
 
-        Steps between positions at least a hull's radius from anything forbidden are skipped.
+        Steps between positions at least a hull's radius from anything forbidden are skipped. Stretches of samples are
+        checked in turn, which bounds the memory.
 
         Args:
             poses: (k, n, 3) sample by sample; ships that do not move are skipped.
         """
+        place: Array = np.full((poses.shape[1], 2), np.nan)
+        stretch = max(1, MONTE_CARLO.collision_samples // max(1, poses.shape[1]))
+        for begin in range(0, len(poses) - 1, stretch):
+            some = poses[begin : begin + stretch + 1]
+            steps, ships = self._close(some)
+            for first in range(0, len(steps), MONTE_CARLO.collision_chunk):
+                chunk = slice(first, first + MONTE_CARLO.collision_chunk)
+                self._first_outside(some, steps[chunk], ships[chunk], place)
+        return place
+
+    def _close(self, poses: Array) -> tuple[np.ndarray, np.ndarray]:
+        """Steps and ships (j,) that move, and perhaps not far from the shore."""
         moved, turned = np.diff(poses[..., :2], axis=0), np.diff(poses[..., 2], axis=0) != 0
         moved = np.sqrt(moved[..., 0] ** 2 + moved[..., 1] ** 2)
         sails = (moved > 0) | turned
@@ -43,21 +56,17 @@ class CollisionCheck:
         concerned[1:] |= sails
         far = np.ones(poses.shape[:2], dtype=bool)
         far[concerned] = self._far(poses[concerned, :2])
-        close = sails & ~(far[:-1] & far[1:] & (moved < self._radius / 2))
-        steps, ships = np.nonzero(close)
-        place: Array = np.full((poses.shape[1], 2), np.nan)
-        for first in range(0, len(steps), MONTE_CARLO.collision_chunk):
-            step, ship = (
-                steps[first : first + MONTE_CARLO.collision_chunk],
-                ships[first : first + MONTE_CARLO.collision_chunk],
-            )
-            corners = [hull_outlines(poses[step + later, ship], self.vessel.hull_b) for later in (0, 1)]
-            spans = shapely.convex_hull(shapely.multipoints(np.concatenate(corners, axis=1)))
-            outside = ~shapely.contains_properly(self._water, spans)
-            gone, earliest = np.unique(ship[outside], return_index=True)
-            fresh = np.isnan(place[gone, 0])
-            place[gone[fresh]] = poses[step[outside][earliest[fresh]], gone[fresh], :2]
-        return place
+        steps, ships = np.nonzero(sails & ~(far[:-1] & far[1:] & (moved < self._radius / 2)))
+        return steps, ships
+
+    def _first_outside(self, poses: Array, steps: np.ndarray, ships: np.ndarray, place: Array) -> None:
+        """Note in `place` where ships first are outside in some steps (j,), in order of time, if not noted before."""
+        corners = [hull_outlines(poses[steps + later, ships], self.vessel.hull_b) for later in (0, 1)]
+        spans = shapely.convex_hull(shapely.multipoints(np.concatenate(corners, axis=1)))
+        outside = ~shapely.contains_properly(self._water, spans)
+        gone, earliest = np.unique(ships[outside], return_index=True)
+        fresh = np.isnan(place[gone, 0])
+        place[gone[fresh]] = poses[steps[outside][earliest[fresh]], gone[fresh], :2]
 
     @cached_property
     def _water(self) -> shapely.MultiPolygon:

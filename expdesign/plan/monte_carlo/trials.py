@@ -15,9 +15,11 @@ from expdesign.plan.legs import LegWater
 from expdesign.plan.monte_carlo.collision import CollisionCheck
 from expdesign.plan.monte_carlo.guidance import Guidance, open_loop
 from expdesign.plan.monte_carlo.procedure import Tolerances, tolerances
+from expdesign.plan.monte_carlo.tuning import MONTE_CARLO
 from expdesign.plan.runs import Fleet, draw_truths
 from expdesign.plan.values import SailedTrial
 from expdesign.plan.verify import hull_clearance
+from expdesign.processes import in_order
 from expdesign.progress import Progress, silent
 from expdesign.values import Array
 
@@ -62,24 +64,51 @@ def sail_trials(
     rng: np.random.Generator,
     progress: Progress = silent,
 ) -> Trials:
-    """Sail drawn trials of a plan.
+    """Sail drawn trials of a plan, `Tuning.trials_at_once` at a time, which bounds the memory that motion takes.
+
+    Time and outcomes grow with the number of draws. Each part has a random stream of its own, so the processes that
+    share them do not change their outcomes.
 
     Args:
         water: vessel, forecast, area, and the water that paths keep to.
         sailed: the plan.
         draws: number of trials.
-        rng: of all draws.
-        progress: by the planned time of legs.
+        rng: of the first part; the streams of the others are spawned from it.
+        progress: by the planned time of legs, or by parts where there are several.
     """
+    within, most = start_tolerances(water, sailed), MONTE_CARLO.trials_at_once
+    counts = [min(most, draws - first) for first in range(0, draws, most)]
+    if len(counts) == 1:
+        return _sail_part(water, sailed, within, draws, rng, progress)
+    parts = []
+    streams = [rng, *rng.spawn(len(counts) - 1)]
+    for part in in_order(_sail_part, (water, sailed, within), zip(counts, streams, strict=True)):
+        progress("sailing drawn trials", len(parts) / len(counts))
+        parts.append(part)
+    outcomes = [name for name in vars(parts[0]) if name != "within"]
+    joined = {name: np.concatenate([getattr(part, name) for part in parts], axis=1) for name in outcomes}
+    return Trials(**joined, within=within)
+
+
+def _sail_part(
+    water: LegWater,
+    sailed: SailedTrial,
+    within: tuple[Tolerances, ...],
+    draws: int,
+    rng: np.random.Generator,
+    progress: Progress = silent,
+) -> Trials:
+    """Sail drawn trials all at once, with the start tolerances of each leg."""
     vessel, track, legs, commands = water.vessel, sailed.states, sailed.legs, sailed.commands
     helm = Helmsman(vessel=vessel, environment=water.environment, ship=water.ship)
     truths = draw_truths(vessel, water.environment, draws, rng)
     fleet = Fleet(vessel, water.environment, truths, state=track[0], standing=np.zeros(len(vessel.limits)), rng=rng)
-    collisions, within = CollisionCheck(area=water.area, vessel=vessel), start_tolerances(water, sailed)
+    collisions = CollisionCheck(area=water.area, vessel=vessel)
     sailing, unexplained = np.ones(draws, dtype=bool), np.zeros((draws, 3))
     shape = (len(legs), draws)
     left, aborted = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
-    go_arounds, samples, abort_cause = (np.zeros(shape, dtype=int) for _ in range(3))
+    go_arounds, abort_cause = np.zeros(shape, dtype=np.int8), np.zeros(shape, dtype=np.int8)
+    samples = np.zeros(shape, dtype=np.int32)
     used, place = np.full(shape, np.nan), np.full((*shape, 2), np.nan)
     for index, leg in enumerate(legs):
         progress("sailing drawn trials", leg.first / len(commands))

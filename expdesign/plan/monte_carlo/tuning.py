@@ -46,7 +46,8 @@ class Tuning:
         node_bearings, node_courses: bearings of these poses at each distance, and courses at each of them.
         first_tries, next_tries: such poses tried for a ship, and for a go-around from another pose.
         curves: Dubins curves that a go-around from such a pose consists of at most.
-        collision_chunk: hulls checked at a time.
+        trials_at_once: trials sailed together, so that memory does not grow with their number.
+        collision_samples, collision_chunk: samples of all ships, and hulls near the shore, checked at a time.
     """
 
     trials: int = 500
@@ -85,6 +86,8 @@ class Tuning:
     first_tries: int = 60
     next_tries: int = 6
     curves: int = 3
+    trials_at_once: int = 1000
+    collision_samples: int = 250_000
     collision_chunk: int = 20_000
 
 

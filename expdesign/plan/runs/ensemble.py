@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from expdesign.plan.runs.tuning import RUNS
 from expdesign.simulation import ActuatorState, Environment
 from expdesign.simulation.environment import vary
 from expdesign.simulation.program import RatesProgram
@@ -106,7 +107,7 @@ class Fleet:
         self._actuators = ActuatorState.standing(
             vessel.responses, self.given.T, sample_time_s=vessel.sample_time_s, substeps=SUBSTEPS
         )
-        self._ships = np.arange(runs)
+        self._ships, self._parameters = np.arange(runs), truths.parameters
         self._program = RatesProgram(vessel.model, runs=runs, parameters=truths.parameters)
         self._program.sea[...] = self.weather.now
 
@@ -159,13 +160,8 @@ class Fleet:
         if self.weather.varies:
             self.weather.draw()
             self._program.sea[...] = self.weather.now[:, self._ships]
-        self._program.hold(given)
-        state, step_s = self.states.T, self.vessel.sample_time_s / SUBSTEPS
         with np.errstate(over="ignore", invalid="ignore"):
-            for part in range(SUBSTEPS):
-                if part < len(given):
-                    self._program.select(part)
-                state = self._program.rk4(state, step_s)
+            state = self._together(given) if len(commands) > RUNS.few_ships else self._one_by_one(given)
             settled = np.abs(state[3:]).max(axis=0) < LARGEST_SPEED
         delivered = given[0].T if len(given) == 1 else given.mean(axis=0).T
         if not settled.all():
@@ -176,6 +172,30 @@ class Fleet:
             )
             commands, delivered = commands.T, delivered.T
         self.states, self.given, self.delivered, self._actuators = state.T, commands, delivered, after
+
+    def _together(self, given: Array) -> Array:
+        """(6, n) states a sample later by operations on all ships at a time."""
+        self._program.hold(given)
+        state, step_s = self.states.T, self.vessel.sample_time_s / SUBSTEPS
+        for part in range(SUBSTEPS):
+            if part < len(given):
+                self._program.select(part)
+            state = self._program.rk4(state, step_s)
+        return state
+
+    def _one_by_one(self, given: Array) -> Array:
+        """The same by compiled steps, the quicker way for few ships."""
+        from expdesign.simulation._casadi import compiled_sample  # CasADi is loaded when a motion is integrated
+
+        sample = compiled_sample(self.vessel.model, rows=len(given), substeps=SUBSTEPS)
+        after = sample.states(
+            self.states,
+            given,
+            sea=self._program.sea,
+            parameters=self._parameters[self._ships],
+            sample_time_s=self.vessel.sample_time_s,
+        )
+        return np.ascontiguousarray(after.T)
 
 
 def _some(table: Array, ships: np.ndarray) -> Array:

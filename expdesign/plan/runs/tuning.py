@@ -7,16 +7,18 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class Tuning:
-    """Dispersion of runs.
+    """Dispersion of runs, and fleets.
 
     Attributes:
         fewest_draws, most_draws: drawn runs of each primitive.
         expected_outside: draws are so many that this number may leave the room.
+        few_ships: up to so many are quicker one by one than by an operation on all of them at a time.
     """
 
     fewest_draws: int = 200
     most_draws: int = 2000
     expected_outside: float = 2.0
+    few_ships: int = 128
 
 
 RUNS = Tuning()
