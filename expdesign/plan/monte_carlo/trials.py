@@ -80,7 +80,7 @@ def sail_trials(
     counts = [min(most, draws - first) for first in range(0, draws, most)]
     if len(counts) == 1:
         return _sail_part(water, sailed, within, draws, rng, progress)
-    parts = []
+    parts: list[Trials] = []
     streams = [rng, *rng.spawn(len(counts) - 1)]
     for part in in_order(_sail_part, (water, sailed, within), zip(counts, streams, strict=True)):
         progress("sailing drawn trials", len(parts) / len(counts))
