@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import accumulate, pairwise
 
 Progress = Callable[[str, float], None]
 """Is called with the present activity and the completed share of the work, 0 to 1."""
@@ -15,3 +16,21 @@ def silent(activity: str, share: float) -> None:
 def within(progress: Progress, low: float, high: float) -> Progress:
     """Progress of a part of the work that begins at share `low` and ends at share `high`."""
     return lambda activity, share: progress(activity, low + (high - low) * share)
+
+
+def in_phases(progress: Progress, *work: float) -> tuple[Progress, ...]:
+    """Progress of parts of the work, one after the other, that take times in these ratios."""
+    ends = [end / sum(work) for end in accumulate(work, initial=0.0)]
+    return tuple(within(progress, low, high) for low, high in pairwise(ends))
+
+
+def never_falling(progress: Progress) -> Progress:
+    """Progress that stays where it is while work is repeated."""
+    most = 0.0
+
+    def report(activity: str, share: float) -> None:
+        nonlocal most
+        most = max(most, share)
+        progress(activity, most)
+
+    return report

@@ -33,9 +33,16 @@ def example_run(made_once: Callable, name: str, *, whole: bool = False) -> tuple
 
     def run(folder: Path) -> list[str]:
         scenario = copied(folder.with_name(f"{folder.name}-scenario"), name, {} if whole else SHORTER[name])
+        told: list[tuple[str, float]] = []
         with counted_work() as (counts, progress):
-            files = [path.name for path in workflows.run(scenario, folder, seed=1, progress=progress).files]
+
+            def report(activity: str, share: float) -> None:
+                told.append((activity, share))
+                progress(activity, share)
+
+            files = [path.name for path in workflows.run(scenario, folder, seed=1, progress=report).files]
         folder.with_name(f"{folder.name}-work.json").write_text(json.dumps(counts), encoding="utf-8")
+        folder.with_name(f"{folder.name}-told.json").write_text(json.dumps(told), encoding="utf-8")
         return files
 
     return made_once(f"{name}-whole" if whole else name, run)
@@ -45,3 +52,9 @@ def example_work(made_once: Callable, name: str) -> dict[str, dict[str, int]]:
     """How much was done by phase and by kind of work while the short example was planned."""
     folder, _ = example_run(made_once, name)
     return json.loads(folder.with_name(f"{folder.name}-work.json").read_text(encoding="utf-8"))
+
+
+def example_told(made_once: Callable, name: str) -> list[tuple[str, float]]:
+    """Activities and shares of the work that were told while the short example was planned."""
+    folder, _ = example_run(made_once, name)
+    return [tuple(item) for item in json.loads(folder.with_name(f"{folder.name}-told.json").read_text("utf-8"))]

@@ -33,8 +33,8 @@ from expdesign.reduction import with_reduced_wind
 from expdesign.signals import Record
 from expdesign.vessel import Vessel
 
-SELECTED, VALIDATED = 0.65, 0.92
-"""Shares of the work after forward selection and after backward elimination."""
+SIMULATED, SELECTED, VALIDATED = 0.1, 0.89, 0.95
+"""Shares of the time after the model in use is simulated, after forward selection, and after backward elimination."""
 
 
 def diagnose(
@@ -111,7 +111,7 @@ class _Selected:
 
 def _select(ship: ExtendedModel, windows: Windows, seed: int, progress: Progress) -> _Selected:
     rng = np.random.default_rng(seed)
-    found = select_forward(ship, windows, initial_states(windows), rng, within(progress, 0.05, SELECTED))
+    found = select_forward(ship, windows, initial_states(windows), rng, within(progress, SIMULATED, SELECTED))
 
     def cross_validated(found: Selection) -> list[HeldOut]:
         return _cross_validated(found, ship, windows, within(progress, SELECTED, VALIDATED))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -26,7 +27,7 @@ from expdesign.plan.runs import Footprint, dispersion_m, footprint
 from expdesign.plan.search import path_exceeds_displacement, place_runs, placement_search
 from expdesign.plan.tuning import PLAN
 from expdesign.plan.work_budget import WorkBudget
-from expdesign.progress import Progress
+from expdesign.progress import Progress, in_phases
 from expdesign.sea_area import SeaArea
 from expdesign.vessel.hull import covering_discs
 
@@ -44,6 +45,22 @@ class PlanRoom:
     space: SearchSpace
 
 
+class Phases(NamedTuple):
+    """Progress of each phase of planning."""
+
+    water: Progress
+    transitions: Progress
+    placing: Progress
+    sailing: Progress
+    trials: Progress
+
+
+def phases_of(problem: PlanProblem, planner: LocalPlanner, progress: Progress) -> Phases:
+    """Phases of a plan by how long they take, where the planner has them."""
+    water, transitions, *others = PLAN.work
+    return Phases(*in_phases(progress, water, transitions * (_most_trials(problem, planner) > 0), *others))
+
+
 def plan_room(problem: PlanProblem, water: LegWater, progress: Progress) -> PlanRoom:
     """Water and search space of the first plan, with the transitions optimised that the search uses.
 
@@ -53,8 +70,8 @@ def plan_room(problem: PlanProblem, water: LegWater, progress: Progress) -> Plan
     planner = local_planner(water, problem.used)
     planner.check_ends(problem.start, problem.goal, water)
     space = search_space(problem, water, planner)
-    if placement_search(problem.settings).tries_transitions:
-        space = _with_transitions(problem, water, space, progress)
+    if _most_trials(problem, planner):
+        space = _with_transitions(problem, water, space, phases_of(problem, planner, progress).transitions)
     return PlanRoom(water=water, space=space)
 
 
@@ -137,9 +154,9 @@ def _with_transitions(problem: PlanProblem, water: LegWater, space: SearchSpace,
         made_good=path_exceeds_displacement(space, counts, problem.start),
         budget=WorkBudget(most_s=PLAN.transitions_s),
     )
-    for number in range(planner.transition_trials):
-        tried = PLAN.share_measured + number / planner.transition_trials * (PLAN.share_tried - PLAN.share_measured)
-        progress("trying transitions between runs", tried)
+    most = _most_trials(problem, planner)
+    for number in range(most):
+        progress("trying transitions between runs", number / most)
         try:
             placements = place_runs(space, counts, start=problem.start, width=PLAN.transition_beam, orders=0)
         except NoPlan:  # the main search keeps more, and says what is impossible
@@ -151,6 +168,11 @@ def _with_transitions(problem: PlanProblem, water: LegWater, space: SearchSpace,
         if trials.budget.exhausted:
             break
     return space
+
+
+def _most_trials(problem: PlanProblem, planner: LocalPlanner) -> int:
+    """Plans whose transitions are tried, at most."""
+    return planner.transition_trials if placement_search(problem.settings).tries_transitions else 0
 
 
 def _footprints(problem: PlanProblem, grid: ClearanceField) -> tuple[Footprint, ...]:

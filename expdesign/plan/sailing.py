@@ -10,7 +10,7 @@ import numpy as np
 
 from expdesign.dictionary import Primitive
 from expdesign.errors import NoPlan
-from expdesign.plan.assembly import PlanRoom
+from expdesign.plan.assembly import PlanRoom, phases_of
 from expdesign.plan.legs import LegTask, LegWater, last_state, nearest_turns
 from expdesign.plan.legs_ahead import LegAhead, leg_found, legs_ahead
 from expdesign.plan.local_planner import LocalPlanner, SearchSpace
@@ -43,31 +43,28 @@ def sail_all(
     """
     voyage = _Voyage(problem=problem, water=room.water, stated=stated, planner=room.space.planner, budget=budget)
     space, left, stuck, proof = room.space, problem.repeats, "", None
+    phases, stretches = phases_of(problem, room.space.planner, progress), sum(left.values()) + 1
     search, failures = placement_search(problem.settings), _Failures(problem.settings.time_budget_s)
     while True:
-        progress("placing runs", _share(problem, left, PLAN.share_tried))
+        phases.placing("placing runs", 0.0)
         placed = _placed(search, space, left, voyage.line, stuck)
         proof, spent_s = proof or placed.lattice, budget.spent_s
         legs = voyage.legs_ahead(placed.runs)
         for placement in placed.runs:
+            phases.sailing(f"sailing {placement.primitive}", 1.0 - (sum(left.values()) + 1) / stretches)
             spent_s = budget.spent_s
             if stuck := voyage.sail_run(placement, next(legs)):
                 space = space.refusing(voyage.line.last, placement)
                 break
             left[placement.primitive] -= 1
-            progress(f"sailing {placement.primitive}", _share(problem, left, PLAN.share_placed))
         else:
+            phases.sailing("sailing to the goal", 1.0 - 1 / stretches)
             if voyage.sail_home(next(legs)):
                 return replace(voyage.sailed, lattice=proof and replace(proof, refused=failures.tries))
             undone = voyage.undo_run()
             space, stuck = space.refusing(voyage.line.last, undone), "no leg leads from the last run to the goal"
             left[undone.primitive] += 1
         failures.count(placed.work_s + budget.spent_s - spent_s, stuck)
-
-
-def _share(problem: PlanProblem, left: dict[str, int], first: float) -> float:
-    total = sum(problem.repeats.values())
-    return first + (PLAN.share_sailed - first) * (total - sum(left.values())) / max(total, 1)
 
 
 def _placed(

@@ -10,7 +10,16 @@ import numpy as np
 
 from expdesign.errors import NoPlan, NoRoom
 from expdesign.memory import in_order
-from expdesign.plan.assembly import PlanRoom, leg_water, plan_room, search_space, ship_on_legs, top_mps, waters
+from expdesign.plan.assembly import (
+    PlanRoom,
+    leg_water,
+    phases_of,
+    plan_room,
+    search_space,
+    ship_on_legs,
+    top_mps,
+    waters,
+)
 from expdesign.plan.bounds import reposition_bound_s
 from expdesign.plan.chart import reachable
 from expdesign.plan.control import Capability
@@ -29,7 +38,7 @@ from expdesign.plan.tuning import PLAN
 from expdesign.plan.values import Leg, Plan, RiskEstimate, SailedTrial, Verification
 from expdesign.plan.verify import realised_efficiencies, verify_plan
 from expdesign.plan.work_budget import WorkBudget
-from expdesign.progress import Progress, silent, within
+from expdesign.progress import Progress, never_falling, silent
 from expdesign.sea_area import SeaArea
 
 
@@ -39,6 +48,7 @@ def plan_trial(problem: PlanProblem, *, progress: Progress = silent) -> Plan:
     Raises:
         NoPlan: no path, no room, or no dynamically feasible leg; the message names what and where.
     """
+    progress = never_falling(progress)
     ship, refused = ship_on_legs(problem), NoRoom("the chart has no water")
     for area in waters(problem, ship):
         try:
@@ -58,18 +68,13 @@ def _planned(whole: PlanProblem, area: SeaArea, ship: Capability, progress: Prog
     for attempt in range(PLAN.replans + 1):
         before_s = budget.spent_s
         sailed = sail_all(problem, room, progress, stated=water, budget=budget)
-        progress("verifying", PLAN.share_sailed)
+        checking = phases_of(problem, room.space.planner, progress).trials
+        checking("verifying", 0.0)
         checks = in_order(_check, (whole, water, sailed), ((_verified,), (_bound_s,)))
         # random streams independent of planning and of earlier attempts
         rng = np.random.default_rng((problem.seed, PLAN.trials_stream, attempt))
         verification = next(checks)
-        risk, trials = estimate_risk(
-            water,
-            sailed,
-            rng=rng,
-            draws=trials_needed(confidence),
-            progress=within(progress, PLAN.share_sailed, 1.0),
-        )
+        risk, trials = estimate_risk(water, sailed, rng=rng, draws=trials_needed(confidence), progress=checking)
         failed = failed_chance_constraint(risk, trials, sailed.legs, problem.area, confidence=confidence)
         if not failed:
             return _plan(whole, sailed, verification=verification, risk=risk, bound_s=next(checks))

@@ -26,8 +26,8 @@ class Tuning:
             a plan cannot return in that time; half, and some for speeds that legs begin and end with.
         iteration_s: one iteration of the optimiser for each sample of a leg, on a machine of 2020 [s].
         sample_s: one sample of some hundred drawn ships there [s].
-        share_measured, share_tried, share_placed, share_sailed: of a plan's time on average, on two cores, after which
-            the water is measured, transitions are tried, runs are placed, and everything is sailed.
+        work: how long phases take beside each other, on average of the examples on two cores: measuring the water,
+            trying transitions, placing runs, sailing them, verifying and sailing drawn trials.
         many_aborted: share of drawn trials aborted above which a warning leads the report.
     """
 
@@ -45,10 +45,7 @@ class Tuning:
     bound_reach: float = 0.6
     iteration_s: float = 2e-4
     sample_s: float = 2.5e-3
-    share_measured: float = 0.15
-    share_tried: float = 0.35
-    share_placed: float = 0.5
-    share_sailed: float = 0.65
+    work: tuple[float, float, float, float, float] = (1.0, 3.0, 1.0, 2.5, 4.0)
     many_aborted: float = 0.2
 
 

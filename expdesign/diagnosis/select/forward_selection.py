@@ -16,7 +16,7 @@ from expdesign.diagnosis.select.score_tests import ScoreTest
 from expdesign.diagnosis.select.selection import Selection, Step, redundant_step, without_step
 from expdesign.diagnosis.select.selection_round import same_effects_as_any, selection_round
 from expdesign.diagnosis.select.tuning import TUNING
-from expdesign.progress import Progress, within
+from expdesign.progress import Progress, never_falling, within
 from expdesign.values import Array
 
 
@@ -30,16 +30,16 @@ def select_forward(
     explain nearly any data. So before such a block is added, causes with fewer effects are tried one after the other.
     At the end, every cause is compared once more with its best replacement beside the others.
     """
-    progress = _monotonic(progress)
+    progress = never_falling(progress)
     base = first = fit_nuisance(ship, windows, starts)
     steps: list[Step] = []
     rejected: list[Candidate] = []
     rounds = exchanges = 0
     while True:
+        share = 1.0 - TUNING.later_rounds**rounds
         rounds += 1
-        share = 1.0 - 0.7**rounds
         progress(f"testing causes, round {rounds}", share)
-        part = within(progress, share, share + 0.2 * (1.0 - share))
+        part = within(progress, share, 1.0 - TUNING.later_rounds**rounds)
         search = _Search(windows=windows, rejected=tuple(rejected), rng=rng, progress=part)
         step, tests = search.round(base)
         if step is None and exchanges < TUNING.most_exchanges:
@@ -140,15 +140,3 @@ def _with_joint_profiles(steps: list[Step]) -> list[Step]:
         others[index] = replace(step, chosen=replace(step.chosen, profiled=(key, std)))
         steps = [*others, replace(last, chosen=replace(last.chosen, fit=found))]
     return steps
-
-
-def _monotonic(progress: Progress) -> Progress:
-    """Progress that never decreases, although rounds repeat work."""
-    most = 0.0
-
-    def report(activity: str, share: float) -> None:
-        nonlocal most
-        most = max(most, share)
-        progress(activity, most)
-
-    return report

@@ -50,12 +50,12 @@ def diagnose(
     """
     if not data:
         raise InputError("no data files are given, expected one or more CSV files")
-    progress("reading the data", 0.02)
+    progress("reading the data", 0.0)
     ship = load_vessel(vessel)
     record = measured(data, ship, velocity=velocity)
     proposals = _proposals(scenario, model_for(ship.model, record)) if scenario else ()
-    found = diagnose_record(ship, record, seed=seed, proposals=proposals, progress=within(progress, 0.05, 0.9))
-    progress("drawing the page", 0.9)
+    found = diagnose_record(ship, record, seed=seed, proposals=proposals, progress=within(progress, 0.0, 0.8))
+    progress("drawing the page", 0.8)
     command = command_text(
         "diagnose",
         data,

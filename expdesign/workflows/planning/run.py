@@ -47,13 +47,15 @@ def run(
 
 
 def _run(case: Scenario, out: Path | None, seed: int, progress: Progress) -> Outcome:
-    information, growth = ready(case, seed=seed, progress=within(progress, 0.02, 0.06))
-    design = designed(case, information, seed=seed, progress=within(progress, 0.06, 0.08))
+    information, growth = ready(case, seed=seed, progress=within(progress, 0.0, 0.03))
+    design = designed(case, information, seed=seed, progress=within(progress, 0.03, 0.08))
+    progress("comparing criteria", 0.08)
     compared = recalled(efficiencies, design)
-    plan = planned(case, information, design, seed=seed, progress=within(progress, 0.08, 0.9))
-    progress("writing routes, run cards and report", 0.9)
+    plan = planned(case, information, design, seed=seed, progress=within(progress, 0.1, 0.78))
+    writing = within(progress, 0.78, 1.0)
+    writing("writing routes, run cards and report", 0.0)
     route = built_route(case, plan)
     content = replace(report_content(case, information, design, plan, seed), compared=compared, route=route)
-    files = trial_files(case, growth, content, route)
+    files = trial_files(case, growth, content, route, progress=writing)
     summary = {**growth_summary(growth, case), **design_summary(design), **plan_summary(plan)}
     return written(case, out, files, summary, progress)

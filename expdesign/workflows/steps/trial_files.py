@@ -19,24 +19,29 @@ from expdesign.export.report import ReportContent, report_html
 from expdesign.growing import Growth
 from expdesign.information import PrimitiveInformation
 from expdesign.plan.values import Plan
+from expdesign.progress import Progress, silent
 from expdesign.scenario import Scenario
 from expdesign.workflows.steps.grown import growth_files
 from expdesign.workflows.steps.planned import plan_files
 from expdesign.workflows.steps.scored import score_files
 
 
-def trial_files(case: Scenario, growth: Growth | None, content: ReportContent, route: Route) -> dict[str, str | bytes]:
+def trial_files(
+    case: Scenario, growth: Growth | None, content: ReportContent, route: Route, *, progress: Progress = silent
+) -> dict[str, str | bytes]:
     """Every file of a planned trial, by name."""
     content = replace(content, growth=growth)
-    return {
+    files = {
         **score_files(case, content.information),
         **growth_files(case, growth),
         "durations.json": durations_json(content.design, compared=content.compared),
         **plan_files(case, content.plan),
         **route_files(route, STANDARD),
-        "report.html": report_html(content),
-        "cards.html": cards_html(content),
     }
+    progress("drawing the report", 0.02)
+    files["report.html"] = report_html(content)
+    progress("drawing the run cards", 0.7)
+    return {**files, "cards.html": cards_html(content)}
 
 
 def built_route(case: Scenario, plan: Plan) -> Route:
