@@ -13,10 +13,10 @@ from expdesign.diagnosis.conclusions.notes import note_on_random_current
 from expdesign.diagnosis.conclusions.verdict import MISSING_EFFECTS, verdict
 from expdesign.diagnosis.data.noise import Noise, white_noise
 from expdesign.diagnosis.fit.cross_validation import HeldOut
-from expdesign.diagnosis.select.forward_selection import _monotonic
 from expdesign.diagnosis.values import ErrorReduction, Finding
 from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.diagnosis.vessel_file.writing import extend
+from expdesign.progress import never_falling
 from expdesign.signals import Record
 
 OUTPUTS = ("u", "v", "r")
@@ -96,7 +96,7 @@ def test_error_reductions_are_of_root_mean_squares():
 def test_progress_never_goes_back():
     """A round may repeat work; its progress then starts below the last one."""
     shares: list[float] = []
-    tell = _monotonic(lambda what, share: shares.append(share))
+    tell = never_falling(lambda what, share: shares.append(share))
     for share in (0.1, 0.46, 0.43, 0.5):
         tell("testing", share)
     assert shares == [0.1, 0.46, 0.46, 0.5]
