@@ -35,7 +35,7 @@ def run(example: str, folder: Path, told: Progress) -> None:
 
 def whatif(folder: Path, told: Progress) -> None:
     base = SCENARIOS / "helsinki.toml"
-    workflows.whatif(base, VARIANTS, folder / "whatif", with_plan=True, jobs=0, progress=told)
+    workflows.whatif(base, VARIANTS, folder / "whatif", with_plan=True, jobs=0, cache=False, progress=told)
 
 
 def simulate(folder: Path, told: Progress) -> None:
