@@ -34,7 +34,7 @@ ESTIMATE = {
     "constant": False,
     "tests": (),
 }
-PLAIN = {"departure": None, "tolerance_m": None}
+PLAIN = {"departure": None, "tolerance_m": None, "fine": False, "name": None}
 REPLAN = {
     "jobs": 0,
     "scheduler": None,
