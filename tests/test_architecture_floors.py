@@ -25,6 +25,7 @@ FLOORS = {
         ("information", "diagnosis", "assessment"),
         ("durations",),
         ("growing", "rehearsal", "plan"),
+        ("shortest_day",),
         ("scenario", "export"),
         ("workflows",),
         ("cli", "__main__"),

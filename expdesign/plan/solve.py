@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -41,6 +41,8 @@ from expdesign.plan.work_budget import WorkBudget
 from expdesign.progress import Progress, never_falling, silent
 from expdesign.sea_area import SeaArea
 
+Planned = TypeVar("Planned")
+
 
 def plan_trial(problem: PlanProblem, *, progress: Progress = silent) -> Plan:
     """One continuous, verified trial from start to goal with every run the design asks for.
@@ -48,11 +50,19 @@ def plan_trial(problem: PlanProblem, *, progress: Progress = silent) -> Plan:
     Raises:
         NoPlan: no path, no room, or no dynamically feasible leg; the message names what and where.
     """
-    progress = never_falling(progress)
+    return _in_water(problem, never_falling(progress), _planned)
+
+
+def _in_water(
+    problem: PlanProblem,
+    progress: Progress,
+    planned: Callable[[PlanProblem, SeaArea, Capability, Progress], Planned],
+) -> Planned:
+    """What is planned in the smallest part of the water that has room."""
     ship, refused = ship_on_legs(problem), NoRoom("the chart has no water")
     for area in waters(problem, ship):
         try:
-            return _planned(problem, area, ship, progress)
+            return planned(problem, area, ship, progress)
         except NoRoom as error:
             refused = error
     raise refused
@@ -83,6 +93,42 @@ def _planned(whole: PlanProblem, area: SeaArea, ship: Capability, progress: Prog
         room = _wider(problem, room, trials, sailed.legs, failed)
         progress = _replanning(progress)
     raise AssertionError("the last plan is returned or refused")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Draft:
+    """A trial as sailed by the planner, before verification, risk and bound.
+
+    Attributes:
+        sailed: commands, motion and legs.
+        direct_s: time of the shortest path from start to goal at transit speed [s].
+        transit_mps: that speed [m/s].
+    """
+
+    sailed: SailedTrial
+    direct_s: float
+    transit_mps: float
+
+
+def draft_trial(problem: PlanProblem, *, progress: Progress = silent) -> Draft:
+    """The trial of `plan_trial` without the checks, for comparing trials.
+
+    Raises:
+        NoPlan: no path, no room, or no dynamically feasible leg.
+    """
+    return _in_water(problem, never_falling(progress), _drafted)
+
+
+def _drafted(whole: PlanProblem, area: SeaArea, ship: Capability, progress: Progress) -> Draft:
+    progress("measuring the water", 0.0)
+    problem = replace(whole, area=area)
+    water = leg_water(problem, ship)
+    room = plan_room(problem, water, progress)
+    budget = WorkBudget(most_s=PLAN.replan_budgets * problem.settings.time_budget_s)
+    sailed = sail_all(problem, room, progress, stated=water, budget=budget)
+    way_m = float(room.space.goal_distance.to_goal(problem.start[None, :2])[0])
+    speed = water.ship.transit_speed_mps
+    return Draft(sailed=sailed, direct_s=way_m / speed, transit_mps=speed)
 
 
 def _check(problem: PlanProblem, water: LegWater, sailed: SailedTrial, check: Callable[..., Any]) -> Any:

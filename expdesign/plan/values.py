@@ -106,6 +106,15 @@ class SailedTrial:
         """(k + 1, 6) pose and velocity over ground."""
         return np.hstack([self.trajectory.pose, self.trajectory.velocity])
 
+    @property
+    def day_s(self) -> float:
+        """Everything between start and goal [s]."""
+        return self.commands.duration_s
+
+    def seconds(self, kind: str) -> float:
+        """Total time of the legs of one kind [s]."""
+        return sum(leg.last - leg.first for leg in self.legs if leg.kind == kind) * self.commands.sample_time_s
+
 
 @dataclass(frozen=True, kw_only=True)
 class Verification:
@@ -250,7 +259,7 @@ class Plan:
 
     def seconds(self, kind: str) -> float:
         """Total time of the legs of one kind [s]."""
-        return sum(leg.last - leg.first for leg in self.legs if leg.kind == kind) * self.commands.sample_time_s
+        return self.sailed.seconds(kind)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import signal
 import threading
+import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -52,7 +53,9 @@ def as_finished(
 @contextmanager
 def local_processes(count: int) -> Iterator[None]:
     """Work of this block is shared among so many processes of this machine."""
-    with parallel_config(backend="loky", n_jobs=count):
+    with warnings.catch_warnings(), parallel_config(backend="loky", n_jobs=count):
+        # joblib replaces a process whose memory has grown, and says so; no work is lost
+        warnings.filterwarnings("ignore", message="A worker stopped while some jobs were given")
         yield
 
 

@@ -13,6 +13,7 @@ from expdesign.indices import OUTCOMES
 from expdesign.scenario.grow_table import GrowTable, build_grow
 from expdesign.scenario.tables import Entry, NonNegative, Positive, Table, Text, shown
 from expdesign.scenario.values import BudgetSettings, DesignSettings
+from expdesign.shortest_day import AccuracySettings
 from expdesign.vessel import Vessel
 
 MOST_SAMPLES = 500
@@ -32,6 +33,23 @@ class BudgetTable(Table):
 
 
 LONGEST_TOTAL_S = 1e6
+
+
+class AccuracyTable(Table):
+    """`[design.accuracy]`."""
+
+    as_: Literal["durations"] | None = Field(
+        default=None,
+        alias="as",
+        description="'durations': as accurate by the design criterion as the optimal durations are in total_s",
+    )
+    std: dict[str, Positive] = Field(
+        default={}, description="the largest standard deviation of parameters, in their units, e.g. {X_u = 0.01}"
+    )
+    relative_std: dict[str, Positive] = Field(
+        default={}, description="the largest standard deviation as a share of the nominal value, e.g. {X_u = 0.05}"
+    )
+    most_s: Positive | None = Field(default=None, description="the longest day allowed [s]; no limit when not given")
 
 
 class DesignTable(Table):
@@ -107,6 +125,11 @@ class DesignTable(Table):
     grow: GrowTable | None = Field(
         default=None, description="a table [design.grow]: search for manoeuvres to add to the dictionary"
     )
+    accuracy: AccuracyTable | None = Field(
+        default=None,
+        description="a table [design.accuracy]: plan the shortest day whose whole track, legs included, is this "
+        "accurate; total_s is then only the time that 'durations' means",
+    )
 
 
 def design_settings(table: DesignTable, vessel: Vessel, primitives: tuple[str, ...], entry: Entry) -> DesignSettings:
@@ -162,6 +185,26 @@ def design_settings(table: DesignTable, vessel: Vessel, primitives: tuple[str, .
         budgets=_budgets(table.budgets, primitives, entry.at("budgets")),
         balance=table.balance,
         grow=None if table.grow is None else build_grow(table.grow, entry.at("grow")),
+        accuracy=None if table.accuracy is None else _accuracy(table.accuracy, vessel, estimated, entry.at("accuracy")),
+    )
+
+
+def _accuracy(table: AccuracyTable, vessel: Vessel, estimated: tuple[str, ...], entry: Entry) -> AccuracySettings:
+    _check_keys(table.std, estimated, entry.at("std"))
+    _check_keys(table.relative_std, estimated, entry.at("relative_std"))
+    if not (table.as_ or table.std or table.relative_std):
+        raise entry.error("is empty, expected as = 'durations', std or relative_std")
+    nominal = dict(zip(vessel.model.names, vessel.model.parameters.tolist(), strict=True))
+    for name in table.relative_std:
+        if name in table.std:
+            raise entry.at("relative_std").error(f"names {name!r}, which std names too; expected it once")
+        if nominal[name] == 0:
+            raise entry.at("relative_std").error(f"names {name!r}, whose nominal value is 0; expected it in std")
+    return AccuracySettings(
+        as_durations=table.as_ is not None,
+        std=dict(table.std),
+        relative_std=dict(table.relative_std),
+        most_s=table.most_s,
     )
 
 

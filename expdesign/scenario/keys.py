@@ -39,7 +39,7 @@ def keys_of(model: type[Table], prefix: str = "") -> tuple[Key, ...]:
 
 
 def _keys(model: type[Table], prefix: str) -> Iterator[Key]:
-    for name, field in model.model_fields.items():
+    for name, field in model.fields().items():
         inner, listed = table_in(field.annotation)
         yield Key(
             name=f"{prefix}{name}",

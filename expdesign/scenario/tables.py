@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from expdesign.errors import FileError, nearest
@@ -38,6 +39,11 @@ class Table(BaseModel):
     topic: ClassVar[str] = ""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+
+    @classmethod
+    def fields(cls) -> Mapping[str, FieldInfo]:
+        """Keys as they stand in files, with their meanings."""
+        return {field.alias or name: field for name, field in cls.model_fields.items()}
 
 
 T = TypeVar("T", bound=Table)
@@ -230,7 +236,7 @@ def _model_at(model: type[Table], place: Iterable[str | int]) -> type[Table] | N
     found: type[Table] | None = model
     for step in place:
         if isinstance(step, str) and found is not None:
-            field = found.model_fields.get(step)
+            field = found.fields().get(step)
             found = _model_in(field.annotation) if field else None
     return found
 
@@ -243,7 +249,7 @@ def _model_in(annotation: Any) -> type[Table] | None:
 
 def _keys_at(model: type[Table], place: Iterable[str | int]) -> tuple[str, ...]:
     table = _model_at(model, place)
-    return tuple(table.model_fields) if table else ()
+    return tuple(table.fields()) if table else ()
 
 
 def _description(model: type[Table], place: tuple[str | int, ...]) -> str:
@@ -251,7 +257,7 @@ def _description(model: type[Table], place: tuple[str | int, ...]) -> str:
     names = [step for step in place if isinstance(step, str)]
     for depth in range(len(names), 0, -1):
         table = _model_at(model, names[: depth - 1])
-        field = table.model_fields.get(names[depth - 1]) if table else None
+        field = table.fields().get(names[depth - 1]) if table else None
         if field is not None:
             return field.description or ""
     return ""

@@ -10,6 +10,7 @@ from expdesign.dictionary.spec import PrimitiveSpec
 from expdesign.growing import GrowSettings
 from expdesign.plan.values import PlanSettings
 from expdesign.sea_area import SeaArea
+from expdesign.shortest_day import AccuracySettings
 from expdesign.simulation.environment import Environment
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
@@ -56,6 +57,7 @@ class DesignSettings:
         prior_data: files of earlier trials, whose information is added to the prior.
         least_s, most_s, required, excluded, budgets, balance: see `durations.Constraints`.
         grow: settings of the dictionary growth, or None for no growth.
+        accuracy: what the shortest day must reach, or None for the most information in total_s of runs.
     """
 
     total_s: float
@@ -80,6 +82,7 @@ class DesignSettings:
     budgets: tuple[BudgetSettings, ...] = ()
     balance: float = 0.0
     grow: GrowSettings | None = None
+    accuracy: AccuracySettings | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

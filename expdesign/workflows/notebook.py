@@ -15,9 +15,9 @@ from expdesign.information import PrimitiveInformation
 from expdesign.plan.values import Plan
 from expdesign.progress import Progress, silent, within
 from expdesign.scenario import Scenario, load_scenario
+from expdesign.workflows.steps.day import planned_day
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.grown import ready
-from expdesign.workflows.steps.planned import planned
 from expdesign.workflows.steps.trial_files import built_route, report_content
 
 FRAME_HEIGHT_PX = 700
@@ -88,7 +88,8 @@ def plan_for(scenario: Scenario | Path | str, *, seed: int = 0, progress: Progre
     case = scenario if isinstance(scenario, Scenario) else load_scenario(Path(scenario))
     information, growth = ready(case, seed=seed, progress=within(progress, 0.0, 0.1))
     design = designed(case, information, seed=seed, progress=within(progress, 0.1, 0.15))
-    plan = planned(case, information, design, seed=seed, progress=within(progress, 0.15, 1.0))
-    route = built_route(case, plan)
-    content = report_content(case, information, design, plan, seed)
-    return Trial(content=replace(content, compared=efficiencies(design), route=route, growth=growth), route=route)
+    day = planned_day(case, information, design, seed=seed, progress=within(progress, 0.15, 1.0))
+    route = built_route(case, day.plan)
+    content = report_content(case, information, day.design, day.plan, seed)
+    content = replace(content, compared=efficiencies(design), route=route, growth=growth, day=day.shortest)
+    return Trial(content=content, route=route)

@@ -12,6 +12,7 @@ from expdesign.export.routes import Route
 from expdesign.growing import Growth
 from expdesign.information.primitive_information import PrimitiveInformation
 from expdesign.plan.values import Plan
+from expdesign.shortest_day import ShortestDay
 from expdesign.simulation.environment import Environment
 from expdesign.values import Array, readonly, seal
 from expdesign.vessel import Vessel
@@ -39,6 +40,7 @@ class ReportContent:
         route: the waypoints as exported, or None when there are none.
         known: the state of a trial in progress, or None for a new trial.
         growth: additions to the dictionary, or None without a search.
+        day: how the day was found to be the shortest, or None where total_s decides.
     """
 
     scenario: str
@@ -59,6 +61,7 @@ class ReportContent:
     route: Route | None = None
     known: Known | None = None
     growth: Growth | None = None
+    day: ShortestDay | None = None
 
     def __post_init__(self) -> None:
         seal(self, start="3", goal="3")

@@ -76,6 +76,8 @@ def report_html(content: ReportContent) -> str:
         conditions=conditions(content),
         checks=checks(content),
         procedure=procedure_sentences(content.plan),
+        day_rows=[] if content.day is None else tables.day_rows(content.day),
+        day_sentences=[] if content.day is None else tables.day_sentences(content.day),
         growth=[] if content.growth is None else growth_rows(content.growth),
         grown=("", "") if content.growth is None else growth_sentences(content.growth),
         glossary=GLOSSARY,
@@ -158,6 +160,11 @@ def lattice_sentences(proof: LatticeProof | None) -> list[str]:
 
 def _design_sentence(content: ReportContent) -> str:
     design, realised = content.design, content.plan.design_efficiency_realised
+    if content.day is not None:
+        return (
+            f"It is the shortest day found that is as accurate as asked for: its track holds "
+            f"{words.percent(content.day.information)} of the information needed."
+        )
     text = (
         f"The durations are optimal for the estimation of {words.counted(len(content.parameters), 'model parameter')}. "
         f"Rounded to whole runs they reach {words.percent(design.efficiency_repeats)} of the certified optimum; equal "
@@ -198,7 +205,8 @@ def facts(content: ReportContent) -> list[Fact]:
         Fact(
             name="Optimality gap",
             value=criteria.short_of_optimum(content),
-            remark=f"certified bound; whole runs reach {words.percent(design.efficiency_repeats)}",
+            remark="certified bound"
+            + (f"; whole runs reach {words.percent(design.efficiency_repeats)}" if content.day is None else ""),
         ),
         Fact(
             name="Information realised",

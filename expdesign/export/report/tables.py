@@ -11,6 +11,7 @@ from expdesign.export import words
 from expdesign.export.report.content import ReportContent, primitive_runs
 from expdesign.information.primitive_information import PrimitiveInformation
 from expdesign.plan.values import Leg, Plan
+from expdesign.shortest_day import ShortestDay
 
 REST_MPS, REST_RADPS = 0.02, 0.0005
 
@@ -169,3 +170,31 @@ def excitation_sentence(content: ReportContent) -> str:
         "value, also with instrumental variables. Output error avoids this bias if sensor noise is the only "
         "disturbance."
     )
+
+
+def day_rows(day: ShortestDay) -> list[tuple[str, ...]]:
+    """The days planned in search of the shortest, in order."""
+    return [
+        (
+            str(number),
+            words.duration(item.day_s),
+            words.duration(item.informative_s),
+            words.percent(item.information),
+            ", ".join(f"{count} {name}" for name, count in item.runs.items()) or "none",
+        )
+        for number, item in enumerate(day.tried, start=1)
+    ]
+
+
+def day_sentences(day: ShortestDay) -> list[str]:
+    """Where the minutes go, and how far the choice of runs is proven."""
+    plan = day.plan
+    runs, legs = (words.duration(plan.seconds(kind)) for kind in ("primitive", "reposition"))
+    return [
+        f"The day takes {words.duration(plan.commands.duration_s)}: {runs} in runs and {legs} in legs, which "
+        "tell, too. Its whole track holds "
+        f"{words.percent(day.information)} of the information that the accuracy asked for needs.",
+        f"It is the shortest that is so accurate, of {words.counted(len(day.tried), 'day')} planned. The runs tried "
+        f"last cost {words.duration(day.cost_s)} with their share of the repositioning; at these prices no "
+        f"choice of runs from the dictionary costs less than {words.duration(day.cost_bound_s)}.",
+    ]

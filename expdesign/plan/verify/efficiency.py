@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from expdesign.durations import Collected, DurationDesign, bordered_moments
+from expdesign.durations import Collected, DurationDesign, DurationProblem, bordered_moments
 from expdesign.information import moments, regressor_rows
 from expdesign.plan.values import SailedTrial
 from expdesign.simulation import Environment, delivered
@@ -31,18 +31,26 @@ def realised_efficiencies(
     problem = replace(design.problem, robust="nominal", sampled=np.zeros((0, 0, 0, 0)))
     if not set(problem.parameters) <= set(vessel.model.names) or not problem.symmetric:
         return None, None
-    commands, legs = sailed.commands, sailed.legs
-    rows = regressor_rows(vessel.model, sailed.trajectory, delivered(vessel, commands), environment)
-    collected, sample_s = Collected.of(problem), commands.sample_time_s
+    collected, share = Collected.of(problem), sailed.commands.sample_time_s / problem.total_s
+    runs, whole = track_information(vessel, problem, environment, sailed)
+    placed, realised = (collected.efficiency_of(share * matrix, design.fractions) for matrix in (runs, whole))
+    return placed, realised
 
-    def efficiency(batches: list[Array]) -> float:
-        subtraction = problem.mean_subtraction
-        matrices = [len(batch) * _bordered(vessel, batch, problem.parameters, subtraction) for batch in batches]
-        return collected.efficiency_of(sample_s / problem.total_s * np.sum(matrices, axis=0), design.fractions)
 
-    runs = [rows[leg.first : leg.last] for leg in legs if leg.kind == "primitive"]
-    everything = [rows[leg.first : leg.last] for leg in legs] if problem.mean_subtraction == "batch" else [rows]
-    return efficiency(runs), efficiency(everything)
+def track_information(
+    vessel: Vessel, problem: DurationProblem, environment: Environment, sailed: SailedTrial
+) -> tuple[Array, Array]:
+    """(d, d) information of a trial's runs, and of its whole track: sums over samples, bordered as B_q."""
+    rows = regressor_rows(vessel.model, sailed.trajectory, delivered(vessel, sailed.commands), environment)
+    subtraction = problem.mean_subtraction
+
+    def total(batches: list[Array]) -> Array:
+        none = np.zeros((problem.dimension, problem.dimension))
+        return sum((len(batch) * _bordered(vessel, batch, problem.parameters, subtraction) for batch in batches), none)
+
+    runs = [rows[leg.first : leg.last] for leg in sailed.legs if leg.kind == "primitive"]
+    everything = [rows[leg.first : leg.last] for leg in sailed.legs] if subtraction == "batch" else [rows]
+    return total(runs), total(everything)
 
 
 def _bordered(vessel: Vessel, rows: Array, parameters: Sequence[str], mean_subtraction: str) -> Array:

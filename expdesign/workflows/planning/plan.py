@@ -10,6 +10,7 @@ from expdesign.progress import Progress, silent, within
 from expdesign.scenario import Scenario, load_repeats
 from expdesign.workflows.outcome import Outcome
 from expdesign.workflows.steps.case import loaded, written
+from expdesign.workflows.steps.day import Day, day_files, day_summary, day_tables, planned_day
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.grown import ready
 from expdesign.workflows.steps.planned import check_plannable, plan_files, plan_summary, planned
@@ -48,7 +49,11 @@ def plan(
 def _plan(case: Scenario, out: Path | None, durations: Path | None, seed: int, progress: Progress) -> Outcome:
     information, _ = ready(case, seed=seed, progress=within(progress, 0.02, 0.1))
     design = designed(case, information, seed=seed)
+    planning = within(progress, 0.1, 0.95)
     if durations is not None:
         design = with_repeats(design, load_repeats(durations, names=design.problem.names))
-    result = planned(case, information, design, seed=seed, progress=within(progress, 0.1, 0.95))
-    return written(case, out, plan_files(case, result), plan_summary(result), progress)
+        day = Day(design=design, plan=planned(case, information, design, seed=seed, progress=planning))
+    else:
+        day = planned_day(case, information, design, seed=seed, progress=planning)
+    files = {**plan_files(case, day.plan), **day_files(day)}
+    return written(case, out, files, {**plan_summary(day.plan), **day_summary(day)}, progress, day_tables(day))

@@ -11,10 +11,11 @@ from expdesign.progress import Progress, silent, within
 from expdesign.scenario import Scenario
 from expdesign.workflows.outcome import Outcome
 from expdesign.workflows.steps.case import loaded, written
+from expdesign.workflows.steps.day import day_files, day_summary, day_tables, planned_day
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.design_tables import design_summary
 from expdesign.workflows.steps.grown import growth_summary, ready
-from expdesign.workflows.steps.planned import check_plannable, plan_summary, planned
+from expdesign.workflows.steps.planned import check_plannable, plan_summary
 from expdesign.workflows.steps.trial_files import built_route, report_content, trial_files
 from expdesign.workflows.steps.workers import workers
 
@@ -51,11 +52,17 @@ def _run(case: Scenario, out: Path | None, seed: int, progress: Progress) -> Out
     design = designed(case, information, seed=seed, progress=within(progress, 0.03, 0.08))
     progress("comparing criteria", 0.08)
     compared = recalled(efficiencies, design)
-    plan = planned(case, information, design, seed=seed, progress=within(progress, 0.1, 0.78))
+    day = planned_day(case, information, design, seed=seed, progress=within(progress, 0.1, 0.78))
     writing = within(progress, 0.78, 1.0)
     writing("writing routes, run cards and report", 0.0)
-    route = built_route(case, plan)
-    content = replace(report_content(case, information, design, plan, seed), compared=compared, route=route)
-    files = trial_files(case, growth, content, route, progress=writing)
-    summary = {**growth_summary(growth, case), **design_summary(design), **plan_summary(plan)}
-    return written(case, out, files, summary, progress)
+    route = built_route(case, day.plan)
+    content = report_content(case, information, day.design, day.plan, seed)
+    content = replace(content, compared=compared, route=route, day=day.shortest)
+    files = {**trial_files(case, growth, content, route, progress=writing), **day_files(day)}
+    summary = {
+        **growth_summary(growth, case),
+        **design_summary(day.design),
+        **plan_summary(day.plan),
+        **day_summary(day),
+    }
+    return written(case, out, files, summary, progress, day_tables(day))

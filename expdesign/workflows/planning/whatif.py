@@ -24,9 +24,10 @@ from expdesign.rehearsal import trial_parts
 from expdesign.scenario import Scenario, load_scenario, load_variant
 from expdesign.workflows.command_text import command_text
 from expdesign.workflows.outcome import Outcome, TextTable
+from expdesign.workflows.steps.day import planned_day
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.grown import ready
-from expdesign.workflows.steps.planned import plan_summary, planned
+from expdesign.workflows.steps.planned import plan_summary
 from expdesign.workflows.steps.workers import workers
 
 WHOLE_RUNS = "repeats"
@@ -111,8 +112,10 @@ def _computed(case: Scenario, changes: tuple[str, ...], with_plan: bool, seed: i
     try:
         information, _ = ready(case, seed=seed)
         design = designed(case, information, seed=seed)
-        plan = dict(plan_summary(planned(case, information, design, seed=seed))) if with_plan else {}
-        if plan:
+        plan: dict[str, object] = {}
+        if with_plan:
+            day = planned_day(case, information, design, seed=seed)
+            design, plan = day.design, dict(plan_summary(day.plan))
             plan["trial_s"] = float(str(plan["informative_s"])) + float(str(plan["repositioning_s"]))
         return _described(case, changes, information, design, plan)
     except NoAnswer as error:

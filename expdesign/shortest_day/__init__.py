@@ -1,0 +1,33 @@
+"""The shortest day: runs, their places and the legs between them that together tell enough, in the least time."""
+
+from typing import TYPE_CHECKING
+
+from expdesign.lazy import load_on_use
+
+if TYPE_CHECKING:
+    from expdesign.shortest_day.accuracy import Accuracy, stated_accuracy
+    from expdesign.shortest_day.alternate import shortest_day
+    from expdesign.shortest_day.cheapest import Choice, cheapest_runs
+    from expdesign.shortest_day.values import AccuracySettings, DayTried, ShortestDay
+
+__all__ = [
+    "Accuracy",
+    "AccuracySettings",
+    "Choice",
+    "DayTried",
+    "ShortestDay",
+    "cheapest_runs",
+    "shortest_day",
+    "stated_accuracy",
+]
+
+if not TYPE_CHECKING:
+    __getattr__ = load_on_use(
+        __name__,
+        {
+            "accuracy": ("Accuracy", "stated_accuracy"),
+            "alternate": ("shortest_day",),
+            "cheapest": ("Choice", "cheapest_runs"),
+            "values": ("AccuracySettings", "DayTried", "ShortestDay"),
+        },
+    )

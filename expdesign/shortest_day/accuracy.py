@@ -1,0 +1,153 @@
+"""How far the information of a day is from the accuracy asked for.
+
+The margin f(M) of an information matrix M is the logarithm of the share of time that could be saved, or is missing, at
+M's rate: f(a M) = f(M) + log a, and the accuracy is reached where f(M) >= 0. It is concave in M, being the least of
+
+    log of the efficiency by the design's criterion against the optimal durations
+    log(s_i^2 / (sigma_i^2 (M^-1)_ii)) for parameters with a largest standard deviation s_i
+
+Source: F. Pukelsheim, Optimal Design of Experiments (2006), 5.4 for concavity of 1 / (M^-1)_ii; combined here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from expdesign.durations import Collected, DurationDesign
+from expdesign.durations.criteria.models import congruent
+from expdesign.errors import InputError
+from expdesign.information.prior import equation_noise
+from expdesign.shortest_day.values import AccuracySettings
+from expdesign.values import Array, seal
+from expdesign.vessel import Vessel
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Accuracy:
+    """An accuracy to be reached; information matrices (d, d) are sums over samples.
+
+    Attributes:
+        collected: the criterion, of information per sample of `samples`; None where it is not asked for.
+        level: value of the criterion to be reached.
+        samples: of the time that the level is reached in.
+        prior: (d, d) information known before.
+        variance: (p,) largest variance of each parameter in units of its equation's noise variance; inf without limit.
+        parameters: names.
+    """
+
+    collected: Collected | None
+    level: float
+    samples: float
+    prior: Array
+    variance: Array
+    parameters: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        seal(self, prior="d d", variance="p")
+
+    def margin(self, information: Array) -> float:
+        """f of information (d, d) besides the prior; -inf where it is singular."""
+        return min(self._criterion_margin(information), float(self._margins(information).min()))
+
+    def supergradient(self, information: Array) -> Array:
+        """(d, d) G with f(N) <= f(M) + <G, N - M> for every N, at a regular M."""
+        if self._criterion_margin(information) <= self._margins(information).min():
+            assert self.collected is not None
+            piece, degree = self.collected.pieces[0], self.collected.degree
+            G = piece.measure.gradient(self._whitened(information))
+            T = piece.transformation
+            return np.asarray(T.T @ G @ T) / (self.samples * degree)
+        index = int(np.argmin(self._margins(information)))
+        column = self._inverse(information)[:, index]
+        return np.asarray(np.outer(column, column) / column[index])
+
+    def scarcest(self, information: Array) -> str:
+        """The parameter whose standard deviation is furthest from its limit; "" where the criterion is."""
+        margins = self._margins(information)
+        if self._criterion_margin(information) <= margins.min():
+            return ""
+        return self.parameters[int(np.argmin(margins))]
+
+    def _criterion_margin(self, information: Array) -> float:
+        if self.collected is None:
+            return np.inf
+        value = float(self.collected.values((self._whitened(information)[None],))[0])
+        return (value - self.level) / self.collected.degree
+
+    def _whitened(self, information: Array) -> Array:
+        assert self.collected is not None
+        piece = self.collected.pieces[0]
+        return np.asarray(piece.prior + congruent(piece.transformation, information / self.samples))
+
+    def _margins(self, information: Array) -> Array:
+        """(p,) of the standard deviations; inf without limit."""
+        limited = np.isfinite(self.variance)
+        margins = np.full(len(self.variance), np.inf)
+        if limited.any():
+            found = np.diag(self._inverse(information))[: len(limited)][limited]
+            with np.errstate(divide="ignore", invalid="ignore"):
+                margins[limited] = np.where(found > 0, np.log(self.variance[limited] / found), -np.inf)
+        return margins
+
+    def _inverse(self, information: Array) -> Array:
+        """(d, d), computed with a unit diagonal; zeros where it is singular."""
+        total = self.prior + information
+        scale = np.sqrt(np.maximum(np.diag(total), 0.0))
+        if not (scale > 0).all():
+            return np.zeros_like(total)
+        try:
+            root = np.linalg.inv(np.linalg.cholesky(total / np.outer(scale, scale)))
+        except np.linalg.LinAlgError:
+            return np.zeros_like(total)
+        return np.asarray(root.T @ root / np.outer(scale, scale))
+
+
+def stated_accuracy(settings: AccuracySettings, design: DurationDesign, vessel: Vessel) -> Accuracy:
+    """The accuracy that settings ask for.
+
+    Args:
+        settings: of the scenario.
+        design: the optimal durations in `total_s`.
+        vessel: gives nominal values and the noise of sensors.
+
+    Raises:
+        InputError: settings of the design under which the information of a track cannot be added up, or a standard
+            deviation of a parameter without stated noise.
+    """
+    problem = design.problem
+    _check_adds_up(design)
+    nominal = dict(zip(vessel.model.names, np.abs(vessel.model.parameters).tolist(), strict=True))
+    asked = {**settings.std, **{name: share * nominal[name] for name, share in settings.relative_std.items()}}
+    noise = dict(zip(asked, equation_noise(vessel, list(asked)).tolist(), strict=True))
+    if silent := [name for name in asked if not noise[name] > 0]:
+        raise InputError(
+            f"design.accuracy asks for the standard deviation of {silent[0]}, which needs the noise of its sensor: "
+            "expected [sensors] in the vessel file to state it"
+        )
+    samples = problem.total_s / vessel.sample_time_s
+    collected = Collected.of(problem) if settings.as_durations else None
+    return Accuracy(
+        collected=collected,
+        level=collected.value(design.fractions) if collected else -np.inf,
+        samples=samples,
+        prior=problem.prior * samples,
+        variance=np.array([(asked[n] / noise[n]) ** 2 if n in asked else np.inf for n in problem.parameters]),
+        parameters=problem.parameters,
+    )
+
+
+def _check_adds_up(design: DurationDesign) -> None:
+    problem = design.problem
+    for is_set, key, value in (
+        (problem.robust != "nominal", "robust", repr(problem.robust)),
+        (bool(problem.nuisance), "predictor", "not 'model'"),
+        (not problem.symmetric, "the dictionary", "with recorded primitives"),
+        (bool(problem.constraints.budgets), "budgets", "set"),
+        (bool(problem.constraints.balance), "balance", f"{problem.constraints.balance:g}"),
+    ):
+        if is_set:
+            raise InputError(
+                f"design.accuracy: design.{key} is {value}, which the shortest day does not count; expected it without"
+            )

@@ -1,0 +1,63 @@
+"""What is asked of a day, and the day found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from expdesign.durations import DurationDesign
+from expdesign.plan.values import Plan
+
+
+@dataclass(frozen=True, kw_only=True)
+class AccuracySettings:
+    """The accuracy asked for.
+
+    Attributes:
+        as_durations: by the design's criterion, as accurate as the optimal durations are in `total_s`.
+        std: largest standard deviation of parameters, in their units.
+        relative_std: the same, as a share of the nominal value.
+        most_s: longest day [s], or None for no limit.
+    """
+
+    as_durations: bool = False
+    std: Mapping[str, float] = field(default_factory=dict)
+    relative_std: Mapping[str, float] = field(default_factory=dict)
+    most_s: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class DayTried:
+    """A day that was planned in search of the shortest.
+
+    Attributes:
+        runs: how often each primitive is run.
+        day_s, informative_s: all of it, and its runs [s].
+        information: of the whole track as a share of what is needed: time would have to be 1 / information as long.
+    """
+
+    runs: Mapping[str, int]
+    day_s: float
+    informative_s: float
+    information: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ShortestDay:
+    """The shortest day found.
+
+    Attributes:
+        plan: the day.
+        design: its runs; fractions and certificate are those of the accuracy's reference.
+        tried: days planned, in order.
+        cost_s, cost_bound_s: cost of the runs chosen last, at the prices of the day planned before, and what no choice
+            of the same dictionary costs less than at these prices and with this information of legs [s].
+        information: of the plan's track, as a share of what is needed.
+    """
+
+    plan: Plan
+    design: DurationDesign
+    tried: tuple[DayTried, ...]
+    cost_s: float
+    cost_bound_s: float
+    information: float

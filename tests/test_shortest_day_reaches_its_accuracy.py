@@ -1,0 +1,75 @@
+"""The shortest day reaches the accuracy asked for, by information recomputed from its files, and is the least tried."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from expdesign import workflows
+from expdesign.information import regressor_rows
+from expdesign.scenario import load_scenario
+from expdesign.signals import Commands, Trajectory
+from expdesign.simulation import delivered
+from outside_check import columns
+from short_examples import copied
+
+ASKED = "total_s = 250.0\naccuracy = {as = 'durations'}"
+
+
+@pytest.fixture(scope="module")
+def day(made_once):
+    """Folder of the day, and its scenario file."""
+
+    def run(folder):
+        scenario = copied(folder.with_name("day-scenario"), "story", {"total_s = 720.0": ASKED})
+        workflows.run(scenario, folder, seed=1)
+        return str(scenario)
+
+    return made_once("shortest-day", run)
+
+
+def centred_log_det(rows, model, parameters):
+    """Sum over equations of log det of the centred rows' products."""
+    equation = {term.name: term.equation for term in model.terms}
+    total = 0.0
+    for output in model.outputs:
+        chosen = [index for index, name in enumerate(parameters) if equation[name] == output]
+        part = rows[:, chosen] - rows[:, chosen].mean(axis=0)
+        total += np.linalg.slogdet(part.T @ part)[1]
+    return total
+
+
+def test_the_track_holds_what_was_asked_for(day):
+    folder, scenario = day
+    case = load_scenario(Path(scenario))
+    durations, found = (
+        json.loads((folder / name).read_text(encoding="utf-8")) for name in ("durations.json", "day.json")
+    )
+    track, given = (columns(folder / name) for name in ("track.csv", "commands.csv"))
+    model, parameters = case.vessel.model, durations["parameters"]
+    commands = Commands(
+        sample_time_s=case.vessel.sample_time_s,
+        names=model.inputs,
+        values=np.stack(list(given.values())[1:-1], axis=1),
+    )
+    motion = Trajectory(
+        sample_time_s=case.vessel.sample_time_s,
+        pose=np.stack([track[name] for name in ("north_m", "east_m", "heading_rad")], axis=1),
+        velocity=np.stack([track[name] for name in ("u_mps", "v_mps", "r_radps")], axis=1),
+    )
+    rows = regressor_rows(model, motion, delivered(case.vessel, commands), case.environment)
+    rows = rows[:, [model.names.index(name) for name in parameters]]
+    asked = durations["log_det"] + len(parameters) * np.log(durations["total_s"] / case.vessel.sample_time_s)
+    share = np.exp((centred_log_det(rows, model, parameters) - asked) / len(parameters))
+    assert share == pytest.approx(found["information"], rel=1e-3)
+    assert share >= 1.0
+
+
+def test_the_day_is_the_shortest_that_was_tried_and_reached_it(day):
+    folder, _ = day
+    found = json.loads((folder / "day.json").read_text(encoding="utf-8"))
+    plan = json.loads((folder / "plan.json").read_text(encoding="utf-8"))
+    assert found["day_s"] == min(item["day_s"] for item in found["tried"] if item["information"] >= 1.0)
+    assert plan["verified"]
+    assert len(found["tried"]) > 1

@@ -1,0 +1,130 @@
+"""The runs chosen for the shortest day are the cheapest that reach the accuracy, and the bound is one."""
+
+import itertools
+
+import numpy as np
+import pytest
+import scipy.optimize
+
+from expdesign.durations import Collected, DurationProblem, optimal_shares
+from expdesign.errors import NoAnswer
+from expdesign.shortest_day import Accuracy, cheapest_runs
+
+PARAMETERS = ("X_u", "Y_v", "N_r")
+SAMPLES = 100.0
+
+
+def random_information(rng, count, dimension=3, rows=5):
+    """(q, d, d) of runs with a few random regressor rows each."""
+    rows_of = rng.normal(size=(count, rows, dimension)) * rng.uniform(0.3, 2.0, (count, 1, dimension))
+    return np.einsum("qki,qkj->qij", rows_of, rows_of)
+
+
+def criterion_accuracy(matrices, prior=None):
+    """As accurate as the D-optimal shares of the matrices in the time of `SAMPLES`."""
+    problem = DurationProblem(
+        names=tuple(f"run{k}" for k in range(len(matrices))),
+        parameters=PARAMETERS,
+        mean_subtraction="none",
+        matrices=matrices,
+        run_s=np.ones(len(matrices)),
+        total_s=SAMPLES,
+    )
+    design, collected = optimal_shares(problem), Collected.of(problem)
+    return design, Accuracy(
+        collected=collected,
+        level=collected.value(design.fractions),
+        samples=SAMPLES,
+        prior=np.zeros((3, 3)) if prior is None else prior,
+        variance=np.full(3, np.inf),
+        parameters=PARAMETERS,
+    )
+
+
+def std_accuracy(variance):
+    return Accuracy(
+        collected=None, level=-np.inf, samples=1.0, prior=np.zeros((3, 3)), variance=variance, parameters=PARAMETERS
+    )
+
+
+def accuracies(matrices):
+    return (
+        criterion_accuracy(matrices)[1],
+        std_accuracy(np.array([0.02, np.inf, 0.05])),
+        std_accuracy(np.array([0.02, 0.03, 0.05])),
+    )
+
+
+def test_the_optimal_shares_just_reach_their_own_accuracy():
+    matrices = random_information(np.random.default_rng(0), 5)
+    design, accuracy = criterion_accuracy(matrices)
+    collected = SAMPLES * np.tensordot(design.fractions, matrices, axes=1)
+    assert accuracy.margin(collected) == pytest.approx(0.0, abs=1e-9)
+    assert accuracy.margin(collected / 2) == pytest.approx(-np.log(2.0))
+
+
+@pytest.mark.parametrize("kind", range(3))
+def test_more_time_saves_its_share_and_every_supergradient_bounds_every_margin(kind):
+    rng = np.random.default_rng(kind)
+    matrices = random_information(rng, 5)
+    accuracy = accuracies(matrices)[kind]
+    for _ in range(50):
+        here, there = np.tensordot(rng.uniform(0.1, 30.0, (2, 5)), matrices, axes=1)
+        factor = rng.uniform(0.2, 5.0)
+        assert accuracy.margin(factor * here) == pytest.approx(accuracy.margin(here) + np.log(factor))
+        bound = accuracy.margin(here) + np.sum(accuracy.supergradient(here) * (there - here))
+        assert accuracy.margin(there) <= bound + 1e-9
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("kind", range(3))
+def test_runs_cost_what_the_best_of_all_costs_and_no_less_than_the_bound(kind, seed):
+    rng = np.random.default_rng(10 * seed + kind)
+    matrices = 12.0 * random_information(rng, 4)
+    accuracy, cost_s = accuracies(matrices / 12.0)[kind], rng.uniform(10.0, 60.0, 4)
+    known, most = 0.5 * random_information(rng, 1)[0], np.full(4, 9.0)
+    found = cheapest_runs(accuracy, matrices, cost_s, known=known, fewest=np.zeros(4), most=most)
+    reached = [
+        float(np.dot(runs, cost_s))
+        for runs in itertools.product(range(10), repeat=4)
+        if accuracy.margin(known + np.tensordot(np.array(runs, dtype=float), matrices, axes=1)) >= 0
+    ]
+    assert accuracy.margin(known + np.tensordot(np.array(found.repeats), matrices, axes=1)) >= -1e-9
+    assert min(reached) <= found.cost_s <= 1.002 * min(reached)
+    assert found.bound_s <= min(reached) + 1e-9
+
+
+@pytest.mark.parametrize("kind", range(3))
+def test_the_bound_is_the_cost_of_the_best_shares_of_runs(kind):
+    rng = np.random.default_rng(100 + kind)
+    matrices = random_information(rng, 4)
+    accuracy, cost_s = accuracies(matrices)[kind], rng.uniform(10.0, 60.0, 4)
+    known, most = 0.5 * random_information(rng, 1)[0], np.full(4, 200.0)
+    found = cheapest_runs(accuracy, matrices, cost_s, known=known, fewest=np.zeros(4), most=most)
+    best = min(
+        scipy.optimize.minimize(
+            lambda runs: runs @ cost_s,
+            start,
+            jac=lambda runs: cost_s,
+            bounds=[(0.0, 200.0)] * 4,
+            constraints={
+                "type": "ineq",
+                "fun": lambda runs: accuracy.margin(known + np.tensordot(runs, matrices, axes=1)),
+            },
+        ).fun
+        for start in (np.full(4, 50.0), np.full(4, 20.0))
+    )
+    assert 0.995 * best < found.bound_s <= best * (1 + 1e-6)
+
+
+def test_what_the_limits_do_not_allow_is_refused_with_the_parameter():
+    blind = np.array([np.diag([1.0, 1.0, 1e-9])])
+    with pytest.raises(NoAnswer, match="standard deviation of N_r"):
+        cheapest_runs(
+            std_accuracy(np.array([np.inf, np.inf, 0.05])),
+            blind,
+            np.ones(1),
+            known=np.zeros((3, 3)),
+            fewest=np.zeros(1),
+            most=np.full(1, 9.0),
+        )
