@@ -47,7 +47,7 @@ def test_every_key_that_a_model_reads_is_explained() -> None:
         model.__name__ for model in models
     }
     for model in models:
-        for name, field in model.model_fields.items():
+        for name, field in model.fields().items():
             assert field.description, f"{model.__name__}.{name}"
             assert (name, field.description) in explained, f"{model.__name__}.{name}"
 
