@@ -218,6 +218,20 @@ def test_instruments_find_wind_forces_from_a_noisy_vane():
         assert error < 4 if told else error > 8
 
 
+@pytest.mark.parametrize("method", ["ls-air", "iv-air"])
+def test_a_stated_wind_stands_for_one_that_is_not_measured(method: str):
+    vessel = replace(ship(), environment=WIND)
+    batch = replace(sailed(vessel, weather=WIND, integrator="euler"), wind=None)
+    assert any("No wind is measured" in note for note in reduced(Record(batches=(batch,)), vessel).notes)
+    assert largest_error(batch, vessel, method, Settings()) < 1e-6
+
+
+def test_a_stated_current_is_said_not_to_be_taken_off():
+    vessel = replace(TRUE, environment=Environment(current_to=np.array([0.2, 0.0])))
+    (note,) = reduced(Record(batches=(sailed(TRUE),)), vessel).notes
+    assert "is not taken off" in note
+
+
 NOISE = {"velocity_mps": 0.03, "yaw_rate_radps": 0.002}
 
 

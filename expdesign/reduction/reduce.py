@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from expdesign.errors import InputError
 from expdesign.reduction.remarks import remarks
-from expdesign.reduction.sensors import Told, shrinkage, undone
+from expdesign.reduction.sensors import Told, measured, shrinkage, turned, undone
 from expdesign.reduction.tuning import TUNING
 from expdesign.signals import Batch, Record
 from expdesign.simulation import deliver
@@ -28,13 +28,45 @@ def reduced(record: Record, vessel: Vessel, *, smoothed: bool = False) -> Record
         smoothed: whether velocities from the pose are smoothed, rather than central differences.
 
     Returns:
-        The record itself where actuators are ideal and sensors exact but for their noise. Otherwise batches that lack
-        the samples which a delayed sensor has not yet shown, with a note for everything that was undone.
+        The record itself where actuators are ideal, sensors exact but for their noise, and no weather is stated.
+        Otherwise batches that lack the samples which a delayed sensor has not yet shown, with a note for everything
+        that was undone. Where no wind is measured, and the model reads it, it is the mean wind that is stated.
 
     Raises:
         InputError: no batch is left.
     """
-    return at_reference_point(with_delivered_inputs(record, vessel.model), vessel.sensors, smoothed=smoothed)
+    delivered = with_delivered_inputs(record, vessel.model)
+    return _in_stated_weather(at_reference_point(delivered, vessel.sensors, smoothed=smoothed), vessel)
+
+
+def _in_stated_weather(record: Record, vessel: Vessel) -> Record:
+    """The record with the stated mean wind where none is measured, and a note on a stated current.
+
+    Headings turn the wind; their noise shrinks it, see `records.central_difference`.
+    """
+    notes, weather = list(record.notes), vessel.environment
+    if weather.current_to.any():
+        notes.append(
+            "The current that the vessel file states is not taken off velocities over ground; augmented methods "
+            "estimate the current of the data."
+        )
+    reads_air = any({"u_q", "v_q"} & set(expression.signals) for expression in vessel.model.expressions)
+    unmeasured = all(b.wind is None and b.pose is not None and measured(b.pose[:, 2]) for b in record.batches)
+    if not (weather.wind_to.any() and reads_air and unmeasured):
+        return record if len(notes) == len(record.notes) else replace(record, notes=tuple(notes))
+    north, east = weather.wind_to.tolist()
+    notes.append(
+        f"No wind is measured; as the vessel file states, it blows at {north:.3g} m/s to north, {east:.3g} m/s to east."
+    )
+    shrunk = float(np.exp(-(vessel.sensors.heading_rad**2) / 2.0))
+    batches = tuple(_blown(batch, weather.wind_to / shrunk) for batch in record.batches)
+    return replace(record, batches=batches, notes=tuple(notes))
+
+
+def _blown(batch: Batch, wind_to: Array) -> Batch:
+    assert batch.pose is not None  # as its heading is measured
+    wind = turned(np.broadcast_to(wind_to, (len(batch), 2)), -batch.pose[:, 2])
+    return replace(batch, wind=batch.velocity[:, :2] - wind)
 
 
 def with_delivered_inputs(record: Record, model: VesselModel, *, standing: Array | None = None) -> Record:
