@@ -22,6 +22,7 @@ from expdesign.diagnosis.select.selection import Selection, Step, least_signific
 from expdesign.diagnosis.select.selection_round import _starting_points, selection_round
 from expdesign.diagnosis.select.starting_point import starting_point
 from expdesign.diagnosis.select.tuning import TUNING
+from expdesign.diagnosis.select.work import Work
 from expdesign.diagnosis.vessel_file.reading import extended_model
 
 DEVIATION = np.ones((6, 3))
@@ -52,27 +53,32 @@ def kept_count(*fits: np.ndarray | float) -> int:
 
 def test_a_first_cause_that_may_cost_half_a_point_is_dropped():
     """If all runs have the same fit, the interval has no width; runs that differ widen it."""
+    gain = 1.2
     assert kept_count(50.0, 50.0 - 0.9 * TUNING.most_loss_points) == 0  # certain to cost something
-    assert kept_count(50.0, 50.0) == 1  # significant in its test, without any gain
     runs = np.array([[-1.0], [-1.0], [-1.0], [1.0], [1.0], [1.0]])
-    assert kept_count(50.0, 50.0 + 0.2 * TUNING.most_loss_points * runs) == 1  # may cost, but never half a point
-    assert (
-        kept_count(50.0, 50.0 - 0.1 * TUNING.most_loss_points + 4.0 * TUNING.most_loss_points * runs) == 0
-    )  # no better on average
-    apart = (
-        50.0 + TUNING.most_loss_points + 4.0 * TUNING.most_loss_points * runs
-    )  # may cost more, but is better on average
+    assert kept_count(50.0, 50.0 + gain + 0.2 * TUNING.most_loss_points * runs) == 1
+    assert kept_count(50.0, 50.0 - 0.1 * TUNING.most_loss_points + 4.0 * gain * runs) == 0  # no better on average
+    apart = 50.0 + gain + 4.0 * gain * runs  # may cost more, but is better on average
     assert kept_count(50.0, apart * np.ones(3)) == 1
-    assert (
-        kept_count(50.0, apart + TUNING.most_loss_points * np.array([1.0, 1.0, -2.0])) == 0
-    )  # and worse in one output
+    assert kept_count(50.0, apart + gain * np.array([1.0, 1.0, -2.0])) == 0  # and worse in one output
+
+
+def test_what_takes_less_than_a_hundredth_off_every_error_is_no_finding():
+    """Errors are what is missing of a fit of 100 points; significant or not, first or later."""
+    for before in (50.0, 90.0):
+        little = TUNING.least_reduction * (100.0 - before)
+        assert kept_count(before, before) == 0
+        assert kept_count(before, before + 0.9 * little) == 0
+        assert kept_count(before, before + 1.1 * little) == 1
+        assert kept_count(before, before + 1.1 * little * np.array([[1.0, 0.0, 0.0]]) * np.ones((6, 1))) == 1
+    assert kept_count(50.0, 60.0, 60.3) == 1
 
 
 def test_later_causes_need_a_clear_or_a_significant_gain():
     assert kept_count(50.0, 60.0, 60.05, 70.0) == 1  # no cause after one that gains too little
-    assert kept_count(50.0, 60.0, 60.2) == 2
+    assert kept_count(50.0, 60.0, 60.5) == 2
     runs = np.array([[-1.0], [-1.0], [-1.0], [1.0], [1.0], [1.0]])
-    assert kept_count(50.0, 60.0, 60.2 + 3.0 * runs) == 1  # a small gain that may be zero
+    assert kept_count(50.0, 60.0, 60.6 + 3.0 * runs) == 1  # a small gain that may be zero
     assert kept_count(50.0, 60.0, 62.0 + 6.0 * runs) == 2  # a clear gain
 
 
@@ -183,12 +189,14 @@ def test_a_block_of_parameters_is_replaced_by_the_one_effect_behind_it(monkeypat
     rounds = iter((block, change))
     real = select_forward.__globals__["selection_round"]
 
-    def scripted(base, windows, rejected, rng, progress, *, most=99):
+    def scripted(base, windows, rejected, rng, progress, work, *, most=99):
         if most < 99:
             return None, ()
         candidate = next(rounds, None)
         return (
-            real(base, windows, rejected, rng, progress) if candidate is None else (added(base, windows, candidate), ())
+            real(base, windows, rejected, rng, progress, work)
+            if candidate is None
+            else (added(base, windows, candidate), ())
         )
 
     monkeypatch.setitem(select_forward.__globals__, "selection_round", scripted)
@@ -210,7 +218,7 @@ def test_candidates_that_converge_to_zero_make_room_for_the_next_best(monkeypatc
         rough = [
             SimpleNamespace(likelihood_gain=gain, fit=None, zero=number in zero) for number, gain in enumerate(gains)
         ]
-        return [item.likelihood_gain for item in names["_significant"](None, None, rough)]
+        return [item.likelihood_gain for item in names["_significant"](None, None, rough, Work())]
 
     assert remaining((155.0, 57.0, 2.0)) == [155.0]
     assert remaining((155.0, 57.0, 2.0), zero=(0,)) == [57.0]

@@ -11,12 +11,13 @@ import tomllib
 
 import numpy as np
 import pytest
-from scipy.stats import chi2
+from scipy.stats import binom, chi2
 
 from expdesign import workflows
 from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.fit.gauss_newton import fit
 from expdesign.diagnosis.motion.simulation import initial_states
+from expdesign.diagnosis.select import SELECTION_TUNING
 from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.records import load_records
 from expdesign.scenario import load_vessel
@@ -41,6 +42,7 @@ def story(made_once):
         workflows.diagnose(data, found, vessel=NOMINAL, scenario=STORY)
         workflows.replan(STORY, second, data=data, vessel=extended, remaining_s=REMAINING_S, seed=1)
         again = workflows.simulate(second / "plan.json", None, truth=TRUE, seed=3)
+        workflows.diagnose([second / "measured.csv"], folder / "again", vessel=extended)
         return strayed.summary, again.summary
 
     folder, (strayed, again) = made_once("story-goes-on", tell)
@@ -89,6 +91,34 @@ def test_the_rest_of_the_trial_confirms_what_was_found(story):
     ]
     assert np.sum(np.square(difference)) < chi2.isf(1e-3, 3)
     assert again.value(keys[-1]) < -5 * again.std(keys[-1])
+
+
+def test_a_second_diagnosis_finds_nothing_new(story):
+    """What the first one found is stated with its standard errors, which the rest of the trial refines."""
+    folder, *_ = story
+    told = read(folder / "again/diagnosis.json")
+    assert told["findings"] == []
+    assert any(note.startswith("Found again and refined: north_mps") for note in told["notes"])
+    first, refined = (load_vessel(folder / name / "vessel-extended.toml").environment for name in ("found", "again"))
+    assert 0 < refined.current_std_mps < first.current_std_mps
+
+
+@pytest.mark.slow
+def test_second_diagnoses_are_silent_as_often_as_tests_say(story, tmp_path):
+    """First and second diagnoses of new trials: alarms are binomial at the level of tests, up to the 99.9 % point."""
+    folder, *_ = story
+    trials, alarms = 12, 0
+    for trial in range(trials):
+        here = tmp_path / str(trial)
+        for number, name in enumerate(("first", "second")):
+            workflows.simulate(
+                folder / "first/plan.json", here / name, truth=TRUE, until_s=UNTIL_S, seed=100 + 2 * trial + number
+            )
+        workflows.diagnose([here / "first/measured.csv"], here / "found", vessel=NOMINAL)
+        extended = here / "found/vessel-extended.toml"
+        workflows.diagnose([here / "second/measured.csv"], here / "again", vessel=extended)
+        alarms += bool(read(here / "again/diagnosis.json")["findings"])
+    assert alarms <= binom.isf(1e-3, trials, SELECTION_TUNING.level)
 
 
 def test_the_rest_begins_where_the_data_end_and_counts_on_the_current_found(story):

@@ -18,6 +18,6 @@ from expdesign.diagnosis.accuracy import Accuracy
 from expdesign.diagnosis.causes import CAUSES
 from expdesign.diagnosis.diagnose import diagnose
 from expdesign.diagnosis.discriminating_manoeuvre import Proposal
-from expdesign.diagnosis.values import Diagnosis, Estimate, Finding
+from expdesign.diagnosis.values import Diagnosis, Estimate, Finding, Lead, Unexplained
 
-__all__ = ["CAUSES", "Accuracy", "Diagnosis", "Estimate", "Finding", "Proposal", "diagnose"]
+__all__ = ["CAUSES", "Accuracy", "Diagnosis", "Estimate", "Finding", "Lead", "Proposal", "Unexplained", "diagnose"]

@@ -7,12 +7,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from expdesign.diagnosis.accuracy import accuracy, check_excitation, constant_inputs, one_step_residuals
+from expdesign.conventions import OUTPUTS
+from expdesign.diagnosis.accuracy import (
+    Accuracy,
+    accuracy,
+    check_excitation,
+    constant_inputs,
+    one_step_residuals,
+    white_noise_std,
+)
 from expdesign.diagnosis.conclusions import (
     finding_of,
     note_on_nuisance,
     note_on_random_current,
     note_on_unconverged,
+    note_on_work,
     notes_on_data,
     notes_on_found_again,
     notes_on_rejected,
@@ -21,11 +30,18 @@ from expdesign.diagnosis.conclusions import (
 )
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.discriminating_manoeuvre import Proposal, most_discriminating, standard_proposals
-from expdesign.diagnosis.fit import Fit, HeldOut, cross_validate
+from expdesign.diagnosis.fit import Fit, HeldOut, cross_validate, held_out_gain, unmeasured_force_share
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import initial_states, simulate_from_measured, stable_windows
-from expdesign.diagnosis.select import Selection, Step, eliminate_backward, only_nuisance, select_forward
-from expdesign.diagnosis.values import Diagnosis, Finding
+from expdesign.diagnosis.select import (
+    Selection,
+    Step,
+    eliminate_backward,
+    leading_candidates,
+    only_nuisance,
+    select_forward,
+)
+from expdesign.diagnosis.values import Diagnosis, Finding, Lead, Unexplained
 from expdesign.diagnosis.vessel_file import extend, extended_model
 from expdesign.errors import Diverged
 from expdesign.progress import Progress, silent, within
@@ -33,6 +49,8 @@ from expdesign.reduction import with_reduced_wind
 from expdesign.signals import Record
 from expdesign.vessel import Vessel
 
+LITTLE_FIT, MORE_THAN_NOISE = 50.0, 2.0
+"""Fit of an output [%] below which the simulation explains little, if its error is so many times the noise."""
 SIMULATED, SELECTED, VALIDATED = 0.1, 0.89, 0.95
 """Shares of the time after the model in use is simulated, after forward selection, and after backward elimination."""
 
@@ -76,16 +94,18 @@ def diagnose(
     refined = steps or ship.stated_std
     final = chosen.kept.last.ship if refined else ship
     extended, not_written = extend(vessel, final, _standard_errors(chosen.kept) if refined else {})
-    before = accuracy(ship, record)
+    before, after = accuracy(ship, record), accuracy(final, record)
+    unexplained = _unexplained(chosen, after, windows, seed)
     return Diagnosis(
         vessel=vessel,
         extended=extended,
         record=record,
         windows=windows,
         before=before,
-        after=accuracy(final, record),
+        after=after,
         findings=ranked,
-        verdict=verdict(ranked, before, unit_name(windows)),
+        verdict=verdict(ranked, before, unit_name(windows), unexplained),
+        unexplained=unexplained,
         simulated_before=motion.predicted,
         simulated_after=simulate_from_measured(final, windows).predicted,
         errors=tuple(step.before.linear.motion.error for step in steps),
@@ -136,6 +156,24 @@ def _cross_validated(found: Selection, ship: ExtendedModel, windows: Windows, pr
     return results
 
 
+def _unexplained(chosen: _Selected, after: Accuracy, windows: Windows, seed: int) -> Unexplained | None:
+    """What the simulation does not explain, where that is much more than noise; None elsewhere."""
+    columns = [OUTPUTS.index(name) for name in after.outputs]
+    noise = white_noise_std(windows.measured[..., columns])
+    if not ((after.fit < LITTLE_FIT) & (after.rmse > MORE_THAN_NOISE * noise)).any():
+        return None
+    base, leads = chosen.held[len(chosen.kept.steps)], []
+    for item in leading_candidates(chosen.kept.last, windows, chosen.kept.last_tests):
+        held = cross_validate(item.fit, item.fit.ship, windows, silent)
+        leads.append(Lead(item.candidate.cause, *held_out_gain(base, held, seed)))
+    return Unexplained(
+        outputs=after.outputs,
+        fit=after.fit,
+        force_share=unmeasured_force_share(chosen.kept.last.linear, after.outputs),
+        leads=tuple(sorted((lead for lead in leads if lead.gain > 0), key=lambda lead: -lead.gain)),
+    )
+
+
 def _findings(chosen: _Selected, windows: Windows, proposals: Sequence[Proposal], seed: int) -> tuple[Finding, ...]:
     """Findings in the order of the selection."""
     return tuple(
@@ -164,7 +202,7 @@ def _notes_on_selection(chosen: _Selected, ship: ExtendedModel, windows: Windows
     if chosen.kept.first.keys:
         unfitted = cross_validate(None, ship, windows, silent)
         notes += note_on_nuisance(unfitted, chosen.held[0], seed)
-    notes += notes_on_found_again(chosen.kept)
+    notes += (*notes_on_found_again(chosen.kept), *note_on_work(chosen.found))
     return (*notes, *note_on_unconverged(chosen.held), *note_on_random_current(chosen.kept.last.noise))
 
 

@@ -70,6 +70,36 @@ class Finding:
     keys: tuple[str, ...]
 
 
+@dataclass(frozen=True)
+class Lead:
+    """A candidate that is not certain.
+
+    Attributes:
+        cause: name in the catalogue.
+        gain: on held-out batches, mean over outputs [points of fit]; gain_interval: 95 %, bootstrap over batches.
+    """
+
+    cause: str
+    gain: float
+    gain_interval: tuple[float, float]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Unexplained:
+    """What remains where a simulation, all findings included, explains little of the data.
+
+    Attributes:
+        fit: (n,) of the simulation [%].
+        force_share: (n,) share of its error that a slowly varying force which nobody measured would take away.
+        leads: the best candidates, by gain.
+    """
+
+    outputs: tuple[str, ...]
+    fit: Array
+    force_share: Array
+    leads: tuple[Lead, ...]
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Diagnosis:
     """Findings, and the simulations that they rest on.
@@ -82,6 +112,7 @@ class Diagnosis:
         before, after: accuracy of both on all batches, in sample.
         findings: in the order of the selection; each gain is relative to the model with the earlier ones.
         verdict: one sentence.
+        unexplained: what remains; None where the simulation explains much, or all but the noise.
         simulated_before, simulated_after: (w, s, 4) channels beside `windows.measured`.
         errors: per finding, (w, s, 4) error of the model with the earlier findings.
         residuals: of the model in use.
@@ -98,6 +129,7 @@ class Diagnosis:
     after: Accuracy
     findings: tuple[Finding, ...]
     verdict: str
+    unexplained: Unexplained | None
     simulated_before: Array
     simulated_after: Array
     errors: tuple[Array, ...]

@@ -64,7 +64,7 @@ def _check_answer(ship: ExtendedModel, windows: Windows) -> None:
     measured = windows.measured[..., columns]
     answer = np.where(np.isfinite(measured), (moved - steady)[..., columns], 0.0)
     size = np.sqrt((answer**2).sum(axis=(0, 1)) / np.maximum(np.isfinite(measured).sum(axis=(0, 1)), 1))
-    noise = _noise(measured)
+    noise = white_noise_std(measured)
     if (size < TUNING.least_response * noise).all():
         rows = np.concatenate(windows.batch_inputs)
         spans = ", ".join(
@@ -77,7 +77,7 @@ def _check_answer(ship: ExtendedModel, windows: Windows) -> None:
         )
 
 
-def _noise(measured: Array) -> Array:
+def white_noise_std(measured: Array) -> Array:
     """(n,) standard deviation of white noise in (w, s, n), from second differences, which include some motion."""
     second = np.diff(measured, 2, axis=1)
     seen = np.isfinite(second)

@@ -9,7 +9,7 @@ import numpy as np
 from expdesign.diagnosis.accuracy import Accuracy
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.fit import validation_units
-from expdesign.diagnosis.values import ErrorReduction, Finding
+from expdesign.diagnosis.values import ErrorReduction, Finding, Unexplained
 
 DIVERGED_FIT = -300.0
 """Fit [%] below which the simulation has diverged from the ship; the number then has no meaning."""
@@ -80,20 +80,46 @@ def unit_name(windows: Windows) -> str:
     return "runs" if np.array_equal(validation_units(windows), windows.batch) else "stretches"
 
 
-def verdict(findings: Sequence[Finding], before: Accuracy, unit: str = "runs") -> str:
+def verdict(
+    findings: Sequence[Finding], before: Accuracy, unit: str = "runs", unexplained: Unexplained | None = None
+) -> str:
     """The whole diagnosis in one sentence.
 
     Args:
         findings: by gain.
         before: accuracy of the model in use.
         unit: what gains are measured on.
+        unexplained: what remains, if that is much.
     """
+    if not findings and unexplained is not None:
+        return f"The simulation explains little of these data and no cause is certain: {_remainder(unexplained, unit)}."
     if not findings:
         return f"These data show no error of the model: {accuracy_in_words(before)}."
     parts = [f"The simulation lacks {listed([missing_effect(item.cause) for item in findings])}"]
     parts += [_benefits(findings, unit), *_invisible(findings)]
     parts += [_open_question(item) for item in findings if item.not_distinguishable_from]
+    parts += [] if unexplained is None else [f"much remains unexplained: {_remainder(unexplained, unit)}"]
     return "; ".join(parts) + "."
+
+
+def _remainder(unexplained: Unexplained, unit: str) -> str:
+    """How little is explained, what an unmeasured force would account for, and the best candidates."""
+    rows = zip(unexplained.outputs, unexplained.fit.tolist(), unexplained.force_share.tolist(), strict=True)
+    fits, shares = [], []
+    for name, fit, share in rows:
+        diverged = "the simulation diverges" if fit < DIVERGED_FIT else f"the fit is {fit:.0f} %"
+        fits.append(f"{diverged} in {WORDS[name]}")
+        shares.append(f"{_percent(share)} % off the {WORDS[name]} error")
+    parts = [listed(fits), f"a slowly varying force that nobody measured would take {listed(shares)}"]
+    if unexplained.leads:
+        leads = [
+            f"{missing_effect(lead.cause)} ({lead.gain:+.1f} points of fit on {unit} held out, "
+            f"{lead.gain_interval[0]:.1f} to {lead.gain_interval[1]:.1f})"
+            for lead in unexplained.leads
+        ]
+        verb = "candidate is" if len(leads) == 1 else "candidates are"
+        parts.append(f"the best uncertain {verb} {listed(leads)}")
+    return "; ".join(parts)
 
 
 def _benefits(findings: Sequence[Finding], unit: str) -> str:

@@ -22,6 +22,7 @@ from expdesign.diagnosis.fit.linear_model import (
     effect_disturbances,
     sensitivities_to,
 )
+from expdesign.diagnosis.fit.unmeasured_force import unmeasured_force_share
 
 __all__ = [
     "Fit",
@@ -43,5 +44,6 @@ __all__ = [
     "on_common_units",
     "profile_cost",
     "sensitivities_to",
+    "unmeasured_force_share",
     "validation_units",
 ]

@@ -31,6 +31,7 @@ class Fit:
         precision: (c,) of the effects' priors.
         step: (c,) to the optimum of the linear model.
         converged: a further step would not lower the cost noticeably.
+        simulations: of all windows that the fit took.
     """
 
     ship: ExtendedModel
@@ -46,6 +47,7 @@ class Fit:
     precision: Array
     step: Array
     converged: bool
+    simulations: int = 1
 
     @property
     def free_keys(self) -> tuple[str, ...]:

@@ -64,8 +64,10 @@ def fit(
     if point is None:
         raise FloatingPointError
     best, noise_is_fitted = _weighted(problem, point, _noise(problem, point, options.noise)), True
+    simulations = 1
     for step in range(options.steps):
-        ahead = _line_search(problem, best)
+        ahead, tries = _line_search(problem, best)
+        simulations += tries
         if ahead is None:
             break
         best, noise_is_fitted = ahead, False
@@ -73,7 +75,7 @@ def fit(
             break
         if step == 0:
             best, noise_is_fitted = _with_noise_refitted(problem, best), True
-    return best if noise_is_fitted else _with_noise_refitted(problem, best)
+    return replace(best if noise_is_fitted else _with_noise_refitted(problem, best), simulations=simulations)
 
 
 def _linearised(problem: _Problem, ship: ExtendedModel, starts: Array, motion: Motion) -> _Point | None:
@@ -124,13 +126,17 @@ def _with_noise_refitted(problem: _Problem, found: Fit) -> Fit:
     return replace(_weighted(problem, found, _noise(problem, found, found.noise)), converged=found.converged)
 
 
-def _line_search(problem: _Problem, best: Fit) -> Fit | None:
-    """The fit after a step, halved until the cost rises no more than allowed; None if no share of it achieves that."""
+def _line_search(problem: _Problem, best: Fit) -> tuple[Fit | None, int]:
+    """The fit after a step, halved until the cost rises no more than allowed, None if no share of it achieves that.
+
+    Beside it the number of simulations.
+    """
     held = problem.options.fixed_weights
     limit = best.cost + TUNING.allowed_rise
     effects = np.broadcast_to(best.step, (len(best.starts), len(best.step)))
     start_step = _resized(best.grams.initial_state_steps(effects), best.ship.states)
-    for share in 0.5 ** np.arange(TUNING.halvings + 1):
+    for halvings in range(TUNING.halvings + 1):
+        share = 0.5**halvings
         ship = best.ship.with_effects(after_step(best.ship, best.keys, share * best.step))
         starts = best.starts + share * start_step
         motion = simulate_windows(ship, problem.windows, starts, warm_start=best.linear)
@@ -139,8 +145,8 @@ def _line_search(problem: _Problem, best: Fit) -> Fit | None:
         point = _linearised(problem, ship, starts, motion)
         ahead = None if point is None else _weighted(problem, point, best.noise)
         if ahead is not None and (held or ahead.cost <= limit):
-            return ahead
-    return None
+            return ahead, halvings + 1
+    return None, TUNING.halvings + 1
 
 
 def _cost_with_weights_of(problem: _Problem, best: Fit, ship: ExtendedModel, error: Array) -> float:

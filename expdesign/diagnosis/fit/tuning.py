@@ -26,6 +26,8 @@ class Tuning:
         fewest_runs: for cluster-robust standard errors.
         folds: of the cross-validation.
         fold_steps: Gauss-Newton steps from the fit to all units to the fit without a fold.
+        force_spacing_s: between the knots of a force that nobody measured [s].
+        force_penalties: sizes of such a force that are tried, as ridge penalties.
         bootstrap_draws: of units, for intervals.
     """
 
@@ -45,6 +47,8 @@ class Tuning:
     fewest_runs: int = 10
     folds: int = 3
     fold_steps: int = 6
+    force_spacing_s: float = 60.0
+    force_penalties: tuple[float, ...] = (1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0, 1e3, 1e4)
     bootstrap_draws: int = 1000
 
 

@@ -83,13 +83,24 @@ def improves_held_out(found: Selection, held: Sequence[HeldOut], seed: int) -> l
     simulation worse, or some output is worse on average and the interval allows a larger loss. (Varying currents make
     the intervals of few runs wide.) Later causes need a gain, because no model of a real ship is exact: once a large
     error is explained, small differences between model and ship become significant. A small gain counts if its
-    interval excludes zero. Uncertain parameters are estimated in any case, so as a cause they need no gain.
+    interval excludes zero. Uncertain parameters are estimated in any case, so as a cause they need no gain. What takes
+    less than `Tuning.least_reduction` off every error is a remark, whatever its p-value.
     """
     gains = [held_out_gain(one, other, seed) for one, other in pairwise(held)]
     return [
-        _improves(index == 0 or only_nuisance(step, found), _no_output_worse(*held[index : index + 2]), gain, interval)
+        _matters(*held[index : index + 2])
+        and _improves(
+            index == 0 or only_nuisance(step, found), _no_output_worse(*held[index : index + 2]), gain, interval
+        )
         for index, (step, (gain, interval)) in enumerate(zip(found.steps, gains, strict=True))
     ]
+
+
+def _matters(before: HeldOut, after: HeldOut) -> bool:
+    """Whether the error of some output falls by enough to be worth a word."""
+    before, after = on_common_units(before, after)
+    lost, left = before.squared_error.sum(axis=0), after.squared_error.sum(axis=0)
+    return bool((left <= (1.0 - TUNING.least_reduction) ** 2 * lost).any())
 
 
 def _no_output_worse(before: HeldOut, after: HeldOut) -> bool:

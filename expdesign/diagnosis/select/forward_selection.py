@@ -16,6 +16,7 @@ from expdesign.diagnosis.select.score_tests import ScoreTest
 from expdesign.diagnosis.select.selection import Selection, Step, redundant_step, without_step
 from expdesign.diagnosis.select.selection_round import same_effects_as_any, selection_round
 from expdesign.diagnosis.select.tuning import TUNING
+from expdesign.diagnosis.select.work import Work
 from expdesign.progress import Progress, never_falling, within
 from expdesign.values import Array
 
@@ -34,15 +35,19 @@ def select_forward(
     base = first = fit_nuisance(ship, windows, starts)
     steps: list[Step] = []
     rejected: list[Candidate] = []
-    rounds = exchanges = 0
+    rounds, exchanges, work = 0, 0, Work()
     while True:
         share = 1.0 - TUNING.later_rounds**rounds
         rounds += 1
         progress(f"testing causes, round {rounds}", share)
         part = within(progress, share, 1.0 - TUNING.later_rounds**rounds)
-        search = _Search(windows=windows, rejected=tuple(rejected), rng=rng, progress=part)
+        search = _Search(windows=windows, rejected=tuple(rejected), rng=rng, progress=part, work=work)
         step, tests = search.round(base)
-        if step is None and exchanges < TUNING.most_exchanges:
+        if (
+            step is None
+            and exchanges < TUNING.most_exchanges
+            and (len(steps) < 2 or work.allows("exchanges of causes"))
+        ):
             exchanges += 1
             exchanged = _exchange(steps, search)
             if exchanged is not None:
@@ -50,7 +55,8 @@ def select_forward(
                 continue
         if step is None or len(steps) == TUNING.most_findings:
             steps = _with_joint_profiles(steps)
-            return Selection(steps=tuple(steps), first=first, last=base, last_tests=tests).with_steps(tuple(steps))
+            found = Selection(steps=tuple(steps), first=first, last=base, last_tests=tests, untried=tuple(work.untried))
+            return found.with_steps(tuple(steps))
         steps += _smaller_causes(step, search) if _is_block(step.chosen) else [step]
         del steps[TUNING.most_findings :]
         base = steps[-1].chosen.fit
@@ -69,10 +75,11 @@ class _Search:
     rejected: tuple[Candidate, ...]
     rng: np.random.Generator
     progress: Progress
+    work: Work
 
     def round(self, base: Fit, *, most: int = 99) -> tuple[Step | None, tuple[ScoreTest, ...]]:
         """One round from a fit, with candidates of at most so many effects."""
-        return selection_round(base, self.windows, list(self.rejected), self.rng, self.progress, most=most)
+        return selection_round(base, self.windows, list(self.rejected), self.rng, self.progress, self.work, most=most)
 
 
 def fit_nuisance(ship: ExtendedModel, windows: Windows, starts: Array) -> Fit:

@@ -45,12 +45,14 @@ class Selection:
         first: the fit before any cause.
         last: the joint fit of all causes.
         last_tests: score tests of the round that found nothing more.
+        untried: what the limit of work left out.
     """
 
     steps: tuple[Step, ...]
     first: Fit
     last: Fit
     last_tests: tuple[ScoreTest, ...]
+    untried: tuple[str, ...] = ()
 
     def with_steps(self, steps: tuple[Step, ...]) -> Selection:
         """The selection with other steps; where these are its first ones, the next round's tests become the last."""

@@ -21,6 +21,7 @@ from expdesign.diagnosis.select.selection import Step, wald_p_value
 from expdesign.diagnosis.select.short_windows import fit_short_windows, start_in_short_windows
 from expdesign.diagnosis.select.starting_point import StartingPoint, starting_point
 from expdesign.diagnosis.select.tuning import TUNING
+from expdesign.diagnosis.select.work import Work
 from expdesign.progress import Progress
 
 
@@ -30,6 +31,7 @@ def selection_round(
     rejected: list[Candidate],
     rng: np.random.Generator,
     progress: Progress,
+    work: Work,
     *,
     most: int = 99,
 ) -> tuple[Step | None, tuple[ScoreTest, ...]]:
@@ -41,6 +43,7 @@ def selection_round(
         rejected: candidates that are not tried again.
         rng: of the null distribution.
         progress: of this round.
+        work: of the search.
         most: effects that a candidate may have.
     """
     tests = score_tests(
@@ -48,7 +51,7 @@ def selection_round(
         [c for c in _candidates(base, windows) if not same_effects_as_any(c, rejected) and len(c.free) <= most],
         rng,
     )
-    return _step(base, windows, tests, progress), tests
+    return _step(base, windows, tests, progress, work), tests
 
 
 def same_effects_as_any(candidate: Candidate, others: list[Candidate]) -> bool:
@@ -66,15 +69,20 @@ def _candidates(base: Fit, windows: Windows) -> list[Candidate]:
     ]
 
 
-def _step(base: Fit, windows: Windows, tests: tuple[ScoreTest, ...], progress: Progress) -> Step | None:
+def _step(base: Fit, windows: Windows, tests: tuple[ScoreTest, ...], progress: Progress, work: Work) -> Step | None:
+    if not work.allows("further causes"):
+        return None
     points, far = _starting_points(base, windows, tests)
     rough: list[FittedCandidate] = []
     for index, point in enumerate(points):
         progress(f"fitting {point.test.candidate.cause}", index / len(points))
+        if not work.allows(f"{point.test.candidate.cause} beside {len(base.free_keys)} effects"):
+            continue
         candidate = fit_candidate(base, windows, point, far=far, steps=TUNING.first_steps)
         if candidate is not None:
+            work.spend(candidate.fit.simulations)
             rough.append(candidate)
-    fitted = _significant(base, windows, ranked_by_gain(base, rough))
+    fitted = _significant(base, windows, ranked_by_gain(base, rough), work)
     chosen = next((item for item in fitted if item.p_value <= TUNING.accepted_p_value), None)
     if chosen is None:
         return None
@@ -97,7 +105,7 @@ def _alternatives(chosen: FittedCandidate, fitted: list[FittedCandidate]) -> tup
     return tuple(found.values())
 
 
-def _significant(base: Fit, windows: Windows, rough: list[FittedCandidate]) -> list[FittedCandidate]:
+def _significant(base: Fit, windows: Windows, rough: list[FittedCandidate], work: Work) -> list[FittedCandidate]:
     """The best candidates, fitted to convergence and significant by a Wald test.
 
     A candidate may converge to zero in the nonlinear fit. Then the next best are fitted.
@@ -108,6 +116,7 @@ def _significant(base: Fit, windows: Windows, rough: list[FittedCandidate]) -> l
             item for item in rough if item.likelihood_gain > TUNING.leading_share * most - TUNING.statistic_margin
         ]
         converged = [fit_to_convergence(base, windows, item) for item in leading]
+        work.spend(sum(new.fit.simulations for new, old in zip(converged, leading, strict=True) if new is not old))
         significant = [item for item in converged if wald_p_value(item, item.fit) <= TUNING.level]
         if significant or not leading:  # nothing gains anything
             return ranked_by_gain(base, significant)
@@ -164,3 +173,12 @@ def _shortlist(tests: tuple[ScoreTest, ...]) -> list[ScoreTest]:
             found.append(test)
             count[cause] = count.get(cause, 0) + 1
     return found
+
+
+def leading_candidates(base: Fit, windows: Windows, tests: tuple[ScoreTest, ...]) -> tuple[FittedCandidate, ...]:
+    """Candidates of the causes with the smallest p-values, one of each, fitted: the best that are not certain."""
+    best: dict[str, ScoreTest] = {}
+    for test in sorted(tests, key=lambda item: item.p_value * item.multiplicity):
+        best.setdefault(test.candidate.cause, test)
+    points = [starting_point(base, test) for test in [*best.values()][: TUNING.leads]]
+    return tuple(item for point in points if (item := fit_candidate(base, windows, point)) is not None)

@@ -34,6 +34,7 @@ class Tuning:
         least_gain_share: candidates that gain less than this share of the best in short windows are not fitted in long
             ones.
         large_current_mps: standard deviation of the random current above which a steady current is fitted too.
+        most_simulations: of all data in fits of candidates, before the search leaves the rest untried.
         most_findings: causes, at most.
         most_rejected: causes that are removed again, at most.
         most_exchanges: of a cause for another that gains more beside the rest, at most.
@@ -44,6 +45,8 @@ class Tuning:
         equivalent_values: this many equally likely values in a round end the search.
         least_gain_points: gain of fit on held-out data that causes after the first need, at least [points].
         clear_gain_points: gain that suffices even where its interval, of few runs perhaps, includes zero [points].
+        leads: candidates that are named where a simulation explains little and no cause is certain.
+        least_reduction: share by which the error of some output must fall on held-out data for a cause to be a finding.
         most_loss_points: loss at the lower end of the interval that the first cause may risk, if some output is
             simulated worse with it [points].
     """
@@ -69,6 +72,7 @@ class Tuning:
     short_steps: int = 6
     least_gain_share: float = 0.75
     large_current_mps: float = 0.1
+    most_simulations: int = 250
     most_findings: int = 6
     most_rejected: int = 4
     most_exchanges: int = 2
@@ -80,6 +84,8 @@ class Tuning:
     equivalent_values: int = 3
     least_gain_points: float = 0.1
     clear_gain_points: float = 1.0
+    leads: int = 3
+    least_reduction: float = 0.01
     most_loss_points: float = 0.5
 
 

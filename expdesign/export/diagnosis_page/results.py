@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from expdesign.diagnosis import Accuracy, Diagnosis, Finding
+from expdesign.diagnosis import Accuracy, Diagnosis, Finding, Unexplained
 from expdesign.diagnosis.accuracy import Residuals, dependence
 from expdesign.export.files import plus_minus, strict_json, vessel_toml
 from expdesign.values import Array
@@ -23,11 +23,24 @@ def diagnosis_json(found: Diagnosis) -> str:
             "extended": accuracy_entry(found.after),
             "findings": [finding_entry(item, found.before.outputs) for item in found.findings],
             "verdict": found.verdict,
+            "unexplained": None if found.unexplained is None else _unexplained(found.unexplained),
             "tested": [{"cause": cause, "p_value": _finite(p_value)} for cause, p_value in found.screened],
             "notes": [*found.notes, *found.record.notes],
             "residuals": _residuals(found.residuals),
         }
     )
+
+
+def _unexplained(found: Unexplained) -> dict[str, Any]:
+    """What remains, and candidates that are not certain."""
+    return {
+        "fit": _named(found.outputs, found.fit),
+        "force_share": _named(found.outputs, found.force_share),
+        "candidates": [
+            {"cause": lead.cause, "gain": _finite(lead.gain), "gain_interval": [_finite(x) for x in lead.gain_interval]}
+            for lead in found.leads
+        ],
+    }
 
 
 def _residuals(found: Residuals) -> dict[str, Any]:

@@ -1,0 +1,88 @@
+"""Where a simulation explains little, the verdict says so, and how much a force that nobody measured would explain."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from diagnosis_case import hidden_record, vessel_of
+from expdesign.diagnosis import Lead, Unexplained
+from expdesign.diagnosis.accuracy.simulated_fit import accuracy
+from expdesign.diagnosis.conclusions.verdict import verdict
+from expdesign.diagnosis.data.windows import cut_windows
+from expdesign.diagnosis.fit.unmeasured_force import unmeasured_force_share
+from expdesign.diagnosis.motion import linearise
+from expdesign.diagnosis.motion.simulation import initial_states, simulate_from_measured
+from expdesign.diagnosis.select import forward_selection
+from expdesign.diagnosis.select.tuning import TUNING
+from expdesign.diagnosis.select.work import Work
+from expdesign.diagnosis.vessel_file.reading import extended_model
+from expdesign.signals import Record
+
+PERIOD_S = 200.0
+
+
+def shares(record: Record) -> np.ndarray:
+    ship = extended_model(vessel_of("barge"), record)
+    return unmeasured_force_share(
+        linearise(simulate_from_measured(ship, cut_windows(ship.model, record))), ("u", "v", "r")
+    )
+
+
+def with_slow_sway_force(record: Record, size: float) -> Record:
+    """The same motion, of which the inputs do not tell a slow part of the force."""
+
+    def untold(batch):
+        slow = np.sin(2 * np.pi * np.arange(len(batch)) / PERIOD_S)
+        return replace(batch, inputs=batch.inputs - size * slow[:, None] * np.array([0.0, 1.0, 0.0]))
+
+    return Record(batches=tuple(untold(batch) for batch in record.batches))
+
+
+def test_a_slow_force_takes_away_the_error_that_one_causes_and_no_white_noise():
+    calm = hidden_record("barge", seed=6, batches=4, samples=300)
+    pushed = with_slow_sway_force(calm, np.abs(calm.batches[0].inputs[:, 1]).mean())
+    noise, slow = shares(calm), shares(pushed)
+    assert (noise < 0.1).all()
+    assert slow[1] > 0.5
+    assert slow[0] < slow[1]
+
+
+def test_little_explained_is_never_called_no_error():
+    record = hidden_record("barge", seed=6, batches=2, samples=120)
+    before = accuracy(extended_model(vessel_of("barge"), record), record)
+    remains = Unexplained(
+        outputs=("u", "v", "r"), fit=np.array([29.0, -68.0, -400.0]), force_share=np.array([0.4, 0.75, 0.0]),
+        leads=(Lead("wind", 3.2, (-1.0, 6.0)), Lead("current", 0.5, (-2.0, 2.0))),
+    )  # fmt: skip
+    assert verdict((), before, "runs", remains) == (
+        "The simulation explains little of these data and no cause is certain: the fit is 29 % in surge, the fit is "
+        "-68 % in sway and the simulation diverges in yaw; a slowly varying force that nobody measured would take 40 % "
+        "off the surge error, 75 % off the sway error and 0 % off the yaw error; the best uncertain candidates are "
+        "wind (+3.2 points of fit on runs held out, -1.0 to 6.0) and a current (+0.5 points of fit on runs held out, -2.0 "
+        "to 2.0)."
+    )
+    assert "no error" in verdict((), before)
+
+
+def test_a_search_ends_at_its_limit_and_says_what_it_left():
+    work = Work()
+    assert work.allows("a")
+    work.spend(TUNING.most_simulations)
+    assert not work.allows("b")
+    assert not work.allows("c")
+    assert not work.allows("b")
+    assert work.untried == ["b", "c"]
+
+
+def test_a_limit_of_nothing_leaves_all_causes_untried(monkeypatch: pytest.MonkeyPatch):
+    spent = Work(simulations=TUNING.most_simulations)
+    monkeypatch.setattr(forward_selection, "Work", lambda: spent)
+    record = hidden_record("barge", seed=6, batches=2, samples=120, effects={"gain": -0.3})
+    ship = extended_model(vessel_of("barge"), record)
+    windows = cut_windows(ship.model, record)
+    found = forward_selection.select_forward(
+        ship, windows, initial_states(windows), np.random.default_rng(0), lambda what, share: None
+    )
+    assert found.steps == ()
+    assert found.untried == ("further causes",)
