@@ -59,8 +59,8 @@ def test_little_explained_is_never_called_no_error():
         "The simulation explains little of these data and no cause is certain: the fit is 29 % in surge, the fit is "
         "-68 % in sway and the simulation diverges in yaw; a slowly varying force that nobody measured would take 40 % "
         "off the surge error, 75 % off the sway error and 0 % off the yaw error; the best uncertain candidates are "
-        "wind (+3.2 points of fit on runs held out, -1.0 to 6.0) and a current (+0.5 points of fit on runs held out, -2.0 "
-        "to 2.0)."
+        "wind (+3.2 points of fit on runs held out, -1.0 to 6.0) and a current (+0.5 points of fit on runs held out, "
+        "-2.0 to 2.0)."
     )
     assert "no error" in verdict((), before)
 
