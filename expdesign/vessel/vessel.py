@@ -43,7 +43,7 @@ class Vessel:
     model: VesselModel
     sensors: Sensors = EXACT
     environment: Environment = CALM
-    std: Mapping[str, float] = field(default_factory=dict)
+    std: Mapping[str, float] = field(default_factory=dict, hash=False)
 
     def __post_init__(self) -> None:
         for name in ("length_m", "beam_m", "draught_m", "sample_time_s"):
