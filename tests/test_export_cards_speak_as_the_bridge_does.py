@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import shapely
 from lxml import html
 
 import export_case as case
 from expdesign.conventions import KNOTS_PER_MPS
 from expdesign.export import words
 from expdesign.export.cards import cards_html
+from expdesign.export.cards.heading_orders import heading_rows
 from expdesign.export.cards.orders import order_rows, orders_notes, starboard_helm
 from expdesign.export.report.criteria import short_of_optimum
-from expdesign.export.report.figures.chart import shown_depths
-from expdesign.export.report.tables import agenda, shown_name
-from expdesign.export.tuning import TUNING
+from expdesign.export.report.figures.chart import chart_legend, deep_from, safety_contour
+from expdesign.export.report.tables import agenda, setting, shown_name, shown_names
 from expdesign.plan.values import Leg
+from expdesign.sea_area import SeaArea, as_multipolygon
 from expdesign.signals import Commands
-from expdesign.simulation import simulate, steady_ahead
+from expdesign.simulation import Conduct, simulate, steady_ahead, zigzag
 from rudder_ship import rudder_ship
 
 
@@ -65,6 +68,54 @@ def test_names_show_angles_in_degrees_and_nothing_else_changes() -> None:
     assert shown_name(plain) == "turn-0.2"
 
 
+def test_names_show_speeds_in_knots_and_two_names_are_never_shown_alike() -> None:
+    def item(speed_mps: float) -> SimpleNamespace:
+        name = f"circle-speed-{speed_mps:.12g}"
+        return SimpleNamespace(primitive=SimpleNamespace(name=name, settings={"speed_mps": speed_mps}))
+
+    assert shown_name(item(5.0)) == f"circle-speed-9.7{words.NB}kn"
+    content = SimpleNamespace(information=(item(5.0), item(5.001), item(2.5)))
+    assert list(shown_names(content).values()) == [
+        "circle-speed-5",
+        "circle-speed-5.001",
+        f"circle-speed-4.9{words.NB}kn",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("speed_mps", 2.0, "speed 2 m/s (3.9 kn)"),
+        ("sway_mps", -0.5, "sway \N{MINUS SIGN}0.5 m/s (\N{MINUS SIGN}1.0 kn)"),
+        ("helm_rad", np.radians(35.0), "helm 35\N{DEGREE SIGN}"),
+        ("yaw_rate_radps", np.radians(2.0), "yaw rate 2 \N{DEGREE SIGN}/s"),
+        ("draw", 2.0, "draw 2"),
+    ],
+)
+def test_settings_are_said_in_knots_and_degrees(name: str, value: float, said: str) -> None:
+    assert setting(name, value).replace(words.NB, " ") == said
+
+
+@pytest.mark.parametrize("helm_deg", [10.0, -20.0])
+def test_a_sheet_by_heading_has_a_row_for_each_order_of_the_helm(helm_deg: float) -> None:
+    """The simulated heading agrees with the rows: the helm changes where the heading has."""
+    ship, size = rudder_ship(), abs(helm_deg)
+    side = "starboard" if helm_deg > 0 else "port"
+    commands, motion = zigzag(
+        ship, heading_rad=np.radians(size), helm_rad=np.radians(size), side=side, conduct=Conduct(duration_s=300.0)
+    )
+    settings = {"helm_rad": np.radians(helm_deg), "heading_rad": np.radians(size)}
+    spec = SimpleNamespace(family="zigzag_heading", settings=settings)
+    rows = heading_rows(spec, ship, commands.values, commands.sample_time_s)
+    assert len(rows) >= 3
+    assert rows[-1][1] == "end of the run"
+    for helm, until, seconds in rows[:-1]:
+        turned = np.degrees(motion.pose[round(float(seconds) / commands.sample_time_s), 2])
+        assert helm == f"{until.split()[-1][0].upper()}{words.NB}{size:g}"
+        assert until.startswith(f"{size:g}\N{DEGREE SIGN} to {'starboard' if turned > 0 else 'port'}")
+        assert abs(turned) >= size - 0.5
+
+
 def test_the_agenda_gives_speeds_in_knots_too() -> None:
     for row in agenda(case.report_content()):
         ends = [[float(part.replace(words.MINUS, "-")) for part in text.split("\N{RIGHTWARDS ARROW}")]
@@ -74,11 +125,41 @@ def test_the_agenda_gives_speeds_in_knots_too() -> None:
     assert "Speed kn" in heads
 
 
-@pytest.mark.parametrize("count", [0, 1, 3, 18])
-def test_a_legend_names_few_depths_with_the_shallowest_and_the_deepest(count: int) -> None:
-    named = shown_depths(count)
-    assert len(named) == min(count, TUNING.legend_depths)
-    assert not count or {0, count - 1} <= named <= set(range(count))
+def charted(*depths_m: float, needed_m: float = 0.0, nested: bool = False) -> SeaArea:
+    """Strips of water a hundred metres wide, each with its least depth; allowed from the depth that is needed."""
+    widths = [1 + len(depths_m) if nested else k + 1 for k in range(len(depths_m))]
+    strips = [shapely.box(100.0 * k, -500, 100.0 * end, 500) for k, end in enumerate(widths)]
+    water = shapely.union_all([strip for depth, strip in zip(depths_m, strips, strict=True) if depth >= needed_m])
+    layers = tuple((depth, as_multipolygon(strip)) for depth, strip in zip(depths_m, strips, strict=True))
+    return replace(case.plan().area, water=as_multipolygon(water), depths=layers)
+
+
+@pytest.mark.parametrize("nested", [False, True])
+@pytest.mark.parametrize(("needed_m", "contour"), [(3.5, 5.0), (5.0, 5.0), (0.5, 2.0), (11.0, 20.0)])
+def test_the_safety_contour_is_the_first_charted_depth_that_is_deep_enough(
+    needed_m: float, contour: float, nested: bool
+) -> None:
+    assert safety_contour(charted(2.0, 5.0, 10.0, 20.0, needed_m=needed_m, nested=nested)) == contour
+
+
+def test_no_contour_is_drawn_where_depth_does_not_bound_the_water() -> None:
+    assert safety_contour(case.plan().area) is None
+    assert safety_contour(replace(charted(5.0, 10.0), water=case.plan().area.water)) is None
+
+
+def test_deep_water_is_four_draughts_deep_and_beyond_the_safety_contour() -> None:
+    area = charted(2.0, 5.0, 10.0, 20.0, needed_m=3.5)
+    assert [deep_from(area, draught) for draught in (1.0, 2.5, 2.6, 6.0)] == [None, 10.0, 20.0, None]
+
+
+@pytest.mark.parametrize("count", [1, 3, 18])
+def test_a_chart_has_three_shades_of_water_however_many_depths_are_charted(count: int) -> None:
+    area = charted(*np.linspace(2.0, 40.0, count).tolist(), needed_m=2.0)
+    content = case.report_content(plan=replace(case.plan(), area=area))
+    told = [entry.text for entry in chart_legend(content)]
+    assert sum("m or more" in text or "shallower" in text or " to " in text for text in told) <= 3
+    assert len(set(told)) == len(told) <= 13
+    assert sum("safety contour" in text for text in told) == 1
 
 
 @pytest.mark.parametrize("gap", [0.0, 1e-9, 1e-5, 1e-2])

@@ -291,8 +291,8 @@ def growth_of(name: str) -> Growth:
 @pytest.mark.usefixtures("_no_figures")
 def test_additions_to_the_dictionary_are_reported_with_their_gain() -> None:
     told = Page(report_html(case.report_content(growth=growth_of("found-1")))).text.replace("\N{NO-BREAK SPACE}", " ")
-    assert "1 found-1 steps; speed 1.5 m/s, duration 60 s 20.25 +2.125 125 % holds" in told
-    assert "2 found-1 steps; speed 1.5 m/s, duration 60 s 19.25 +2.125 225 % does not hold" in told
+    assert "1 found-1 steps; speed 1.5 m/s (2.9 kn), duration 60 s 20.25 +2.125 125 % holds" in told
+    assert "2 found-1 steps; speed 1.5 m/s (2.9 kn), duration 60 s 19.25 +2.125 225 % does not hold" in told
     assert "The search evaluated 321 candidates, with u from 0.00 to 3.00 m/s" in told
     assert f"at least {100 * math.exp(-0.05):.1f} % among all evaluated candidates" in told
     assert "Manoeuvres added by the search" not in report_html(case.report_content())

@@ -7,6 +7,7 @@ import pytest
 from lxml import html
 
 from expdesign.errors import InputError
+from expdesign.export import words
 from expdesign.export.indices_form import Held, IndicesContent, indices_html
 from expdesign.export.indices_form.appendix import condition_rows, form_lines, ship_rows
 from expdesign.indices import Circle, criteria, standard_results
@@ -68,7 +69,7 @@ def test_ship_data_are_the_vessels_and_data_without_a_file_stay_open() -> None:
     rows = dict(ship_rows(content()))
     assert rows["Length, beam, mean draught"] == "L 180 m, B 30 m, T 10 m"
     assert (rows["L/B"], rows["B/T"]) == ("6.00", "3.00")
-    assert rows["L/V"] == f"{180 / SPEED:.1f} s ({SPEED:.2f} m/s)"
+    assert rows["L/V"] == f"{180 / SPEED:.1f} s at {words.speed(SPEED)}"
     assert rows["Block coefficient"] == rows["Type of ship"] == ""
     assert dict(ship_rows(content(scale=25.0)))["L/V"].startswith(f"{180 / SPEED * 5:.1f} s")
 

@@ -25,7 +25,7 @@ class Tuning:
         line_points: points per line: more cannot be told apart at this size.
         shown_beyond: share of the measured range that is shown beyond it; simulations that leave it are cut off.
         least_fraction: time fractions below this count as none.
-        legend_depths: depths named in the legend of a chart.
+        uncharted_share: share of the allowed water that may be outside the charted depths that bound it.
         hulls: hulls drawn along the path of a primitive.
         footprint_seed: random seed of the footprint figure; the planner uses other random numbers.
         footprint_pieces: places of the hull along a run that its drawn footprint is made of.
@@ -69,7 +69,7 @@ class Tuning:
     line_points: int = 500
     shown_beyond: float = 0.6
     least_fraction: float = 1e-6
-    legend_depths: int = 4
+    uncharted_share: float = 1e-6
     hulls: int = 5
     footprint_seed: int = 0
     footprint_pieces: int = 40

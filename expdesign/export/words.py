@@ -75,7 +75,7 @@ def compass(radians: float) -> str:
 
 def current(velocity: Array, std_mps: float) -> str:
     """A current by speed and direction of flow."""
-    spread = f", standard deviation {number(std_mps)}{NB}m/s per component" if std_mps > 0 else ""
+    spread = f", standard deviation {speed(std_mps)} north and east" if std_mps > 0 else ""
     if not np.any(velocity):
         return f"no mean current{spread}"
     towards = math.atan2(velocity[1], velocity[0])
@@ -84,7 +84,7 @@ def current(velocity: Array, std_mps: float) -> str:
 
 def wind(velocity: Array, std_mps: float) -> str:
     """A wind by speed and direction of origin."""
-    spread = f", standard deviation {number(std_mps)}{NB}m/s per component" if std_mps > 0 else ""
+    spread = f", standard deviation {speed(std_mps)} north and east" if std_mps > 0 else ""
     if not np.any(velocity):
         return f"no mean wind{spread}"
     origin = math.atan2(-velocity[1], -velocity[0])

@@ -11,6 +11,7 @@ import numpy as np
 from expdesign.export import words
 from expdesign.export.cards.chart import run_chart
 from expdesign.export.cards.danger import Danger, look_out
+from expdesign.export.cards.heading_orders import HEADS, heading_rows, heading_zigzag
 from expdesign.export.cards.orders import columns_of, order_columns, order_rows, orders_notes, run_orders
 from expdesign.export.report.content import ReportContent, Run, relative_information
 from expdesign.export.report.tables import settings_sentence, shown_name
@@ -36,7 +37,7 @@ class Card:
         runs: numbers of the runs.
         approach, danger, end: (name, one text for each run) row by row.
         orders: the rows of orders, in one or several columns.
-        signals: (name, unit) of the columns of orders.
+        heads: of the columns of orders.
         room: (name, text) pairs.
     """
 
@@ -48,7 +49,7 @@ class Card:
     approach: list[tuple[str, tuple[str, ...]]]
     danger: list[tuple[str, tuple[str, ...]]]
     end: list[tuple[str, tuple[str, ...]]]
-    signals: list[tuple[str, str]]
+    heads: tuple[str, ...]
     orders: list[list[tuple[str, ...]]]
     orders_notes: list[str]
     room: list[tuple[str, str]]
@@ -94,7 +95,7 @@ def build_card(content: ReportContent, runs: Sequence[Run]) -> Card:
     dangers = [look_out(pose, hull_b=vessel.hull_b, water=plan.area.water) for pose in poses]
     step = plan.commands.sample_time_s
     lasts = words.duration((legs[0].last - legs[0].first) * step)
-    rows, missed = order_rows(vessel, run_orders(content, runs[0]), step)
+    heads, rows, missed = _orders(content, runs[0])
     return Card(
         runs=tuple(run.number for run in runs),
         name=shown_name(item),
@@ -104,12 +105,21 @@ def build_card(content: ReportContent, runs: Sequence[Run]) -> Card:
         approach=_together([_approach(content, leg.first) for leg in legs]),
         danger=_together([_danger(danger, leg.first, step) for danger, leg in zip(dangers, legs, strict=True)]),
         end=_together([_end(content, leg.first, leg.last) for leg in legs]),
-        signals=[(name, unit) for name, unit, _ in order_columns(vessel)],
+        heads=heads,
         orders=columns_of(rows),
         orders_notes=orders_notes(content, legs[0], rows, missed),
         room=_room(content, max((danger.room_m for danger in dangers), key=math.prod)),
         record=_record(content),
     )
+
+
+def _orders(content: ReportContent, run: Run) -> tuple[tuple[str, ...], list[tuple[str, ...]], float]:
+    """Heads and rows of the orders, and the largest error between rows; by heading where the helm goes by it."""
+    vessel, values, step = content.vessel, run_orders(content, run), content.plan.commands.sample_time_s
+    if zigzag := heading_zigzag(content, content.plan.legs[run.leg].name):
+        return HEADS, heading_rows(zigzag, vessel, values, step), 0.0
+    signals = (f"{name}, {unit}" if unit else name for name, unit, _ in order_columns(vessel))
+    return ("time, s", *signals), *order_rows(vessel, values, step)
 
 
 def _together(runs: list[list[tuple[str, str]]]) -> list[tuple[str, tuple[str, ...]]]:
@@ -129,14 +139,14 @@ def _approach(content: ReportContent, first: int) -> list[tuple[str, str]]:
     plan = content.plan
     pose, velocity = plan.trajectory.pose[first], plan.trajectory.velocity[first]
     lat, lon = plan.area.frame.to_degrees(pose[:2]).tolist()
-    sway, rate = words.number(velocity[1]), words.number(math.degrees(velocity[2]), 1)
+    sway, rate = words.speed(float(velocity[1])), words.number(math.degrees(velocity[2]), 1)
     return [
         ("Start time", words.clock(first * plan.commands.sample_time_s)),
         ("Latitude", words.latitude(lat)),
         ("Longitude", words.longitude(lon)),
         ("Heading", words.bearing(float(pose[2]))),
         ("Speed over ground", words.speed(float(np.hypot(*velocity[:2])))),
-        ("Sway; yaw rate", f"{sway}{words.NB}m/s; {rate}{words.NB}\N{DEGREE SIGN}/s"),
+        ("Sway; yaw rate", f"{sway}; {rate}{words.NB}\N{DEGREE SIGN}/s"),
         ("Steady for", words.duration(steady_s(content, first))),
         *_within(plan, first),
     ]
@@ -152,8 +162,8 @@ def _within(plan: Plan, first: int) -> list[tuple[str, str]]:
     return [
         (
             "Start tolerance",
-            f"{words.distance(off_m)}; {heading}{words.NB}\N{DEGREE SIGN}; "
-            f"{words.number(risk.speed_mps)}{words.NB}m/s; {rate}{words.NB}\N{DEGREE SIGN}/s; else go-around",
+            f"{words.distance(off_m)}; {heading}\N{DEGREE SIGN}; "
+            f"{words.speed(risk.speed_mps)}; {rate}{words.NB}\N{DEGREE SIGN}/s; else go-around",
         )
     ]
 

@@ -35,7 +35,7 @@ def run_chart(content: ReportContent, legs: Sequence[Leg], *, numbers: Sequence[
     axes.set_aspect("equal")
     axes.set_xlim(box[0], box[2])
     axes.set_ylim(box[1], box[3])
-    draw_sea(axes, plan.area, box, content.clearance_m)
+    draw_sea(axes, plan.area, box, clearance_m=content.clearance_m, draught_m=content.vessel.draught_m)
     for leg, track in zip(legs, tracks, strict=True):
         lead = pose[max(leg.first - (leg.last - leg.first), 0) : leg.first + 1]
         axes.plot(lead[:, 1], lead[:, 0], color=REPOSITION, linewidth=1.2)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from expdesign.errors import ExpdesignError
+from expdesign.export.cards.heading_orders import heading_notes, heading_zigzag
 from expdesign.export.report.content import ReportContent, Run
 from expdesign.export.tuning import TUNING
 from expdesign.export.words import NB
@@ -117,16 +118,16 @@ def columns_of(rows: list[tuple[str, ...]]) -> list[list[tuple[str, ...]]]:
 
 def orders_notes(content: ReportContent, leg: Leg, rows: list[tuple[str, ...]], missed: float) -> list[str]:
     """How the rows of orders of a leg are to be used; `missed` is their largest error as a share of the range."""
+    if zigzag := heading_zigzag(content, leg.name):
+        return heading_notes(zigzag)
     step = content.plan.commands.sample_time_s
     every = (leg.last - leg.first) * step / len(rows)
     side = starboard_helm(content.vessel)
     known = SIGNS | ({"rudder": "rudder: S turns to starboard, P to port, 0 amidships."} if side else {})
     signs = [meaning for what, meaning in known.items() if any(stem(n) == what for n in content.vessel.model.inputs)]
     notes = [
-        *_by_heading(content, leg),
-        f"Between the rows all orders change linearly. They deviate from commands.csv (one command every {step:g} s) "
-        "by at "
-        f"most {100 * missed:.0f} % of the range of each order. {' '.join(signs)}".rstrip(),
+        "Between the rows all orders change evenly. They differ from commands.csv (one command every "
+        f"{step:g} s) by at most {100 * missed:.0f} % of the range of each order. {' '.join(signs)}".rstrip(),
     ]
     if every < TUNING.called_order_s:
         notes.append(
@@ -134,21 +135,6 @@ def orders_notes(content: ReportContent, leg: Leg, rows: list[tuple[str, ...]], 
             "commands.csv, and use these rows to monitor it."
         )
     return notes
-
-
-def _by_heading(content: ReportContent, leg: Leg) -> list[str]:
-    """How a zig-zag that is switched by heading is ordered; nothing for other manoeuvres."""
-    spec = next((item.primitive for item in content.information if item.primitive.name == leg.name), None)
-    if spec is None or spec.family != "zigzag_heading":
-        return []
-    helm, change = (math.degrees(spec.settings[key]) for key in ("helm_rad", "heading_rad"))
-    first, other = ("S", "P") if helm > 0 else ("P", "S")
-    return [
-        f"Order by heading, not by time. From the approach course order {first} {abs(helm):.3g}. When the heading has "
-        f"changed by {change:.3g}\N{DEGREE SIGN} to that side, order {other} {abs(helm):.3g}. When it is "
-        f"{change:.3g}\N{DEGREE SIGN} to the other side of the approach course, reverse again, and so on until the run "
-        "ends. The times in the rows are those that the model needs."
-    ]
 
 
 SIGNS = {

@@ -10,7 +10,7 @@ from expdesign.export.pages import page_templates
 from expdesign.export.pages.figures import drawn
 from expdesign.export.report import tables
 from expdesign.export.report.content import ReportContent, primitive_runs
-from expdesign.export.report.figures.chart import chart
+from expdesign.export.report.figures.chart import chart, chart_legend
 from expdesign.export.report.procedure import day_sentence, procedure_sentences
 from expdesign.export.routes import require_verified
 
@@ -33,6 +33,7 @@ def cards_html(content: ReportContent) -> str:
         blanks=BLANKS,
         depths=bool(content.plan.area.depths),
         chart=overview,
+        legend=chart_legend(content),
         agenda=tables.agenda(content),
         procedure=procedure_sentences(content.plan),
         day=day_sentence(content.plan.risk, content.plan.commands.duration_s),

@@ -36,7 +36,7 @@ VARIABLES = {
 def window_figure(found: Diagnosis, index: int) -> str:
     """One stretch of data: measured, simulated by the model in use, simulated by the extended one."""
     outputs = found.before.outputs
-    figure = new_figure(9.0, 0.7 + 1.4 * len(outputs))
+    figure = new_figure(7.2, 0.7 + 1.4 * len(outputs))
     rows = np.atleast_1d(figure.subplots(len(outputs), 1, sharex=True))
     windows = found.windows
     time = np.asarray(windows.sample_s * np.arange(windows.measured.shape[1]), dtype=float)
@@ -65,7 +65,7 @@ def window_figure(found: Diagnosis, index: int) -> str:
 def growth_figure(found: Diagnosis) -> str:
     """Error of the simulation against the time since it started from a measured state."""
     outputs = found.before.outputs
-    figure = new_figure(9.0, 2.4)
+    figure = new_figure(7.2, 2.4)
     columns = np.atleast_1d(figure.subplots(1, len(outputs)))
     for index, (axes, output) in enumerate(zip(columns, outputs, strict=True)):
         label, factor = AXES[output]
@@ -97,7 +97,7 @@ def suspect_figure(found: Diagnosis, index: int, key: str) -> str:
         values, label = suspected(found, item)
         what, axis = "error of", AXES
         rows = np.stack([found.errors[index][..., OUTPUTS.index(output)] for output in outputs])
-    figure = new_figure(9.0, 2.5)
+    figure = new_figure(7.2, 2.5)
     columns = np.atleast_1d(figure.subplots(1, len(outputs)))
     for axes, output, row in zip(columns, outputs, rows, strict=True):
         name, factor = axis[output]

@@ -27,7 +27,7 @@ def run_figure(index: int, methods: tuple[Assessed, ...]) -> str:
     """One run: every output measured (thick, grey) and simulated by each method."""
     checks = [item.runs[index] for item in methods]
     run = checks[0]
-    figure = new_figure(9.0, 0.7 + 1.3 * len(run.outputs))
+    figure = new_figure(7.2, 0.7 + 1.3 * len(run.outputs))
     rows = np.atleast_1d(figure.subplots(len(run.outputs), 1, sharex=True))
     for axes, output in zip(rows, run.outputs, strict=True):
         _draw_output(axes, output, checks, [item.method.name for item in methods])
@@ -73,7 +73,7 @@ def thinned(time: Array, values: Array) -> tuple[Array, Array]:
 def residual_figure(item: Assessed, runs: tuple[str, ...], sample_time_s: float) -> str:
     """One-step residuals of all runs, one after the other."""
     found = item.one_step
-    figure = new_figure(9.0, 0.6 + 1.3 * len(found.outputs))
+    figure = new_figure(7.2, 0.6 + 1.3 * len(found.outputs))
     rows = np.atleast_1d(figure.subplots(len(found.outputs), 1, sharex=True))
     minutes = np.arange(len(found.residuals)) * sample_time_s / 60
     for axes, output, values in zip(rows, found.outputs, found.residuals.T, strict=True):
@@ -91,7 +91,7 @@ def residual_figure(item: Assessed, runs: tuple[str, ...], sample_time_s: float)
 def autocorrelation_figure(item: Assessed, sample_time_s: float) -> str:
     """Autocorrelation of the residuals of every output, with the band that white ones would keep to."""
     found = item.one_step
-    figure = new_figure(9.0, 2.2)
+    figure = new_figure(7.2, 2.2)
     columns = np.atleast_1d(figure.subplots(1, len(found.outputs), sharey=True))
     seconds = np.arange(len(found.autocorrelation)) * sample_time_s
     for axes, output, values in zip(columns, found.outputs, found.autocorrelation.T, strict=True):
@@ -108,7 +108,7 @@ def autocorrelation_figure(item: Assessed, sample_time_s: float) -> str:
 def interval_figure(methods: tuple[Assessed, ...], best: Assessed) -> str:
     """Every estimate with its 95 % interval, relative to the value in the vessel file."""
     names = best.estimate.names
-    figure = new_figure(9.0, 1.0 + 0.3 * len(names))
+    figure = new_figure(7.2, 1.0 + 0.3 * len(names))
     axes = figure.subplots()
     for place, (item, colour) in enumerate(zip(methods, LINES * len(methods), strict=False)):
         shift = 0.6 * ((place + 0.5) / len(methods) - 0.5)

@@ -9,6 +9,7 @@ from collections import Counter
 from dataclasses import dataclass
 
 from expdesign.export.indices_form.form import IndicesContent, shown
+from expdesign.export.words import speed
 from expdesign.indices import DEPTH_BY_DRAUGHT, HIGHEST_SEA, STRONGEST_WIND, Verdict, beaufort
 
 GROUPS = (
@@ -129,7 +130,7 @@ def ship_rows(content: IndicesContent) -> list[tuple[str, str]]:
 
 def _length_by_speed(content: IndicesContent) -> str:
     found = dict.fromkeys(
-        f"{content.vessel.length_m / trial.speed_mps * content.scale**0.5:.1f} s ({trial.speed_mps:.2f} m/s)"
+        f"{content.vessel.length_m / trial.speed_mps * content.scale**0.5:.1f} s at {speed(trial.speed_mps)}"
         for _, trial in content.trials
     )
     return ", ".join(found)
@@ -159,7 +160,7 @@ def condition_rows(content: IndicesContent) -> list[Shown]:
         ),
         Shown(
             name="Wind",
-            found="" if force is None else f"{held.wind_mps:g} m/s, Beaufort {force}",
+            found="" if force is None else f"{speed(held.wind_mps or 0.0)}, Beaufort {force}",
             limit=f"Beaufort {STRONGEST_WIND} at most",
             met=None if force is None else force <= STRONGEST_WIND,
         ),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from expdesign.export import words
 from expdesign.export.indices_form.appendix import condition_rows, form_lines, ship_rows
 from expdesign.export.indices_form.form import IndicesContent, shown, verdict_rows
 from expdesign.export.pages import page_templates
@@ -31,7 +32,7 @@ def indices_html(content: IndicesContent) -> str:
 
 
 def _degrees(angle_rad: float) -> str:
-    return f"{round(math.degrees(angle_rad), 1) + 0.0:.1f}"
+    return words.number(math.degrees(angle_rad), 1)
 
 
 def _metres(value: float | None) -> str:
@@ -43,7 +44,7 @@ def _circle(source: str, trial: Circle) -> tuple[str, ...]:
     current = ""
     if trial.current_north_mps is not None and trial.current_east_mps is not None:
         current = f"{trial.current_north_mps:.3f}, {trial.current_east_mps:.3f}"
-    head = (source, trial.name, trial.side, _degrees(trial.helm_rad), f"{trial.speed_mps:.3g}")
+    head = (source, trial.name, trial.side, _degrees(trial.helm_rad), words.speed(trial.speed_mps))
     return (*head, *(_metres(length) for length in lengths), current)
 
 
@@ -52,10 +53,10 @@ def _zigzag(source: str, trial: ZigZag) -> tuple[str, ...]:
     executes = ", ".join(f"{order.time_s:.1f} s at {_degrees(order.heading_rad)}" for order in trial.executes[:4])
     more = ", ..." if len(trial.executes) > 4 else ""
     head = (source, trial.name, trial.side, f"{_degrees(trial.heading_rad)} / {_degrees(trial.helm_rad)}")
-    return (*head, f"{trial.speed_mps:.3g}", overshoots, _metres(trial.initial_turning_m), executes + more)
+    return (*head, words.speed(trial.speed_mps), overshoots, _metres(trial.initial_turning_m), executes + more)
 
 
 def _stop(source: str, trial: Stop) -> tuple[str, ...]:
     lengths = (trial.track_reach_m, trial.head_reach_m, trial.lateral_m)
     times = (_degrees(trial.heading_change_rad), f"{trial.time_s:.0f}")
-    return (source, trial.name, f"{trial.speed_mps:.3g}", *(shown("_m", length) for length in lengths), *times)
+    return (source, trial.name, words.speed(trial.speed_mps), *(shown("_m", length) for length in lengths), *times)

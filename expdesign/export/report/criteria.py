@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from expdesign.durations import CRITERIA, limits_kept
 from expdesign.export import words
 from expdesign.export.report.content import ReportContent
+from expdesign.export.report.tables import shown_names
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,13 +74,12 @@ def certificate(content: ReportContent) -> str:
         return f"There is no certificate of optimality: {proof.kind.removeprefix('none: ')}."
     best = int(net.argmax())
     price = " minus the price of the limits" if proof.multipliers else ""
-    gap = words.significant(design.gap, 2) if design.gap > 1e-6 else "0.000001"
+    named = shown_names(content).get(design.problem.names[best], design.problem.names[best])
     return (
-        f"The durations are optimal if no sensitivity{price} exceeds the bound {words.significant(proof.level, 6)}, "
-        f"and every used manoeuvre reaches it ({proof.kind}). The largest value is {words.number(float(net[best]), 6)} "
-        f"({design.problem.names[best]}). The logarithm of the criterion, {words.number(proof.value, 3)}, can "
-        f"therefore increase by {gap} at most: no other durations of these manoeuvres are better by more than "
-        f"{short_of_optimum(content)} in {design.problem.aim.criterion}-efficiency."
+        f"The durations are optimal if no sensitivity{price} exceeds the bound {words.significant(proof.level, 4)}, "
+        f"and every used manoeuvre reaches it ({proof.kind}). The largest value is "
+        f"{words.significant(float(net[best]), 4)}, that of {named}. So no other durations of these manoeuvres are "
+        f"better by more than {short_of_optimum(content)} in {design.problem.aim.criterion}-efficiency."
     )
 
 

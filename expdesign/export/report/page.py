@@ -12,7 +12,7 @@ from expdesign.export.pages.figures import drawn
 from expdesign.export.report import criteria, tables
 from expdesign.export.report.checks import checks, conditions
 from expdesign.export.report.content import ReportContent, primitive_runs
-from expdesign.export.report.figures.chart import chart
+from expdesign.export.report.figures.chart import chart, chart_legend
 from expdesign.export.report.figures.design import durations_figure, information_figure
 from expdesign.export.report.figures.gallery import primitive_figure
 from expdesign.export.report.figures.timeline import timeline_figure
@@ -33,9 +33,7 @@ SUBTRACTION = {
 }
 
 
-MORE_THAN_OPTIMAL = (
-    " (more than 100 % because the legs between the runs add time and motions that no manoeuvre of the dictionary has)"
-)
+MORE_THAN_OPTIMAL = " It is more than 100 % because the legs between the runs inform, too."
 UNKNOWN_DEPTH = "No depths were checked: the chart shows only land. Check the whole track against the official chart."
 
 
@@ -66,6 +64,7 @@ def report_html(content: ReportContent) -> str:
         comparison=criteria.comparison(content),
         limits=criteria.limit_rows(content),
         assumptions=assumptions(content),
+        legend=chart_legend(content),
         agenda=tables.agenda(content),
         primitives=tables.primitive_rows(content),
         parameters=rows,
@@ -76,7 +75,7 @@ def report_html(content: ReportContent) -> str:
         conditions=conditions(content),
         checks=checks(content),
         procedure=procedure_sentences(content.plan),
-        day_rows=[] if content.day is None else tables.day_rows(content.day),
+        day_rows=[] if content.day is None else tables.day_rows(content, content.day),
         day_sentences=[] if content.day is None else tables.day_sentences(content.day),
         growth=[] if content.growth is None else growth_rows(content.growth),
         grown=("", "") if content.growth is None else growth_sentences(content.growth),
@@ -118,8 +117,8 @@ def summary(content: ReportContent) -> list[str]:
     plan, check = content.plan, content.plan.verification
     total, runs = plan.commands.duration_s, len(primitive_runs(plan))
     bound = (
-        f" (lower bound for these runs at this transit speed: {words.duration(plan.reposition_bound_s)}, with the "
-        "fastest known changes of speed)"
+        f" At this transit speed these runs need at least {words.duration(plan.reposition_bound_s)} of repositioning, "
+        "in any order and place."
     )
     verdict = (
         f"The plan is verified. An independent simulation of its commands keeps the hull at least "
@@ -132,7 +131,7 @@ def summary(content: ReportContent) -> list[str]:
     return [
         f"The trial takes {words.duration(total)} and {words.distance(plan.trajectory.distance_m)} from start to goal: "
         f"{words.duration(plan.seconds('primitive'))} in {words.counted(runs, 'informative run')}, and "
-        f"{words.duration(plan.seconds('reposition'))} of repositioning{bound if plan.reposition_bound_s > 0 else ''}.",
+        f"{words.duration(plan.seconds('reposition'))} of repositioning.{bound if plan.reposition_bound_s > 0 else ''}",
         *lattice_sentences(plan.lattice),
         *([day] if (day := day_sentence(plan.risk, total)) else []),
         verdict,
@@ -166,19 +165,18 @@ def _design_sentence(content: ReportContent) -> str:
             f"{words.percent(content.day.information)} of the information needed."
         )
     text = (
-        f"The durations are optimal for the estimation of {words.counted(len(content.parameters), 'model parameter')}. "
-        f"Rounded to whole runs they reach {words.percent(design.efficiency_repeats)} of the certified optimum; equal "
-        f"time for every manoeuvre would reach {words.percent(design.efficiency_uniform)}"
+        f"The durations are the best for estimating {words.counted(len(content.parameters), 'model parameter')}. "
+        f"Rounded to whole runs they reach {words.percent(design.efficiency_repeats)} of the optimum. Equal time for "
+        f"every manoeuvre would reach {words.percent(design.efficiency_uniform)}."
     )
     if realised is None:
-        return f"{text}."
-    optimal = words.duration(design.problem.total_s)
-    more = MORE_THAN_OPTIMAL if realised > 1 else ""
+        return text
     placed = content.plan.design_efficiency_placed
-    runs = "" if placed is None else f"the runs as placed collect {words.percent(placed)}, and "
+    runs = "" if placed is None else f" The runs as placed collect {words.percent(placed)} of it."
     return (
-        f"{text}. Compared with {optimal} of the optimal design, {runs}the whole track including repositioning "
-        f"collects {words.percent(realised)}{more}."
+        f"{text} The whole track, repositioning included, collects {words.percent(realised)} of the information that "
+        f"{words.duration(design.problem.total_s)} of the optimal design would."
+        f"{MORE_THAN_OPTIMAL if realised > 1 else ''}{runs}"
     )
 
 
@@ -203,9 +201,9 @@ def facts(content: ReportContent) -> list[Fact]:
             remark=f"{words.distance(content.clearance_m)} required{'' if plan.area.depths else '; to land only'}",
         ),
         Fact(
-            name="Optimality gap",
+            name="Short of the optimum by",
             value=criteria.short_of_optimum(content),
-            remark="certified bound"
+            remark="at most, proven"
             + (f"; whole runs reach {words.percent(design.efficiency_repeats)}" if content.day is None else ""),
         ),
         Fact(

@@ -32,7 +32,7 @@ def _tolerances(risk: RiskEstimate, runs: list[bool]) -> str:
     position = least if least == most else f"the distance on its card ({least} to {most}, depending on the sea room)"
     return (
         f"the position is within {position} of the planned start, the heading within "
-        f"{words.significant(math.degrees(risk.heading_rad), 2)}{words.NB}\N{DEGREE SIGN}, the velocity over ground "
+        f"{words.significant(math.degrees(risk.heading_rad), 2)}\N{DEGREE SIGN}, the velocity over ground "
         f"within {words.speed(risk.speed_mps)} and the yaw rate within "
         f"{words.significant(math.degrees(risk.yaw_rate_radps), 2)}{words.NB}\N{DEGREE SIGN}/s of the planned ones"
     )
@@ -72,6 +72,7 @@ def day_sentence(risk: RiskEstimate | None, planned_s: float) -> str:
     warning = f"Warning: {risk.note}. " if risk.note else ""
     whole = words.duration(planned_s + max(risk.extra_most_s, 0.0))
     return (
-        f"{warning}Returning to the start of each run takes time in addition to the plan: {extra_words(risk)}. "
+        f"{warning}Returning to the start of each run takes time in addition to the plan: {_more(risk.extra_median_s)} "
+        f"in the middle of the simulated trials, and at most {_more(risk.extra_most_s)} in 95{words.NB}% of them. "
         f"Reserve {whole} from start to goal, without breaks."
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,12 +35,15 @@ class AgendaRow:
 
 def agenda(content: ReportContent) -> list[AgendaRow]:
     """The agenda: time, name, duration, position, heading and speeds of every leg."""
-    plan = content.plan
+    plan, names = content.plan, shown_names(content)
     numbers = {run.leg: run.number for run in primitive_runs(plan)}
-    return [_agenda_row(plan, index, leg, numbers.get(index)) for index, leg in enumerate(plan.legs)]
+    return [
+        _agenda_row(plan, index, leg, numbers.get(index), names.get(leg.name, leg.name))
+        for index, leg in enumerate(plan.legs)
+    ]
 
 
-def _agenda_row(plan: Plan, index: int, leg: Leg, run: int | None) -> AgendaRow:
+def _agenda_row(plan: Plan, index: int, leg: Leg, run: int | None, name: str) -> AgendaRow:
     pose = plan.trajectory.pose[leg.first]
     lat, lon = plan.area.frame.to_degrees(pose[:2]).tolist()
     before, after = (float(np.hypot(*plan.trajectory.velocity[sample, :2])) for sample in (leg.first, leg.last))
@@ -47,7 +51,7 @@ def _agenda_row(plan: Plan, index: int, leg: Leg, run: int | None) -> AgendaRow:
         leg=index,
         run=run,
         starts=words.clock(leg.first * plan.commands.sample_time_s),
-        what=leg.name if run else f"reposition to {leg.name}",
+        what=name if run else f"reposition to {name}",
         lasts=words.duration((leg.last - leg.first) * plan.commands.sample_time_s),
         latitude=words.latitude(lat),
         longitude=words.longitude(lon),
@@ -91,7 +95,7 @@ def primitive_rows(content: ReportContent) -> list[PrimitiveRow]:
     )
     return [
         PrimitiveRow(
-            name=item.primitive.name,
+            name=shown_name(item),
             family=item.primitive.family.replace("_", " "),
             settings=settings_sentence(item),
             lasts=words.duration(item.primitive.duration_s),
@@ -118,21 +122,33 @@ UNITS = {
 """Ending of a setting's name -> unit shown and factor to it."""
 
 
+UNITS_IN_NAMES = UNITS | {"mps": (f"{words.NB}kn", KNOTS_PER_MPS)}
+
+
+def shown_names(content: ReportContent) -> dict[str, str]:
+    """Name in the files -> name as people read it; the same where two would be shown alike."""
+    shown = {item.primitive.name: shown_name(item) for item in content.information}
+    twice = {name for name, count in Counter(shown.values()).items() if count > 1}
+    return {name: name if text in twice else text for name, text in shown.items()}
+
+
 def shown_name(item: PrimitiveInformation) -> str:
-    """The name of a primitive with its angles in degrees: turning-circle-helm-35\N{DEGREE SIGN}."""
+    """The name of a primitive with angles in degrees and speeds in knots: circle-speed-4 kn-helm-35\N{DEGREE SIGN}."""
     name = item.primitive.name
     for key, value in item.primitive.settings.items():
-        unit, factor = UNITS.get(key.rpartition("_")[2], ("", 1.0))
-        text = f"{key.rpartition('_')[0].replace('_', '-')}-{value:.12g}"
-        if unit.startswith("\N{DEGREE SIGN}") and f"{name}-".find(f"-{text}-") >= 0:
-            shown = words.significant(value * factor)
+        stem, _, ending = key.rpartition("_")
+        unit, factor = UNITS_IN_NAMES.get(ending, ("", 1.0))
+        text = f"{stem.replace('_', '-')}-{value:.12g}"
+        if unit.startswith(("\N{DEGREE SIGN}", words.NB)) and f"{name}-".find(f"-{text}-") >= 0:
+            shown = words.number(value * factor, 1) if ending == "mps" else words.significant(value * factor)
             name = f"{name}-".replace(f"-{text}-", f"-{text.removesuffix(f'{value:.12g}')}{shown}{unit}-")[:-1]
     return name
 
 
 def settings_sentence(item: PrimitiveInformation) -> str:
-    """Settings of a primitive in friendly units, its duration left out."""
-    chosen = {name: value for name, value in item.primitive.settings.items() if name != "duration_s"}
+    """Settings of a primitive in friendly units, without its duration and offsets of zero."""
+    settings = item.primitive.settings.items()
+    chosen = {name: value for name, value in settings if name != "duration_s" and (value or "offset" not in name)}
     return ", ".join(setting(name, value) for name, value in chosen.items())
 
 
@@ -141,16 +157,20 @@ def setting(name: str, value: float) -> str:
     stem, _, ending = name.rpartition("_")
     unit, factor = UNITS.get(ending, ("", 1.0)) if stem else ("", 1.0)
     title = (stem if unit else name).replace("_", " ")
-    return f"{title} {words.significant(value * factor)} {unit}".rstrip()
+    if ending == "mps" and value:
+        knots = words.number(value * KNOTS_PER_MPS, 1)
+        return f"{title} {words.significant(value)}{words.NB}m/s ({knots}{words.NB}kn)"
+    gap = "" if unit == "\N{DEGREE SIGN}" else words.NB
+    return f"{title} {words.significant(value * factor)}{gap}{unit}".rstrip()
 
 
 def _entry(item: PrimitiveInformation) -> str:
     u, v, r = item.primitive.entry_velocity.tolist()
     if np.hypot(u, v) < REST_MPS and abs(r) < REST_RADPS:
         return "at rest"
-    parts = [f"{words.number(u)} m/s ahead"]
+    parts = [f"{words.speed(u)} ahead"]
     if abs(v) >= REST_MPS:
-        parts.append(f"{words.number(abs(v))} m/s to {'starboard' if v > 0 else 'port'}")
+        parts.append(f"{words.speed(abs(v))} to {'starboard' if v > 0 else 'port'}")
     if abs(r) >= REST_RADPS:
         side = "starboard" if r > 0 else "port"
         parts.append(f"turning {words.number(abs(np.degrees(r)))} \N{DEGREE SIGN}/s to {side}")
@@ -172,15 +192,16 @@ def excitation_sentence(content: ReportContent) -> str:
     )
 
 
-def day_rows(day: ShortestDay) -> list[tuple[str, ...]]:
+def day_rows(content: ReportContent, day: ShortestDay) -> list[tuple[str, ...]]:
     """The days planned in search of the shortest, in order."""
+    names = shown_names(content)
     return [
         (
             str(number),
             words.duration(item.day_s),
             words.duration(item.informative_s),
             words.percent(item.information),
-            ", ".join(f"{count} {name}" for name, count in item.runs.items()) or "none",
+            ", ".join(f"{count} {names.get(name, name)}" for name, count in item.runs.items()) or "none",
         )
         for number, item in enumerate(day.tried, start=1)
     ]
@@ -191,8 +212,8 @@ def day_sentences(day: ShortestDay) -> list[str]:
     plan = day.plan
     runs, legs = (words.duration(plan.seconds(kind)) for kind in ("primitive", "reposition"))
     return [
-        f"The day takes {words.duration(plan.commands.duration_s)}: {runs} in runs and {legs} in legs, which "
-        "tell, too. Its whole track holds "
+        f"The day takes {words.duration(plan.commands.duration_s)}: {runs} in runs and {legs} in the "
+        "legs between them. Legs inform, too. The whole track holds "
         f"{words.percent(day.information)} of the information that the accuracy asked for needs.",
         f"It is the shortest that is so accurate, of {words.counted(len(day.tried), 'day')} planned. The runs tried "
         f"last cost {words.duration(day.cost_s)} with their share of the repositioning; at these prices no "

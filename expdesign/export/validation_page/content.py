@@ -70,9 +70,9 @@ def _comparison(content: ValidationContent) -> Iterator[str]:
     for other in others:
         ratio = float(np.exp(np.mean(np.log(other.found / best.found))))
         yield (
-            f"{best.design.capitalize()} against {other.design}: standard deviations of the second are {ratio:.2f} "
-            f"times as large (geometric mean). The median normalised errors are {np.median(best.errors):.3g} and "
-            f"{np.median(other.errors):.3g}."
+            f"{other.design.capitalize()}: standard deviations are {ratio:.2f} times (geometric mean) those of the "
+            f"{best.design} design. The median error is {np.median(other.errors):.3g}, that of the {best.design} "
+            f"design {np.median(best.errors):.3g}."
         )
 
 

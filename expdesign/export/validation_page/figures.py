@@ -11,7 +11,7 @@ from expdesign.rehearsal import Validated
 
 def error_figure(results: tuple[Validated, ...]) -> str:
     """Share of trials below each normalised error, one line per design."""
-    figure = new_figure(8.0, 3.4)
+    figure = new_figure(6.4, 3.4)
     axes = figure.subplots()
     for result, colour in zip(results, LINES, strict=False):
         errors = np.sort(result.errors)
@@ -22,10 +22,10 @@ def error_figure(results: tuple[Validated, ...]) -> str:
     if low < ERROR_LIMIT < high:
         axes.axvline(ERROR_LIMIT, color=GREY, linewidth=0.8, linestyle="--", label=f"good below {ERROR_LIMIT:g}")
     round_ticks(axes)
-    axes.set_xlabel("root mean square of (estimate \N{MINUS SIGN} truth) / |truth| over the parameters")
+    axes.set_xlabel("error of a trial, relative to the true parameters")
     axes.set_ylabel("trials below [%]")
     axes.set_ylim(0, 101)
-    axes.legend(loc="lower right")
+    axes.legend(loc="upper left", fontsize=9)
     light_grid(axes)
     return svg(figure, key="errors", label="Share of simulated trials below each normalised error, by design")
 
@@ -33,7 +33,7 @@ def error_figure(results: tuple[Validated, ...]) -> str:
 def spread_figure(result: Validated) -> str:
     """Observed over predicted standard deviation of each parameter, with its sampling error."""
     names = [plain(name) for name in result.parameters]
-    figure = new_figure(8.0, 1.1 + 0.26 * len(names))
+    figure = new_figure(6.4, 1.1 + 0.26 * len(names))
     axes = figure.subplots()
     rows = np.arange(len(names))
     axes.axvline(1.0, color="black", linewidth=1.0)

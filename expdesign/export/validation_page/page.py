@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from expdesign.estimation.methods import method_named
+from expdesign.export import words
 from expdesign.export.pages import page_templates
 from expdesign.export.pages.figures import report_style
 from expdesign.export.validation_page.content import ERROR_LIMIT, ValidationContent, judgements
@@ -65,11 +66,11 @@ def _parameter_rows(result: Validated) -> list[tuple[str, ...]]:
             _text(result.theory[index]),
             _text(result.forecast[index]),
             _text(result.stated[:, index].mean()),
-            f"{100 * result.coverage[index]:.0f} %" if np.isfinite(result.truth[index]) else "-",
+            f"{100 * result.coverage[index]:.0f} %" if np.isfinite(result.truth[index]) else "\N{EN DASH}",
         )
         for index, name in enumerate(result.parameters)
     ]
 
 
 def _text(value: float) -> str:
-    return f"{value:.3g}" if np.isfinite(value) else "-"
+    return words.significant(value) if np.isfinite(value) else "\N{EN DASH}"

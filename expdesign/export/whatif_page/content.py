@@ -138,7 +138,7 @@ def _accuracy(first: Case, case: Case, against: Against) -> str:
         return f"In {minutes:.1f} min it collects the same information as {scenario}."
     return (
         f"In {minutes:.1f} min it collects {against.accuracy:.2f} times the information of the scenario in "
-        f"{first.informative_s / 60:.1f} min (determinant, per parameter). The same accuracy takes {needed:.1f} min."
+        f"{first.informative_s / 60:.1f} min. The same accuracy takes {needed:.1f} min."
     )
 
 

@@ -11,7 +11,7 @@ from expdesign.export.whatif_page.content import WhatIfContent
 def time_figure(content: WhatIfContent) -> str:
     """Informative time, with the repositioning where planned, and the time for the accuracy of the scenario."""
     cases = [case for case in content.cases if not case.problem]
-    figure = new_figure(8.0, 1.3 + 0.42 * len(cases))
+    figure = new_figure(6.4, 1.3 + 0.42 * len(cases))
     axes = figure.subplots()
     rows = np.arange(len(cases))
     axes.barh(rows, [case.informative_s / 60 for case in cases], height=0.55, color=VERMILION, alpha=0.75, label="runs")
@@ -20,7 +20,7 @@ def time_figure(content: WhatIfContent) -> str:
         begin = [case.informative_s / 60 for case in cases]
         axes.barh(rows, moving, left=begin, height=0.55, color=REPOSITION, alpha=0.6, label="repositioning")
     same = [against.same_accuracy_s / 60 if (against := content.against(case)) else np.nan for case in cases]
-    axes.plot(same, rows, "D", color="white", markeredgecolor="black", label="runs for the accuracy of the scenario")
+    axes.plot(same, rows, "D", color="white", markeredgecolor="black", label="for the same accuracy")
     axes.set_yticks(rows, [plain(case.name) for case in cases])
     axes.invert_yaxis()
     axes.set_xlabel("time [min]")
@@ -35,7 +35,7 @@ def ratio_figure(content: WhatIfContent) -> str | None:
     if not compared:
         return None
     names = content.cases[0].parameters
-    figure = new_figure(8.0, 1.3 + 0.26 * len(names))
+    figure = new_figure(6.4, 1.3 + 0.26 * len(names))
     axes = figure.subplots()
     axes.axvline(1.0, color="black", linewidth=1.0, label=plain(content.cases[0].name))
     for (case, against), colour in zip(compared, LINES * 9, strict=False):
@@ -56,7 +56,7 @@ def runs_figure(content: WhatIfContent) -> str:
     cases = [case for case in content.cases if not case.problem]
     names = list(dict.fromkeys(name for case in cases for name in case.runs))
     table = np.array([[case.runs.get(name, 0) for name in names] for case in cases])
-    figure = new_figure(8.0, 1.6 + 0.3 * len(names))
+    figure = new_figure(6.4, 1.6 + 0.3 * len(names))
     axes = figure.subplots()
     axes.imshow(
         np.where(table > 0, table, np.nan).T, cmap="Blues", vmin=0, vmax=1.6 * max(1, table.max()), aspect="auto"

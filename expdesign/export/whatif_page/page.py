@@ -35,7 +35,7 @@ def table_header(content: WhatIfContent) -> tuple[str, ...]:
         "time [min]",
         "information",
         "same accuracy [min]",
-        "certificate gap",
+        "short of optimum",
         *planned,
     )
 
@@ -57,13 +57,18 @@ def table_row(content: WhatIfContent, case: Case) -> tuple[str, ...]:
         f"{case.informative_s / 60:.1f}",
         "-" if against is None else f"{against.accuracy:.2f} \N{MULTIPLICATION SIGN}",
         "-" if against is None else f"{against.same_accuracy_s / 60:.1f}",
-        f"{case.gap_relative:.0e}",
+        _short(case.gap_relative),
         *planned,
     )
 
 
 def _row(content: WhatIfContent, case: Case) -> tuple[tuple[str, ...], tuple[str, ...], str]:
     return table_row(content, case), case.changes, case.problem
+
+
+def _short(gap: float) -> str:
+    """A proven distance from the optimum, with no more digits than anyone can use."""
+    return "below 0.01 %" if gap < 1e-4 else f"{100 * gap:.2g} %"
 
 
 def _minutes(value: object) -> str:

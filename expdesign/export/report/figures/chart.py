@@ -1,8 +1,10 @@
-"""The chart: land, allowed water, the track by kind of leg, runs numbered in order."""
+"""The chart: land, water with its safety contour, the track by kind of leg, runs numbered in order."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,17 +29,19 @@ from expdesign.export.report.figures.footprints import footprints
 from expdesign.export.report.figures.labels import place_labels
 from expdesign.export.report.figures.position_axes import draw_position_ticks, draw_scale_and_north
 from expdesign.export.tuning import TUNING
+from expdesign.indices import DEPTH_BY_DRAUGHT
 from expdesign.plan.values import Plan
 from expdesign.sea_area import SeaArea, as_multipolygon, eroded
 from expdesign.values import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch, PathPatch
+    from matplotlib.patches import PathPatch
 
-WIDTH_IN = 8.0
+WIDTH_IN = 6.4
 KINDS = {"reposition": (REPOSITION, 1.3), "primitive": (PRIMITIVE, 2.4)}
+SHALLOW, DEEP, SAFETY = "#a9cfe8", "#ffffff", "#3f4a55"
+"""Water within the safety contour, water deep enough for trials in deep water, and the contour itself."""
 Box = tuple[float, float, float, float]
 
 
@@ -46,14 +50,14 @@ def chart(content: ReportContent) -> str:
     plan = content.plan
     box = view(content)
     west, south, east, north = box
-    map_width_in = WIDTH_IN - 1.0
+    map_width_in = WIDTH_IN - 0.9
     height_in = map_width_in * (north - south) / (east - west)
-    figure = new_figure(WIDTH_IN, height_in + 1.5)
+    figure = new_figure(WIDTH_IN, height_in + 0.4)
     axes = figure.subplots()
     axes.set_aspect("equal")
     axes.set_xlim(west, east)
     axes.set_ylim(south, north)
-    draw_sea(axes, plan.area, box, content.clearance_m)
+    draw_sea(axes, plan.area, box, clearance_m=content.clearance_m, draught_m=content.vessel.draught_m)
     for covered in footprints(content):
         axes.add_patch(_patch(covered, facecolor=PRIMITIVE, alpha=0.18, edgecolor="none"))
     _draw_track(axes, plan, content.vessel.hull_b, least_length_m=0.022 * (east - west))
@@ -61,7 +65,6 @@ def chart(content: ReportContent) -> str:
     _draw_runs(axes, plan, metres_per_inch=(east - west) / map_width_in)
     draw_position_ticks(axes, plan.area.frame, box)
     draw_scale_and_north(axes, box)
-    figure.legend(handles=_legend(content), loc="outside lower center", ncols=3, fontsize=9)
     label = f"Chart of the trial in {plan.area.name}: track, {len(primitive_runs(plan))} numbered runs, start and goal"
     return svg(figure, key="chart", label=label)
 
@@ -79,16 +82,25 @@ def view(content: ReportContent) -> Box:
     )  # fmt: skip
 
 
-def draw_sea(axes: Axes, area: SeaArea, box: Box, clearance_m: float) -> None:
-    """Forbidden as background, allowed water, land, and how near the hull may come."""
+def draw_sea(axes: Axes, area: SeaArea, box: Box, *, clearance_m: float, draught_m: float) -> None:
+    """Forbidden as background, water in the shades of an electronic chart, land, and how near the hull may come.
+
+    Water shallower than the safety contour is blue, deeper water pale, and from the depth of `deep_from` on white. The
+    safety contour is the bold line; there is none where depth is not charted.
+
+    Source: IHO S-52 (2014), presentation of depth areas and the safety contour.
+    """
     axes.set_facecolor(FORBIDDEN)
     around = shapely.box(*box).buffer(3 * clearance_m + 1.0, join_style="mitre")
     detail = (box[2] - box[0]) / 2000
     near = as_multipolygon(shapely.intersection(area.water, around))
     axes.add_patch(_patch(shapely.simplify(near, detail), facecolor=WATER, edgecolor="#7aa6c2", linewidth=0.5))
-    for number, (_, polygons) in enumerate(area.depths):
-        deep = as_multipolygon(shapely.simplify(shapely.intersection(polygons, around), detail))
-        axes.add_patch(_patch(deep, facecolor=depth_colour(number, len(area.depths)), edgecolor="none", alpha=0.6))
+    for shade, polygons in _depth_shades(area, draught_m, around):
+        axes.add_patch(_patch(shapely.simplify(polygons, detail), facecolor=shade, edgecolor="none"))
+    contour = safety_contour(area)
+    if contour is not None:
+        line = shapely.simplify(_at_least(area, contour, around), detail)
+        axes.add_patch(_patch(line, facecolor="none", edgecolor=SAFETY, linewidth=1.6))
     land = as_multipolygon(shapely.simplify(shapely.intersection(area.land, around), detail))
     axes.add_patch(_patch(land, facecolor=LAND, edgecolor="#8a7440", linewidth=0.5))
     if clearance_m > 0:
@@ -96,15 +108,41 @@ def draw_sea(axes: Axes, area: SeaArea, box: Box, clearance_m: float) -> None:
         axes.add_patch(_patch(safe, facecolor="none", edgecolor=GREY, linewidth=0.7, linestyle=(0, (2, 2))))
 
 
-def shown_depths(count: int) -> set[int]:
-    """Numbers of the depths in the legend: few of them, the shallowest and the deepest among them."""
-    return set(np.linspace(0, count - 1, min(count, TUNING.legend_depths)).round().astype(int).tolist())
+def _depth_shades(
+    area: SeaArea, draught_m: float, around: shapely.Geometry
+) -> Iterator[tuple[str, shapely.MultiPolygon]]:
+    """(shade, water of it) from shallow to deep; later ones cover earlier ones."""
+    if not area.depths:
+        return
+    contour = safety_contour(area)
+    yield SHALLOW, _at_least(area, -math.inf, around)
+    if contour is not None:
+        yield WATER, _at_least(area, contour, around)
+    deep = deep_from(area, draught_m)
+    if deep is not None:
+        yield DEEP, _at_least(area, deep, around)
 
 
-def depth_colour(number: int, count: int) -> str:
-    """Shallow to deep: from the blue of charts to white, as on paper charts."""
-    share = number / max(count - 1, 1)
-    return "#" + "".join(f"{round(low + share * (255 - low)):02x}" for low in (0xB7, 0xD7, 0xEE))
+def _at_least(area: SeaArea, depth_m: float, around: shapely.Geometry) -> shapely.MultiPolygon:
+    near = [shapely.intersection(polygons, around) for depth, polygons in area.depths if depth >= depth_m]
+    return as_multipolygon(shapely.union_all(near))
+
+
+def safety_contour(area: SeaArea) -> float | None:
+    """The charted depth that bounds the allowed water [m]; None where depth does not bound it."""
+    left: shapely.Geometry = area.water
+    for depth, polygons in reversed(area.depths):
+        left = left.difference(polygons)
+        if left.area <= TUNING.uncharted_share * area.water.area:
+            return float(depth)
+    return None
+
+
+def deep_from(area: SeaArea, draught_m: float) -> float | None:
+    """The least charted depth that counts as deep water for manoeuvring trials [m]; None where there is none."""
+    contour = safety_contour(area)
+    deep = [depth for depth, _ in area.depths if depth >= DEPTH_BY_DRAUGHT * draught_m]
+    return min(deep) if deep and contour is not None and min(deep) > contour else None
 
 
 def _patch(geometry: shapely.Geometry, **style: object) -> PathPatch:
@@ -162,29 +200,40 @@ def _draw_runs(axes: Axes, plan: Plan, *, metres_per_inch: float) -> None:
         )  # fmt: skip
 
 
-def _legend(content: ReportContent) -> Sequence[Line2D | Patch]:
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
+@dataclass(frozen=True, kw_only=True)
+class LegendEntry:
+    """One entry of the legend: a sign in a colour, or an area of it where there is no sign."""
 
-    reposition, primitive = KINDS["reposition"], KINDS["primitive"]
-    clearance = f"{content.clearance_m:g} m from forbidden water"
-    covered = f"hull area with {100 * content.confidence:g} % probability"
-    depths = content.plan.area.depths
-    shown = (
-        Patch(facecolor=depth_colour(number, len(depths)), edgecolor="#7aa6c2", alpha=0.6, label=f"{depth:g} m or more")
-        for number, (depth, _) in enumerate(depths)
-        if number in shown_depths(len(depths))
-    )
-    return (
-        Line2D([], [], color=primitive[0], linewidth=primitive[1], label="informative run, numbered"),
-        Patch(facecolor=PRIMITIVE, alpha=0.18, label=covered),
-        Line2D([], [], color=reposition[0], linewidth=reposition[1], label="repositioning"),
-        Line2D([], [], color=BLACK, marker="x", linestyle="", markeredgewidth=2, label="least clearance"),
-        Line2D([], [], color=GREEN, marker="o", linestyle="", markersize=9, label="start"),
-        Line2D([], [], color=PURPLE, marker="*", linestyle="", markersize=13, label="goal"),
-        Line2D([], [], color=GREY, linewidth=0.8, linestyle=(0, (2, 2)), label=clearance),
-        Patch(facecolor=WATER, edgecolor="#7aa6c2", label="allowed water, within the safety contour"),
-        Patch(facecolor=LAND, edgecolor="#8a7440", label="land"),
-        Patch(facecolor=FORBIDDEN, edgecolor=GREY, label="forbidden or uncharted"),
-        *shown,
-    )
+    text: str
+    colour: str
+    sign: str = ""
+
+
+def chart_legend(content: ReportContent) -> list[LegendEntry]:
+    """The signs of the chart, for the text under it: only those that it shows."""
+    area, box = content.plan.area, shapely.box(*view(content))
+    contour, deep = safety_contour(area), deep_from(area, content.vessel.draught_m)
+    entries = [
+        LegendEntry(text="run, numbered", colour=PRIMITIVE, sign="\N{BOX DRAWINGS HEAVY HORIZONTAL}"),
+        LegendEntry(text="repositioning", colour=REPOSITION, sign="\N{BOX DRAWINGS LIGHT HORIZONTAL}"),
+        LegendEntry(text=f"the hull stays here with {100 * content.confidence:g} % probability", colour="#f8ddd0"),
+        LegendEntry(text="start", colour=GREEN, sign="\N{BLACK CIRCLE}"),
+        LegendEntry(text="goal", colour=PURPLE, sign="\N{BLACK STAR}"),
+        LegendEntry(text="least clearance", colour=BLACK, sign="\N{MULTIPLICATION X}"),
+    ]
+    if content.clearance_m > 0:
+        text = f"{content.clearance_m:g} m from forbidden water"
+        entries.append(LegendEntry(text=text, colour=GREY, sign="\N{BOX DRAWINGS LIGHT TRIPLE DASH HORIZONTAL}"))
+    if contour is not None:
+        text = f"safety contour, {contour:g} m"
+        entries.append(LegendEntry(text=text, colour=SAFETY, sign="\N{BOX DRAWINGS HEAVY HORIZONTAL}"))
+        entries.append(LegendEntry(text=f"shallower than {contour:g} m", colour=SHALLOW))
+    safe = "allowed water" if contour is None else f"{contour:g} m or more"
+    entries.append(LegendEntry(text=safe if deep is None else f"{contour:g} to {deep:g} m", colour=WATER))
+    if deep is not None:
+        entries.append(LegendEntry(text=f"{deep:g} m or more: deep for trials", colour=DEEP))
+    if area.land.intersects(box):
+        entries.append(LegendEntry(text="land", colour=LAND))
+    if not shapely.union_all([area.water, area.land, *(each for _, each in area.depths)]).covers(box):
+        entries.append(LegendEntry(text="forbidden or uncharted", colour=FORBIDDEN))
+    return entries

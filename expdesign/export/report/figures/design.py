@@ -9,6 +9,7 @@ import numpy as np
 from expdesign.durations import DurationDesign
 from expdesign.export.pages.figures import BLUE, GREY, PRIMITIVE, light_grid, new_figure, short, svg
 from expdesign.export.report.content import ReportContent, relative_information
+from expdesign.export.report.tables import shown_names
 from expdesign.export.tuning import TUNING
 
 if TYPE_CHECKING:
@@ -18,12 +19,12 @@ if TYPE_CHECKING:
 def durations_figure(content: ReportContent) -> str:
     """Left: time of each primitive, optimal and in whole runs. Right: its sensitivity against the bound."""
     design = content.design
-    names = [short(name) for name in design.problem.names]
-    figure = new_figure(8.0, 1.5 + 0.32 * len(names))
+    names = [short(name) for name in shown_names(content).values()]
+    figure = new_figure(6.4, 1.5 + 0.32 * len(names))
     times, sensitivities = figure.subplots(1, 2, sharey=True, width_ratios=(3, 2))
     _draw_times(times, design)
     _draw_sensitivities(sensitivities, design)
-    times.set_yticks(range(len(names)), names)
+    times.set_yticks(range(len(names)), names, fontsize=9)
     times.invert_yaxis()
     label = "Time of each primitive, and its sensitivity against the bound of the optimality certificate"
     return svg(figure, key="durations", label=label)
@@ -41,7 +42,7 @@ def _draw_times(axes: Axes, design: DurationDesign) -> None:
         axes.annotate(text, (beyond, row), (8, 0), textcoords="offset points", va="center", fontsize=9)
     axes.set_xlabel("time [min]")
     axes.set_xlim(0, 1.14 * max(whole.max(), optimal.max()))
-    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, fontsize=9)
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=1, fontsize=9)
     light_grid(axes, "x")
 
 
@@ -56,15 +57,15 @@ def _draw_sensitivities(axes: Axes, design: DurationDesign) -> None:
     low, high = min(0.0, float(net.min())), max(bound, float(net.max()))
     axes.set_xlim(low - 0.12 * (high - low) * (low < 0), high + 0.12 * (high - low))
     axes.set_xlabel("sensitivity minus price" if design.certificate.multipliers else "sensitivity")
-    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=9, columnspacing=1.0)
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, fontsize=9, columnspacing=1.0)
     light_grid(axes, "x")
 
 
 def information_figure(content: ReportContent) -> str:
     """Heat map: for each parameter, information per minute of each primitive relative to the best one."""
     share = relative_information(content).T
-    names = [short(name) for name in content.design.problem.names]
-    figure = new_figure(min(2.2 + 0.62 * len(names), 14.0), 1.9 + 0.3 * len(content.parameters))
+    names = [short(name) for name in shown_names(content).values()]
+    figure = new_figure(min(max(2.2 + 0.62 * len(names), 6.4), 14.0), 1.9 + 0.3 * len(content.parameters))
     axes = figure.subplots()
     mesh = axes.pcolormesh(share, cmap="cividis", vmin=0.0, vmax=1.0, edgecolors="white", linewidth=1.0)
     for (row, column), value in np.ndenumerate(share):

@@ -34,8 +34,8 @@ def draw_position_ticks(
     lons, lon_decimals = _round_minutes(lon_low, lon_high + 360.0 * (lon_high < lon_low), most_lon)
     ticks_north = [float(frame.to_metres(np.array([lat, lon_low]))[0]) for lat in lats]
     ticks_east = [float(frame.to_metres(np.array([lat_low, lon]))[1]) for lon in lons]
-    axes.set_yticks(ticks_north, [words.latitude(lat, lat_decimals) for lat in lats], fontsize=8)
-    axes.set_xticks(ticks_east, [words.longitude(lon, lon_decimals) for lon in lons], fontsize=8)
+    axes.set_yticks(ticks_north, [words.latitude(lat, lat_decimals) for lat in lats], fontsize=9)
+    axes.set_xticks(ticks_east, [words.longitude(lon, lon_decimals) for lon in lons], fontsize=9)
     for spine in axes.spines.values():
         spine.set_visible(True)
 

@@ -42,7 +42,7 @@ GROUPS = {
 def timeline_figure(plan: Plan) -> str:
     """Speed, yaw rate and every actuator command over the time of the trial."""
     panels = (*_motion_panels(plan), *_command_panels(plan))
-    figure = new_figure(9.0, 0.9 + 1.45 * len(panels))
+    figure = new_figure(7.2, 0.9 + 1.45 * len(panels))
     rows = np.atleast_1d(figure.subplots(len(panels), 1, sharex=True))
     for axes, panel in zip(rows, panels, strict=True):
         _draw(axes, panel, plan.trajectory.sample_time_s)

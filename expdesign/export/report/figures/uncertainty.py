@@ -13,7 +13,7 @@ from expdesign.values import Array
 def uncertainty_figure(content: ReportContent, found: Expected) -> str:
     """One row for each parameter, logarithmic: prior, after the runs, after the whole track."""
     names = [short(name) for name in content.parameters]
-    figure = new_figure(8.0, 1.4 + 0.27 * len(names))
+    figure = new_figure(6.4, 1.4 + 0.27 * len(names))
     axes = figure.subplots()
     size = parameter_size(content)
     rows = np.arange(len(names))
@@ -22,15 +22,15 @@ def uncertainty_figure(content: ReportContent, found: Expected) -> str:
     )
     axes.hlines(rows, np.fmin(before, track), np.fmax(before, track), color=GREY, linewidth=1.0)
     axes.plot(before, rows, "s", color="white", markeredgecolor=BLACK, label="before")
-    axes.plot(runs, rows, "D", color=PRIMITIVE, markersize=5, label="after, informative runs alone")
-    axes.plot(track, rows, "o", color=BLUE, label="after, whole track")
+    axes.plot(runs, rows, "D", color=PRIMITIVE, markersize=5, label="after the runs alone")
+    axes.plot(track, rows, "o", color=BLUE, label="after the whole track")
     axes.set_xscale("log")
     axes.set_yticks(rows, names)
     axes.invert_yaxis()
-    axes.set_xlabel("standard deviation, % of the parameter (of its prior standard deviation where the value is 0)")
+    axes.set_xlabel("standard deviation, % of the parameter (where it is 0: of the one before)")
     axes.xaxis.label.set_fontsize(9)
     round_ticks(axes)
-    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=9)
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=9, columnspacing=1.0)
     light_grid(axes, "x")
     return svg(figure, key="uncertainty", label="Standard deviation of every parameter before and after the trial")
 
