@@ -149,9 +149,11 @@ def recalled(function: Callable[..., Result], *arguments: Any, **aside: Any) -> 
     memory = memory_in_use()
     keys = None if memory is None else _keys(function, (), [arguments])
     if memory is None or keys is None:
+        processes.begin()
         return function(*arguments, **aside)
     result = memory.read(keys[0])
     if result is ABSENT:
+        processes.begin()
         result = function(*arguments, **aside)
         memory.write(keys[0], result)
     return cast(Result, result)

@@ -35,9 +35,9 @@ ESTIMATE = {
     "tests": (),
 }
 PLAIN = {"departure": None, "tolerance_m": None, "fine": False, "name": None}
+SHARED = {"jobs": 0, "scheduler": None, "cache": True}
 REPLAN = {
-    "jobs": 0,
-    "scheduler": None,
+    **SHARED,
     "data": (Path("d.csv"),),
     "vessel": None,
     "remaining_s": None,
@@ -82,21 +82,21 @@ def workflows(monkeypatch: pytest.MonkeyPatch) -> Workflows:
 @pytest.mark.parametrize(
     ("typed", "name", "arguments", "options"),
     [
-        ("run a.toml", "run", (Path("a.toml"), None), {"seed": 0, "jobs": 0, "scheduler": None}),
+        ("run a.toml", "run", (Path("a.toml"), None), {"seed": 0, **SHARED}),
         (
-            "run a.toml --out o --seed 7 --jobs 1",
+            "run a.toml --out o --seed 7 --jobs 1 --no-cache",
             "run",
             (Path("a.toml"), Path("o")),
-            {"seed": 7, "jobs": 1, "scheduler": None},
+            {"seed": 7, "jobs": 1, "scheduler": None, "cache": False},
         ),
         ("score --seed 1 a.toml", "score", (Path("a.toml"), None), {"seed": 1}),
         ("durations a.toml", "durations", (Path("a.toml"), None), {"seed": 0, "grow": False}),
-        ("plan a.toml", "plan", (Path("a.toml"), None), {"seed": 0, "jobs": 0, "scheduler": None, "durations": None}),
+        ("plan a.toml", "plan", (Path("a.toml"), None), {"seed": 0, **SHARED, "durations": None}),
         (
             "plan a.toml --durations d.json",
             "plan",
             (Path("a.toml"), None),
-            {"seed": 0, "jobs": 0, "scheduler": None, "durations": Path("d.json")},
+            {"seed": 0, **SHARED, "durations": Path("d.json")},
         ),
         ("export p.json --format rtz gpx", "export", (Path("p.json"), None), {"formats": ("rtz", "gpx"), **PLAIN}),
         (
@@ -141,8 +141,7 @@ def workflows(monkeypatch: pytest.MonkeyPatch) -> Workflows:
                 "vessel": Path("v.toml"),
                 "remaining_s": 300.0,
                 "interest": ("Y_v", "N_r"),
-                "jobs": 0,
-                "scheduler": None,
+                **SHARED,
                 "seed": 0,
             },
         ),

@@ -9,9 +9,10 @@ import signal
 import threading
 import warnings
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from functools import lru_cache
+from itertools import chain
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import cloudpickle
@@ -24,6 +25,8 @@ Result = TypeVar("Result")
 
 _CLUSTER: ContextVar[Cluster | None] = ContextVar("_CLUSTER", default=None)
 """Where `on_cluster` shares the work of a block."""
+_START: ContextVar[Callable[[], None]] = ContextVar("_START", default=lambda: None)
+"""Starts the processes of a block of `local_processes`."""
 
 
 def in_order(
@@ -51,12 +54,37 @@ def as_finished(
 
 
 @contextmanager
-def local_processes(count: int) -> Iterator[None]:
-    """Work of this block is shared among so many processes of this machine."""
+def local_processes(count: int, *, load: Callable[[], None] | None = None) -> Iterator[None]:
+    """Work of this block is shared among so many processes of this machine.
+
+    Args:
+        count: of processes.
+        load: what each does first, where `begin` is called before there is work to share.
+    """
+    started: list[Iterator[None]] = []
+
+    def start() -> None:
+        if load is not None and not started and effective_n_jobs(None) > 1:
+            started.append(as_finished(load, (), [()] * count))
+
     with warnings.catch_warnings(), parallel_config(backend="loky", n_jobs=count):
         # joblib replaces a process whose memory has grown, and says so; no work is lost
         warnings.filterwarnings("ignore", message="A worker stopped while some jobs were given")
-        yield
+        token = _START.set(start)
+        try:
+            yield
+        except BaseException:
+            with suppress(Exception):  # of processes interrupted while they start: what ended the work counts
+                list(chain(*started))
+            raise
+        finally:
+            _START.reset(token)
+        list(chain(*started))
+
+
+def begin() -> None:
+    """Start the processes of this block, if they are not: there will be work to share."""
+    _START.get()()
 
 
 @contextmanager

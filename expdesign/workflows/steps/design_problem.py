@@ -22,6 +22,7 @@ from expdesign.information.augmented import score_augmented
 from expdesign.information.outcome_gradients import outcome_gradients
 from expdesign.information.prior import equation_noise, score_prior, stated_information
 from expdesign.information.recorded import pooled, recorded_information
+from expdesign.memory import recalled
 from expdesign.progress import Progress, silent, within
 from expdesign.reduction import at_reference_point
 from expdesign.scenario import Scenario
@@ -41,7 +42,7 @@ def designed(
     """The certified durations of a scored scenario; arguments as of `duration_problem`."""
     problem = duration_problem(case, information, stated_std=stated_std, seed=seed, progress=within(progress, 0.0, 0.8))
     progress("sharing out time", 0.8)
-    return solve_durations(problem)
+    return recalled(solve_durations, problem)
 
 
 def duration_problem(

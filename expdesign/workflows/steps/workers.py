@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
-
-from joblib import effective_n_jobs
+from contextlib import contextmanager
 
 from expdesign.errors import InputError
-from expdesign.processes import as_finished, local_processes, on_cluster
+from expdesign.processes import local_processes, on_cluster
 
 
 def load_planner() -> None:
@@ -30,7 +28,7 @@ def workers(
     Args:
         jobs: processes; 0 for one per core, 1 for this one alone.
         scheduler: address of a Dask scheduler whose workers do the work instead.
-        load: what processes of this machine do meanwhile.
+        load: what processes of this machine do first, once something is missing in the cache.
 
     Raises:
         InputError: the number of processes is negative; as `on_cluster`.
@@ -41,13 +39,5 @@ def workers(
         with on_cluster(scheduler):
             yield
         return
-    with local_processes(jobs or os.cpu_count() or 1):
-        count = effective_n_jobs(None)
-        starting = as_finished(load, (), [()] * count) if load is not None and count > 1 else iter(())
-        try:
-            yield
-        except BaseException:
-            with suppress(Exception):  # of processes interrupted while they start: what ended the work counts
-                list(starting)
-            raise
-        list(starting)
+    with local_processes(jobs or os.cpu_count() or 1, load=load):
+        yield
