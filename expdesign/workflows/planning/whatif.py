@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from itertools import chain
+from collections.abc import Sequence
+from operator import itemgetter
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -18,8 +17,8 @@ from expdesign.export.whatif_page.page import table_header, table_row
 from expdesign.information import PrimitiveInformation, estimated_parameters
 from expdesign.information.expected import expected_covariance
 from expdesign.memory import Memory, recalled, remembering, user_memory
-from expdesign.processes import as_finished
-from expdesign.progress import Progress, silent
+from expdesign.processes import as_finished, told_together
+from expdesign.progress import Progress, in_phases, silent
 from expdesign.rehearsal import trial_parts
 from expdesign.scenario import Scenario, load_scenario, load_variant
 from expdesign.workflows.command_text import command_text
@@ -31,6 +30,10 @@ from expdesign.workflows.steps.planned import plan_summary
 from expdesign.workflows.steps.workers import workers
 
 WHOLE_RUNS = "repeats"
+REST = 0.4
+"""Time that a case takes after the first, which it shares work with, to that of the first."""
+WORK, WORK_WITHOUT_PLAN = (0.5, 0.5, 10.0, 0.5), (1.0, 1.0, 0.0, 1.0)
+"""How long parts of a case take beside each other: scoring, sharing out time, planning, comparing criteria."""
 
 
 def whatif(
@@ -70,19 +73,18 @@ def whatif(
     for name in names:
         if names.count(name) > 1:
             raise InputError(f"the name {name!r} is given to {names.count(name)} cases, expected different names")
-    done: dict[int, Case] = {}
     memory = user_memory() if cache else None
     with remembering(memory), workers(jobs, scheduler=scheduler):
-        tasks = [(index, *case) for index, case in enumerate(cases)]
-        shared = with_plan, seed, memory
-        ahead = int(with_plan and memory is not None and scheduler is None)  # the others share what it finds
-        for index, found in chain(
-            (_case(*shared, *task) for task in tasks[:ahead]), _as_finished(shared, tasks[ahead:])
-        ):
-            done[index] = found
-            progress(f"{found.name} is done", 0.95 * len(done) / len(cases))
+        first = 1 if with_plan and memory is not None and scheduler is None else 0  # the others share what it finds
+        before, rest = in_phases(progress, first, REST * (len(cases) - first))
+        done = [_case(with_plan, seed, memory, index, *cases[index], before) for index in range(first)]
+        with told_together(rest, len(cases) - first) as tellers:
+            tasks = [(index, *cases[index], tellers[index - first]) for index in range(first, len(cases))]
+            for index, found in as_finished(_case, (with_plan, seed, memory), tasks):
+                tellers[index - first](f"{found.name} is done", 1.0)
+                done.append((index, found))
     content = WhatIfContent(
-        cases=tuple(done[index] for index in range(len(cases))),
+        cases=tuple(case for _, case in sorted(done, key=itemgetter(0))),
         planned=with_plan,
         command=command_text("whatif", [scenario, *variants], {"--plan": with_plan, "--seed": seed}),
         version=__version__,
@@ -95,28 +97,34 @@ def whatif(
     return Outcome(files=written, summary=_summary(content), tables=_tables(content))
 
 
-def _as_finished(shared: tuple[Any, ...], tasks: Sequence[tuple[Any, ...]]) -> Iterator[tuple[int, Case]]:
-    """Cases as they are finished; begun when the first is asked for."""
-    yield from as_finished(_case, shared, tasks)
-
-
 def _case(
-    with_plan: bool, seed: int, memory: Memory | None, index: int, case: Scenario, changes: tuple[str, ...]
+    with_plan: bool,
+    seed: int,
+    memory: Memory | None,
+    index: int,
+    case: Scenario,
+    changes: tuple[str, ...],
+    progress: Progress,
 ) -> tuple[int, Case]:
-    """One case, computed without progress, because it may run in another process."""
+    """One case, perhaps in another process."""
     with remembering(memory):
-        return index, _computed(case, changes, with_plan, seed)
+        return index, _computed(case, changes, with_plan, seed, progress)
 
 
-def _computed(case: Scenario, changes: tuple[str, ...], with_plan: bool, seed: int) -> Case:
+def _computed(case: Scenario, changes: tuple[str, ...], with_plan: bool, seed: int, progress: Progress) -> Case:
+    def told(activity: str, share: float) -> None:
+        progress(f"{case.name}: {activity}", share)
+
+    scoring, sharing, planning, comparing = in_phases(told, *(WORK if with_plan else WORK_WITHOUT_PLAN))
     try:
-        information, _ = ready(case, seed=seed)
-        design = designed(case, information, seed=seed)
+        information, _ = ready(case, seed=seed, progress=scoring)
+        design = designed(case, information, seed=seed, progress=sharing)
         plan: dict[str, object] = {}
         if with_plan:
-            day = planned_day(case, information, design, seed=seed)
+            day = planned_day(case, information, design, seed=seed, progress=planning)
             design, plan = day.design, dict(plan_summary(day.plan))
             plan["trial_s"] = float(str(plan["informative_s"])) + float(str(plan["repositioning_s"]))
+        comparing("comparing criteria", 0.0)
         return _described(case, changes, information, design, plan)
     except NoAnswer as error:
         empty = np.zeros((0, 0))
