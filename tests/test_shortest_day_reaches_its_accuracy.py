@@ -73,3 +73,15 @@ def test_the_day_is_the_shortest_that_was_tried_and_reached_it(day):
     assert found["day_s"] == min(item["day_s"] for item in found["tried"] if item["information"] >= 1.0)
     assert plan["verified"]
     assert len(found["tried"]) > 1
+
+
+def test_no_day_found_is_shorter_than_the_bound(day):
+    folder, _ = day
+    found = json.loads((folder / "day.json").read_text(encoding="utf-8"))
+    bound = found["bound"]
+    assert found["day_bound_s"] == max(bound["information_s"], bound["way_s"])
+    assert 0 < bound["information_s"] <= bound["information_searched_s"]
+    assert found["day_over_bound"] == pytest.approx(found["day_s"] / found["day_bound_s"])
+    for item in found["tried"]:
+        assert item["day_s"] >= bound["way_s"]
+        assert item["day_s"] / item["information"] >= bound["information_s"]

@@ -7,16 +7,19 @@ from expdesign.lazy import load_on_use
 if TYPE_CHECKING:
     from expdesign.shortest_day.accuracy import Accuracy, stated_accuracy
     from expdesign.shortest_day.alternate import shortest_day
+    from expdesign.shortest_day.bounds import day_bound
     from expdesign.shortest_day.cheapest import Choice, cheapest_runs
-    from expdesign.shortest_day.values import AccuracySettings, DayTried, ShortestDay
+    from expdesign.shortest_day.values import AccuracySettings, DayBound, DayTried, ShortestDay
 
 __all__ = [
     "Accuracy",
     "AccuracySettings",
     "Choice",
+    "DayBound",
     "DayTried",
     "ShortestDay",
     "cheapest_runs",
+    "day_bound",
     "shortest_day",
     "stated_accuracy",
 ]
@@ -27,7 +30,8 @@ if not TYPE_CHECKING:
         {
             "accuracy": ("Accuracy", "stated_accuracy"),
             "alternate": ("shortest_day",),
+            "bounds": ("day_bound",),
             "cheapest": ("Choice", "cheapest_runs"),
-            "values": ("AccuracySettings", "DayTried", "ShortestDay"),
+            "values": ("AccuracySettings", "DayBound", "DayTried", "ShortestDay"),
         },
     )

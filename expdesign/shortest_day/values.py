@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from expdesign.durations import DurationDesign
 from expdesign.plan.values import Plan
+from expdesign.values import Array, seal
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,6 +44,36 @@ class DayTried:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class DayBound:
+    """What no day of a class takes less than.
+
+    Class: velocities through water within limits, delivered inputs within those of the actuators, any heading, the
+    nominal model; motions need not obey it, so the class is wider than what the ship can do.
+
+    Attributes:
+        information_s: least time in which a motion of the class tells what is needed; proved, 0 where nothing is.
+        searched_s: the same if the search found the samples that tell most; an estimate, never less.
+        way_s: least time from start to goal in safe water at the largest speed of the class.
+        velocities: (3, 2) limits of u, v and r through water [m/s, rad/s].
+        speed_mps: largest speed through water, in any direction.
+    """
+
+    information_s: float
+    searched_s: float
+    way_s: float
+    velocities: Array
+    speed_mps: float
+
+    def __post_init__(self) -> None:
+        seal(self, velocities="3 2")
+
+    @property
+    def day_s(self) -> float:
+        """Of the whole day."""
+        return max(self.information_s, self.way_s)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class ShortestDay:
     """The shortest day found.
 
@@ -53,6 +84,7 @@ class ShortestDay:
         cost_s, cost_bound_s: cost of the runs chosen last, at the prices of the day planned before, and what no choice
             of the same dictionary costs less than at these prices and with this information of legs [s].
         information: of the plan's track, as a share of what is needed.
+        bound: on every day of a class that holds this one; None where it was not computed.
     """
 
     plan: Plan
@@ -61,3 +93,4 @@ class ShortestDay:
     cost_s: float
     cost_bound_s: float
     information: float
+    bound: DayBound | None = None

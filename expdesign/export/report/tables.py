@@ -218,4 +218,20 @@ def day_sentences(day: ShortestDay) -> list[str]:
         f"It is the shortest that is so accurate, of {words.counted(len(day.tried), 'day')} planned. The runs tried "
         f"last cost {words.duration(day.cost_s)} with their share of the repositioning; at these prices no "
         f"choice of runs from the dictionary costs less than {words.duration(day.cost_bound_s)}.",
+        *_bound_sentences(day),
+    ]
+
+
+def _bound_sentences(day: ShortestDay) -> list[str]:
+    """What no day can fall below, and for which motions that is proved."""
+    bound = day.bound
+    if bound is None or bound.day_s <= 0:
+        return []
+    (u_low, u_high), (_, v), (_, r) = bound.velocities.tolist()
+    return [
+        f"No day is shorter than {words.duration(bound.day_s)}, "
+        f"{words.percent(bound.day_s / day.plan.commands.duration_s)} of this one: the way to the goal takes at least "
+        f"{words.duration(bound.way_s)}, and what must be told at least {words.duration(bound.information_s)}. "
+        f"Proved for all motions through water with {u_low:.2f} to {u_high:.2f} m/s ahead, {v:.2f} m/s to a side, "
+        f"{bound.speed_mps:.2f} m/s in all and {r:.3f} rad/s, by any input within limits; no ship can do most of them."
     ]

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from expdesign.durations import DurationDesign
 from expdesign.information import PrimitiveInformation
+from expdesign.memory import recalled
 from expdesign.plan.values import Plan
 from expdesign.progress import Progress, silent
 from expdesign.scenario import Scenario
@@ -54,11 +55,12 @@ def planned_day(
     """
     if case.design.accuracy is None:
         return Day(design=design, plan=planned(case, information, design, seed=seed, progress=progress))
-    from expdesign.shortest_day import shortest_day, stated_accuracy
+    from expdesign.shortest_day import day_bound, shortest_day, stated_accuracy
 
     problem = plan_problem(case, information, design, seed=seed)
     accuracy = stated_accuracy(case.design.accuracy, design, case.vessel)
     found = shortest_day(problem, accuracy, most_s=case.design.accuracy.most_s, progress=progress)
+    found = replace(found, bound=recalled(day_bound, problem, accuracy, found.plan))
     return Day(design=found.design, plan=found.plan, shortest=found)
 
 
@@ -70,6 +72,7 @@ def day_files(day: Day) -> dict[str, str | bytes]:
     content = {
         "day_s": found.plan.commands.duration_s,
         "information": found.information,
+        **_bound(found),
         "cost_of_runs_s": found.cost_s,
         "cost_of_runs_bound_s": found.cost_bound_s,
         "tried": [
@@ -85,6 +88,26 @@ def day_files(day: Day) -> dict[str, str | bytes]:
     return {"day.json": json.dumps(content, indent=2) + "\n"}
 
 
+def _bound(found: ShortestDay) -> dict[str, object]:
+    """The bound on the day, the ratio, and the class that it holds for."""
+    bound = found.bound
+    if bound is None or bound.day_s <= 0:
+        return {}
+    return {
+        "day_bound_s": bound.day_s,
+        "day_over_bound": found.plan.commands.duration_s / bound.day_s,
+        "bound": {
+            "holds_for": "motions within these velocities through water and the actuators' limits, whether or not "
+            "the model can follow them; regressors by the nominal model",
+            "velocities": dict(zip(("u_mps", "v_mps", "r_radps"), bound.velocities.tolist(), strict=True)),
+            "speed_mps": bound.speed_mps,
+            "information_s": bound.information_s,
+            "information_searched_s": bound.searched_s,
+            "way_s": bound.way_s,
+        },
+    }
+
+
 def day_summary(day: Day) -> dict[str, object]:
     """Key numbers."""
     found = day.shortest
@@ -93,6 +116,7 @@ def day_summary(day: Day) -> dict[str, object]:
     return {
         "day_s": found.plan.commands.duration_s,
         "information_of_what_was_asked": found.information,
+        **{name: value for name, value in _bound(found).items() if name != "bound"},
         "days_tried": len(found.tried),
         "runs": {n: c for n, c in zip(day.design.problem.names, day.design.repeats, strict=True) if c},
     }

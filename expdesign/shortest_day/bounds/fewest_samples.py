@@ -1,0 +1,198 @@
+"""No day is shorter: a lower bound on the time in which any motion of a class tells what is needed.
+
+Let f be the margin of an accuracy, concave in information, and B(x) the information of one sample. For a supergradient
+G of f at any M, and a day of N samples that reaches the accuracy,
+
+    0 <= f(sum_k B(x_k)) <= f(M) - <G, M> + sum_k <G, B(x_k)>    so    N >= (<G, M> - f(M)) / max_x <G, B(x)>
+
+It holds for every M, and for every average of such inequalities. The best M is that of the measure over samples that
+tells most per time, by the equivalence theorem. The measure is searched, the maximum over x is proved (`richest`).
+
+Source: J. Kiefer and J. Wolfowitz, The equivalence of two extremum problems, Canad. J. Math. 12 (1960), 363-366;
+S. D. Silvey, D. M. Titterington and B. Torsney, An algorithm for optimal designs on a finite design space, Commun.
+Statist. A7 (1978), 1379-1389 (weights); combined here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import linprog
+
+from expdesign.errors import InputError
+from expdesign.shortest_day.accuracy import Accuracy
+from expdesign.shortest_day.bounds.motions import Motions
+from expdesign.shortest_day.bounds.richest import Richest, richest_sample, sample_values
+from expdesign.shortest_day.bounds.tuning import TUNING
+from expdesign.values import Array, seal
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SampleBound:
+    """The fewest samples that reach an accuracy.
+
+    Attributes:
+        least: no motion of the class reaches it with fewer; proved.
+        estimate: the same if no sample tells more than those found; not proved.
+        enough: samples that a measure over the class needs, whether a motion can follow it or not.
+        multiplier: (k, k) G for the columns of `Motions.rows`: the information of all that is accurate enough has
+            <G, M> >= 1.
+    """
+
+    least: float
+    estimate: float
+    enough: float
+    multiplier: Array
+
+    def __post_init__(self) -> None:
+        seal(self, multiplier="k k")
+
+
+def fewest_samples(
+    accuracy: Accuracy, motions: Motions, *, mean_subtraction: str, most_boxes: int = TUNING.boxes
+) -> SampleBound | None:
+    """The fewest samples of any motion of a class that reach an accuracy.
+
+    Args:
+        accuracy: to be reached.
+        motions: the class.
+        mean_subtraction: "none", "batch" or "complete".
+        most_boxes: work limit of the proof; the bound holds with any.
+
+    Returns:
+        None where samples of the class do not inform about every parameter.
+
+    Raises:
+        InputError: the accuracy is reached by what is known before.
+    """
+    if accuracy.margin(np.zeros_like(accuracy.prior)) >= 0:
+        raise InputError("the accuracy is reached without any sample")
+    search = _Search(accuracy=accuracy, motions=motions, mean_subtraction=mean_subtraction)
+    for _ in range(TUNING.searches):
+        measured = search.measured()
+        if measured is None:
+            return None
+        multiplier, enough = measured
+        richest = richest_sample(motions, multiplier, most_boxes=min(most_boxes, TUNING.few_boxes))
+        if richest.found * enough < 1 + 2 * TUNING.gap:
+            break
+        search.add(richest)
+    proved = richest_sample(motions, multiplier, most_boxes=most_boxes)
+    return SampleBound(
+        least=1.0 / proved.bound,
+        estimate=1.0 / max(proved.found, richest.found),
+        enough=enough,
+        multiplier=multiplier,
+    )
+
+
+class _Search:
+    """A measure over samples of a class, made better by turns."""
+
+    def __init__(self, *, accuracy: Accuracy, motions: Motions, mean_subtraction: str) -> None:
+        self.accuracy, self.motions, self.mean_subtraction = accuracy, motions, mean_subtraction
+        rng = np.random.default_rng(0)
+        self.rows = motions.rows(_drawn(motions, rng))
+        force = motions.forces[rng.integers(len(motions.forces), size=self.rows.shape[1])]
+        self.active = _with_force(self.rows, force)
+        self.weights = np.full(len(self.active), 1.0 / len(self.active))
+        self.samples = 1.0
+
+    def add(self, richest: Richest) -> None:
+        """Samples that the measure may use."""
+        self.rows = np.concatenate([self.rows, self.motions.rows(richest.points)], axis=1)
+
+    def measured(self) -> tuple[Array, float] | None:
+        """A multiplier (k, k), with <G, M> >= 1 for all that is accurate enough, and the measure's own samples."""
+        enough, cuts = np.inf, list[Array]()
+        for _ in range(TUNING.rounds):
+            cuts = []
+            for _ in range(TUNING.steps):
+                M = self._information()
+                margin = self.accuracy.margin(self.samples * self._centred(M))
+                if not np.isfinite(margin):
+                    return None
+                self.samples *= np.exp(-margin)
+                cuts.append(self._cut(M))
+                self._reweigh(cuts[-1])
+            enough = self.samples
+            if self._extended(cuts[-1]):
+                break
+        return self._mixed(cuts), float(enough)
+
+    def _information(self) -> Array:
+        """(k, k) per sample, means beside the parameters."""
+        return np.asarray(self.motions.equations * (self.active.T @ (self.weights[:, None] * self.active)))
+
+    def _centred(self, M: Array) -> Array:
+        """(d, d) what the accuracy counts: as it is bordered by the design."""
+        p = len(self.motions.parameters)
+        if self.mean_subtraction == "complete":
+            return M
+        if self.mean_subtraction == "batch":
+            return np.asarray(M[:p, :p] - M[:p, p:] @ M[p:, :p])
+        return M[:p, :p]
+
+    def _cut(self, M: Array) -> Array:
+        """(k, k) G of the inequality <G, M> >= 1, from the supergradient at the samples collected.
+
+        Batches are centred each on its own means, which leaves no more than centring on any other.
+        """
+        p, here = len(self.motions.parameters), self.samples * self._centred(M)
+        G = self.accuracy.supergradient(here)
+        least = float(np.sum(G * here)) - self.accuracy.margin(here)
+        if self.mean_subtraction == "complete":
+            return np.asarray(G / least)
+        C = M[:p, p:] if self.mean_subtraction == "batch" else np.zeros_like(M[:p, p:])
+        return np.asarray(np.block([[G, -G @ C], [-C.T @ G, C.T @ G @ C]]) / least)
+
+    def _reweigh(self, G: Array) -> None:
+        values = np.einsum("ak,ak->a", self.active @ (G * self.motions.equations), self.active)
+        power = 1.0 if self.accuracy.scarcest(self.samples * self._centred(self._information())) == "" else 0.5
+        weights = self.weights * np.maximum(values, 0.0) ** power
+        weights /= weights.sum()
+        kept = weights > TUNING.least_weight / len(weights)
+        self.active, self.weights = self.active[kept], weights[kept] / weights[kept].sum()
+
+    def _extended(self, G: Array) -> bool:
+        """Adds the samples that tell most; whether the measure was good enough without."""
+        values = sample_values(self.motions, G, self.rows)
+        best = values.max(axis=1)
+        if best.max() * self.samples < 1 + TUNING.gap:
+            return True
+        chosen = np.argsort(-best)[: TUNING.added]
+        chosen = chosen[best[chosen] * self.samples > 1]
+        force = self.motions.forces[values[chosen].argmax(axis=1)]
+        self.active = np.concatenate([self.active, _with_force(self.rows[:, chosen], force)])
+        more = np.full(len(chosen), TUNING.added_weight / len(chosen))
+        self.weights = np.concatenate([(1 - TUNING.added_weight) * self.weights, more])
+        return False
+
+    def _mixed(self, cuts: list[Array]) -> Array:
+        """(k, k) the average of inequalities whose largest value over the samples is least."""
+        values = np.array([sample_values(self.motions, G, self.rows).max(axis=1) for G in cuts])
+        size = values.max()
+        found = linprog(
+            np.r_[np.zeros(len(cuts)), 1.0],
+            A_ub=np.c_[values.T / size, -np.ones(values.shape[1])],
+            b_ub=np.zeros(values.shape[1]),
+            A_eq=np.r_[np.ones(len(cuts)), 0.0][None],
+            b_eq=[1.0],
+            method="highs",
+        )
+        shares = np.eye(len(cuts))[-1] if found.x is None else np.maximum(found.x[:-1], 0.0)
+        return np.asarray(np.tensordot(shares / shares.sum(), np.array(cuts), axes=1))
+
+
+def _with_force(rows: Array, force: Array) -> Array:
+    """(b, k) rows (4, b, k) under a force (b, 3) each."""
+    return np.asarray(rows[0] + np.einsum("bi,ibk->bk", force, rows[1:]))
+
+
+def _drawn(motions: Motions, rng: np.random.Generator) -> Array:
+    """(b, d) samples of the class: even inside it, or at its limits, coordinate by coordinate."""
+    shape = (TUNING.samples, len(motions.low))
+    inside = rng.uniform(motions.low, motions.high, shape)
+    ends = np.where(rng.random(shape) < 0.5, motions.low, motions.high)
+    return np.asarray(np.where(rng.random(shape) < 0.5, ends, inside))

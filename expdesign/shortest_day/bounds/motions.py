@@ -1,0 +1,185 @@
+"""The motions that a bound holds for: velocities through water and inputs within limits, on any heading.
+
+A motion may take any velocity with any input at any time. What cannot follow from each other in a real motion counts
+as possible, so the class is wider than what the ship can do, and a bound for it holds for the ship.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from expdesign.errors import InputError
+from expdesign.shortest_day.bounds.affine import AFFINE, Affine, over_boxes
+from expdesign.shortest_day.bounds.tuning import TUNING
+from expdesign.simulation import to_body
+from expdesign.values import Array, seal
+from expdesign.vessel import NUMPY, Actuator, Operators, VesselModel, direct_terms, force_matrix, stem
+from expdesign.vessel.structures import FORCE_SIGNALS, SHOAL
+
+VELOCITIES = ("u", "v", "r")
+AIR = ("u_q", "v_q")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Motions:
+    """All motions of a model within limits.
+
+    A point is (u, v, r) through water, the heading where the air matters, and the inputs where terms read them or are
+    not affine in the forces they give. In all other models the regressors are affine in the force, and the most that a
+    convex function of them can be is at a corner of a polytope that holds all forces.
+
+    Attributes:
+        model: gives the terms.
+        parameters: names of the p parameters counted.
+        low, high: (d,) limits of a point.
+        air_to: (2,) mean wind less mean current, north and east [m/s].
+        forces: (f, 3) corners of a polytope of generalised forces; one of zeros where inputs are in the point.
+    """
+
+    model: VesselModel
+    parameters: tuple[str, ...]
+    low: Array
+    high: Array
+    air_to: Array
+    forces: Array
+
+    def __post_init__(self) -> None:
+        seal(self, low="d", high="d", air_to="2", forces="f 3")
+
+    @staticmethod
+    def within(model: VesselModel, parameters: Sequence[str], velocities: Array, *, air_to: Array) -> Motions:
+        """Within velocities (3, 2) through water and the limits of the actuators.
+
+        Raises:
+            InputError: an actuator has no limits.
+        """
+        limits = [velocities]
+        if _feels_air(model, air_to):
+            limits.append(np.array([[-np.pi, np.pi]]))
+        if direct := bool(direct_terms(model)) or not _affine_in_force(model):
+            limits.append(_input_limits(model))
+        forces = np.zeros((1, 3)) if direct else _force_corners(model.actuators)
+        low, high = np.concatenate(limits).T
+        return Motions(
+            model=model, parameters=tuple(parameters), low=low, high=high, air_to=np.array(air_to), forces=forces
+        )
+
+    @property
+    def equations(self) -> Array:
+        """(p + n, p + n) 1 for columns of the same equation, the means' columns last."""
+        equation = {term.name: term.equation for term in self.model.terms}
+        of = np.array([*(equation[name] for name in self.parameters), *self.model.outputs])
+        return np.asarray(of[:, None] == of, dtype=float)
+
+    def rows(self, points: Array) -> Array:
+        """(4, b, p + n) regressors and a 1 for each mean, at points (b, d): without force, and by unit forces."""
+        base, gains = self._regressors(tuple(points.T), NUMPY)
+        rows = np.zeros((4, len(points), len(self.parameters) + len(self.model.outputs)))
+        for column, values in enumerate(zip(base, *gains, strict=True)):
+            for row, value in zip(rows[:, :, column], values, strict=True):
+                row[:] = value
+        rows[0, :, len(self.parameters) :] = 1.0
+        return rows
+
+    def affine_rows(self, centres: Array, halves: Array) -> tuple[Array, Array, Array]:
+        """The same over boxes: centres (4, b, p + n), slopes (d, 4, b, p + n) and errors (4, b, p + n)."""
+        base, gains = self._regressors(over_boxes(centres, halves), AFFINE)
+        count, d = centres.shape
+        shape = (4, count, len(self.parameters) + len(self.model.outputs))
+        middle, slopes, error = np.zeros(shape), np.zeros((d, *shape)), np.zeros(shape)
+        for column, values in enumerate(zip(base, *gains, strict=True)):
+            for row, value in enumerate(values):
+                if isinstance(value, Affine):
+                    middle[row, :, column], error[row, :, column] = value.centre, value.error
+                    slopes[:, row, :, column] = value.slopes
+                else:
+                    middle[row, :, column] = value
+        middle[0, :, len(self.parameters) :] = 1.0
+        return middle, slopes, error
+
+    def _regressors(self, point: tuple[Any, ...], ops: Operators) -> tuple[list[Any], list[list[Any]]]:
+        """p regressors without force, and what each unit of force adds to them."""
+        table = self._signals(point, ops)
+        chosen = [self.model.expressions[self.model.names.index(name)] for name in self.parameters]
+        base = [expression.evaluate(table, ops) for expression in chosen]
+        if len(self.forces) == 1:
+            return base, [[0.0] * len(base)] * 3
+        gains = []
+        for name in FORCE_SIGNALS:
+            unit = {**table, name: 1.0}
+            gains.append(
+                [
+                    expression.evaluate(unit, ops) - without if name in expression.signals else 0.0
+                    for expression, without in zip(chosen, base, strict=True)
+                ]
+            )
+        return base, gains
+
+    def _signals(self, point: tuple[Any, ...], ops: Operators) -> dict[str, Any]:
+        """All signals of a point; without force where inputs are not in it."""
+        (u, v, r), rest = point[:3], list(point[3:])
+        air = to_body(self.air_to, rest.pop(0), ops) if _feels_air(self.model, self.air_to) else (0.0, 0.0)
+        inputs = rest or [0.0] * len(self.model.inputs)
+        return dict(self.model.signals((u, v, r), (u - air[0], v - air[1]), inputs, ops))
+
+
+def _feels_air(model: VesselModel, air_to: Array) -> bool:
+    """Whether the heading matters: the air moves over the water and a term reads it."""
+    return bool(np.any(air_to)) and any(set(AIR) & set(expression.signals) for expression in model.expressions)
+
+
+def _affine_in_force(model: VesselModel) -> bool:
+    """Whether every term is affine in the generalised force: affine arithmetic finds no error there."""
+    some = dict(zip((*VELOCITIES, *AIR), (0.3, -0.7, 1.1, -1.3, 0.9), strict=True))
+    forces = over_boxes(np.zeros((1, 3)), np.ones((1, 3)))
+    table = {**some, SHOAL: 0.0, **dict(zip(FORCE_SIGNALS, forces, strict=True))}
+    values = (expression.evaluate(table, AFFINE) for expression in model.expressions)
+    return not any(isinstance(value, Affine) and value.error.any() for value in values)
+
+
+def _input_limits(model: VesselModel) -> Array:
+    """(m, 2) of what actuators deliver."""
+    rows = []
+    for actuator in model.actuators:
+        for signal, limit, response in zip(actuator.signals, actuator.limits, actuator.responses, strict=True):
+            low, high = limit.low + response.offset, limit.high + response.offset
+            if stem(signal) == "a" and not np.isfinite([low, high]).all():
+                low, high = -np.pi, np.pi
+            if not np.isfinite([low, high]).all():
+                raise InputError(f"{signal} has no limits, expected some in the vessel file")
+            rows.append((min(low, 0.0), max(high, 0.0)))
+    return np.array(rows).reshape(-1, 2)
+
+
+def _force_corners(actuators: Sequence[Actuator]) -> Array:
+    """(f, 3) corners of a polytope that holds the generalised forces of all inputs within limits.
+
+    The forces of an azimuth lie in a disc, which a regular polygon holds.
+
+    Raises:
+        InputError: an actuator that drives has no limits.
+    """
+    azimuths = sum(actuator.kind == "azimuth" for actuator in actuators)
+    sides = max(TUNING.fewest_sides, TUNING.most_sides // max(azimuths, 1))
+    angles = 2 * np.pi * np.arange(sides) / sides
+    polygon = np.stack([np.cos(angles), np.sin(angles)], axis=1) / np.cos(np.pi / sides)
+    unit_forces, column, corners = force_matrix(tuple(actuators)), 0, np.zeros((1, 3))
+    for actuator in actuators:
+        if actuator.kind == "rudder":
+            continue
+        driving = actuator.limits if actuator.kind == "force" else actuator.limits[:1]
+        ranges = [(min(limit.low, 0.0), max(limit.high, 0.0)) for limit in driving]
+        if not np.isfinite(ranges).all():
+            raise InputError(f"{actuator.signals[0]} has no limits, expected some in the vessel file")
+        own = np.array(list(itertools.product(*ranges)))
+        if actuator.kind == "azimuth":
+            own = np.abs(ranges).max() * polygon
+        share = own @ unit_forces[:, column : column + own.shape[1]].T
+        column += own.shape[1]
+        corners = np.unique((corners[:, None] + share).reshape(-1, 3), axis=0)
+    return corners
