@@ -19,7 +19,7 @@ from expdesign.diagnosis.select.fitted_candidate import fit_candidate
 from expdesign.diagnosis.select.forward_selection import fit_nuisance, select_forward
 from expdesign.diagnosis.select.score_tests import ScoreTest, score_tests
 from expdesign.diagnosis.select.selection import Selection, Step, least_significant_step, wald_p_value, without_step
-from expdesign.diagnosis.select.selection_round import _starting_points, selection_round
+from expdesign.diagnosis.select.selection_round import _starting_points, selection_round, simplest
 from expdesign.diagnosis.select.starting_point import starting_point
 from expdesign.diagnosis.select.tuning import TUNING
 from expdesign.diagnosis.select.work import Work
@@ -205,6 +205,35 @@ def test_a_block_of_parameters_is_replaced_by_the_one_effect_behind_it(monkeypat
     assert {"change_point", "load_change"} <= causes
     assert "parameters" not in causes
     assert abs(found.last.value("inertia:r") - 0.35) < 3 * found.last.std("inertia:r") + 0.01
+
+
+def test_a_cause_with_fewer_numbers_comes_before_one_that_imitates_many():
+    """If it explains nearly as much; a candidate that imitates nothing keeps its place."""
+
+    def item(gain: float, count: int, *, imitates: bool = False) -> SimpleNamespace:
+        return SimpleNamespace(
+            likelihood_gain=gain, keys=tuple(range(count)), candidate=SimpleNamespace(imitates=imitates)
+        )
+
+    wind, block = item(100.0, 3, imitates=True), item(100.0, 3)
+    near, far = (item(share * 100.0 * TUNING.nearly_as_much, 1) for share in (1.01, 0.99))
+    assert simplest([wind, near]) is near
+    assert simplest([wind, far, near]) is near
+    assert simplest([wind, far]) is wind
+    assert simplest([wind, item(99.0, 3)]) is wind
+    assert simplest([block, near]) is block
+
+
+def test_air_that_pushes_against_the_wind_is_no_cause():
+    """Candidates of a wind that nobody measured state which of their numbers must not be positive."""
+    record = hidden_record("tug", seed=1, batches=2, samples=120)
+    record = replace(record, batches=tuple(replace(batch, wind=None) for batch in record.batches))
+    lacking = vessel_of("tug", without=("W_abs_u_u", "W_abs_v_v", "W_uv"))
+    ship = extended_model(lacking, record)
+    situation = Situation(ship=ship, windows=cut_windows(ship.model, record))
+    winds = [one for cause in CAUSES for one in cause.candidates(situation) if one.cause == "wind"]
+    assert winds
+    assert all(one.imitates and set(one.drags) == {"term:W_abs_u_u", "term:W_abs_v_v"} for one in winds)
 
 
 def test_candidates_that_converge_to_zero_make_room_for_the_next_best(monkeypatch):

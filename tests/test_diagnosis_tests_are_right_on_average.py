@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import chi2
+from scipy.stats import chi2, kstest
 
 import hidden_effects as sea
 from diagnosis_case import hidden_record, vessel_of
@@ -31,6 +31,22 @@ def case(ship="barge", **options):
     record = hidden_record(ship, seed=3, batches=2, samples=150, **options)
     extended = extended_model(vessel_of(ship), record)
     return extended, cut_windows(extended.model, record)
+
+
+@pytest.fixture(scope="module")
+def clean_scores():
+    """p-value and share of half a second, for dead time and lag, in clean trials."""
+    found = {"delay:all": [], "lag:all": []}
+    candidates = [Candidate(cause="actuator_lag", free={key: 0.5}, finite=True) for key in found]
+    for seed in range(20):
+        record = hidden_record("barge", seed=seed, batches=3, samples=150)
+        ship = extended_model(vessel_of("barge"), record)
+        windows = cut_windows(ship.model, record)
+        base = fit_nuisance(ship, windows, initial_states(windows))
+        for test in score_tests(base, candidates):
+            (key,) = test.candidate.free
+            found[key].append((test.p_value, float(test.step[0])))
+    return found
 
 
 def test_sensitivities_are_differences_of_simulations():
@@ -115,6 +131,14 @@ def test_a_missing_sample_costs_only_the_samples_whose_filter_reads_it():
     assert seen.sum(axis=0).tolist() == [25, 28, 28, 27]
     assert not seen[8:11, 0].any()
     assert not seen[0, 3]
+
+
+@pytest.mark.parametrize("key", ["delay:all", "lag:all"])
+def test_p_values_of_times_that_are_zero_are_uniform(clean_scores, key):
+    """The Kolmogorov-Smirnov test of clean trials, and a mean estimate of zero within its own standard error."""
+    p_values, shares = np.array(clean_scores[key]).T
+    assert kstest(p_values, "uniform").pvalue > 1e-3
+    assert abs(shares.mean()) < 4 * shares.std() / np.sqrt(len(shares))
 
 
 def test_an_effect_that_is_not_there_is_estimated_as_zero_within_its_standard_error():

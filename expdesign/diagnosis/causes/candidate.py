@@ -20,6 +20,8 @@ class Candidate:
         finite: the effect is not smooth at zero; it is tried at the first guess as a whole.
         grid: effect whose value is found by trying these once the candidate is singled out, as the likelihood has
             corners in it.
+        drags: effects that slow the ship down, so that a fit with a positive one is against physics.
+        imitates: its numbers imitate many causes; one with fewer numbers that explains nearly as much comes first.
     """
 
     cause: str
@@ -27,6 +29,8 @@ class Candidate:
     fixed: Mapping[str, float] = field(default_factory=dict)
     finite: bool = False
     grid: tuple[str, tuple[float, ...]] | None = None
+    drags: tuple[str, ...] = ()
+    imitates: bool = False
 
     @property
     def size(self) -> int:

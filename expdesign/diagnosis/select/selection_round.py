@@ -82,10 +82,12 @@ def _step(base: Fit, windows: Windows, tests: tuple[ScoreTest, ...], progress: P
         if candidate is not None:
             work.spend(candidate.fit.simulations)
             rough.append(candidate)
-    fitted = _significant(base, windows, ranked_by_gain(base, rough), work)
-    chosen = next((item for item in fitted if item.p_value <= TUNING.accepted_p_value), None)
-    if chosen is None:
+    physical = [item for item in rough if all(item.fit.value(key) <= 0.0 for key in item.candidate.drags)]
+    fitted = _significant(base, windows, ranked_by_gain(base, physical), work)
+    accepted = [item for item in fitted if item.p_value <= TUNING.accepted_p_value]
+    if not accepted:
         return None
+    chosen = simplest(accepted)
     return Step(
         chosen=with_profile_estimate(chosen, base),
         p_value=chosen.p_value,
@@ -93,6 +95,20 @@ def _step(base: Fit, windows: Windows, tests: tuple[ScoreTest, ...], progress: P
         before=base,
         tests=tests,
     )
+
+
+def simplest(accepted: list[FittedCandidate]) -> FittedCandidate:
+    """The best candidate, or the best with fewer numbers that explains nearly as much as one that imitates many causes.
+
+    No model of a real ship is exact, and a few free coefficients always explain some of its errors too. The candidate
+    that imitates remains among the alternatives.
+    """
+    first = accepted[0]
+    if not first.candidate.imitates:
+        return first
+    enough = TUNING.nearly_as_much * first.likelihood_gain
+    simple = [item for item in accepted[1:] if len(item.keys) < len(first.keys) and not item.candidate.imitates]
+    return next((item for item in simple if item.likelihood_gain >= enough), first)
 
 
 def _alternatives(chosen: FittedCandidate, fitted: list[FittedCandidate]) -> tuple[FittedCandidate, ...]:

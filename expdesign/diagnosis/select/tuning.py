@@ -25,6 +25,8 @@ class Tuning:
             d comes out ahead by more than this with a probability below Phi(-sqrt(equivalent_within)).
         first_steps: Gauss-Newton steps of every candidate.
         leading_share: candidates that then gain less than this share of the best are dropped.
+        nearly_as_much: share of the gain of a candidate that imitates many causes which one with fewer numbers needs to
+            come first.
         nuisance_steps: Gauss-Newton steps of the fit before anything is tested, at most.
         large_share: share of the remainder above which an effect counts as large and is fitted in short windows too.
         certain: best candidates that are always fitted in long windows.
@@ -63,6 +65,7 @@ class Tuning:
     equivalent_within: float = 5.0
     first_steps: int = 3
     leading_share: float = 0.6
+    nearly_as_much: float = 0.7
     nuisance_steps: int = 12
     large_share: float = 0.15
     certain: int = 2

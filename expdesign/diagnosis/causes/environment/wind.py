@@ -13,6 +13,8 @@ from expdesign.diagnosis.model import ExtendedModel, own_air_terms
 
 ASSUMED_MPS, SECTORS, FINER = 10.0, 8, 7
 """Of a wind that is not measured: assumed speed, number of directions tried, and steps within each sector."""
+DRAGS = ("term:W_abs_u_u", "term:W_abs_v_v")
+"""Air pushes where it blows; the sign of its yaw moment depends on the superstructure."""
 SPEEDS_MPS = (3.0, 8.0)
 DIRECTIONS = ((1.0, 0.0), (0.7, 0.7), (0.0, 1.0), (-0.7, 0.7), (-1.0, 0.0), (-0.7, -0.7), (0.0, -1.0), (0.7, -0.7))
 
@@ -60,6 +62,8 @@ def _of_unknown_wind(situation: Situation, terms: list[str]) -> list[Candidate]:
             free=free,
             fixed={"wind:speed": ASSUMED_MPS, "wind:toward": float(turn)},
             grid=("wind:toward", tuple((turn + around).tolist())),
+            drags=tuple(key for key in free if key in DRAGS),
+            imitates=True,
         )
         for turn in turns
     ]
