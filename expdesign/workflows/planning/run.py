@@ -51,7 +51,7 @@ def _run(case: Scenario, out: Path | None, seed: int, progress: Progress) -> Out
     information, growth = ready(case, seed=seed, progress=within(progress, 0.0, 0.03))
     design = designed(case, information, seed=seed, progress=within(progress, 0.03, 0.08))
     progress("comparing criteria", 0.08)
-    compared = recalled(efficiencies, design)
+    compared = recalled(efficiencies, replace(design, repeats=()) if case.design.accuracy else design)
     day = planned_day(case, information, design, seed=seed, progress=within(progress, 0.1, 0.78))
     writing = within(progress, 0.78, 1.0)
     writing("writing routes, run cards and report", 0.0)
@@ -61,8 +61,7 @@ def _run(case: Scenario, out: Path | None, seed: int, progress: Progress) -> Out
     files = {**trial_files(case, growth, content, route, progress=writing), **day_files(day)}
     summary = {
         **growth_summary(growth, case),
-        **design_summary(day.design),
-        **plan_summary(day.plan),
         **day_summary(day),
+        **plan_summary(day.plan),
     }
     return written(case, out, files, summary, progress, day_tables(day))

@@ -14,6 +14,7 @@ from expdesign.progress import Progress, silent
 from expdesign.scenario import Scenario
 from expdesign.shortest_day import ShortestDay
 from expdesign.workflows.outcome import TextTable
+from expdesign.workflows.steps.design_tables import design_summary
 from expdesign.workflows.steps.planned import plan_problem, planned
 
 
@@ -109,16 +110,16 @@ def _bound(found: ShortestDay) -> dict[str, object]:
 
 
 def day_summary(day: Day) -> dict[str, object]:
-    """Key numbers."""
-    found = day.shortest
+    """Key numbers of the durations and of the day."""
+    found, summary = day.shortest, design_summary(day.design)
     if found is None:
-        return {}
+        return summary
     return {
+        **{key: value for key, value in summary.items() if key != "efficiency_of_whole_runs"},
         "day_s": found.plan.commands.duration_s,
         "information_of_what_was_asked": found.information,
         **{name: value for name, value in _bound(found).items() if name != "bound"},
         "days_tried": len(found.tried),
-        "runs": {n: c for n, c in zip(day.design.problem.names, day.design.repeats, strict=True) if c},
     }
 
 
@@ -132,7 +133,7 @@ def day_tables(day: Day) -> tuple[TextTable, ...]:
             str(number),
             f"{item.day_s:.0f}",
             f"{item.informative_s:.0f}",
-            f"{item.information:.0%}",
+            f"{item.information:.1%}",
             ", ".join(f"{count} {name}" for name, count in item.runs.items()),
         )
         for number, item in enumerate(found.tried, start=1)
