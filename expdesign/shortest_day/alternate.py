@@ -15,12 +15,13 @@ from expdesign.durations import DurationDesign, with_repeats
 from expdesign.errors import NoAnswer, NoPlan, NotInformative
 from expdesign.memory import recalled
 from expdesign.plan.problem import PlanProblem
-from expdesign.plan.solve import Draft, draft_trial, plan_trial
+from expdesign.plan.solve import draft_trial, plan_trial
+from expdesign.plan.values import SailedTrial
 from expdesign.plan.verify import track_information
 from expdesign.progress import Progress, silent, within
 from expdesign.shortest_day.accuracy import Accuracy
 from expdesign.shortest_day.cheapest import Choice, cheapest_runs
-from expdesign.shortest_day.prices import Prices, first_prices, learnt_prices
+from expdesign.shortest_day.prices import DraftedDay, Prices, first_prices, learnt_prices
 from expdesign.shortest_day.tuning import TUNING
 from expdesign.shortest_day.values import DayTried, ShortestDay
 from expdesign.values import Array
@@ -42,28 +43,16 @@ def shortest_day(
         NoPlan: no day was found at all.
     """
     search = _Search.of(problem, accuracy)
-    prices, tried, choices = first_prices(search.run_s, len(accuracy.prior)), list[_Day](), list[Choice]()
+    prices, days, choices = first_prices(search.run_s, len(accuracy.prior)), list[DraftedDay](), list[Choice]()
     for number in range(TUNING.rounds):
         share = number / (TUNING.rounds + 1)
-        choice = search.chosen(prices)
-        choices.append(choice)
-        if any(choice.repeats == day.repeats for day in tried):
+        choice = search.untried(prices, days)
+        if choice is None:
             break
-        day = search.planned(choice, within(progress, share, share + 1 / (TUNING.rounds + 1)))
-        tried.append(day)
-        prices = search.prices(day)
-    return search.best(tried, choices, most_s, within(progress, TUNING.rounds / (TUNING.rounds + 1), 1.0))
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Day:
-    """A day as drafted, and the information (d, d) of its runs and of its whole track."""
-
-    repeats: tuple[int, ...]
-    draft: Draft
-    runs: Array
-    whole: Array
-    margin: float
+        choices.append(choice)
+        days.append(search.drafted(choice, within(progress, share, share + 1 / (TUNING.rounds + 1))))
+        prices = search.prices(days)
+    return search.best(days, choices, most_s, within(progress, TUNING.rounds / (TUNING.rounds + 1), 1.0))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -100,37 +89,49 @@ class _Search:
             most=np.minimum(np.floor(most_s / durations.run_s), TUNING.most_runs),
         )
 
-    def chosen(self, prices: Prices) -> Choice:
-        """The cheapest runs that should reach the accuracy with their legs."""
+    def untried(self, prices: Prices, days: Sequence[DraftedDay]) -> Choice | None:
+        """The cheapest runs that no day has had and that should reach the accuracy with their legs, by some margin."""
+        for step in range(TUNING.level_steps):
+            choice = self.chosen(prices, level=prices.level + step * TUNING.level_step)
+            if all(choice.repeats != day.repeats for day in days):
+                return choice
+        return None
+
+    def chosen(self, prices: Prices, *, level: float) -> Choice:
+        """The cheapest runs that with their legs reach this margin by the prices."""
         return cheapest_runs(
             self.accuracy,
-            self.matrices + prices.leg,
+            self.matrices + prices.legs,
             prices.cost_s,
-            known=prices.leg,
+            known=prices.goal,
             fewest=self.fewest,
             most=self.most,
-            level=prices.informed,
+            level=level,
         )
 
-    def planned(self, choice: Choice, progress: Progress) -> _Day:
+    def drafted(self, choice: Choice, progress: Progress) -> DraftedDay:
         """The day with these runs."""
         problem = replace(self.problem, design=self.design(choice.repeats))
         draft = recalled(draft_trial, problem, progress=progress)
-        vessel, durations = self.problem.vessel, self.problem.design.problem
-        runs, whole = track_information(vessel, durations, self.problem.environment, draft.sailed)
-        return _Day(repeats=choice.repeats, draft=draft, runs=runs, whole=whole, margin=self.accuracy.margin(whole))
+        information = self._information(draft.sailed)
+        margin = self.accuracy.margin(information.sum(axis=0))
+        return DraftedDay(repeats=choice.repeats, draft=draft, information=information, margin=margin)
 
-    def prices(self, day: _Day) -> Prices:
-        """Prices by a day."""
-        legs = day.whole - day.runs
-        expected = np.tensordot(np.array(day.repeats, dtype=float), self.matrices, axes=1) + legs
-        return learnt_prices(
-            self.problem.primitives,
-            day.repeats,
-            day.draft,
-            legs=legs,
-            informed=self.accuracy.margin(expected) - day.margin,
-        )
+    def _information(self, sailed: SailedTrial) -> Array:
+        durations, weather = self.problem.design.problem, self.problem.environment
+        return track_information(self.problem.vessel, durations, weather, sailed)
+
+    def prices(self, days: Sequence[DraftedDay]) -> Prices:
+        """Prices by the days so far; the level is raised by what they promised too much on average."""
+        prices = learnt_prices(self.problem.primitives, days)
+        promised = [
+            self.accuracy.margin(
+                np.tensordot(np.array(day.repeats, dtype=float), self.matrices + prices.legs, axes=1) + prices.goal
+            )
+            for day in days
+        ]
+        short = np.mean([more - day.margin for more, day in zip(promised, days, strict=True)])
+        return replace(prices, level=float(short))
 
     def design(self, repeats: Sequence[int]) -> DurationDesign:
         """The reference with other runs; together with legs they may tell what they cannot alone."""
@@ -140,44 +141,43 @@ class _Search:
             return replace(self.problem.design, repeats=tuple(repeats), efficiency_repeats=0.0, note="")
 
     def best(
-        self, tried: Sequence[_Day], choices: Sequence[Choice], most_s: float | None, progress: Progress
+        self, days: Sequence[DraftedDay], choices: Sequence[Choice], most_s: float | None, progress: Progress
     ) -> ShortestDay:
         """The shortest day that reaches the accuracy, planned with its verification and its risk."""
-        reached = sorted((day for day in tried if day.margin >= 0), key=lambda day: day.draft.sailed.day_s)
+        reached = sorted((day for day in days if day.margin >= 0), key=lambda day: day.day_s)
         for day in reached:
-            if most_s is not None and day.draft.sailed.day_s > most_s:
+            if most_s is not None and day.day_s > most_s:
                 raise NoAnswer(self._too_long(day, most_s))
             design = self.design(day.repeats)
             plan = recalled(plan_trial, replace(self.problem, design=design), progress=progress)
-            _, whole = track_information(self.problem.vessel, design.problem, self.problem.environment, plan.sailed)
-            if (margin := self.accuracy.margin(whole)) >= 0:
+            if (margin := self.accuracy.margin(self._information(plan.sailed).sum(axis=0))) >= 0:
                 return ShortestDay(
                     plan=plan,
                     design=design,
-                    tried=tuple(self._told(item) for item in tried),
+                    tried=tuple(self._told(item) for item in days),
                     cost_s=choices[-1].cost_s,
                     cost_bound_s=choices[-1].bound_s,
                     information=float(np.exp(margin)),
                 )
-        short = max(tried, key=lambda day: day.margin)
+        short = max(days, key=lambda day: day.margin)
         raise NoPlan(
-            f"no day found reaches design.accuracy; the best of {len(tried)} tells {np.exp(short.margin):.0%} of what "
+            f"no day found reaches design.accuracy; the best of {len(days)} tells {np.exp(short.margin):.0%} of what "
             "is needed"
         )
 
-    def _told(self, day: _Day) -> DayTried:
+    def _told(self, day: DraftedDay) -> DayTried:
         names = self.problem.design.problem.names
         return DayTried(
             runs={name: count for name, count in zip(names, day.repeats, strict=True) if count},
-            day_s=day.draft.sailed.day_s,
+            day_s=day.day_s,
             informative_s=day.draft.sailed.seconds("primitive"),
             information=float(np.exp(day.margin)),
         )
 
-    def _too_long(self, day: _Day, most_s: float) -> str:
-        name = self.accuracy.scarcest(day.whole)
+    def _too_long(self, day: DraftedDay, most_s: float) -> str:
+        name = self.accuracy.scarcest(day.information.sum(axis=0))
         about = f"; {name} needs most of it" if name else ""
         return (
             f"design.accuracy.most_s is {most_s:g}: the shortest day found that reaches the accuracy takes "
-            f"{day.draft.sailed.day_s:.0f} s{about}; a larger most_s or less accuracy would do"
+            f"{day.day_s:.0f} s{about}; a larger most_s or less accuracy would do"
         )

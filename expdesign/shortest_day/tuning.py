@@ -13,6 +13,8 @@ class Tuning:
         rounds: most days that are planned in search of the shortest.
         first_share: information from runs in the first day, as a share of what is needed; legs tell the rest.
         first_leg_s: time of repositioning for each run, before a day has been planned [s].
+        level_step, level_steps: margin that is asked for besides where the cheapest runs were tried already, at most so
+            many times.
         least_price: least cost of a run, as a share of its duration.
         cuts: most linear bounds on the accuracy in the choice of runs.
         blend: share of one run of everything that is added to singular information where a bound is made; grows
@@ -26,6 +28,8 @@ class Tuning:
     rounds: int = 6
     first_share: float = 0.6
     first_leg_s: float = 60.0
+    level_step: float = 0.05
+    level_steps: int = 10
     least_price: float = 0.25
     cuts: int = 200
     blend: float = 1e-6

@@ -32,25 +32,22 @@ def realised_efficiencies(
     if not set(problem.parameters) <= set(vessel.model.names) or not problem.symmetric:
         return None, None
     collected, share = Collected.of(problem), sailed.commands.sample_time_s / problem.total_s
-    runs, whole = track_information(vessel, problem, environment, sailed)
-    placed, realised = (collected.efficiency_of(share * matrix, design.fractions) for matrix in (runs, whole))
+    legs = track_information(vessel, problem, environment, sailed)
+    runs = legs[[leg.kind == "primitive" for leg in sailed.legs]].sum(axis=0)
+    placed, realised = (
+        collected.efficiency_of(share * matrix, design.fractions) for matrix in (runs, legs.sum(axis=0))
+    )
     return placed, realised
 
 
-def track_information(
-    vessel: Vessel, problem: DurationProblem, environment: Environment, sailed: SailedTrial
-) -> tuple[Array, Array]:
-    """(d, d) information of a trial's runs, and of its whole track: sums over samples, bordered as B_q."""
+def track_information(vessel: Vessel, problem: DurationProblem, environment: Environment, sailed: SailedTrial) -> Array:
+    """(legs, d, d) information of each leg of a trial: sums over its samples, bordered as B_q."""
     rows = regressor_rows(vessel.model, sailed.trajectory, delivered(vessel, sailed.commands), environment)
-    subtraction = problem.mean_subtraction
-
-    def total(batches: list[Array]) -> Array:
-        none = np.zeros((problem.dimension, problem.dimension))
-        return sum((len(batch) * _bordered(vessel, batch, problem.parameters, subtraction) for batch in batches), none)
-
-    runs = [rows[leg.first : leg.last] for leg in sailed.legs if leg.kind == "primitive"]
-    everything = [rows[leg.first : leg.last] for leg in sailed.legs] if subtraction == "batch" else [rows]
-    return total(runs), total(everything)
+    batches = [rows[leg.first : leg.last] for leg in sailed.legs]
+    matrices = [
+        len(batch) * _bordered(vessel, batch, problem.parameters, problem.mean_subtraction) for batch in batches
+    ]
+    return np.array(matrices)
 
 
 def _bordered(vessel: Vessel, rows: Array, parameters: Sequence[str], mean_subtraction: str) -> Array:

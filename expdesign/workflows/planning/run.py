@@ -13,7 +13,6 @@ from expdesign.workflows.outcome import Outcome
 from expdesign.workflows.steps.case import loaded, written
 from expdesign.workflows.steps.day import day_files, day_summary, day_tables, planned_day
 from expdesign.workflows.steps.design_problem import designed
-from expdesign.workflows.steps.design_tables import design_summary
 from expdesign.workflows.steps.grown import growth_summary, ready
 from expdesign.workflows.steps.planned import check_plannable, plan_summary
 from expdesign.workflows.steps.trial_files import built_route, report_content, trial_files
