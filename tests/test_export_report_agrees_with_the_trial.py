@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import shapely
 from lxml import etree
+from lxml import html as lxml_html
 
 import export_case as case
 from expdesign.durations import MEAN_SUBTRACTIONS, build_durations, solve_durations
@@ -347,3 +348,16 @@ def test_footprints_hold_the_planned_hull_and_grow_with_what_is_unknown() -> Non
         pose = content.plan.trajectory.pose[[leg.first, leg.last]]
         assert all(wide.buffer(0.1).covers(hull) for hull in hull_polygons(pose, content.vessel.hull_b))
         assert wide.area > tight.area
+
+
+def test_every_stacked_cell_says_what_it_is_as_the_head_of_its_column_would() -> None:
+    """On a narrow screen the head of a stacked table is hidden and each cell names its column."""
+    tables = [table for table in lxml_html.fromstring(page()).iter("table") if "stack" in (table.get("class") or "")]
+    assert len(tables) >= 4
+    for table in tables:
+        heads = [cell.text_content().strip() for cell in table.find("thead").iter("th")]
+        for row in table.find("tbody").iter("tr"):
+            named = [cell.get("data-label") for cell in row]
+            assert all(named)
+            if len(named) == len(heads):
+                assert [name for name, head in zip(named, heads, strict=True) if head] == [*filter(None, heads)]

@@ -133,6 +133,6 @@ def round_ticks(axes: Axes) -> None:
     ticks = [step * 10.0**decade for decade in decades for step in ladder if low <= step * 10.0**decade <= high]
     if len(ticks) < 2:
         ticks = [low, high]
-    axes.set_xticks(ticks, [f"{tick:.3g}" for tick in ticks])
+    axes.set_xticks(ticks, [f"{tick:.4g}" for tick in ticks])
     axes.minorticks_off()
     axes.set_xlim(low, high)
