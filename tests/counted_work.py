@@ -12,7 +12,7 @@ import shapely
 
 from expdesign.plan.legs._casadi import Program
 from expdesign.progress import Progress
-from expdesign.simulation._casadi import CompiledIntegrator
+from expdesign.simulation._casadi import CompiledIntegrator, CompiledSample
 from expdesign.simulation.program import RatesProgram
 
 GEOMETRY = ("buffer", "contains", "contains_properly", "contains_xy", "covers", "convex_hull", "difference", "distance")
@@ -51,6 +51,7 @@ def counted_work() -> Iterator[tuple[Counts, Progress]]:
         for owner, name, count in (
             (Program, "solve", lambda solver, *_: {"solves": 1, "iterations": solver.solver.stats()["iter_count"]}),
             (CompiledIntegrator, "states", lambda _, start, delivered, *__: {"samples": len(delivered)}),
+            (CompiledSample, "states", lambda _, start, *__: {"samples of few ships": len(start)}),
             (RatesProgram, "rk4", lambda *_: {"steps of many ships": 1}),
             *((shapely, name, lambda *_: {"geometry calls": 1}) for name in GEOMETRY),
         ):

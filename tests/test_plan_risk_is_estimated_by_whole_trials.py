@@ -82,7 +82,7 @@ def test_every_trial_has_one_outcome_and_runs_begin_within_tolerance():
     assert not trials.samples[1:][over].any()  # nothing is sailed after the end
 
 
-def test_parts_sailed_in_turn_have_streams_of_their_own_and_take_the_memory_of_one(monkeypatch):
+def test_parts_sailed_in_turn_have_streams_of_their_own_and_no_more_ships_than_one_part(monkeypatch):
     _, alone = sailing(draws=10)
     at_once = []
 
