@@ -21,6 +21,7 @@ from expdesign.plan.bounds.goal_times import GoalTimes, goal_times
 from expdesign.plan.bounds.track import SIDES, Track, track_of
 from expdesign.plan.bounds.tuning import BOUNDS
 from expdesign.plan.chart import build_visibility_graph, sight_lines, simplified
+from expdesign.sea_area import moved
 from expdesign.values import Array
 from expdesign.vessel import Vessel
 
@@ -167,7 +168,7 @@ def spread_m(cell_m: float, reach_m: float, level: int) -> float:
 def grown(water: shapely.Geometry, distance_m: float) -> shapely.Geometry:
     """A superset of the water grown by a distance, or a subset of the water shrunk by a negative one."""
     wide_m = distance_m / np.cos(np.pi / (4 * BOUNDS.quad_segments)) + np.copysign(1e-6, distance_m)
-    return shapely.buffer(water, wide_m, quad_segs=BOUNDS.quad_segments)
+    return moved(water, wide_m, quad_segs=BOUNDS.quad_segments)
 
 
 def first_cells(water: shapely.Geometry, more_m: float, cell_m: float) -> Array:

@@ -18,6 +18,8 @@ class Tuning:
         corners: of a simplified water at most; more would make the graph slow.
         corners_coarse, coarse: corners accepted once the tolerance is so many times the one asked for: water that
             shrinks further loses its narrow passages.
+        straight: share of the tolerance by which moved shores are straightened; the rest is for moving them.
+        dense: corners of a water above which a coarser one is made of a finer one that was tried, not of the water.
         slit_m: growth of the water before lines of sight are tested, as a path may touch the shore.
         glances: shares of a line of sight at which it is tested first.
         taut: share of the water's size by which a path may miss a corner that it bends at.
@@ -33,6 +35,8 @@ class Tuning:
     corners: int = 700
     corners_coarse: int = 2500
     coarse: float = 16.0
+    straight: float = 0.98
+    dense: int = 16_000
     slit_m: float = 1e-3
     glances: tuple[float, ...] = (0.5, 0.75, 0.25, 0.9, 0.1, 0.625, 0.375)
     taut: float = 1e-3

@@ -16,7 +16,7 @@ import scipy
 import shapely
 
 from expdesign.plan.chart.tuning import CHART
-from expdesign.sea_area import as_multipolygon
+from expdesign.sea_area import as_multipolygon, moved
 from expdesign.values import Array
 
 
@@ -101,14 +101,8 @@ class VisibilityGraph:
         return np.flatnonzero(shapely.covers(self.water, lines) | ~apart)
 
     def joins(self, a: Array, b: Array) -> np.ndarray:
-        """(n,) whether points (n, 2) are in sight of each other: first some places between, then the whole lines."""
-        seen = np.arange(len(a))
-        for share in CHART.glances:
-            north, east = ((1.0 - share) * a[seen] + share * b[seen]).T
-            seen = seen[shapely.intersects_xy(self.water, east, north)]
-        found = np.zeros(len(a), dtype=bool)
-        found[seen] = shapely.covers(self.water, sight_lines(a[seen], b[seen]))
-        return found
+        """(n,) whether points (n, 2) are in sight of each other."""
+        return _joined(self.water, a, b)
 
     def bends(self, points: Array, corners: np.ndarray, ahead: Array) -> np.ndarray:
         """(k, n) whether a shortest path from a point (k, 2) may bend at a corner (n,), on to a place (n, 2).
@@ -138,7 +132,7 @@ def build_visibility_graph(water: shapely.Geometry) -> VisibilityGraph:
     tangent = _tangent(corners[tail], corners[head], before[head], after[head])
     tangent &= _tangent(corners[head], corners[tail], before[tail], after[tail])
     tail, head = tail[tangent], head[tangent]
-    seen = shapely.covers(grown, sight_lines(corners[tail], corners[head])) if len(tail) else np.zeros(0, dtype=bool)
+    seen = _joined(grown, corners[tail], corners[head])
     tail, head = tail[seen], head[seen]
     away = np.hypot(*(corners[tail] - corners[head]).T)
     lengths = scipy.sparse.coo_matrix((away, (tail, head)), shape=(len(corners), len(corners))).tocsr()
@@ -148,19 +142,44 @@ def build_visibility_graph(water: shapely.Geometry) -> VisibilityGraph:
 def simplified(water: shapely.MultiPolygon, *, grow: bool, tolerance_m: float) -> shapely.MultiPolygon:
     """Water with at most `Tuning.corners` corners that contains the given water (`grow`), or lies inside it.
 
+    The shore is moved by a tolerance, and straightened by less than that. The tolerance is doubled until few enough
+    corners are left, also in water of any number of corners: its least passages are then lost.
+
     Args:
         water: polygons.
         grow: whether the result contains the water; else it lies inside.
-        tolerance_m: at first; doubled until few enough corners are left.
+        tolerance_m: at first.
     """
     coarse_m = np.inf if grow else CHART.coarse * tolerance_m
+    source, moved_m, made = water, 0.0, [(water, 0.0)]
     while True:
-        moved = shapely.buffer(water, tolerance_m if grow else -tolerance_m)
-        simple = as_multipolygon(shapely.make_valid(shapely.simplify(moved, 0.98 * tolerance_m)))
+        step_m = tolerance_m - moved_m
+        simple = _straightened(moved(source, step_m if grow else -step_m), CHART.straight * step_m)
         most = CHART.corners_coarse if tolerance_m >= coarse_m else CHART.corners
         if len(_corners(simple)[0]) <= most:
             return simple
+        made.append((simple, tolerance_m))
+        if shapely.get_num_coordinates(source) > CHART.dense:
+            source, moved_m = made[-2]  # moved by a quarter of what comes next
         tolerance_m *= 2.0
+
+
+def _straightened(water: shapely.Geometry, tolerance_m: float) -> shapely.MultiPolygon:
+    """Water whose shores pass by the given ones within a tolerance, with fewer corners.
+
+    Source: D. H. Douglas and T. K. Peucker, Cartographica 10 (1973), 112-122. Shores are lines that keep their first
+    corner, as GEOS drops that of a ring up to twice the tolerance away. Where shores come to cross, what lies inside an
+    odd number of them is water; nothing farther from them than the tolerance changes.
+    """
+    rings, part = shapely.get_rings(shapely.get_parts(as_multipolygon(water)), return_index=True)
+    points, ring = shapely.get_coordinates(rings, return_index=True)
+    lines = shapely.simplify(shapely.linestrings(points, indices=ring), tolerance_m, preserve_topology=False)
+    polygons = [
+        shapely.Polygon(shell, [hole for hole in holes if len(hole.coords) > 3])
+        for shell, *holes in np.split(lines, np.flatnonzero(np.diff(part)) + 1)
+        if len(shell.coords) > 3
+    ]
+    return as_multipolygon(shapely.make_valid(shapely.MultiPolygon(polygons)))
 
 
 def polyline_length(points: Array) -> float:
@@ -171,6 +190,17 @@ def polyline_length(points: Array) -> float:
 def sight_lines(a: Array, b: Array) -> np.ndarray:
     """(n,) straight lines between north/east points (n, 2), for shapely."""
     return np.asarray(shapely.linestrings(np.stack([a[:, ::-1], b[:, ::-1]], axis=1)))
+
+
+def _joined(water: shapely.MultiPolygon, a: Array, b: Array) -> np.ndarray:
+    """(n,) whether a water covers the lines between points (n, 2): first some places on them, then the whole lines."""
+    seen = np.arange(len(a))
+    for share in CHART.glances:
+        north, east = ((1.0 - share) * a[seen] + share * b[seen]).T
+        seen = seen[shapely.intersects_xy(water, east, north)]
+    found = np.zeros(len(a), dtype=bool)
+    found[seen] = shapely.covers(water, sight_lines(a[seen], b[seen])) if len(seen) else False
+    return found
 
 
 def _corners(water: shapely.MultiPolygon) -> tuple[Array, Array, Array]:
