@@ -55,7 +55,7 @@ def richest_sample(motions: Motions, multiplier: Array, *, most_boxes: int = TUN
     G = multiplier * motions.equations
     monomials = _monomials(motions.forces)
     boxes = _bounded(motions, G, monomials, *_first_boxes(motions))
-    found, left = _samples(boxes), most_boxes
+    found, left = _samples(boxes), most_boxes * 16 / max(16, 2 ** len(motions.low))  # the work goes with the corners
     while left > 0:
         order = np.flatnonzero(boxes.bounds > found.best * (1 + TUNING.box_gap))
         if not len(order):
@@ -144,10 +144,11 @@ def _bounded(motions: Motions, G: Array, monomials: Array, centres: Array, halve
 
 
 def _first_boxes(motions: Motions) -> tuple[Array, Array]:
-    """Centres and half sides (b, d): velocities are parted at zero, where moduli bend, other sides in eight."""
-    edges = []
+    """Centres and half sides (b, d): velocities are parted at zero, where moduli bend, other sides in up to eight."""
+    edges, others = [], len(motions.low) - 3
+    parts = int(min(8.0, max(2.0, (TUNING.first_boxes / 8) ** (1 / max(others, 1)))))
     for side, (low, high) in enumerate(zip(motions.low, motions.high, strict=True)):
-        parted = [low, *([0.0] if low < 0 < high else []), high] if side < 3 else np.linspace(low, high, 9)
+        parted = [low, *([0.0] if low < 0 < high else []), high] if side < 3 else np.linspace(low, high, parts + 1)
         edges.append(np.array(parted))
     grids = [np.meshgrid(*parts, indexing="ij") for parts in ([e[:-1] for e in edges], [e[1:] for e in edges])]
     lows, highs = (np.stack([axis.ravel() for axis in grid], axis=1) for grid in grids)

@@ -11,7 +11,8 @@ class Tuning:
 
     Attributes:
         fewest_sides, most_sides: of the polygon that holds the force of an azimuth; several azimuths share the most.
-        boxes: most that a class of motions is parted into, where the bound is proved.
+        first_boxes: about as many to begin with, at most.
+        boxes: most that a class of motions is parted into, where the bound is proved; fewer above four dimensions.
         few_boxes: the same while the measure is searched.
         boxes_at_once: that are halved together.
         box_gap: relative gap at which halving ends.
@@ -29,6 +30,7 @@ class Tuning:
 
     fewest_sides: int = 4
     most_sides: int = 24
+    first_boxes: int = 4096
     boxes: int = 200_000
     few_boxes: int = 20_000
     boxes_at_once: int = 2000
