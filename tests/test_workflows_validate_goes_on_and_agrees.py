@@ -9,6 +9,7 @@ import pytest
 from expdesign import workflows
 from expdesign.cli import main
 from expdesign.errors import InputError
+from expdesign.export import words
 from expdesign.rehearsal.validation import Rehearsal
 from expdesign.scenario import load_scenario
 from expdesign.workflows.trials.validate import _identity
@@ -51,7 +52,7 @@ def test_the_page_shows_what_the_file_holds(whole):
     assert set(content["designs"]) == {"optimised", "equal shares", "random"}
     for design in content["designs"].values():
         for entry in design["parameters"].values():
-            assert f"{entry['std_found']:.3g}" in page
+            assert words.significant(entry["std_found"]) in page
             assert 0 <= entry["coverage_95"] <= 1
     random = content["designs"]["random"]
     assert random["runs"] is None
