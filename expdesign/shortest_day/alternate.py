@@ -18,7 +18,7 @@ from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import draft_trial, plan_trial
 from expdesign.plan.values import SailedTrial
 from expdesign.plan.verify import track_information
-from expdesign.progress import Progress, silent, within
+from expdesign.progress import Progress, in_phases, silent
 from expdesign.shortest_day.accuracy import Accuracy
 from expdesign.shortest_day.cheapest import Choice, cheapest_runs
 from expdesign.shortest_day.prices import DraftedDay, Prices, first_prices, learnt_prices
@@ -44,15 +44,22 @@ def shortest_day(
     """
     search = _Search.of(problem, accuracy)
     prices, days, choices = first_prices(search.run_s, len(accuracy.prior)), list[DraftedDay](), list[Choice]()
-    for number in range(TUNING.rounds):
-        share = number / (TUNING.rounds + 1)
-        choice = search.untried(prices, days)
+    *rounds, last = in_phases(progress, *np.ones(TUNING.rounds + 1))
+    refused = NoPlan("no day was planned")
+    for told in rounds:
+        choice = search.untried(prices, choices)
         if choice is None:
             break
         choices.append(choice)
-        days.append(search.drafted(choice, within(progress, share, share + 1 / (TUNING.rounds + 1))))
+        try:
+            days.append(search.drafted(choice, told))
+        except NoPlan as error:  # other runs may find their places
+            refused = error
+            continue
         prices = search.prices(days)
-    return search.best(days, choices, most_s, within(progress, TUNING.rounds / (TUNING.rounds + 1), 1.0))
+    if not days:
+        raise refused
+    return search.best(days, choices[-1], most_s, last)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -89,11 +96,11 @@ class _Search:
             most=np.minimum(np.floor(most_s / durations.run_s), TUNING.most_runs),
         )
 
-    def untried(self, prices: Prices, days: Sequence[DraftedDay]) -> Choice | None:
-        """The cheapest runs that no day has had and that should reach the accuracy with their legs, by some margin."""
+    def untried(self, prices: Prices, tried: Sequence[Choice]) -> Choice | None:
+        """The cheapest runs not tried yet that should reach the accuracy with their legs, by some margin."""
         for step in range(TUNING.level_steps):
             choice = self.chosen(prices, level=prices.level + step * TUNING.level_step)
-            if all(choice.repeats != day.repeats for day in days):
+            if all(choice.repeats != earlier.repeats for earlier in tried):
                 return choice
         return None
 
@@ -140,25 +147,30 @@ class _Search:
         except NotInformative:
             return replace(self.problem.design, repeats=tuple(repeats), efficiency_repeats=0.0, note="")
 
-    def best(
-        self, days: Sequence[DraftedDay], choices: Sequence[Choice], most_s: float | None, progress: Progress
-    ) -> ShortestDay:
+    def best(self, days: Sequence[DraftedDay], last: Choice, most_s: float | None, progress: Progress) -> ShortestDay:
         """The shortest day that reaches the accuracy, planned with its verification and its risk."""
+        refused: NoPlan | None = None
         reached = sorted((day for day in days if day.margin >= 0), key=lambda day: day.day_s)
         for day in reached:
             if most_s is not None and day.day_s > most_s:
                 raise NoAnswer(self._too_long(day, most_s))
             design = self.design(day.repeats)
-            plan = recalled(plan_trial, replace(self.problem, design=design), progress=progress)
+            try:
+                plan = recalled(plan_trial, replace(self.problem, design=design), progress=progress)
+            except NoPlan as error:  # a longer day may be less risky
+                refused = error
+                continue
             if (margin := self.accuracy.margin(self._information(plan.sailed).sum(axis=0))) >= 0:
                 return ShortestDay(
                     plan=plan,
                     design=design,
                     tried=tuple(self._told(item) for item in days),
-                    cost_s=choices[-1].cost_s,
-                    cost_bound_s=choices[-1].bound_s,
+                    cost_s=last.cost_s,
+                    cost_bound_s=last.bound_s,
                     information=float(np.exp(margin)),
                 )
+        if refused is not None:
+            raise refused
         short = max(days, key=lambda day: day.margin)
         raise NoPlan(
             f"no day found reaches design.accuracy; the best of {len(days)} tells {np.exp(short.margin):.0%} of what "

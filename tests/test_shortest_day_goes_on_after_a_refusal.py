@@ -1,0 +1,53 @@
+"""Runs that find no place do not end the search for the shortest day: others are tried."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from expdesign.errors import NoPlan
+from expdesign.scenario import load_scenario
+from expdesign.shortest_day import AccuracySettings, alternate, shortest_day, stated_accuracy
+from expdesign.workflows.steps.design_problem import designed
+from expdesign.workflows.steps.grown import ready
+from expdesign.workflows.steps.planned import plan_problem
+
+STORY = Path(__file__).parents[1] / "scenarios" / "story.toml"
+
+
+class Found(Exception):
+    """Ends the search where a day would be drafted."""
+
+
+@pytest.fixture(scope="module")
+def asked():
+    case = load_scenario(STORY)
+    information, _ = ready(case, seed=1)
+    design = designed(case, information, seed=1)
+    accuracy = stated_accuracy(AccuracySettings(as_durations=True), design, case.vessel)
+    return plan_problem(case, information, design, seed=1), accuracy
+
+
+def test_other_runs_are_tried_each_once(asked, monkeypatch):
+    tried = []
+
+    def refuse(problem, progress):
+        tried.append(problem.design.repeats)
+        if len(tried) == 3:
+            raise Found
+        raise NoPlan("no place for a run")
+
+    monkeypatch.setattr(alternate, "draft_trial", refuse)
+    with pytest.raises(Found):
+        shortest_day(*asked)
+    assert len(set(tried)) == 3
+
+
+def test_where_no_day_has_a_plan_the_last_refusal_is_told(asked, monkeypatch):
+    def refuse(problem, progress):
+        raise NoPlan("no place for a run")
+
+    monkeypatch.setattr(alternate, "draft_trial", refuse)
+    monkeypatch.setattr(alternate, "TUNING", replace(alternate.TUNING, rounds=2))
+    with pytest.raises(NoPlan, match="no place for a run"):
+        shortest_day(*asked)
