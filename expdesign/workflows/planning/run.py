@@ -47,12 +47,12 @@ def run(
 
 
 def _run(case: Scenario, out: Path | None, seed: int, progress: Progress) -> Outcome:
-    information, growth = ready(case, seed=seed, progress=within(progress, 0.0, 0.03))
-    design = designed(case, information, seed=seed, progress=within(progress, 0.03, 0.08))
-    progress("comparing criteria", 0.08)
+    information, growth = ready(case, seed=seed, progress=within(progress, 0.0, 0.05))
+    design = designed(case, information, seed=seed, progress=within(progress, 0.05, 0.13))
+    progress("comparing criteria", 0.13)
     compared = recalled(efficiencies, replace(design, repeats=()) if case.design.accuracy else design)
-    day = planned_day(case, information, design, seed=seed, progress=within(progress, 0.1, 0.78))
-    writing = within(progress, 0.78, 1.0)
+    day = planned_day(case, information, design, seed=seed, progress=within(progress, 0.15, 0.83))
+    writing = within(progress, 0.83, 1.0)
     writing("writing routes, run cards and report", 0.0)
     route = built_route(case, day.plan)
     content = report_content(case, information, day.design, day.plan, seed)
