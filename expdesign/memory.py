@@ -13,6 +13,7 @@ import hashlib
 import os
 import pickle
 import platform
+import re
 import sys
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Set
@@ -37,6 +38,8 @@ MOST_BYTES = 256 * 2**20
 MARK = b"expdesign result 1\n"
 COMPUTING = ("casadi", "clarabel", "cvxpy", "matplotlib", "numpy", "ompl", "scipy", "shapely")
 """Packages whose version a result depends on."""
+OURS = re.compile(r"[0-9a-f]{40}|\.new-.*")
+"""Names of entries, and of those not yet in their place."""
 ABSENT = object()
 """Stands for a result that is not remembered."""
 
@@ -89,6 +92,8 @@ class Memory:
         found = []
         with suppress(OSError):
             for entry in os.scandir(self.folder):
+                if not OURS.fullmatch(entry.name):  # a folder that someone chose may hold other files
+                    continue
                 with suppress(OSError):
                     status = entry.stat(follow_symlinks=False)
                     found.append((status.st_mtime_ns, status.st_size, entry.path))

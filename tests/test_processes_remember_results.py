@@ -194,6 +194,15 @@ def test_the_folder_keeps_its_size_and_what_was_used_last(tmp_path):
     assert [bytes([1]) * 400] == CALLS
 
 
+def test_a_folder_s_other_files_are_left_alone(tmp_path):
+    mine = tmp_path / "thesis.pdf"
+    mine.write_bytes(bytes(10_000))
+    os.utime(mine, ns=(0, 0))
+    with remembering(Memory(tmp_path, most_bytes=100)):
+        recalled(doubled, bytes(400))
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.pdf"]
+
+
 def test_several_writers_at_once_leave_whole_entries(tmp_path):
     kept = Memory(tmp_path)
 

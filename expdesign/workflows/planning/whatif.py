@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from operator import itemgetter
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +16,8 @@ from expdesign.export.whatif_page.page import table_header, table_row
 from expdesign.information import PrimitiveInformation, estimated_parameters
 from expdesign.information.expected import expected_covariance
 from expdesign.memory import Memory, recalled, remembering, user_memory
-from expdesign.processes import as_finished, told_together
-from expdesign.progress import Progress, in_phases, silent
+from expdesign.processes import as_finished
+from expdesign.progress import Progress, in_phases, silent, within
 from expdesign.rehearsal import trial_parts
 from expdesign.scenario import Scenario, load_scenario, load_variant
 from expdesign.workflows.command_text import command_text
@@ -30,9 +29,9 @@ from expdesign.workflows.steps.planned import plan_summary
 from expdesign.workflows.steps.workers import workers
 
 WHOLE_RUNS = "repeats"
-REST = 0.4
-"""Time that a case takes after the first, which it shares work with, to that of the first."""
-WORK, WORK_WITHOUT_PLAN = (0.5, 0.5, 10.0, 0.5), (1.0, 1.0, 0.0, 1.0)
+WORKED = 0.95
+"""Share of the work that the cases are."""
+WORK = (0.5, 0.5, 10.0, 0.5)
 """How long parts of a case take beside each other: scoring, sharing out time, planning, comparing criteria."""
 
 
@@ -75,16 +74,12 @@ def whatif(
             raise InputError(f"the name {name!r} is given to {names.count(name)} cases, expected different names")
     memory = user_memory() if cache else None
     with remembering(memory), workers(jobs, scheduler=scheduler):
-        first = 1 if with_plan and memory is not None and scheduler is None else 0  # the others share what it finds
-        before, rest = in_phases(progress, first, REST * (len(cases) - first))
-        done = [_case(with_plan, seed, memory, index, *cases[index], before) for index in range(first)]
-        with told_together(rest, len(cases) - first) as tellers:
-            tasks = [(index, *cases[index], tellers[index - first]) for index in range(first, len(cases))]
-            for index, found in as_finished(_case, (with_plan, seed, memory), tasks):
-                tellers[index - first](f"{found.name} is done", 1.0)
-                done.append((index, found))
+        done = {}
+        for found in _cases(cases, with_plan, seed, memory, progress, one_by_one=with_plan and scheduler is None):
+            done[found.name] = found
+            progress(f"{found.name} is done", WORKED * len(done) / len(cases))
     content = WhatIfContent(
-        cases=tuple(case for _, case in sorted(done, key=itemgetter(0))),
+        cases=tuple(done[name] for name in names),
         planned=with_plan,
         command=command_text("whatif", [scenario, *variants], {"--plan": with_plan, "--seed": seed}),
         version=__version__,
@@ -97,25 +92,43 @@ def whatif(
     return Outcome(files=written, summary=_summary(content), tables=_tables(content))
 
 
+def _cases(
+    cases: Sequence[tuple[Scenario, tuple[str, ...]]],
+    with_plan: bool,
+    seed: int,
+    memory: Memory | None,
+    progress: Progress,
+    *,
+    one_by_one: bool,
+) -> Iterator[Case]:
+    """The cases as they are done: at once, or one by one, each using what those before it found."""
+    shared = with_plan, seed, memory
+    if not one_by_one:
+        yield from as_finished(_case, shared, cases)
+        return
+    for case, part in zip(cases, in_phases(within(progress, 0.0, WORKED), *(1.0,) * len(cases)), strict=True):
+        yield _case(*shared, *case, progress=part)
+
+
 def _case(
     with_plan: bool,
     seed: int,
     memory: Memory | None,
-    index: int,
     case: Scenario,
     changes: tuple[str, ...],
-    progress: Progress,
-) -> tuple[int, Case]:
+    *,
+    progress: Progress = silent,
+) -> Case:
     """One case, perhaps in another process."""
     with remembering(memory):
-        return index, _computed(case, changes, with_plan, seed, progress)
+        return _computed(case, changes, with_plan, seed, progress)
 
 
 def _computed(case: Scenario, changes: tuple[str, ...], with_plan: bool, seed: int, progress: Progress) -> Case:
     def told(activity: str, share: float) -> None:
         progress(f"{case.name}: {activity}", share)
 
-    scoring, sharing, planning, comparing = in_phases(told, *(WORK if with_plan else WORK_WITHOUT_PLAN))
+    scoring, sharing, planning, comparing = in_phases(told, *WORK)
     try:
         information, _ = ready(case, seed=seed, progress=scoring)
         design = designed(case, information, seed=seed, progress=sharing)
