@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from expdesign.errors import NoPlan
+from expdesign.errors import NoAnswer, NoPlan
 from expdesign.scenario import load_scenario
 from expdesign.shortest_day import AccuracySettings, alternate, shortest_day, stated_accuracy
 from expdesign.workflows.steps.design_problem import designed
@@ -51,3 +51,21 @@ def test_where_no_day_has_a_plan_the_last_refusal_is_told(asked, monkeypatch):
     monkeypatch.setattr(alternate, "TUNING", replace(alternate.TUNING, rounds=2))
     with pytest.raises(NoPlan, match="no place for a run"):
         shortest_day(*asked)
+
+
+def test_limits_that_allow_no_more_end_the_search_with_what_was_tried(asked, monkeypatch):
+    problem, accuracy = asked
+    answers = iter([alternate.cheapest_runs])
+
+    def choose(*arguments, **options):
+        for once in answers:
+            return once(*arguments, **options)
+        raise NoAnswer("no more runs are allowed")
+
+    def refuse(problem, progress):
+        raise NoPlan("no place for a run")
+
+    monkeypatch.setattr(alternate, "cheapest_runs", choose)
+    monkeypatch.setattr(alternate, "draft_trial", refuse)
+    with pytest.raises(NoPlan, match="no place for a run"):
+        shortest_day(problem, accuracy)

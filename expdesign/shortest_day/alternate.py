@@ -97,9 +97,18 @@ class _Search:
         )
 
     def untried(self, prices: Prices, tried: Sequence[Choice]) -> Choice | None:
-        """The cheapest runs not tried yet that should reach the accuracy with their legs, by some margin."""
+        """The cheapest runs not tried yet that should reach the accuracy with their legs, by some margin.
+
+        Raises:
+            NoAnswer: by the first prices, no runs within the limits reach it.
+        """
         for step in range(TUNING.level_steps):
-            choice = self.chosen(prices, level=prices.level + step * TUNING.level_step)
+            try:
+                choice = self.chosen(prices, level=prices.level + step * TUNING.level_step)
+            except NoAnswer:
+                if not tried:
+                    raise
+                return None  # the limits allow no more than what was tried
             if all(choice.repeats != earlier.repeats for earlier in tried):
                 return choice
         return None

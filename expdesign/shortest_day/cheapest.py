@@ -68,7 +68,7 @@ def cheapest_runs(
             integrality=np.ones(len(cost_s)),
             options={"mip_rel_gap": TUNING.choice_gap, "node_limit": TUNING.choice_nodes},
         )
-        runs = most if found.x is None else np.rint(found.x)
+        runs = most if found.x is None else np.rint(found.x)  # most reaches the level, and is thinned out below
         if accuracy.margin(cuts.information(runs)) >= level - TUNING.reached:
             break
         cuts.add(runs)
