@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -96,6 +97,8 @@ class Batch:
             all are readings.
         vane_std_rad: standard deviation of the noise on the angle of the vane that gave the wind, where the wind is
             divided by the shrinkage that it causes; else 0.
+        delivered: (k, s, m) means of the inputs over each of s equal parts of a sample, where actuators deliver other
+            than held inputs; then `inputs` are the means over the sample. None where inputs are held.
     """
 
     name: str
@@ -110,10 +113,12 @@ class Batch:
     first_row: int = 0
     interpolated: Array | None = None
     vane_std_rad: float = 0.0
+    delivered: Array | None = None
 
     def __post_init__(self) -> None:
         shapes = {
             "inputs": "k m", "velocity": "k 3", "pose": "k 3", "wind": "k 2", "depth_m": "k", "interpolated": "k 3",
+            "delivered": "k s m",
         }  # fmt: skip
         seal(self, **{name: shape for name, shape in shapes.items() if getattr(self, name) is not None})
         if self.inputs.shape[1] != len(self.input_names):
@@ -126,6 +131,12 @@ class Batch:
     def time_s(self) -> Array:
         """(k,) from zero [s]."""
         return np.asarray(np.arange(len(self)) * self.sample_time_s, dtype=float)
+
+    def cut(self, part: slice) -> Batch:
+        """Consecutive samples of the batch."""
+        series = ("inputs", "velocity", "pose", "wind", "depth_m", "interpolated", "delivered")
+        rows: dict[str, Any] = {name: values[part] for name in series if (values := getattr(self, name)) is not None}
+        return replace(self, first_row=self.first_row and self.first_row + part.start, **rows)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

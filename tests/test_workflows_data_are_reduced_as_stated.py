@@ -34,15 +34,23 @@ def stating(vessel: Vessel, path: Path) -> Vessel:
     return stated
 
 
+def shorten(path: Path, *, digits: int) -> None:
+    """Write every number of a data file with fewer digits."""
+    header, *rows = path.read_text("utf-8").splitlines()
+    short = [",".join(f"{float(cell):.{digits}g}" for cell in row.split(",")) for row in rows]
+    path.write_text("\n".join([header, *short]) + "\n", encoding="utf-8")
+
+
 def test_estimates_and_their_run_check_are_of_the_ship_not_of_her_instruments(tmp_path: Path):
     ship = stating(TUG_TRUE, tmp_path / "ship.toml")
-    data = write_run(tmp_path / "one.csv", ship, tug_commands(500), velocity=(1.7, 0.7, 0.0), substeps=1)
+    data = write_run(tmp_path / "one.csv", ship, tug_commands(500), velocity=(1.7, 0.7, 0.0))
+    shorten(data, digits=10)  # as `expdesign simulate` writes
     workflows.estimate([data], tmp_path / "out", vessel=tmp_path / "ship.toml", methods=["oe"])
     content = json.loads((tmp_path / "out" / "estimate.json").read_text("utf-8"))
     found = {name: item["value"] for name, item in content["oe"]["parameters"].items()}
     truth = dict(zip(TUG_TRUE.model.names, TUG_TRUE.model.parameters.tolist(), strict=True))
-    for name in ("X_u", "X_mu", "Y_v", "Y_mu", "N_r", "N_mu"):
-        assert found[name] == pytest.approx(truth[name], rel=1e-4)  # the file holds ten digits
+    for name in set(found) - {"W_abs_u_u", "W_abs_v_v", "W_uv", "X_abs_u_u", "Y_abs_v_v", "N_uv"}:
+        assert found[name] == pytest.approx(truth[name], rel=1e-6)
     assert min(content["oe"]["fit"]["estimation"]["one.csv"].values()) > 99.99
     page = (tmp_path / "out" / "estimate.html").read_text("utf-8")
     for words in ("n1, a1, n2, a2 answer commands", "velocities are measured 6 m forward", "velocities are 2 s late"):

@@ -19,6 +19,7 @@ from expdesign.estimation.solve import Weighting
 from expdesign.estimation.values import Estimate
 from expdesign.progress import Progress, silent
 from expdesign.signals import Record
+from expdesign.simulation.run import SUBSTEPS
 from expdesign.vessel import Vessel
 
 AUTO = "auto"
@@ -66,7 +67,7 @@ class EstimateOptions:
     @property
     def integration(self) -> Integration:
         """Integrator of the models."""
-        return Integration("rk4", 1) if self.motion == CONTINUOUS else Integration()
+        return Integration("rk4", SUBSTEPS) if self.motion == CONTINUOUS else Integration()
 
     @property
     def quadrature(self) -> str:

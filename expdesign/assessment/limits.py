@@ -21,7 +21,7 @@ import scipy
 from expdesign.assessment.runs import RunCheck
 from expdesign.assessment.tuning import TUNING
 from expdesign.conventions import OUTPUTS
-from expdesign.estimation.regression import inputs_of, model_for
+from expdesign.estimation.regression import drive_of, model_for
 from expdesign.estimation.replay import Compiled, Integration, Stretches, compiled
 from expdesign.estimation.values import Estimate
 from expdesign.signals import Batch, Record
@@ -115,7 +115,7 @@ def decomposed(model: VesselModel, run: RunCheck, found: Estimate, *, wind: bool
 def _stretches(model: VesselModel, batch: Batch, wind: bool, integration: Integration, found: Estimate) -> Stretches:
     """The run as one stretch."""
     driven = model_for(model, Record(batches=(batch,)))
-    drive = inputs_of(driven, batch)
+    drive = drive_of(driven, batch, substeps=integration.substeps)
     if wind and batch.wind is not None:
         drive = np.concatenate([drive, _whole(batch.velocity[:, :2] - batch.wind)], axis=1)
     return Stretches(

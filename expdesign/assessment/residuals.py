@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.assessment.tuning import TUNING
-from expdesign.estimation.methods import method_named
+from expdesign.estimation.methods import as_read, method_named
 from expdesign.estimation.regression import Integers, build_layout, build_regression, model_for
 from expdesign.estimation.values import Estimate
 from expdesign.signals import Record
@@ -61,9 +61,10 @@ def one_step(
         fixed: fixed parameters.
         quadrature: one of `predictors.QUADRATURES`.
     """
-    predictor = method_named(found.method).predictor
+    method = method_named(found.method)
+    record = as_read(record, method)
     layout = build_layout(
-        model_for(model, record), record, predictor=predictor, fixed=tuple(fixed), quadrature=quadrature
+        model_for(model, record), record, predictor=method.predictor, fixed=tuple(fixed), quadrature=quadrature
     )
     regression = build_regression(layout, record).regression
     names, values = (*found.names, *found.nuisance_names), np.concatenate([found.values, found.nuisance_values])

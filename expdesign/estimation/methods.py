@@ -9,7 +9,15 @@ import numpy as np
 
 from expdesign.errors import Diverged, InputError, UnknownName
 from expdesign.estimation.output_error import Fitting, minimise_output_error
-from expdesign.estimation.regression import Layout, Regression, Rows, build_layout, build_regression, model_for
+from expdesign.estimation.regression import (
+    Layout,
+    Regression,
+    Rows,
+    build_layout,
+    build_regression,
+    model_for,
+    with_wind_as_measured,
+)
 from expdesign.estimation.replay import InstrumentModel, Integration, apart_from_start, build_replay
 from expdesign.estimation.solve import NullSpace, Refined, Solution, Weighting, refine_iv, solve_ls
 from expdesign.estimation.tuning import TUNING
@@ -119,6 +127,7 @@ def estimate(record: Record, model: VesselModel, *, method: str = "iv", settings
     chosen, choices = method_named(method), settings or Settings()
     if model.roll is not None:
         raise InputError(ROLLS)
+    measured, record = record, as_read(record, chosen)
     layout = build_layout(
         model_for(model, record),
         record,
@@ -126,6 +135,7 @@ def estimate(record: Record, model: VesselModel, *, method: str = "iv", settings
         fixed=choices.fixed,
         quadrature=choices.quadrature,
     )
+    layout = replace(layout, notes=(*layout.notes, *_vane_notes(measured, layout, chosen)))
     rows = build_regression(layout, record)
     if chosen.solver == "iv":
         rows = apart_from_start(rows)
@@ -137,6 +147,21 @@ def estimate(record: Record, model: VesselModel, *, method: str = "iv", settings
             chosen, layout, Rows(regression=regression, used=(), left_out=left_out), Refined(solution, 0, ())
         )
     return _estimate(chosen, layout, rows, refined)
+
+
+def as_read(record: Record, method: Method) -> Record:
+    """The record as a method reads it."""
+    return with_wind_as_measured(record) if method.solver == "ls" else record
+
+
+def _vane_notes(record: Record, layout: Layout, method: Method) -> tuple[str, ...]:
+    std_rad = max(batch.vane_std_rad for batch in record.batches)
+    if method.solver != "ls" or not layout.predictor.wind or not std_rad:
+        return ()
+    return (
+        f"The vane's noise of {std_rad:.2g} rad draws least squares towards zero in the terms of the wind; "
+        "methods with instruments (iv-air, iv-wind) are free of it.",
+    )
 
 
 def _fitting(choices: Settings) -> Fitting:

@@ -15,6 +15,7 @@ from expdesign.reduction.sensors import Told, measured, shrinkage, turned, undon
 from expdesign.reduction.tuning import TUNING
 from expdesign.signals import Batch, Record
 from expdesign.simulation import deliver
+from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array
 from expdesign.vessel import IDEAL, Response, Sensors, Vessel, VesselModel
 
@@ -70,7 +71,7 @@ def _blown(batch: Batch, wind_to: Array) -> Batch:
 
 
 def with_delivered_inputs(record: Record, model: VesselModel, *, standing: Array | None = None) -> Record:
-    """The record with the mean delivered value of every input over each sample.
+    """The record with the mean delivered value of every input over each sample, and over each integrator step in it.
 
     Inputs that are no commands of the model's actuators stay as they are.
 
@@ -101,8 +102,8 @@ def with_delivered_inputs(record: Record, model: VesselModel, *, standing: Array
 
 def _delivered(batch: Batch, responses: Mapping[str, Response], standing: Array | None) -> Batch:
     own = [responses.get(name, IDEAL) for name in batch.input_names]
-    inputs = deliver(own, batch.inputs, sample_time_s=batch.sample_time_s, standing=standing)[:, 0]
-    return replace(batch, inputs=inputs)
+    steps = deliver(own, batch.inputs, sample_time_s=batch.sample_time_s, substeps=SUBSTEPS, standing=standing)
+    return replace(batch, inputs=steps.mean(axis=1), delivered=steps)
 
 
 def at_reference_point(record: Record, sensors: Sensors, *, smoothed: bool = False) -> Record:
@@ -156,11 +157,7 @@ def _without_ends(before: Batch, after: Batch) -> Batch | None:
     if len(known) < TUNING.shortest_batch:
         return None
     part = slice(int(known[0]), int(known[-1]) + 1)
-    if part == slice(0, len(after)):
-        return after
-    names = ("inputs", "velocity", "pose", "wind", "depth_m", "interpolated")
-    rows: dict[str, Any] = {name: values[part] for name in names if (values := getattr(after, name)) is not None}
-    return replace(after, first_row=after.first_row and after.first_row + part.start, **rows)
+    return after if part == slice(0, len(after)) else after.cut(part)
 
 
 def _lost(before: Array, after: Array) -> NDArray[np.bool_]:

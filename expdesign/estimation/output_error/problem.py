@@ -8,7 +8,7 @@ import numpy as np
 
 from expdesign.conventions import OUTPUTS
 from expdesign.errors import InputError
-from expdesign.estimation.regression import Integers, Layout, inputs_of
+from expdesign.estimation.regression import Integers, Layout, drive_of
 from expdesign.estimation.replay import Compiled, Integration, Stretches, compiled
 from expdesign.signals import Batch, Record
 from expdesign.values import Array
@@ -90,7 +90,7 @@ def build_problem(layout: Layout, record: Record, fitting: Fitting, samples: int
     model, time_s = layout.model, sample_time(record)
     states = tuple(OUTPUTS.index(name) for name in model.outputs)
     cuts = [(number, first) for number, b in enumerate(record.batches) for first in _firsts(len(b), samples)]
-    drives = [_drive(layout, batch) for batch in record.batches]
+    drives = [_drive(layout, batch, fitting.integration.substeps) for batch in record.batches]
     ends = [_end(first, samples, len(record.batches[number])) for number, first in cuts]
     length = max(end - first for (_, first), end in zip(cuts, ends, strict=True))
 
@@ -135,9 +135,9 @@ def _read(batch: Batch) -> Array:
     return batch.velocity if batch.interpolated is None else np.where(batch.interpolated > 0, np.nan, batch.velocity)
 
 
-def _drive(layout: Layout, batch: Batch) -> Array:
-    """(k, m) inputs, and the b-frame wind where it is used; missing wind takes the last known value."""
-    inputs = inputs_of(layout.model, batch)
+def _drive(layout: Layout, batch: Batch, substeps: int) -> Array:
+    """(k, c) as of `drive_of`, and the b-frame wind where it is used; missing wind takes the last known value."""
+    inputs = drive_of(layout.model, batch, substeps=substeps)
     if not np.isfinite(inputs).all():
         raise InputError(f"{batch.name}: output error needs inputs at every sample; some are not numbers")
     if not layout.predictor.wind:

@@ -8,6 +8,7 @@ from expdesign.estimation.regression.tables import (
     AIR,
     VANE,
     Table,
+    drive_of,
     heading_of,
     in_depth,
     inputs_of,
@@ -16,6 +17,7 @@ from expdesign.estimation.regression.tables import (
     signal_table,
     with_depth,
 )
+from expdesign.estimation.regression.vane import with_wind_as_measured
 from expdesign.estimation.regression.zero_mean import MEANS, subtract_mean
 
 __all__ = [
@@ -34,6 +36,7 @@ __all__ = [
     "batch_slices",
     "build_layout",
     "build_regression",
+    "drive_of",
     "heading_of",
     "in_depth",
     "inputs_of",
@@ -45,4 +48,5 @@ __all__ = [
     "subtract_mean",
     "symbol",
     "with_depth",
+    "with_wind_as_measured",
 ]

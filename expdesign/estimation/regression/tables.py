@@ -71,6 +71,21 @@ def inputs_of(model: VesselModel, batch: Batch) -> Array:
     return batch.inputs[:, [batch.input_names.index(name) for name in model.inputs]]
 
 
+def drive_of(model: VesselModel, batch: Batch, *, substeps: int) -> Array:
+    """(k, m) inputs held over each sample, or (k, g m) those of its g equal parts, in the model's order.
+
+    Args:
+        model: gives the order.
+        batch: recorded, or with delivered inputs.
+        substeps: integrator steps per sample, a multiple of g.
+    """
+    steps = batch.delivered
+    if steps is None or substeps % steps.shape[1]:
+        return inputs_of(model, batch)
+    order = [batch.input_names.index(name) for name in model.inputs]
+    return np.asarray(steps[:, :, order].reshape(len(batch), -1))
+
+
 def measured_table(model: VesselModel, batch: Batch, *, wind_measured: bool) -> Table:
     """Measured signals; without measured wind the air velocities are those over ground.
 

@@ -5,6 +5,9 @@ wind, n = 1, come divided by exp(-s**2 / 2). In a term of second degree, such as
 its sign, that leaves the mean over the angle, n = 0, too large by exp(s**2) and the rest, n = 2, too small by as much.
 Both are known from the term at the wind turned by 90 degrees.
 
+That is right for instruments. Least squares is biased towards zero by the noise left in its regressors, and more so the
+more they are enlarged; it uses the wind as measured.
+
 Source: F. Ljungberg, doctoral thesis, Linköping University, (5.47)-(5.50), for components; K. V. Mardia and P. E. Jupp,
 Directional Statistics (2000), 3.5.7, for the harmonics of an angle with Gaussian noise.
 """
@@ -17,9 +20,23 @@ from typing import Any
 import numpy as np
 
 from expdesign.estimation.regression.tables import AIR, Table
+from expdesign.signals import Record
 from expdesign.values import Array
 from expdesign.vessel import NUMPY
 from expdesign.vessel.expressions import Expression
+
+
+def with_wind_as_measured(record: Record) -> Record:
+    """The record with winds from a vane as it measured them, shrunk by its noise."""
+    if not any(batch.vane_std_rad for batch in record.batches):
+        return record
+    batches = tuple(
+        batch
+        if batch.wind is None
+        else replace(batch, wind=batch.wind * np.exp(-(batch.vane_std_rad**2) / 2.0), vane_std_rad=0.0)
+        for batch in record.batches
+    )
+    return replace(record, batches=batches)
 
 
 def unbiased_value(expression: Expression, table: Table, std_rad: float) -> Array:

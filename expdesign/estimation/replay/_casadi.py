@@ -7,6 +7,7 @@ Source: J. A. E. Andersson et al., CasADi, Mathematical Programming Computation 
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import casadi as ca
@@ -22,20 +23,19 @@ CASADI = Operators(ca.fabs, ca.sin, ca.cos)
 
 
 def batch_simulator(
-    model: VesselModel, *, samples: int, sample_time_s: float, integrator: str, substeps: int, windy: bool = False
+    model: VesselModel, *, samples: int, sample_time_s: float, integrator: str, substeps: int, width: int, windy: bool
 ) -> Simulate:
     """A function that simulates batches of so many samples; numbers that run away come back as inf or nan.
 
-    Where `windy`, two columns follow the model's inputs: the n-frame wind to north and east [m/s].
+    Its inputs have `width` columns: those of `drive_of`, and where `windy` the n-frame wind to north and east [m/s].
     """
-    m, p = len(model.inputs), len(model.terms)
-    x, theta, drive = ca.SX.sym("x", model.states), ca.SX.sym("p", p), ca.SX.sym("i", m + 2 * windy)
-    wind = (drive[m], drive[m + 1]) if windy else (0.0, 0.0)
+    x, theta, drive = ca.SX.sym("x", model.states), ca.SX.sym("p", len(model.terms)), ca.SX.sym("i", width)
+    held, wind = _split(drive, len(model.inputs), windy)
 
-    def rates(state: tuple[Any, ...]) -> tuple[Any, ...]:
-        return motion_rates(model, state, ca.vertsplit(drive[:m]), wind_to=wind, ops=CASADI, parameters=theta)
+    def rates(state: tuple[Any, ...], inputs: list[ca.SX]) -> tuple[Any, ...]:
+        return motion_rates(model, state, inputs, wind_to=wind, ops=CASADI, parameters=theta)
 
-    after = _stepped(rates, x, sample_time_s, integrator, substeps)
+    after = _stepped(rates, x, held, sample_time_s, integrator, substeps)
     return _chained(ca.Function("step", [x, drive, theta], [after]), samples)
 
 
@@ -82,28 +82,37 @@ def stretch_functions(stretches: Stretches) -> tuple[ca.Function, ca.Function]:
 def velocity_step(problem: Stretches) -> ca.Function:
     """One sample of the modelled velocities: (state (n,), drive (m,), values (p + n,)) -> state."""
     model, n, p = problem.model, len(problem.states), len(problem.sought)
-    m = len(model.inputs)
     x, drive, values = ca.SX.sym("x", n), ca.SX.sym("i", problem.drive.shape[2]), ca.SX.sym("p", p + n)
+    held, wind = _split(drive, len(model.inputs), problem.windy)
     theta = ca.SX(model.parameters)
     for index, place in enumerate(problem.sought):
         theta[place] = values[index]
 
-    def rates(state: tuple[Any, ...]) -> tuple[Any, ...]:
+    def rates(state: tuple[Any, ...], inputs: list[ca.SX]) -> tuple[Any, ...]:
         water: list[Any] = [0.0, 0.0, 0.0]
         for index, place in enumerate(problem.states):
             water[place] = state[index]
-        wind = (drive[m], drive[m + 1]) if problem.windy else (0.0, 0.0)
         air = (water[0] - wind[0], water[1] - wind[1])
-        all_rates = model.accelerations(water, air, ca.vertsplit(drive[:m]), CASADI, theta)
+        all_rates = model.accelerations(water, air, inputs, CASADI, theta)
         return tuple(all_rates[place] + values[p + index] for index, place in enumerate(problem.states))
 
-    after = _stepped(rates, x, problem.sample_time_s, problem.integrator, problem.substeps)
+    after = _stepped(rates, x, held, problem.sample_time_s, problem.integrator, problem.substeps)
     return ca.Function("velocities", [x, drive, values], [after])
 
 
-def _stepped(rates: Any, x: ca.SX, sample_time_s: float, integrator: str, substeps: int) -> ca.SX:
+def _split(drive: ca.SX, m: int, windy: bool) -> tuple[list[list[ca.SX]], tuple[Any, Any]]:
+    """Inputs held over each part of a sample, and the wind."""
+    signals = ca.vertsplit(drive)
+    wind = (signals.pop(-2), signals.pop(-1)) if windy else (0.0, 0.0)
+    return [signals[first : first + m] for first in range(0, len(signals), max(1, m))] or [[]], wind
+
+
+def _stepped(
+    rates: Any, x: ca.SX, held: list[list[ca.SX]], sample_time_s: float, integrator: str, substeps: int
+) -> ca.SX:
     state: tuple[Any, ...] = tuple(ca.vertsplit(x))
-    for _ in range(substeps):
-        state = INTEGRATORS[integrator](rates, state, sample_time_s / substeps)
+    for step in range(substeps):
+        inputs = held[step * len(held) // substeps]
+        state = INTEGRATORS[integrator](partial(rates, inputs=inputs), state, sample_time_s / substeps)
     after: ca.SX = ca.vertcat(*state)
     return after

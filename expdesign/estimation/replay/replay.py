@@ -9,7 +9,7 @@ import numpy as np
 
 from expdesign.conventions import OUTPUTS
 from expdesign.errors import Diverged, InputError, UnknownName
-from expdesign.estimation.regression import inputs_of, model_for
+from expdesign.estimation.regression import drive_of, model_for
 from expdesign.estimation.replay.stretches import INTEGRATORS, Simulate
 from expdesign.signals import Batch, Record, Trajectory
 from expdesign.simulation.motion import begun
@@ -44,12 +44,14 @@ class Replay:
 
     Attributes:
         model: driven by the recorded inputs.
-        simulators: (samples, sample time) of a batch -> compiled simulation.
+        simulators: (samples, sample time, columns of `drive_of`) of a batch -> compiled simulation.
+        substeps: integrator steps per sample.
         windy: whether simulations are given wind.
     """
 
     model: VesselModel
-    simulators: Mapping[tuple[int, float], Simulate]
+    simulators: Mapping[tuple[int, float, int], Simulate]
+    substeps: int
     windy: bool = False
 
     def states(self, batch: Batch, parameters: Array, wind_to: Array | None = None) -> Array:
@@ -65,12 +67,13 @@ class Replay:
             InputError: the first velocity, or an input, is not measured.
         """
         start = np.array(begun(self.model, tuple(start_state(self.model, batch))))
-        inputs = inputs_of(self.model, batch)
+        inputs = drive_of(self.model, batch, substeps=self.substeps)
+        simulator = self.simulators[len(batch), batch.sample_time_s, inputs.shape[1]]
         if self.windy:
             inputs = np.concatenate([inputs, np.zeros((len(batch), 2)) if wind_to is None else wind_to], axis=1)
         if not np.isfinite(inputs).all():
             raise InputError(f"{batch.name} has inputs that are not numbers, which cannot be simulated")
-        states = self.simulators[len(batch), batch.sample_time_s](parameters, start, inputs)
+        states = simulator(parameters, start, inputs)
         wild = ~(np.abs(states[:, 3:]).max(axis=1) < LARGEST_SPEED)
         if wild.any():
             time_s = int(np.argmax(wild)) * batch.sample_time_s
@@ -85,20 +88,25 @@ def build_replay(
     from expdesign.estimation.replay._casadi import batch_simulator  # CasADi takes a second to load
 
     how = integration or Integration()
-    kinds = {(len(batch), batch.sample_time_s) for batch in record.batches}
+    kinds = {
+        (len(batch), batch.sample_time_s, drive_of(model, batch, substeps=how.substeps).shape[1])
+        for batch in record.batches
+    }
     return Replay(
         model,
         {
-            (samples, time_s): batch_simulator(
+            (samples, time_s, columns): batch_simulator(
                 model,
                 samples=samples,
                 sample_time_s=time_s,
                 integrator=how.integrator,
                 substeps=how.substeps,
+                width=columns + 2 * windy,
                 windy=windy,
             )
-            for samples, time_s in kinds
+            for samples, time_s, columns in kinds
         },
+        how.substeps,
         windy,
     )
 

@@ -25,7 +25,7 @@ class Stretches:
         model: structure; gives the values of parameters not sought.
         sought: (p,) places of the parameters to find, among the model's.
         states: (n,) places of the velocities that have an equation, among u, v, r.
-        drive: (L, W, m) inputs; two columns more, the wind's velocity in the b-frame, where `windy`.
+        drive: (L, W, c) inputs as of `drive_of`; two columns more, the wind's velocity in the b-frame, where `windy`.
         windy: whether air velocities are those of that wind.
         sample_time_s: of all stretches.
         integrator, substeps: how the model is integrated.

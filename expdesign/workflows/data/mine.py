@@ -117,11 +117,8 @@ def _pieces(batch: Batch, piece_s: float) -> list[Batch]:
 
 
 def _piece(batch: Batch, span: slice) -> Batch:
-    parts = {name: getattr(batch, name) for name in ("inputs", "velocity", "pose", "wind", "depth_m")}
-    cut = {name: values[span] for name, values in parts.items() if values is not None}
     begin, end = (row * batch.sample_time_s for row in (span.start, span.stop))
-    name = f"{batch.name}, {begin:g} to {end:g} s"
-    return replace(batch, name=name, first_row=batch.first_row and batch.first_row + span.start, **cut)
+    return replace(batch.cut(span), name=f"{batch.name}, {begin:g} to {end:g} s")
 
 
 def _parameters(model: VesselModel, fixed: Sequence[str], *, windy: bool) -> tuple[tuple[str, ...], tuple[str, ...]]:
