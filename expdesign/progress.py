@@ -24,6 +24,33 @@ def in_phases(progress: Progress, *work: float) -> tuple[Progress, ...]:
     return tuple(within(progress, low, high) for low, high in pairwise(ends))
 
 
+class Estimated:
+    """Progress of work whose amount becomes known as it goes: the share done of what is done and what is left.
+
+    Args:
+        progress: of all the work.
+        after: work that follows what is told, in the unit in which all work is counted.
+    """
+
+    def __init__(self, progress: Progress, *, after: float = 0.0) -> None:
+        """Begin with nothing done."""
+        self._progress, self.after, self.done = never_falling(progress), after, 0.0
+
+    def tell(self, activity: str, left: float) -> None:
+        """What is done next, and how much work is expected to be left."""
+        self._progress(activity, self.done / (self.done + left + self.after or 1.0))
+
+    def part(self, work: float, left: float) -> Progress:
+        """Progress of the next part of the work, with so much left after it."""
+        began = self.done
+
+        def report(activity: str, share: float) -> None:
+            self.done = began + work * share
+            self.tell(activity, work * (1.0 - share) + left)
+
+        return report
+
+
 def never_falling(progress: Progress) -> Progress:
     """Progress that stays where it is while work is repeated."""
     most = 0.0

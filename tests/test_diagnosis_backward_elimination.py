@@ -24,6 +24,7 @@ from expdesign.diagnosis.select.starting_point import starting_point
 from expdesign.diagnosis.select.tuning import TUNING
 from expdesign.diagnosis.select.work import Work
 from expdesign.diagnosis.vessel_file.reading import extended_model
+from expdesign.progress import Estimated, silent
 
 DEVIATION = np.ones((6, 3))
 
@@ -189,18 +190,14 @@ def test_a_block_of_parameters_is_replaced_by_the_one_effect_behind_it(monkeypat
     rounds = iter((block, change))
     real = select_forward.__globals__["selection_round"]
 
-    def scripted(base, windows, rejected, rng, progress, work, *, most=99):
+    def scripted(base, windows, rejected, rng, work, *, most=99):
         if most < 99:
             return None, ()
         candidate = next(rounds, None)
-        return (
-            real(base, windows, rejected, rng, progress, work)
-            if candidate is None
-            else (added(base, windows, candidate), ())
-        )
+        return real(base, windows, rejected, rng, work) if candidate is None else (added(base, windows, candidate), ())
 
     monkeypatch.setitem(select_forward.__globals__, "selection_round", scripted)
-    found = select_forward(extended, windows, start, np.random.default_rng(0), lambda what, share: None)
+    found = select_forward(extended, windows, start, np.random.default_rng(0), Estimated(silent))
     causes = {step.chosen.candidate.cause for step in found.steps}
     assert {"change_point", "load_change"} <= causes
     assert "parameters" not in causes

@@ -17,6 +17,7 @@ from expdesign.diagnosis.select import forward_selection
 from expdesign.diagnosis.select.tuning import TUNING
 from expdesign.diagnosis.select.work import Work
 from expdesign.diagnosis.vessel_file.reading import extended_model
+from expdesign.progress import Estimated, silent
 from expdesign.signals import Record
 
 PERIOD_S = 200.0
@@ -77,12 +78,12 @@ def test_a_search_ends_at_its_limit_and_says_what_it_left():
 
 def test_a_limit_of_nothing_leaves_all_causes_untried(monkeypatch: pytest.MonkeyPatch):
     spent = Work(simulations=TUNING.most_simulations)
-    monkeypatch.setattr(forward_selection, "Work", lambda: spent)
+    monkeypatch.setattr(forward_selection, "Work", lambda **_: spent)
     record = hidden_record("barge", seed=6, batches=2, samples=120, effects={"gain": -0.3})
     ship = extended_model(vessel_of("barge"), record)
     windows = cut_windows(ship.model, record)
     found = forward_selection.select_forward(
-        ship, windows, initial_states(windows), np.random.default_rng(0), lambda what, share: None
+        ship, windows, initial_states(windows), np.random.default_rng(0), Estimated(silent)
     )
     assert found.steps == ()
     assert found.untried == ("further causes",)

@@ -8,7 +8,7 @@ cubes of all steps add up to less than 1 - 0.98^2, however well they are placed.
 import numpy as np
 import pytest
 
-from expdesign.progress import in_phases, never_falling
+from expdesign.progress import Estimated, in_phases, never_falling
 from short_examples import SHORTER, example_told
 
 LARGEST = 1.0 - 0.98**2
@@ -40,3 +40,18 @@ def test_phases_take_their_ratios_of_the_whole_and_repeated_work_tells_nothing_l
     for phase, share in ((first, 0.0), (first, 1.0), (none, 0.5), (last, 0.5), (first, 0.5), (last, 1.0)):
         phase("at work", share)
     assert told == pytest.approx([0.0, 0.25, 0.25, 0.625, 0.625, 1.0])
+
+
+def test_of_work_that_becomes_known_as_it_goes_the_share_done_of_what_is_expected_is_told_and_never_less():
+    told = []
+    work = Estimated(lambda activity, share: told.append(share), after=10.0)
+    work.tell("at work", 30.0)
+    work.done += 10.0
+    work.tell("at work", 20.0)
+    work.tell("at work", 180.0)  # more than was expected
+    part = work.part(20.0, 0.0)
+    part("at work", 0.5)
+    part("at work", 1.0)
+    work.after = 0.0
+    work.tell("done", 0.0)
+    assert told == pytest.approx([0.0, 0.25, 0.25, 0.5, 0.75, 1.0])

@@ -34,6 +34,7 @@ from expdesign.diagnosis.fit import Fit, HeldOut, cross_validate, held_out_gain,
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import initial_states, simulate_from_measured, stable_windows
 from expdesign.diagnosis.select import (
+    SELECTION_TUNING,
     Selection,
     Step,
     eliminate_backward,
@@ -44,15 +45,15 @@ from expdesign.diagnosis.select import (
 from expdesign.diagnosis.values import Diagnosis, Finding, Lead, Unexplained
 from expdesign.diagnosis.vessel_file import extend, extended_model
 from expdesign.errors import Diverged
-from expdesign.progress import Progress, silent, within
+from expdesign.progress import Estimated, Progress, silent, within
 from expdesign.reduction import with_reduced_wind
 from expdesign.signals import Record
 from expdesign.vessel import Vessel
 
 LITTLE_FIT, MORE_THAN_NOISE = 50.0, 2.0
 """Fit of an output [%] below which the simulation explains little, if its error is so many times the noise."""
-SIMULATED, SELECTED, VALIDATED = 0.1, 0.89, 0.95
-"""Shares of the time after the model in use is simulated, after forward selection, and after backward elimination."""
+SIMULATED, VALIDATED, CONCLUDED = 18.0, 4.0, 25.0
+"""Work before the selection, of the cross-validation of a model, and of conclusions, in simulations of all data."""
 
 
 def diagnose(
@@ -61,7 +62,7 @@ def diagnose(
     *,
     seed: int = 0,
     proposals: Sequence[Proposal] = (),
-    progress: Progress = silent,
+    progress: Estimated | None = None,
 ) -> Diagnosis:
     """Find the causes of the simulation error, extend the model by them, and measure the gain.
 
@@ -70,13 +71,14 @@ def diagnose(
         record: measured data; velocities over ground, inputs, perhaps pose, wind and depth.
         seed: of the draws behind adjusted p-values and gain intervals.
         proposals: manoeuvres that may distinguish causes; standard ones when empty.
-        progress: of the diagnosis.
+        progress: of the diagnosis and of what follows it, in simulations of all data.
 
     Raises:
         NotInformative: the data cannot support a diagnosis; the message says what is missing.
         Diverged: the model in use cannot be simulated over the data.
     """
-    progress("simulating the model in use", 0.0)
+    told = Estimated(silent) if progress is None else progress
+    told.tell("simulating the model in use", SIMULATED + SELECTION_TUNING.first_rounds * SELECTION_TUNING.round_work)
     record = with_reduced_wind(record, vessel.sensors)
     ship = extended_model(vessel, record)
     windows = stable_windows(ship, record)
@@ -84,8 +86,10 @@ def diagnose(
     motion = simulate_from_measured(ship, windows)
     if motion.diverged:
         raise Diverged(f"vessel {vessel.name!r}: its simulation of the data diverges; the model is unstable")
-    chosen = _select(ship, windows, seed, progress)
-    progress("looking for manoeuvres that distinguish causes", VALIDATED)
+    told.done = SIMULATED
+    chosen = _select(ship, windows, seed, told)
+    concluding = told.part(CONCLUDED, 0.0)
+    concluding("looking for manoeuvres that distinguish causes", 0.0)
     proposals = proposals or standard_proposals(windows, ship.model.inputs, windows.sample_s)
     findings = _findings(chosen, windows, proposals, seed)
     order = sorted(range(len(findings)), key=lambda index: -findings[index].gain)
@@ -96,6 +100,7 @@ def diagnose(
     extended, not_written = extend(vessel, final, _standard_errors(chosen.kept) if refined else {})
     before, after = accuracy(ship, record), accuracy(final, record)
     unexplained = _unexplained(chosen, after, windows, seed)
+    concluding("measuring the gain on held-out runs", 1.0)
     return Diagnosis(
         vessel=vessel,
         extended=extended,
@@ -129,12 +134,12 @@ class _Selected:
     held: list[HeldOut]
 
 
-def _select(ship: ExtendedModel, windows: Windows, seed: int, progress: Progress) -> _Selected:
+def _select(ship: ExtendedModel, windows: Windows, seed: int, told: Estimated) -> _Selected:
     rng = np.random.default_rng(seed)
-    found = select_forward(ship, windows, initial_states(windows), rng, within(progress, SIMULATED, SELECTED))
+    found = select_forward(ship, windows, initial_states(windows), rng, told)
 
     def cross_validated(found: Selection) -> list[HeldOut]:
-        return _cross_validated(found, ship, windows, within(progress, SELECTED, VALIDATED))
+        return _cross_validated(found, ship, windows, told.part(VALIDATED * (1 + len(found.steps)), CONCLUDED))
 
     kept, held = eliminate_backward(found, windows, cross_validated, seed)
     return _Selected(found=found, kept=kept, held=held)

@@ -154,9 +154,8 @@ def _with_transitions(problem: PlanProblem, water: LegWater, space: SearchSpace,
         made_good=path_exceeds_displacement(space, counts, problem.start),
         budget=WorkBudget(most_s=PLAN.transitions_s),
     )
-    most = _most_trials(problem, planner)
-    for number in range(most):
-        progress("trying transitions between runs", number / most)
+    for part in in_phases(progress, *PLAN.fewer_trials ** np.arange(_most_trials(problem, planner))):
+        part("trying transitions between runs", 0.0)
         try:
             placements = place_runs(space, counts, start=problem.start, width=PLAN.transition_beam, orders=0)
         except NoPlan:  # the main search keeps more, and says what is impossible
@@ -164,7 +163,7 @@ def _with_transitions(problem: PlanProblem, water: LegWater, space: SearchSpace,
         pairs = pairs_of(placements)
         if all(pair in space.tried for pair in pairs):
             break
-        space = planner.with_transitions(space, pairs, trials)
+        space = planner.with_transitions(space, pairs, replace(trials, progress=part))
         if trials.budget.exhausted:
             break
     return space

@@ -19,6 +19,7 @@ class Tuning:
         wider_reach: factor on the part of the chart that is planned in where the one before had no room.
         transition_beam: partial plans kept in the searches that choose the transitions to optimise.
         transitions_s: work budget of optimising transitions; the others keep the rule for leg times [s].
+        fewer_trials: time that trying the transitions of a plan takes, beside that of the plan before.
         failure_s: least cost of a failed placement [s].
         leg_s: work budget of one leg [s].
         clock_budgets: time budgets by the clock after which a search that is stuck ends, whatever its counted work.
@@ -39,6 +40,7 @@ class Tuning:
     wider_reach: float = 4.0
     transition_beam: int = 100
     transitions_s: float = 30.0
+    fewer_trials: float = 0.4
     failure_s: float = 2.0
     leg_s: float = 40.0
     clock_budgets: float = 5.0

@@ -14,15 +14,15 @@ from expdesign.diagnosis.select.fitted_candidate import FittedCandidate
 from expdesign.diagnosis.select.profile_likelihood import profile_estimate
 from expdesign.diagnosis.select.score_tests import ScoreTest
 from expdesign.diagnosis.select.selection import Selection, Step, redundant_step, without_step
-from expdesign.diagnosis.select.selection_round import same_effects_as_any, selection_round
+from expdesign.diagnosis.select.selection_round import listed_causes, same_effects_as_any, selection_round
 from expdesign.diagnosis.select.tuning import TUNING
 from expdesign.diagnosis.select.work import Work
-from expdesign.progress import Progress, never_falling, within
+from expdesign.progress import Estimated
 from expdesign.values import Array
 
 
 def select_forward(
-    ship: ExtendedModel, windows: Windows, starts: Array, rng: np.random.Generator, progress: Progress
+    ship: ExtendedModel, windows: Windows, starts: Array, rng: np.random.Generator, progress: Estimated
 ) -> Selection:
     """Add causes until nothing significant is left, and take out those that later ones make redundant.
 
@@ -31,18 +31,14 @@ def select_forward(
     explain nearly any data. So before such a block is added, causes with fewer effects are tried one after the other.
     At the end, every cause is compared once more with its best replacement beside the others.
     """
-    progress = never_falling(progress)
     base = first = fit_nuisance(ship, windows, starts)
     steps: list[Step] = []
     rejected: list[Candidate] = []
-    rounds, exchanges, work = 0, 0, Work()
+    exchanges, work = 0, Work(progress=progress)
     while True:
-        share = 1.0 - TUNING.later_rounds**rounds
-        rounds += 1
-        progress(f"testing causes, round {rounds}", share)
-        part = within(progress, share, 1.0 - TUNING.later_rounds**rounds)
-        search = _Search(windows=windows, rejected=tuple(rejected), rng=rng, progress=part, work=work)
+        search = _Search(windows=windows, rejected=tuple(rejected), rng=rng, work=work)
         step, tests = search.round(base)
+        work.rounds_left = listed_causes(tests) + len(steps)  # each step is compared with others at the end
         if (
             step is None
             and exchanges < TUNING.most_exchanges
@@ -74,12 +70,11 @@ class _Search:
     windows: Windows
     rejected: tuple[Candidate, ...]
     rng: np.random.Generator
-    progress: Progress
     work: Work
 
     def round(self, base: Fit, *, most: int = 99) -> tuple[Step | None, tuple[ScoreTest, ...]]:
         """One round from a fit, with candidates of at most so many effects."""
-        return selection_round(base, self.windows, list(self.rejected), self.rng, self.progress, self.work, most=most)
+        return selection_round(base, self.windows, list(self.rejected), self.rng, self.work, most=most)
 
 
 def fit_nuisance(ship: ExtendedModel, windows: Windows, starts: Array) -> Fit:
@@ -122,6 +117,7 @@ def _exchange(steps: list[Step], search: _Search) -> list[Step] | None:
         others = without_step(steps, index, search.windows)
         if others is None:
             continue
+        search.work.rounds_left = len(steps) - 2 - index
         new, _ = search.round(others[-1].chosen.fit)
         if new is not None and _gains_more(new.chosen, old.chosen, steps[-1].chosen.fit):
             return [*others, new]

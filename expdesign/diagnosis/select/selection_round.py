@@ -21,8 +21,7 @@ from expdesign.diagnosis.select.selection import Step, wald_p_value
 from expdesign.diagnosis.select.short_windows import fit_short_windows, start_in_short_windows
 from expdesign.diagnosis.select.starting_point import StartingPoint, starting_point
 from expdesign.diagnosis.select.tuning import TUNING
-from expdesign.diagnosis.select.work import Work
-from expdesign.progress import Progress
+from expdesign.diagnosis.select.work import Work, work_of_simulation
 
 
 def selection_round(
@@ -30,7 +29,6 @@ def selection_round(
     windows: Windows,
     rejected: list[Candidate],
     rng: np.random.Generator,
-    progress: Progress,
     work: Work,
     *,
     most: int = 99,
@@ -42,16 +40,17 @@ def selection_round(
         windows: data.
         rejected: candidates that are not tried again.
         rng: of the null distribution.
-        progress: of this round.
         work: of the search.
         most: effects that a candidate may have.
     """
+    work.tell("testing causes", TUNING.round_work)
     tests = score_tests(
         base,
         [c for c in _candidates(base, windows) if not same_effects_as_any(c, rejected) and len(c.free) <= most],
         rng,
     )
-    return _step(base, windows, tests, progress, work), tests
+    work.progress.done += TUNING.tests_work
+    return _step(base, windows, tests, work), tests
 
 
 def same_effects_as_any(candidate: Candidate, others: list[Candidate]) -> bool:
@@ -69,18 +68,19 @@ def _candidates(base: Fit, windows: Windows) -> list[Candidate]:
     ]
 
 
-def _step(base: Fit, windows: Windows, tests: tuple[ScoreTest, ...], progress: Progress, work: Work) -> Step | None:
+def _step(base: Fit, windows: Windows, tests: tuple[ScoreTest, ...], work: Work) -> Step | None:
     if not work.allows("further causes"):
         return None
     points, far = _starting_points(base, windows, tests)
     rough: list[FittedCandidate] = []
+    fits = [(TUNING.first_steps + 1) * work_of_simulation(base.ship.with_effects(point.effects)) for point in points]
     for index, point in enumerate(points):
-        progress(f"fitting {point.test.candidate.cause}", index / len(points))
+        work.tell(f"fitting {point.test.candidate.cause}", sum(fits[index:]))
         if not work.allows(f"{point.test.candidate.cause} beside {len(base.free_keys)} effects"):
             continue
         candidate = fit_candidate(base, windows, point, far=far, steps=TUNING.first_steps)
         if candidate is not None:
-            work.spend(candidate.fit.simulations)
+            work.spend(candidate.fit.simulations, work_of_simulation(candidate.fit.ship))
             rough.append(candidate)
     physical = [item for item in rough if all(item.fit.value(key) <= 0.0 for key in item.candidate.drags)]
     fitted = _significant(base, windows, ranked_by_gain(base, physical), work)
@@ -132,7 +132,9 @@ def _significant(base: Fit, windows: Windows, rough: list[FittedCandidate], work
             item for item in rough if item.likelihood_gain > TUNING.leading_share * most - TUNING.statistic_margin
         ]
         converged = [fit_to_convergence(base, windows, item) for item in leading]
-        work.spend(sum(new.fit.simulations for new, old in zip(converged, leading, strict=True) if new is not old))
+        for new, old in zip(converged, leading, strict=True):
+            if new is not old:
+                work.spend(new.fit.simulations, work_of_simulation(new.fit.ship))
         significant = [item for item in converged if wald_p_value(item, item.fit) <= TUNING.level]
         if significant or not leading:  # nothing gains anything
             return ranked_by_gain(base, significant)
@@ -170,6 +172,11 @@ def _hidden_by_random_current(base: Fit, tests: tuple[ScoreTest, ...]) -> list[S
         return []
     listed = {id(item.candidate) for item in _shortlist(tests)}
     return [item for item in tests if item.candidate.cause == "current" and id(item.candidate) not in listed]
+
+
+def listed_causes(tests: tuple[ScoreTest, ...]) -> int:
+    """How many causes have candidates that are worth a fit."""
+    return len({test.candidate.cause for test in _shortlist(tests)})
 
 
 def _shortlist(tests: tuple[ScoreTest, ...]) -> list[ScoreTest]:

@@ -40,7 +40,9 @@ class Tuning:
         most_findings: causes, at most.
         most_rejected: causes that are removed again, at most.
         most_exchanges: of a cause for another that gains more beside the rest, at most.
-        later_rounds: share of the time of a selection that is still to come after a round, on average.
+        first_rounds: rounds expected after the first, before anything is tested.
+        tests_work, round_work: time of the tests of a round, and of a round, in simulations of all data.
+        roll_work: time of a simulation with roll, which is stepped through, in simulations without.
         refined_grid: values of the second grid search.
         profile_points, profile_rounds: values per round of a profile likelihood, and rounds, at most.
         equivalent_cost: values of a profile count as equally likely up to this cost: one standard error of a Gaussian.
@@ -79,7 +81,10 @@ class Tuning:
     most_findings: int = 6
     most_rejected: int = 4
     most_exchanges: int = 2
-    later_rounds: float = 0.75
+    first_rounds: int = 2
+    tests_work: float = 18.0
+    round_work: float = 35.0
+    roll_work: float = 15.0
     refined_grid: int = 11
     profile_points: int = 9
     profile_rounds: int = 9

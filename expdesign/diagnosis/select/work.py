@@ -1,10 +1,12 @@
-"""The work of a search: counted, limited, and what it leaves untried."""
+"""The work of a search: counted, limited, what is expected to be left of it, and what it leaves untried."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.select.tuning import TUNING
+from expdesign.progress import Estimated, silent
 
 
 @dataclass(kw_only=True)
@@ -14,14 +16,23 @@ class Work:
     Attributes:
         simulations: so far.
         untried: what was left out once the limit was reached, in order.
+        rounds_left: expected after the present one.
+        progress: of the search and of what follows, in simulations of all data without roll.
     """
 
     simulations: int = 0
     untried: list[str] = field(default_factory=list)
+    rounds_left: int = TUNING.first_rounds
+    progress: Estimated = field(default_factory=lambda: Estimated(silent))
 
-    def spend(self, simulations: int) -> None:
-        """Count some."""
+    def spend(self, simulations: int, each: float = 1.0) -> None:
+        """Count some, each with the work of so many without roll."""
         self.simulations += simulations
+        self.progress.done += simulations * each
+
+    def tell(self, activity: str, left: float) -> None:
+        """What is done next, and the work left in this round."""
+        self.progress.tell(activity, left + self.rounds_left * TUNING.round_work)
 
     def allows(self, what: str) -> bool:
         """Whether the limit allows more; otherwise that is noted as untried."""
@@ -30,3 +41,8 @@ class Work:
         if what not in self.untried:
             self.untried.append(what)
         return False
+
+
+def work_of_simulation(ship: ExtendedModel) -> float:
+    """Of all data, beside one without roll."""
+    return 1.0 if ship.roll is None else TUNING.roll_work

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
 import numpy as np
 
 from expdesign.diagnosis import Diagnosis, Finding
@@ -30,19 +34,14 @@ from expdesign.export.files import plus_minus
 from expdesign.export.pages import page_templates
 from expdesign.export.pages.figures import report_style
 from expdesign.export.tuning import TUNING
+from expdesign.progress import Progress, silent
 
 NO_NUMBER = "\N{EN DASH}"
 
 
-def diagnosis_html(found: Diagnosis, *, command: str, version: str) -> str:
+def diagnosis_html(found: Diagnosis, *, command: str, version: str, progress: Progress = silent) -> str:
     """One HTML page without any outside reference."""
-    with report_style():
-        figures = {
-            "windows": [(_stretch(found, i), window_figure(found, i)) for i in drawn(found)],
-            "growth": growth_figure(found),
-            "residuals": residual_figures(found),
-            "suspects": [suspect_figure(found, i, f"suspect{i}") for i in range(len(found.findings))],
-        }
+    figures = _figures(found, progress)
     page = page_templates("expdesign.export.diagnosis_page").get_template("diagnosis.html")
     return page.render(
         found=found,
@@ -60,6 +59,25 @@ def diagnosis_html(found: Diagnosis, *, command: str, version: str) -> str:
         command=command,
         version=version,
     )
+
+
+def _figures(found: Diagnosis, progress: Progress) -> dict[str, object]:
+    """Figures by their places in the page."""
+    windows, causes = drawn(found), range(len(found.findings))
+    drawing: list[Callable[[], Any]] = [
+        partial(growth_figure, found),
+        partial(residual_figures, found),
+        *(partial(window_figure, found, index) for index in windows),
+        *(partial(suspect_figure, found, index, f"suspect{index}") for index in causes),
+    ]
+    done: list[Any] = []
+    with report_style():
+        for figure in drawing:
+            progress("drawing the page", len(done) / len(drawing))
+            done.append(figure())
+    growth, residuals, *others = done
+    stretches = [(_stretch(found, index), others.pop(0)) for index in windows]
+    return {"windows": stretches, "growth": growth, "residuals": residuals, "suspects": others}
 
 
 def _mean_missing(found: Diagnosis) -> list[str]:

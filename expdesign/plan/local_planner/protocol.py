@@ -20,6 +20,7 @@ from expdesign.plan.legs import LegTask, LegWater
 from expdesign.plan.runs import Footprint
 from expdesign.plan.values import Placement
 from expdesign.plan.work_budget import WorkBudget
+from expdesign.progress import Progress, silent
 from expdesign.sea_area import LocalFrame
 from expdesign.values import Array, seal
 
@@ -218,6 +219,7 @@ class TransitionTrials:
         start: (3,) pose of the plan.
         made_good: whether displacement towards the goal saves time on later legs.
         budget: work budget; transitions that are not tried within it keep the rule for leg times.
+        progress: of choosing some transitions, which counts as one of them, and trying them.
     """
 
     water: LegWater
@@ -225,6 +227,7 @@ class TransitionTrials:
     start: Array
     made_good: bool
     budget: WorkBudget = dataclasses.field(default_factory=WorkBudget)
+    progress: Progress = silent
 
 
 class LocalPlanner(Protocol):

@@ -49,9 +49,10 @@ def with_transitions(
     fresh = [pair for pair in pairs if pair not in tried]
     tasks = (_desired_leg(space, pair, trials, times, water) for pair in fresh)
     results = in_order(_optimised, (water, ship), tasks)
-    for pair in fresh:
+    for number, pair in enumerate(fresh):
         if trials.budget.exhausted:
             break
+        trials.progress("trying transitions between runs", (number + 1) / (len(fresh) + 1))
         found, spent_s = next(results)
         tried[pair] = None if found is None else _tried(space, times, pair, *found)
         trials.budget.spent_s += spent_s

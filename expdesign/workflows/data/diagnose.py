@@ -16,7 +16,7 @@ from expdesign.estimation.regression import model_for
 from expdesign.export import write_files
 from expdesign.export.diagnosis_page import diagnosis_html, diagnosis_json, diagnosis_tables, extended_vessel
 from expdesign.export.diagnosis_page.results import accuracy_entry, finding_entry
-from expdesign.progress import Progress, silent, within
+from expdesign.progress import Estimated, Progress, silent
 from expdesign.scenario import load_scenario, load_vessel
 from expdesign.signals import Commands
 from expdesign.values import Array
@@ -25,6 +25,9 @@ from expdesign.vessel.structures import FORCE_SIGNALS, SHOAL
 from expdesign.workflows.command_text import command_text
 from expdesign.workflows.outcome import Outcome, TextTable
 from expdesign.workflows.steps.measured import measured
+
+MOST_PAGE_WORK, PAGE_SAMPLES = 270.0, 375.0
+"""Simulations of few data that take as long as drawing the page, and the samples from which on they take longer."""
 
 
 def diagnose(
@@ -54,8 +57,11 @@ def diagnose(
     ship = load_vessel(vessel)
     record = measured(data, ship, velocity=velocity)
     proposals = _proposals(scenario, model_for(ship.model, record)) if scenario else ()
-    found = diagnose_record(ship, record, seed=seed, proposals=proposals, progress=within(progress, 0.0, 0.8))
-    progress("drawing the page", 0.8)
+    samples = sum(len(batch.inputs) for batch in record.batches)
+    drawing = MOST_PAGE_WORK / (1.0 + samples / PAGE_SAMPLES)
+    told = Estimated(progress, after=drawing)
+    found = diagnose_record(ship, record, seed=seed, proposals=proposals, progress=told)
+    told.after = 0.0
     command = command_text(
         "diagnose",
         data,
@@ -64,7 +70,7 @@ def diagnose(
     )
     files = {
         "diagnosis.json": diagnosis_json(found),
-        "diagnosis.html": diagnosis_html(found, command=command, version=__version__),
+        "diagnosis.html": diagnosis_html(found, command=command, version=__version__, progress=told.part(drawing, 0.0)),
         "vessel-extended.toml": extended_vessel(found, command=command),
     }
     written = write_files(out or Path("runs") / data[0].stem, files)

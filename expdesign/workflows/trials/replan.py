@@ -70,7 +70,7 @@ def replan(
         NoAnswer: there is no informative design or no feasible plan.
     """
     progress("reading scenario and data", 0.0)
-    state = present_state(scenario, data, vessel=vessel, remaining_s=remaining_s, progress=within(progress, 0.0, 0.01))
+    state = present_state(scenario, data, vessel=vessel, remaining_s=remaining_s, progress=within(progress, 0.0, 0.02))
     words = command_text(
         "replan",
         [scenario],
@@ -91,13 +91,13 @@ def _replanned(
 ) -> Outcome:
     """Plan the rest and write it; `words` are the command."""
     case, notes = rest_of(state, interest=interest)
-    information, growth = ready(case, seed=seed, progress=within(progress, 0.01, 0.02))
+    information, growth = ready(case, seed=seed, progress=within(progress, 0.02, 0.05))
     design = designed(
-        case, information, stated_std=_stated(state.first.vessel), seed=seed, progress=within(progress, 0.02, 0.05)
+        case, information, stated_std=_stated(state.first.vessel), seed=seed, progress=within(progress, 0.05, 0.13)
     )
     _check_runs(design)
-    plan = planned(case, information, design, seed=seed, progress=within(progress, 0.05, 0.74))
-    writing = within(progress, 0.74, 1.0)
+    plan = planned(case, information, design, seed=seed, progress=within(progress, 0.15, 0.8))
+    writing = within(progress, 0.8, 1.0)
     writing("writing routes, run cards and report", 0.0)
     known = known_of(replace(state, notes=(*state.notes, *notes)), case, design, plan)
     route = built_route(case, plan)
