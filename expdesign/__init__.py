@@ -19,7 +19,12 @@ What every number means:
   knots, latitude and longitude appear only in files.
 - Time counts from the start of the trial [s]; commands are held over one sample time.
 - What is wrong raises `InputError`, what has no answer raises `NoAnswer` (`expdesign.errors`), each with one line.
-- The same seed gives the same result.
+- The same seed gives the same result. For that, linear algebra uses one thread, where OPENBLAS_NUM_THREADS says
+  nothing else.
 """
+
+from expdesign.threads import use_one_thread
+
+use_one_thread()
 
 __version__ = "0.1.0"

@@ -13,7 +13,7 @@ ROOT = Path(expdesign.__file__).parent
 
 FLOORS = {
     "": (
-        ("errors", "interruptions", "lazy", "progress"),
+        ("errors", "interruptions", "lazy", "progress", "threads"),
         ("input_files", "processes"),
         ("memory",),
         ("conventions", "values"),
