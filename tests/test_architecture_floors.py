@@ -30,7 +30,7 @@ FLOORS = {
         ("workflows",),
         ("cli", "__main__"),
     ),
-    "records": (("tuning",), ("file",), ("pose",), ("remarks",), ("load",)),
+    "records": (("tuning",), ("file",), ("pose",), ("remarks",), ("load", "labels")),
     "estimation": (
         ("fit", "tuning"),
         ("regression",),

@@ -50,6 +50,8 @@ def test_the_dictionary_file_holds_the_matrices_to_the_last_bit() -> None:
         for name in ("X", "Y", "Z"):
             assert np.array_equal(np.array(entry[name]), getattr(item, name))
         assert (entry["log_det_alone"] is None) == (item.log_det_alone is None)
+    gains = [entry["gain_beside_pool"] for entry in file["primitives"]]
+    assert sum(gains) == pytest.approx(0.0, abs=1e-6)
 
 
 def test_the_footprint_of_a_straight_run_reaches_from_its_start_to_a_corner_of_the_bow() -> None:

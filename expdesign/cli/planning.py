@@ -29,7 +29,7 @@ def run(
 
 @command("score")
 def score(scenario: ScenarioFile, out: Out = None, seed: Seed = 0) -> Asked:
-    """Simulate the manoeuvres of the dictionary and compute the information of each.
+    """Simulate the manoeuvres of the dictionary, and rank them by the information that each adds beside all others.
 
     Writes dictionary.json.
     """

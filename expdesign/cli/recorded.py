@@ -175,7 +175,7 @@ def mine(
     vessel: Annotated[
         Path, typer.Option("--vessel", metavar="VESSEL.toml", help="Nominal model; its simulation gives instruments.")
     ],
-    keep: Annotated[int, typer.Option("--keep", metavar="K", help="How many batches to choose.")],
+    keep: Annotated[int, typer.Option("--keep", metavar="K", help="How many batches, or pieces, to choose.")],
     piece: Annotated[
         float | None,
         typer.Option("--piece", metavar="SECONDS", help="Cut runs into pieces of about this length first."),
@@ -183,13 +183,29 @@ def mine(
     fixed: Fixed = None,
     mean: Mean = "complete",
     velocity: Velocity = "auto",
+    labels: Annotated[
+        str | None,
+        typer.Option(
+            "--labels",
+            metavar="WHERE",
+            help="Make a dictionary of labelled manoeuvres, share out K pieces of --piece seconds among them, and "
+            "compare with random pieces. Labels are in the column manoeuvre (column), or before the first underscore "
+            "of a file's name (file).",
+        ),
+    ] = None,
+    draws: Annotated[
+        int, typer.Option("--draws", metavar="N", help="With --labels: subsets drawn of each design.")
+    ] = 500,
     out: OutByData = None,
+    seed: Seed = 0,
 ) -> Asked:
     """Rank recorded runs by their information, and choose the few to estimate from.
 
-    Writes mining.json and chosen.csv, which `estimate` reads.
+    Writes mining.json and chosen.csv, which `estimate` reads. With --labels: dictionary.json, durations.json, and
+    subsets.json with the simulation error of optimised and of random subsets on the pieces that they leave.
 
     Example: expdesign mine voyage.csv --vessel ship.toml --piece 120 --keep 10
+    Example: expdesign mine trials --vessel ship.toml --labels file --piece 100 --keep 6
     """
     return ask(
         "mine",
@@ -201,4 +217,7 @@ def mine(
         fixed=fixed or (),
         mean=mean,
         velocity=velocity,
+        labels=labels,
+        draws=draws,
+        seed=seed,
     )

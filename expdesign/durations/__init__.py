@@ -3,10 +3,10 @@
 from expdesign.durations.certificate import Certificate, DurationDesign, log_det, scaled, sensitivities, whitened
 from expdesign.durations.concave import Collected
 from expdesign.durations.criteria import CRITERIA, Aim, Criterion
-from expdesign.durations.efficiency import Efficiencies, Kept, efficiencies, limits_kept
+from expdesign.durations.efficiency import Efficiencies, Kept, efficiencies, limits_kept, pool_gains
 from expdesign.durations.large_scale import LargeDesign, d_optimal, rows_of
 from expdesign.durations.limits import NO_CONSTRAINTS, Budget, Constraints
-from expdesign.durations.mining import Subset, best_subset
+from expdesign.durations.mining import Subset, best_subset, build_recorded
 from expdesign.durations.problem import (
     ROBUST,
     DurationProblem,
@@ -41,12 +41,14 @@ __all__ = [
     "bordered_moments",
     "build_durations",
     "build_fused",
+    "build_recorded",
     "d_optimal",
     "efficiencies",
     "limits_kept",
     "log_det",
     "monte_carlo_covariance",
     "optimal_shares",
+    "pool_gains",
     "rows_of",
     "scaled",
     "sensitivities",

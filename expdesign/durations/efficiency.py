@@ -13,6 +13,7 @@ from expdesign.durations.criteria import CRITERIA
 from expdesign.durations.criteria.models import stacked_values
 from expdesign.durations.problem import DurationProblem
 from expdesign.durations.solve import floors_of, optimal_shares
+from expdesign.durations.tuning import TUNING
 from expdesign.errors import InputError, NoAnswer
 from expdesign.values import Array
 
@@ -128,3 +129,27 @@ def _optimum(design: DurationDesign, problem: DurationProblem, name: str) -> Arr
 def _of(problem: DurationProblem, name: str, designs: Mapping[str, Array], best: Array) -> dict[str, float]:
     collected = Collected.of(problem, name)
     return {design: collected.efficiency(shares, best) for design, shares in designs.items()}
+
+
+def pool_gains(matrices: Array) -> Array:
+    """(q,) gain in log det by each primitive beside the pool of all, per unit of time taken from equal shares.
+
+    With B = mean of the B_q this is trace(B^-1 B_q) - d, the slope of log |det B| towards primitive q. It ranks
+    primitives also where none informs about every parameter alone, and adds up to zero over all.
+
+    Args:
+        matrices: (q, d, d) B_q, see `DurationProblem`.
+
+    Returns:
+        The gains; nan where all together do not inform about every parameter.
+
+    Source: J. Kiefer and J. Wolfowitz, The equivalence of two extremum problems, Canad. J. Math. 12 (1960), 363-366.
+    """
+    size = np.sqrt(np.abs(np.diagonal(matrices, axis1=1, axis2=2)).mean(axis=0))
+    size = np.where(size > 0, size, 1.0)
+    scaled = matrices / np.outer(size, size)
+    pool = scaled.mean(axis=0)
+    values = np.linalg.svd(pool, compute_uv=False)
+    if not values[-1] > TUNING.singular * values[0]:
+        return np.full(len(matrices), np.nan)
+    return np.asarray(np.einsum("ij,qji->q", np.linalg.inv(pool), scaled) - len(pool))

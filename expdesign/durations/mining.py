@@ -18,7 +18,7 @@ import numpy as np
 
 from expdesign.durations.concave import Collected, symmetric_part
 from expdesign.durations.criteria import Aim
-from expdesign.durations.limits import Constraints
+from expdesign.durations.limits import NO_CONSTRAINTS, Constraints
 from expdesign.durations.problem import DurationProblem
 from expdesign.durations.solve import optimal_shares
 from expdesign.durations.tuning import TUNING
@@ -106,22 +106,53 @@ def best_subset(
     )
 
 
+def build_recorded(
+    batches: Sequence[BatchInformation],
+    parameters: Sequence[str],
+    *,
+    run_s: Array,
+    total_s: float,
+    mean_subtraction: str = "complete",
+    aim: Aim | None = None,
+    constraints: Constraints = NO_CONSTRAINTS,
+) -> DurationProblem:
+    """The duration problem of recorded primitives, from the moments of their data.
+
+    Args:
+        batches: moments of each primitive, see `information.recorded`.
+        parameters: names in the order of their matrices.
+        run_s: (q,) duration of one whole run of each [s].
+        total_s: total time of all primitives [s].
+        mean_subtraction: "none", "batch" or "complete".
+        aim: criterion with its settings; D when not given.
+        constraints: limits on the durations.
+    """
+    return DurationProblem(
+        names=tuple(batch.name for batch in batches),
+        parameters=tuple(parameters),
+        mean_subtraction=mean_subtraction,
+        matrices=np.array([batch.bordered(mean_subtraction) for batch in batches]),
+        run_s=run_s,
+        total_s=total_s,
+        aim=aim or Aim(),
+        constraints=constraints,
+    )
+
+
 def _pool(
     batches: Sequence[BatchInformation], parameters: Sequence[str], mean_subtraction: str, aim: Aim
 ) -> tuple[DurationProblem, Collected]:
     """All batches as primitives of one run each, in their total time, and the criterion."""
-    matrices = np.array([batch.bordered(mean_subtraction) for batch in batches])
     samples = np.array([float(batch.samples) for batch in batches])
-    problem = DurationProblem(
-        names=tuple(batch.name for batch in batches),
-        parameters=tuple(parameters),
-        mean_subtraction=mean_subtraction,
-        matrices=matrices,
+    problem = build_recorded(
+        batches,
+        parameters,
         run_s=samples,
         total_s=float(samples.sum()),
+        mean_subtraction=mean_subtraction,
         aim=aim,
     )
-    definite = replace(problem, matrices=symmetric_part(matrices))
+    definite = replace(problem, matrices=symmetric_part(problem.matrices))
     try:
         return definite, Collected.of(definite)
     except NotInformative:

@@ -66,6 +66,7 @@ def recorded_information(
     *,
     predictor: str = "basic",
     regressors: str = "measured",
+    delivered: bool = False,
 ) -> tuple[BatchInformation, ...]:
     """Information of every batch about named parameters, in the units of `information.moments`.
 
@@ -73,11 +74,12 @@ def recorded_information(
     inform about it.
 
     Args:
-        record: measured data, with commands as inputs.
+        record: measured data, with commands as inputs unless `delivered`.
         model: nominal; its simulation gives the instruments.
         parameters: p names; all others are fixed.
         predictor: name in `estimation.predictors.PREDICTORS` without nuisance regressors, "basic" or "basic-wind".
         regressors: "measured", or "simulated" as in the instruments, which makes X symmetric.
+        delivered: the record holds what the actuators deliver, not commands.
 
     Raises:
         InputError: a predictor with nuisance regressors, or data that lack what it needs.
@@ -87,7 +89,8 @@ def recorded_information(
     if regressors not in REGRESSORS:
         raise InputError(f"regressors is {regressors!r}, expected one of {', '.join(REGRESSORS)}")
     driven = model_for(model, record)
-    record = with_delivered_inputs(record, driven)
+    if not delivered:
+        record = with_delivered_inputs(record, driven)
     fixed = tuple(name for name in driven.names if name not in parameters)
     layout = build_layout(driven, record, predictor=predictor, fixed=fixed)
     if layout.nuisance:
@@ -124,6 +127,26 @@ def _padded(values: Array, place: list[int], count: int, *, both: bool = False) 
     full = np.zeros((count, count if both else values.shape[1]))
     full[np.ix_(place, place if both else range(values.shape[1]))] = values
     return full
+
+
+def by_label(batches: Sequence[BatchInformation], labels: Sequence[str]) -> tuple[BatchInformation, ...]:
+    """Information of each label: the moments of all its batches together, in the order in which labels first appear.
+
+    Args:
+        batches: as from `recorded_information`.
+        labels: of each batch.
+    """
+    found = []
+    for label in dict.fromkeys(labels):
+        own = [batch for batch, name in zip(batches, labels, strict=True) if name == label]
+        rows = np.array([batch.samples for batch in own])
+        X, Y, Z = (
+            np.tensordot(rows / rows.sum(), np.array([getattr(batch, name) for batch in own]), axes=1)
+            for name in ("X", "Y", "Z")
+        )
+        seconds = sum(batch.seconds for batch in own)
+        found.append(BatchInformation(name=label, seconds=seconds, samples=int(rows.sum()), X=X, Y=Y, Z=Z))
+    return tuple(found)
 
 
 def pooled(batches: Sequence[BatchInformation], mean_subtraction: str) -> tuple[Array, int]:

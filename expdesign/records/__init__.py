@@ -8,14 +8,26 @@ One file has one header row (row 1 in every message) and one row per sample. Col
 - inputs `tau_x tau_y tau_psi`, or per actuator `n1_rps a1_rad rudder1_rad ...`;
 - relative wind `wind_u_mps wind_v_mps` (ship's velocity through the air), or of a vane `wind_speed_mps wind_angle_rad`,
   the direction it comes from, clockwise from the bow: u_q = V cos, v_q = V sin;
-- `depth_m`, water depth.
+- `depth_m`, water depth;
+- `manoeuvre`, a text that labels the row, which only `row_labels` reads.
 
 Known quantities in other units (`u_knots`, `n1_rpm`, `wind_angle_deg`) are converted and noted; unknown columns
 are ignored and noted. Every error is a `FileError` with the rows concerned.
 """
 
 from expdesign.records.file import COLUMNS
+from expdesign.records.labels import LABEL_SOURCES, row_labels
 from expdesign.records.load import load_records
 from expdesign.records.pose import VELOCITY_METHODS, Fix, central_difference, last_fix, smoothed_velocity
 
-__all__ = ["COLUMNS", "VELOCITY_METHODS", "Fix", "central_difference", "last_fix", "load_records", "smoothed_velocity"]
+__all__ = [
+    "COLUMNS",
+    "LABEL_SOURCES",
+    "VELOCITY_METHODS",
+    "Fix",
+    "central_difference",
+    "last_fix",
+    "load_records",
+    "row_labels",
+    "smoothed_velocity",
+]

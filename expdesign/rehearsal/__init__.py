@@ -1,5 +1,26 @@
-"""Monte Carlo validation of designs: estimates from many simulated trials, compared with the predictions."""
+"""Designs put to the test: Monte Carlo trials of a true ship, and subsets of recorded data."""
 
+from expdesign.rehearsal.recorded import (
+    Drawn,
+    Pieces,
+    drawn_subsets,
+    random_subsets,
+    recorded_pieces,
+    try_subsets,
+)
 from expdesign.rehearsal.validation import RANDOM, Rehearsal, Validated, equal_runs, trial_parts, validate
 
-__all__ = ["RANDOM", "Rehearsal", "Validated", "equal_runs", "trial_parts", "validate"]
+__all__ = [
+    "RANDOM",
+    "Drawn",
+    "Pieces",
+    "Rehearsal",
+    "Validated",
+    "drawn_subsets",
+    "equal_runs",
+    "random_subsets",
+    "recorded_pieces",
+    "trial_parts",
+    "try_subsets",
+    "validate",
+]

@@ -11,9 +11,13 @@ class Tuning:
 
     Attributes:
         chunk_trials: trials in one chunk; each chunk has its own random stream.
+        singular: least singular value of scaled equations, as a share of the largest, that still gives an estimate.
+        degenerate_share: simulation errors above this share of the motion make a model degenerate.
     """
 
     chunk_trials: int = 20
+    singular: float = 1e-12
+    degenerate_share: float = 1.0
 
 
 TUNING = Tuning()

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from expdesign.export.files.known import Known, Purchase, replan_json
     from expdesign.export.files.plan_files import commands_csv, plan_json, track_csv
     from expdesign.export.files.record_file import record_csv
+    from expdesign.export.files.recorded_design import recorded_dictionary_json, subsets_json
     from expdesign.export.files.text import finite, strict_json
     from expdesign.export.files.vessel_file import vessel_toml
 
@@ -53,8 +54,10 @@ __all__ = [
     "plan_json",
     "plus_minus",
     "record_csv",
+    "recorded_dictionary_json",
     "replan_json",
     "strict_json",
+    "subsets_json",
     "track_csv",
     "unstable_warning",
     "vessel_toml",
@@ -80,6 +83,7 @@ if not TYPE_CHECKING:
             "known": ("Known", "Purchase", "replan_json"),
             "plan_files": ("commands_csv", "plan_json", "track_csv"),
             "record_file": ("record_csv",),
+            "recorded_design": ("recorded_dictionary_json", "subsets_json"),
             "text": ("finite", "strict_json"),
             "vessel_file": ("vessel_toml",),
         },

@@ -12,25 +12,36 @@ import numpy as np
 
 from expdesign.conventions import VELOCITY_COLUMNS, to_b_frame, to_n_frame
 from expdesign.dictionary.primitive import Primitive
-from expdesign.durations import DurationDesign, Efficiencies, limits_kept
+from expdesign.durations import DurationDesign, Efficiencies, bordered, limits_kept, pool_gains
 from expdesign.export.files.text import finite, named, strict_json
 from expdesign.information.primitive_information import PrimitiveInformation
 from expdesign.vessel import Vessel
 
 
-def dictionary_json(information: Sequence[PrimitiveInformation], parameters: Sequence[str], *, vessel: Vessel) -> str:
+def dictionary_json(
+    information: Sequence[PrimitiveInformation],
+    parameters: Sequence[str],
+    *,
+    vessel: Vessel,
+    mean_subtraction: str = "complete",
+) -> str:
     """The dictionary with the information of each primitive, as dictionary.json.
 
     Args:
         information: of each primitive.
         parameters: (p) names in the order of the matrices.
         vessel: its model says which velocities have equations, its hull gives the footprint.
+        mean_subtraction: by which primitives are ranked beside all others.
     """
+    gains = pool_gains(np.array([bordered(item, mean_subtraction) for item in information]))
     return strict_json(
         {
             "parameters": list(parameters),
             "outputs": list(vessel.model.outputs),
-            "primitives": [_primitive_entry(item, vessel) for item in information],
+            "primitives": [
+                {**_primitive_entry(item, vessel), "gain_beside_pool": finite(gain)}
+                for item, gain in zip(information, gains.tolist(), strict=True)
+            ],
         }
     )
 

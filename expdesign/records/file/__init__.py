@@ -1,14 +1,17 @@
 """One file of measured data: header, cells, columns, clock, ranges."""
 
+from expdesign.records.file.cells import FIRST_ROW, read_cells
 from expdesign.records.file.choice import Inputs, mistyped
 from expdesign.records.file.clock import Clock, read_clock
-from expdesign.records.file.names import COLUMNS, is_input
+from expdesign.records.file.names import COLUMNS, LABEL, is_input
 from expdesign.records.file.ranges import check_ranges
 from expdesign.records.file.table import Table, read_table
 from expdesign.records.file.wind import check_wind, relative_wind
 
 __all__ = [
     "COLUMNS",
+    "FIRST_ROW",
+    "LABEL",
     "Clock",
     "Inputs",
     "Table",
@@ -16,6 +19,7 @@ __all__ = [
     "check_wind",
     "is_input",
     "mistyped",
+    "read_cells",
     "read_clock",
     "read_table",
     "relative_wind",

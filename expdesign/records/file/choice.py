@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from expdesign.errors import FileError, nearest
-from expdesign.records.file.names import Source, Unitless, is_input, meaning
+from expdesign.records.file.names import LABEL, Source, Unitless, is_input, meaning
 
 PAIRS = (
     ("north_m", "east_m"),
@@ -122,5 +122,6 @@ def _conversions(chosen: Sources) -> list[str]:
 
 def _ignored(header: tuple[str, ...], chosen: Sources, meanings: list[Source | Unitless | None]) -> list[str]:
     used = {source.column for source in chosen.values()}
+    used |= {column for column, name in enumerate(header) if name == LABEL}
     extra = [name or f"column {column + 1}" for column, name in enumerate(header) if column not in used]
     return [f"ignored {', '.join(extra)}"] if extra else []

@@ -10,6 +10,8 @@ from expdesign.conventions import KNOTS_PER_MPS, METRES_PER_NAUTICAL_MILE
 
 FORCES = ("tau_x", "tau_y", "tau_psi")
 PLAIN = ("batch", *FORCES)
+LABEL = "manoeuvre"
+"""A column of texts, which only `records.labels` reads."""
 """Names without a unit."""
 
 DEGREE = math.pi / 180.0
@@ -75,6 +77,7 @@ COLUMNS = (
     *QUANTITIES,
     Quantity("", {}, "tau_x, tau_y, tau_psi", "generalised forces in the model's unit, instead of actuator signals"),
     Quantity("", {}, "batch", "a change of its value starts a new batch"),
+    Quantity("", {}, LABEL, "label of the manoeuvre, a text; only expdesign mine --labels column reads it"),
 )
 """All columns that are read."""
 

@@ -1,4 +1,4 @@
-"""`expdesign mine`: the most informative recorded batches."""
+"""`expdesign mine`: the most informative recorded batches, or a design from labelled ones."""
 
 from __future__ import annotations
 
@@ -17,14 +17,22 @@ from expdesign.export import write_files
 from expdesign.export.files import record_csv
 from expdesign.information import estimated_parameters
 from expdesign.information.recorded import BatchInformation, recorded_information
-from expdesign.progress import Progress, silent
+from expdesign.progress import Progress, silent, within
 from expdesign.reduction import at_reference_point
 from expdesign.scenario import load_vessel
 from expdesign.signals import Batch, Record
 from expdesign.vessel import VesselModel
 from expdesign.workflows.command_text import command_text
+from expdesign.workflows.data.labelled import (
+    Asked,
+    labelled_design,
+    labelled_files,
+    labelled_summary,
+    labelled_tables,
+    piece_of,
+)
 from expdesign.workflows.outcome import Outcome, TextTable
-from expdesign.workflows.steps.measured import measured
+from expdesign.workflows.steps.measured import data_files, measured, reduced_data
 
 
 def mine(
@@ -37,12 +45,18 @@ def mine(
     fixed: Sequence[str] = (),
     mean: str = "complete",
     velocity: str = "auto",
+    labels: str | None = None,
+    draws: int = 500,
+    seed: int = 0,
     progress: Progress = silent,
 ) -> Outcome:
     """The `keep` batches with the most information together, into `out` or runs/<first data file>.
 
+    With labels, the data are cut into pieces of one label each; time is shared out among the labels, and draws of that
+    design are compared with random subsets of as many pieces.
+
     Args:
-        data: CSV files; a gap starts a new batch.
+        data: CSV files, or folders of them; a gap starts a new batch.
         out: folder, or None.
         vessel: nominal model, which simulates the instruments.
         keep: how many batches to choose.
@@ -50,6 +64,9 @@ def mine(
         fixed: parameters held at the vessel's values.
         mean: mean subtraction of the estimator that will follow.
         velocity: source of the velocities, as in `estimate`.
+        labels: where labels are, one of `records.LABEL_SOURCES`; None for a choice of batches.
+        draws: of each design that is compared, with labels.
+        seed: of the draws.
         progress: of the command.
 
     Raises:
@@ -59,17 +76,7 @@ def mine(
     if mean not in MEAN_SUBTRACTIONS:
         raise InputError(f"--mean is {mean}, expected one of {', '.join(MEAN_SUBTRACTIONS)}")
     progress("reading the data", 0.02)
-    ship = load_vessel(vessel)
-    record = in_pieces(measured(data, ship, velocity=velocity), piece_s)
-    windy = all(batch.wind is not None for batch in record.batches)
-    names, unseen = _parameters(ship.model, fixed, windy=windy)
-    progress("simulating the runs", 0.2)
-    seen = at_reference_point(record, ship.sensors, smoothed=velocity == "smoothed")
-    batches = recorded_information(seen, ship.model, names, predictor="basic-wind" if windy else "basic")
-    _need_every_parameter(batches, names)
-    progress("choosing among them", 0.6)
-    subset = best_subset(batches, names, size=keep, mean_subtraction=mean)
-    chosen = [batch for batch in record.batches if batch.name in subset.chosen]
+    ship, paths = load_vessel(vessel), data_files(data)
     command = command_text(
         "mine",
         data,
@@ -80,17 +87,67 @@ def mine(
             "--fixed": tuple(fixed),
             "--mean": mean,
             "--velocity": velocity,
+            "--labels": labels,
+            **({} if labels is None else {"--draws": draws, "--seed": seed}),
         },
-        usual={"--mean": "complete", "--velocity": "auto"},
+        usual={"--mean": "complete", "--velocity": "auto", "--draws": 500, "--seed": 0},
     )
+    folder = out or Path("runs") / data[0].stem
+    if labels is not None:
+        asked = Asked(labels=labels, piece_s=_stated(piece_s), keep=keep, draws=draws, mean=mean, seed=seed)
+        record = reduced_data(paths, ship, velocity=velocity)
+        return _designed(record, paths, folder, ship.model, fixed, asked, command, within(progress, 0.1, 1.0))
+    record = in_pieces(measured(paths, ship, velocity=velocity), piece_s)
+    windy = all(batch.wind is not None for batch in record.batches)
+    names, unseen = _parameters(ship.model, fixed, windy=windy)
+    progress("simulating the runs", 0.2)
+    seen = at_reference_point(record, ship.sensors, smoothed=velocity == "smoothed")
+    batches = recorded_information(seen, ship.model, names, predictor="basic-wind" if windy else "basic")
+    _need_every_parameter(batches, names)
+    progress("choosing among them", 0.6)
+    subset = best_subset(batches, names, size=keep, mean_subtraction=mean)
+    chosen = [batch for batch in record.batches if batch.name in subset.chosen]
     content = _content(subset, batches, names, unseen, mean=mean, command=command)
     files = {
         "mining.json": json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n",
         "chosen.csv": record_csv(chosen),
     }
-    written = write_files(out or Path("runs") / data[0].stem, files)
+    written = write_files(folder, files)
     progress("done", 1.0)
     return Outcome(files=written, summary=_summary(content), tables=(_table(subset, batches),))
+
+
+def _stated(piece_s: float | None) -> float:
+    if piece_s is None:
+        raise InputError("--labels needs --piece, the length of a piece in seconds")
+    return piece_s
+
+
+def _designed(
+    record: Record,
+    paths: Sequence[Path],
+    folder: Path,
+    model: VesselModel,
+    fixed: Sequence[str],
+    asked: Asked,
+    command: str,
+    progress: Progress,
+) -> Outcome:
+    """A design from labelled data, written."""
+    windy = all(batch.wind is not None for batch in record.batches)
+    names, _ = _parameters(model, fixed, windy=windy)
+    found = labelled_design(
+        record,
+        paths,
+        model,
+        parameters=names,
+        predictor="basic-wind" if windy else "basic",
+        asked=asked,
+        progress=progress,
+    )
+    written = write_files(folder, labelled_files(found, names, model.outputs, command))
+    progress("done", 1.0)
+    return Outcome(files=written, summary=labelled_summary(found), tables=labelled_tables(found, model.outputs))
 
 
 def in_pieces(record: Record, piece_s: float | None) -> Record:
@@ -113,12 +170,7 @@ def _pieces(batch: Batch, piece_s: float) -> list[Batch]:
         return [batch]
     edges = np.linspace(0, len(batch), count + 1).round().astype(int)
     spans = [slice(int(first), int(last)) for first, last in pairwise(edges)]
-    return [_piece(batch, span) for span in spans]
-
-
-def _piece(batch: Batch, span: slice) -> Batch:
-    begin, end = (row * batch.sample_time_s for row in (span.start, span.stop))
-    return replace(batch.cut(span), name=f"{batch.name}, {begin:g} to {end:g} s")
+    return [piece_of(batch, span) for span in spans]
 
 
 def _parameters(model: VesselModel, fixed: Sequence[str], *, windy: bool) -> tuple[tuple[str, ...], tuple[str, ...]]:

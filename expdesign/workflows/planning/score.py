@@ -8,7 +8,7 @@ from expdesign.dictionary.desired import deviating
 from expdesign.progress import Progress, silent, within
 from expdesign.workflows.outcome import Outcome
 from expdesign.workflows.steps.case import loaded, written
-from expdesign.workflows.steps.scored import parameters_of, score_files, scored
+from expdesign.workflows.steps.scored import parameters_of, ranking, score_files, scored
 
 
 def score(scenario: Path, out: Path | None, *, seed: int = 0, progress: Progress = silent) -> Outcome:
@@ -20,6 +20,7 @@ def score(scenario: Path, out: Path | None, *, seed: int = 0, progress: Progress
         "parameters": len(parameters_of(case)),
         "meet_excitation_condition": sum(item.excitation_condition for item in information),
         "informative_alone": sum(item.log_det_alone is not None for item in information),
+        "most_beside_the_others": ranking(case, information).rows[0][1],
         "stray_from_their_wish": [item.name for item in deviating([item.primitive for item in information])],
     }
-    return written(case, out, score_files(case, information), summary, progress)
+    return written(case, out, score_files(case, information), summary, progress, (ranking(case, information),))

@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
+from expdesign.errors import FileError
 from expdesign.estimation.regression import with_depth
 from expdesign.input_files import check_ends
 from expdesign.records import load_records
@@ -13,6 +14,21 @@ from expdesign.reduction import reduced
 from expdesign.signals import Record
 from expdesign.vessel import Vessel, column_name
 from expdesign.vessel.structures import FORCE_SIGNALS
+
+
+def data_files(data: Sequence[Path]) -> tuple[Path, ...]:
+    """Files, and the CSV files of folders in the order of their names.
+
+    Raises:
+        FileError: a folder without CSV files.
+    """
+    found: list[Path] = []
+    for path in data:
+        inside = sorted(path.glob("*.csv")) if path.is_dir() else [path]
+        if not inside:
+            raise FileError(path, "", "is a folder without CSV files, expected some")
+        found += inside
+    return tuple(found)
 
 
 def measured(data: Sequence[Path], vessel: Vessel, *, velocity: str = "auto") -> Record:

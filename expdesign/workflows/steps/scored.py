@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from expdesign.dictionary import PrimitiveSpec, build_dictionary
+from expdesign.durations import bordered, pool_gains
 from expdesign.export import (
     dictionary_json,
 )
@@ -13,6 +16,7 @@ from expdesign.memory import recalled
 from expdesign.progress import Progress, silent
 from expdesign.scenario import Scenario
 from expdesign.vessel import Environment, Vessel
+from expdesign.workflows.outcome import TextTable
 
 
 def scored(case: Scenario, *, progress: Progress = silent) -> tuple[PrimitiveInformation, ...]:
@@ -51,7 +55,29 @@ def _scored(
 
 def score_files(case: Scenario, information: Sequence[PrimitiveInformation]) -> dict[str, str | bytes]:
     """`dictionary.json`."""
-    return {"dictionary.json": dictionary_json(information, parameters_of(case), vessel=case.vessel)}
+    text = dictionary_json(
+        information, parameters_of(case), vessel=case.vessel, mean_subtraction=case.design.mean_subtraction
+    )
+    return {"dictionary.json": text}
+
+
+def ranking(case: Scenario, information: Sequence[PrimitiveInformation]) -> TextTable:
+    """Primitives by what they add beside all others, which also ranks those that do not inform alone."""
+    gains = pool_gains(np.array([bordered(item, case.design.mean_subtraction) for item in information]))
+    order = np.argsort(np.where(np.isnan(gains), np.inf, -gains), kind="stable")
+    return TextTable(
+        title="Primitives by what they add to log det beside all others, and alone",
+        header=("rank", "primitive", "gain beside the pool", "log det alone"),
+        rows=tuple(
+            (
+                str(rank),
+                information[q].primitive.name,
+                "-" if np.isnan(gains[q]) else f"{gains[q]:.3g}",
+                "singular" if (alone := information[q].log_det_alone) is None else f"{alone:.4g}",
+            )
+            for rank, q in enumerate(order, start=1)
+        ),
+    )
 
 
 def parameters_of(case: Scenario) -> tuple[str, ...]:
