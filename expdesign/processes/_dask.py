@@ -10,6 +10,7 @@ import logging
 import threading
 import time
 import traceback
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from queue import Empty, SimpleQueue
@@ -83,7 +84,9 @@ class Cluster:
     def _submitted(self, both: bytes, tasks: Sequence[bytes]) -> dict[int, Future[Any]]:
         name, expected = uuid4().hex, self._expected["expdesign"]
         try:
-            shared = self._client.submit(bytes, both, key=f"shared-{name}")
+            with warnings.catch_warnings():
+                warnings.filterwarnings("ignore", message="Sending large graph")  # it is sent once
+                shared = self._client.submit(bytes, both, key=f"shared-{name}")
             return {
                 number: self._client.submit(self._call, expected, shared, task, key=f"task-{name}-{number}")
                 for number, task in enumerate(tasks)

@@ -174,8 +174,16 @@ def validate(
 def _tasks(rehearsal: Rehearsal) -> Iterator[tuple[str, str, int, int]]:
     """(key, design, chunk number, trials in it)."""
     for name in rehearsal.designs:
-        for number, first in enumerate(range(0, rehearsal.trials, TUNING.chunk_trials)):
-            yield f"{name}/{number}", name, number, min(TUNING.chunk_trials, rehearsal.trials - first)
+        most = TUNING.chunk_trials if _at_once(rehearsal, name) else TUNING.single_trials
+        for number, first in enumerate(range(0, rehearsal.trials, most)):
+            last = min(first + most, rehearsal.trials)
+            yield f"{name}/{first}-{last}", name, number, last - first
+
+
+def _at_once(rehearsal: Rehearsal, design: str) -> bool:
+    """Whether all trials of a chunk are simulated at once: the same runs in the same mean weather."""
+    weather = rehearsal.environment
+    return rehearsal.designs[design] is not None and not (weather.current_std_mps or weather.wind_std_mps)
 
 
 def _chunk(rehearsal: Rehearsal, key: str, design: str, number: int, trials: int) -> tuple[str, Array]:
@@ -183,8 +191,7 @@ def _chunk(rehearsal: Rehearsal, key: str, design: str, number: int, trials: int
     order = sorted(rehearsal.designs).index(design)
     rng = np.random.default_rng([rehearsal.seed, order, number])
     runs, weather = rehearsal.designs[design], rehearsal.environment
-    steady = not (weather.current_std_mps or weather.wind_std_mps)
-    if runs is not None and steady:
+    if runs is not None and _at_once(rehearsal, design):
         return key, np.array([_estimated(rehearsal, item) for item in _sailed(rehearsal, runs, weather, trials, rng)])
     rows = []
     for _ in range(trials):

@@ -1,7 +1,8 @@
 """Work shared among the workers of a Dask scheduler: what it gains, what it sends, and what a hundred would gain.
 
-``python tests/benchmarks/cluster.py``: `whatif --plan` with three cases, `validate`, and ten thousand drawn trials of a
-plan are done by this process, then by one and by two workers of one thread. Results are compared.
+``python tests/benchmarks/cluster.py [WORD ...]``: `whatif`, designs alone and with plans, `validate`, a published study
+and ten thousand drawn trials of a plan are done by this process, then by one and by two workers of one thread. Words
+choose among them. Results are compared.
 
 Speed-ups are by processor seconds, whatever else the machine does: those of this process alone over the sum of what
 this process still does and what the busiest worker does, its imports included. Wall times stand beside. `outside tasks`
@@ -29,17 +30,23 @@ import numpy as np
 from main_job import ROOT, SCENARIOS, processor_s
 
 sys.path.insert(0, str(ROOT / "tests"))
+sys.path.insert(0, str(ROOT / "tests" / "benchmarks" / "published"))
+import manoeuvring
 from dask_cluster import LocalCluster, local_cluster
 from expdesign import workflows
-from expdesign.plan.assembly import leg_water
+from expdesign.plan.assembly import leg_water, ship_on_legs
 from expdesign.plan.monte_carlo import estimate_risk
 from expdesign.processes import on_cluster, sharing
 from expdesign.scenario import load_scenario
 
+PUBLISHED = ROOT / "tests" / "benchmarks" / "published"
+"""Folder whose modules workers import too."""
 MANY = 100
 """Workers on paper."""
-TRIALS, DRAWS = 40, 10_000
-"""Of each design, and of a plan."""
+TRIALS, DRAWS, RUNS = 60, 10_000, 40
+"""Of each design, of a plan, and of the study."""
+TOTALS_S = 240.0, 300.0, 360.0, 420.0, 480.0
+"""Informative times of the variants of the story."""
 MIB = 2**20
 
 
@@ -84,7 +91,7 @@ def observed() -> Iterator[Tasks]:
 
 def on_workers(work: Callable[[], Any], count: int) -> tuple[Any, float, float]:
     """The result, processor seconds of this process and of the busiest worker together, and wall seconds."""
-    with local_cluster(count) as cluster:
+    with local_cluster(count, first=PUBLISHED) as cluster:
         before = _worker_s(cluster)
         began, wall = time.process_time(), time.perf_counter()
         with on_cluster(cluster.address):
@@ -119,42 +126,56 @@ def row(name: str, work: Callable[[], Any]) -> tuple[str, str]:
 
 
 def cases(folder: Path) -> list[Path]:
-    """Variants of the story with less time."""
+    """Variants of the story with other times."""
     found = []
-    for total_s in (240.0, 300.0):
+    for total_s in TOTALS_S:
         found.append(folder / f"{total_s:.0f}.toml")
         found[-1].write_text(f"[design]\ntotal_s = {total_s}\n", "utf-8")
     return found
 
 
-def works(folder: Path) -> Iterator[tuple[str, Callable[[], Any]]]:
-    """Names of what is measured, and functions that do it."""
-    story = SCENARIOS / "story.toml"
+def works(folder: Path) -> dict[str, Callable[[], Callable[[], Any]]]:
+    """Names of what is measured, and functions that make ready what does it."""
+    variants, model_ship = cases(folder), SCENARIOS / "model-ship.toml"
 
     def written(command: Callable, file: str) -> Any:
         command(folder / "out")
         return json.loads((folder / "out" / file).read_text("utf-8"))
 
-    variants = cases(folder)
-    whatif = partial(workflows.whatif, story, variants, with_plan=True, jobs=1)
-    validate = partial(workflows.validate_design, SCENARIOS / "model-ship.toml", trials=TRIALS, jobs=1)
-    yield f"`whatif --plan`, {1 + len(variants)} cases", partial(written, whatif, "whatif.json")
-    yield f"`validate`, {TRIALS} trials of each design", partial(written, validate, "validation.json")
-    case = load_scenario(story)
+    def whatif(scenario: str, **options: Any) -> Callable[[], Any]:
+        command = partial(workflows.whatif, SCENARIOS / scenario, variants, jobs=1, cache=False, **options)
+        return partial(written, command, "whatif.json")
+
+    validate = partial(workflows.validate_design, model_ship, trials=TRIALS, jobs=1)
+    return {
+        f"`whatif`, {1 + len(variants)} designs": partial(whatif, "helsinki.toml"),
+        f"`whatif --plan`, {1 + len(variants)} cases": partial(whatif, "story.toml", with_plan=True),
+        f"`validate`, {TRIALS} trials of each design": lambda: partial(written, validate, "validation.json"),
+        f"study of a published table, {RUNS} runs": lambda: study,
+        f"{DRAWS} drawn trials": drawn_trials,
+    }
+
+
+def study() -> Any:
+    """Errors of six estimators."""
+    outcomes = manoeuvring.run_case(manoeuvring.MILD, runs=RUNS, rng=np.random.default_rng(1))
+    return [(item.errors.tolist(), item.std.tolist()) for item in outcomes]
+
+
+def drawn_trials() -> Callable[[], Any]:
+    """What sails drawn trials of the plan of the story."""
+    case = load_scenario(SCENARIOS / "story.toml")
     information = workflows.scored(case)
     design = workflows.designed(case, information)
-    water = leg_water(workflows.plan_problem(case, information, design))
-    sailed = workflows.planned(case, information, design).sailed
-
-    def drawn() -> Any:
-        return estimate_risk(water, sailed, draws=DRAWS, rng=np.random.default_rng(1))[0]
-
-    yield f"{DRAWS} drawn trials", drawn
+    problem = workflows.plan_problem(case, information, design)
+    water, sailed = leg_water(problem, ship_on_legs(problem)), workflows.planned(case, information, design).sailed
+    return lambda: estimate_risk(water, sailed, draws=DRAWS, rng=np.random.default_rng(1))[0]
 
 
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as place:
-        lines = [row(name, work) for name, work in works(Path(place))]
+        chosen = {name: made for name, made in works(Path(place)).items() if any(map(name.count, sys.argv[1:] or [""]))}
+        lines = [row(name, made()) for name, made in chosen.items()]
     print("| work | alone | tasks | speed-up by 1 worker (wall) | by 2 workers (wall) |")
     print("|---|---|---|---|---|", *(first for first, _ in lines), sep="\n")
     print("\nOn paper; bytes in MiB:\n")

@@ -209,23 +209,22 @@ def run_case(
     estimators: Sequence[str] = tuple(ESTIMATORS),
     progress: Progress = silent,
 ) -> list[Outcome]:
-    """Every estimator on every run of one set."""
-    trials = simulate_case(case, runs=runs, rng=rng)
-    return [estimate_all(case.name, trials, name, progress=progress) for name in estimators]
-
-
-def estimate_all(case: str, trials: Ensemble, estimator: str, *, progress: Progress = silent) -> Outcome:
-    """One estimator on every run.
+    """Every estimator on every run of one set.
 
     The wind is white from sample to sample, so only the measured wind itself can be an instrument for it.
     """
-    found, failed = [], 0
-    for run, item in enumerate(in_order(_estimated, (trials, estimator), ((run,) for run in range(trials.runs)))):
-        if item is None:
-            failed += 1
-        else:
-            found.append(item)
-        progress(f"{case}, {estimator}", (run + 1) / trials.runs)
+    trials = simulate_case(case, runs=runs, rng=rng)
+    tasks = [(name, run) for name in estimators for run in range(runs)]
+    found: dict[str, list[Estimate | None]] = {name: [] for name in estimators}
+    for number, ((name, _), item) in enumerate(zip(tasks, in_order(_estimated, (trials,), tasks), strict=True), 1):
+        found[name].append(item)
+        progress(f"{case.name}, {name}", number / len(tasks))
+    return [_outcome(case.name, name, items) for name, items in found.items()]
+
+
+def _outcome(case: str, estimator: str, items: Sequence[Estimate | None]) -> Outcome:
+    """One estimator on every run."""
+    found = [item for item in items if item is not None]
     if not found:
         raise NoAnswer(f"{estimator} gives no estimate in any run of {case}")
     names = found[0].names
@@ -237,7 +236,7 @@ def estimate_all(case: str, trials: Ensemble, estimator: str, *, progress: Progr
         parameters=names,
         errors=np.array([(item.values - truth) / scale for item in settled]).reshape(-1, len(names)),
         std=np.array([item.std / scale for item in settled]).reshape(-1, len(names)),
-        unsettled=failed + len(found) - len(settled),
+        unsettled=len(items) - len(settled),
     )
 
 
