@@ -1,7 +1,7 @@
 """Work shared among the workers of a Dask scheduler: what it gains, what it sends, and what a hundred would gain.
 
 ``python tests/benchmarks/cluster.py [WORD ...]``: `whatif`, designs alone and with plans, `validate`, a published study
-and ten thousand drawn trials of a plan are done by this process, then by one and by two workers of one thread. Words
+and many drawn trials of a plan are done by this process, then by one and by two workers of one thread. Words
 choose among them. Results are compared.
 
 Speed-ups are by processor seconds, whatever else the machine does: those of this process alone over the sum of what
@@ -43,7 +43,7 @@ PUBLISHED = ROOT / "tests" / "benchmarks" / "published"
 """Folder whose modules workers import too."""
 MANY = 100
 """Workers on paper."""
-TRIALS, DRAWS, RUNS = 60, 10_000, 40
+TRIALS, DRAWS, RUNS = 60, 20_000, 80
 """Of each design, of a plan, and of the study."""
 TOTALS_S = 240.0, 300.0, 360.0, 420.0, 480.0
 """Informative times of the variants of the story."""
