@@ -7,11 +7,13 @@ thousand moments of the run; the largest lead and lag say how far apart the two 
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +25,7 @@ SCENARIOS = Path(__file__).parents[2] / "scenarios"
 EXAMPLES = ("story", "coaster", "harbour", "helsinki", "model-ship", "narrows")
 VARIANTS = tuple(SCENARIOS / "variants" / name for name in ("half-an-hour.toml", "no-telegraph.toml"))
 TENDER, TRUE_TENDER = (SCENARIOS / "vessels" / f"tender-20m{kind}.toml" for kind in ("", "-true"))
+AZIMUTH, TRUE_AZIMUTH = (SCENARIOS / "vessels" / f"azimuth-30m{kind}.toml" for kind in ("", "-true"))
 MOMENTS = (np.arange(1000) + 0.5) / 1000
 LEAST, SHORTEST_S = 0.98, 1.0
 
@@ -47,6 +50,20 @@ def diagnose(folder: Path, told: Progress) -> None:
     workflows.diagnose((_measured(folder),), folder / "diagnose", vessel=TENDER, progress=told)
 
 
+def diagnose_recorded(name: str, vessel: Path, folder: Path, told: Progress) -> None:
+    data = folder / name
+    workflows.diagnose((data / "measured.csv",), data, vessel=vessel, progress=told)
+
+
+def estimate(name: str, vessel: Path, folder: Path, told: Progress) -> None:
+    data = folder / name
+    workflows.estimate((data / "measured.csv",), data, vessel=vessel, methods=("oe",), progress=told)
+
+
+def shortest_day(folder: Path, told: Progress) -> None:
+    workflows.run(folder / "scenarios" / "story.toml", folder / "day", seed=1, jobs=0, cache=False, progress=told)
+
+
 def replan(folder: Path, told: Progress) -> None:
     data, found = (_measured(folder),), folder / "diagnose" / "vessel-extended.toml"
     out = folder / "replan"
@@ -62,22 +79,54 @@ def _measured(folder: Path) -> Path:
     return folder / "run story" / "measured.csv"
 
 
-CASES: dict[str, tuple[Callable[..., None], tuple[str, ...]]] = {
+def recorded(plan: str, name: str, truth: Path, folder: Path) -> None:
+    """Data of at most an hour of a plan."""
+    workflows.simulate(folder / plan / "plan.json", folder / name, truth=truth, until_s=3600.0, seed=2)
+
+
+def asks_for_the_shortest_day(folder: Path) -> None:
+    """The story with a table that asks for the shortest day."""
+    copy = Path(shutil.copytree(SCENARIOS, folder / "scenarios")) / "story.toml"
+    asked = (SCENARIOS / "variants" / "shortest-day.toml").read_text("utf-8")
+    copy.write_text(copy.read_text("utf-8") + "\n" + asked, "utf-8")
+
+
+CASES: dict[str, tuple[Callable[..., None], tuple[object, ...]]] = {
     **{f"run {example}": (run, (example,)) for example in EXAMPLES},
+    "run story, shortest day": (shortest_day, ()),
     "whatif --plan helsinki": (whatif, ()),
     "simulate story": (simulate, ()),
     "diagnose story": (diagnose, ()),
+    "diagnose where nothing is hidden": (diagnose_recorded, ("clean", TENDER)),
+    "diagnose an hour": (diagnose_recorded, ("hour", AZIMUTH)),
+    "estimate an hour by output error": (estimate, ("hour", AZIMUTH)),
     "replan story": (replan, ()),
     **{f"validate {example}": (validate_design, (example,)) for example in ("story", "model-ship")},
 }
-NEEDED = ("run story", "simulate story", "diagnose story")
-"""Cases that later ones take files from, in order."""
+BEFORE: dict[str, tuple[str, ...]] = {
+    "simulate story": ("run story",),
+    "diagnose story": ("run story", "simulate story"),
+    "diagnose where nothing is hidden": ("run story",),
+    "diagnose an hour": ("run helsinki",),
+    "estimate an hour by output error": ("run helsinki",),
+    "replan story": ("run story", "simulate story", "diagnose story"),
+}
+"""Cases that others take files from."""
+READY: dict[str, Callable[[Path], object]] = {
+    "run story, shortest day": asks_for_the_shortest_day,
+    "diagnose where nothing is hidden": partial(recorded, "run story", "clean", TENDER),
+    "diagnose an hour": partial(recorded, "run helsinki", "hour", TRUE_AZIMUTH),
+    "estimate an hour by output error": partial(recorded, "run helsinki", "hour", TRUE_AZIMUTH),
+}
+"""What is done before the clock starts."""
 
 
 def told_by(name: str, folder: Path) -> tuple[float, list[tuple[float, float, str]]]:
     """How long a case takes [s], and when it told which share and activity."""
     work, options = CASES[name]
-    getattr(workflows, work.__name__)  # is loaded before anything is told
+    READY.get(name, lambda folder: None)(folder)
+    for command in ("run", "whatif", "simulate", "diagnose", "estimate", "replan", "validate_design"):
+        getattr(workflows, command)  # is loaded before anything is told
     moments = [(0.0, 0.0, "starting")]
     began_s = time.perf_counter()
     work(*options, folder, lambda activity, share: moments.append((time.perf_counter() - began_s, share, activity)))
@@ -104,8 +153,7 @@ if __name__ == "__main__":
         print(row(sys.argv[2], *told_by(sys.argv[2], Path(sys.argv[3]))))
         sys.exit()
     chosen = [name for name in CASES if not sys.argv[1:] or any(word in name for word in sys.argv[1:])]
-    last_needed = max((NEEDED.index(name) for name in NEEDED if name in chosen), default=-1)
-    needed = NEEDED if "replan story" in chosen else NEEDED[: last_needed + 1]
+    needed = [name for case in chosen for name in BEFORE.get(case, ())]
     print("| command | wall | correlation | largest lead | largest lag | during |")
     print("|---|---|---|---|---|---|", flush=True)
     with tempfile.TemporaryDirectory() as folder:

@@ -50,7 +50,7 @@ def estimate(
     for path in tests:
         if path in data:
             raise InputError(f"{path} is given for estimation and for testing, expected only one of them")
-    progress("reading the data", 0.02)
+    progress("reading the data", 0.0)
     ship = load_vessel(vessel)
     options = EstimateOptions(
         methods=tuple(methods),
@@ -63,8 +63,8 @@ def estimate(
     )
     record = reduced_data(data, ship, velocity=velocity)
     apart = reduced_data(tests, ship, velocity=velocity) if tests else NO_TESTS
-    found = assess(ship, record, options, tests=apart, progress=within(progress, 0.1, 0.8))
-    progress("drawing the report", 0.8)
+    found = assess(ship, record, options, tests=apart, progress=within(progress, 0.01, 0.6))
+    progress("drawing the report", 0.65)
     command = command_text(
         "estimate",
         data,
