@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from difflib import get_close_matches
 from pathlib import Path
+from typing import Any
 
 
 class ExpdesignError(Exception):
@@ -87,7 +88,30 @@ class NotInformative(NoAnswer):
 
 
 class NoPlan(NoAnswer):
-    """No trajectory satisfies the limits; the message names the place or the primitive."""
+    """No trajectory satisfies the limits; the message names the place or the primitive, and what helps.
+
+    Attributes:
+        obstacle: what stands in the way.
+        remedies: changes that were checked, or that none of those tried helps; one sentence each.
+        what: kind of the obstacle: "room" for a run, "passage" between places, "berth" of start or goal, or "".
+        which: the run, or "start" or "goal"; "" for neither.
+        place: north and east of the obstacle [m], or None.
+        tried: what was tried before, one line each.
+        poses: (k, 3) north m, east m, heading rad of the track as far as it was planned, or None.
+        within: the part of the sea area that was planned in, or None where planning did not begin.
+    """
+
+    def __init__(self, obstacle: str, *, what: str = "", which: str = "", place: Any = None, remedy: str = "") -> None:
+        self.obstacle, self.what, self.which = obstacle, what, which
+        self.place = None if place is None else (float(place[0]), float(place[1]))
+        self.remedies: tuple[str, ...] = (remedy,) if remedy else ()
+        self.tried: tuple[str, ...] = ()
+        self.poses: Any = None
+        self.within: Any = None
+        super().__init__(obstacle)
+
+    def __str__(self) -> str:
+        return "; ".join((self.obstacle, *self.remedies))
 
 
 class NoRoom(NoPlan):

@@ -60,8 +60,10 @@ FLOORS = {
         ("local_planner",),
         ("bounds", "legs_ahead"),
         ("search", "monte_carlo"),
+        ("feasibility",),
         ("assembly",),
         ("sailing",),
+        ("remedies",),
         ("solve",),
     ),
     "workflows": (

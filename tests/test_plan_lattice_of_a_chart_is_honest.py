@@ -162,9 +162,9 @@ def test_no_run_begins_again_where_one_has_failed_and_legs_after_get_longer():
     assert np.hypot(*(poses[1, :2] - ends)) >= (1.5 + 0.5) * case.hull_m - 1e-9
 
 
-def test_a_lattice_without_a_plan_says_which_and_what_may_help():
+def test_a_lattice_without_a_plan_says_which_and_what_was_not_tried():
     case = space(shapely.box(-400, -400, 400, 400), (200, 200, 0), run("ahead", (240, 0, 0), room_m=500.0))
-    with pytest.raises(NoPlan, match=r"^no room for 'ahead' on a lattice of 60 m; a plan.lattice_spacing_m smaller"):
+    with pytest.raises(NoPlan, match=r"^no room for 'ahead' on a lattice of 60 m; not tried: a plan.lattice_spac"):
         LatticeSearch(spacing_m=60.0).place(case, (1,), start=np.zeros(3))
 
 

@@ -84,7 +84,8 @@ def test_without_a_wider_passage_the_refusal_names_the_share_the_leg_and_the_pla
     with pytest.raises(NoPlan) as caught:
         plan_trial(problem((0.0, GAP_M)))
     text = str(caught.value)
-    assert text.startswith(f"{attempts[0].left:.1%} of {attempts[0].trials} drawn trials")
+    share = f"{attempts[0].left:.1%} of {attempts[0].trials} drawn trials"
+    assert text.startswith(f"the plan found is too risky: {share}")
     assert "on the leg to the goal" in text
     np.testing.assert_allclose(place_in(text), [STRAIT_M, 0.0], atol=30.0)
-    assert text.endswith("there is no path to the goal with more clearance")
+    assert "there is no path to the goal with more clearance; " in text

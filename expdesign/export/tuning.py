@@ -53,6 +53,7 @@ class Tuning:
         dry_cost: of a corridor that leaves the water, in legs.
         fence_margin: room around the track, as a share of its extent, that the fence may cover.
         fence_halvings: of the slack by which the fence is simplified, until it keeps to the water.
+        draft_poses: of the track of a refused plan at most.
         noticed: relative differences below this are not reported.
     """
 
@@ -97,6 +98,7 @@ class Tuning:
     dry_cost: float = 1000.0
     fence_margin: float = 0.1
     fence_halvings: int = 12
+    draft_poses: int = 2000
     noticed: float = 0.02
 
 

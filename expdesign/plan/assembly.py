@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-import shapely
 
 from expdesign.errors import NoPlan, NoRoom
 from expdesign.plan.chart import (
@@ -20,6 +19,7 @@ from expdesign.plan.chart import (
     resolved,
 )
 from expdesign.plan.control import Capability, capability
+from expdesign.plan.feasibility import check_room
 from expdesign.plan.legs import LegWater
 from expdesign.plan.local_planner import LocalPlanner, SearchSpace, TransitionTrials, local_planner, pairs_of
 from expdesign.plan.problem import PlanProblem
@@ -29,6 +29,7 @@ from expdesign.plan.tuning import PLAN
 from expdesign.plan.work_budget import WorkBudget
 from expdesign.progress import Progress, in_phases
 from expdesign.sea_area import SeaArea
+from expdesign.values import Array
 from expdesign.vessel.hull import covering_discs
 
 
@@ -124,15 +125,28 @@ def search_space(problem: PlanProblem, water: LegWater, planner: LocalPlanner) -
     """What the search for places works on.
 
     Raises:
-        NoPlan: no path leads from start to goal; says where it is too narrow.
+        NoPlan: no path leads from start to goal, or a run surely has no place; says where and how much is lacking.
+    """
+    space = open_space(problem, water, planner)
+    check_room(space)
+    return space
+
+
+def open_space(
+    problem: PlanProblem, water: LegWater, planner: LocalPlanner, off_m: Sequence[Array] | None = None
+) -> SearchSpace:
+    """The search space, whether or not every run has a place in it; `off_m` are the dispersions, where known.
+
+    Raises:
+        NoPlan: no path leads from start to goal.
     """
     grid = water.field
     margin = water.leg_margin_m + grid.cell_m / 2
     goal_distance = build_goal_distance(water.narrowest_graph, grid, problem.goal[:2])
     if goal_distance is None or not water.candidate_paths(problem.start[:2], problem.goal[:2]):
-        raise NoRoom(_no_path(problem, grid, margin))
+        raise _no_path(problem, grid, margin)
     return SearchSpace(
-        footprints=_footprints(problem, grid),
+        footprints=footprints(problem, grid, dispersions(problem) if off_m is None else off_m),
         frame=problem.area.frame,
         field=grid,
         goal_distance=goal_distance,
@@ -174,36 +188,62 @@ def _most_trials(problem: PlanProblem, planner: LocalPlanner) -> int:
     return planner.transition_trials if placement_search(problem.settings).tries_transitions else 0
 
 
-def _footprints(problem: PlanProblem, grid: ClearanceField) -> tuple[Footprint, ...]:
-    """The runs with the room they need: the clearance asked for, or the dispersion of drawn runs where that is more.
-
-    The probability of leaving that room is shared evenly among all runs, so that together they keep the confidence.
-    """
-    vessel, used = problem.vessel, problem.repeats
-    centres, disc_m = covering_discs(vessel.length_m, vessel.beam_m)
-    confidence = 1.0 - (1.0 - problem.settings.confidence) / max(1, sum(used.values()))
-    rng = np.random.default_rng(problem.seed)
+def footprints(problem: PlanProblem, grid: ClearanceField, off_m: Sequence[Array]) -> tuple[Footprint, ...]:
+    """The runs with the room they need: the clearance asked for, or the dispersion of drawn runs where that is more."""
+    vessel = problem.vessel
+    _, disc_m = covering_discs(vessel.length_m, vessel.beam_m)
     found = []
-    for item in problem.used:
-        off_m = dispersion_m(vessel, item, problem.environment, centres_m=centres, confidence=confidence, rng=rng)
-        room = disc_m + grid.cell_m / 2 + np.maximum(problem.settings.clearance_m, off_m)
+    for item, off in zip(problem.used, off_m, strict=True):
+        room = disc_m + grid.cell_m / 2 + np.maximum(problem.settings.clearance_m, off)
         found.append(footprint(item, room, length_m=vessel.length_m, beam_m=vessel.beam_m))
     return tuple(found)
 
 
-def _no_path(problem: PlanProblem, grid: ClearanceField, needed_m: float) -> str:
-    ends = shapely.points(problem.start[1::-1]), shapely.points(problem.goal[1::-1])
-    if not any(shapely.contains(part, ends).all() for part in problem.area.water.geoms):
-        return "the goal cannot be reached from the start: forbidden water lies between them on every path"
+def dispersions(problem: PlanProblem) -> list[Array]:
+    """(k + 1,) of each run that is used.
+
+    The probability of leaving that room is shared evenly among all runs, so that together they keep the confidence.
+    """
+    vessel, rng = problem.vessel, np.random.default_rng(problem.seed)
+    centres, _ = covering_discs(vessel.length_m, vessel.beam_m)
+    confidence = confidence_of_run(problem)
+    return [
+        dispersion_m(vessel, item, problem.environment, centres_m=centres, confidence=confidence, rng=rng)
+        for item in problem.used
+    ]
+
+
+def confidence_of_run(problem: PlanProblem) -> float:
+    """Share of cases in which each run keeps to its room."""
+    return 1.0 - (1.0 - problem.settings.confidence) / max(1, sum(problem.repeats.values()))
+
+
+def check_connected(problem: PlanProblem) -> None:
+    """Raise NoPlan where forbidden water parts start and goal."""
+    if connects(problem.area, problem.ends):
+        return
+    lat, lon = problem.area.frame.to_degrees(problem.goal[:2])
+    raise NoPlan(
+        "the goal cannot be reached from the start: forbidden water lies between them on every path to the goal near "
+        f"{lat:.5f}, {lon:.5f}",
+        what="parted",
+        which="goal",
+        place=problem.goal[:2],
+    )
+
+
+def _no_path(problem: PlanProblem, grid: ClearanceField, needed_m: float) -> NoRoom:
     widest, place = narrowest_passage(grid, problem.start[:2], problem.goal[:2])
     lat, lon = problem.area.frame.to_degrees(place)
     if widest <= grid.error_m or widest > needed_m:  # below the grid's resolution, or lost in simplifying the shore
-        return (
+        obstacle = (
             f"the goal cannot be reached from the start in a chart grid of {grid.cell_m:.3g} m and by a simplified "
-            f"shore: if there is a path, also near {lat:.5f}, {lon:.5f}, give the area smaller [bounds]"
+            f"shore, near {lat:.5f}, {lon:.5f}"
         )
-    return (
-        f"the goal cannot be reached from the start: the widest passage leaves {widest:.1f} m on each side near "
-        f"{lat:.5f}, {lon:.5f}, while {needed_m:.1f} m are needed (plan.clearance_m = "
-        f"{problem.settings.clearance_m:g}, the hull in a turn, and the chart grid)"
-    )
+    else:
+        obstacle = (
+            f"the goal cannot be reached from the start: the widest passage leaves {widest:.1f} m on each side near "
+            f"{lat:.5f}, {lon:.5f}, while {needed_m:.1f} m are needed (plan.clearance_m = "
+            f"{problem.settings.clearance_m:g}, the hull in a turn, and the chart grid)"
+        )
+    return NoRoom(obstacle, what="passage", place=place)

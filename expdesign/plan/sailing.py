@@ -42,8 +42,18 @@ def sail_all(
         NoPlan: there is no place for a run, or none was found within the budget; the message says what failed.
     """
     voyage = _Voyage(problem=problem, water=room.water, stated=stated, planner=room.space.planner, budget=budget)
-    space, left, stuck, proof = room.space, problem.repeats, "", None
-    phases, stretches = phases_of(problem, room.space.planner, progress), sum(left.values()) + 1
+    try:
+        return _sailed(voyage, room.space, progress)
+    except NoPlan as error:
+        error.poses = voyage.sailed.trajectory.pose if voyage.line.stretches else None
+        raise
+
+
+def _sailed(voyage: _Voyage, space: SearchSpace, progress: Progress) -> SailedTrial:
+    """Every run and leg; what failed is avoided in the placements that follow."""
+    problem, budget = voyage.problem, voyage.budget
+    left, stuck, proof = problem.repeats, "", None
+    phases, stretches = phases_of(problem, space.planner, progress), sum(left.values()) + 1
     search, failures = placement_search(problem.settings), _Failures(problem.settings.time_budget_s)
     while True:
         phases.placing("placing runs", 0.0)
@@ -64,7 +74,7 @@ def sail_all(
             undone = voyage.undo_run()
             space, stuck = space.refusing(voyage.line.last, undone), "no leg leads from the last run to the goal"
             left[undone.primitive] += 1
-        failures.count(placed.work_s + budget.spent_s - spent_s, stuck)
+        failures.count(placed.work_s + budget.spent_s - spent_s, stuck, space.refused[-1, :2])
 
 
 def _placed(
@@ -76,7 +86,8 @@ def _placed(
     except NoPlan as error:
         if not stuck:
             raise
-        raise NoPlan(f"{error}; before that, {stuck}") from None
+        error.obstacle = f"{error.obstacle}; before that, {stuck}"
+        raise
 
 
 class _Failures:
@@ -86,13 +97,15 @@ class _Failures:
         self._budget_s, self._deadline = budget_s, time.monotonic() + PLAN.clock_budgets * budget_s
         self.tries, self._lost_s = 0, 0.0
 
-    def count(self, cost_s: float, stuck: str) -> None:
-        """Count one failure, and raise NoPlan where it was one too many."""
+    def count(self, cost_s: float, stuck: str, place: Array) -> None:
+        """Count one failure at a place (2,), and raise NoPlan where it was one too many."""
         self.tries += 1
         self._lost_s += max(PLAN.failure_s, cost_s)
         if self._lost_s > self._budget_s or time.monotonic() > self._deadline:
             raise NoPlan(
-                f"no plan within plan.time_budget_s = {self._budget_s:g}, {self.tries} places were tried: {stuck}"
+                f"no plan within plan.time_budget_s = {self._budget_s:g}, {self.tries} places were tried: {stuck}",
+                place=place,
+                remedy="not tried: more plan.time_budget_s, less design.total_s",
             )
 
 

@@ -12,6 +12,10 @@ from expdesign.errors import NoPlan, NoRoom
 from expdesign.memory import in_order
 from expdesign.plan.assembly import (
     PlanRoom,
+    check_connected,
+    confidence_of_run,
+    dispersions,
+    footprints,
     leg_water,
     phases_of,
     plan_room,
@@ -33,6 +37,8 @@ from expdesign.plan.monte_carlo import (
     worst_leg,
 )
 from expdesign.plan.problem import PlanProblem
+from expdesign.plan.remedies import advised
+from expdesign.plan.runs import draws_for
 from expdesign.plan.sailing import sail_all
 from expdesign.plan.tuning import PLAN
 from expdesign.plan.values import Leg, Plan, RiskEstimate, SailedTrial, Verification
@@ -40,6 +46,7 @@ from expdesign.plan.verify import realised_efficiencies, verify_plan
 from expdesign.plan.work_budget import WorkBudget
 from expdesign.progress import Progress, never_falling, silent
 from expdesign.sea_area import SeaArea
+from expdesign.values import Array
 
 Planned = TypeVar("Planned")
 
@@ -48,9 +55,14 @@ def plan_trial(problem: PlanProblem, *, progress: Progress = silent) -> Plan:
     """One continuous, verified trial from start to goal with every run the design asks for.
 
     Raises:
-        NoPlan: no path, no room, or no dynamically feasible leg; the message names what and where.
+        NoPlan: no path, no room, or no dynamically feasible leg; the message names what, where, and which change of
+            one key helps, if one of those tried does.
     """
-    return _in_water(problem, never_falling(progress), _planned)
+    try:
+        return _in_water(problem, never_falling(progress), _planned)
+    except NoPlan as error:
+        progress("looking for what would help", 0.95)
+        raise advised(replace(problem, area=error.within or problem.area), error) from None
 
 
 def _in_water(
@@ -59,11 +71,16 @@ def _in_water(
     planned: Callable[[PlanProblem, SeaArea, Capability, Progress], Planned],
 ) -> Planned:
     """What is planned in the smallest part of the water that has room."""
+    check_connected(problem)
+    draws_for(confidence_of_run(problem))
     ship, refused = ship_on_legs(problem), NoRoom("the chart has no water")
     for area in waters(problem, ship):
         try:
             return planned(problem, area, ship, progress)
-        except NoRoom as error:
+        except NoPlan as error:
+            error.within = area
+            if not isinstance(error, NoRoom):
+                raise
             refused = error
     raise refused
 
@@ -75,9 +92,13 @@ def _planned(whole: PlanProblem, area: SeaArea, ship: Capability, progress: Prog
     water, confidence = leg_water(problem, ship), problem.settings.confidence
     room = plan_room(problem, water, progress)
     budget = WorkBudget(most_s=PLAN.replan_budgets * problem.settings.time_budget_s)
+    first, made = room, list[Refused]()
     for attempt in range(PLAN.replans + 1):
         before_s = budget.spent_s
-        sailed = sail_all(problem, room, progress, stated=water, budget=budget)
+        try:
+            sailed = sail_all(problem, room, progress, stated=water, budget=budget)
+        except NoPlan as error:
+            raise _not_again(error, made) from None
         checking = phases_of(problem, room.space.planner, progress).trials
         checking("verifying", 0.0)
         checks = in_order(_check, (whole, water, sailed), ((_verified,), (_bound_s,)))
@@ -89,10 +110,15 @@ def _planned(whole: PlanProblem, area: SeaArea, ship: Capability, progress: Prog
         if not failed:
             return _plan(whole, sailed, verification=verification, risk=risk, bound_s=next(checks))
         budget.sailed(int(trials.samples.max(axis=1).sum()))
-        _check_worth_replanning(problem, risk, failed, budget, attempt=attempt, before_s=before_s)
-        room = _wider(problem, room, trials, sailed.legs, failed)
+        made.append(Refused(sailed=sailed, risk=risk, trials=trials, failed=failed))
+        if not _worth_replanning(problem, risk, budget, attempt=attempt, before_s=before_s):
+            break
+        try:
+            room = _wider(problem, room, trials, sailed.legs)
+        except NoPlan as error:
+            raise _too_risky(problem, first, made, f"; {error.obstacle}") from None
         progress = _replanning(progress)
-    raise AssertionError("the last plan is returned or refused")
+    raise _too_risky(problem, first, made)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -154,22 +180,78 @@ def _verified(problem: PlanProblem, water: LegWater, sailed: SailedTrial) -> Ver
     return verification
 
 
-def _check_worth_replanning(
-    problem: PlanProblem, risk: RiskEstimate, failed: str, budget: WorkBudget, *, attempt: int, before_s: float
-) -> None:
-    """Raise NoPlan where more room would not help, or where no budget is left to try."""
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Refused:
+    """A plan that is too risky.
+
+    Attributes:
+        sailed: commands, motion and legs.
+        risk, trials: by drawn trials.
+        failed: why it is refused.
+    """
+
+    sailed: SailedTrial
+    risk: RiskEstimate
+    trials: Trials
+    failed: str
+
+    @property
+    def place(self) -> Array | None:
+        """(2,) where most trials left allowed water, or None where none did."""
+        places = self.trials.place[worst_leg(self.trials)]
+        left = ~np.isnan(places[:, 0])
+        return np.median(places[left], axis=0) if left.any() else None
+
+
+def _worth_replanning(
+    problem: PlanProblem, risk: RiskEstimate, budget: WorkBudget, *, attempt: int, before_s: float
+) -> bool:
+    """Whether more room may help: once anyway, again where the budget is expected to be enough."""
     leaving = violates_chance_constraint(risk, problem.settings.confidence)
     expected_s = budget.spent_s + (budget.spent_s - before_s)
-    if attempt == PLAN.replans or not leaving or expected_s > budget.most_s:
-        more = (
-            "; more plan.clearance_m may help where the water is wide enough for it, less plan.confidence accepts more"
-            if leaving
-            else ""
-        )
-        raise NoPlan(f"the plan found is too risky: {failed}{more}")
+    return leaving and attempt < PLAN.replans and (attempt == 0 or expected_s <= budget.most_s)
 
 
-def _wider(problem: PlanProblem, room: PlanRoom, trials: Trials, legs: tuple[Leg, ...], failed: str) -> PlanRoom:
+def _too_risky(problem: PlanProblem, first: PlanRoom, made: list[Refused], more: str = "") -> NoPlan:
+    """The refusal of plans of which too many drawn trials fail, with the confidence that accepts the first of them."""
+    last, best = made[-1], min(made, key=lambda plan: plan.risk.left)
+    again = f"; planned {len(made)} times, each with more room than before" if len(made) > 1 else ""
+    error = NoPlan(f"the plan found is too risky: {best.failed}{again}{more}", what="risk", place=best.place)
+    error.tried = tuple(f"plan {number}: {plan.failed}" for number, plan in enumerate(made, start=1))
+    error.poses = last.sailed.trajectory.pose
+    error.remedies = (_accepting(problem, first, made[0]),)
+    return error
+
+
+def _accepting(problem: PlanProblem, first: PlanRoom, plan: Refused) -> str:
+    """The confidence with which the planner makes the first plan once more, and accepts it."""
+    risk, confidence = plan.risk, problem.settings.confidence
+    lower = np.floor(1000.0 * (1.0 - risk.left - risk.error)) / 1000.0
+    if not PLAN.least_confidence <= lower < confidence:
+        return "the planner has tried more room, no other change was tried"
+    changed = replace(problem, settings=replace(problem.settings, confidence=lower))
+    same = trials_needed(lower) == trials_needed(confidence)
+    if same and not failed_chance_constraint(risk, plan.trials, plan.sailed.legs, problem.area, confidence=lower):
+        runs = footprints(changed, first.space.field, dispersions(changed))
+        same = all(np.array_equal(a.room_m, b.room_m) for a, b in zip(runs, first.space.footprints, strict=True))
+        if same:
+            return f"with plan.confidence = {lower:g} the first plan is made once more, and accepted"
+    return (
+        f"not tried: plan.confidence = {lower:g}, which the first plan would meet, but with which runs would get less "
+        "room"
+    )
+
+
+def _not_again(error: NoPlan, made: list[Refused]) -> NoPlan:
+    """Where a plan with more room fails: what was wrong with the one before comes first."""
+    if made:
+        error.obstacle = f"the plan found is too risky: {made[0].failed}; made anew with more room: {error.obstacle}"
+        error.tried = tuple(f"plan {number}: {plan.failed}" for number, plan in enumerate(made, start=1))
+        error.poses = made[-1].sailed.trajectory.pose if error.poses is None else error.poses
+    return error
+
+
+def _wider(problem: PlanProblem, room: PlanRoom, trials: Trials, legs: tuple[Leg, ...]) -> PlanRoom:
     """More room where most trials leave the water: for that run, or for all legs.
 
     Raises:
@@ -187,7 +269,7 @@ def _wider(problem: PlanProblem, room: PlanRoom, trials: Trials, legs: tuple[Leg
     try:
         found = search_space(problem, water, space.planner)
     except NoPlan:
-        raise NoPlan(f"{failed}; and there is no path to the goal with more clearance") from None
+        raise NoPlan("there is no path to the goal with more clearance") from None
     return PlanRoom(water=water, space=replace(found, footprints=space.footprints, tried=space.tried))
 
 

@@ -11,6 +11,17 @@ class Tuning:
 
     Attributes:
         most_runs: runs in one plan.
+        first_places, first_headings: places and headings at which a run is tried first, before boxes round them are
+            halved.
+        boxes: of places and headings at most; with more of them it stays open whether the run has a place.
+        least_slack_cells: slack in cells of the clearance grid at which that stays open, too.
+        lookups: clearances looked up at a time.
+        least_confidence: below which none is named as a remedy.
+        lower_confidences: tried as remedies of a refusal, the highest first.
+        most_left_out: designs tried as remedies, each without the runs that had no place in the one before.
+        turns_deg: from the heading asked for at start and goal, tried as remedies to both sides [deg].
+        tighter: turning radii tried as remedies, in that of legs.
+        faster: repositioning speeds tried as remedies, in the mean current.
         trials_stream: random stream of the drawn trials, apart from other draws of the same seed.
         replans: plans made after the first one, each with more room where drawn trials of the one before left the
             water.
@@ -33,6 +44,17 @@ class Tuning:
     """
 
     most_runs: int = 1000
+    first_places: int = 2000
+    first_headings: int = 24
+    boxes: int = 400_000
+    least_slack_cells: float = 3.0
+    lookups: int = 200_000
+    least_confidence: float = 0.5
+    lower_confidences: tuple[float, ...] = (0.9999, 0.9995, 0.999, 0.995, 0.99, 0.98, 0.95, 0.9, 0.8)
+    most_left_out: int = 8
+    turns_deg: tuple[float, ...] = tuple(15.0 * count for count in range(1, 13))
+    tighter: tuple[float, ...] = (0.9, 0.8, 0.7, 0.6, 0.5)
+    faster: tuple[float, ...] = (1.05, 1.2, 1.5)
     trials_stream: int = 1
     replans: int = 2
     widening: float = 1.4

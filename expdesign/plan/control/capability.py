@@ -48,7 +48,8 @@ def capability(vessel: Vessel, settings: PlanSettings, *, current_mps: float = 0
     if settings.turning_radius_m is not None and settings.turning_radius_m < transit / yaw:
         raise NoPlan(
             f"plan.turning_radius_m is {settings.turning_radius_m:g}, at {transit:.3g} m/s vessel {vessel.name!r} "
-            f"needs {transit / yaw:.3g} m or more"
+            f"needs {transit / yaw:.4g} m or more",
+            what="radius",
         )
     spot = _largest(lambda r: _holds(vessel, (0.0, 0.0, r)), start=1e-4 * transit / vessel.length_m) or 0.0
     agile = bool(np.linalg.matrix_rank(force_matrix(vessel.actuators)) == 3) and spot > transit / vessel.length_m / 10
@@ -81,9 +82,15 @@ def needs_helm(vessel: Vessel) -> bool:
 def _transit_speed(vessel: Vessel, settings: PlanSettings, top: float, current_mps: float) -> float:
     transit = settings.transit_speed_mps or CONTROL.usable_share * top
     if transit > top:
-        raise NoPlan(f"plan.transit_speed_mps is {transit:g}, vessel {vessel.name!r} reaches {top:.3g} m/s")
+        raise NoPlan(
+            f"plan.transit_speed_mps is {transit:g}, vessel {vessel.name!r} reaches {top:.3g} m/s", what="speed"
+        )
     if current_mps >= transit:
-        raise NoPlan(f"the mean current of {current_mps:.3g} m/s is not slower than repositioning at {transit:.3g} m/s")
+        raise NoPlan(
+            f"the mean current of {current_mps:.3g} m/s is not slower than repositioning at {transit:.3g} m/s, vessel "
+            f"{vessel.name!r} reaches {top:.3g} m/s",
+            what="speed",
+        )
     return transit
 
 

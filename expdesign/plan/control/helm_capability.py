@@ -45,7 +45,8 @@ def leg_radius_m(approach: Approach, settings: PlanSettings, pairs: list[tuple[S
     if asked_m is not None and asked_m < tightest:
         raise NoPlan(
             f"plan.turning_radius_m is {asked_m:g}, at {transit:.3g} m/s vessel {vessel.name!r} needs {tightest:.3g} m "
-            "or more with its helm hard over"
+            "or more with its helm hard over",
+            what="radius",
         )
     found = [tightest, 1.5 * vessel.length_m]
     for some in at_speeds:

@@ -76,6 +76,8 @@ def check_ends(start: Array, goal: Array, water: LegWater) -> None:
                 f"no path was found {to} the {name}, near {lat:.5f}, {lon:.5f} and heading "
                 f"{np.degrees(pose[2]) % 360.0:.0f} degrees, on turns of {water.ship.turning_radius_m:.3g} m radius, "
                 f"which vessel {water.vessel.name!r} sails at {water.ship.transit_speed_mps:.3g} m/s, with "
-                f"{water.clearance_m:g} m of clearance; a {name} with more room, another heading or a smaller "
-                "plan.turning_radius_m or plan.transit_speed_mps may help"
+                f"{water.clearance_m:g} m of clearance",
+                what="berth",
+                which=name,
+                place=pose[:2],
             )

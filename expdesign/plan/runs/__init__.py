@@ -1,6 +1,6 @@
 """Runs as the planner places them: footprint of the swept hull, dispersion of drawn ships."""
 
-from expdesign.plan.runs.dispersion import dispersion_m, draw_truths, run_at_headings
+from expdesign.plan.runs.dispersion import dispersion_m, draw_truths, draws_for, run_at_headings
 from expdesign.plan.runs.ensemble import Fleet
 from expdesign.plan.runs.footprint import Footprint, footprint
 
@@ -9,6 +9,7 @@ __all__ = [
     "Footprint",
     "dispersion_m",
     "draw_truths",
+    "draws_for",
     "footprint",
     "run_at_headings",
 ]

@@ -55,13 +55,42 @@ def dispersion_m(
     Raises:
         NoPlan: so many drawn vessels are unstable that the share cannot be met, or it is too high to be estimated.
     """
-    needed = np.ceil(RUNS.expected_outside / (1.0 - confidence))
-    draws = draws or int(np.clip(needed, RUNS.fewest_draws, RUNS.most_draws))
-    if draws * (1.0 - confidence) < 1.0:
+    draws, most = draws or draws_for(confidence), RUNS.draws_at_once
+    counts = [min(most, draws - first) for first in range(0, draws, most)]
+    apart = [_apart(vessel, primitive, environment, centres_m=centres_m, rng=rng, draws=count) for count in counts]
+    return _radius(np.concatenate(apart, axis=1), confidence, primitive.name)
+
+
+def draws_for(confidence: float) -> int:
+    """How many draws resolve what a share `confidence` of runs keeps to.
+
+    So many that `Tuning.expected_outside` are outside, or one where that takes many.
+
+    Raises:
+        NoPlan: the share is so high that it takes too many.
+    """
+    outside = 1.0 - confidence
+    usual = int(np.clip(np.ceil(RUNS.expected_outside / outside), RUNS.fewest_draws, RUNS.usual_draws))
+    needed = max(usual, int(np.ceil((1.0 - 1e-9) / outside)))
+    if needed > RUNS.most_draws:
         raise NoPlan(
             f"plan.confidence is too high to be estimated: each run would have to keep to its room in {confidence:.6g} "
-            f"of all cases, which {draws} drawn vessels cannot resolve"
+            f"of all cases, and it takes {needed} drawn vessels to resolve that, more than {RUNS.most_draws}",
+            what="confidence",
         )
+    return needed
+
+
+def _apart(
+    vessel: Vessel,
+    primitive: Primitive,
+    environment: Environment,
+    *,
+    centres_m: Array,
+    rng: np.random.Generator,
+    draws: int,
+) -> Array:
+    """(k + 1, n) distance of the discs of drawn runs from the nominal ones, the largest of each sample."""
     truths, samples = draw_truths(vessel, environment, draws, rng), len(primitive.commands)
     heading = rng.uniform(-np.pi, np.pi, draws)
     states = run_at_headings(
@@ -79,8 +108,7 @@ def dispersion_m(
     pose_b = np.concatenate([back, states[..., 2:3] - heading[:, None]], axis=-1)  # (k + 1, n, 3)
     nominal = disc_points(primitive.trajectory.pose, centres_m)
     drawn = disc_points(pose_b.reshape(-1, 3), centres_m).reshape(*pose_b.shape[:2], -1, 2)
-    apart = np.hypot(*np.moveaxis(drawn - nominal[:, None], -1, 0)).max(axis=-1)  # (k + 1, n)
-    return _radius(apart, confidence, primitive.name)
+    return np.asarray(np.hypot(*np.moveaxis(drawn - nominal[:, None], -1, 0)).max(axis=-1))
 
 
 def run_at_headings(
@@ -133,8 +161,8 @@ def _radius(apart: Array, confidence: float, name: str) -> Array:
     if not np.isfinite(factor):
         raise NoPlan(
             f"{name!r} is unstable for {np.mean(~stable):.1%} of the vessels drawn from model.parameter_std, while "
-            f"plan.confidence, shared out over the runs, allows each {1.0 - confidence:.2%}; parameters known better "
-            'help (more data, or earlier knowledge by design.prior = "parameter_std"), or to leave it out by '
-            "design.excluded"
+            f"plan.confidence, shared out over the runs, allows each {1.0 - confidence:.2%}",
+            what="unstable",
+            which=name,
         )
     return np.asarray(factor * shape)

@@ -35,6 +35,15 @@ class Footprint:
     exit_mps: float
 
     @property
+    def needs(self) -> str:
+        """The water that it needs, in words."""
+        return (
+            f"it goes up to {np.hypot(*self.discs.T).max():.4g} m from its start and needs up to "
+            f"{self.room_m.max():.4g} m round its centre line (hull, plan.clearance_m, and what the vessel's "
+            "parameter_std and the forecast add at plan.confidence)"
+        )
+
+    @property
     def displacement_m(self) -> float:
         """Distance made good through water."""
         return float(np.hypot(*self.displacement[:2]))

@@ -62,7 +62,7 @@ def place_runs(
     final_s = beam.cost_s + space.planner.to_goal_s(space, beam)
     best = int(np.argmin(final_s))
     if not np.isfinite(final_s[best]):
-        raise NoRoom("no path to the goal from where the last run ends")
+        raise NoRoom("no path to the goal from where the last run ends", place=beam.pose[best, :2])
     runs, poses = _chain(beam, best)
     if orders:
         ends = ChainEnds(start=start, exit_mps=exit_mps, last=names.index(last) if last else -1)
@@ -95,7 +95,7 @@ def _advance(space: SearchSpace, beam: PartialPlans, width: int, ahead: OrdersAh
     left = beam.left[:, None] - np.eye(len(space.footprints), dtype=int)  # (b, q, q) after each next run
     chosen = _select(space, found, left, _totals_s(space, beam, found, left, ahead), width)
     if not len(chosen):
-        raise NoRoom(_what_blocks(space, beam))
+        raise _what_blocks(space, beam)
     return PartialPlans(
         pose=chosen.end,
         exit_mps=np.array([space.footprints[q].exit_mps for q in chosen.primitive]),
@@ -163,15 +163,16 @@ def _in_order(values: Array, at_once: int) -> Iterator[np.ndarray]:
         left = left[~among]
 
 
-def _what_blocks(space: SearchSpace, beam: PartialPlans) -> str:
+def _what_blocks(space: SearchSpace, beam: PartialPlans) -> NoRoom:
     """The largest run that is still to do, and where the search came to a halt."""
     waiting = [item for q, item in enumerate(space.footprints) if beam.left[:, q].any()]
     largest = max(waiting, key=lambda item: float((np.hypot(*item.discs.T) + item.room_m).max()))
-    north, east = beam.pose[0, :2]
-    lat, lon = space.frame.to_degrees(np.array([north, east]))
-    return (
-        f"no room for {largest.name!r}: it goes up to {np.hypot(*largest.discs.T).max():.4g} m from its start and "
-        f"needs up to {largest.room_m.max():.4g} m round its centre line (hull, plan.clearance_m, and what the "
-        "vessel's parameter_std and the forecast add at plan.confidence); the search stopped near "
-        f"{lat:.5f}, {lon:.5f} with {int(beam.left[0].sum())} runs to go"
+    place = beam.pose[0, :2]
+    lat, lon = space.frame.to_degrees(place)
+    return NoRoom(
+        f"no room for {largest.name!r}: {largest.needs}; the search stopped near {lat:.5f}, {lon:.5f} with "
+        f"{int(beam.left[0].sum())} runs to go",
+        what="room",
+        which=largest.name,
+        place=place,
     )

@@ -49,7 +49,7 @@ class LatticeSearch:
             except NoPlan as error:
                 refusal = error
         finer = "smaller" if self.spacing_m or len(spacings) == 1 else f"smaller than {spacings[-1]:.4g}"
-        raise NoRoom(f"{refusal}; a plan.lattice_spacing_m {finer} may help, or plan.planner = 'beam'")
+        raise NoRoom(f"{refusal}; not tried: a plan.lattice_spacing_m {finer}", what="lattice")
 
     def _spacings(self, space: SearchSpace) -> tuple[float, ...]:
         """Distances between cells to try; ships that cannot turn on the spot need a turning radius."""

@@ -8,8 +8,9 @@ from expdesign.durations import with_repeats
 from expdesign.memory import remembering, user_memory
 from expdesign.progress import Progress, silent, within
 from expdesign.scenario import Scenario, load_repeats
+from expdesign.workflows.command_text import command_text
 from expdesign.workflows.outcome import Outcome
-from expdesign.workflows.steps.case import loaded, written
+from expdesign.workflows.steps.case import drafted, loaded, written
 from expdesign.workflows.steps.day import Day, day_files, day_summary, day_tables, planned_day
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.grown import ready
@@ -42,7 +43,12 @@ def plan(
     """
     case = loaded(scenario, progress)
     check_plannable(case)
-    with remembering(user_memory() if cache else None), workers(jobs, scheduler=scheduler):
+    words = command_text("plan", [scenario], {"--durations": durations, "--seed": seed})
+    with (
+        remembering(user_memory() if cache else None),
+        workers(jobs, scheduler=scheduler),
+        drafted(case, out, command=words),
+    ):
         return _plan(case, out, durations, seed, progress)
 
 

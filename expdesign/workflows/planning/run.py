@@ -9,8 +9,9 @@ from expdesign.durations import efficiencies
 from expdesign.memory import recalled, remembering, user_memory
 from expdesign.progress import Progress, silent, within
 from expdesign.scenario import Scenario
+from expdesign.workflows.command_text import command_text
 from expdesign.workflows.outcome import Outcome
-from expdesign.workflows.steps.case import loaded, written
+from expdesign.workflows.steps.case import drafted, loaded, written
 from expdesign.workflows.steps.day import day_files, day_summary, day_tables, planned_day
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.grown import growth_summary, ready
@@ -42,7 +43,12 @@ def run(
     """
     case = loaded(scenario, progress)
     check_plannable(case)
-    with remembering(user_memory() if cache else None), workers(jobs, scheduler=scheduler):
+    words = command_text("run", [scenario], {"--seed": seed})
+    with (
+        remembering(user_memory() if cache else None),
+        workers(jobs, scheduler=scheduler),
+        drafted(case, out, command=words),
+    ):
         return _run(case, out, seed, progress)
 
 

@@ -1,16 +1,20 @@
-"""Reading a scenario, and writing the results of a command on it."""
+"""Reading a scenario, and writing the results of a command on it, or the draft that a refused plan leaves."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from expdesign.export import (
-    write_files,
-)
+from expdesign import __version__
+from expdesign.errors import FileError, NoPlan
+from expdesign.export import write_files
 from expdesign.progress import Progress
 from expdesign.scenario import Scenario, load_scenario
 from expdesign.workflows.outcome import Outcome, TextTable
+
+DRAFT = ("refused.json", "refused.html")
+"""Names of the files of a draft; no results have them."""
 
 
 def loaded(scenario: Path, progress: Progress) -> Scenario:
@@ -31,3 +35,42 @@ def written(
     paths = write_files(out or Path("runs") / case.name, files)
     progress("done", 1.0)
     return Outcome(files=paths, summary={"scenario": case.name, **summary}, tables=tables)
+
+
+@contextmanager
+def drafted(case: Scenario, out: Path | None, *, command: str) -> Iterator[None]:
+    """Leave a draft in `out`, or in runs/<scenario>, where the block refuses a plan; the refusal names it.
+
+    Results of an earlier attempt stay there, and the draft says that they are none of this one. A plan that is found
+    takes an earlier draft away.
+    """
+    folder = out or Path("runs") / case.name
+    try:
+        yield
+    except NoPlan as error:
+        with suppress(FileError):  # the refusal matters more
+            path = write_files(folder, _files(case, folder, error, command))[-1]
+            error.remedies += (f"the draft is {path}",)
+        raise
+    for name in DRAFT:
+        with suppress(OSError):
+            (folder / name).unlink(missing_ok=True)
+
+
+def _files(case: Scenario, folder: Path, error: NoPlan, command: str) -> dict[str, str | bytes]:
+    from expdesign.export.refused_page import Refusal, refused_html, refused_json
+
+    there = sorted(path.name for path in folder.iterdir() if path.is_file()) if folder.is_dir() else []
+    refusal = Refusal(
+        scenario=case.name,
+        vessel=case.vessel,
+        area=case.area,
+        start=case.start,
+        goal=case.goal,
+        clearance_m=case.plan.clearance_m,
+        error=error,
+        earlier=tuple(name for name in there if name not in DRAFT and not name.startswith(".")),
+        command=command,
+        version=__version__,
+    )
+    return {"refused.json": refused_json(refusal), "refused.html": refused_html(refusal)}

@@ -24,6 +24,7 @@ from expdesign.values import Array
 from expdesign.vessel import Vessel
 from expdesign.workflows.command_text import command_text
 from expdesign.workflows.outcome import Outcome, TextTable
+from expdesign.workflows.steps.case import drafted
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.design_tables import design_summary
 from expdesign.workflows.steps.grown import growth_summary, ready
@@ -82,7 +83,11 @@ def replan(
             "--seed": seed,
         },
     )
-    with remembering(user_memory() if cache else None), workers(jobs, scheduler=scheduler):
+    with (
+        remembering(user_memory() if cache else None),
+        workers(jobs, scheduler=scheduler),
+        drafted(replace(state.first, start=state.pose, vessel=state.ship), out, command=words),
+    ):
         return _replanned(state, out, words, interest=interest, seed=seed, progress=progress)
 
 

@@ -1,0 +1,127 @@
+"""Whether a run has a place in the water at all, by branch and bound over places and headings.
+
+The tests are those of the search for places, with a slack for the places and headings between those looked at: where
+none passes with the slack, none passes anywhere, and the search would be in vain.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from expdesign.errors import NoRoom
+from expdesign.plan.local_planner import SearchSpace, moved
+from expdesign.plan.search import runs_clear
+from expdesign.plan.tuning import PLAN
+from expdesign.values import Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Fit:
+    """Where a run has room.
+
+    Attributes:
+        pose: (3,) a start pose with room for the run, or None where none was found.
+        impossible: whether there surely is none.
+    """
+
+    pose: Array | None = None
+    impossible: bool = False
+
+
+def place_of(space: SearchSpace, index: int) -> Fit:
+    """A place for one of the space's runs, taken by itself: legs to and from it are not looked at."""
+    run = space.footprints[index]
+    points = np.vstack([run.discs, (0.0, 0.0), run.displacement[:2]])
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    reach_m = float(np.hypot(*(points - middle).T).max())
+    half_m, half_rad, whole = _first_half_m(space), np.pi / PLAN.first_headings, True
+    boxes = _first_boxes(space, half_m)
+    outline = _outline(run.discs)
+    while True:
+        slack_m = np.sqrt(2.0) * (half_m + space.field.cell_m) + reach_m * half_rad
+        poses = moved(boxes, np.array([-middle[0], -middle[1], 0.0]))
+        for some in (outline, np.arange(len(run.discs))):
+            part = replace(run, discs=run.discs[some], times_s=run.times_s[some], room_m=run.room_m[some] - slack_m)
+            looser = replace(space, footprints=(part,), leg_margin_m=space.leg_margin_m - slack_m)
+            kept = np.concatenate([np.zeros(0, dtype=bool), *(clear for _, clear in _clear(looser, 0, poses))])
+            boxes, poses = boxes[kept], poses[kept]
+        if not len(boxes):
+            return Fit(impossible=whole)
+        found = next((some[clear][0] for some, clear in _clear(space, index, poses) if clear.any()), None)
+        if found is not None:
+            return Fit(pose=found)
+        if slack_m < PLAN.least_slack_cells * space.field.cell_m:
+            return Fit()
+        most = PLAN.boxes // 8
+        whole, boxes = whole and len(boxes) <= most, boxes[:: -(-len(boxes) // most)]
+        half_m, half_rad = half_m / 2, half_rad / 2
+        boxes = np.concatenate([boxes + np.multiply(step, (half_m, half_m, half_rad)) for step in _CORNERS])
+
+
+_CORNERS = tuple((north, east, turn) for north in (-1, 1) for east in (-1, 1) for turn in (-1, 1))
+
+
+def _first_half_m(space: SearchSpace) -> float:
+    """Half the side of the boxes of places looked at first [m]."""
+    rows, columns = space.field.clearance_m.shape
+    return space.field.cell_m * max(1.0, math.sqrt(rows * columns / PLAN.first_places) / 2)
+
+
+def _first_boxes(space: SearchSpace, half_m: float) -> Array:
+    """(n, 3) middles of boxes of places and headings that cover the grid."""
+    low = space.field.origin
+    north, east = (
+        np.arange(first + half_m, first + count * space.field.cell_m + half_m, 2 * half_m)
+        for first, count in zip(low, space.field.clearance_m.shape, strict=True)
+    )
+    turn = (np.arange(PLAN.first_headings) + 0.5) * 2 * np.pi / PLAN.first_headings
+    return np.stack(np.meshgrid(north, east, turn, indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+def _outline(discs: Array) -> np.ndarray:
+    """Indices of the discs (n, 2) that reach farthest in eight directions: they rule most places out."""
+    angles = np.arange(8) * np.pi / 4
+    return np.unique((discs @ np.stack([np.cos(angles), np.sin(angles)])).argmax(axis=0))
+
+
+def _clear(space: SearchSpace, index: int, poses: Array) -> Iterator[tuple[Array, np.ndarray]]:
+    """Poses (n, 3), some at a time, and whether a run from them keeps its margins."""
+    at_once = max(1, PLAN.lookups // len(space.footprints[index].discs))
+    for first in range(0, len(poses), at_once):
+        some = poses[first : first + at_once]
+        yield some, runs_clear(space, np.full(len(some), index), some)
+
+
+def without_place(space: SearchSpace) -> Iterator[str]:
+    """Names of the runs that surely have no place in the water."""
+    for index, run in enumerate(space.footprints):
+        if place_of(space, index).impossible:
+            yield run.name
+
+
+def check_room(space: SearchSpace) -> None:
+    """Raise NoRoom where a run surely has no place, before anything is searched."""
+    names = tuple(without_place(space))
+    if not names:
+        return
+    run = max((item for item in space.footprints if item.name in names), key=lambda item: _size_m(item.discs))
+    row, column = np.unravel_index(int(space.field.clearance_m.argmax()), space.field.clearance_m.shape)
+    widest = space.field.origin + space.field.cell_m * np.array([row, column])
+    lat, lon = space.frame.to_degrees(widest)
+    others = f", nor do {', '.join(map(repr, sorted(set(names) - {run.name})))}" if len(names) > 1 else ""
+    raise NoRoom(
+        f"no room for {run.name!r}: {run.needs}; it fits nowhere in the water that can be reached, at any "
+        f"heading{others}; the shore is farthest near {lat:.5f}, {lon:.5f}, {space.field.clearance_m.max():.4g} m",
+        what="room",
+        which=run.name,
+        place=widest,
+    )
+
+
+def _size_m(discs: Array) -> float:
+    north, east = np.ptp(discs, axis=0).tolist()
+    return math.hypot(north, east)
