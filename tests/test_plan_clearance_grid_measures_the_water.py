@@ -46,3 +46,15 @@ def test_a_pier_thinner_than_a_cell_is_not_overlooked():
     widest, place = narrowest_passage(field, np.array([0.0, -200.0]), np.array([0.0, 200.0]))
     assert widest == pytest.approx(100.0, abs=field.error_m)  # round its end, not through it
     assert 300 < place[0] < 500
+
+
+def test_of_several_passages_in_a_row_one_of_the_narrowest_is_named():
+    water = shapely.box(-500, -500, 900, 500)
+    for east, north in ((-100, 350), (300, -350), (700, 300)):
+        wall = shapely.box(east - 10, -600, east + 10, 600)
+        water = water.difference(wall.difference(shapely.box(east - 20, north - 40, east + 20, north + 40)))
+    field = clearance_field(area(water), resolution_m=4.0)
+    widest, place = narrowest_passage(field, np.array([-300.0, -300.0]), np.array([-300.0, 800.0]))
+    assert widest == pytest.approx(40.0, abs=field.error_m)
+    gaps = np.array([[350.0, -100.0], [-350.0, 300.0], [300.0, 700.0]])
+    assert np.hypot(*(gaps - place).T).min() < 40.0 + 10.0 + 3 * field.error_m

@@ -22,7 +22,6 @@ from expdesign.plan.problem import PlanProblem
 from expdesign.plan.runs import draws_for
 from expdesign.plan.search import place_runs
 from expdesign.plan.tuning import PLAN
-from expdesign.plan.values import PlanSettings
 from expdesign.values import Array
 
 NONE = "no single change of those tried helps ({})"
@@ -81,55 +80,48 @@ def _for_passage(problem: PlanProblem, refused: NoPlan) -> Iterator[str]:
 
 
 def _for_room(problem: PlanProblem, refused: NoPlan) -> Iterator[str]:
-    """A clearance with which every run has a place, a confidence, or the runs to leave out."""
+    """A clearance or a confidence with which the runs find places, or the runs to leave out."""
     water = leg_water(problem, ship_on_legs(problem))
     planner, off_m = local_planner(water, problem.used), dispersions(problem)
-    space = open_space(problem, water, planner, off_m)
-    lacking = _without_place(space)
-    if not lacking:
-        yield (
-            "each run by itself has a place, so no single change of those tried helps; not tried: less design.total_s, "
-            "more plan.time_budget_s, the other plan.planner, wider [bounds] of the area"
-        )
-        return
-    asked, tried = problem.settings.clearance_m, ["plan.clearance_m down to 0"]
+    lacking = _without_place(open_space(problem, water, planner, off_m))
+    asked = problem.settings.clearance_m
 
-    def fits(off_m: Sequence[Array], clearance_m: float) -> bool:
-        changed = replace(problem, settings=replace(problem.settings, clearance_m=clearance_m))
+    def changed(**settings: float) -> PlanProblem:
+        return _with(problem, **settings)
+
+    def fits(clearance_m: float) -> bool:
         other = replace(water, clearance_m=clearance_m)
-        return not _without_place(open_space(changed, other, planner, off_m))
+        return not _without_place(open_space(changed(clearance_m=clearance_m), other, planner, off_m))
 
-    clearance_m = _largest(lambda value: fits(off_m, value), asked)
-    if clearance_m is not None:
-        yield f"with plan.clearance_m = {clearance_m:g} every run has a place; {REST}"
-        return
+    most = _largest(fits, asked) if lacking else asked
+    for share in PLAN.clearance_shares if most is not None else ():
+        clearance_m = float(f"{share * (most or 0.0):.2g}")
+        if clearance_m < asked and _found(changed(clearance_m=clearance_m), off_m):
+            yield f"with plan.clearance_m = {clearance_m:g} the search finds a place for every run; {REST}"
+            return
+    tried = ["plan.clearance_m down to 0"]
     for confidence in PLAN.lower_confidences:
         if confidence < problem.settings.confidence and any((off > asked).any() for off in off_m):
             tried.append(f"plan.confidence = {confidence:g}")
-            lower = replace(problem, settings=replace(problem.settings, confidence=confidence))
-            if fits(dispersions(lower), asked):
-                yield f"with plan.confidence = {confidence:g} every run has a place; {REST}"
+            if _found(changed(confidence=confidence)):
+                yield f"with {tried[-1]} the search finds a place for every run; {REST}"
                 return
-    yield from _leaving_out(problem, water, lacking, tried)
+    yield from _leaving_out(problem, lacking or {refused.which}, tried)
 
 
 def _for_lattice(problem: PlanProblem, refused: NoPlan) -> Iterator[str]:
     """The other planner, if it finds places for the runs."""
-    water = leg_water(problem, ship_on_legs(problem))
-    space = open_space(problem, water, local_planner(water, problem.used))
-    repeats = [problem.repeats[run.name] for run in space.footprints]
-    try:
-        place_runs(space, repeats, start=problem.start, width=PLAN.transition_beam, orders=0)
-    except NoPlan:
-        yield NONE.format("plan.planner = 'beam'")
+    if _found(problem):
+        yield f"with plan.planner = 'beam' the search finds a place for every run; {REST}"
     else:
-        yield f"with plan.planner = 'beam' every run has a place; {REST}"
+        yield NONE.format("plan.planner = 'beam'")
 
 
-def _leaving_out(problem: PlanProblem, water: LegWater, lacking: set[str], tried: list[str]) -> Iterator[str]:
-    """Runs without which the design exists, and each of its runs has a place."""
+def _leaving_out(problem: PlanProblem, lacking: set[str], tried: list[str]) -> Iterator[str]:
+    """Runs without which the design exists, and the search finds a place for each of its runs."""
     if isinstance(problem.design, DurationDesign):
         limits = problem.design.problem.constraints
+        water = leg_water(problem, ship_on_legs(problem))
         for _ in range(PLAN.most_left_out):
             excluded = (*limits.excluded, *sorted(lacking - set(limits.excluded)))
             try:
@@ -138,13 +130,35 @@ def _leaving_out(problem: PlanProblem, water: LegWater, lacking: set[str], tried
                 more = _without_place(open_space(other, water, local_planner(water, other.used)))
             except (InputError, NoAnswer):
                 break
-            if not more:
+            if more:
+                lacking = lacking | more
+            elif _found(other):
                 names = ", ".join(f'"{name}"' for name in excluded)
-                yield f"with design.excluded = [{names}] the design has only runs that have a place; {REST}"
+                yield f"with design.excluded = [{names}] the search finds a place for every run; {REST}"
                 return
-            lacking |= more
-        tried.append("design.excluded with all runs that have none")
-    yield NONE.format(", ".join(tried)) + "; not tried: wider [bounds] of the area, another chart"
+            else:
+                break
+        tried = [*tried, "design.excluded with " + ", ".join(sorted(lacking))]
+    yield NONE.format(", ".join(tried)) + "; not tried: less design.total_s, wider [bounds] of the area"
+
+
+def _found(problem: PlanProblem, off_m: Sequence[Array] | None = None) -> bool:
+    """Whether a narrow search finds places for all runs."""
+    try:
+        draws_for(confidence_of_run(problem))
+        water = leg_water(problem, ship_on_legs(problem))
+        space = open_space(problem, water, local_planner(water, problem.used), off_m)
+        if _without_place(space):
+            return False
+        repeats = [problem.repeats[run.name] for run in space.footprints]
+        place_runs(space, repeats, start=problem.start, width=PLAN.transition_beam, orders=0)
+    except NoPlan:
+        return False
+    return True
+
+
+def _with(problem: PlanProblem, **settings: Any) -> PlanProblem:
+    return replace(problem, settings=replace(problem.settings, **settings))
 
 
 def _without_place(space: SearchSpace) -> set[str]:
@@ -174,7 +188,7 @@ def _for_berth(problem: PlanProblem, refused: NoPlan) -> Iterator[str]:
     for key, radius in (("plan.turning_radius_m", share * water.ship.turning_radius_m) for share in PLAN.tighter):
         value = _up(radius)
         try:
-            ship = ship_on_legs(replace(problem, settings=replace(problem.settings, turning_radius_m=value)))
+            ship = ship_on_legs(_with(problem, turning_radius_m=value))
         except NoPlan:
             break
         if free(pose[2], replace(water, ship=ship)):
@@ -184,40 +198,30 @@ def _for_berth(problem: PlanProblem, refused: NoPlan) -> Iterator[str]:
 
 
 def _for_confidence(problem: PlanProblem, refused: NoPlan) -> Iterator[str]:
-    """The largest confidence, and the most runs, that can be estimated."""
-    runs = sum(problem.repeats.values())
-
-    def possible(confidence: float) -> bool:
-        asked = replace(problem, settings=replace(problem.settings, confidence=confidence))
-        try:
-            return draws_for(confidence_of_run(asked)) > 0
-        except NoPlan:
-            return False
-
-    steps = np.array([confidence for confidence in PLAN.lower_confidences if confidence < problem.settings.confidence])
-    found = next((float(value) for value in steps if possible(value)), None)
-    if found is None:
-        yield NONE.format("plan.confidence")
+    """The largest confidence of those tried at which the room of runs can be estimated, and every run has a place."""
+    tried = []
+    for confidence in PLAN.lower_confidences:
+        if confidence < problem.settings.confidence:
+            tried.append(f"plan.confidence = {confidence:g}")
+            if _found(_with(problem, confidence=confidence)):
+                yield f"with {tried[-1]} the search finds a place for every run; {REST}"
+                return
+    if refused.what == "unstable":
+        yield from _leaving_out(problem, {refused.which}, tried)
     else:
-        yield f"with plan.confidence = {found:g} the room of {runs} runs can be estimated; {REST}"
+        yield NONE.format(", ".join(tried))
 
 
 def _for_settings(problem: PlanProblem, refused: NoPlan) -> Iterator[str]:
     """Speeds and radii that the ship is capable of."""
-    asked = problem.settings
     key = "transit_speed_mps" if refused.what == "speed" else "turning_radius_m"
     for value in (None, *(_speeds(problem) if refused.what == "speed" else ())):
-        settings = _settings(asked, key, value)
-        if settings != asked and _capable(problem, settings):
+        other = _with(problem, **{key: value})
+        if other.settings != problem.settings and _capable(other):
             change = f"without plan.{key}" if value is None else f"with plan.{key} = {value:g}"
             yield f"{change} the vessel is capable of what is asked; {REST}"
             return
     yield NONE.format(f"plan.{key}")
-
-
-def _settings(settings: PlanSettings, key: str, value: float | None) -> PlanSettings:
-    changed: dict[str, Any] = {key: value}
-    return replace(settings, **changed)
 
 
 def _speeds(problem: PlanProblem) -> tuple[float, ...]:
@@ -225,30 +229,9 @@ def _speeds(problem: PlanProblem) -> tuple[float, ...]:
     return tuple(_up(share * problem.current_mps) for share in PLAN.faster if problem.current_mps > 0)
 
 
-def _capable(problem: PlanProblem, settings: PlanSettings) -> bool:
+def _capable(problem: PlanProblem) -> bool:
     try:
-        return ship_on_legs(replace(problem, settings=settings)) is not None
-    except NoPlan:
-        return False
-
-
-def _for_unstable(problem: PlanProblem, refused: NoPlan) -> Iterator[str]:
-    """A confidence at which drawn runs are stable often enough, or the run left out."""
-    tried = []
-    for confidence in PLAN.lower_confidences:
-        if confidence < problem.settings.confidence:
-            tried.append(f"plan.confidence = {confidence:g}")
-            changed = replace(problem, settings=replace(problem.settings, confidence=confidence))
-            if _stable(changed):
-                yield f"with plan.confidence = {confidence:g} so few are unstable that the plan can be tried; {REST}"
-                return
-    water = leg_water(problem, ship_on_legs(problem))
-    yield from _leaving_out(problem, water, {refused.which}, tried)
-
-
-def _stable(problem: PlanProblem) -> bool:
-    try:
-        return bool(dispersions(problem))
+        return ship_on_legs(problem) is not None
     except NoPlan:
         return False
 
@@ -281,6 +264,6 @@ CHECKS: Mapping[str, Callable[[PlanProblem, NoPlan], Iterator[str]]] = {
     "radius": _for_settings,
     "room": _for_room,
     "speed": _for_settings,
-    "unstable": _for_unstable,
+    "unstable": _for_confidence,
 }
 """Remedies by the kind of obstacle, as `NoPlan.what` names it."""

@@ -17,6 +17,7 @@ class Tuning:
         least_slack_cells: slack in cells of the clearance grid at which that stays open, too.
         lookups: clearances looked up at a time.
         least_confidence: below which none is named as a remedy.
+        clearance_shares: of the largest clearance with which every run has a place, tried as remedies.
         lower_confidences: tried as remedies of a refusal, the highest first.
         most_left_out: designs tried as remedies, each without the runs that had no place in the one before.
         turns_deg: from the heading asked for at start and goal, tried as remedies to both sides [deg].
@@ -50,6 +51,7 @@ class Tuning:
     least_slack_cells: float = 3.0
     lookups: int = 200_000
     least_confidence: float = 0.5
+    clearance_shares: tuple[float, ...] = (1.0, 0.9, 0.75, 0.5, 0.25, 0.0)
     lower_confidences: tuple[float, ...] = (0.9999, 0.9995, 0.999, 0.995, 0.99, 0.98, 0.95, 0.9, 0.8)
     most_left_out: int = 8
     turns_deg: tuple[float, ...] = tuple(15.0 * count for count in range(1, 13))

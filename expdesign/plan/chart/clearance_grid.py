@@ -102,12 +102,24 @@ def narrowest_passage(field: ClearanceField, start: Array, goal: Array) -> tuple
         regions, _ = scipy.ndimage.label(field.clearance_m >= middle, structure=eight)
         low, high = (middle, high) if regions[a] == regions[b] else (low, middle)
     regions, _ = scipy.ndimage.label(field.clearance_m >= high, structure=eight)
-    apart = sum(
-        scipy.ndimage.distance_transform_edt(regions != regions[end]) if regions[end] else 0.0 * regions
-        for end in (a, b)
-    )
     path = _path(field, start, goal, low - field.cell_m)
-    return low, path[int(np.argmin(apart[field.index(path)]))]
+    passage, beside = _first_passage(regions[field.index(path)])
+    apart = sum(scipy.ndimage.distance_transform_edt(regions != region) for region in beside if region)
+    among = path[passage]
+    return low, among[int(np.argmin(apart[field.index(among)]))] if any(beside) else among[len(among) // 2]
+
+
+def _first_passage(regions: np.ndarray) -> tuple[slice, tuple[int, int]]:
+    """The part of a path (k,) between the first two wide regions that it passes through, and these; 0 for none."""
+    wide = np.flatnonzero(regions)
+    changes = np.flatnonzero(np.diff(regions[wide]))
+    if len(wide) and not regions[0]:  # it begins in narrow water
+        first, last = 0, int(wide[0])
+    elif len(changes):
+        first, last = int(wide[changes[0]]), int(wide[changes[0] + 1])
+    else:
+        first, last = int(wide[-1]) if len(wide) else 0, len(regions) - 1
+    return slice(first, last + 1), (int(regions[first]), int(regions[last]))
 
 
 def _path(fine: ClearanceField, start: Array, goal: Array, clearance_m: float) -> Array:

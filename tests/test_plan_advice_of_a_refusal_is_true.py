@@ -1,0 +1,160 @@
+"""Who follows the advice of a refusal to the letter is not refused for the same reason again.
+
+Each case is refused, takes the one key that the message names with the value it names, and is planned once more.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import shapely
+
+from expdesign.errors import NoPlan
+from expdesign.plan import PlanSettings, solve
+from expdesign.plan.assembly import check_connected, leg_water, plan_room, search_space, ship_on_legs
+from expdesign.plan.feasibility import place_of
+from expdesign.plan.legs import escapes
+from expdesign.plan.legs.escape_check import check_ends
+from expdesign.plan.local_planner import local_planner
+from expdesign.plan.problem import PlanProblem
+from expdesign.plan.remedies import advised
+from expdesign.plan.runs import draws_for
+from expdesign.plan.solve import plan_trial
+from expdesign.progress import silent
+from expdesign.simulation import CALM, Environment
+from helm_case import catamaran
+from plan_case import acceleration, area, ship
+
+WIDE = shapely.box(-400, -400, 400, 400)
+
+
+def problem(
+    water: shapely.Geometry, *, start=(0.0, -200.0, 0.0), goal=(0.0, 200.0, 0.0), runs=1, environment=CALM, **wishes
+) -> PlanProblem:
+    """Some runs in a water, between two berths."""
+    vessel = ship()
+    return PlanProblem(
+        vessel=vessel,
+        area=area(water),
+        environment=environment,
+        settings=PlanSettings(**wishes),
+        primitives=(acceleration(vessel, speed_mps=1.0),),
+        design=SimpleNamespace(problem=SimpleNamespace(names=("go",)), repeats=(runs,)),
+        start=np.array(start),
+        goal=np.array(goal),
+    )
+
+
+@pytest.fixture(autouse=True)
+def plans_end_with_their_checks(monkeypatch):
+    """A plan that passes verification and trials is represented by its track."""
+    monkeypatch.setattr(solve, "_plan", lambda problem, sailed, **rest: sailed.trajectory)
+
+
+def refusal(case: PlanProblem) -> str:
+    with pytest.raises(NoPlan) as caught:
+        plan_trial(case)
+    return str(caught.value)
+
+
+def setting(text: str, key: str) -> float:
+    """The value that a message gives a key."""
+    found = re.search(rf"with plan\.{key} = ([\d.e+-]+\d)", text)
+    assert found is not None, text
+    return float(found[1])
+
+
+def changed(case: PlanProblem, **settings) -> PlanProblem:
+    return replace(case, settings=replace(case.settings, **settings))
+
+
+def gap(half_m: float) -> shapely.Geometry:
+    return WIDE.difference(shapely.box(-10, -400, 10, -half_m).union(shapely.box(-10, half_m, 10, 400)))
+
+
+def test_the_clearance_named_for_a_narrow_passage_leads_through_it():
+    case = problem(gap(24.0), clearance_m=25.0)
+    text = refusal(case)
+    assert "the widest passage leaves" in text
+    assert 0 < setting(text, "clearance_m") < 25.0
+    plan_trial(changed(case, clearance_m=setting(text, "clearance_m")))
+
+
+def test_the_clearance_named_for_a_run_without_a_place_gives_it_one():
+    pool = problem(shapely.box(-90, -90, 90, 90), start=(0.0, -5.0, 0.0), goal=(0.0, 5.0, 0.0), clearance_m=65.0)
+    certain = replace(pool.vessel.model, parameter_std=np.zeros(len(pool.vessel.model.names)))
+    case = replace(pool, vessel=replace(pool.vessel, model=certain))
+    text = refusal(case)
+    assert text.startswith("no room for 'go'")
+    followed = changed(case, clearance_m=setting(text, "clearance_m"))
+    water = leg_water(followed, ship_on_legs(followed))
+    search_space(followed, water, local_planner(water, followed.used))  # no longer refused
+    plan_trial(followed)
+
+
+def test_a_goal_that_land_cuts_off_comes_with_the_nearest_one_that_can_be_reached():
+    case = problem(gap(-1.0))
+    text = refusal(case)
+    north, east = re.search(r"north_m = (-?[\d.]+), east_m = (-?[\d.]+)", text).groups()
+    moved = replace(case, goal=np.array([float(north), float(east), 0.0]))
+    check_connected(moved)
+    plan_trial(moved)
+
+
+def test_the_confidence_named_where_it_cannot_be_estimated_can_be():
+    case = problem(WIDE, confidence=0.99999)
+    text = refusal(case)
+    assert "too high to be estimated" in text
+    plan_trial(changed(case, confidence=setting(text, "confidence")))
+
+
+def test_the_speed_named_against_a_current_overcomes_it():
+    stream = Environment(current_to=np.array([0.0, 0.5]))
+    case = problem(WIDE, environment=stream, transit_speed_mps=0.4)
+    text = refusal(case)
+    assert "without plan.transit_speed_mps the vessel is capable" in text
+    plan_trial(changed(case, transit_speed_mps=None))
+
+
+@pytest.mark.parametrize("settings", [{"transit_speed_mps": 50.0}, {"turning_radius_m": 1.0}])
+def test_without_a_speed_or_a_radius_beyond_the_ship_there_is_a_plan(settings):
+    case = problem(WIDE, **settings)
+    ((key, _),) = settings.items()
+    assert f"without plan.{key} the vessel is capable" in refusal(case)
+    plan_trial(changed(case, **{key: None}))
+
+
+def test_the_heading_named_for_a_berth_leads_out_of_it():
+    vessel = catamaran()
+    base = problem(WIDE, clearance_m=0.5)
+    radius = ship_on_legs(replace(base, vessel=vessel)).turning_radius_m
+    bay = shapely.box(-8 * radius, 0, 8 * radius, 8 * radius)
+    slip = bay.union(shapely.box(-0.6 * radius, -4 * radius, 0.6 * radius, 0.1))
+    into = np.array([-2 * radius, 0.0, np.pi])
+    case = replace(base, vessel=vessel, area=area(slip), start=into, goal=into)
+    water = leg_water(case, ship_on_legs(case))
+    with pytest.raises(NoPlan) as caught:
+        check_ends(case.start, case.goal, water)
+    text = str(advised(case, caught.value))
+    heading = np.radians(float(re.search(r"start\.heading_deg = (\d+)", text)[1]))
+    assert escapes(np.array([*into[:2], heading]), water)
+
+
+def test_a_run_without_a_place_is_refused_before_anything_is_searched_and_one_with_a_place_is_not():
+    for half_m, fits in ((35.0, False), (300.0, True)):
+        case = problem(shapely.box(-half_m, -half_m, half_m, half_m), start=(0.0, -5.0, 0.0), goal=(0.0, 5.0, 0.0))
+        water = leg_water(case, ship_on_legs(case))
+        if fits:
+            space = plan_room(case, water, silent).space
+            assert place_of(space, 0).pose is not None
+        else:
+            with pytest.raises(NoPlan, match="fits nowhere"):
+                plan_room(case, water, silent)
+
+
+def test_a_thousand_runs_can_be_planned_for_at_the_usual_confidence():
+    assert draws_for(1.0 - (1.0 - PlanSettings.confidence) / 1000) * (1.0 - PlanSettings.confidence) / 1000 >= 1.0
