@@ -150,4 +150,4 @@ def test_a_lattice_too_coarse_ends_in_one_line(tmp_path, capsys):
     message = capsys.readouterr().err.strip()
     assert "\n" not in message
     assert "on a lattice of 3000 m" in message
-    assert "a plan.lattice_spacing_m smaller may help" in message
+    assert "not tried: a plan.lattice_spacing_m smaller" in message

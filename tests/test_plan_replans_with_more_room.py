@@ -6,6 +6,7 @@ aside to go straight, and her bow comes nearer to the rocks than a plan can tell
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -89,3 +90,28 @@ def test_without_a_wider_passage_the_refusal_names_the_share_the_leg_and_the_pla
     assert "on the leg to the goal" in text
     np.testing.assert_allclose(place_in(text), [STRAIT_M, 0.0], atol=30.0)
     assert "there is no path to the goal with more clearance; " in text
+
+
+def test_more_room_is_tried_once_whatever_the_work_budget(attempts):
+    case = problem((0.0, GAP_M), (ASIDE_M, 45.0))
+    hurried = replace(case, settings=replace(case.settings, time_budget_s=0.1))
+    track = plan_trial(hurried)
+    assert len(attempts) == 2
+    assert abs(crossing_m(track) - ASIDE_M) < 45.0
+
+
+def test_where_runs_have_the_same_room_the_confidence_named_accepts_the_first_plan(attempts):
+    case = problem((0.0, 9.2))  # a short run does not stray as far as the clearance
+    case = replace(
+        case,
+        primitives=(acceleration(case.vessel, duration_s=3.0),),
+        environment=Environment(current_std_mps=0.5),
+        settings=replace(case.settings, clearance_m=1.6),
+    )
+    with pytest.raises(NoPlan) as caught:
+        plan_trial(case)
+    text = str(caught.value)
+    named = re.search(r"with plan\.confidence = ([\d.]+\d) the first plan is made once more, and accepted", text)
+    assert named is not None, text
+    plan_trial(replace(case, settings=replace(case.settings, confidence=float(named[1]))))
+    assert attempts[-1].left == attempts[0].left

@@ -24,8 +24,8 @@ class PlanSettings:
         confidence: share of drawn trials that must stay in allowed water from start to goal, between 0 and 1.
         time_budget_s: for tries of other places where a leg or a run fails: one for every two seconds, fewer where legs
             cost more [s]. Work is counted, so that a slow machine finds the same plan as a fast one; by the clock a
-            search that is stuck ends after five times the budget. A replan, because drawn trials left the water, has
-            the budget again if the work counted so far suggests that it ends within twice the budget.
+            search that is stuck ends after five times the budget. A plan whose drawn trials leave the water is made
+            anew once, and a second time if the work counted so far suggests that this ends within twice the budget.
         transit_speed_mps: speed of repositioning legs, or None for nine tenths of what the actuators allow.
         turning_radius_m: of repositioning legs, or None for what the vessel model allows.
         planner: name of the search that orders and places the runs, see `expdesign.plan.search.placement_search`.

@@ -30,11 +30,19 @@ AREAS = (
     "seamark:type, in English or as an object class of S-57. A property depth_m, depth or VALSOU states their least "
     "depth [m]; without one they count as at the surface. Results name every layer that is not used."
 )
+REFUSED = (
+    "A plan that is refused ends with exit status 3 and leaves a draft, refused.html and refused.json: what stands in the "
+    "way and where, what was tried, and a change of one key with which the test that failed passes. A draft is no plan and "
+    "has no route. Results of an earlier attempt in the same folder stay; the draft names them. A plan that is found takes "
+    "the draft away."
+)
 
 
 def scenario_topic() -> Topic:
     """Keys of a scenario file."""
-    return Topic(name="scenario", title="Scenario files", text=VARIANTS, sections=_by_table(ScenarioFile))
+    return Topic(
+        name="scenario", title="Scenario files", text=f"{VARIANTS} {REFUSED}", sections=_by_table(ScenarioFile)
+    )
 
 
 def vessel_topic() -> Topic:
