@@ -31,10 +31,10 @@ AREAS = (
     "depth [m]; without one they count as at the surface. Results name every layer that is not used."
 )
 REFUSED = (
-    "A plan that is refused ends with exit status 3 and leaves a draft, refused.html and refused.json: what stands in the "
-    "way and where, what was tried, and a change of one key with which the test that failed passes. A draft is no plan and "
-    "has no route. Results of an earlier attempt in the same folder stay; the draft names them. A plan that is found takes "
-    "the draft away."
+    "A plan that is refused ends with exit status 3 and leaves a draft, refused.html and refused.json: what stands in "
+    "the way and where, what was tried, and a change of one key with which the test that failed passes. A draft is no "
+    "plan and has no route. Results of an earlier attempt in the same folder stay; the draft names them. A plan that "
+    "is found takes the draft away."
 )
 
 
