@@ -26,7 +26,7 @@ from expdesign.workflows.steps.day import planned_day
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.grown import ready
 from expdesign.workflows.steps.planned import plan_summary
-from expdesign.workflows.steps.workers import workers
+from expdesign.workflows.steps.workers import load_plans, workers
 
 WHOLE_RUNS = "repeats"
 WORKED = 0.95
@@ -73,7 +73,7 @@ def whatif(
         if names.count(name) > 1:
             raise InputError(f"the name {name!r} is given to {names.count(name)} cases, expected different names")
     memory = user_memory() if cache else None
-    with remembering(memory), workers(jobs, scheduler=scheduler):
+    with remembering(memory), workers(jobs, scheduler=scheduler, load=load_plans):
         done = {}
         for found in _cases(cases, with_plan, seed, memory, progress, one_by_one=with_plan and scheduler is None):
             done[found.name] = found

@@ -10,10 +10,15 @@ from expdesign.errors import InputError
 from expdesign.processes import local_processes, on_cluster
 
 
+def load_plans() -> None:
+    """Import what plans need."""
+    import expdesign.plan.solve  # noqa: F401
+
+
 def load_planner() -> None:
     """Import what plans and reports need."""
-    import expdesign.export.report
-    import expdesign.plan.solve  # noqa: F401
+    load_plans()
+    import expdesign.export.report  # noqa: F401
     from expdesign.export.pages.figures import new_figure
 
     new_figure(1.0, 1.0)  # loads what figures are drawn with
