@@ -19,7 +19,7 @@ from expdesign.estimation.regression import (
     with_wind_as_measured,
 )
 from expdesign.estimation.replay import InstrumentModel, Integration, apart_from_start, build_replay
-from expdesign.estimation.solve import NullSpace, Refined, Solution, Weighting, refine_iv, solve_ls
+from expdesign.estimation.solve import NullSpace, Prior, Refined, Solution, Weighting, refine_iv, solve_ls
 from expdesign.estimation.tuning import TUNING
 from expdesign.estimation.values import Estimate, Residuals
 from expdesign.signals import Record
@@ -189,8 +189,19 @@ def _instrumental(layout: Layout, record: Record, rows: Rows, choices: Settings)
         first,
         lambda values: simulation.instruments(full_parameters(layout, values)),
         choices.weighting,
+        prior=_prior(layout, start),
         most=choices.most_refinements,
     )
+
+
+def _prior(layout: Layout, start: Array) -> Prior:
+    """The first model, around which parameters spread as far as the vessel file states, or by their own size."""
+    model = layout.model
+    places = [model.names.index(name) for name in layout.parameters]
+    stated, sizes = model.parameter_std[places], TUNING.prior_share * np.abs(start[places])
+    spread = np.where(stated > 0, stated, np.where(sizes > 0, sizes, np.inf))
+    others = len(layout.nuisance)
+    return Prior(values=np.append(start[places], np.zeros(others)), spread=np.append(spread, np.full(others, np.inf)))
 
 
 def full_parameters(layout: Layout, values: Array) -> Array:

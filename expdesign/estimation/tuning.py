@@ -18,15 +18,21 @@ class Tuning:
         named_parameters: most parameters of a combination that a message names.
         most_refinements: of simulated instruments.
         settled_deviations: change of an estimate, in standard deviations, that ends the refinement.
+        stabilising_weights: of the first model, tried one after the other where an estimate is unstable.
+        prior_share: spread of a parameter without a stated standard deviation, relative to its size.
         first_horizon_samples: of output error.
         horizon_growth: ratio of successive horizons of output error.
         most_steps: of Gauss and Newton at one horizon.
         settled_cost: expected decrease of the cost, in squared standard deviations, that ends the last horizons.
         rough_cost: the same for earlier horizons.
         block_instructions: size of the flat CasADi functions that simulations are cut into.
+        block_samples: of a stretch, simulated at once.
+        block_points: samples of all stretches, simulated or differentiated at once.
         spectrum_bins: bins of the periodogram, of equal width in the logarithm of frequency.
         spectrum_iterations: of reweighted non-negative least squares.
         spectrum_misfit: Bartlett's statistic at 1 % (Kolmogorov's distribution).
+        least_left: share of a part of the noise that parameters leave in residuals at a frequency, at least.
+        rounding: expected periodogram of a part with unit variance below which it is rounding errors.
         long_gap_samples: missing samples in a row after which the noise starts again.
         slowest_pole: bound on the autoregressive coefficient of a whitening filter.
         whitening_passes: the second filter finds a slow disturbance below the measurement noise.
@@ -43,15 +49,21 @@ class Tuning:
     named_parameters: int = 4
     most_refinements: int = 30
     settled_deviations: float = 1e-3
+    stabilising_weights: tuple[float, ...] = (0.01, 0.1, 1.0, 10.0, 100.0, 1e4)
+    prior_share: float = 1.0
     first_horizon_samples: int = 8
     horizon_growth: int = 4
     most_steps: int = 40
     settled_cost: float = 1e-4
     rough_cost: float = 0.1
     block_instructions: int = 20_000
+    block_samples: int = 256
+    block_points: int = 4096
     spectrum_bins: int = 80
     spectrum_iterations: int = 12
     spectrum_misfit: float = 1.628
+    least_left: float = 0.05
+    rounding: float = 1e-9
     long_gap_samples: int = 500
     slowest_pole: float = 0.98
     whitening_passes: int = 2

@@ -1,12 +1,13 @@
 """The noise in residuals: components, long-run variance and whitening filters."""
 
-from expdesign.estimation.noise.components import Components, fit_components, score_covariance
+from expdesign.estimation.noise.components import Components, Fitted, fit_components, score_covariance
 from expdesign.estimation.noise.long_run import automatic_lags, long_run_covariance, lost_share
 from expdesign.estimation.noise.timeline import Timeline, stretches, timeline
 from expdesign.estimation.noise.whitening import white_parts
 
 __all__ = [
     "Components",
+    "Fitted",
     "Timeline",
     "automatic_lags",
     "fit_components",

@@ -1,12 +1,13 @@
 """Instrumental-variable equations solved, with covariance and null space."""
 
 from expdesign.estimation.solve.null_space import Direction, NullSpace
-from expdesign.estimation.solve.refine import Refined, refine_iv
+from expdesign.estimation.solve.refine import Prior, Refined, refine_iv
 from expdesign.estimation.solve.solution import Solution, Weighting, solve_iv, solve_ls
 
 __all__ = [
     "Direction",
     "NullSpace",
+    "Prior",
     "Refined",
     "Solution",
     "Weighting",

@@ -1,5 +1,14 @@
 """Refined IV: simulate the instruments, estimate, simulate them again with the estimate, until it stops moving.
 
+From few data an estimate may be an unstable model, which gives no instruments. They are then simulated with the
+estimate drawn towards the first model,
+
+    theta(w) = (P^-1 + w D^-1)^-1 (P^-1 theta + w D^-1 theta_0),    D = diag(spread^2),
+
+by the least of some weights w at which the simulation stays bounded. Combinations that the data show stay as estimated,
+others come near the first model. With such instruments the estimate itself is not biased, as they depend on the noise
+no more than others do; most become stable. One that stays unstable is given as drawn, with the covariance before that.
+
 Source: F. Ljungberg, doctoral thesis, Linköping University, (4.37)-(4.39); P. C. Young, refined instrumental variables,
 Automatica 51 (2015), 35-46.
 """
@@ -7,7 +16,7 @@ Automatica 51 (2015), 35-46.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,6 +28,29 @@ from expdesign.values import Array
 
 Simulate = Callable[[Array], Array]
 """Parameter values (p,) of the regression -> instruments (k, n, p); raises Diverged."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """A stable model that unstable estimates are drawn to.
+
+    Attributes:
+        values: (p,) of the regression's parameters.
+        spread: (p,) how far from them parameters may well be; infinite for those without influence on stability.
+    """
+
+    values: Array
+    spread: Array
+
+    def drawn(self, values: Array, covariance: Array, weight: float) -> Array:
+        """(p,) values with this covariance, combined with the prior's at a weight."""
+        places = np.flatnonzero(np.isfinite(self.spread))
+        scale = self.spread[places]
+        P = covariance[np.ix_(places, places)] / np.outer(scale, scale)
+        gain = np.linalg.solve(P + np.eye(len(places)) / weight, P)  # of the prior, transposed
+        result = np.array(values)
+        result[places] += scale * (gain.T @ ((self.values - values)[places] / scale))
+        return result
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,34 +74,65 @@ def refine_iv(
     simulate: Simulate,
     weighting: Weighting,
     *,
+    prior: Prior | None = None,
     most: int = TUNING.most_refinements,
     settled: float = TUNING.settled_deviations,
 ) -> Refined:
     """Refine from first instruments (k, n, p).
 
-    A model that diverges, or that loses sight of parameters, during refinement ends it with a warning; the estimate is
-    then the last one whose instruments could be simulated.
+    A model that loses sight of parameters during refinement ends it with a warning, and so does one that diverges where
+    there is no prior; the estimate is then the last one whose instruments could be simulated.
 
     Raises:
         NotInformative: the first instruments already fail.
     """
     equations = build_equations(regression, first, weighting)
-    instruments, (values, _) = first, solve_quick(equations, first)
-    moved, count, warnings = 0.0, 0, []
+    instruments, (values, covariance) = first, solve_quick(equations, first)
+    moved, count, weight, warnings = 0.0, 0, 0.0, []
     while count < most:
         try:
-            newer_instruments = simulate(values)
-            newer, deviations = solve_quick(equations, newer_instruments)
+            newer_instruments, weight = _bounded(simulate, values, covariance, prior)
+            newer, covariance = solve_quick(equations, newer_instruments)
         except Diverged as error:
             warnings.append(f"Refinement stopped: the estimated model is unstable ({error}).")
             break
         except NotInformative as error:
             warnings.append(f"Refinement stopped: {error}.")
             break
+        deviations = np.sqrt(np.diag(covariance))
         moved = float(np.max(np.abs(newer - values) / np.maximum(deviations, 1e-150)))
         instruments, values, count = newer_instruments, newer, count + 1
         if moved < settled:
             break
     if count == most and moved >= settled:
         warnings.append(f"The estimate still changes by {moved:.2g} standard deviations after {most} refinements.")
-    return Refined(solve(equations, instruments), count, tuple(warnings))
+    solution = solve(equations, instruments)
+    if prior is None or not weight:
+        return Refined(solution, count, tuple(warnings))
+    drawn = prior.drawn(solution.values, solution.covariance, weight)
+    moved = float(np.max(np.abs(drawn - solution.values) / np.maximum(np.sqrt(np.diag(solution.covariance)), 1e-150)))
+    warnings.append(
+        "The data alone give an unstable model. What they show least is drawn towards the first model, by up to "
+        f"{moved:.2g} standard deviations."
+    )
+    return Refined(replace(solution, values=drawn, residuals=regression.residuals(drawn)), count, tuple(warnings))
+
+
+def _bounded(simulate: Simulate, values: Array, covariance: Array, prior: Prior | None) -> tuple[Array, float]:
+    """Instruments from the values, or from those drawn to the prior by the least weight at which they stay bounded.
+
+    Raises:
+        Diverged: none does.
+    """
+    try:
+        return simulate(values), 0.0
+    except Diverged:
+        if prior is None:
+            raise
+    *some, most = TUNING.stabilising_weights
+    for weight in some:
+        try:
+            return simulate(prior.drawn(values, covariance, weight)), weight
+        except Diverged:
+            continue
+    return simulate(prior.drawn(values, covariance, most)), most

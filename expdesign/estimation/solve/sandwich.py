@@ -8,8 +8,9 @@ nearly cancels; disturbances may last. By choice,
 - "components", the default: noise is a sum of white, sensor and slow parts, whose variances are estimated, and P is
   exact for them, for one long batch as for many short ones, see `components`. Both assumptions are tested. Where the
   variance changes with the instruments (White's test, 1 % for all parameters of an equation together), standard
-  deviations are multiplied by what White's factor says of the whitened residuals. Where the parts do not fit the
-  periodogram (Bartlett's test, 1 %), they are those of "hac" where these are larger, and a warning says so.
+  deviations are multiplied by what White's factor says of the whitened residuals. Where there are slow parts, which
+  turns of the ship may modulate, or the parts do not fit the periodogram (Bartlett's test, 1 %), they are those of
+  "hac" where these are larger; of a misfit a warning tells.
 - "hac": robust to changing variance and to any correlation in time that a kernel with few lags sees after the residuals
   are made white, see `whitening`. Disturbances that last for tens of samples are seen in part.
 - "kernel": robust to both too, by the kernel alone; "hc0" and "hc1" are robust to changing variance only. These three
@@ -28,6 +29,7 @@ import scipy
 
 from expdesign.estimation.noise import (
     Components,
+    Fitted,
     Timeline,
     automatic_lags,
     fit_components,
@@ -38,7 +40,7 @@ from expdesign.estimation.noise import (
     timeline,
     white_parts,
 )
-from expdesign.estimation.regression import Regression, batch_slices
+from expdesign.estimation.regression import Integers, Regression, batch_slices
 from expdesign.estimation.solve.systems import Part
 from expdesign.estimation.solve.weighting import Weighting
 from expdesign.estimation.tuning import TUNING
@@ -135,26 +137,30 @@ def _by_components(
     regression: Regression, weighting: Weighting, parts: Sequence[Part], residuals: Array, factor: float
 ) -> Uncertainty:
     places = stretches(regression.batch_of, regression.step_of)
-    fitted = fit_components(residuals, places)
-    P = factor * _exact(regression, parts, residuals, fitted)
+    by, columns = _taken(regression, parts)
+    fitted = fit_components(residuals, places, by)
+    P = _exact(regression, by, columns, residuals, fitted)
     scale, odd = np.ones((2, len(P)))
+    slow = np.zeros(len(P), dtype=bool)
     for item in _terms(regression, parts, residuals, passes=1):
         system = item.part.system
         scale[system.columns] = np.sqrt(item.white_factor())
         odd[system.columns] = max(fitted[output].misfit for output in system.outputs)
+        slow[system.columns] = any(fitted[output].variances[2:].any() for output in system.outputs)
     P *= np.outer(scale, scale)
-    if (odd <= TUNING.spectrum_misfit).all():
+    doubtful = slow | (odd > TUNING.spectrum_misfit)
+    if not doubtful.any():
         return Uncertainty(P, 0)
     robust, lags = _summed(
         _terms(regression, parts, residuals, passes=TUNING.whitening_passes), weighting, len(P), len(regression)
     )
     own, other = np.diag(P), factor * np.diag(robust)
-    larger = (odd > TUNING.spectrum_misfit) & (other > own) & (own > 0)
+    larger = doubtful & (other > own) & (own > 0)
     scale = np.sqrt(np.divide(other, own, out=np.ones_like(own), where=larger))
     names = [
         name for name, item in zip(regression.outputs, fitted, strict=True) if item.misfit > TUNING.spectrum_misfit
     ]
-    return Uncertainty(P * np.outer(scale, scale), lags, (_misfit_note(names),))
+    return Uncertainty(P * np.outer(scale, scale), lags, (_misfit_note(names),) if names else ())
 
 
 def _misfit_note(outputs: Sequence[str]) -> str:
@@ -164,19 +170,32 @@ def _misfit_note(outputs: Sequence[str]) -> str:
     )
 
 
-def _exact(regression: Regression, parts: Sequence[Part], residuals: Array, fitted: Sequence[Components]) -> Array:
-    """(p, p) covariance of an estimate under noise of these parts."""
-    W, columns = [], []
-    for output in range(residuals.shape[1]):
+def _taken(regression: Regression, parts: Sequence[Part]) -> tuple[list[Fitted], list[Integers]]:
+    """What the parameters of each output take from its noise, and their columns."""
+    by, columns = [], []
+    for output in range(len(regression.outputs)):
         own = next((part for part in parts if output in part.system.outputs), None)
         if own is None:
-            W.append(np.zeros((len(regression), 0)))
+            by.append(Fitted(*np.zeros((2, len(regression), 0))))
             columns.append(np.zeros(0, dtype=np.int64))
             continue
         place = int(np.flatnonzero(own.system.outputs == output)[0])
-        W.append(by_batch(own.A, own.Z[:, place], own.system.parts))
+        W = by_batch(own.A, own.Z[:, place], own.system.parts)
+        by.append(Fitted(own.system.varying[:, place], W))
         columns.append(own.system.columns)
+    return by, columns
+
+
+def _exact(
+    regression: Regression,
+    by: Sequence[Fitted],
+    columns: Sequence[Integers],
+    residuals: Array,
+    fitted: Sequence[Components],
+) -> Array:
+    """(p, p) covariance of an estimate under noise of these parts."""
     P = np.zeros((len(regression.parameters),) * 2)
+    W = [item.W for item in by]
     blocks = score_covariance(W, residuals, fitted, stretches(regression.batch_of, regression.step_of))
     for row, line in zip(columns, blocks, strict=True):
         for column, block in zip(columns, line, strict=True):

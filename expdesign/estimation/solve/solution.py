@@ -117,15 +117,16 @@ def solve(equations: Equations, instruments: Array) -> Solution:
 
 
 def solve_quick(equations: Equations, instruments: Array) -> tuple[Array, Array]:
-    """Parameters (p,), and standard deviations (p,) that ignore correlation in time: for iterations."""
+    """Parameters (p,), and a covariance (p, p) that ignores correlation in time: for iterations."""
     equations = _fitting(equations, instruments)
-    values, std = np.zeros((2, len(equations.regression.parameters)))
+    count = len(equations.regression.parameters)
+    values, covariance = np.zeros(count), np.zeros((count, count))
     for part in _parts(equations, instruments, exogenous=True):  # spares the search for weak instruments
         theta, left = part.solved(equations.weighting.mean)
         influences = by_batch(part.A, np.einsum("knp,kn->kp", part.Z, left), part.system.parts)
         values[part.system.columns] = theta
-        std[part.system.columns] = np.sqrt(np.einsum("kp,kp->p", influences, influences))
-    return values, std
+        covariance[np.ix_(part.system.columns, part.system.columns)] = influences.T @ influences
+    return values, covariance
 
 
 def _fitting(equations: Equations, instruments: Array) -> Equations:
