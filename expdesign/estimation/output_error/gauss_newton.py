@@ -32,6 +32,7 @@ def minimised(problem: Problem, values: Array, *, settled: float) -> tuple[Array
             normal = _normal(problem, values, states)
             while damping < 1e10:
                 step, shift, expected = _step(normal, damping)
+                step = np.append(step, np.zeros(len(values) - len(step)))  # constants that are not estimated
                 if expected < settled:
                     return values, starts
                 newer = problem.states(values + step, starts + shift)
@@ -60,19 +61,35 @@ class Normal:
 
 
 def _normal(problem: Problem, values: Array, states: Array) -> Normal:
-    Jv, Js = slopes_of(problem, values, states)
-    residuals, root = problem.residuals(states), np.sqrt(problem.weights)
-    p, n, count = problem.parameters, Js.shape[3], len(problem.batch)
-    by_v, by_s, left = (stretchwise(part * root[:, None]) for part in (Jv, Js, residuals[..., None]))
-    S, near, V_w = by_s.swapaxes(1, 2) @ by_s, by_s.swapaxes(1, 2) @ by_v, by_v.swapaxes(1, 2) @ by_v
-    g_w = (by_v.swapaxes(1, 2) @ left)[..., 0]
+    root, residuals = np.sqrt(problem.weights), problem.residuals(states)
+    p, count, n = problem.parameters, len(problem.batch), states.shape[2]
+    q, runs = p + n * problem.constant, int(problem.batch.max()) + 1
+    S, near, g_s = np.zeros((count, n, n)), np.zeros((count, n, q)), np.zeros((count, n))
+    V_b, g_b = np.zeros((runs, q, q)), np.zeros((runs, q))
+    for part in problem.compiled.slope_blocks(problem.local(values), states):
+        at = (part.samples, part.active)
+        weights = np.where(np.isfinite(problem.measured[at]), root, 0.0)[..., None]
+        by_v, by_s, left = (
+            stretchwise(rows * weights) for rows in (part.by_values[..., :q], part.by_start, residuals[at][..., None])
+        )
+        S[part.active] += by_s.swapaxes(1, 2) @ by_s
+        near[part.active] += by_s.swapaxes(1, 2) @ by_v
+        g_s[part.active] += (by_s.swapaxes(1, 2) @ left)[..., 0]
+        for number in np.unique(problem.batch[part.active]) if problem.constant else (None,):
+            own = slice(None) if number is None else problem.batch[part.active] == number
+            rows, misfit = by_v[own].reshape(-1, q), left[own].reshape(-1)
+            V_b[number or 0] += rows.T @ rows
+            g_b[number or 0] += rows.T @ misfit
+    if not problem.constant:
+        return Normal(S=S, C=near, V=V_b[0], gradient_s=g_s, gradient_v=g_b[0])
     C, V, g = np.zeros((count, n, len(values))), np.zeros((len(values),) * 2), np.zeros(len(values))
-    for w, number in enumerate(problem.batch):
+    for number in range(runs):
         places = np.concatenate([np.arange(p), p + number * n + np.arange(n)])
-        C[w][:, places] = near[w]
-        V[np.ix_(places, places)] += V_w[w]
-        g[places] += g_w[w]
-    return Normal(S=S, C=C, V=V, gradient_s=(by_s.swapaxes(1, 2) @ left)[..., 0], gradient_v=g)
+        own = np.flatnonzero(problem.batch == number)
+        C[np.ix_(own, np.arange(n), places)] = near[own]
+        V[np.ix_(places, places)] += V_b[number]
+        g[places] += g_b[number]
+    return Normal(S=S, C=C, V=V, gradient_s=g_s, gradient_v=g)
 
 
 def stretchwise(rows: Array) -> Array:

@@ -110,6 +110,7 @@ def build_problem(layout: Layout, record: Record, fitting: Fitting, samples: int
                 sample_time_s=time_s,
                 integrator=fitting.integration.integrator,
                 substeps=fitting.integration.substeps,
+                counts=np.array([end - first for (_, first), end in zip(cuts, ends, strict=True)]),
             )
         ),
         measured=stacked([_read(batch)[:, states] for batch in record.batches], fill=False),

@@ -68,15 +68,15 @@ def _chained(step: ca.Function, samples: int) -> Simulate:
     return simulate
 
 
-def stretch_functions(stretches: Stretches) -> tuple[ca.Function, ca.Function]:
-    """Simulation of all stretches, and derivatives of each next state by state and by values."""
-    (length, count, m), n = stretches.drive.shape, len(stretches.states)
-    steps = max(1, length - 1)
+def stretch_functions(stretches: Stretches, steps: int, count: int, points: int) -> tuple[ca.Function, ca.Function]:
+    """Simulation of so many samples of so many stretches, and derivatives of the next states of so many points."""
+    m, n = stretches.drive.shape[2], len(stretches.states)
     step = velocity_step(stretches)
     x, u, values = ca.SX.sym("x", n), ca.SX.sym("u", m), ca.SX.sym("t", len(stretches.sought) + n)
     after = step(x, u, values)
-    slopes = ca.Function("slopes", [x, u, values], [ca.jacobian(after, x), ca.jacobian(after, values)])
-    return step.mapaccum("stretch", steps).map(count), slopes.map(steps * count)
+    by_x, by_values = (ca.densify(ca.jacobian(after, seen)) for seen in (x, values))
+    slopes = ca.Function("slopes", [x, u, values], [by_x, by_values], {"cse": True})
+    return step.mapaccum("stretch", steps).map(count), slopes.map(points)
 
 
 def velocity_step(problem: Stretches) -> ca.Function:
@@ -97,7 +97,7 @@ def velocity_step(problem: Stretches) -> ca.Function:
         return tuple(all_rates[place] + values[p + index] for index, place in enumerate(problem.states))
 
     after = _stepped(rates, x, held, problem.sample_time_s, problem.integrator, problem.substeps)
-    return ca.Function("velocities", [x, drive, values], [after])
+    return ca.Function("velocities", [x, drive, values], [after], {"cse": True})
 
 
 def _split(drive: ca.SX, m: int, windy: bool) -> tuple[list[list[ca.SX]], tuple[Any, Any]]:

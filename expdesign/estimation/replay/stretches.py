@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from expdesign.estimation.regression import Integers
+from expdesign.estimation.tuning import TUNING
 from expdesign.simulation import euler_step, rk4_step
-from expdesign.values import Array
+from expdesign.values import Array, frozen_set
 from expdesign.vessel import VesselModel
 
 INTEGRATORS = {"euler": euler_step, "rk4": rk4_step}
@@ -29,6 +31,7 @@ class Stretches:
         windy: whether air velocities are those of that wind.
         sample_time_s: of all stretches.
         integrator, substeps: how the model is integrated.
+        counts: (W,) samples of each stretch; L for all when left out.
     """
 
     model: VesselModel
@@ -39,6 +42,28 @@ class Stretches:
     sample_time_s: float
     integrator: str
     substeps: int
+    counts: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+
+    def __post_init__(self) -> None:
+        length, count = self.drive.shape[:2]
+        if len(self.counts) != count:
+            frozen_set(self, "counts", np.full(count, length))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Slopes:
+    """Derivatives of simulated states in consecutive samples of the stretches that last so long.
+
+    Attributes:
+        samples: of the stretches.
+        active: (w,) places of those stretches.
+        by_values, by_start: (l, w, n, q) by the values, (l, w, n, n) by the start.
+    """
+
+    samples: slice
+    active: Integers
+    by_values: Array
+    by_start: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,48 +72,90 @@ class Compiled:
 
     Attributes:
         stretches: the simulated stretches.
-        run: (starts, drives, values) -> states after each sample.
-        slopes: (states, drives, values) -> derivatives of the next state by state and by values.
+        block: samples and stretches of one call of `run`, points of one call of `slopes`.
+        run: (starts, drives, values) -> states after each sample, of a block.
+        slopes: (states, drives, values) -> derivatives of the next state by state and by values, of a block of points.
     """
 
     stretches: Stretches
+    block: tuple[int, int, int]
     run: Any
     slopes: Any
 
     def states(self, values: Array, start: Array) -> Array:
         """(L, W, n) velocities from start velocities (W, n) and values (W, p + n): parameters, then accelerations.
 
-        A constant acceleration [unit of the output per second] stands for steady forces outside the model.
+        A constant acceleration [unit of the output per second] stands for steady forces outside the model. Where a
+        stretch has ended the rows mean nothing.
         """
-        (length, count, m), n = self.stretches.drive.shape, start.shape[1]
-        if length == 1:
-            return start[None].copy()
-        drive = self.stretches.drive[:-1].transpose(1, 0, 2).reshape(-1, m)
-        states = self.run(start.T, drive.T, np.repeat(values, length - 1, axis=0).T)
-        return np.concatenate([start[None], states.full().T.reshape(count, length - 1, n).transpose(1, 0, 2)])
+        drive, counts, (steps, many, _) = self.stretches.drive, self.stretches.counts, self.block
+        length, n = len(drive), start.shape[1]
+        result = np.repeat(start[None], length, axis=0)
+        for first in range(0, length - 1, steps):
+            rows = np.minimum(np.arange(first, first + steps), length - 2)
+            end = min(first + steps, length - 1)
+            active = np.flatnonzero(counts - 1 > first)
+            for begin in range(0, len(active), many):
+                part = active[begin : begin + many]
+                whole = np.resize(part, many)
+                held = drive[rows[:, None], whole].transpose(1, 0, 2).reshape(steps * many, -1)
+                after = self.run(result[first, whole].T, held.T, np.repeat(values[whole], steps, axis=0).T)
+                after = after.full().T.reshape(many, steps, n)[: len(part), : end - first]
+                result[first + 1 : end + 1, part] = after.transpose(1, 0, 2)
+        return result
 
     def sensitivities(self, values: Array, states: Array) -> tuple[Array, Array]:
         """Derivatives of simulated states (L, W, n): by the values (L, W, n, p + n), by the start (L, W, n, n)."""
         (length, count, n), q = states.shape, values.shape[1]
         by_values, by_start = np.zeros((length, count, n, q)), np.zeros((length, count, n, n))
-        by_start[0] = np.eye(n)
-        flat = (length - 1) * count
-        if not flat:
-            return by_values, by_start
-        held = np.broadcast_to(values, (length - 1, count, q)).reshape(flat, q)
-        drive = self.stretches.drive[:-1].reshape(flat, -1)
-        A, B = (
-            part.full().reshape(n, flat, -1).transpose(1, 0, 2).reshape(length - 1, count, n, -1)
-            for part in self.slopes(states[:-1].reshape(flat, n).T, drive.T, held.T)
-        )
-        for index in range(1, length):
-            by_start[index] = A[index - 1] @ by_start[index - 1]
-            by_values[index] = A[index - 1] @ by_values[index - 1] + B[index - 1]
+        for part in self.slope_blocks(values, states):
+            by_values[part.samples, part.active] = part.by_values
+            by_start[part.samples, part.active] = part.by_start
         return by_values, by_start
+
+    def slope_blocks(self, values: Array, states: Array) -> Iterator[Slopes]:
+        """The same block by block of samples, without what lies behind the ends of stretches."""
+        (length, count, n), counts = states.shape, self.stretches.counts
+        carried = np.zeros((count, n, values.shape[1])), np.tile(np.eye(n), (count, 1, 1))
+        yield Slopes(
+            samples=slice(0, 1), active=np.arange(count), by_values=carried[0][None], by_start=carried[1][None]
+        )
+        size = max(1, TUNING.block_points // count)
+        for first in range(1, length, size):
+            samples = slice(first, min(first + size, length))
+            active = np.flatnonzero(counts > first)
+            before = slice(first - 1, samples.stop - 1)
+            A, B = self._steps(values[active], states[before, active], self.stretches.drive[before, active])
+            by_values, by_start = B, A  # both become sums in place
+            was = carried[0][active], carried[1][active]
+            for index in range(len(A)):
+                step = A[index].copy()
+                by_values[index] += step @ was[0]
+                by_start[index] = step @ was[1]
+                was = by_values[index], by_start[index]
+            carried[0][active], carried[1][active] = was
+            yield Slopes(samples=samples, active=active, by_values=by_values, by_start=by_start)
+
+    def _steps(self, values: Array, states: Array, drive: Array) -> tuple[Array, Array]:
+        """Derivatives of each next state: (l, w, n, n) by the state, (l, w, n, q) by the values."""
+        (length, count, n), points = states.shape, self.block[2]
+        held = np.broadcast_to(values, (length, *values.shape)).reshape(length * count, -1)
+        flat = states.reshape(-1, n), drive.reshape(length * count, -1), held
+        found = []
+        for begin in range(0, length * count, points):
+            part = [np.resize(rows[begin : begin + points], (points, rows.shape[1])).T for rows in flat]
+            found.append([each.full().reshape(n, points, -1).transpose(1, 0, 2) for each in self.slopes(*part)])
+        A, B = (
+            np.concatenate(parts)[: length * count].reshape(length, count, n, -1) for parts in zip(*found, strict=True)
+        )
+        return A, B
 
 
 def compiled(stretches: Stretches) -> Compiled:
     """Everything that does not depend on the values, done once."""
     from expdesign.estimation.replay._casadi import stretch_functions  # CasADi takes a second to load
 
-    return Compiled(stretches, *stretch_functions(stretches))
+    length, count = stretches.drive.shape[:2]
+    steps = min(max(1, length - 1), TUNING.block_samples)
+    block = (steps, min(count, -(-TUNING.block_points // steps)), min(max(1, length - 1) * count, TUNING.block_points))
+    return Compiled(stretches, block, *stretch_functions(stretches, *block))
