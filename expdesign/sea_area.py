@@ -27,6 +27,8 @@ TILE_CORNERS = 16_000
 """Corners of a shore above which it is moved in tiles, and of one tile at most."""
 REACHES = {"round": 1.1, "mitre": 5.5}
 """Distances moved within which a shore matters: moved shores err by a hundredth, mitres are 5 long at most."""
+MOST_CORNERS, THINNED = 200_000, 0.005
+"""Corners of a shore above which plans keep to a coarser one, and its tolerance as a share of the clearance."""
 NARROW = 4.0
 """Reaches in a tile that is not halved again, however many corners it has."""
 
@@ -91,6 +93,16 @@ class SeaArea:
     def safe_water(self, clearance_m: float) -> shapely.MultiPolygon:
         """The water at least `clearance_m` from everything forbidden."""
         return as_multipolygon(eroded(self.water, clearance_m))
+
+    def water_to_plan_in(self, clearance_m: float) -> shapely.MultiPolygon:
+        """The safe water, or nearly all of it where the shore has very many corners.
+
+        Corners within a tolerance of the shore without them are then left out, and the clearance is greater by as much.
+        """
+        if shapely.get_num_coordinates(self.water) <= MOST_CORNERS:
+            return self.safe_water(clearance_m)
+        tolerance_m = THINNED * clearance_m
+        return as_multipolygon(eroded(shapely.simplify(self.water, tolerance_m), clearance_m + tolerance_m))
 
 
 def eroded(water: shapely.Geometry, distance_m: float, *, join_style: str = "round") -> shapely.Geometry:

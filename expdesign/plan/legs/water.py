@@ -79,7 +79,7 @@ class LegWater:
     @cached_property
     def safe(self) -> shapely.MultiPolygon:
         """Water that the hulls at both ends of a sample must keep to, so that those in between keep the clearance."""
-        safe = self.area.safe_water(self._safe_margin_m)
+        safe = self.area.water_to_plan_in(self._safe_margin_m)
         shapely.prepare(safe)
         return safe
 
@@ -100,7 +100,7 @@ class LegWater:
     def visibility_graphs(self) -> tuple[VisibilityGraph, ...]:
         """For the centre lines of hulls that point along their path, from wide to narrow margins."""
         spares, tolerance_m = self.ship.path_spares_m(self.vessel), self.vessel.length_m / 60
-        waters = [self.area.safe_water(self.clearance_m + spare) for spare in spares]
+        waters = [self.area.water_to_plan_in(self.clearance_m + spare) for spare in spares]
         return tuple(build_visibility_graph(simplified(water, grow=False, tolerance_m=tolerance_m)) for water in waters)
 
     @property
@@ -136,7 +136,7 @@ class LegWater:
 
     @cached_property
     def _open(self) -> shapely.MultiPolygon:
-        water = self.area.safe_water(self.straight_margin_m)
+        water = self.area.water_to_plan_in(self.straight_margin_m)
         shapely.prepare(water)
         return water
 
