@@ -203,7 +203,25 @@ def test_a_primitive_with_a_singular_covariance_cannot_be_fused():
         build_fused(("a", "b"), ("x", "y"), np.array([np.eye(2), np.diag([1.0, 0.0])]), seconds=np.ones(2),
                     run_s=np.ones(2), total_s=10.0)  # fmt: skip
     with pytest.raises(InputError, match="more than 3 finite estimates"):
-        monte_carlo_covariance(np.ones((3, 2)))
+        monte_carlo_covariance(np.ones((3, 2)), np.ones(2))
+
+
+def test_bias_counts_in_a_monte_carlo_covariance_as_noise_does():
+    """Second moment of b + e about zero: b b^T + C; for b = 0.5 and C = 0.01 that is 0.26."""
+    rng = np.random.default_rng(0)
+    noise = 0.1 * rng.standard_normal((4000, 1))
+    found = monte_carlo_covariance(3.5 + noise, np.array([3.0]))
+    # the standard error of the mean square is sqrt((2 C^2 + 4 b^2 C) / 4000) = 0.0016
+    assert found[0, 0] == pytest.approx(0.26, abs=5 * 0.0016)
+    sample = rng.standard_normal((50, 3)) + np.array([1.0, -2.0, 0.5])
+    mean = sample.mean(axis=0)
+    np.testing.assert_allclose(
+        monte_carlo_covariance(sample, np.zeros(3)),
+        monte_carlo_covariance(sample, mean) + np.outer(mean, mean),
+        atol=1e-12,
+    )
+    with pytest.raises(InputError, match="3 parameters need as many"):
+        monte_carlo_covariance(sample, np.zeros(2))
 
 
 def test_monte_carlo_covariances_of_linear_regression_give_the_same_shares_as_its_information():
@@ -213,7 +231,7 @@ def test_monte_carlo_covariances_of_linear_regression_give_the_same_shares_as_it
     for Phi in rows:
         noise = rng.standard_normal((4000, 40))
         estimates.append(noise @ Phi @ np.linalg.inv(Phi.T @ Phi))
-    covariances = np.array([monte_carlo_covariance(found) for found in estimates])
+    covariances = np.array([monte_carlo_covariance(found, np.zeros(2)) for found in estimates])
     fused = build_fused(("a", "b"), ("x", "y"), covariances, seconds=np.full(2, 40.0), run_s=np.ones(2), total_s=100.0)
     exact = duration_problem([Phi.T @ Phi / 40 for Phi in rows])
     # Relative error of a sample covariance of 4000 runs: sqrt(2 / 4000) = 2.2 %; shares move by less than that.

@@ -44,13 +44,24 @@ def durations(
         bool,
         typer.Option("--grow", help="Also search for manoeuvres to add, as the table [design.grow] does."),
     ] = False,
+    monte_carlo: Annotated[
+        int,
+        typer.Option(
+            "--monte-carlo",
+            metavar="N",
+            help="Share out time by covariances of estimates, bias counted, from N simulated trials of each manoeuvre "
+            "alone, instead of by information. Only manoeuvres that inform about every parameter on their own count.",
+        ),
+    ] = 0,
+    jobs: Jobs = 0,
     seed: Seed = 0,
 ) -> Asked:
     """Choose how long to run each manoeuvre, with a certificate of how close to the optimum that is.
 
-    Writes durations.json; with --grow also growth.json and dictionary-grown.toml, which any scenario can name.
+    Writes durations.json; with --grow also growth.json and dictionary-grown.toml, which any scenario can name;
+    with --monte-carlo also covariances.json.
     """
-    return ask("durations", scenario, out, grow=grow, seed=seed)
+    return ask("durations", scenario, out, grow=grow, monte_carlo=monte_carlo, jobs=jobs, seed=seed)
 
 
 @command("plan")

@@ -180,16 +180,23 @@ def bordered_moments(X: Array, Y: Array, Z: Array, YZ: Array, mean_subtraction: 
     return np.block([[X, Y], [Z.T, np.eye(Y.shape[1])]])
 
 
-def monte_carlo_covariance(estimates: Array) -> Array:
-    """(p, p) sample covariance of estimates (runs, p) of the same parameters from independent runs.
+def monte_carlo_covariance(estimates: Array, nominal: Array) -> Array:
+    """(p, p) mean of (estimate - nominal) (estimate - nominal)^T, so that bias counts as noise does (7.59).
+
+    Args:
+        estimates: (runs, p) of the same parameters from independent simulated runs.
+        nominal: (p,) parameters that were simulated.
 
     Raises:
-        InputError: too few runs for a regular covariance, or numbers missing.
+        InputError: too few runs for a regular covariance, numbers missing, or other parameters.
     """
     runs, p = estimates.shape
-    if runs <= p + 1 or not np.isfinite(estimates).all():
+    if np.shape(nominal) != (p,):
+        raise InputError(f"estimates of {p} parameters need as many nominal ones, found {np.size(nominal)}")
+    if runs <= p + 1 or not (np.isfinite(estimates).all() and np.isfinite(nominal).all()):
         raise InputError(f"a covariance of {p} parameters needs more than {p + 1} finite estimates, found {runs}")
-    return np.asarray(np.cov(estimates, rowvar=False).reshape(p, p))
+    errors = estimates - nominal
+    return np.asarray(errors.T @ errors / runs)
 
 
 def build_fused(

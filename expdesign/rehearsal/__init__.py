@@ -1,5 +1,6 @@
 """Designs put to the test: Monte Carlo trials of a true ship, and subsets of recorded data."""
 
+from expdesign.rehearsal.covariances import Alone, estimates_alone
 from expdesign.rehearsal.recorded import (
     Drawn,
     Pieces,
@@ -12,12 +13,14 @@ from expdesign.rehearsal.validation import RANDOM, Rehearsal, Validated, equal_r
 
 __all__ = [
     "RANDOM",
+    "Alone",
     "Drawn",
     "Pieces",
     "Rehearsal",
     "Validated",
     "drawn_subsets",
     "equal_runs",
+    "estimates_alone",
     "random_subsets",
     "recorded_pieces",
     "trial_parts",

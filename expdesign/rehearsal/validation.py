@@ -23,6 +23,7 @@ import numpy as np
 from expdesign.dictionary import Primitive
 from expdesign.errors import InputError, NoAnswer
 from expdesign.estimation.methods import Settings, estimate
+from expdesign.estimation.replay import Integration
 from expdesign.estimation.solve import Weighting
 from expdesign.information.expected import TrialPart, expected_covariance
 from expdesign.information.tuning import TUNING as INFORMATION_TUNING
@@ -54,6 +55,8 @@ class Rehearsal:
         environment: weather; its mean is drawn for each trial with its standard deviation.
         parameters: names of the estimated parameters; the others are fixed at the nominal model's values.
         method, mean_subtraction: of the estimator.
+        continuous: whether parameters of the continuous motion are estimated, as by `expdesign estimate`; else those
+            of Euler's map at the sample time.
         integrator: of the true ship, "rk4" or "euler", the map that defines discrete parameters.
         trials: number for each design.
         seed: of all random numbers.
@@ -68,6 +71,7 @@ class Rehearsal:
     parameters: tuple[str, ...]
     method: str = "iv"
     mean_subtraction: str = "complete"
+    continuous: bool = False
     integrator: str = "rk4"
     trials: int = 100
     seed: int = 0
@@ -187,18 +191,22 @@ def _at_once(rehearsal: Rehearsal, design: str) -> bool:
 
 
 def _chunk(rehearsal: Rehearsal, key: str, design: str, number: int, trials: int) -> tuple[str, Array]:
-    """Rows (trials, 2 p) of estimates and stated standard deviations, nan where there is none."""
+    return key, estimates_of(rehearsal, design, number, trials)
+
+
+def estimates_of(rehearsal: Rehearsal, design: str, number: int, trials: int) -> Array:
+    """(trials, 2 p) estimates and stated standard deviations of one chunk of a design; nan where there is none."""
     order = sorted(rehearsal.designs).index(design)
     rng = np.random.default_rng([rehearsal.seed, order, number])
     runs, weather = rehearsal.designs[design], rehearsal.environment
     if runs is not None and _at_once(rehearsal, design):
-        return key, np.array([_estimated(rehearsal, item) for item in _sailed(rehearsal, runs, weather, trials, rng)])
+        return np.array([_estimated(rehearsal, item) for item in _sailed(rehearsal, runs, weather, trials, rng)])
     rows = []
     for _ in range(trials):
         counts = _random_runs(rehearsal, rng) if runs is None else runs
         (record,) = _sailed(rehearsal, counts, _drawn(weather, rng), 1, rng)
         rows.append(_estimated(rehearsal, record))
-    return key, np.array(rows)
+    return np.array(rows)
 
 
 def _random_runs(rehearsal: Rehearsal, rng: np.random.Generator) -> tuple[int, ...]:
@@ -261,6 +269,8 @@ def _estimated(rehearsal: Rehearsal, record: Record) -> Array:
     model = rehearsal.nominal.model
     fixed = tuple(name for name in model.names if name not in rehearsal.parameters)
     settings = Settings(fixed=fixed, weighting=Weighting(mean=rehearsal.mean_subtraction))
+    if rehearsal.continuous:
+        settings = replace(settings, integration=Integration("rk4", 1), quadrature="trapezoid")
     try:
         found = estimate(record, model, method=rehearsal.method, settings=settings)
     except NoAnswer:

@@ -103,8 +103,8 @@ def duration_problem(
         parameters,
         total_s=settings.total_s,
         mean_subtraction=settings.mean_subtraction,
-        aim=_aim(case, parameters, interest, progress=within(progress, 0.4, 0.9)),
-        constraints=_constraints(case, primitives),
+        aim=aim_of(case, parameters, interest, progress=within(progress, 0.4, 0.9)),
+        constraints=constraints_of(case, primitives),
         prior=_prior(case, parameters, stated_std),
         sampled=sampled,
         robust=settings.robust,
@@ -123,7 +123,10 @@ def _still_estimated(interest: tuple[str, ...], estimated: tuple[str, ...], pred
     return interest
 
 
-def _aim(case: Scenario, parameters: tuple[str, ...], interest: tuple[str, ...], *, progress: Progress) -> Aim:
+def aim_of(
+    case: Scenario, parameters: tuple[str, ...], interest: tuple[str, ...], *, progress: Progress = silent
+) -> Aim:
+    """Criterion of [design] with its settings for named parameters."""
     settings, model = case.design, case.vessel.model
     size = np.abs(model.parameters) if settings.relative_to == "nominal" else model.parameter_std
     nominal = dict(zip(model.names, size.tolist(), strict=True))
@@ -161,7 +164,8 @@ def _aim(case: Scenario, parameters: tuple[str, ...], interest: tuple[str, ...],
     )
 
 
-def _constraints(case: Scenario, primitives: Sequence[Primitive]) -> Constraints:
+def constraints_of(case: Scenario, primitives: Sequence[Primitive]) -> Constraints:
+    """Limits of [design]."""
     settings = case.design
     return Constraints(
         least_s=settings.least_s,
