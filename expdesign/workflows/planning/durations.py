@@ -13,10 +13,10 @@ from expdesign.export import (
 from expdesign.progress import Progress, silent, within
 from expdesign.scenario import Scenario
 from expdesign.workflows.outcome import Outcome
+from expdesign.workflows.planning.fused import covariance_table, covariances_json, fused_problem, tried_alone
 from expdesign.workflows.steps.case import loaded, written
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.design_tables import design_summary, design_tables
-from expdesign.workflows.steps.fused import covariance_table, covariances_json, fused_problem, tried_alone
 from expdesign.workflows.steps.grown import growth_files, growth_summary, growth_tables, ready
 from expdesign.workflows.steps.workers import workers
 
