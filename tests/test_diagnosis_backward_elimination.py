@@ -16,7 +16,7 @@ from expdesign.diagnosis.fit.gauss_newton import fit
 from expdesign.diagnosis.motion.simulation import initial_states
 from expdesign.diagnosis.select.backward_elimination import before_first_without_gain, improves_held_out
 from expdesign.diagnosis.select.fitted_candidate import fit_candidate
-from expdesign.diagnosis.select.forward_selection import fit_nuisance, select_forward
+from expdesign.diagnosis.select.forward_selection import fit_nuisance, select_forward, to_take_out
 from expdesign.diagnosis.select.score_tests import ScoreTest, score_tests
 from expdesign.diagnosis.select.selection import Selection, Step, least_significant_step, wald_p_value, without_step
 from expdesign.diagnosis.select.selection_round import _starting_points, selection_round, simplest
@@ -62,6 +62,32 @@ def test_a_first_cause_that_may_cost_half_a_point_is_dropped():
     apart = 50.0 + gain + 4.0 * gain * runs  # may cost more, but is better on average
     assert kept_count(50.0, apart * np.ones(3)) == 1
     assert kept_count(50.0, apart + gain * np.array([1.0, 1.0, -2.0])) == 0  # and worse in one output
+
+
+def test_a_cause_that_imitates_others_costs_no_output_more_than_it_gains_on_average():
+    found = steps_of("wind")
+    windy = Candidate(cause="wind", free={"effect": 0.0}, imitates=True)
+    step = SimpleNamespace(chosen=SimpleNamespace(keys=("wind",), fit="wind", candidate=windy))
+    for change, kept in (([6.0, 6.0, -3.1], False), ([6.0, 6.0, -2.9], True), ([6.0, 6.0, 0.0], True)):
+        held = [errors(50.0), errors(50.0 + np.array(change) * np.ones((6, 1)))]  # gains of 2.97, 3.03 and 4 points
+        assert improves_held_out(found, held, 0) == [True]
+        assert improves_held_out(replace(found, steps=(step,)), held, 0) == [kept]
+
+
+def test_a_cause_that_imitates_others_does_not_make_a_simpler_one_redundant():
+    """Unless it gains much more than the simpler one: then that was an approximation."""
+
+    def step(keys: int, gain: float, *, imitates: bool = False) -> Step:
+        candidate = Candidate(cause="any", free={}, imitates=imitates)
+        chosen = SimpleNamespace(keys=("key",) * keys, likelihood_gain=gain, candidate=candidate)
+        return SimpleNamespace(chosen=chosen)  # type: ignore[return-value]
+
+    simple, block = step(1, 70.0), step(3, 70.0)
+    for gain, taken in ((29.0, 1), (31.0, 0)):  # `simple` is more or less than 0.7 of what both gain
+        wind = step(3, gain, imitates=True)
+        assert to_take_out([simple, wind], 0) == taken
+        assert to_take_out([block, wind], 0) == 0
+        assert to_take_out([simple, step(3, gain)], 0) == 0
 
 
 def test_what_takes_less_than_a_hundredth_off_every_error_is_no_finding():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from diagnosis_case import hidden_record, vessel_of
-from expdesign.diagnosis import Lead, Unexplained
+from expdesign.diagnosis import Lead, Unexplained, diagnose
 from expdesign.diagnosis.accuracy.simulated_fit import accuracy
 from expdesign.diagnosis.conclusions.verdict import verdict
 from expdesign.diagnosis.data.windows import cut_windows
@@ -87,3 +87,16 @@ def test_a_limit_of_nothing_leaves_all_causes_untried(monkeypatch: pytest.Monkey
     )
     assert found.steps == ()
     assert found.untried == ("further causes",)
+
+
+def test_parameters_within_their_standard_deviations_are_re_estimated_and_nothing_is_called_missing():
+    """The true ship's parameters are drawn with the standard deviations that the file states."""
+    record = hidden_record("barge", seed=11, relative_std=0.3, batches=4, samples=200)
+    found = diagnose(vessel_of("barge", relative_std=0.3), record)
+    assert found.findings == ()
+    assert found.verdict.startswith("Parameters re-estimated within their stated standard deviations")
+    assert "no other cause is certain" in found.verdict
+    assert (found.after.fit > found.before.fit).all()
+    stated, refined = found.vessel.model, found.extended.model
+    assert (refined.parameter_std < stated.parameter_std).all()
+    assert (np.abs(refined.parameters - stated.parameters) < 4.0 * stated.parameter_std).all()

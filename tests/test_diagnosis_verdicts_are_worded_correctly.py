@@ -78,6 +78,15 @@ def test_a_verdict_without_findings_states_the_accuracy():
     assert "66608676" not in verdict([], lost)
 
 
+def test_what_parameters_gain_within_their_standard_deviations_is_no_missing_effect():
+    gains = (ErrorReduction(output="u", share=0.62, low=0.55, high=0.7),)
+    gains += (ErrorReduction(output="v", share=0.9, low=0.1, high=0.95),)
+    assert verdict([], BEFORE, within_std=gains) == (
+        "Parameters re-estimated within their stated standard deviations cut the surge error by 62 % (55 to 70 %) on "
+        "runs held out; no other cause is certain."
+    )
+
+
 def test_every_cause_of_the_catalogue_has_words():
     assert {cause.name for cause in CAUSES} - {"missing_term"} == set(MISSING_EFFECTS)
 

@@ -17,6 +17,7 @@ from expdesign.diagnosis.accuracy import (
     white_noise_std,
 )
 from expdesign.diagnosis.conclusions import (
+    error_reductions_of,
     finding_of,
     note_on_nuisance,
     note_on_random_current,
@@ -30,7 +31,7 @@ from expdesign.diagnosis.conclusions import (
 )
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.discriminating_manoeuvre import Proposal, most_discriminating, standard_proposals
-from expdesign.diagnosis.fit import Fit, HeldOut, cross_validate, held_out_gain, unmeasured_force_share
+from expdesign.diagnosis.fit import HeldOut, cross_validate, held_out_gain, unmeasured_force_share
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import initial_states, simulate_from_measured, stable_windows
 from expdesign.diagnosis.select import (
@@ -42,7 +43,7 @@ from expdesign.diagnosis.select import (
     only_nuisance,
     select_forward,
 )
-from expdesign.diagnosis.values import Diagnosis, Finding, Lead, Unexplained
+from expdesign.diagnosis.values import Diagnosis, ErrorReduction, Finding, Lead, Unexplained
 from expdesign.diagnosis.vessel_file import extend, extended_model
 from expdesign.errors import Diverged
 from expdesign.progress import Estimated, Progress, silent, within
@@ -52,6 +53,8 @@ from expdesign.vessel import Vessel
 
 LITTLE_FIT, MORE_THAN_NOISE = 50.0, 2.0
 """Fit of an output [%] below which the simulation explains little, if its error is so many times the noise."""
+LEAST_GAIN_WITHIN_STD = 1.0
+"""Gain of fit [points] from which parameters re-estimated within their standard deviations are the verdict."""
 SIMULATED, VALIDATED, CONCLUDED = 18.0, 4.0, 25.0
 """Work before the selection, of the cross-validation of a model, and of conclusions, in simulations of all data."""
 
@@ -95,7 +98,8 @@ def diagnose(
     order = sorted(range(len(findings)), key=lambda index: -findings[index].gain)
     steps = [chosen.kept.steps[index] for index in order]
     ranked = tuple(findings[index] for index in order)
-    refined = steps or ship.stated_std
+    within = () if findings else _gains_within_std(chosen, ship, seed)
+    refined = steps or ship.stated_std or within
     final = chosen.kept.last.ship if refined else ship
     extended, not_written = extend(vessel, final, _standard_errors(chosen.kept) if refined else {})
     before, after = accuracy(ship, record), accuracy(final, record)
@@ -109,7 +113,7 @@ def diagnose(
         before=before,
         after=after,
         findings=ranked,
-        verdict=verdict(ranked, before, unit_name(windows), unexplained),
+        verdict=verdict(ranked, before, unit_name(windows), unexplained, within),
         unexplained=unexplained,
         simulated_before=motion.predicted,
         simulated_after=simulate_from_measured(final, windows).predicted,
@@ -118,7 +122,7 @@ def diagnose(
         step_residuals=tuple(one_step_residuals(step.before.ship, windows) for step in steps),
         notes=(
             *notes_on_data(vessel, record, windows, constant_inputs(ship, windows)),
-            *_notes_on_selection(chosen, ship, windows, seed),
+            *_notes_on_selection(chosen, windows, seed),
             *not_written,
         ),
         screened=_smallest_p_values(chosen.kept),
@@ -127,38 +131,55 @@ def diagnose(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Selected:
-    """Causes by forward selection, those that backward elimination kept, and their errors on held-out units."""
+    """Causes by forward selection, those that backward elimination kept, and their errors on held-out units.
+
+    Attributes:
+        as_stated: errors of the model in use as its file states it.
+        held: of the model before any cause, then after every one that was kept.
+    """
 
     found: Selection
     kept: Selection
+    as_stated: HeldOut
     held: list[HeldOut]
 
 
 def _select(ship: ExtendedModel, windows: Windows, seed: int, told: Estimated) -> _Selected:
     rng = np.random.default_rng(seed)
     found = select_forward(ship, windows, initial_states(windows), rng, told)
+    as_stated = cross_validate(None, ship, windows, silent)
 
     def cross_validated(found: Selection) -> list[HeldOut]:
-        return _cross_validated(found, ship, windows, told.part(VALIDATED * (1 + len(found.steps)), CONCLUDED))
+        return _cross_validated(found, as_stated, windows, told.part(VALIDATED * (1 + len(found.steps)), CONCLUDED))
 
     kept, held = eliminate_backward(found, windows, cross_validated, seed)
-    return _Selected(found=found, kept=kept, held=held)
+    return _Selected(found=found, kept=kept, as_stated=as_stated, held=held)
 
 
-def _cross_validated(found: Selection, ship: ExtendedModel, windows: Windows, progress: Progress) -> list[HeldOut]:
-    """Of the model in use with its uncertain parameters fitted, then after every step.
+def _cross_validated(found: Selection, as_stated: HeldOut, windows: Windows, progress: Progress) -> list[HeldOut]:
+    """Of the model before any cause, then after every step.
 
-    The gain of uncertain parameters within their standard deviations is not attributed to a cause. If the first cause
-    is that they exceed these, it gets their gain, and the model in use is not fitted.
+    The gain of uncertain parameters within their standard deviations is not attributed to a cause. So the model in use
+    has them fitted, unless it simulates held-out units better as it is: what a cause repairs of a worse fit is no gain.
+    If the first cause is that they exceed their standard deviations, it gets their gain, and the model is not fitted.
     """
     fitted = bool(found.first.keys) and not any(only_nuisance(step, found) for step in found.steps[:1])
-    fits: list[Fit | None] = [found.first if fitted else None, *(step.chosen.fit for step in found.steps)]
-    results = []
+    fits = [*[found.first] * fitted, *(step.chosen.fit for step in found.steps)]
+    results = [as_stated]
     for number, item in enumerate(fits):
-        model = ship if item is None else item.ship
         part = within(progress, number / len(fits), (number + 1) / len(fits))
-        results.append(cross_validate(item, model, windows, part))
+        results.append(cross_validate(item, item.ship, windows, part))
+    if fitted:
+        results[:2] = [max(results[:2], key=lambda held: float(np.nan_to_num(held.fit, nan=-np.inf).mean()))]
     return results
+
+
+def _gains_within_std(chosen: _Selected, ship: ExtendedModel, seed: int) -> tuple[ErrorReduction, ...]:
+    """What uncertain parameters gain within their standard deviations on held-out units; none where that is unclear."""
+    gain, (low, _) = held_out_gain(chosen.as_stated, chosen.held[0], seed)
+    if not (gain > LEAST_GAIN_WITHIN_STD and low > 0):
+        return ()
+    return error_reductions_of(ship.model.outputs, chosen.as_stated, chosen.held[0], seed)
 
 
 def _unexplained(chosen: _Selected, after: Accuracy, windows: Windows, seed: int) -> Unexplained | None:
@@ -202,11 +223,10 @@ def _discriminating(step: Step, proposals: Sequence[Proposal], windows: Windows)
     return most_discriminating(found.ship, [other.fit.ship for other in step.alternatives], proposals, std, windows)
 
 
-def _notes_on_selection(chosen: _Selected, ship: ExtendedModel, windows: Windows, seed: int) -> tuple[str, ...]:
+def _notes_on_selection(chosen: _Selected, windows: Windows, seed: int) -> tuple[str, ...]:
     notes = [*notes_on_rejected(chosen.found, chosen.kept, unit_name(windows))]
     if chosen.kept.first.keys:
-        unfitted = cross_validate(None, ship, windows, silent)
-        notes += note_on_nuisance(unfitted, chosen.held[0], seed)
+        notes += note_on_nuisance(chosen.as_stated, chosen.held[0], seed)
     notes += (*notes_on_found_again(chosen.kept), *note_on_work(chosen.found))
     return (*notes, *note_on_unconverged(chosen.held), *note_on_random_current(chosen.kept.last.noise))
 

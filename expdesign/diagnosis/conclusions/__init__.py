@@ -1,6 +1,6 @@
 """Conclusions of a diagnosis: findings, verdict and notes."""
 
-from expdesign.diagnosis.conclusions.findings import finding_of
+from expdesign.diagnosis.conclusions.findings import error_reductions_of, finding_of
 from expdesign.diagnosis.conclusions.notes import (
     note_on_nuisance,
     note_on_random_current,
@@ -25,6 +25,7 @@ __all__ = [
     "DIVERGED_FIT",
     "accuracy_in_words",
     "benefit",
+    "error_reductions_of",
     "finding_of",
     "has_diverged",
     "manoeuvre",

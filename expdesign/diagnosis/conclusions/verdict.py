@@ -67,12 +67,15 @@ def benefit(item: Finding) -> str:
     if not known:
         return f"gains {item.gain:.1f} points of fit"
     best = max(known, key=lambda reduction: reduction.low)
-    if best.share < VISIBLE:
-        return "reduces no error by 1 % or more"
+    return _reduction(best) if best.share >= VISIBLE else "reduces no error by 1 % or more"
+
+
+def _reduction(best: ErrorReduction, verbs: tuple[str, str] = ("halves", "cuts")) -> str:
+    halves, cuts = verbs
     interval = f"({_percent(best.low)} to {_percent(best.high)} %)"
     if abs(best.share - 0.5) < 0.025:
-        return f"halves the {WORDS[best.output]} error {interval}"
-    return f"cuts the {WORDS[best.output]} error by {_percent(best.share)} % {interval}"
+        return f"{halves} the {WORDS[best.output]} error {interval}"
+    return f"{cuts} the {WORDS[best.output]} error by {_percent(best.share)} % {interval}"
 
 
 def unit_name(windows: Windows) -> str:
@@ -81,7 +84,11 @@ def unit_name(windows: Windows) -> str:
 
 
 def verdict(
-    findings: Sequence[Finding], before: Accuracy, unit: str = "runs", unexplained: Unexplained | None = None
+    findings: Sequence[Finding],
+    before: Accuracy,
+    unit: str = "runs",
+    unexplained: Unexplained | None = None,
+    within_std: Sequence[ErrorReduction] = (),
 ) -> str:
     """The whole diagnosis in one sentence.
 
@@ -90,7 +97,10 @@ def verdict(
         before: accuracy of the model in use.
         unit: what gains are measured on.
         unexplained: what remains, if that is much.
+        within_std: what uncertain parameters gain within their standard deviations, if that is clear.
     """
+    if not findings and within_std:
+        return _within_std(within_std, unexplained, unit)
     if not findings and unexplained is not None:
         return f"The simulation explains little of these data and no cause is certain: {_remainder(unexplained, unit)}."
     if not findings:
@@ -100,6 +110,14 @@ def verdict(
     parts += [_open_question(item) for item in findings if item.not_distinguishable_from]
     parts += [] if unexplained is None else [f"much remains unexplained: {_remainder(unexplained, unit)}"]
     return "; ".join(parts) + "."
+
+
+def _within_std(gains: Sequence[ErrorReduction], unexplained: Unexplained | None, unit: str) -> str:
+    best = _reduction(max(gains, key=lambda item: item.low), verbs=("halve", "cut"))
+    rest = "no other cause is certain"
+    if unexplained is not None:
+        rest = f"much remains unexplained: {_remainder(unexplained, unit)}"
+    return f"Parameters re-estimated within their stated standard deviations {best} on {unit} held out; {rest}."
 
 
 def _remainder(unexplained: Unexplained, unit: str) -> str:

@@ -83,14 +83,16 @@ def improves_held_out(found: Selection, held: Sequence[HeldOut], seed: int) -> l
     simulation worse, or some output is worse on average and the interval allows a larger loss. (Varying currents make
     the intervals of few runs wide.) Later causes need a gain, because no model of a real ship is exact: once a large
     error is explained, small differences between model and ship become significant. A small gain counts if its
-    interval excludes zero. Uncertain parameters are estimated in any case, so as a cause they need no gain. What takes
-    less than `Tuning.least_reduction` off every error is a remark, whatever its p-value.
+    interval excludes zero. Uncertain parameters are estimated in any case, so as a cause they need no gain. A cause
+    that imitates others may make no output worse by more than it gains on average. What takes less than
+    `Tuning.least_reduction` off every error is a remark, whatever its p-value.
     """
     gains = [held_out_gain(one, other, seed) for one, other in pairwise(held)]
     return [
         _matters(*held[index : index + 2])
+        and (not step.chosen.candidate.imitates or _least_change(*held[index : index + 2]) >= -gain)
         and _improves(
-            index == 0 or only_nuisance(step, found), _no_output_worse(*held[index : index + 2]), gain, interval
+            index == 0 or only_nuisance(step, found), _least_change(*held[index : index + 2]) >= 0.0, gain, interval
         )
         for index, (step, (gain, interval)) in enumerate(zip(found.steps, gains, strict=True))
     ]
@@ -103,10 +105,10 @@ def _matters(before: HeldOut, after: HeldOut) -> bool:
     return bool((left <= (1.0 - TUNING.least_reduction) ** 2 * lost).any())
 
 
-def _no_output_worse(before: HeldOut, after: HeldOut) -> bool:
-    """No output is simulated worse on average."""
+def _least_change(before: HeldOut, after: HeldOut) -> float:
+    """Change of fit of the output that gains least [points]."""
     before, after = on_common_units(before, after)
-    return bool(len(before.squared_error) and (np.nan_to_num(after.fit - before.fit) >= 0.0).all())
+    return float(np.nan_to_num(after.fit - before.fit).min()) if len(before.squared_error) else -np.inf
 
 
 def _improves(certain: bool, no_output_worse: bool, gain: float, interval: tuple[float, float]) -> bool:

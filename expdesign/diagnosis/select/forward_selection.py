@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -58,9 +59,22 @@ def select_forward(
         base = steps[-1].chosen.fit
         redundant = redundant_step(steps, windows) if len(rejected) < TUNING.most_rejected else None
         if redundant is not None:
+            redundant = to_take_out(steps, redundant)
             rejected.append(steps[redundant].chosen.candidate)
             base = steps[redundant].before
             del steps[redundant:]
+
+
+def to_take_out(steps: Sequence[Step], redundant: int) -> int:
+    """The step to take out where one is redundant: the last one, if that only imitates what the other explains.
+
+    A cause with many numbers makes simpler ones redundant whether or not it acts. It has to gain more than they do.
+    """
+    simple, last = steps[redundant].chosen, steps[-1].chosen
+    if not last.candidate.imitates or simple.candidate.imitates or len(simple.keys) >= len(last.keys):
+        return redundant
+    both = simple.likelihood_gain + last.likelihood_gain
+    return len(steps) - 1 if simple.likelihood_gain >= TUNING.nearly_as_much * both else redundant
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
