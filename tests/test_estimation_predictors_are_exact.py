@@ -7,13 +7,13 @@ import pytest
 
 from estimation_case import CURRENT, NOMINAL, QUIET, TRUE, commands, measured, record
 from expdesign.errors import InputError, NotInformative, UnknownName
-from expdesign.estimation.disturbance import mean_current
+from expdesign.estimation.disturbance import READINGS, mean_current
 from expdesign.estimation.methods import METHODS, Settings, estimate
 from expdesign.estimation.regression.predictors import build_layout, build_regression
 from expdesign.estimation.solve.solution import Weighting
 from expdesign.signals import Batch
 from expdesign.simulation import Environment, Variation
-from expdesign.vessel import Term
+from expdesign.vessel import Sensors, Term
 
 TRUTH = dict(zip(TRUE.model.names, TRUE.model.parameters.tolist(), strict=True))
 MERGED = {"X_abs_u_u": "W_abs_u_u", "Y_abs_v_v": "W_abs_v_v", "N_uv": "W_uv"}
@@ -63,6 +63,23 @@ def test_a_steady_current_is_removed_exactly_and_read_out(mean: str) -> None:
     )
     assert_true(found, rtol=1e-5)
     np.testing.assert_allclose(mean_current(found)[0], CURRENT, rtol=1e-5)
+
+
+@pytest.mark.parametrize("lost", ["X_u", "Y_v"])
+def test_surge_and_sway_each_tell_the_current(lost: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without the damping of one equation the other one's reading is left; both together are no less certain."""
+    weather = Environment(current_to=CURRENT)
+    noisy = replace(QUIET, sensors=Sensors(velocity_mps=0.01, yaw_rate_radps=0.01, heading_rad=0.01))
+    rng = np.random.default_rng(12)
+    batch = measured(noisy, commands(3000, rng), weather=weather)
+    found = estimate(record(batch), NOMINAL, method="iv-augmented")
+    both, covariance = mean_current(found, heading_std_rad=0.01)
+    left = tuple(reading for reading in READINGS if reading[0] != lost)
+    monkeypatch.setattr("expdesign.estimation.disturbance.READINGS", left)
+    alone, wider = mean_current(found, heading_std_rad=0.01)
+    for value, spread in ((both, covariance), (alone, wider)):
+        assert (np.abs(value - CURRENT) < 5 * np.sqrt(np.diag(spread))).all()
+    assert (np.diag(covariance) <= np.diag(wider) * (1 + 1e-9)).all()
 
 
 def test_batches_excited_the_other_way_round_flip_the_signs_of_nuisance_terms() -> None:

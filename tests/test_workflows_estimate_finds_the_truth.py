@@ -12,6 +12,8 @@ from expdesign import workflows
 from expdesign.assessment import EstimateOptions, assess, check_run
 from expdesign.assessment.assess import preferred
 from expdesign.assessment.residuals import autocorrelation
+from expdesign.estimation.methods import Settings, estimate
+from expdesign.estimation.solve import Weighting
 from expdesign.records import load_records
 from expdesign.scenario import load_vessel
 from expdesign.simulation import Environment
@@ -240,6 +242,19 @@ def test_the_mean_current_is_read_out_of_an_augmented_estimate(tmp_path: Path) -
         assert abs(item["value"] - truth) < 4 * item["std"] < 0.8
     assert found["ls"]["current_to"] is None
     assert "Mean current, estimated" in (tmp_path / "out" / "estimate.html").read_text(encoding="utf-8")
+
+
+def test_blocks_asked_for_are_blocks_used(trial: Path, tmp_path: Path) -> None:
+    """Every run a block of its own: the estimate is that of the library, and differs from one block for all."""
+    files, ship = [trial.parent / f"{name}.csv" for name in ("one", "two")], load_vessel(MODEL_SHIP)
+    workflows.estimate(files, tmp_path, vessel=MODEL_SHIP, methods=["iv"], mean="batch", blocks="batch", motion="euler")
+    record = load_records(files, vessel_inputs=ship.model.inputs)
+    found = estimates(tmp_path)["iv"]["parameters"]
+    for blocks, same in (("batch", True), ("one", False)):
+        weighting = Weighting(mean="batch", blocks=blocks)
+        own = estimate(record, ship.model, method="iv", settings=Settings(weighting=weighting))
+        near = [found[name]["value"] == pytest.approx(own.value(name), rel=1e-6) for name in own.names]
+        assert all(near) == same
 
 
 def test_a_vessel_file_without_values_starts_from_least_squares(trial: Path, tmp_path: Path) -> None:

@@ -10,12 +10,12 @@ from expdesign.assessment.residuals import one_step
 from expdesign.assessment.runs import ESTIMATION, TEST, check_run
 from expdesign.assessment.values import INSTRUMENTAL, Assessed, Assessment, Current
 from expdesign.errors import Diverged, InputError, NoAnswer, NotInformative, UnknownName
-from expdesign.estimation.disturbance import COLUMNS, DAMPING, mean_current
+from expdesign.estimation.disturbance import mean_current, tells_current
 from expdesign.estimation.excitation import check_excitation, worst_case
 from expdesign.estimation.methods import STARTS, Method, Settings, estimate, method_named
 from expdesign.estimation.regression import AIR, MEANS, PREDICTORS
 from expdesign.estimation.replay import Integration
-from expdesign.estimation.solve import Weighting
+from expdesign.estimation.solve import BLOCKS, Weighting
 from expdesign.estimation.values import Estimate
 from expdesign.progress import Progress, silent
 from expdesign.signals import Record
@@ -37,6 +37,7 @@ class EstimateOptions:
         methods: names in `estimation.methods.METHODS`; empty for those that suit the data.
         fixed: parameters held at the vessel's values.
         mean: subtracted from the instruments: "none", "batch" or "complete".
+        blocks: of instruments: "one" for all runs, or one for each "batch" (4.45).
         start: of the first instruments: "nominal" for the vessel's values, "ls" for the least-squares estimate, "auto"
             for the vessel's values unless they are all zero or fail.
         motion: "continuous" for parameters of the continuous-time motion, which plans use; "euler" for those of Euler's
@@ -48,6 +49,7 @@ class EstimateOptions:
     methods: tuple[str, ...] = ()
     fixed: tuple[str, ...] = ()
     mean: str = "complete"
+    blocks: str = "one"
     start: str = AUTO
     motion: str = CONTINUOUS
     horizon_s: float | None = None
@@ -56,6 +58,7 @@ class EstimateOptions:
     def __post_init__(self) -> None:
         for what, value, known in (
             ("instrument mean", self.mean, MEANS),
+            ("instrument blocks", self.blocks, BLOCKS),
             ("start", self.start, (AUTO, *STARTS)),
             ("motion", self.motion, MOTIONS),
         ):
@@ -186,7 +189,7 @@ def _assessed(vessel: Vessel, record: Record, tests: Record, method: Method, opt
 
 
 def _current(found: Estimate, vessel: Vessel) -> Current | None:
-    if not {DAMPING, *COLUMNS} <= {*found.names, *found.nuisance_names}:
+    if not tells_current(found):
         return None
     to_mps, covariance = mean_current(found, heading_std_rad=vessel.sensors.heading_rad)
     return Current(to_mps=to_mps, std_mps=covariance.diagonal() ** 0.5)
@@ -196,7 +199,7 @@ def _estimated(vessel: Vessel, record: Record, method: Method, options: Estimate
     """The estimate, and the start of its first instruments: the vessel's values, or least squares where they fail."""
 
     def attempt(start: str) -> Estimate:
-        weighting = Weighting(mean=options.mean)
+        weighting = Weighting(mean=options.mean, blocks=options.blocks)
         settings = Settings(
             fixed=options.fixed,
             weighting=weighting,

@@ -34,6 +34,14 @@ def estimate(
     ] = None,
     velocity: Velocity = "auto",
     mean: Mean = "complete",
+    blocks: Annotated[
+        str,
+        typer.Option(
+            metavar="HOW",
+            help="Instruments of all runs in one block, or batch: a block for each run, which are weighed by how much "
+            "they tell.",
+        ),
+    ] = "one",
     start: Annotated[
         str,
         typer.Option(
@@ -78,6 +86,7 @@ def estimate(
         fixed=fixed or (),
         velocity=velocity,
         mean=mean,
+        blocks=blocks,
         start=start,
         motion=motion,
         horizon_s=horizon,

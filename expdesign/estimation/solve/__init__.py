@@ -3,8 +3,10 @@
 from expdesign.estimation.solve.null_space import Direction, NullSpace
 from expdesign.estimation.solve.refine import Prior, Refined, refine_iv
 from expdesign.estimation.solve.solution import Solution, Weighting, solve_iv, solve_ls
+from expdesign.estimation.solve.weighting import BLOCKS
 
 __all__ = [
+    "BLOCKS",
     "Direction",
     "NullSpace",
     "Prior",
