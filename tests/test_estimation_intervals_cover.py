@@ -8,6 +8,7 @@ current that wanders for 100 s. Thresholds are the binomial chance error of as m
 import numpy as np
 import pytest
 
+from coverage_cases import METHODS, Case, tried
 from estimation_case import (
     CALM_CURRENT,
     NOMINAL,
@@ -53,6 +54,35 @@ def test_intervals_cover_small(case: str, trials: int, samples: int) -> None:
     chance = np.sqrt(0.95 * 0.05 / trials)
     assert (shares > 0.95 - 4 * chance).all(), shares
     assert abs(shares.mean() - 0.95) < 2 * chance, shares
+
+
+TABLE = [
+    Case(method=method, wandering=wandering, samples=1000, batches=batches)
+    for method in METHODS
+    for wandering in ((False,) if method == "ls" else (False, True))
+    for batches in (1, 5)
+]
+
+
+@pytest.mark.parametrize("case", TABLE[::5], ids=str)
+def test_intervals_of_every_method_cover_small(case: Case) -> None:
+    """All parameters together; those of an equation err together, which the chance of four standard errors allows."""
+    trials = 24
+    found = tried(case, trials, seed=32)
+    assert found.failed == 0
+    assert abs(found.held.mean() - 0.95) < 4 * np.sqrt(0.95 * 0.05 / trials) / 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", TABLE, ids=str)
+def test_intervals_of_every_method_cover(case: Case) -> None:
+    """Each parameter in 88 to 98 of 100 trials, give or take two standard errors; on average in 92 to 97."""
+    trials = 300
+    found = tried(case, trials, seed=33)
+    chance = 2 * np.sqrt(0.95 * 0.05 / trials)
+    assert found.failed <= 0.01 * trials
+    assert ((found.held > 0.88 - chance) & (found.held < 0.98 + chance)).all(), found.held
+    assert 0.92 < found.held.mean() < 0.97
 
 
 @pytest.mark.slow

@@ -162,6 +162,18 @@ def test_velocities_from_the_pose_are_of_the_reference_point():
     np.testing.assert_allclose(seen.pose, other.pose[1 : 1 + len(seen)], atol=1e-9)
 
 
+def test_inputs_are_averaged_as_velocities_from_the_pose_are():
+    """Otherwise the response to inputs seems weaker than it is."""
+    batch = from_pose(sailed(ship(), commands=tug_commands(2000)))
+    (seen,) = reduced(Record(batches=(batch,)), ship()).batches
+    np.testing.assert_allclose(seen.inputs[1:-1], batch.inputs[:-2] / 4 + batch.inputs[1:-1] / 2 + batch.inputs[2:] / 4)
+    truth = dict(zip(TRUE.model.names, TRUE.model.parameters.tolist(), strict=True))
+    found = [estimate(Record(batches=(one,)), NOMINAL, method="ls", settings=CONTINUOUS) for one in (seen, batch)]
+    for name in ("Y_mu", "N_mu"):
+        with_, without = (abs(item.assignments[name] / truth[name] - 1.0) for item in found)
+        assert with_ < 0.7 * without, name
+
+
 def from_pose(batch: Batch) -> Batch:
     from expdesign.records import central_difference
 

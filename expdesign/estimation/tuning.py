@@ -23,6 +23,7 @@ class Tuning:
         first_horizon_samples: of output error.
         horizon_growth: ratio of successive horizons of output error.
         most_steps: of Gauss and Newton at one horizon.
+        rough_samples: compared at earlier horizons than the last, spread over the data.
         settled_cost: expected decrease of the cost, in squared standard deviations, that ends the last horizons.
         rough_cost: the same for earlier horizons.
         block_instructions: size of the flat CasADi functions that simulations are cut into.
@@ -54,6 +55,7 @@ class Tuning:
     first_horizon_samples: int = 8
     horizon_growth: int = 4
     most_steps: int = 40
+    rough_samples: int = 10_000
     settled_cost: float = 1e-4
     rough_cost: float = 0.1
     block_instructions: int = 20_000

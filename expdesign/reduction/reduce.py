@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from expdesign.conventions import OUTPUTS
 from expdesign.errors import InputError
 from expdesign.reduction.remarks import remarks
 from expdesign.reduction.sensors import Told, measured, shrinkage, turned, undone
@@ -29,15 +30,35 @@ def reduced(record: Record, vessel: Vessel, *, smoothed: bool = False) -> Record
         smoothed: whether velocities from the pose are smoothed, rather than central differences.
 
     Returns:
-        The record itself where actuators are ideal, sensors exact but for their noise, and no weather is stated.
-        Otherwise batches that lack the samples which a delayed sensor has not yet shown, with a note for everything
-        that was undone. Where no wind is measured, and the model reads it, it is the mean wind that is stated.
+        The record itself where actuators are ideal, sensors exact but for their noise, velocities measured, and no
+        weather is stated. Otherwise batches that lack the samples which a delayed sensor has not yet shown, with a note
+        for everything that was undone. Where no wind is measured, and the model reads it, it is the mean wind that is
+        stated.
 
     Raises:
         InputError: no batch is left.
     """
     delivered = with_delivered_inputs(record, vessel.model)
+    delivered = delivered if smoothed else with_averaged_inputs(delivered)
     return _in_stated_weather(at_reference_point(delivered, vessel.sensors, smoothed=smoothed), vessel)
+
+
+def with_averaged_inputs(record: Record) -> Record:
+    """The record with inputs averaged as velocities are that are central differences of the pose.
+
+    Such a velocity is the mean over the sample before and the one after. Its change in a sample is the mean of the
+    acceleration over three samples with the weights 1/4, 1/2, 1/4.
+    """
+    if not any(set(OUTPUTS) <= set(batch.derived) for batch in record.batches):
+        return record
+    batches = tuple(_averaged(b) if set(OUTPUTS) <= set(b.derived) else b for b in record.batches)
+    note = "Inputs are averaged over three samples, as velocities from the pose are."
+    return replace(record, batches=batches, notes=(*record.notes, note))
+
+
+def _averaged(batch: Batch) -> Batch:
+    wide = np.concatenate([batch.inputs[:1], batch.inputs, batch.inputs[-1:]])
+    return replace(batch, inputs=(wide[:-2] + 2.0 * wide[1:-1] + wide[2:]) / 4.0, delivered=None)
 
 
 def _in_stated_weather(record: Record, vessel: Vessel) -> Record:

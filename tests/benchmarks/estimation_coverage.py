@@ -1,12 +1,9 @@
 """How often 95 % intervals hold the truth, parameter by parameter, and why not more or less often.
 
-``python tests/benchmarks/estimation_coverage.py [--trials 1000] [--case iv-augmented]``, shared among
-processes or workers by `--jobs` or `--scheduler`: every trial has its own input
-(but for short batches), sensor noise, which enters through the regressors, and current. Cases:
-
-- iv, iv-augmented: one batch of `--samples` samples, white current, for iv-augmented around a mean;
-- wandering: the same as iv-augmented with a current of 100 s correlation;
-- short: `iv` from twelve batches of 300 samples, the optimised runs of the model ship, white current.
+``python tests/benchmarks/estimation_coverage.py [--trials 1000] [--method iv-augmented] [--samples 1000] [--batches 9]
+[--wandering] [--derived]``, shared among processes or workers by `--jobs` or `--scheduler`. Every trial has its own
+input, sensor noise, which enters through the regressors, and current; see `coverage_cases.Case`. Without `--method`
+every method is tried. `--short` tries `iv` from twelve batches of 300 samples, the optimised runs of the model ship.
 
 Columns: share of intervals that hold the truth, with its Monte Carlo error; predicted over actual standard deviation;
 bias over actual standard deviation; kurtosis of the error (3 for a normal one).
@@ -21,42 +18,53 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from estimation_case import CALM_CURRENT, STEADY_CURRENT, WANDERING_CURRENT, errors_and_std, many_short_batches
+from coverage_cases import METHODS, Case, Tried, tried
+from estimation_case import many_short_batches
 from shared_work import add_sharing, shared_work
 
-LONG = {
-    "iv": ("iv", CALM_CURRENT),
-    "iv-augmented": ("iv-augmented", STEADY_CURRENT),
-    "wandering": ("iv-augmented", WANDERING_CURRENT),
-}
 
-
-def tried(case: str, trials: int, samples: int, seed: int) -> tuple[tuple[str, ...], np.ndarray, np.ndarray, int]:
-    """Names, errors (t, p), stated standard deviations (t, p) and trials without a usable estimate."""
-    if case in LONG:
-        method, weather = LONG[case]
-        return errors_and_std(trials, samples, method, weather, seed=seed)
+def short(trials: int, seed: int) -> Tried:
+    """Many short batches of the model ship."""
     found = many_short_batches(trials, seed=seed)
-    return found.parameters, found.estimates - found.truth, found.stated, found.failed
+    return Tried(found.parameters, found.estimates - found.truth, found.stated, found.failed)
 
 
 def main() -> None:
-    """Print the table."""
+    """Print the tables."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--trials", type=int, default=1000)
+    parser.add_argument("--method", choices=METHODS, nargs="*", default=METHODS)
     parser.add_argument("--samples", type=int, default=4000)
-    parser.add_argument("--case", choices=(*LONG, "short"), default="iv-augmented")
+    parser.add_argument("--batches", type=int, default=1)
+    parser.add_argument("--wandering", action="store_true")
+    parser.add_argument("--derived", action="store_true")
+    parser.add_argument("--short", action="store_true")
     parser.add_argument("--seed", type=int, default=31)
     add_sharing(parser)
     chosen = parser.parse_args()
     with shared_work(chosen):
-        names, errors, std, failed = tried(chosen.case, chosen.trials, chosen.samples, chosen.seed)
+        if chosen.short:
+            show("iv, twelve short batches", short(chosen.trials, chosen.seed))
+            return
+        for method in chosen.method:
+            case = Case(
+                method=method,
+                wandering=chosen.wandering,
+                samples=chosen.samples,
+                batches=chosen.batches,
+                derived=chosen.derived,
+            )
+            show(str(case), tried(case, chosen.trials, seed=chosen.seed))
+
+
+def show(title: str, found: Tried) -> None:
+    """One table."""
+    errors, std, covered = found.errors, found.std, found.held
     actual = errors.std(axis=0, ddof=1)
-    covered = (np.abs(errors) < 1.96 * std).mean(axis=0)
     centred = errors - errors.mean(axis=0)
-    print(f"{chosen.case}, {len(errors)} trials, {failed} without a usable estimate")
+    print(f"{title}, {len(errors)} trials, {found.failed} without an estimate")
     print(f"{'':12} {'covered':>16} {'predicted/actual':>17} {'bias/std':>9} {'kurtosis':>9}")
-    for index, name in enumerate(names):
+    for index, name in enumerate(found.names):
         share, chance = covered[index], np.sqrt(covered[index] * (1 - covered[index]) / len(errors))
         ratio = np.sqrt((std[:, index] ** 2).mean()) / actual[index]
         bias = errors[:, index].mean() / actual[index]

@@ -9,8 +9,9 @@ Measured wind acts through the b-frame velocity of the air, ship velocity minus 
 
 The method is Levenberg and Marquardt with exact derivatives. It starts from least squares with a short horizon, which
 grows by `TUNING.horizon_growth` until it is the requested one: a poor model diverges over a whole run, but not over few
-samples. The weight of an output is the inverse residual variance of the stage before. The covariance uses the
-derivatives of the simulation and is robust to coloured residuals, as for IV.
+samples. Of long data only some stretches are compared until then. The weight of an output is the inverse residual
+variance of the stage before. The covariance uses the derivatives of the simulation and is robust to coloured residuals,
+as for IV.
 
 Source: L. Ljung, System Identification, 2nd ed. (1999), 4.2 and 9.3; H. G. Bock, in Modelling of Chemical Reaction
 Systems (1981), 102-125, for the stretches.
@@ -58,10 +59,10 @@ def minimise_output_error(
     full = longest if fitting.horizon_s is None else max(2, round(fitting.horizon_s / sample_time(record)) + 1)
     horizons = _horizons(min(full, longest))
     for stage, samples in enumerate([*horizons, horizons[-1]]):
-        problem = build_problem(layout, record, fitting, samples, weights)
-        values, starts = minimised(
-            problem, values, settled=TUNING.rough_cost if stage < len(horizons) - 1 else TUNING.settled_cost
-        )
+        rough = stage < len(horizons) - 1
+        most = TUNING.rough_samples if rough else np.inf
+        problem = build_problem(layout, record, fitting, samples, weights, most=most)
+        values, starts = minimised(problem, values, settled=TUNING.rough_cost if rough else TUNING.settled_cost)
         weights = 1.0 / _at_least(_variance(problem, values, starts), record, layout)
     return _with_covariance(problem, layout, values, starts)
 

@@ -85,11 +85,14 @@ def sample_time(record: Record) -> float:
     return times.pop()
 
 
-def build_problem(layout: Layout, record: Record, fitting: Fitting, samples: int, weights: Array) -> Problem:
-    """The problem with stretches of so many samples and output weights (n,)."""
+def build_problem(
+    layout: Layout, record: Record, fitting: Fitting, samples: int, weights: Array, *, most: float = np.inf
+) -> Problem:
+    """The problem with stretches of so many samples and output weights (n,), of `most` samples in all or some more."""
     model, time_s = layout.model, sample_time(record)
     states = tuple(OUTPUTS.index(name) for name in model.outputs)
     cuts = [(number, first) for number, b in enumerate(record.batches) for first in _firsts(len(b), samples)]
+    cuts = cuts[:: max(1, int(sum(map(len, record.batches)) / most))]
     drives = [_drive(layout, batch, fitting.integration.substeps) for batch in record.batches]
     ends = [_end(first, samples, len(record.batches[number])) for number, first in cuts]
     length = max(end - first for (_, first), end in zip(cuts, ends, strict=True))
