@@ -62,18 +62,36 @@ def phases_of(problem: PlanProblem, planner: LocalPlanner, progress: Progress) -
     return Phases(*in_phases(progress, water, transitions * (_most_trials(problem, planner) > 0), *others))
 
 
-def plan_room(problem: PlanProblem, water: LegWater, progress: Progress) -> PlanRoom:
+def plan_room(problem: PlanProblem, water: LegWater, progress: Progress, *, strict: bool = False) -> PlanRoom:
     """Water and search space of the first plan, with the transitions optimised that the search uses.
+
+    With `strict`, runs that may have a place are refused, too, where none was found.
 
     Raises:
         NoPlan: no path leads from start to goal, or the ship cannot leave its start or reach its goal.
     """
     planner = local_planner(water, problem.used)
     planner.check_ends(problem.start, problem.goal, water)
-    space = search_space(problem, water, planner)
+    space = search_space(problem, water, planner, strict=strict)
     if _most_trials(problem, planner):
         space = _with_transitions(problem, water, space, phases_of(problem, planner, progress).transitions)
     return PlanRoom(water=water, space=space)
+
+
+def roomy_water(problem: PlanProblem, ship: Capability, progress: Progress) -> tuple[LegWater, PlanRoom]:
+    """The water, and what the first plan is made in; on a finer grid where passages or places are too narrow for it.
+
+    Raises:
+        NoPlan: as `plan_room`.
+    """
+    water = leg_water(problem, ship)
+    try:
+        return water, plan_room(problem, water, progress, strict=True)
+    except NoRoom:
+        finer = leg_water(problem, ship, finer=PLAN.finer_grid)
+    if finer.field.cell_m < 0.75 * water.field.cell_m:  # else the area is too large for it
+        water = finer
+    return water, plan_room(problem, water, progress)
 
 
 def waters(problem: PlanProblem, ship: Capability) -> Iterator[SeaArea]:
@@ -109,26 +127,26 @@ def ship_on_legs(problem: PlanProblem) -> Capability:
     return replace(ship, lateral_mps2=lateral)
 
 
-def leg_water(problem: PlanProblem, ship: Capability) -> LegWater:
-    """Vessel, weather and water that all legs of the problem share."""
+def leg_water(problem: PlanProblem, ship: Capability, *, finer: float = 1.0) -> LegWater:
+    """Vessel, weather and water that all legs of the problem share, on a grid so many times finer than usual."""
     return LegWater(
         vessel=problem.vessel,
         environment=problem.environment,
         ship=ship,
         area=problem.area,
         clearance_m=problem.settings.clearance_m,
-        field=clearance_field(problem.area, resolution_m=problem.vessel.length_m / 8),
+        field=clearance_field(problem.area, resolution_m=problem.vessel.length_m / 8 / finer),
     )
 
 
-def search_space(problem: PlanProblem, water: LegWater, planner: LocalPlanner) -> SearchSpace:
+def search_space(problem: PlanProblem, water: LegWater, planner: LocalPlanner, *, strict: bool = False) -> SearchSpace:
     """What the search for places works on.
 
     Raises:
         NoPlan: no path leads from start to goal, or a run surely has no place; says where and how much is lacking.
     """
     space = open_space(problem, water, planner)
-    check_room(space)
+    check_room(space, strict=strict)
     return space
 
 

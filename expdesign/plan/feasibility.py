@@ -96,16 +96,11 @@ def _clear(space: SearchSpace, index: int, poses: Array) -> Iterator[tuple[Array
         yield some, runs_clear(space, np.full(len(some), index), some)
 
 
-def without_place(space: SearchSpace) -> Iterator[str]:
-    """Names of the runs that surely have no place in the water."""
-    for index, run in enumerate(space.footprints):
-        if place_of(space, index).impossible:
-            yield run.name
-
-
-def check_room(space: SearchSpace) -> None:
-    """Raise NoRoom where a run surely has no place, before anything is searched."""
-    names = tuple(without_place(space))
+def check_room(space: SearchSpace, *, strict: bool = False) -> None:
+    """Raise NoRoom where a run surely has no place, before anything is searched; `strict` also where none was found."""
+    fits = [place_of(space, index) for index in range(len(space.footprints))]
+    lacking = [fit.impossible or (strict and fit.pose is None) for fit in fits]
+    names = tuple(run.name for run, lacks in zip(space.footprints, lacking, strict=True) if lacks)
     if not names:
         return
     run = max((item for item in space.footprints if item.name in names), key=lambda item: _size_m(item.discs))

@@ -16,9 +16,8 @@ from expdesign.plan.assembly import (
     confidence_of_run,
     dispersions,
     footprints,
-    leg_water,
     phases_of,
-    plan_room,
+    roomy_water,
     search_space,
     ship_on_legs,
     top_mps,
@@ -89,8 +88,8 @@ def _planned(whole: PlanProblem, area: SeaArea, ship: Capability, progress: Prog
     """The trial planned in a part of the water, checked with all of it."""
     progress("measuring the water", 0.0)
     problem = replace(whole, area=area)
-    water, confidence = leg_water(problem, ship), problem.settings.confidence
-    room = plan_room(problem, water, progress)
+    water, room = roomy_water(problem, ship, progress)
+    confidence = problem.settings.confidence
     budget = WorkBudget(most_s=PLAN.replan_budgets * problem.settings.time_budget_s)
     first, made = room, list[Refused]()
     for attempt in range(PLAN.replans + 1):
@@ -148,8 +147,7 @@ def draft_trial(problem: PlanProblem, *, progress: Progress = silent) -> Draft:
 def _drafted(whole: PlanProblem, area: SeaArea, ship: Capability, progress: Progress) -> Draft:
     progress("measuring the water", 0.0)
     problem = replace(whole, area=area)
-    water = leg_water(problem, ship)
-    room = plan_room(problem, water, progress)
+    water, room = roomy_water(problem, ship, progress)
     budget = WorkBudget(most_s=PLAN.replan_budgets * problem.settings.time_budget_s)
     sailed = sail_all(problem, room, progress, stated=water, budget=budget)
     way_m = float(room.space.goal_distance.to_goal(problem.start[None, :2])[0])

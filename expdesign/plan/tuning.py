@@ -11,6 +11,8 @@ class Tuning:
 
     Attributes:
         most_runs: runs in one plan.
+        finer_grid: how many times finer the clearance grid is where the usual one is too coarse for a passage or a
+            place.
         first_places, first_headings: places and headings at which a run is tried first, before boxes round them are
             halved.
         boxes: of places and headings at most; with more of them it stays open whether the run has a place.
@@ -45,6 +47,7 @@ class Tuning:
     """
 
     most_runs: int = 1000
+    finer_grid: float = 4.0
     first_places: int = 2000
     first_headings: int = 24
     boxes: int = 400_000

@@ -171,7 +171,10 @@ def _straightened(water: shapely.Geometry, tolerance_m: float) -> shapely.MultiP
     corner, as GEOS drops that of a ring up to twice the tolerance away. Where shores come to cross, what lies inside an
     odd number of them is water; nothing farther from them than the tolerance changes.
     """
-    rings, part = shapely.get_rings(shapely.get_parts(as_multipolygon(water)), return_index=True)
+    parts = shapely.get_parts(as_multipolygon(water))
+    if not len(parts):
+        return shapely.MultiPolygon()
+    rings, part = shapely.get_rings(parts, return_index=True)
     points, ring = shapely.get_coordinates(rings, return_index=True)
     lines = shapely.simplify(shapely.linestrings(points, indices=ring), tolerance_m, preserve_topology=False)
     polygons = [
