@@ -155,3 +155,28 @@ def test_dangers_beyond_the_antimeridian_are_where_they_are(tmp_path):
         return load_area(tmp_path / "a.toml", draught_m=1.0).water
 
     assert load().area - load(danger("rocks", at=[-179.998, 0.001])).area == pytest.approx(DISC, rel=1e-4)
+
+
+SEAMARKS = (
+    *("rock", "wreck", "obstruction", "buoy_lateral", "buoy_cardinal", "beacon_special_purpose", "pile", "pylon"),
+    *("platform", "fishing_facility", "marine_farm", "mooring", "hulk", "pontoon", "light_vessel", "light_float"),
+    *("weed", "gate"),
+)
+
+
+@pytest.mark.parametrize("key", ["seamark:type", "seamark_type", "seamark-type"])
+@pytest.mark.parametrize("value", SEAMARKS)
+def test_a_seamark_that_ships_keep_clear_of_closes_water(loaded, key, value):
+    assert closed_m2(loaded, danger(**{key: value})) > 0.5 * DISC
+
+
+@pytest.mark.parametrize("layer", ["UWTROC", "OBSTRN", "WRECKS", "SOUNDG", "PILPNT", "BOYLAT", "BCNCAR", "MORFAC"])
+def test_an_object_class_closes_water_as_layer_or_acronym_in_any_case(loaded, layer):
+    for point in (danger(layer), danger(layer.lower()), danger(acronym=layer)):
+        assert closed_m2(loaded, point) > 0.5 * DISC
+
+
+def test_a_seamark_that_is_no_danger_is_named_as_not_used(loaded):
+    area = loaded(danger("lights", **{"seamark:type": "light_minor"}))
+    assert area.water.area == loaded().water.area
+    assert any("not used: 1 Point in layer 'lights' of seamark:type 'light_minor'" in note for note in area.notes)

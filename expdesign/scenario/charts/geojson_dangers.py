@@ -32,7 +32,20 @@ WORDS = {
     "bridge": "BRIDGE",
 }
 """Words for dangers and obstacles, and their object class."""
-KIND_KEYS = ("kind", "type", "class", "category", "object", "feature", "acronym", "natural", "hazard", "seamark:type")
+SEAMARKS = {
+    **{"cable_overhead": "CBLOHD", "pipeline_overhead": "PIPOHD", "conveyor": "CONVYR", "platform": "OFSPLF"},
+    **{"fishing_facility": "FSHFAC", "marine_farm": "MARCUL", "mooring": "MORFAC", "hulk": "HULKES"},
+    **{"pontoon": "PONTON", "floating_dock": "FLODOC", "dry_dock": "DRYDOC", "dyke": "DYKCON", "dam": "DAMCON"},
+    **{"gate": "GATCON", "causeway": "CAUSWY", "log_pond": "LOGPON", "shoreline_construction": "SLCONS"},
+    **{"light_vessel": "LITVES", "light_float": "LITFLT", "ice_area": "ICEARE", "weed": "WEDKLP"},
+}
+"""Values of seamark:type that no word tells, and their object class.
+
+Source: OpenSeaMap, seamarks and their object classes in S-57 (wiki.openstreetmap.org/wiki/Seamarks).
+"""
+SEAMARK_KEYS = ("seamark:type", "seamark_type", "seamark-type")
+"""The property as it is, and as file formats without colons in names write it."""
+KIND_KEYS = ("kind", "type", "class", "category", "object", "feature", "acronym", "natural", "hazard", *SEAMARK_KEYS)
 """Properties that may say what a feature is."""
 CLASS_OF_KEY = {"catwrk": "WRECKS", "catobs": "OBSTRN", "valsou": "OBSTRN"}
 """Attributes that only dangers have."""
@@ -104,8 +117,10 @@ def _said(feature: Feature) -> str:
     number = properties.get("objl")
     if type(number) in (int, float) and number in NUMBERS:
         return NUMBERS[int(number)]
-    stated = (_class(value) for key in KIND_KEYS if isinstance(value := properties.get(key), str))
-    return next(filter(None, stated), "") or next((CLASS_OF_KEY[key] for key in CLASS_OF_KEY if key in properties), "")
+    stated = [(key, value) for key in KIND_KEYS if isinstance(value := properties.get(key), str)]
+    marked = (SEAMARKS.get(value.lower(), "") for key, value in stated if key in SEAMARK_KEYS)
+    said = next(filter(None, (*marked, *(_class(value) for _, value in stated))), "")
+    return said or next((CLASS_OF_KEY[key] for key in CLASS_OF_KEY if key in properties), "")
 
 
 def _kind_words(feature: Feature) -> str:
