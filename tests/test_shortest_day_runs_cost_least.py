@@ -9,6 +9,7 @@ import scipy.optimize
 from expdesign.durations import Collected, DurationProblem, optimal_shares
 from expdesign.errors import NoAnswer
 from expdesign.shortest_day import Accuracy, cheapest_runs
+from expdesign.shortest_day.cheapest import Offer, cheapest_shares
 
 PARAMETERS = ("X_u", "Y_v", "N_r")
 SAMPLES = 100.0
@@ -44,6 +45,18 @@ def criterion_accuracy(matrices, prior=None):
 def std_accuracy(variance):
     return Accuracy(
         collected=None, level=-np.inf, samples=1.0, prior=np.zeros((3, 3)), variance=variance, parameters=PARAMETERS
+    )
+
+
+def offered(matrices, cost_s, *, known, most, saved_s=None, way_s=0.0):
+    return Offer(
+        matrices=matrices,
+        cost_s=cost_s,
+        saved_s=np.zeros(len(matrices)) if saved_s is None else saved_s,
+        way_s=way_s,
+        known=known,
+        fewest=np.zeros(len(matrices)),
+        most=most,
     )
 
 
@@ -83,7 +96,7 @@ def test_runs_cost_what_the_best_of_all_costs_and_no_less_than_the_bound(kind, s
     matrices = 12.0 * random_information(rng, 4)
     accuracy, cost_s = accuracies(matrices / 12.0)[kind], rng.uniform(10.0, 60.0, 4)
     known, most = 0.5 * random_information(rng, 1)[0], np.full(4, 9.0)
-    found = cheapest_runs(accuracy, matrices, cost_s, known=known, fewest=np.zeros(4), most=most)
+    found = cheapest_runs(accuracy, offered(matrices, cost_s, known=known, most=most))
     reached = [
         float(np.dot(runs, cost_s))
         for runs in itertools.product(range(10), repeat=4)
@@ -100,7 +113,7 @@ def test_the_bound_is_the_cost_of_the_best_shares_of_runs(kind):
     matrices = random_information(rng, 4)
     accuracy, cost_s = accuracies(matrices)[kind], rng.uniform(10.0, 60.0, 4)
     known, most = 0.5 * random_information(rng, 1)[0], np.full(4, 200.0)
-    found = cheapest_runs(accuracy, matrices, cost_s, known=known, fewest=np.zeros(4), most=most)
+    found = cheapest_runs(accuracy, offered(matrices, cost_s, known=known, most=most))
     best = min(
         scipy.optimize.minimize(
             lambda runs: runs @ cost_s,
@@ -122,9 +135,38 @@ def test_what_the_limits_do_not_allow_is_refused_with_the_parameter():
     with pytest.raises(NoAnswer, match="standard deviation of N_r"):
         cheapest_runs(
             std_accuracy(np.array([np.inf, np.inf, 0.05])),
-            blind,
-            np.ones(1),
-            known=np.zeros((3, 3)),
-            fewest=np.zeros(1),
-            most=np.full(1, 9.0),
+            offered(blind, np.ones(1), known=np.zeros((3, 3)), most=np.full(1, 9.0)),
         )
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("way_s", [0.0, 60.0, 1e6])
+def test_way_made_good_saves_time_as_far_as_there_is_a_way(seed, way_s):
+    rng = np.random.default_rng(seed)
+    matrices = 12.0 * random_information(rng, 4)
+    accuracy, cost_s = criterion_accuracy(matrices / 12.0)[1], rng.uniform(30.0, 60.0, 4)
+    saved_s, known = cost_s * rng.uniform(0.0, 0.95, 4), 0.5 * random_information(rng, 1)[0]
+    offer = offered(matrices, cost_s, known=known, most=np.full(4, 9.0), saved_s=saved_s, way_s=way_s)
+    found = cheapest_runs(accuracy, offer)
+    reached = [
+        float(np.dot(runs, cost_s)) - min(float(np.dot(runs, saved_s)), way_s)
+        for runs in itertools.product(range(10), repeat=4)
+        if accuracy.margin(known + np.tensordot(np.array(runs, dtype=float), matrices, axes=1)) >= 0
+    ]
+    assert min(reached) - 1e-9 <= found.cost_s <= 1.002 * min(reached)
+    assert found.bound_s <= min(reached) + 1e-9
+
+
+@pytest.mark.parametrize("way_s", [0.0, 60.0, 1e6])
+@pytest.mark.parametrize("kind", range(3))
+def test_no_run_offered_is_worth_more_than_it_costs_and_those_chosen_are_worth_it(kind, way_s):
+    rng = np.random.default_rng(kind)
+    matrices, cost_s = random_information(rng, 4), rng.uniform(30.0, 60.0, 4)
+    accuracy = accuracies(matrices)[kind]
+    saved_s, known = cost_s * rng.uniform(0.0, 0.95, 4), 0.5 * random_information(rng, 1)[0]
+    offer = offered(matrices, cost_s, known=known, most=np.full(4, 200.0), saved_s=saved_s, way_s=way_s)
+    found = cheapest_shares(accuracy, offer)
+    net_s = cost_s - found.worth_of_saved * saved_s - np.einsum("ij,qji->q", found.worth, matrices)
+    assert (net_s >= -1e-6 * cost_s).all()
+    assert np.abs(net_s[found.runs > 1e-9]) == pytest.approx(0.0, abs=1e-6 * cost_s.max())
+    assert 0.0 <= found.worth_of_saved <= 1.0

@@ -5,18 +5,35 @@ from typing import TYPE_CHECKING
 from expdesign.lazy import load_on_use
 
 if TYPE_CHECKING:
-    from expdesign.growing.loop import grow_dictionary
+    from expdesign.growing.loop import grow_dictionary, motion_limits, searched_spaces
     from expdesign.growing.optimal_design import optimum, shared
+    from expdesign.growing.search import Archive, Candidate, Measure, Worth, pool_of, refined
     from expdesign.growing.values import GrowRound, GrowSettings, Growth
 
-__all__ = ["GrowRound", "GrowSettings", "Growth", "grow_dictionary", "optimum", "shared"]
+__all__ = [
+    "Archive",
+    "Candidate",
+    "GrowRound",
+    "GrowSettings",
+    "Growth",
+    "Measure",
+    "Worth",
+    "grow_dictionary",
+    "motion_limits",
+    "optimum",
+    "pool_of",
+    "refined",
+    "searched_spaces",
+    "shared",
+]
 
 if not TYPE_CHECKING:
     __getattr__ = load_on_use(
         __name__,
         {
-            "loop": ("grow_dictionary",),
+            "loop": ("grow_dictionary", "motion_limits", "searched_spaces"),
             "optimal_design": ("optimum", "shared"),
+            "search": ("Archive", "Candidate", "Measure", "Worth", "pool_of", "refined"),
             "values": ("GrowRound", "GrowSettings", "Growth"),
         },
     )

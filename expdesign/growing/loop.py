@@ -18,7 +18,7 @@ from expdesign.dictionary import FAMILIES, Primitive, PrimitiveSpec, build_primi
 from expdesign.errors import InputError, UnknownName
 from expdesign.growing._casadi import FreeForm, optimise_commands
 from expdesign.growing.optimal_design import Optimum, optimum, sensitivity
-from expdesign.growing.search import Measure, best_of, pool_of, refined, violation
+from expdesign.growing.search import Measure, Worth, best_of, pool_of, refined, violation
 from expdesign.growing.space import FamilySpace, family_spaces
 from expdesign.growing.tuning import TUNING
 from expdesign.growing.values import GrowRound, GrowSettings, Growth
@@ -64,7 +64,8 @@ def grow_dictionary(
     )
     check_informative(information, case.names, mean_subtraction)
     progress("simulating candidates", 0.0)
-    spaces, measure = _spaces(case, information, settings), _measure(case)
+    primitives = [item.primitive for item in information]
+    spaces, measure = searched_spaces(case.vessel, primitives, settings, case.limits), _measure(case)
     rng = np.random.default_rng(settings.seed or 0)
     archives = pool_of(spaces, measure, pool=settings.pool, seed=settings.seed or 0)
     grown, specs, rounds = list(information), list[PrimitiveSpec](), list[GrowRound]()
@@ -72,12 +73,13 @@ def grow_dictionary(
     while True:
         number, last = len(rounds), settings.rounds + 1
         part = within(progress, number / last, (number + 1) / last)
-        archives = refined(archives, best.inverse, measure, rng, part)
-        spec, found = best_of(archives, best.inverse)
-        left = found
-        if spec is None or len(rounds) == settings.rounds:
+        worth = Worth(gradient=best.inverse)
+        archives = refined(archives, worth, measure, rng, part)
+        found = best_of(archives, worth)
+        left = -np.inf if found is None else found.merit
+        if found is None or len(rounds) == settings.rounds:
             break
-        item, spec = _addition(case, best, spec, settings, part)
+        item, spec = _addition(case, best, found.spec, settings, part)
         left = sensitivity(best, item, mean_subtraction)
         if left <= best.dimension * (1 + settings.tolerance):
             break
@@ -92,7 +94,7 @@ def grow_dictionary(
                 family=spec.family,
                 settings=spec.settings,
                 sensitivity=left,
-                searched=found,
+                searched=found.merit,
                 log_det_gain=best.log_det - before.log_det,
                 efficiency=float(np.exp((best.log_det - first.log_det) / len(case.names))),
                 excitation_condition=item.excitation_condition,
@@ -192,13 +194,19 @@ def motion_limits(settings: GrowSettings, primitives: Sequence[Primitive]) -> Ar
     return limits
 
 
-def _spaces(
-    case: _Case, information: Sequence[PrimitiveInformation], settings: GrowSettings
+def searched_spaces(
+    vessel: Vessel, primitives: Sequence[Primitive], settings: GrowSettings, limits: Array
 ) -> tuple[FamilySpace, ...]:
-    step_s = case.vessel.sample_time_s
-    run_s = settings.run_s or float(np.median([item.primitive.duration_s for item in information]))
+    """What is searched for additions to a dictionary.
+
+    Raises:
+        UnknownName: no such family.
+        InputError: no family is left.
+    """
+    step_s = vessel.sample_time_s
+    run_s = settings.run_s or float(np.median([item.duration_s for item in primitives]))
     chosen = tuple(family(name) for name in settings.families) or FAMILIES
-    return family_spaces(case.vessel, chosen, case.limits, max(round(run_s / step_s), 2) * step_s)
+    return family_spaces(vessel, chosen, limits, max(round(run_s / step_s), 2) * step_s)
 
 
 def _measure(case: _Case) -> Measure:

@@ -1,8 +1,8 @@
-"""Search for the candidate of largest sensitivity: a quasi-random pool, then local random steps from the best ones.
+"""Search for the candidate that is worth most: a quasi-random pool, then local random steps from the best ones.
 
-A candidate's matrix does not depend on the design, so every simulated candidate is kept and its sensitivity for a new
-design costs one product. No evaluated candidate has a larger sensitivity than reported. This is not a bound over all
-members of the families.
+A candidate's matrix does not depend on the design, so every simulated candidate is kept and its worth for a new design
+costs one product. No evaluated candidate is worth more than reported. This is not a bound over all members of the
+families.
 """
 
 from __future__ import annotations
@@ -19,13 +19,66 @@ from expdesign.growing.tuning import TUNING
 from expdesign.information.many import bordered_runs
 from expdesign.progress import Progress, silent
 from expdesign.simulation import Environment
-from expdesign.values import Array
+from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Worth:
+    """What a run's information is worth, per second that the run costs.
+
+    Attributes:
+        gradient: (d, d) G; information B is worth trace(G B). For the D criterion B(w)^-1, which gives the sensitivity.
+        leg_s: time of the leg that each run brings.
+        saved_s_per_m: time that a metre made good saves elsewhere.
+    """
+
+    gradient: Array
+    leg_s: float = 0.0
+    saved_s_per_m: float = 0.0
+
+    def __post_init__(self) -> None:
+        seal(self, gradient="d d")
+
+    def of(self, matrices: Array, made_good_m: Array, run_s: float) -> Array:
+        """(n,) of runs with information B (n, d, d) and distances made good (n,)."""
+        cost = 1.0 + (self.leg_s - self.saved_s_per_m * made_good_m) / run_s
+        return np.asarray(np.einsum("ij,nji->n", self.gradient, matrices) / np.maximum(cost, TUNING.least_cost))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Runs:
+    """Evaluated specifications.
+
+    Attributes:
+        matrices: (n, d, d) B of each; 0 for impossible runs.
+        excess: (n,) violations of the limits; infinite for impossible runs.
+        made_good_m: (n,) distance from begin to end through water.
+    """
+
+    matrices: Array
+    excess: Array
+    made_good_m: Array
+
+    def __post_init__(self) -> None:
+        seal(self, matrices="n d d", excess="n", made_good_m="n")
+
+    def __getitem__(self, rows: slice) -> Runs:
+        return Runs(matrices=self.matrices[rows], excess=self.excess[rows], made_good_m=self.made_good_m[rows])
+
+    @staticmethod
+    def joined(parts: Sequence[Runs]) -> Runs:
+        """All of them."""
+        return Runs(
+            matrices=np.concatenate([part.matrices for part in parts]),
+            excess=np.concatenate([part.excess for part in parts]),
+            made_good_m=np.concatenate([part.made_good_m for part in parts]),
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Measure:
-    """Information matrix and limit violation of a specification.
+    """Information matrix, limit violation and way of a specification.
 
     Attributes:
         vessel, names, environment, mean_subtraction: as in `information.many.bordered_runs`.
@@ -38,12 +91,13 @@ class Measure:
     mean_subtraction: str
     limits: Array
 
-    def __call__(self, specs: Sequence[PrimitiveSpec]) -> tuple[Array, Array]:
-        """Matrices B (n, d, d) and violations (n,), which are infinite for impossible runs."""
-        pieces = [self._some(specs[first : first + TUNING.batch]) for first in range(0, len(specs), TUNING.batch)]
-        return np.concatenate([B for B, _ in pieces]), np.concatenate([excess for _, excess in pieces])
+    def __call__(self, specs: Sequence[PrimitiveSpec]) -> Runs:
+        """The runs of specifications of one duration."""
+        return Runs.joined(
+            [self._some(specs[first : first + TUNING.batch]) for first in range(0, len(specs), TUNING.batch)]
+        )
 
-    def _some(self, specs: Sequence[PrimitiveSpec]) -> tuple[Array, Array]:
+    def _some(self, specs: Sequence[PrimitiveSpec]) -> Runs:
         runs = excite_many(self.vessel, specs)
         matrices, motion = bordered_runs(
             self.vessel,
@@ -56,7 +110,19 @@ class Measure:
         )
         over = violation(motion, self.limits)
         sound = (runs.possible > 0) & np.isfinite(matrices).all(axis=(1, 2)) & np.isfinite(over)
-        return np.where(sound[:, None, None], matrices, 0.0), np.where(sound, over, np.inf)
+        return Runs(
+            matrices=np.where(sound[:, None, None], matrices, 0.0),
+            excess=np.where(sound, over, np.inf),
+            made_good_m=np.where(sound, made_good_m(motion, self.vessel.sample_time_s), 0.0),
+        )
+
+
+def made_good_m(motion: Array, sample_time_s: float) -> Array:
+    """(n,) distance from begin to end of motions (n, k + 1, 3) through calm water, by the trapezoidal rule."""
+    u, v, r = np.moveaxis((motion[:, 1:] + motion[:, :-1]) / 2, -1, 0)
+    heading = (np.cumsum(r, axis=1) - r / 2) * sample_time_s
+    along, across = u * np.cos(heading) - v * np.sin(heading), u * np.sin(heading) + v * np.cos(heading)
+    return np.asarray(np.hypot(along.sum(axis=1), across.sum(axis=1)) * sample_time_s)
 
 
 def violation(motion: Array, limits: Array) -> Array:
@@ -67,33 +133,60 @@ def violation(motion: Array, limits: Array) -> Array:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Candidate:
+    """An evaluated run.
+
+    Attributes:
+        spec: of it.
+        merit: its worth.
+        matrix: (d, d) B.
+        made_good_m: distance from begin to end through water.
+    """
+
+    spec: PrimitiveSpec
+    merit: float
+    matrix: Array
+    made_good_m: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Archive:
     """All evaluated candidates of one family.
 
     Attributes:
         space: the family's.
         points: (n, a) places in the unit cube.
-        matrices: (n, d, d) B of each.
-        excess: (n,) violations of the limits.
+        runs: n of them.
     """
 
     space: FamilySpace
     points: Array
-    matrices: Array
-    excess: Array
+    runs: Runs
 
-    def merits(self, inverse: Array) -> Array:
-        """(n,) sensitivity of those within limits, minus the violation of the others."""
-        d = np.einsum("ij,nji->n", inverse, self.matrices)
-        return np.where(self.excess <= TUNING.limit_rounding, d, -self.excess)
+    def merits(self, worth: Worth) -> Array:
+        """(n,) worth of those within limits, minus the violation of the others."""
+        found = worth.of(self.runs.matrices, self.runs.made_good_m, self.space.run_s)
+        return np.where(self.runs.excess <= TUNING.limit_rounding, found, -self.runs.excess)
+
+    def best(self, worth: Worth) -> Candidate | None:
+        """The candidate within limits that is worth most, if any is within them."""
+        merits = self.merits(worth)
+        place = int(np.argmax(merits))
+        if self.runs.excess[place] > TUNING.limit_rounding:
+            return None
+        return Candidate(
+            spec=self.space.spec(self.points[place]),
+            merit=float(merits[place]),
+            matrix=self.runs.matrices[place],
+            made_good_m=float(self.runs.made_good_m[place]),
+        )
 
     def with_more(self, other: Archive) -> Archive:
         """Both together."""
         return Archive(
             space=self.space,
             points=np.concatenate([self.points, other.points]),
-            matrices=np.concatenate([self.matrices, other.matrices]),
-            excess=np.concatenate([self.excess, other.excess]),
+            runs=Runs.joined([self.runs, other.runs]),
         )
 
 
@@ -111,36 +204,32 @@ def pool_of(spaces: Sequence[FamilySpace], measure: Measure, *, pool: int, seed:
 
 def refined(
     archives: Sequence[Archive],
-    inverse: Array,
+    worth: Worth,
     measure: Measure,
     rng: np.random.Generator,
     progress: Progress = silent,
 ) -> tuple[Archive, ...]:
-    """The archives with local steps from each family's best candidates for a design with B^-1 (d, d)."""
+    """The archives with local steps from each family's best candidates."""
     spaces, grown = [archive.space for archive in archives], tuple(archives)
     for generation, stride in enumerate(TUNING.strides):
         progress("searching for runs that add more information", generation / len(TUNING.strides))
-        points = [_steps(archive, inverse, stride, rng) for archive in grown]
+        points = [_steps(archive, worth, stride, rng) for archive in grown]
         more = _measured(spaces, points, measure)
         grown = tuple(archive.with_more(other) for archive, other in zip(grown, more, strict=True))
     return grown
 
 
-def best_of(archives: Sequence[Archive], inverse: Array) -> tuple[PrimitiveSpec | None, float]:
-    """The candidate of largest sensitivity within limits, and that; None and -inf where there is none."""
-    merits = [archive.merits(inverse) for archive in archives]
-    winner = int(np.argmax([values.max() for values in merits]))
-    place, archive = int(np.argmax(merits[winner])), archives[winner]
-    if archive.excess[place] > TUNING.limit_rounding:
-        return None, -np.inf
-    return archive.space.spec(archive.points[place]), float(merits[winner][place])
+def best_of(archives: Sequence[Archive], worth: Worth) -> Candidate | None:
+    """The candidate within limits that is worth most, if any is within them."""
+    found = [best for archive in archives if (best := archive.best(worth)) is not None]
+    return max(found, key=lambda candidate: candidate.merit, default=None)
 
 
-def _steps(archive: Archive, inverse: Array, stride: float, rng: np.random.Generator) -> Array:
+def _steps(archive: Archive, worth: Worth, stride: float, rng: np.random.Generator) -> Array:
     """(n, a) points near the family's best ones."""
     if archive.space.family.closed_loop:
         return archive.points[:0]
-    order = np.argsort(-archive.merits(inverse), kind="stable")[: TUNING.leaders]
+    order = np.argsort(-archive.merits(worth), kind="stable")[: TUNING.leaders]
     parents = np.repeat(archive.points[order], TUNING.offspring, axis=0)
     steps = stride * rng.standard_normal(parents.shape)
     moved = rng.random(parents.shape) < max(0.4, 1.0 / parents.shape[1])
@@ -154,13 +243,9 @@ def _steps(archive: Archive, inverse: Array, stride: float, rng: np.random.Gener
 
 def _measured(spaces: Sequence[FamilySpace], points: Sequence[Array], measure: Measure) -> tuple[Archive, ...]:
     """Candidates of every family, simulated together."""
-    matrices, excess = measure(
-        [space.spec(point) for space, rows in zip(spaces, points, strict=True) for point in rows]
-    )
-    ends = np.cumsum([len(rows) for rows in points])[:-1]
+    runs = measure([space.spec(point) for space, rows in zip(spaces, points, strict=True) for point in rows])
+    ends = np.cumsum([0, *map(len, points)]).tolist()
     return tuple(
-        Archive(space=space, points=rows, matrices=found, excess=over)
-        for space, rows, found, over in zip(
-            spaces, points, np.split(matrices, ends), np.split(excess, ends), strict=True
-        )
+        Archive(space=space, points=rows, runs=runs[first:last])
+        for space, rows, first, last in zip(spaces, points, ends[:-1], ends[1:], strict=True)
     )

@@ -22,6 +22,7 @@ class Tuning:
         offspring: local steps from each leader in one generation.
         strides: size of the local steps of each generation, as a share of each setting's range.
         redrawn: share of local steps that take another random draw, where the family has one.
+        least_cost: least cost of a second of a run that makes way good, in seconds.
         free_form_excess: share of a range by which optimised commands may exceed a limit.
         iterations: most iterations of the optimal control solver.
         margin: share of each range kept from the limits, for the solver's integration error.
@@ -41,6 +42,7 @@ class Tuning:
     offspring: int = 6
     strides: tuple[float, ...] = (0.25, 0.15, 0.1, 0.06, 0.04, 0.025, 0.015, 0.01)
     redrawn: float = 0.3
+    least_cost: float = 0.02
     free_form_excess: float = 1e-6
     iterations: int = 300
     margin: float = 0.005

@@ -21,7 +21,14 @@ from expdesign.plan.chart import (
 from expdesign.plan.control import Capability, capability
 from expdesign.plan.feasibility import check_room
 from expdesign.plan.legs import LegWater
-from expdesign.plan.local_planner import LocalPlanner, SearchSpace, TransitionTrials, local_planner, pairs_of
+from expdesign.plan.local_planner import (
+    GoAroundTime,
+    LocalPlanner,
+    SearchSpace,
+    TransitionTrials,
+    local_planner,
+    pairs_of,
+)
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.runs import Footprint, dispersion_m, footprint
 from expdesign.plan.search import path_exceeds_displacement, place_runs, placement_search
@@ -173,6 +180,7 @@ def open_space(
         hull_m=problem.vessel.length_m,
         leg_margin_m=margin,
         current_to=problem.environment.current_to,
+        go_around=GoAroundTime.of(water.ship, problem.vessel) if problem.expected else None,
     )
 
 

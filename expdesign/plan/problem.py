@@ -25,6 +25,7 @@ class PlanProblem:
         design: gives the number of runs of each.
         start, goal: (3,) poses; the ship starts and ends at rest through the water.
         seed: of everything drawn.
+        expected: whether plans are compared by their expected time, go-arounds included, where the ship has a rule.
     """
 
     vessel: Vessel
@@ -36,6 +37,7 @@ class PlanProblem:
     start: Array
     goal: Array
     seed: int = 0
+    expected: bool = False
 
     def __post_init__(self) -> None:
         seal(self, start="3", goal="3")

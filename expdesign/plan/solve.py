@@ -128,11 +128,13 @@ class Draft:
         sailed: commands, motion and legs.
         direct_s: time of the shortest path from start to goal at transit speed [s].
         transit_mps: that speed [m/s].
+        going_round_s: expected time of go-arounds before runs that follow others [s].
     """
 
     sailed: SailedTrial
     direct_s: float
     transit_mps: float
+    going_round_s: float = 0.0
 
 
 def draft_trial(problem: PlanProblem, *, progress: Progress = silent) -> Draft:
@@ -152,7 +154,11 @@ def _drafted(whole: PlanProblem, area: SeaArea, ship: Capability, progress: Prog
     sailed = sail_all(problem, room, progress, stated=water, budget=budget)
     way_m = float(room.space.goal_distance.to_goal(problem.start[None, :2])[0])
     speed = water.ship.transit_speed_mps
-    return Draft(sailed=sailed, direct_s=way_m / speed, transit_mps=speed)
+    go_around, sample_s = room.space.go_around, problem.vessel.sample_time_s
+    legs = [leg for leg in sailed.legs[1:-1] if leg.kind == "reposition"]
+    leg_s = sample_s * np.array([leg.last - leg.first for leg in legs])
+    rounds_s = 0.0 if go_around is None else float(go_around.seconds(leg_s).sum())
+    return Draft(sailed=sailed, direct_s=way_m / speed, transit_mps=speed, going_round_s=rounds_s)
 
 
 def _check(problem: PlanProblem, water: LegWater, sailed: SailedTrial, check: Callable[..., Any]) -> Any:

@@ -50,6 +50,10 @@ class AccuracyTable(Table):
         default={}, description="the largest standard deviation as a share of the nominal value, e.g. {X_u = 0.05}"
     )
     most_s: Positive | None = Field(default=None, description="the longest day allowed [s]; no limit when not given")
+    grow: bool = Field(
+        default=True,
+        description="whether manoeuvres are searched for, and added, that shorten the day; [design.grow] limits them",
+    )
 
 
 class DesignTable(Table):
@@ -205,6 +209,7 @@ def _accuracy(table: AccuracyTable, vessel: Vessel, estimated: tuple[str, ...], 
         std=dict(table.std),
         relative_std=dict(table.relative_std),
         most_s=table.most_s,
+        grow=table.grow,
     )
 
 

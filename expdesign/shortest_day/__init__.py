@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from expdesign.shortest_day.alternate import shortest_day
     from expdesign.shortest_day.bounds import day_bound
     from expdesign.shortest_day.cheapest import Choice, cheapest_runs
+    from expdesign.shortest_day.manoeuvres import manoeuvres_worth_adding
     from expdesign.shortest_day.values import AccuracySettings, DayBound, DayTried, ShortestDay
 
 __all__ = [
@@ -20,6 +21,7 @@ __all__ = [
     "ShortestDay",
     "cheapest_runs",
     "day_bound",
+    "manoeuvres_worth_adding",
     "shortest_day",
     "stated_accuracy",
 ]
@@ -32,6 +34,7 @@ if not TYPE_CHECKING:
             "alternate": ("shortest_day",),
             "bounds": ("day_bound",),
             "cheapest": ("Choice", "cheapest_runs"),
+            "manoeuvres": ("manoeuvres_worth_adding",),
             "values": ("AccuracySettings", "DayBound", "DayTried", "ShortestDay"),
         },
     )

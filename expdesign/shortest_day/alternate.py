@@ -20,21 +20,27 @@ from expdesign.plan.values import SailedTrial
 from expdesign.plan.verify import track_information
 from expdesign.progress import Progress, in_phases, silent
 from expdesign.shortest_day.accuracy import Accuracy
-from expdesign.shortest_day.cheapest import Choice, cheapest_runs
-from expdesign.shortest_day.prices import DraftedDay, Prices, first_prices, learnt_prices
+from expdesign.shortest_day.cheapest import Choice, Offer, cheapest_runs
+from expdesign.shortest_day.prices import DraftedDay, Prices, first_prices, learnt_prices, offered
 from expdesign.shortest_day.tuning import TUNING
 from expdesign.shortest_day.values import DayTried, ShortestDay
 from expdesign.values import Array
 
 
 def shortest_day(
-    problem: PlanProblem, accuracy: Accuracy, *, most_s: float | None = None, progress: Progress = silent
+    problem: PlanProblem,
+    accuracy: Accuracy,
+    *,
+    added: Sequence[str] = (),
+    most_s: float | None = None,
+    progress: Progress = silent,
 ) -> ShortestDay:
     """The shortest day found that reaches an accuracy, planned and verified.
 
     Args:
         problem: gives the dictionary, the limits on runs and the water; the runs of its design are not used.
         accuracy: to be reached by the whole track, legs included.
+        added: runs that the day may have although the durations exclude them.
         most_s: longest day allowed [s].
         progress: of all rounds.
 
@@ -42,8 +48,8 @@ def shortest_day(
         NoAnswer: no runs within the limits reach it, or no day found does within `most_s`.
         NoPlan: no day was found at all.
     """
-    search = _Search.of(problem, accuracy)
-    prices, days, choices = first_prices(search.run_s, len(accuracy.prior)), list[DraftedDay](), list[Choice]()
+    search = _Search(problem=problem, accuracy=accuracy, added=tuple(added))
+    prices, days, choices = first_prices(problem), list[DraftedDay](), list[Choice]()
     *rounds, last = in_phases(progress, *np.ones(TUNING.rounds + 1))
     refused = NoPlan("no day was planned")
     for told in rounds:
@@ -67,34 +73,12 @@ class _Search:
     """What all rounds share.
 
     Attributes:
-        problem, accuracy: as of `shortest_day`.
-        matrices: (q, d, d) information of one whole run, summed over its samples.
-        run_s: (q,) duration of one.
-        fewest, most: (q,) limits on runs.
+        problem, accuracy, added: as of `shortest_day`.
     """
 
     problem: PlanProblem
     accuracy: Accuracy
-    matrices: Array
-    run_s: Array
-    fewest: Array
-    most: Array
-
-    @staticmethod
-    def of(problem: PlanProblem, accuracy: Accuracy) -> _Search:
-        durations, sample_s = problem.design.problem, problem.vessel.sample_time_s
-        limits, names = durations.constraints, durations.names
-        least_s = np.array([limits.least_s.get(name, 0.0) for name in names])
-        most_s = np.array([0.0 if name in limits.excluded else limits.most_s.get(name, np.inf) for name in names])
-        required = np.array([float(name in limits.required) for name in names])
-        return _Search(
-            problem=problem,
-            accuracy=accuracy,
-            matrices=durations.matrices * (durations.run_s / sample_s)[:, None, None],
-            run_s=durations.run_s,
-            fewest=np.maximum(np.ceil(least_s / durations.run_s), required),
-            most=np.minimum(np.floor(most_s / durations.run_s), TUNING.most_runs),
-        )
+    added: tuple[str, ...]
 
     def untried(self, prices: Prices, tried: Sequence[Choice]) -> Choice | None:
         """The cheapest runs not tried yet that should reach the accuracy with their legs, by some margin.
@@ -115,15 +99,11 @@ class _Search:
 
     def chosen(self, prices: Prices, *, level: float) -> Choice:
         """The cheapest runs that with their legs reach this margin by the prices."""
-        return cheapest_runs(
-            self.accuracy,
-            self.matrices + prices.legs,
-            prices.cost_s,
-            known=prices.goal,
-            fewest=self.fewest,
-            most=self.most,
-            level=level,
-        )
+        return cheapest_runs(self.accuracy, self.offer(prices), level=level)
+
+    def offer(self, prices: Prices) -> Offer:
+        """What runs cost and tell with their legs, by the prices."""
+        return offered(self.problem, prices, free=self.added)
 
     def drafted(self, choice: Choice, progress: Progress) -> DraftedDay:
         """The day with these runs."""
@@ -141,10 +121,7 @@ class _Search:
         """Prices by the days so far; the level is raised by what they promised too much on average."""
         prices = learnt_prices(self.problem.primitives, days)
         promised = [
-            self.accuracy.margin(
-                np.tensordot(np.array(day.repeats, dtype=float), self.matrices + prices.legs, axes=1) + prices.goal
-            )
-            for day in days
+            self.accuracy.margin(self.offer(prices).information(np.array(day.repeats, dtype=float))) for day in days
         ]
         short = np.mean([more - day.margin for more, day in zip(promised, days, strict=True)])
         return replace(prices, level=float(short))
@@ -159,7 +136,7 @@ class _Search:
     def best(self, days: Sequence[DraftedDay], last: Choice, most_s: float | None, progress: Progress) -> ShortestDay:
         """The shortest day that reaches the accuracy, planned with its verification and its risk."""
         refused: NoPlan | None = None
-        reached = sorted((day for day in days if day.margin >= 0), key=lambda day: day.day_s)
+        reached = sorted((day for day in days if day.margin >= 0), key=lambda day: day.expected_s)
         for day in reached:
             if most_s is not None and day.day_s > most_s:
                 raise NoAnswer(self._too_long(day, most_s))
@@ -191,6 +168,7 @@ class _Search:
         return DayTried(
             runs={name: count for name, count in zip(names, day.repeats, strict=True) if count},
             day_s=day.day_s,
+            expected_s=day.expected_s,
             informative_s=day.draft.sailed.seconds("primitive"),
             information=float(np.exp(day.margin)),
         )

@@ -1,13 +1,16 @@
 """The whole runs of least cost that reach an accuracy, together with what is known.
 
-    minimise  sum_q n_q c_q   subject to  f(K + sum_q n_q M_q) >= 0,  n_q whole numbers within limits
+    minimise  sum_q n_q c_q - s   subject to  f(K + sum_q n_q M_q) >= 0,  n_q whole numbers within limits,
+                                              0 <= s <= sum_q n_q s_q,  s <= time of the way
 
-f is concave, so every supergradient G at any M gives a linear inequality that all solutions satisfy. They are added
-until the solution of the linear program with whole numbers satisfies f itself (outer approximation). The bound is that
-of the continuous problem. It is computed from the multipliers of its linear inequalities, scaled until they are dual
-feasible, and so holds whatever the solver's accuracy.
+s is the time of transit that the runs' own way made good saves, as far as there is a way to go. f is concave, so every
+supergradient G at any M gives a linear inequality that all solutions satisfy. They are added until the solution of the
+linear program with whole numbers satisfies f itself (outer approximation). The bound is that of the continuous problem.
+It is computed from the multipliers of its linear inequalities, scaled until they are dual feasible, and so holds
+whatever the solver's accuracy.
 
-Source: J. E. Kelley 1960; M. A. Duran and I. E. Grossmann 1986.
+Source: J. E. Kelley 1960; A. F. Veinott 1967 for cuts where the way to inner points meets the boundary; M. A. Duran and
+I. E. Grossmann 1986.
 """
 
 from __future__ import annotations
@@ -20,7 +23,7 @@ from scipy.optimize import Bounds, LinearConstraint, linprog, milp
 from expdesign.errors import NoAnswer
 from expdesign.shortest_day.accuracy import Accuracy
 from expdesign.shortest_day.tuning import TUNING
-from expdesign.values import Array
+from expdesign.values import Array, seal
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,7 +32,7 @@ class Choice:
 
     Attributes:
         repeats: (q,) whole runs, one at least.
-        cost_s: of them.
+        cost_s: of them, less what they save.
         bound_s: no runs, whole or not, reach the accuracy for less.
     """
 
@@ -38,44 +41,95 @@ class Choice:
     bound_s: float
 
 
-def cheapest_runs(
-    accuracy: Accuracy, matrices: Array, cost_s: Array, *, known: Array, fewest: Array, most: Array, level: float = 0.0
-) -> Choice:
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Offer:
+    """Runs to choose from.
+
+    Attributes:
+        matrices: (q, d, d) information of one whole run, summed over its samples.
+        cost_s: (q,) of one whole run.
+        saved_s: (q,) time of transit that its way made good saves.
+        way_s: most that all runs save together.
+        known: (d, d) information without runs.
+        fewest, most: (q,) limits on runs.
+    """
+
+    matrices: Array
+    cost_s: Array
+    saved_s: Array
+    way_s: float
+    known: Array
+    fewest: Array
+    most: Array
+
+    def __post_init__(self) -> None:
+        seal(self, matrices="q d d", cost_s="q", saved_s="q", known="d d", fewest="q", most="q")
+
+    def information(self, runs: Array) -> Array:
+        """(d, d) of runs (q,), and what is known."""
+        return np.asarray(self.known + np.tensordot(runs, self.matrices, axes=1))
+
+    def total_s(self, runs: Array) -> float:
+        """Cost of runs (q,), less what they save."""
+        return float(runs @ self.cost_s) - min(float(runs @ self.saved_s), self.way_s)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Relaxed:
+    """The continuous problem's solution.
+
+    Attributes:
+        runs: (q,) not whole.
+        bound_s: no runs, whole or not, cost less.
+        worth: (d, d) what information is worth at the margin: trace(G M) seconds.
+        worth_of_saved: of a second of transit saved, from 0 to 1.
+    """
+
+    runs: Array
+    bound_s: float
+    worth: Array
+    worth_of_saved: float
+
+
+def cheapest_runs(accuracy: Accuracy, offer: Offer, *, level: float = 0.0) -> Choice:
     """The cheapest whole runs that reach an accuracy.
 
     Args:
         accuracy: gives the margin f.
-        matrices: (q, d, d) information of one whole run, summed over its samples.
-        cost_s: (q,) of one whole run, more than 0.
-        known: (d, d) information without runs.
-        fewest, most: (q,) limits on runs.
+        offer: runs and their costs.
         level: of f that is to be reached; 0 reaches the accuracy.
 
     Raises:
         NoAnswer: no runs within the limits reach it.
     """
-    cuts = _Cuts(accuracy=accuracy, matrices=matrices, known=known, level=level)
-    if accuracy.margin(cuts.information(most)) < level - TUNING.reached:
-        _refuse(accuracy, cuts.information(most))
-    cuts.add(most.astype(float))
-    bound_s = _relaxed(cuts, cost_s, fewest, most)
+    cuts = _Cuts(accuracy=accuracy, offer=offer, level=level)
+    bound_s = _relaxed(cuts).bound_s
     for _ in range(TUNING.cuts):
         A, b = cuts.rows
         found = milp(
-            cost_s,
+            cuts.cost_s,
             constraints=LinearConstraint(A, lb=b),
-            bounds=Bounds(fewest, most),
-            integrality=np.ones(len(cost_s)),
-            options={"mip_rel_gap": TUNING.choice_gap, "node_limit": TUNING.choice_nodes},
+            bounds=Bounds(*cuts.bounds),
+            integrality=np.r_[np.ones(len(offer.cost_s)), 0.0],
+            options={"mip_rel_gap": TUNING.choice_gap, "node_limit": TUNING.choice_nodes, "presolve": False},
         )
-        runs = most if found.x is None else np.rint(found.x)  # most reaches the level, and is thinned out below
-        if accuracy.margin(cuts.information(runs)) >= level - TUNING.reached:
+        runs = offer.most if found.x is None else np.rint(found.x[:-1])  # most reaches the level, and is thinned out
+        if accuracy.margin(offer.information(runs)) >= level - TUNING.reached:
             break
         cuts.add(runs)
     else:
-        runs = most
-    runs = _without_spare(cuts, runs, cost_s, fewest)
-    return Choice(repeats=tuple(int(n) for n in runs), cost_s=float(runs @ cost_s), bound_s=bound_s)
+        runs = offer.most
+    runs = _without_spare(cuts, runs)
+    return Choice(repeats=tuple(int(n) for n in runs), cost_s=offer.total_s(runs), bound_s=bound_s)
+
+
+def cheapest_shares(accuracy: Accuracy, offer: Offer, *, level: float = 0.0) -> Relaxed:
+    """The cheapest runs, whole or not, and what information and way are worth at the margin.
+
+    Raises:
+        NoAnswer: no runs within the limits reach it.
+    """
+    return _relaxed(_Cuts(accuracy=accuracy, offer=offer, level=level))
 
 
 def _refuse(accuracy: Accuracy, information: Array) -> None:
@@ -89,63 +143,100 @@ def _refuse(accuracy: Accuracy, information: Array) -> None:
 
 
 class _Cuts:
-    """Linear inequalities A n >= b that all runs n with margin above the level satisfy."""
+    """Linear inequalities A x >= b that all x = (runs n, time saved s) with margin above the level satisfy."""
 
-    def __init__(self, *, accuracy: Accuracy, matrices: Array, known: Array, level: float) -> None:
-        self.accuracy, self.matrices, self.known, self.level = accuracy, matrices, known, level
-        self._equal = self.information(np.ones(len(matrices)))
-        self._A, self._b = [np.ones(len(matrices))], [1.0]  # a trial has a run
+    def __init__(self, *, accuracy: Accuracy, offer: Offer, level: float) -> None:
+        """The inequality of the time saved, and a first tangent.
 
-    def information(self, runs: Array) -> Array:
-        """(d, d) of runs (q,), and what is known."""
-        return np.asarray(self.known + np.tensordot(runs, self.matrices, axes=1))
+        Raises:
+            NoAnswer: the most runs do not reach the level.
+        """
+        self.accuracy, self.offer, self.level = accuracy, offer, level
+        most = offer.information(offer.most)
+        if accuracy.margin(most) < level - TUNING.reached:
+            _refuse(accuracy, most)
+        count = len(offer.cost_s)
+        self.cost_s = np.r_[offer.cost_s, -1.0]
+        self.bounds = np.r_[offer.fewest, 0.0], np.r_[offer.most, max(offer.way_s, 0.0)]
+        self.inner = self._moved(offer.fewest, offer.most, min(level + 1.0, accuracy.margin(most)))
+        self._A, self._b = [np.r_[offer.saved_s, -1.0], np.r_[np.ones(count), 0.0]], [0.0, 1.0]  # a trial has a run
+        self._gradients = [np.zeros_like(most)] * 2
+        self.add(offer.fewest)
 
     def add(self, runs: Array) -> None:
-        """The inequality that is tangent at the information of given runs (q,), or near it where that is singular."""
-        M, blend = self.information(runs), TUNING.blend
-        while not np.isfinite(self.accuracy.margin(M)):
-            M, blend = self.information(runs) + blend * self._equal, 10 * blend
+        """The inequality that is tangent where the way from runs (q,) that fall short to inner ones meets the level."""
+        M, matrices = self.offer.information(self._reaching(runs)), self.offer.matrices
         G = self.accuracy.supergradient(M)
-        slope = self.matrices.reshape(len(self.matrices), -1) @ G.ravel()
-        short = self.level - self.accuracy.margin(M) + float(np.sum(G * (M - self.known)))
+        slope = matrices.reshape(len(matrices), -1) @ G.ravel()
+        short = self.level - self.accuracy.margin(M) + float(np.sum(G * (M - self.offer.known)))
         size = max(float(np.abs(slope).max()), np.finfo(float).tiny)
-        self._A.append(slope / size)
+        self._A.append(np.r_[slope / size, 0.0])
         self._b.append(short / size)
+        self._gradients.append(G / size)
+
+    def _reaching(self, runs: Array) -> Array:
+        """Runs (q,) themselves where they nearly reach the level, else the first to do so on the way to the inner ones.
+
+        At runs that tell far too little, information is nearly singular, and a tangent there says next to nothing.
+        """
+        return self._moved(runs, self.inner, self.level - TUNING.choice_gap)
+
+    def _moved(self, runs: Array, inner: Array, level: float) -> Array:
+        """The first runs that reach a level, from given ones to inner ones that do."""
+        low, high = 0.0, 1.0
+        if self.accuracy.margin(self.offer.information(runs)) >= level:
+            return runs
+        for _ in range(TUNING.halvings):
+            middle = (low + high) / 2
+            if self.accuracy.margin(self.offer.information(runs + middle * (inner - runs))) >= level:
+                high = middle
+            else:
+                low = middle
+        return np.asarray(runs + high * (inner - runs))
 
     @property
     def rows(self) -> tuple[Array, Array]:
-        """A (c, q) and b (c,)."""
+        """A (c, q + 1) and b (c,)."""
         return np.array(self._A), np.array(self._b)
 
+    def worth(self, multipliers: Array) -> Array:
+        """(d, d) of information, by the multipliers of the rows."""
+        return np.asarray(np.tensordot(multipliers, np.array(self._gradients), axes=1))
 
-def _relaxed(cuts: _Cuts, cost_s: Array, fewest: Array, most: Array) -> float:
-    """A bound on the cost of the continuous problem, which leaves its tangents among the cuts."""
-    bound_s = float(fewest @ cost_s)
+
+def _relaxed(cuts: _Cuts) -> Relaxed:
+    """The continuous problem, which leaves its tangents among the cuts."""
+    offer, (low, high) = cuts.offer, cuts.bounds
+    best = Relaxed(runs=offer.most, bound_s=-np.inf, worth=np.zeros_like(offer.known), worth_of_saved=0.0)
     for _ in range(TUNING.cuts):
         A, b = cuts.rows
-        found = linprog(cost_s, A_ub=-A, b_ub=-b, bounds=np.column_stack([fewest, most]), method="highs")
+        found = linprog(cuts.cost_s, A_ub=-A, b_ub=-b, bounds=np.column_stack([low, high]), method="highs")
         if found.x is None:
             break
-        bound_s = max(bound_s, _dual_bound(A, b, cost_s, fewest, most, np.maximum(-found.ineqlin.marginals, 0.0)))
-        if cuts.accuracy.margin(cuts.information(found.x)) >= cuts.level - TUNING.choice_gap / 10:
+        multipliers, runs = np.maximum(-found.ineqlin.marginals, 0.0), found.x[:-1]
+        bound_s = max(best.bound_s, _dual_bound(A, b, cuts, multipliers))
+        best = Relaxed(
+            runs=runs, bound_s=bound_s, worth=cuts.worth(multipliers), worth_of_saved=min(float(multipliers[0]), 1.0)
+        )
+        if cuts.accuracy.margin(offer.information(runs)) >= cuts.level - TUNING.choice_gap / 10:
             break
-        cuts.add(found.x)
-    return bound_s
+        cuts.add(runs)
+    return best
 
 
-def _dual_bound(A: Array, b: Array, cost_s: Array, fewest: Array, most: Array, multipliers: Array) -> float:
+def _dual_bound(A: Array, b: Array, cuts: _Cuts, multipliers: Array) -> float:
     """Least cost within the limits by weak duality, for any multipliers that are not negative."""
-    reduced = cost_s - multipliers @ A
-    return float(multipliers @ b + np.where(reduced > 0, reduced * fewest, reduced * most).sum())
+    reduced, (low, high) = cuts.cost_s - multipliers @ A, cuts.bounds
+    return float(multipliers @ b + np.where(reduced > 0, reduced * low, reduced * high).sum())
 
 
-def _without_spare(cuts: _Cuts, runs: Array, cost_s: Array, fewest: Array) -> Array:
+def _without_spare(cuts: _Cuts, runs: Array) -> Array:
     """Runs (q,) without those that can be left out, dearest first."""
-    runs = np.array(runs, dtype=float)
-    for index in np.argsort(-cost_s):
-        while runs[index] > fewest[index] and runs.sum() > 1:
+    offer, runs = cuts.offer, np.array(runs, dtype=float)
+    for index in np.argsort(-offer.cost_s):
+        while runs[index] > offer.fewest[index] and runs.sum() > 1:
             fewer = runs - np.eye(len(runs))[index]
-            if cuts.accuracy.margin(cuts.information(fewer)) < cuts.level - TUNING.reached:
+            if cuts.accuracy.margin(offer.information(fewer)) < cuts.level - TUNING.reached:
                 break
             runs = fewer
     return runs

@@ -1,19 +1,22 @@
 """What one more run costs and tells, its leg included, learnt from the days that were planned.
 
-A run takes its own time, and a share of the repositioning that plans have beyond the direct way, less the time that its
-way made good saves. The leg that leads to a run tells, too; where no day had the run, it is taken to tell nothing.
+A run takes its own time, and a share of the repositioning that plans have beyond the direct way. Its way made good
+saves time of that way. The leg that leads to a run tells, too; where no day had the run, it is taken to tell nothing.
 These are estimates for the next plan; the next plan itself says what is true.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from expdesign.dictionary import Primitive
+from expdesign.plan.assembly import ship_on_legs
+from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import Draft
+from expdesign.shortest_day.cheapest import Offer
 from expdesign.shortest_day.tuning import TUNING
 from expdesign.values import Array, seal
 
@@ -23,19 +26,23 @@ class Prices:
     """Costs and information at the margin.
 
     Attributes:
-        cost_s: (q,) of one more whole run.
+        cost_s: (q,) of one more whole run, its leg included.
+        saved_s: (q,) time at transit speed of its way made good.
+        way_s: time at transit speed of the way from start to goal.
         legs: (q, d, d) information of the leg that leads to it.
         goal: (d, d) information of the leg to the goal.
         level: margin of the accuracy that runs and legs must reach by these estimates.
     """
 
     cost_s: Array
+    saved_s: Array
+    way_s: float
     legs: Array
     goal: Array
     level: float = 0.0
 
     def __post_init__(self) -> None:
-        seal(self, cost_s="q", legs="q d d", goal="d d")
+        seal(self, cost_s="q", saved_s="q", legs="q d d", goal="d d")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -56,17 +63,52 @@ class DraftedDay:
 
     @property
     def day_s(self) -> float:
-        """Everything between start and goal [s]."""
+        """Everything between start and goal, as planned [s]."""
         return self.draft.sailed.day_s
 
+    @property
+    def expected_s(self) -> float:
+        """The same with the expected time of go-arounds [s]."""
+        return self.day_s + self.draft.going_round_s
 
-def first_prices(run_s: Array, dimension: int) -> Prices:
-    """Prices before any day was planned."""
+
+def first_prices(problem: PlanProblem) -> Prices:
+    """Prices before any day was planned: the way is at least the straight line to the goal."""
+    count, dimension = len(problem.primitives), problem.design.problem.dimension
+    transit_mps = ship_on_legs(problem).transit_speed_mps
     return Prices(
-        cost_s=run_s + TUNING.first_leg_s,
-        legs=np.zeros((len(run_s), dimension, dimension)),
+        cost_s=problem.design.problem.run_s + TUNING.first_leg_s,
+        saved_s=_made_good_s(problem.primitives, transit_mps),
+        way_s=float(np.hypot(*(problem.goal - problem.start)[:2])) / transit_mps,
+        legs=np.zeros((count, dimension, dimension)),
         goal=np.zeros((dimension, dimension)),
         level=float(np.log(TUNING.first_share)),
+    )
+
+
+def offered(problem: PlanProblem, prices: Prices, free: Collection[str] = ()) -> Offer:
+    """What runs cost and tell with their legs.
+
+    Args:
+        problem: gives the runs and the limits on them.
+        prices: of runs.
+        free: of the limits.
+    """
+    durations, limits = problem.design.problem, problem.design.problem.constraints
+    names, run_s = durations.names, durations.run_s
+    barred = set(limits.excluded) - set(free)
+    least_s = np.array([limits.least_s.get(name, 0.0) for name in names])
+    most_s = np.array([0.0 if name in barred else limits.most_s.get(name, np.inf) for name in names])
+    required = np.array([float(name in limits.required) for name in names])
+    samples = run_s / problem.vessel.sample_time_s
+    return Offer(
+        matrices=durations.matrices * samples[:, None, None] + prices.legs,
+        cost_s=prices.cost_s,
+        saved_s=prices.saved_s,
+        way_s=prices.way_s,
+        known=prices.goal,
+        fewest=np.maximum(np.ceil(least_s / run_s), required),
+        most=np.minimum(np.floor(most_s / run_s), TUNING.most_runs),
     )
 
 
@@ -86,21 +128,28 @@ def learnt_prices(primitives: Sequence[Primitive], days: Sequence[DraftedDay]) -
             if leg.kind == "reposition":
                 told[names.index(leg.name)] += matrix
                 found[names.index(leg.name)] += 1
-    return Prices(cost_s=_cost_s(primitives, days), legs=told / np.maximum(found, 1)[:, None, None], goal=goal)
+    draft = days[0].draft
+    saved_s = _made_good_s(primitives, draft.transit_mps)
+    return Prices(
+        cost_s=np.array([item.duration_s for item in primitives]) + _leg_s(days, saved_s),
+        saved_s=saved_s,
+        way_s=draft.direct_s,
+        legs=told / np.maximum(found, 1)[:, None, None],
+        goal=goal,
+    )
 
 
-def _cost_s(primitives: Sequence[Primitive], days: Sequence[DraftedDay]) -> Array:
-    """(q,) cost of one more whole run [s]."""
-    draft, run_s = days[0].draft, np.array([item.duration_s for item in primitives])
-    made_good_s = np.array([_displacement_m(item) for item in primitives]) / draft.transit_mps
-    runs = np.array([day.repeats for day in days], dtype=float)
-    usable = min(1.0, draft.direct_s / max(float((runs @ made_good_s).mean()), 1e-9))
-    saved_s = usable * made_good_s
-    beyond_s = sum(day.draft.sailed.seconds("reposition") - draft.direct_s for day in days)
-    leg_s = (beyond_s + float((runs @ saved_s).sum())) / float(runs.sum())
-    return np.asarray(np.maximum(run_s + leg_s - saved_s, TUNING.least_price * run_s))
+def _leg_s(days: Sequence[DraftedDay], saved_s: Array) -> float:
+    """Repositioning for each run, beyond the way to the goal that runs leave [s]."""
+    beyond_s = sum(
+        day.draft.sailed.seconds("reposition")
+        + day.draft.going_round_s
+        - max(day.draft.direct_s - float(np.dot(day.repeats, saved_s)), 0.0)
+        for day in days
+    )
+    return max(float(beyond_s) / sum(sum(day.repeats) for day in days), TUNING.least_leg_s)
 
 
-def _displacement_m(primitive: Primitive) -> float:
-    track = primitive.trajectory.pose[:, :2]
-    return float(np.hypot(*(track[-1] - track[0])))
+def _made_good_s(primitives: Sequence[Primitive], transit_mps: float) -> Array:
+    """(q,) time at transit speed of each run's displacement."""
+    return np.array([np.hypot(*item.displacement[:2]) for item in primitives]) / transit_mps

@@ -15,10 +15,14 @@ class Tuning:
         first_leg_s: time of repositioning for each run, before a day has been planned [s].
         level_step, level_steps: margin that is asked for besides where the cheapest runs were tried already, at most so
             many times.
-        least_price: least cost of a run, as a share of its duration.
+        least_leg_s: least of it once days have been planned [s].
+        growth_rounds: searches for manoeuvres that are worth more than they cost.
+        growth_families: searched in each of them, the most promising; the best of each may be added.
+        added_speed: largest surge speed of a manoeuvre that is added, in transit speeds; ships that are a little slower
+            than the model must still reach it.
+        used: least runs of a manoeuvre found, in the cheapest runs not made whole, for it to be added.
         cuts: most linear bounds on the accuracy in the choice of runs.
-        blend: share of one run of everything that is added to singular information where a bound is made; grows
-            tenfold until it is regular.
+        halvings: of the way to inner runs, in search of the boundary.
         reached: shortfall of the accuracy's margin that counts as reached.
         choice_gap: relative gap at which the choice of whole runs ends.
         choice_nodes: most nodes of its tree.
@@ -27,12 +31,16 @@ class Tuning:
 
     rounds: int = 6
     first_share: float = 0.6
-    first_leg_s: float = 60.0
+    first_leg_s: float = 30.0
     level_step: float = 0.05
     level_steps: int = 10
-    least_price: float = 0.25
+    least_leg_s: float = 5.0
+    growth_rounds: int = 4
+    growth_families: int = 3
+    added_speed: float = 0.9
+    used: float = 0.2
     cuts: int = 200
-    blend: float = 1e-6
+    halvings: int = 20
     reached: float = 1e-9
     choice_gap: float = 1e-3
     choice_nodes: int = 2000

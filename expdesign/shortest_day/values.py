@@ -19,12 +19,14 @@ class AccuracySettings:
         std: largest standard deviation of parameters, in their units.
         relative_std: the same, as a share of the nominal value.
         most_s: longest day [s], or None for no limit.
+        grow: whether manoeuvres are added that shorten the day.
     """
 
     as_durations: bool = False
     std: Mapping[str, float] = field(default_factory=dict)
     relative_std: Mapping[str, float] = field(default_factory=dict)
     most_s: float | None = None
+    grow: bool = True
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,13 +35,15 @@ class DayTried:
 
     Attributes:
         runs: how often each primitive is run.
-        day_s, informative_s: all of it, and its runs [s].
+        day_s, informative_s: all of it, and its runs, as planned [s].
+        expected_s: all of it with the expected time of go-arounds [s].
         information: of the whole track as a share of what is needed: time would have to be 1 / information as long.
     """
 
     runs: Mapping[str, int]
     day_s: float
     informative_s: float
+    expected_s: float
     information: float
 
 

@@ -90,6 +90,6 @@ def plan_for(scenario: Scenario | Path | str, *, seed: int = 0, progress: Progre
     design = designed(case, information, seed=seed, progress=within(progress, 0.1, 0.15))
     day = planned_day(case, information, design, seed=seed, progress=within(progress, 0.15, 1.0))
     route = built_route(case, day.plan)
-    content = report_content(case, information, day.design, day.plan, seed)
+    content = report_content(case, day.information, day.design, day.plan, seed)
     content = replace(content, compared=efficiencies(design), route=route, growth=growth, day=day.shortest)
     return Trial(content=content, route=route)

@@ -3,6 +3,7 @@
 from expdesign.plan.local_planner.arcs import arc_end, moved, run_ends
 from expdesign.plan.local_planner.factory import local_planner
 from expdesign.plan.local_planner.protocol import (
+    GoAroundTime,
     LegEnds,
     LocalPlanner,
     Pair,
@@ -15,6 +16,7 @@ from expdesign.plan.local_planner.protocol import (
 from expdesign.plan.local_planner.transitions import pairs_of
 
 __all__ = [
+    "GoAroundTime",
     "LegEnds",
     "LocalPlanner",
     "Pair",

@@ -98,14 +98,15 @@ class AgilePlanner:
             length_m = np.hypot(*ahead.T) + polyline_length(bends) + np.hypot(*behind.T)
             through_m = np.maximum(length_m - away @ space.current_to / rule.speed_mps, 0.0)
             first, last = (np.arctan2(step[..., 1], step[..., 0]) for step in (ahead, behind))
-            return rule.seconds(through_m, froms[..., 2] - first, tos[..., 2] - last, turn, *speeds) + more_s
+            found = rule.seconds(through_m, froms[..., 2] - first, tos[..., 2] - last, turn, *speeds) + more_s
+            return found + space.going_round_s(ends.before, ends.after, found)
         leg_s = np.zeros(len(away))
         for _ in range(LOCAL.drift_rounds if space.current_to.any() else 1):
             step = away - leg_s[:, None] * space.current_to
             course = np.arctan2(step[..., 1], step[..., 0])
             angles = froms[..., 2] - course, tos[..., 2] - course, turn
             leg_s = rule.seconds(np.hypot(*step.T), *angles, *speeds) + more_s
-        return leg_s
+        return leg_s + space.going_round_s(ends.before, ends.after, leg_s)
 
     def leg_path(self, space: SearchSpace, before: int, start: Array, end: Array) -> Array:
         """(k, 2) places on the straight line."""
@@ -176,6 +177,7 @@ class AgilePlanner:
             if longer:  # straight before the run
                 step = step + longer * np.column_stack([np.cos(step[:, 2]), np.sin(step[:, 2]), 0 * leg_s])
                 leg_s = self.times.step_s(step, np.array(exit_mps), entry) + space.more_s(last, q)
+            leg_s = leg_s + space.going_round_s(last, q, leg_s)
             found.append(_stepped(space, plans, q, able[where], step, leg_s))
         return found
 
@@ -189,7 +191,8 @@ class AgilePlanner:
             longer = length + space.more_run_up_m(last, q)
             steps = np.column_stack([longer * np.cos(course), longer * np.sin(course), heading])
             seconds = self.times.step_s(steps, np.array(exit_mps), np.array(space.footprints[q].entry_mps))
-            step[where], leg_s[where] = steps, seconds + space.more_s(last, q)
+            seconds = seconds + space.more_s(last, q)
+            step[where], leg_s[where] = steps, seconds + space.going_round_s(last, q, seconds)
         return _stepped(space, plans, q, able, step, leg_s)
 
     def _on_path(
@@ -215,6 +218,7 @@ class AgilePlanner:
         )
         more_s = np.array([space.more_s(last, q) for last in range(-1, len(space.footprints))])
         leg_s += more_s[plans.last[parent] + 1, None]
+        leg_s += np.where(plans.last[parent, None] >= 0, space.going_round_s(q, q, leg_s), 0.0)
         start = np.column_stack([np.repeat(place, len(turns), axis=0), heading.ravel()])
         return on_paths(space, q, plans.pose, np.repeat(parent, len(turns)), start, leg_s.ravel())
 

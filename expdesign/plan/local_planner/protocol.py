@@ -15,14 +15,16 @@ import numpy as np
 from expdesign.conventions import wrap_angle
 from expdesign.dictionary import Primitive
 from expdesign.plan.chart import ClearanceField, GoalDistance
-from expdesign.plan.control import Capability
+from expdesign.plan.control import AgileShip, Capability
 from expdesign.plan.legs import LegTask, LegWater
+from expdesign.plan.local_planner.tuning import LOCAL
 from expdesign.plan.runs import Footprint
 from expdesign.plan.values import Placement
 from expdesign.plan.work_budget import WorkBudget
 from expdesign.progress import Progress, silent
 from expdesign.sea_area import LocalFrame
 from expdesign.values import Array, seal
+from expdesign.vessel import Vessel
 
 Pair = tuple[str, str]
 """Names of the runs before and after a leg; "" for start and goal."""
@@ -45,6 +47,31 @@ class TriedTransition:
     more_s: float
 
 
+@dataclass(frozen=True, kw_only=True)
+class GoAroundTime:
+    """Expected time of go-arounds before a run that follows another: the shorter the leg, the less the ship is settled.
+
+    Attributes:
+        soon_s: where there is no leg.
+        settled_s: length of leg on which it falls to 1/e.
+    """
+
+    soon_s: float
+    settled_s: float
+
+    @staticmethod
+    def of(ship: Capability, vessel: Vessel) -> GoAroundTime | None:
+        """Of ships that turn on the spot; the legs of others have run-ups."""
+        if not isinstance(ship, AgileShip):
+            return None
+        run_up_s = ship.run_up_s(vessel, ship.transit_speed_mps)
+        return GoAroundTime(soon_s=LOCAL.go_around_run_ups * run_up_s, settled_s=LOCAL.settled_run_ups * run_up_s)
+
+    def seconds(self, leg_s: Array) -> Array:
+        """(...,) for legs (...,)."""
+        return np.asarray(self.soon_s * np.exp(-np.asarray(leg_s) / self.settled_s))
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SearchSpace:
     """Data of the search for places and orders.
@@ -60,6 +87,7 @@ class SearchSpace:
         current_to: (2,) mean current [m/s].
         tried: transitions that were tried; None where no leg was found.
         run_up: extra straight before a run in hull lengths; grows where a leg failed.
+        go_around: expected time of go-arounds, where plans are compared by it too.
         refused: (b, 3) start poses that turned out unreachable or unsafe; none is tried near them again.
     """
 
@@ -74,6 +102,7 @@ class SearchSpace:
     current_to: Array
     tried: Mapping[Pair, TriedTransition | None] = dataclasses.field(default_factory=dict)
     run_up: Mapping[Pair, float] = dataclasses.field(default_factory=dict)
+    go_around: GoAroundTime | None = None
     refused: Array = dataclasses.field(default_factory=lambda: np.zeros((0, 3)))
 
     def __post_init__(self) -> None:
@@ -93,6 +122,12 @@ class SearchSpace:
         """How much longer legs from one run to another take than the rule says; -1 for start and goal."""
         tried = self.tried.get(self.pair(before, after))
         return 0.0 if tried is None else tried.more_s
+
+    def going_round_s(self, before: int, after: int, leg_s: Array) -> Array:
+        """(...,) expected time of go-arounds after legs (...,) from one run to another; -1 for start and goal."""
+        if self.go_around is None or before < 0 or after < 0:
+            return np.zeros(np.shape(leg_s))
+        return self.go_around.seconds(leg_s)
 
     def more_run_up_m(self, before: int, after: int) -> float:
         """Extra straight before a run [m]."""

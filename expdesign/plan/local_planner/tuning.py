@@ -27,6 +27,8 @@ class Tuning:
         settling_share: time to settle, in that of the actuators from nothing to full.
         near_hulls: hull lengths that an agile leg needs to suit any place, heading and speed at its ends; shorter ones
             are optimised in advance.
+        go_around_run_ups: expected time of go-arounds before a run that follows another at once, in run-ups, and
+        settled_run_ups: length of leg, in run-ups, on which it falls to 1/e; of drawn trials with legs of 5 to 270 s.
         drift_rounds: rounds in which the time of a leg and the drift in that time are made to agree.
         transition_trials: plans whose transitions are tried before the search proper.
         transition_guess_hulls: length of the leg with which the optimiser begins.
@@ -54,6 +56,8 @@ class Tuning:
     settling_share: float = 1.2
     near_hulls: float = 1.5
     far_hulls: float = 4.0
+    go_around_run_ups: float = 3.0
+    settled_run_ups: float = 2.0
     drift_rounds: int = 3
     transition_trials: int = 4
     transition_guess_hulls: float = 0.5

@@ -146,7 +146,10 @@ class _Legs:
         north, east = after[:2] - before[:2] - tried.seconds * self.space.current_to
         away = np.hypot(c * north + s * east - tried.step[0], c * east - s * north - tried.step[1])
         turned = abs(float(wrap_angle(after[2] - before[2] - tried.step[2])))
-        return tried.seconds if away < SEARCH.same * self.space.hull_m and turned < SEARCH.same else 0.0
+        if away >= SEARCH.same * self.space.hull_m or turned >= SEARCH.same:
+            return 0.0
+        before_run, after_run = (int(run) for run in np.r_[self.ends.last, runs, -1][k : k + 2])
+        return tried.seconds + float(self.space.going_round_s(before_run, after_run, np.array(tried.seconds)))
 
     def _kept(self, runs: np.ndarray, k: int) -> bool:
         """Whether leg k failed elsewhere and was given more room: it is left alone."""

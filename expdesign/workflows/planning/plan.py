@@ -58,8 +58,12 @@ def _plan(case: Scenario, out: Path | None, durations: Path | None, seed: int, p
     planning = within(progress, 0.1, 0.95)
     if durations is not None:
         design = with_repeats(design, load_repeats(durations, names=design.problem.names))
-        day = Day(design=design, plan=planned(case, information, design, seed=seed, progress=planning))
+        day = Day(
+            information=information,
+            design=design,
+            plan=planned(case, information, design, seed=seed, progress=planning),
+        )
     else:
         day = planned_day(case, information, design, seed=seed, progress=planning)
-    files = {**plan_files(case, day.plan), **day_files(day)}
+    files = {**plan_files(case, day.plan), **day_files(case, day)}
     return written(case, out, files, {**plan_summary(day.plan), **day_summary(day)}, progress, day_tables(day))

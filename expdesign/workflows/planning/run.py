@@ -61,9 +61,9 @@ def _run(case: Scenario, out: Path | None, seed: int, progress: Progress) -> Out
     writing = within(progress, 0.83, 1.0)
     writing("writing routes, run cards and report", 0.0)
     route = built_route(case, day.plan)
-    content = report_content(case, information, day.design, day.plan, seed)
+    content = report_content(case, day.information, day.design, day.plan, seed)
     content = replace(content, compared=compared, route=route, day=day.shortest)
-    files = {**trial_files(case, growth, content, route, progress=writing), **day_files(day)}
+    files = {**trial_files(case, growth, content, route, progress=writing), **day_files(case, day)}
     summary = {
         **growth_summary(growth, case),
         **day_summary(day),

@@ -135,7 +135,7 @@ def _computed(case: Scenario, changes: tuple[str, ...], with_plan: bool, seed: i
         plan: dict[str, object] = {}
         if with_plan:
             day = planned_day(case, information, design, seed=seed, progress=planning)
-            design, plan = day.design, dict(plan_summary(day.plan))
+            information, design, plan = day.information, day.design, dict(plan_summary(day.plan))
             plan["trial_s"] = float(str(plan["informative_s"])) + float(str(plan["repositioning_s"]))
         comparing("comparing criteria", 0.0)
         return _described(case, changes, information, design, plan)

@@ -6,16 +6,29 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from expdesign.dictionary import PrimitiveSpec
 from expdesign.durations import DurationDesign
+from expdesign.errors import InputError
+from expdesign.export.files import dictionary_files
+from expdesign.growing import GrowSettings
 from expdesign.information import PrimitiveInformation
 from expdesign.memory import recalled
+from expdesign.plan.problem import PlanProblem
 from expdesign.plan.values import Plan
-from expdesign.progress import Progress, silent
+from expdesign.progress import Progress, in_phases, silent
 from expdesign.scenario import Scenario
-from expdesign.shortest_day import ShortestDay
+from expdesign.shortest_day import Accuracy, ShortestDay
 from expdesign.workflows.outcome import TextTable
+from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.design_tables import design_summary
+from expdesign.workflows.steps.grown import STEM
 from expdesign.workflows.steps.planned import plan_problem, planned
+from expdesign.workflows.steps.scored import scored
+
+FEW_CANDIDATES = 64
+"""Of every family at first, where [design.grow] does not say how many: the prices of each round lead to better ones."""
+WORK = (0.2, 0.8)
+"""Share of the work: the search for manoeuvres, and for the shortest day."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -23,14 +36,18 @@ class Day:
     """A planned trial.
 
     Attributes:
+        information: of the dictionary that the plan takes its runs from.
         design: with the runs that the plan does.
         plan: the trial.
         shortest: how it was found to be the shortest, or None where total_s decides.
+        added: manoeuvres of it that the scenario's dictionary has not.
     """
 
+    information: tuple[PrimitiveInformation, ...]
     design: DurationDesign
     plan: Plan
     shortest: ShortestDay | None = None
+    added: tuple[PrimitiveSpec, ...] = ()
 
 
 def planned_day(
@@ -54,19 +71,53 @@ def planned_day(
         InputError: plans cannot be made for the vessel, or the accuracy cannot be counted.
         NoAnswer: the accuracy cannot be reached, or there is no plan.
     """
-    if case.design.accuracy is None:
-        return Day(design=design, plan=planned(case, information, design, seed=seed, progress=progress))
+    asked, information = case.design.accuracy, tuple(information)
+    if asked is None:
+        plan = planned(case, information, design, seed=seed, progress=progress)
+        return Day(information=information, design=design, plan=plan)
     from expdesign.shortest_day import day_bound, shortest_day, stated_accuracy
 
-    problem = plan_problem(case, information, design, seed=seed)
-    accuracy = stated_accuracy(case.design.accuracy, design, case.vessel)
-    found = shortest_day(problem, accuracy, most_s=case.design.accuracy.most_s, progress=progress)
+    accuracy = stated_accuracy(asked, design, case.vessel)
+    searching, planning = in_phases(progress, *WORK)
+    added = _added(case, plan_problem(case, information, design, seed=seed), accuracy, seed, searching)
+    if added:
+        case = _with_additions(case, added)
+        information = scored(case)
+        design = designed(case, information, seed=seed)
+    problem = replace(plan_problem(case, information, design, seed=seed), expected=True)
+    names = tuple(spec.name for spec in added)
+    found = shortest_day(problem, accuracy, added=names, most_s=asked.most_s, progress=planning)
     found = replace(found, bound=recalled(day_bound, problem, accuracy, found.plan))
-    return Day(design=found.design, plan=found.plan, shortest=found)
+    return Day(information=information, design=found.design, plan=found.plan, shortest=found, added=added)
 
 
-def day_files(day: Day) -> dict[str, str | bytes]:
-    """The search for the shortest day, where there was one."""
+def _added(
+    case: Scenario, problem: PlanProblem, accuracy: Accuracy, seed: int, progress: Progress
+) -> tuple[PrimitiveSpec, ...]:
+    """Manoeuvres that would shorten the day; none where the scenario wants none, or the vessel can do none."""
+    from expdesign.shortest_day import manoeuvres_worth_adding
+
+    if case.design.accuracy is None or not case.design.accuracy.grow:
+        return ()
+    settings = case.design.grow or GrowSettings(pool=FEW_CANDIDATES)
+    if settings.seed is None:
+        settings = replace(settings, seed=seed)
+    try:
+        return recalled(manoeuvres_worth_adding, problem, accuracy, settings, progress=progress)
+    except InputError:
+        if case.design.grow is None:  # not asked for, so no fault of the scenario
+            return ()
+        raise
+
+
+def _with_additions(case: Scenario, added: Sequence[PrimitiveSpec]) -> Scenario:
+    """The scenario with more manoeuvres, which the optimal durations that state the accuracy go without."""
+    excluded = (*case.design.excluded, *(spec.name for spec in added))
+    return replace(case, dictionary=(*case.dictionary, *added), design=replace(case.design, excluded=excluded))
+
+
+def day_files(case: Scenario, day: Day) -> dict[str, str | bytes]:
+    """The search for the shortest day, where there was one, and the dictionary with what it added."""
     found = day.shortest
     if found is None:
         return {}
@@ -74,19 +125,32 @@ def day_files(day: Day) -> dict[str, str | bytes]:
         "day_s": found.plan.commands.duration_s,
         "information": found.information,
         **_bound(found),
+        "added": {spec.name: {"family": spec.family, **spec.settings} for spec in day.added},
         "cost_of_runs_s": found.cost_s,
         "cost_of_runs_bound_s": found.cost_bound_s,
         "tried": [
             {
                 "runs": dict(item.runs),
                 "day_s": item.day_s,
+                "expected_s": item.expected_s,
                 "informative_s": item.informative_s,
                 "information": item.information,
             }
             for item in found.tried
         ],
     }
-    return {"day.json": json.dumps(content, indent=2) + "\n"}
+    return {"day.json": json.dumps(content, indent=2) + "\n", **_dictionary(case, day.added)}
+
+
+def _dictionary(case: Scenario, added: Sequence[PrimitiveSpec]) -> dict[str, str | bytes]:
+    """The dictionary with additions as a file for every command; nothing without any."""
+    if not added:
+        return {}
+    comments = (
+        f"The dictionary of scenario {case.name!r} and {len(added)} manoeuvres that shorten its day.",
+        f"They were found for vessel {case.vessel.name!r}.",
+    )
+    return dictionary_files([*case.dictionary, *added], name=f"{case.name}-grown", stem=STEM, comments=comments)
 
 
 def _bound(found: ShortestDay) -> dict[str, object]:
@@ -119,6 +183,7 @@ def day_summary(day: Day) -> dict[str, object]:
         "day_s": found.plan.commands.duration_s,
         "information_of_what_was_asked": found.information,
         **{name: value for name, value in _bound(found).items() if name != "bound"},
+        "manoeuvres_added": len(day.added),
         "days_tried": len(found.tried),
     }
 
@@ -132,11 +197,12 @@ def day_tables(day: Day) -> tuple[TextTable, ...]:
         (
             str(number),
             f"{item.day_s:.0f}",
+            f"{item.expected_s:.0f}",
             f"{item.informative_s:.0f}",
             f"{item.information:.1%}",
             ", ".join(f"{count} {name}" for name, count in item.runs.items()),
         )
         for number, item in enumerate(found.tried, start=1)
     )
-    header = ("day", "seconds", "of these in runs", "information of what is needed", "runs")
+    header = ("day", "seconds", "with go-arounds", "of these in runs", "information of what is needed", "runs")
     return (TextTable(title="Days planned in search of the shortest", header=header, rows=rows),)

@@ -24,7 +24,9 @@ def grown(
     seed: int = 0,
     progress: Progress = silent,
 ) -> Growth | None:
-    """The scored dictionary with additions as the scenario sets; None without [design.grow].
+    """The scored dictionary with additions as the scenario sets; None without [design.grow], and for a stated accuracy.
+
+    The search for the shortest day looks for additions by itself, for what they save.
 
     Args:
         case: the scenario; its key design.grow says how.
@@ -33,7 +35,8 @@ def grown(
         seed: of all chance, unless the key has its own.
         progress: of the search.
     """
-    settings = case.design.grow or (GrowSettings() if always else None)
+    for_durations = None if case.design.accuracy else case.design.grow
+    settings = for_durations or ((case.design.grow or GrowSettings()) if always else None)
     if settings is None:
         return None
     return grow_dictionary(

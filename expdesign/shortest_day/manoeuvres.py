@@ -1,0 +1,147 @@
+"""Manoeuvres besides the dictionary that shorten the day: worth more at the margin than they cost.
+
+The cheapest runs of the present dictionary give prices: what information is worth in seconds, and what a second of
+transit saved is. A manoeuvre that is worth more than its time, its leg's included, less what its own way saves, makes
+the day cheaper, and is added. So where there is a way to go, manoeuvres are found that inform while they make good as
+much of it as a transit would.
+
+Source: G. B. Dantzig and P. Wolfe, Operations Research 8 (1960), 101-111, for adding columns by the prices of the rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from expdesign.dictionary import PrimitiveSpec
+from expdesign.growing import (
+    Archive,
+    Candidate,
+    GrowSettings,
+    Measure,
+    Worth,
+    motion_limits,
+    pool_of,
+    refined,
+    searched_spaces,
+)
+from expdesign.plan.assembly import ship_on_legs
+from expdesign.plan.problem import PlanProblem
+from expdesign.progress import Progress, silent
+from expdesign.shortest_day.accuracy import Accuracy
+from expdesign.shortest_day.cheapest import Offer, Relaxed, cheapest_shares
+from expdesign.shortest_day.prices import first_prices, offered
+from expdesign.shortest_day.tuning import TUNING
+from expdesign.values import Array
+
+
+def manoeuvres_worth_adding(
+    problem: PlanProblem, accuracy: Accuracy, settings: GrowSettings, *, progress: Progress = silent
+) -> tuple[PrimitiveSpec, ...]:
+    """Manoeuvres that the cheapest runs for an accuracy would use, found by their worth in seconds.
+
+    Velocities keep to the range of the dictionary, and nearly reach the speed of legs, unless the settings limit them.
+    They last as long as the longest run of the dictionary, unless the settings say how long.
+
+    Args:
+        problem: gives the dictionary, the limits on runs, and the way from start to goal.
+        accuracy: to be reached.
+        settings: of the search; seconds worth take the place of sensitivity.
+        progress: of the search.
+
+    Raises:
+        NoAnswer: no runs within the limits reach the accuracy; then there are no prices.
+        InputError: no family or no range is left to search.
+    """
+    progress("simulating candidates", 0.0)
+    offer, transit_mps = offered(problem, first_prices(problem)), ship_on_legs(problem).transit_speed_mps
+    limits = _limits(problem, settings, transit_mps)
+    settings = replace(settings, run_s=settings.run_s or max(item.duration_s for item in problem.primitives))
+    spaces = searched_spaces(problem.vessel, problem.primitives, settings, limits)
+    measure, seed = _measure(problem, limits), settings.seed or 0
+    archives, rng = pool_of(spaces, measure, pool=settings.pool, seed=seed), np.random.default_rng(seed)
+    level, given, specs = float(np.log(TUNING.first_share)), len(offer.cost_s), list[PrimitiveSpec]()
+    for number in range(TUNING.growth_rounds):
+        worth = _worth(cheapest_shares(accuracy, offer, level=level), problem, transit_mps)
+        progress("searching for manoeuvres that shorten the day", (number + 0.5) / (TUNING.growth_rounds + 1))
+        archives = _refined(archives, worth, measure, rng)
+        found = _better(archives, worth, settings)
+        if not found:
+            break
+        specs += [candidate.spec for candidate in found]
+        offer = _with(offer, found, problem, transit_mps)
+    runs = cheapest_shares(accuracy, offer, level=level).runs[given:]
+    most = np.argsort(-runs, kind="stable")[: settings.rounds]
+    chosen = [specs[index] for index in np.sort(most[runs[most] > TUNING.used])]
+    taken = {item.name for item in problem.primitives}
+    return tuple(replace(spec, name=_unused(number, spec, taken)) for number, spec in enumerate(chosen, start=1))
+
+
+def _limits(problem: PlanProblem, settings: GrowSettings, transit_mps: float) -> Array:
+    """(3, 2) of u, v, r: of the dictionary, nearly as fast ahead as legs are, and what is stated."""
+    limits = motion_limits(settings, problem.primitives)
+    if "u_mps" not in settings.limits:
+        limits[0, 1] = max(limits[0, 1], TUNING.added_speed * transit_mps)
+    return limits
+
+
+def _measure(problem: PlanProblem, limits: Array) -> Measure:
+    durations = problem.design.problem
+    return Measure(
+        vessel=problem.vessel,
+        names=durations.parameters,
+        environment=problem.environment,
+        mean_subtraction=durations.mean_subtraction,
+        limits=limits,
+    )
+
+
+def _worth(shares: Relaxed, problem: PlanProblem, transit_mps: float) -> Worth:
+    """Seconds that a run is worth for each second that it costs."""
+    return Worth(
+        gradient=shares.worth / problem.vessel.sample_time_s,
+        leg_s=TUNING.first_leg_s,
+        saved_s_per_m=shares.worth_of_saved / transit_mps,
+    )
+
+
+def _refined(
+    archives: Sequence[Archive], worth: Worth, measure: Measure, rng: np.random.Generator
+) -> tuple[Archive, ...]:
+    """The archives, the most promising of them with local steps."""
+    merits = np.array([float(archive.merits(worth).max()) for archive in archives])
+    chosen = np.sort(np.argsort(-merits, kind="stable")[: TUNING.growth_families]).tolist()
+    better = iter(refined([archives[index] for index in chosen], worth, measure, rng))
+    return tuple(next(better) if index in chosen else archive for index, archive in enumerate(archives))
+
+
+def _better(archives: Sequence[Archive], worth: Worth, settings: GrowSettings) -> list[Candidate]:
+    """The best candidate of each family that is worth more than it costs, the best first, so many at most."""
+    found = [best for archive in archives if (best := archive.best(worth)) is not None]
+    better = sorted((best for best in found if best.merit > 1 + settings.tolerance), key=lambda best: -best.merit)
+    return better[: TUNING.growth_families]
+
+
+def _with(offer: Offer, found: Sequence[Candidate], problem: PlanProblem, transit_mps: float) -> Offer:
+    """More runs to choose from."""
+    run_s = np.array([candidate.spec.settings["duration_s"] for candidate in found])
+    samples = run_s / problem.vessel.sample_time_s
+    matrices = np.array([candidate.matrix for candidate in found]) * samples[:, None, None]
+    return replace(
+        offer,
+        matrices=np.concatenate([offer.matrices, matrices]),
+        cost_s=np.r_[offer.cost_s, run_s + TUNING.first_leg_s],
+        saved_s=np.r_[offer.saved_s, np.array([candidate.made_good_m for candidate in found]) / transit_mps],
+        fewest=np.r_[offer.fewest, np.zeros(len(found))],
+        most=np.r_[offer.most, np.full(len(found), float(TUNING.most_runs))],
+    )
+
+
+def _unused(number: int, spec: PrimitiveSpec, taken: Collection[str]) -> str:
+    """A name that no primitive has."""
+    name = f"added-{number}-{spec.family.replace('_', '-')}"
+    while name in taken:
+        name += "-again"
+    return name
