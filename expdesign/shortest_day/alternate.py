@@ -137,9 +137,10 @@ class _Search:
         """The shortest day that reaches the accuracy, planned with its verification and its risk."""
         refused: NoPlan | None = None
         reached = sorted((day for day in days if day.margin >= 0), key=lambda day: day.expected_s)
-        for day in reached:
-            if most_s is not None and day.day_s > most_s:
-                raise NoAnswer(self._too_long(day, most_s))
+        allowed = [day for day in reached if most_s is None or day.day_s <= most_s]
+        if reached and not allowed and most_s is not None:
+            raise NoAnswer(self._too_long(min(reached, key=lambda day: day.day_s), most_s))
+        for day in allowed:
             design = self.design(day.repeats)
             try:
                 plan = recalled(plan_trial, replace(self.problem, design=design), progress=progress)
@@ -158,9 +159,11 @@ class _Search:
         if refused is not None:
             raise refused
         short = max(days, key=lambda day: day.margin)
+        name = self.accuracy.scarcest(short.information.sum(axis=0))
+        about = f", {name} being the furthest from what is asked" if name else ""
         raise NoPlan(
             f"no day found reaches design.accuracy; the best of {len(days)} tells {np.exp(short.margin):.0%} of what "
-            "is needed"
+            f"is needed{about}; less accuracy, or manoeuvres that need less room, would do"
         )
 
     def _told(self, day: DraftedDay) -> DayTried:

@@ -133,12 +133,17 @@ def cheapest_shares(accuracy: Accuracy, offer: Offer, *, level: float = 0.0) -> 
 
 
 def _refuse(accuracy: Accuracy, information: Array) -> None:
-    name = accuracy.scarcest(information)
-    what = f"the standard deviation of {name}" if name else "the information"
-    share = np.exp(accuracy.margin(information))
+    name, margin = accuracy.scarcest(information), accuracy.margin(information)
+    most = f"with {TUNING.most_runs} runs of every manoeuvre, or as many as the limits on durations allow"
+    if not name:
+        raise NoAnswer(
+            f"design.accuracy cannot be reached: {most}, there is {np.exp(margin):.3g} times the information needed; "
+            "other manoeuvres in the dictionary or better sensors would help"
+        )
     raise NoAnswer(
-        f"design.accuracy cannot be reached: {what} is the obstacle; with the most runs of every primitive there is "
-        f"{share:.3g} times the information needed; other manoeuvres in the dictionary or better sensors would help"
+        f"design.accuracy cannot be reached: the standard deviation of {name} is at best {np.exp(-margin / 2):.3g} "
+        f"times the one asked for, {most}; a sensor with {np.exp(margin / 2):.3g} of the noise would do, or "
+        "manoeuvres in the dictionary that excite it more"
     )
 
 
