@@ -1,6 +1,7 @@
 """The runs chosen for the shortest day are the cheapest that reach the accuracy, and the bound is one."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -65,6 +66,11 @@ def accuracies(matrices):
         criterion_accuracy(matrices)[1],
         std_accuracy(np.array([0.02, np.inf, 0.05])),
         std_accuracy(np.array([0.02, 0.03, 0.05])),
+        replace(
+            std_accuracy(np.array([0.02, np.inf, np.inf])),
+            outcomes=("advance_m", "tactical_m"),
+            gradients=np.array([[1.0, -2.0, 5.0], [3.0, 0.0, 4.0]]),
+        ),
     )
 
 
@@ -76,7 +82,7 @@ def test_the_optimal_shares_just_reach_their_own_accuracy():
     assert accuracy.margin(collected / 2) == pytest.approx(-np.log(2.0))
 
 
-@pytest.mark.parametrize("kind", range(3))
+@pytest.mark.parametrize("kind", range(4))
 def test_more_time_saves_its_share_and_every_supergradient_bounds_every_margin(kind):
     rng = np.random.default_rng(kind)
     matrices = random_information(rng, 5)
@@ -90,7 +96,7 @@ def test_more_time_saves_its_share_and_every_supergradient_bounds_every_margin(k
 
 
 @pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("kind", range(3))
+@pytest.mark.parametrize("kind", range(4))
 def test_runs_cost_what_the_best_of_all_costs_and_no_less_than_the_bound(kind, seed):
     rng = np.random.default_rng(10 * seed + kind)
     matrices = 12.0 * random_information(rng, 4)
@@ -107,7 +113,7 @@ def test_runs_cost_what_the_best_of_all_costs_and_no_less_than_the_bound(kind, s
     assert found.bound_s <= min(reached) + 1e-9
 
 
-@pytest.mark.parametrize("kind", range(3))
+@pytest.mark.parametrize("kind", range(4))
 def test_the_bound_is_the_cost_of_the_best_shares_of_runs(kind):
     rng = np.random.default_rng(100 + kind)
     matrices = random_information(rng, 4)
@@ -158,7 +164,7 @@ def test_way_made_good_saves_time_as_far_as_there_is_a_way(seed, way_s):
 
 
 @pytest.mark.parametrize("way_s", [0.0, 60.0, 1e6])
-@pytest.mark.parametrize("kind", range(3))
+@pytest.mark.parametrize("kind", range(4))
 def test_no_run_offered_is_worth_more_than_it_costs_and_those_chosen_are_worth_it(kind, way_s):
     rng = np.random.default_rng(kind)
     matrices, cost_s = random_information(rng, 4), rng.uniform(30.0, 60.0, 4)
@@ -170,3 +176,12 @@ def test_no_run_offered_is_worth_more_than_it_costs_and_those_chosen_are_worth_i
     assert (net_s >= -1e-6 * cost_s).all()
     assert np.abs(net_s[found.runs > 1e-9]) == pytest.approx(0.0, abs=1e-6 * cost_s.max())
     assert 0.0 <= found.worth_of_saved <= 1.0
+
+
+def test_an_outcome_is_as_accurate_as_the_parameters_along_its_gradient():
+    rng = np.random.default_rng(5)
+    gradient, M = np.array([1.0, -2.0, 5.0]), random_information(rng, 1)[0]
+    asked = replace(std_accuracy(np.full(3, np.inf)), outcomes=("advance_m",), gradients=gradient[None])
+    draws = rng.multivariate_normal(np.zeros(3), np.linalg.inv(M), size=200_000) @ gradient
+    assert asked.margin(M) == pytest.approx(-np.log(draws.var()), abs=5 * np.sqrt(2 / len(draws)))
+    assert asked.scarcest(M) == "advance_m"

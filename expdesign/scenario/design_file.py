@@ -49,6 +49,11 @@ class AccuracyTable(Table):
     relative_std: dict[str, Positive] = Field(
         default={}, description="the largest standard deviation as a share of the nominal value, e.g. {X_u = 0.05}"
     )
+    outcomes_95: dict[str, Positive] = Field(
+        default={},
+        description="the largest half-width of the 95 % interval of predicted results of standard trials, e.g. "
+        "{advance_m = 5.0}, see expdesign explain outcomes; design.outcome_speed_mps is their approach speed",
+    )
     most_s: Positive | None = Field(default=None, description="the longest day allowed [s]; no limit when not given")
     grow: bool = Field(
         default=True,
@@ -189,15 +194,20 @@ def design_settings(table: DesignTable, vessel: Vessel, primitives: tuple[str, .
         budgets=_budgets(table.budgets, primitives, entry.at("budgets")),
         balance=table.balance,
         grow=None if table.grow is None else build_grow(table.grow, entry.at("grow")),
-        accuracy=None if table.accuracy is None else _accuracy(table.accuracy, vessel, estimated, entry.at("accuracy")),
+        accuracy=None
+        if table.accuracy is None
+        else _accuracy(table.accuracy, vessel, estimated, table.outcome_speed_mps, entry.at("accuracy")),
     )
 
 
-def _accuracy(table: AccuracyTable, vessel: Vessel, estimated: tuple[str, ...], entry: Entry) -> AccuracySettings:
+def _accuracy(
+    table: AccuracyTable, vessel: Vessel, estimated: tuple[str, ...], speed_mps: float | None, entry: Entry
+) -> AccuracySettings:
     _check_keys(table.std, estimated, entry.at("std"))
     _check_keys(table.relative_std, estimated, entry.at("relative_std"))
-    if not (table.as_ or table.std or table.relative_std):
-        raise entry.error("is empty, expected as = 'durations', std or relative_std")
+    _check_keys(table.outcomes_95, OUTCOMES, entry.at("outcomes_95"))
+    if not (table.as_ or table.std or table.relative_std or table.outcomes_95):
+        raise entry.error("is empty, expected as = 'durations', std, relative_std or outcomes_95")
     nominal = dict(zip(vessel.model.names, vessel.model.parameters.tolist(), strict=True))
     for name in table.relative_std:
         if name in table.std:
@@ -208,6 +218,8 @@ def _accuracy(table: AccuracyTable, vessel: Vessel, estimated: tuple[str, ...], 
         as_durations=table.as_ is not None,
         std=dict(table.std),
         relative_std=dict(table.relative_std),
+        outcomes_95=dict(table.outcomes_95),
+        outcome_speed_mps=speed_mps,
         most_s=table.most_s,
         grow=table.grow,
     )

@@ -5,23 +5,28 @@ M's rate: f(a M) = f(M) + log a, and the accuracy is reached where f(M) >= 0. It
 
     log of the efficiency by the design's criterion against the optimal durations
     log(s_i^2 / (sigma_i^2 (M^-1)_ii)) for parameters with a largest standard deviation s_i
+    log(s_o^2 / (c_o' M^-1 c_o)) for outcomes of trials, c_o their gradients by parameters, in noise units
 
 Source: F. Pukelsheim, Optimal Design of Experiments (2006), 5.4 for concavity of 1 / (M^-1)_ii; combined here.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from expdesign.durations import Collected, DurationDesign
 from expdesign.durations.criteria.models import congruent
 from expdesign.errors import InputError
+from expdesign.information.outcome_gradients import outcome_gradients
 from expdesign.information.prior import equation_noise
 from expdesign.shortest_day.values import AccuracySettings
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
+
+NORMAL_95 = 1.959963984540054
+"""Half of the interval that holds a normal variable in 95 of 100 cases, in standard deviations."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -35,6 +40,8 @@ class Accuracy:
         prior: (d, d) information known before.
         variance: (p,) largest variance of each parameter in units of its equation's noise variance; inf without limit.
         parameters: names.
+        outcomes: names of outcomes with a largest standard deviation.
+        gradients: (o, d) of each by the parameters, in units of that standard deviation and of the noise.
     """
 
     collected: Collected | None
@@ -43,9 +50,13 @@ class Accuracy:
     prior: Array
     variance: Array
     parameters: tuple[str, ...]
+    outcomes: tuple[str, ...] = ()
+    gradients: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
     def __post_init__(self) -> None:
-        seal(self, prior="d d", variance="p")
+        if not self.outcomes:
+            object.__setattr__(self, "gradients", np.zeros((0, len(self.prior))))
+        seal(self, prior="d d", variance="p", gradients="o d")
 
     def margin(self, information: Array) -> float:
         """f of information (d, d) besides the prior; -inf where it is singular."""
@@ -60,15 +71,16 @@ class Accuracy:
             T = piece.transformation
             return np.asarray(T.T @ G @ T) / (self.samples * degree)
         index = int(np.argmin(self._margins(information)))
-        column = self._inverse(information)[:, index]
-        return np.asarray(np.outer(column, column) / column[index])
+        direction = self._directions[index]
+        column = self._inverse(information) @ direction
+        return np.asarray(np.outer(column, column) / (column @ direction))
 
     def scarcest(self, information: Array) -> str:
-        """The parameter whose standard deviation is furthest from its limit; "" where the criterion is."""
+        """The parameter or outcome whose standard deviation is furthest from its limit; "" where the criterion is."""
         margins = self._margins(information)
         if self._criterion_margin(information) <= margins.min():
             return ""
-        return self.parameters[int(np.argmin(margins))]
+        return (*self.parameters, *self.outcomes)[int(np.argmin(margins))]
 
     def _criterion_margin(self, information: Array) -> float:
         if self.collected is None:
@@ -81,14 +93,21 @@ class Accuracy:
         piece = self.collected.pieces[0]
         return np.asarray(piece.prior + congruent(piece.transformation, information / self.samples))
 
+    @property
+    def _directions(self) -> Array:
+        """(p + o, d) whose variances are limited: of parameters, and of outcomes."""
+        return np.concatenate([np.eye(len(self.variance), len(self.prior)), self.gradients])
+
     def _margins(self, information: Array) -> Array:
-        """(p,) of the standard deviations; inf without limit."""
-        limited = np.isfinite(self.variance)
-        margins = np.full(len(self.variance), np.inf)
+        """(p + o,) of the standard deviations; inf without limit."""
+        largest = np.r_[self.variance, np.ones(len(self.outcomes))]
+        limited = np.isfinite(largest)
+        margins = np.full(len(largest), np.inf)
         if limited.any():
-            found = np.diag(self._inverse(information))[: len(limited)][limited]
+            along = self._directions[limited]
+            found = np.einsum("od,de,oe->o", along, self._inverse(information), along)
             with np.errstate(divide="ignore", invalid="ignore"):
-                margins[limited] = np.where(found > 0, np.log(self.variance[limited] / found), -np.inf)
+                margins[limited] = np.where(found > 0, np.log(largest[limited] / found), -np.inf)
         return margins
 
     def _inverse(self, information: Array) -> Array:
@@ -126,6 +145,7 @@ def stated_accuracy(settings: AccuracySettings, design: DurationDesign, vessel: 
             f"design.accuracy asks for the standard deviation of {silent[0]}, which needs the noise of its sensor: "
             "expected [sensors] in the vessel file to state it"
         )
+    outcomes, gradients = _outcomes(settings, design, vessel)
     samples = problem.total_s / vessel.sample_time_s
     collected = Collected.of(problem) if settings.as_durations else None
     return Accuracy(
@@ -135,7 +155,33 @@ def stated_accuracy(settings: AccuracySettings, design: DurationDesign, vessel: 
         prior=problem.prior * samples,
         variance=np.array([(asked[n] / noise[n]) ** 2 if n in asked else np.inf for n in problem.parameters]),
         parameters=problem.parameters,
+        outcomes=outcomes,
+        gradients=gradients,
     )
+
+
+def _outcomes(settings: AccuracySettings, design: DurationDesign, vessel: Vessel) -> tuple[tuple[str, ...], Array]:
+    """Outcomes asked for, and their gradients (o, d) in units of their largest standard deviation and of the noise.
+
+    Raises:
+        InputError: an outcome without stated noise of a sensor, or the vessel cannot run its trial.
+        NoAnswer: a trial does not end, or an outcome is not smooth in a parameter.
+    """
+    problem, asked = design.problem, settings.outcomes_95
+    if not asked:
+        return (), np.zeros((0, 0))
+    found = outcome_gradients(vessel, tuple(asked), problem.parameters, speed_mps=settings.outcome_speed_mps)
+    noise = equation_noise(vessel, problem.parameters)
+    silent = [name for name, size in zip(problem.parameters, noise.tolist(), strict=True) if not size > 0]
+    if silent:
+        raise InputError(
+            f"design.accuracy.outcomes_95 needs the noise of the sensor for {silent[0]}: expected [sensors] in the "
+            "vessel file to state it"
+        )
+    std = np.array([asked[name] for name in found.names]) / NORMAL_95
+    gradients = np.zeros((len(found.names), len(problem.prior)))
+    gradients[:, : len(problem.parameters)] = found.gradients * noise / std[:, None]
+    return found.names, gradients
 
 
 def _check_adds_up(design: DurationDesign) -> None:

@@ -18,6 +18,8 @@ class AccuracySettings:
         as_durations: by the design's criterion, as accurate as the optimal durations are in `total_s`.
         std: largest standard deviation of parameters, in their units.
         relative_std: the same, as a share of the nominal value.
+        outcomes_95: half-widths of the 95 % intervals of predicted outcomes of standard trials, by `indices.OUTCOMES`.
+        outcome_speed_mps: approach speed of these trials, or None for the nominal model's.
         most_s: longest day [s], or None for no limit.
         grow: whether manoeuvres are added that shorten the day.
     """
@@ -25,6 +27,8 @@ class AccuracySettings:
     as_durations: bool = False
     std: Mapping[str, float] = field(default_factory=dict)
     relative_std: Mapping[str, float] = field(default_factory=dict)
+    outcomes_95: Mapping[str, float] = field(default_factory=dict)
+    outcome_speed_mps: float | None = None
     most_s: float | None = None
     grow: bool = True
 
