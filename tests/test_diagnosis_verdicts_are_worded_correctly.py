@@ -78,6 +78,12 @@ def test_a_verdict_without_findings_states_the_accuracy():
     assert "66608676" not in verdict([], lost)
 
 
+def test_an_offset_of_angles_is_named_after_them_and_not_after_thrust():
+    offset = replace(finding("thruster_asymmetry"), keys=("offset:rudder",))
+    assert verdict([offset], BEFORE).startswith("The simulation lacks the offset of the rudder angle; adding it")
+    assert "lacks an asymmetry of thrust;" in verdict([replace(offset, keys=("asymmetry",))], BEFORE)
+
+
 def test_what_parameters_gain_within_their_standard_deviations_is_no_missing_effect():
     gains = (ErrorReduction(output="u", share=0.62, low=0.55, high=0.7),)
     gains += (ErrorReduction(output="v", share=0.9, low=0.1, high=0.95),)

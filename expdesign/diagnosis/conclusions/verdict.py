@@ -56,6 +56,12 @@ def missing_effect(cause: str) -> str:
     return f"the term {term}" if kind == "missing_term" else MISSING_EFFECTS[kind]
 
 
+def lacking(item: Finding) -> str:
+    """Missing effect of a finding: as of its cause, but an offset is named after its actuators."""
+    kind, _, group = (item.keys or ("",))[0].partition(":")
+    return f"the offset of the {group} angle" if kind == "offset" else missing_effect(item.cause)
+
+
 def manoeuvre(name: str) -> str:
     """A proposal in words."""
     return MANOEUVRES.get(name, f"the manoeuvre {name}")
@@ -105,7 +111,7 @@ def verdict(
         return f"The simulation explains little of these data and no cause is certain: {_remainder(unexplained, unit)}."
     if not findings:
         return f"These data show no error of the model: {accuracy_in_words(before)}."
-    parts = [f"The simulation lacks {listed([missing_effect(item.cause) for item in findings])}"]
+    parts = [f"The simulation lacks {listed([lacking(item) for item in findings])}"]
     parts += [_benefits(findings, unit), *_invisible(findings)]
     parts += [_open_question(item) for item in findings if item.not_distinguishable_from]
     parts += [] if unexplained is None else [f"much remains unexplained: {_remainder(unexplained, unit)}"]
@@ -143,19 +149,17 @@ def _remainder(unexplained: Unexplained, unit: str) -> str:
 def _benefits(findings: Sequence[Finding], unit: str) -> str:
     if len(findings) == 1:
         return f"adding it {benefit(findings[0])} on {unit} held out of the fit"
-    first, *others = [f"{missing_effect(item.cause)} {benefit(item)}" for item in findings]
+    first, *others = [f"{lacking(item)} {benefit(item)}" for item in findings]
     return f"on {unit} held out of the fit, {listed([f'adding {first}', *others])}"
 
 
 def _invisible(findings: Sequence[Finding]) -> list[str]:
     """Findings that are significant and yet do not improve the simulation visibly."""
-    causes = [
-        item.cause for item in findings if item.error_reductions and not any(map(_is_visible, item.error_reductions))
-    ]
-    if not causes:
+    small = [item for item in findings if item.error_reductions and not any(map(_is_visible, item.error_reductions))]
+    if not small:
         return []
-    names = "it" if len(findings) == 1 else listed([missing_effect(cause) for cause in causes])
-    verb = "is" if len(causes) == 1 else "are"
+    names = "it" if len(findings) == 1 else listed([lacking(item) for item in small])
+    verb = "is" if len(small) == 1 else "are"
     return [f"{names} {verb} significant in a test, but too small to show in velocities as noisy as these"]
 
 
@@ -167,10 +171,10 @@ def _open_question(item: Finding) -> str:
     """Alternatives of a finding, and the manoeuvre that distinguishes them."""
     alternatives = listed([missing_effect(name) for name in item.not_distinguishable_from], "or")
     if item.would_tell_apart is None:
-        return f"these data cannot distinguish {missing_effect(item.cause)} from {alternatives}"
+        return f"these data cannot distinguish {lacking(item)} from {alternatives}"
     verb = "explains" if len(item.not_distinguishable_from) == 1 else "explain"
     return (
-        f"{manoeuvre(item.would_tell_apart)} would distinguish {missing_effect(item.cause)} from {alternatives}, which "
+        f"{manoeuvre(item.would_tell_apart)} would distinguish {lacking(item)} from {alternatives}, which "
         f"{verb} these data as well"
     )
 

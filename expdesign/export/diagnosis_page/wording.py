@@ -10,7 +10,7 @@ TITLES = {
     "wind": "Wind",
     "thrust_gain": "Thrust gain",
     "thrust_advance_loss": "Thrust loss with advance speed",
-    "thruster_asymmetry": "Thrust asymmetry",
+    "thruster_asymmetry": "Asymmetry of thrust or angles",
     "actuator_lag": "Actuator lag",
     "actuator_delay": "Actuator dead time",
     "actuator_deadband": "Actuator dead band",
