@@ -38,8 +38,8 @@ def estimate(
         str,
         typer.Option(
             metavar="HOW",
-            help="Instruments of all runs in one block, or batch: a block for each run, which are weighed by how much "
-            "they tell.",
+            help="Instruments of all runs in one block, or batch: a block for each run, weighed by what it tells, "
+            "with --mean batch or none.",
         ),
     ] = "one",
     start: Annotated[

@@ -169,8 +169,12 @@ def voyages(
     segments: Sequence[Segment],
     *,
     rng: np.random.Generator,
+    mean: str = "complete",
 ) -> Trials:
-    """Estimates of trials sailed in one go from the first primitive's entry velocity; so are the instruments."""
+    """Estimates of trials sailed in one go from the first primitive's entry velocity; so are the instruments.
+
+    The mean is taken off instruments over the complete data, over each "segment", or not ("none").
+    """
     parts = [_commands(primitives, segment.chosen)[: segment.samples] for segment in segments]
     if any(len(part) < segment.samples for part, segment in zip(parts, segments, strict=True)):
         raise InputError("a segment of a voyage is longer than its primitive, expected several segments")
@@ -190,7 +194,11 @@ def voyages(
         _regressors(nominal, expected.velocity[:-1], commands),
         np.diff(seen, axis=0),
     )
-    return _estimated(truth, [tuple(table.swapaxes(0, 1) for table in rows)])
+    whole = [tuple(table.swapaxes(0, 1) for table in rows)]
+    if mean == "segment":
+        ends = np.cumsum([segment.samples for segment in segments])[:-1]
+        whole = list(zip(*(np.split(table, ends, axis=1) for table in whole[0]), strict=True))
+    return _estimated(truth, whole, mean=mean)
 
 
 def _cut_run(
@@ -228,10 +236,13 @@ def _measured(truth: Vessel, commands: Array, start: Array, rng: np.random.Gener
     return sailed.measured_velocity
 
 
-def _estimated(truth: Vessel, parts: Sequence[tuple[Array, ...]]) -> Trials:
-    """Instrumental variables with the instruments' mean over the complete data taken off."""
+def _estimated(truth: Vessel, parts: Sequence[tuple[Array, ...]], *, mean: str = "complete") -> Trials:
+    """Instrumental variables with the instruments' mean over the complete data taken off, or over each part."""
+    if mean == "segment":
+        parts = [(own, seen - seen.mean(axis=1, keepdims=True), change) for own, seen, change in parts]
     regressors, instruments, changes = (np.concatenate(tables, axis=1) for tables in zip(*parts, strict=True))
-    instruments = instruments - instruments.mean(axis=1, keepdims=True)
+    if mean == "complete":
+        instruments = instruments - instruments.mean(axis=1, keepdims=True)
     estimates = np.full((len(regressors), len(truth.model.names)), np.nan)
     for output, name in enumerate(truth.model.outputs):
         own = [index for index, term in enumerate(truth.model.terms) if term.equation == name]
