@@ -6,12 +6,12 @@ first primitive's speed or at rest, whether a segment is the first 200 samples o
 is taken off instruments (7.19)-(7.20), and whether 0.025 is the variance of every disturbance, as the source says, or
 half of it.
 
-Found: no single reading gives both numbers. With the variance stated and the mean over the complete data, random designs
-have 56 to 86 %. With the mean of each segment they come down to 19 to 68 %, but so does the optimised design, which
-assumes the complete mean. With each design in its own way, complete for the optimised one and by segments for random
-ones, the published pair lies between the two readings of the ranges: 100 and 56 to 68 % with those of the nominal ship,
-98 and 26 to 31 % with those of the true one, from rest. Start and place in the signal change little. Which it was cannot
-be known: the source prints neither its signals nor how random designs were estimated from.
+Found: no single reading gives both numbers. With the variance stated and the mean over the complete data, random
+designs have 56 to 86 %. With the mean of each segment they come down to 19 to 68 %, but so does the optimised design,
+which assumes the complete mean. With each design in its own way, complete for the optimised one and by segments for
+random ones, the published pair lies between the two readings of the ranges: 100 and 56 to 68 % with those of the
+nominal ship, 98 and 26 to 31 % with those of the true one, from rest. Start and place in the signal change little.
+Which it was cannot be known: the source prints neither its signals nor how random designs were estimated from.
 
 `python tests/benchmarks/published/design_readings.py --runs 300` takes one to two minutes.
 

@@ -24,10 +24,10 @@ Found with 500 trials: the optimised design has the published accuracy (errors b
 0.15 in 99.6 %; published more than 99 % and 99 %), random designs are better than published (84 and 80 %; 46 and
 69 %). With slower primitives, whose ranges the true ship has, random designs come down to 58 and 68 %, but the
 optimised one to 83 and 88 %, too. So all numbers hang on the size of the signals beside the noise, and no choice tried
-here gives both published ones; `design_readings.py` varies how random designs are sailed and estimated from. The period of the
-zig-zags, not given either, does not decide: with half and with three times of ours random designs have 85 %. Most of
-the error is that of Y_ur, whose true value is small, then of N_uv and X_|u|u. Equal shares come close to the optimised
-ones here; their errors of the parameters are large in 2 % of the trials.
+here gives both published ones; `design_readings.py` varies how random designs are sailed and estimated from. The
+period of the zig-zags, not given either, does not decide: with half and with three times of ours random designs have
+85 %. Most of the error is that of Y_ur, whose true value is small, then of N_uv and X_|u|u. Equal shares come close to
+the optimised ones here; their errors of the parameters are large in 2 % of the trials.
 
 Source: F. Ljungberg, doctoral thesis, Linköping University, 9.1.
 """
