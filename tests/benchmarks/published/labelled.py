@@ -3,8 +3,9 @@
 Repeats figures 9.9 to 9.12 of the source, whose data are not public, on other data: runs tau1 to tau11 of the simulated
 model ship (five whole runs of each, three pieces in a design); runs tau12 to tau20 of the simulated full-scale ship
 (four of each, six pieces; tau16 to tau18 in 10 m/s of wind, as in the source, unknown to the model); and, with --data,
-the trials of a 3 m tanker on a pond (four random, turning, zig-zag runs each; pieces of 60 s at 10 Hz, six in a design).
-500 draws of each design, a fifth of them for the tanker. Source: optimised designs are degenerate less often, in 0 against 20 % on the model ship.
+trials of a 3 m tanker on a pond (four random, turning, zig-zag runs each; pieces of 60 s at 10 Hz, six in a design).
+500 draws of each design, a fifth of them for the tanker. Source: on its model ship random designs are degenerate in
+about 20 %, and optimised ones are not.
 
 Source: F. Ljungberg, doctoral thesis, Linköping University, 9.2 and 9.3.
 """
