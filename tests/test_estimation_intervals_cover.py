@@ -67,7 +67,7 @@ TABLE = [
 @pytest.mark.parametrize("case", TABLE[::5], ids=str)
 def test_intervals_of_every_method_cover_small(case: Case) -> None:
     """All parameters together; those of an equation err together, which the chance of four standard errors allows."""
-    trials = 24
+    trials = 12
     found = tried(case, trials, seed=32)
     assert found.failed == 0
     assert abs(found.held.mean() - 0.95) < 4 * np.sqrt(0.95 * 0.05 / trials) / 2
