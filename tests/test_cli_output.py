@@ -28,6 +28,7 @@ ESTIMATE = {
     "fixed": (),
     "velocity": "auto",
     "mean": "complete",
+    "blocks": "one",
     "start": "auto",
     "motion": "continuous",
     "horizon_s": None,
@@ -90,7 +91,12 @@ def workflows(monkeypatch: pytest.MonkeyPatch) -> Workflows:
             {"seed": 7, "jobs": 1, "scheduler": None, "cache": False},
         ),
         ("score --seed 1 a.toml", "score", (Path("a.toml"), None), {"seed": 1}),
-        ("durations a.toml", "durations", (Path("a.toml"), None), {"seed": 0, "grow": False}),
+        (
+            "durations a.toml",
+            "durations",
+            (Path("a.toml"), None),
+            {"seed": 0, "grow": False, "monte_carlo": 0, "jobs": 0},
+        ),
         ("plan a.toml", "plan", (Path("a.toml"), None), {"seed": 0, **SHARED, "durations": None}),
         (
             "plan a.toml --durations d.json",
