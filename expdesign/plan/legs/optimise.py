@@ -11,6 +11,7 @@ from expdesign.memory import recalled
 from expdesign.plan.legs._casadi import program
 from expdesign.plan.legs.problem import LegProblem
 from expdesign.plan.legs.tuning import LEGS
+from expdesign.plan.legs.water import nearest_turns
 from expdesign.values import Array
 
 
@@ -32,8 +33,9 @@ def solve_transition(problem: LegProblem) -> tuple[float, Array] | None:
 
 
 def _even(problem: LegProblem) -> LegProblem:
-    """The same leg with commands that change evenly as a first guess."""
-    return replace(problem, inputs=np.linspace(problem.inputs[0], problem.inputs[-1], len(problem.inputs)))
+    """The same leg with commands that change evenly as a first guess, azimuths by less than half a turn."""
+    last = nearest_turns(problem.vessel, problem.end_inputs, problem.inputs[0])
+    return replace(problem, end_inputs=last, inputs=np.linspace(problem.inputs[0], last, len(problem.inputs)))
 
 
 def _size(problem: LegProblem, duration_s: float) -> tuple[int, int]:

@@ -22,6 +22,7 @@ class Tuning:
         smoothness: weight of squared command steps against time in units of `LegProblem.time_scale_s`.
         smallness: weight of squared commands: decides between commands that give the same force.
         nodes: numbers of nodes tried while the time is free.
+        free_samples: least and largest time between samples while it is free, in sample times.
         settled: miss of what lagging actuators deliver at the end, relative to the largest.
         iterations: of IPOPT at most.
         programs: nonlinear programs kept built.
@@ -56,6 +57,7 @@ class Tuning:
     smoothness: float = 0.02
     smallness: float = 1e-4
     nodes: tuple[int, ...] = (12, 18, 24, 32, 44, 60, 80, 110, 160)
+    free_samples: tuple[float, float] = (0.2, 3.0)
     settled: float = 1e-4
     iterations: int = 100
     programs: int = 24
