@@ -23,13 +23,13 @@ LIMITS = {
     },
     "model-ship": {
         "water": {"geometry calls": 145, "steps of many ships": 2400},
-        "transitions": {"geometry calls": 3, "solves": 27, "iterations": 1030},
+        "transitions": {"geometry calls": 3, "solves": 22, "iterations": 600},
         "placing and legs": {"geometry calls": 340, "samples": 3600, "solves": 11, "iterations": 300},
         "checks": {
             "samples": 1530,
             "geometry calls": 930,
             "steps of many ships": 3910,
-            "samples of few ships": 50_600,
+            "samples of few ships": 67_700,
         },
         "files": {"geometry calls": 125, "samples": 2730, "steps of many ships": 4800},
     },

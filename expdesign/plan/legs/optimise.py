@@ -16,7 +16,10 @@ from expdesign.values import Array
 
 
 def solve_transition(problem: LegProblem) -> tuple[float, Array] | None:
-    """Time on whole samples and end pose (3,) of the leg with least time less the value of displacement, or None."""
+    """Time on whole samples and end pose (3,) of the leg with least time less the value of displacement.
+
+    None where no such leg is found, or none is best: displacement at the speed of a fast end is worth more than time.
+    """
     sample_s, duration_s = problem.vessel.sample_time_s, problem.duration_s
     nodes, block = _size(problem, duration_s)
     fastest = program(problem.vessel, problem.environment, nodes, block, True)
@@ -24,6 +27,8 @@ def solve_transition(problem: LegProblem) -> tuple[float, Array] | None:
         found = fastest.solve(_respaced(guess, nodes), duration_s / (nodes * block))
         if found is None:
             continue
+        if found[1] > LEGS.unlimited * LEGS.free_samples[1] * sample_s:
+            return None
         count = max(2, int(np.ceil(nodes * found[1] / sample_s - 1e-6)))
         smooth = program(problem.vessel, problem.environment, count, block, False)
         exact = smooth.solve(_respaced(found[0], count), sample_s)

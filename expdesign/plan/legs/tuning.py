@@ -23,6 +23,7 @@ class Tuning:
         smallness: weight of squared commands: decides between commands that give the same force.
         nodes: numbers of nodes tried while the time is free.
         free_samples: least and largest time between samples while it is free, in sample times.
+        unlimited: share of the largest from which on a transition would last for ever.
         settled: miss of what lagging actuators deliver at the end, relative to the largest.
         iterations: of IPOPT at most.
         programs: nonlinear programs kept built.
@@ -58,6 +59,7 @@ class Tuning:
     smallness: float = 1e-4
     nodes: tuple[int, ...] = (12, 18, 24, 32, 44, 60, 80, 110, 160)
     free_samples: tuple[float, float] = (0.2, 3.0)
+    unlimited: float = 0.999
     settled: float = 1e-4
     iterations: int = 100
     programs: int = 24
