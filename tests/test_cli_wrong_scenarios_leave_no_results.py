@@ -1,4 +1,4 @@
-"""What a user meets who makes a mistake: one line, the right exit status, and no files."""
+"""Wrong scenarios: one line on standard error, the right exit status, and no results; a refused plan leaves a draft."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ def real_ship(folder):
         (blind_parameters, 3, ("W_abs_u_u",)),
     ],
 )
-def test_one_line_the_right_status_no_files(tmp_path, capsys, mistake, status, words):
+def test_one_line_the_right_status_no_results(tmp_path, capsys, mistake, status, words):
     scenario = write_scenario(tmp_path)
     mistake(tmp_path)
     out = tmp_path / "results"
@@ -121,4 +121,6 @@ def test_one_line_the_right_status_no_files(tmp_path, capsys, mistake, status, w
     assert len(captured.err.strip().splitlines()) == 1, captured.err
     for word in words:
         assert word in captured.err
-    assert not out.exists()
+    left = {path.name for path in out.iterdir()} if out.exists() else set()
+    planned = mistake in (walled_off_goal, too_narrow_a_gap, too_uncertain_for_the_area)
+    assert left == ({"refused.html", "refused.json"} if planned else set())
