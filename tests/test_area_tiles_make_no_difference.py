@@ -31,7 +31,7 @@ def islands(seed: int, *, corners: int, radius_m: float = 40.0, count: int = 60)
 @pytest.fixture
 def small_tiles(monkeypatch):
     monkeypatch.setattr(sea_area, "TILE_CORNERS", 60)
-    monkeypatch.setattr(visibility_graph, "CHART", replace(CHART, dense=60, corners=150))
+    monkeypatch.setattr(visibility_graph, "CHART", replace(CHART, dense=60, corners=((1.0, 150), *CHART.corners[1:])))
 
 
 def at_once(water: shapely.Geometry, distance_m: float, **options) -> shapely.Geometry:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
 
+from expdesign.plan.chart import visibility_graph
 from expdesign.plan.chart.clearance_grid import clearance_field
 from expdesign.plan.chart.goal_distance import build_goal_distance, first_bends, shortest_path_tree, taut_bends
+from expdesign.plan.chart.tuning import CHART
 from expdesign.plan.chart.visibility_graph import (
     VisibilityGraph,
     build_visibility_graph,
@@ -133,3 +137,26 @@ def test_few_lines_of_sight_are_tested_for_each_cell(monkeypatch):
     cells = table.field.centre(np.arange(table.field.clearance_m.size))
     wet = shapely.contains_xy(table.graph.water, cells[:, 1], cells[:, 0])
     assert wet.sum() <= sum(lines) <= 3 * wet.sum()
+
+
+def test_corners_tested_in_parts_give_the_graph_of_all_at_once(monkeypatch):
+    water = rocks(3)
+    whole = build_visibility_graph(water)
+    monkeypatch.setattr(visibility_graph, "CHART", replace(CHART, pairs=len(whole.corners) ** 2 // 7))
+    parts = build_visibility_graph(water)
+    assert whole.lengths.nnz > len(whole.corners)
+    assert (whole.lengths != parts.lengths).nnz == 0
+
+
+def test_passages_between_a_thousand_islands_remain():
+    """Islands have four corners each at least, so 4000 must be accepted before their passages are lost."""
+    pitch_m, radius_m, side = 1000.0, 200.0, 32
+    middles = pitch_m * (np.stack(np.divmod(np.arange(side**2), side), axis=1) + 0.5)
+    islands = shapely.buffer(shapely.points(middles), radius_m, quad_segs=8)
+    water = shapely.MultiPolygon(
+        [shapely.box(0, 0, pitch_m * side, pitch_m * side).difference(shapely.union_all(islands))]
+    )
+    simple = simplified(water, grow=False, tolerance_m=1.0)
+    assert water.covers(simple)
+    lanes = pitch_m * np.stack([np.arange(1, side), np.full(side - 1, 0.5)], axis=1)
+    assert shapely.covers(simple, sight_lines(lanes, lanes + np.array([0.0, pitch_m * (side - 1)]))).all()

@@ -15,11 +15,12 @@ class Tuning:
         kept: share of the extent of the water, from which on nothing is left out for being unreachable.
         least_reach_hulls: hull lengths that this part reaches from start and goal at least.
         routing_cells: of the grid on which the narrowest passage is located.
-        corners: of a simplified water at most; more would make the graph slow.
-        corners_coarse, coarse: corners accepted once the tolerance is so many times the one asked for: water that
-            shrinks further loses its narrow passages.
+        corners: of a simplified water at most, by the least tolerance, in those asked for, at which so many are
+            accepted: more make the graph slow, but water that shrinks further loses its passages. A thousand islands
+            have four thousand corners, however straight their shores. Water that grows has the first number at most.
         straight: share of the tolerance by which moved shores are straightened; the rest is for moving them.
         dense: corners of a water above which a coarser one is made of a finer one that was tried, not of the water.
+        pairs: of corners that are tested for sight at a time.
         slit_m: growth of the water before lines of sight are tested, as a path may touch the shore.
         glances: shares of a line of sight at which it is tested first.
         taut: share of the water's size by which a path may miss a corner that it bends at.
@@ -32,11 +33,10 @@ class Tuning:
     kept: float = 0.9
     least_reach_hulls: float = 60.0
     routing_cells: int = 400_000
-    corners: int = 700
-    corners_coarse: int = 2500
-    coarse: float = 16.0
+    corners: tuple[tuple[float, int], ...] = ((1.0, 700), (16.0, 2500), (128.0, 5000))
     straight: float = 0.98
     dense: int = 16_000
+    pairs: int = 1_000_000
     slit_m: float = 1e-3
     glances: tuple[float, ...] = (0.5, 0.75, 0.25, 0.9, 0.1, 0.625, 0.375)
     taut: float = 1e-3

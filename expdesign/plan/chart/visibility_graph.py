@@ -124,39 +124,49 @@ class VisibilityGraph:
 
 
 def build_visibility_graph(water: shapely.Geometry) -> VisibilityGraph:
-    """The visibility graph of a water polygon with at most some hundreds of corners."""
+    """The visibility graph of a water polygon with at most some thousands of corners."""
     corners, before, after = _corners(as_multipolygon(water))
     grown = as_multipolygon(shapely.buffer(as_multipolygon(water), CHART.slit_m, join_style="mitre"))
     shapely.prepare(grown)  # stays prepared for all later lines of sight
-    tail, head = np.triu_indices(len(corners), 1)
-    tangent = _tangent(corners[tail], corners[head], before[head], after[head])
-    tangent &= _tangent(corners[head], corners[tail], before[tail], after[tail])
-    tail, head = tail[tangent], head[tangent]
-    seen = _joined(grown, corners[tail], corners[head])
-    tail, head = tail[seen], head[seen]
+    parts = np.array_split(np.arange(len(corners)), len(corners) ** 2 // CHART.pairs + 1)
+    pairs = [_pairs_in_sight(grown, corners, before, after, tails) for tails in parts]
+    tail, head = np.concatenate(pairs, axis=1)
     away = np.hypot(*(corners[tail] - corners[head]).T)
     lengths = scipy.sparse.coo_matrix((away, (tail, head)), shape=(len(corners), len(corners))).tocsr()
     return VisibilityGraph(water=grown, corners=corners, beside=np.stack([before, after], axis=1), lengths=lengths)
+
+
+def _pairs_in_sight(
+    water: shapely.MultiPolygon, corners: Array, before: Array, after: Array, tails: np.ndarray
+) -> np.ndarray:
+    """(2, k) some corners of all (n, 2), and later ones in sight of them to which a shortest path may lead."""
+    rows, head = np.nonzero(tails[:, None] < np.arange(len(corners)))
+    tail = tails[rows]
+    tangent = _tangent(corners[tail], corners[head], before[head], after[head])
+    tangent &= _tangent(corners[head], corners[tail], before[tail], after[tail])
+    tail, head = tail[tangent], head[tangent]
+    seen = _joined(water, corners[tail], corners[head])
+    return np.stack([tail[seen], head[seen]])
 
 
 def simplified(water: shapely.MultiPolygon, *, grow: bool, tolerance_m: float) -> shapely.MultiPolygon:
     """Water with at most `Tuning.corners` corners that contains the given water (`grow`), or lies inside it.
 
     The shore is moved by a tolerance, and straightened by less than that. The tolerance is doubled until few enough
-    corners are left, also in water of any number of corners: its least passages are then lost.
+    corners are left: passages narrower than four tolerances may then be lost, or, grown, islands.
 
     Args:
         water: polygons.
         grow: whether the result contains the water; else it lies inside.
         tolerance_m: at first.
     """
-    coarse_m = np.inf if grow else CHART.coarse * tolerance_m
+    least_m = tolerance_m
     source, moved_m, made = water, 0.0, [(water, 0.0)]
     while True:
         step_m = tolerance_m - moved_m
         simple = _straightened(moved(source, step_m if grow else -step_m), CHART.straight * step_m)
-        most = CHART.corners_coarse if tolerance_m >= coarse_m else CHART.corners
-        if len(_corners(simple)[0]) <= most:
+        most = max(count for times, count in CHART.corners if times * least_m <= tolerance_m)
+        if len(_corners(simple)[0]) <= (CHART.corners[0][1] if grow else most):
             return simple
         made.append((simple, tolerance_m))
         if shapely.get_num_coordinates(source) > CHART.dense:
