@@ -260,7 +260,7 @@ def test_where_orders_are_too_many_the_losses_counted_are_less():
 def test_changing_speed_loses_what_constant_acceleration_loses():
     step_s = 0.1  # a hundredth of the time that the ship's engines take to full
     for first, last in ((0.0, 1.0), (1.0, 0.0), (0.4, 0.9), (0.0, 0.0), (0.7, 0.7)):
-        lost, least = least_loss(steady(first, 0.5, 1.0), steady(last, 0.5, 1.0), ship())
+        lost, least = least_loss([steady(first, 0.5, 1.0)], [steady(last, 0.5, 1.0)], ship())[0, 0]
         change_s = abs(last - first) / 0.5
         assert least <= change_s + 1e-9  # no more than the truth, and little less
         assert lost <= change_s * (1 - (first + last) / 2) + 1e-9

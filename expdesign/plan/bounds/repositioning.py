@@ -90,7 +90,7 @@ def reposition_bound_s(
         if found is not None:
             path_s = max(path_s, found[0] - sum(counts[name] * most_s for name, most_s in found[1].items()))
     firsts, lasts = _leg_ends(vessel, environment, runs, exits, speed_mps, yaw_rate_radps)
-    losses = np.array([[least_loss(first, last, vessel) for last in lasts] for first in firsts])
+    losses = least_loss(firsts, lasts, vessel)
     lost_m, least_s = (least_losses(losses[..., k], list(counts.values())) for k in (0, 1))
     return float(max(0.0, least_s, path_s + lost_m / (speed_mps + headway.current_mps)))
 

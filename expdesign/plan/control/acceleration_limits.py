@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -174,23 +176,39 @@ def _rates(vessel: Vessel, shares: Array, boxes: Array, edges: Array, wind_mps: 
     return np.asarray(surge * np.cos(drift) + sway * np.sin(drift))
 
 
-def least_loss(first: LegEnd, last: LegEnd, vessel: Vessel) -> tuple[float, float]:
-    """What no leg between two ends falls below: distance lost against the fastest leg [m], and time [s].
+def least_loss(firsts: Sequence[LegEnd], lasts: Sequence[LegEnd], vessel: Vessel) -> Array:
+    """(n, k, 2) what no leg from each of n ends to each of k falls below.
 
-    The speed at any time is at most what can be reached by then and what can still be shed, so the longer a leg, the
-    more is lost: the shortest one counts in which the one speed can become the other, and the one command the other.
+    That is the distance lost against the fastest leg [m], and the time [s]. The speed at any time is at most what can
+    be reached by then and what can still be shed, so the longer a leg, the more is lost: the shortest one counts in
+    which the one speed can become the other, and the one command the other.
     """
-    step_s, back = CONTROL.loss_step * to_work_s(vessel), last.changes.reversed()
-    moved_s = 0.0 if first.inputs is None or last.inputs is None else _moved_s(vessel, first.inputs, last.inputs)
+    step_s = CONTROL.loss_step * to_work_s(vessel)
     time_s: Array = step_s * np.arange(CONTROL.loss_steps, dtype=np.float64)
-    fast, slow = first.changes.most(first.fastest_mps, time_s), first.changes.least(first.slowest_mps, time_s)
-    shed, kept = back.most(last.fastest_mps, time_s), back.least(last.slowest_mps, time_s)
-    count = min(int(moved_s / step_s), CONTROL.loss_steps - 1)
-    while count < CONTROL.loss_steps - 1 and not _can_meet(fast, slow, shed, kept, count):
+    after = [_speeds(end, end.changes, time_s) for end in firsts]
+    before = [_speeds(end, end.changes.reversed(), time_s) for end in lasts]
+    losses = np.empty((len(firsts), len(lasts), 2))
+    for (row, first), (column, last) in product(enumerate(firsts), enumerate(lasts)):
+        moved_s = 0.0 if first.inputs is None or last.inputs is None else _moved_s(vessel, first.inputs, last.inputs)
+        count = _steps_to_meet(after[row], before[column], int(moved_s / step_s))
+        most, shed = after[row][0], before[column][0]
+        sailed_m = step_s * float(np.minimum(most[: count + 1], shed[count::-1]).sum())  # no less than the integral
+        least_s = step_s * max(0, count - 1)  # the step before was too short
+        losses[row, column] = max(0.0, float(first.changes.edges_mps[-1]) * least_s - sailed_m), least_s
+    return losses
+
+
+def _speeds(end: LegEnd, changes: SpeedChanges, time_s: Array) -> tuple[Array, Array]:
+    """Largest and least speeds (n,) at times (n,) from an end."""
+    return changes.most(end.fastest_mps, time_s), changes.least(end.slowest_mps, time_s)
+
+
+def _steps_to_meet(after: tuple[Array, Array], before: tuple[Array, Array], least: int) -> int:
+    """Steps until speeds after one end can meet those before another, so many at least."""
+    count = min(least, CONTROL.loss_steps - 1)
+    while count < CONTROL.loss_steps - 1 and not _can_meet(*after, *before, count):
         count += 1
-    sailed_m = step_s * float(np.minimum(fast[: count + 1], shed[count::-1]).sum())  # no less than the integral
-    least_s = step_s * max(0, count - 1)  # the step before was too short
-    return max(0.0, float(first.changes.edges_mps[-1]) * least_s - sailed_m), least_s
+    return count
 
 
 def _can_meet(fast: Array, slow: Array, shed: Array, kept: Array, count: int) -> bool:
