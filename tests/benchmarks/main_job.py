@@ -3,8 +3,8 @@
 ``python tests/benchmarks/main_job.py [SCENARIO.toml ...]``, by default all examples; each is run by a process of its
 own. The phases are those of `counted_work`, after the start of Python. Seconds count all processes of the job, whatever
 else the machine does meanwhile; work that other processes have begun ahead counts where it is done. The last column but
-one is the sum in multiples of the baseline (`baseline.py`), by which machines compare; memory is that of the largest
-process.
+two is the sum in multiples of the baseline (`baseline.py`), by which machines compare; memory is that of the largest
+process, and of all together, what they share counted once (Linux).
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ import subprocess
 import sys
 import tempfile
 from collections import defaultdict
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
 
@@ -25,6 +26,7 @@ from baseline import Baseline, measured_baseline
 
 ROOT = Path(__file__).parents[2]
 SCENARIOS = ROOT / "scenarios"
+SAMPLED_S = 0.2
 PHASES = ("start", "design", "water", "transitions", "placing and legs", "checks", "files")
 
 
@@ -36,17 +38,29 @@ class MainJob:
         phase_s: processor seconds of each phase.
         peak_mib: memory of the largest process.
         summary: key numbers of the plan.
+        together_mib: memory of all processes when it was largest.
     """
 
     phase_s: dict[str, float]
     peak_mib: float
     summary: dict[str, float]
+    together_mib: float = 0.0
 
 
 def main_job(scenario: Path) -> MainJob:
     """A scenario run by a fresh process."""
     command = [sys.executable, __file__, "--measure", str(scenario)]
-    return MainJob(**json.loads(subprocess.run(command, stdout=subprocess.PIPE, check=True).stdout))
+    together_mib = 0.0
+    with subprocess.Popen(command, stdout=subprocess.PIPE) as process:
+        while True:
+            try:
+                output, _ = process.communicate(timeout=SAMPLED_S)
+                break
+            except subprocess.TimeoutExpired:
+                together_mib = max(together_mib, memory_mib(process.pid))
+    if process.returncode:
+        raise subprocess.CalledProcessError(process.returncode, command)
+    return replace(MainJob(**json.loads(output)), together_mib=together_mib)
 
 
 def measured(scenario: Path) -> MainJob:
@@ -77,19 +91,32 @@ def measured(scenario: Path) -> MainJob:
 
 def processor_s(process: int) -> float:
     """Processor seconds so far of a process and all that it has started, those that ended included (Linux)."""
-    ticks, children = {}, defaultdict(list)
+    ticks = sum(sum(map(int, values[11:15])) for values in family(process).values())
+    return ticks / os.sysconf("SC_CLK_TCK")
+
+
+def memory_mib(process: int) -> float:
+    """Memory now of a process and all that it has started, what they share counted once (Linux)."""
+    shares_kib = []
+    for member in family(process):
+        with suppress(FileNotFoundError, ProcessLookupError, PermissionError):  # it has ended
+            lines = Path(f"/proc/{member}/smaps_rollup").read_text("utf-8").splitlines()
+            shares_kib += [int(line.split()[1]) for line in lines if line.startswith("Pss:")]
+    return sum(shares_kib) / 1024
+
+
+def family(process: int) -> dict[int, list[str]]:
+    """What the system states of a process and of all that it has started, from the state on (proc_pid_stat(5))."""
+    stated, children = {}, defaultdict(list)
     for path in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            values = path.read_text("utf-8").rpartition(")")[2].split()
-        except (FileNotFoundError, ProcessLookupError):
-            continue
-        number = int(path.parent.name)
-        ticks[number] = sum(map(int, values[11:15]))
-        children[int(values[1])].append(number)
-    family = [process]
-    for member in family:  # grows meanwhile
-        family += children[member]
-    return sum(ticks.get(member, 0) for member in family) / os.sysconf("SC_CLK_TCK")
+        with suppress(FileNotFoundError, ProcessLookupError):  # it has ended
+            number, values = int(path.parent.name), path.read_text("utf-8").rpartition(")")[2].split()
+            stated[number] = values
+            children[int(values[1])].append(number)
+    members = [process]
+    for member in members:  # grows meanwhile
+        members += children[member]
+    return {member: stated[member] for member in members if member in stated}
 
 
 def row(scenario: Path, baseline: Baseline) -> str:
@@ -101,7 +128,8 @@ def row(scenario: Path, baseline: Baseline) -> str:
     phases = " | ".join(f"{job.phase_s.get(phase, 0.0):.1f}" for phase in PHASES)
     return (
         f"| {__version__} ({date.today()}) | {scenario.stem} | {phases} | {total_s:.1f} | {baseline.numpy_s:.2f} + "
-        f"{baseline.ipopt_s:.2f} | {total_s / baseline.total_s:.0f} | {job.peak_mib:.0f} MiB |"
+        f"{baseline.ipopt_s:.2f} | {total_s / baseline.total_s:.0f} | {job.peak_mib:.0f} MiB | "
+        f"{job.together_mib:.0f} MiB |"
     )
 
 
@@ -113,7 +141,7 @@ if __name__ == "__main__":
     if chosen.measure:
         print(json.dumps(vars(measured(chosen.measure))))
     else:
-        names = (*PHASES, "all [s]", "NumPy + IPOPT [s]", "x baseline", "memory")
+        names = (*PHASES, "all [s]", "NumPy + IPOPT [s]", "x baseline", "memory", "together")
         print("| version | scenario |", " | ".join(names), "|")
         print("|---" * (2 + len(names)) + "|")
         for scenario in chosen.scenarios:
