@@ -2,7 +2,7 @@
 
 ``python tests/benchmarks/cluster.py [WORD ...]``: `whatif`, designs alone and with plans, `validate`, a published study
 and many drawn trials of a plan are done by this process, then by one and by two workers of one thread. Words
-choose among them. Results are compared.
+choose among them. Results are compared. Alone, this process is given a scheduler too, as that decides what are tasks.
 
 Processor seconds are those of this process alone, or the sum of what this process still does and what the busiest
 worker does, its imports included; the speed-up is their ratio, whatever else the machine does. Wall seconds stand in
@@ -43,7 +43,7 @@ from expdesign.scenario import load_scenario
 PUBLISHED = ROOT / "tests" / "benchmarks" / "published"
 """Folder whose modules workers import too."""
 MANY = 100
-"""Workers on paper."""
+"""Workers that are calculated with."""
 TRIALS, DRAWS, RUNS = 20, 10_000, 40
 """Of each design, of a plan, and of the study."""
 TOTALS_S = tuple(range(240, 720, 30))
@@ -92,13 +92,12 @@ def observed() -> Iterator[Tasks]:
         sharing._results = usual
 
 
-def on_workers(work: Callable[[], Any], count: int) -> tuple[Any, float, float]:
+def on_workers(work: Callable[[str], Any], count: int) -> tuple[Any, float, float]:
     """The result, processor seconds of this process and of the busiest worker together, and wall seconds."""
     with local_cluster(count, first=PUBLISHED) as cluster:
         before = _worker_s(cluster)
         began, wall = time.process_time(), time.perf_counter()
-        with on_cluster(cluster.address):
-            result = work()
+        result = work(cluster.address)
         own, passed = time.process_time() - began, time.perf_counter() - wall
         busiest = max(after - first for after, first in zip(_worker_s(cluster), before, strict=True))
     return result, own + busiest, passed
@@ -108,12 +107,12 @@ def _worker_s(cluster: LocalCluster) -> list[float]:
     return [processor_s(worker.pid) for worker in cluster.workers]
 
 
-def row(name: str, work: Callable[[], Any]) -> tuple[str, str]:
+def row(name: str, work: Callable[[str], Any]) -> tuple[str, str]:
     """Lines of both tables."""
-    wall, began = time.perf_counter(), time.process_time()
-    with observed() as tasks:
-        expected = work()
-    alone, wall = time.process_time() - began, time.perf_counter() - wall
+    with local_cluster(1, first=PUBLISHED) as idle, on_cluster(idle.address), observed() as tasks:
+        began, wall = time.process_time(), time.perf_counter()
+        expected = work(idle.address)
+        alone, wall = time.process_time() - began, time.perf_counter() - wall
     runs = [on_workers(work, count) for count in (1, 2)]
     assert all(result == expected for result, *_ in runs)
     spent = " | ".join(f"{own:.1f} s ({passed:.1f} s)" for own, passed in [(alone, wall), *(run[1:] for run in runs)])
@@ -138,19 +137,19 @@ def cases(folder: Path) -> list[Path]:
     return found
 
 
-def works(folder: Path) -> dict[str, Callable[[], Callable[[], Any]]]:
+def works(folder: Path) -> dict[str, Callable[[], Callable[[str], Any]]]:
     """Names of what is measured, and functions that make ready what does it."""
     variants, model_ship = cases(folder), SCENARIOS / "model-ship.toml"
 
-    def written(command: Callable, file: str) -> Any:
-        command(folder / "out")
+    def written(command: Callable, file: str, scheduler: str) -> Any:
+        command(folder / "out", scheduler=scheduler)
         return json.loads((folder / "out" / file).read_text("utf-8"))
 
-    def whatif(scenario: str, some: list[Path], **options: Any) -> Callable[[], Any]:
-        command = partial(workflows.whatif, SCENARIOS / scenario, some, jobs=1, cache=False, **options)
+    def whatif(scenario: str, some: list[Path], **options: Any) -> Callable[[str], Any]:
+        command = partial(workflows.whatif, SCENARIOS / scenario, some, cache=False, **options)
         return partial(written, command, "whatif.json")
 
-    validate = partial(workflows.validate_design, model_ship, trials=TRIALS, jobs=1)
+    validate = partial(workflows.validate_design, model_ship, trials=TRIALS)
     return {
         f"`whatif`, {1 + len(variants)} designs": partial(whatif, "helsinki.toml", variants),
         f"`whatif --plan`, {1 + PLANNED} cases": partial(whatif, "story.toml", variants[:PLANNED], with_plan=True),
@@ -160,20 +159,26 @@ def works(folder: Path) -> dict[str, Callable[[], Callable[[], Any]]]:
     }
 
 
-def study() -> Any:
+def study(scheduler: str) -> Any:
     """Errors of six estimators."""
-    outcomes = manoeuvring.run_case(manoeuvring.MILD, runs=RUNS, rng=np.random.default_rng(1))
-    return [(item.errors.tolist(), item.std.tolist()) for item in outcomes]
+    with on_cluster(scheduler):
+        outcomes = manoeuvring.run_case(manoeuvring.MILD, runs=RUNS, rng=np.random.default_rng(1))
+        return [(item.errors.tolist(), item.std.tolist()) for item in outcomes]
 
 
-def drawn_trials() -> Callable[[], Any]:
+def drawn_trials() -> Callable[[str], Any]:
     """What sails drawn trials of the plan of the story."""
     case = load_scenario(SCENARIOS / "story.toml")
     information = workflows.scored(case)
     design = workflows.designed(case, information)
     problem = workflows.plan_problem(case, information, design)
     water, sailed = leg_water(problem, ship_on_legs(problem)), workflows.planned(case, information, design).sailed
-    return lambda: estimate_risk(water, sailed, draws=DRAWS, rng=np.random.default_rng(1))[0]
+
+    def work(scheduler: str) -> Any:
+        with on_cluster(scheduler):
+            return estimate_risk(water, sailed, draws=DRAWS, rng=np.random.default_rng(1))[0]
+
+    return work
 
 
 if __name__ == "__main__":
