@@ -99,6 +99,9 @@ class Batch:
             divided by the shrinkage that it causes; else 0.
         delivered: (k, s, m) means of the inputs over each of s equal parts of a sample, where actuators deliver other
             than held inputs; then `inputs` are the means over the sample. None where inputs are held.
+        steered: (k,) 1 where the inputs follow the ship's motion, 0 where they were set beforehand; None where the
+            data do not say.
+        planned: (k, p) what the first p inputs were planned to be, whatever the ship did; None where unknown.
     """
 
     name: str
@@ -114,11 +117,13 @@ class Batch:
     interpolated: Array | None = None
     vane_std_rad: float = 0.0
     delivered: Array | None = None
+    steered: Array | None = None
+    planned: Array | None = None
 
     def __post_init__(self) -> None:
         shapes = {
             "inputs": "k m", "velocity": "k 3", "pose": "k 3", "wind": "k 2", "depth_m": "k", "interpolated": "k 3",
-            "delivered": "k s m",
+            "delivered": "k s m", "steered": "k", "planned": "k p",
         }  # fmt: skip
         seal(self, **{name: shape for name, shape in shapes.items() if getattr(self, name) is not None})
         if self.inputs.shape[1] != len(self.input_names):
@@ -134,7 +139,9 @@ class Batch:
 
     def cut(self, part: slice) -> Batch:
         """Consecutive samples of the batch."""
-        series = ("inputs", "velocity", "pose", "wind", "depth_m", "interpolated", "delivered")
+        series = (
+            "inputs", "velocity", "pose", "wind", "depth_m", "interpolated", "delivered", "steered", "planned"
+        )  # fmt: skip
         rows: dict[str, Any] = {name: values[part] for name in series if (values := getattr(self, name)) is not None}
         return replace(self, first_row=self.first_row and self.first_row + part.start, **rows)
 

@@ -14,7 +14,7 @@ from expdesign.estimation.disturbance import mean_current, tells_current
 from expdesign.estimation.excitation import check_excitation, worst_case
 from expdesign.estimation.methods import STARTS, Method, Settings, estimate, method_named
 from expdesign.estimation.regression import AIR, MEANS, PREDICTORS
-from expdesign.estimation.replay import Integration
+from expdesign.estimation.replay import STEERED, Integration
 from expdesign.estimation.solve import BLOCKS, Weighting
 from expdesign.estimation.values import Estimate
 from expdesign.progress import Progress, silent
@@ -44,6 +44,7 @@ class EstimateOptions:
             map at the sample time.
         horizon_s: simulation horizon of output error [s], None for whole runs.
         constant: whether output error gives every run a constant force of its own.
+        steered: what becomes of samples marked as steered, one of `estimation.replay.STEERED`.
     """
 
     methods: tuple[str, ...] = ()
@@ -54,6 +55,7 @@ class EstimateOptions:
     motion: str = CONTINUOUS
     horizon_s: float | None = None
     constant: bool = False
+    steered: str = AUTO
 
     def __post_init__(self) -> None:
         for what, value, known in (
@@ -61,6 +63,7 @@ class EstimateOptions:
             ("instrument blocks", self.blocks, BLOCKS),
             ("start", self.start, (AUTO, *STARTS)),
             ("motion", self.motion, MOTIONS),
+            ("treatment of steered samples", self.steered, STEERED),
         ):
             if value not in known:
                 raise UnknownName(what, value, known=known)
@@ -208,6 +211,7 @@ def _estimated(vessel: Vessel, record: Record, method: Method, options: Estimate
             quadrature=options.quadrature,
             horizon_s=options.horizon_s,
             constant=options.constant,
+            steered=options.steered,
         )
         return estimate(record, vessel.model, method=method.name, settings=settings)
 

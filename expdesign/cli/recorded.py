@@ -69,6 +69,14 @@ def estimate(
     constant: Annotated[
         bool, typer.Option("--constant", help="Give every run a constant force of its own in output error.")
     ] = False,
+    steered: Annotated[
+        str,
+        typer.Option(
+            metavar="HOW",
+            help="Samples that the data mark as steered: use; leave-out; planned, instruments from columns of planned "
+            "inputs; auto: in methods with instruments planned where there are such columns, else leave-out.",
+        ),
+    ] = "auto",
     out: OutByData = None,
 ) -> Asked:
     """Estimate the model's parameters from measured data, with standard errors.
@@ -91,6 +99,7 @@ def estimate(
         motion=motion,
         horizon_s=horizon,
         constant=constant,
+        steered=steered,
         tests=tests or (),
     )
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from expdesign.errors import Diverged, InputError, UnknownName
+from expdesign.estimation.feedback import Feedback, feedback_in, feedback_notes
 from expdesign.estimation.output_error import Fitting, minimise_output_error
 from expdesign.estimation.regression import (
     Layout,
@@ -18,7 +19,19 @@ from expdesign.estimation.regression import (
     model_for,
     with_wind_as_measured,
 )
-from expdesign.estimation.replay import InstrumentModel, Integration, apart_from_start, build_replay
+from expdesign.estimation.replay import (
+    LEAVE_OUT,
+    PLANNED,
+    STEERED,
+    InstrumentModel,
+    Integration,
+    Steered,
+    apart_from_start,
+    as_planned,
+    build_replay,
+    open_loop,
+    treatment_of,
+)
 from expdesign.estimation.solve import NullSpace, Prior, Refined, Solution, Weighting, refine_iv, solve_ls
 from expdesign.estimation.tuning import TUNING
 from expdesign.estimation.values import Estimate, Residuals
@@ -73,6 +86,8 @@ class Settings:
         horizon_s: of output error [s], None for whole runs.
         constant: whether output error gives each run a constant acceleration of its own.
         quadrature: of regressors and instruments over a sample interval, "euler" or "trapezoid".
+        steered: what becomes of samples marked as steered: "use", "leave-out", "planned" for instruments from the
+            inputs as planned, or "auto", see `replay.treatment_of`.
     """
 
     fixed: tuple[str, ...] = ()
@@ -85,13 +100,23 @@ class Settings:
     horizon_s: float | None = None
     constant: bool = False
     quadrature: str = "euler"
+    steered: str = "auto"
 
     def __post_init__(self) -> None:
+        if self.steered not in STEERED:
+            raise UnknownName("treatment of steered samples", self.steered, known=STEERED)
         if self.start not in STARTS:
             raise UnknownName("start of instruments", self.start, known=STARTS)
 
 
 STARTS = ("nominal", "ls")
+HOLDS_STEERED = {
+    "ls": "least squares then holds only where it does without: velocities without noise, disturbances without memory.",
+    "iv": "instruments simulated from their inputs are biased by disturbances that last.",
+    "oe": "output error then holds only for noise of the sensors without memory: a current or wind that is not "
+    "measured makes the simulation's error last, and inputs that answer it bias the estimate.",
+}
+"""What a method's estimate needs where inputs follow the ship's motion; derived in `feedback`."""
 ROLLS = (
     "the vessel's model has a roll mode, [model.roll], which estimate does not support; expected a vessel file "
     "without that table, or use expdesign diagnose"
@@ -127,6 +152,8 @@ def estimate(record: Record, model: VesselModel, *, method: str = "iv", settings
     chosen, choices = method_named(method), settings or Settings()
     if model.roll is not None:
         raise InputError(ROLLS)
+    steered = treatment_of(record, choices.steered, instruments=chosen.solver == "iv")
+    record = open_loop(record) if steered.treatment == LEAVE_OUT else record
     measured, record = record, as_read(record, chosen)
     layout = build_layout(
         model_for(model, record),
@@ -135,18 +162,23 @@ def estimate(record: Record, model: VesselModel, *, method: str = "iv", settings
         fixed=choices.fixed,
         quadrature=choices.quadrature,
     )
-    layout = replace(layout, notes=(*layout.notes, *_vane_notes(measured, layout, chosen)))
+    notes = (*layout.notes, *_vane_notes(measured, layout, chosen), *_steered_notes(steered, chosen))
+    layout = replace(layout, notes=notes)
     rows = build_regression(layout, record)
     if chosen.solver == "iv":
         rows = apart_from_start(rows)
-    refined = _instrumental(layout, record, rows, choices) if chosen.solver == "iv" else _least_squares(rows, choices)
+    planned = steered.treatment == PLANNED
+    driving = as_planned(record) if planned else record
+    refined = _instrumental(layout, driving, rows, choices) if chosen.solver == "iv" else _least_squares(rows, choices)
     if chosen.solver == "oe":
         solution, regression = minimise_output_error(layout, record, refined.solution, _fitting(choices))
         left_out = sum(map(len, record.batches)) - len(regression)
-        return _estimate(
-            chosen, layout, Rows(regression=regression, used=(), left_out=left_out), Refined(solution, 0, ())
-        )
-    return _estimate(chosen, layout, rows, refined)
+        rows = Rows(regression=regression, used=(), left_out=left_out)
+        return _estimate(chosen, layout, rows, Refined(solution, 0, ()), steered)
+    feedback = None
+    if chosen.solver == "iv":
+        feedback = feedback_in(record, rows.regression, refined.solution.residuals, known_steered=planned)
+    return _estimate(chosen, layout, rows, refined, steered, feedback)
 
 
 def as_read(record: Record, method: Method) -> Record:
@@ -162,6 +194,17 @@ def _vane_notes(record: Record, layout: Layout, method: Method) -> tuple[str, ..
         f"The vane's noise of {std_rad:.2g} rad draws least squares towards zero in the terms of the wind; "
         "methods with instruments (iv-air, iv-wind) are free of it.",
     )
+
+
+def _steered_notes(steered: Steered, method: Method) -> tuple[str, ...]:
+    if not steered.samples:
+        return ()
+    told = f"{steered.samples} of {steered.of} samples are marked as steered"
+    if steered.treatment == LEAVE_OUT:
+        return (f"{told}; they are left out, and {steered.of - steered.samples} are used.",)
+    if steered.treatment == PLANNED:
+        return (f"{told}; all are used, those with instruments from the inputs as planned.",)
+    return (f"{told} and used all the same; {HOLDS_STEERED[method.solver]}",)
 
 
 def _fitting(choices: Settings) -> Fitting:
@@ -214,7 +257,9 @@ def full_parameters(layout: Layout, values: Array) -> Array:
     return full
 
 
-def _estimate(method: Method, layout: Layout, rows: Rows, refined: Refined) -> Estimate:
+def _estimate(
+    method: Method, layout: Layout, rows: Rows, refined: Refined, steered: Steered, feedback: Feedback | None = None
+) -> Estimate:
     solution, p = refined.solution, len(layout.parameters)
     full = dict(zip(layout.model.names, full_parameters(layout, solution.values).tolist(), strict=True))
     return Estimate(
@@ -235,7 +280,10 @@ def _estimate(method: Method, layout: Layout, rows: Rows, refined: Refined) -> E
             *refined.warnings,
             *solution.warnings,
             *faint_notes(solution.null_space),
+            *feedback_notes(feedback),
         ),
+        steered=steered,
+        feedback=feedback,
     )
 
 

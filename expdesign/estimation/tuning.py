@@ -39,6 +39,11 @@ class Tuning:
         whitening_passes: the second filter finds a slow disturbance below the measurement noise.
         white_test_level: of White's test.
         longest_lag_share: automatic lags end at the longest batch divided by this.
+        shortest_stretch: samples between steered ones that are worth a batch.
+        feedback_lags: past samples known to the test for feedback, and later ones tested.
+        feedback_gap_of_differences: first later sample tested where velocities are differences of the pose.
+        feedback_level: chance below which inputs are said to follow disturbances.
+        feedback_rounding: size of a direction of inputs, relative to theirs, below which it is rounding errors.
         few_lags: up to this number, sums of products are faster than Fourier transforms.
     """
 
@@ -71,6 +76,11 @@ class Tuning:
     whitening_passes: int = 2
     white_test_level: float = 0.01
     longest_lag_share: int = 8
+    shortest_stretch: int = 3
+    feedback_lags: int = 8
+    feedback_gap_of_differences: int = 3
+    feedback_level: float = 0.01
+    feedback_rounding: float = 1e-6
     few_lags: int = 10
 
 

@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from expdesign.errors import UnknownName
+from expdesign.estimation.feedback import Feedback
+from expdesign.estimation.replay import Steered
 from expdesign.estimation.solve import NullSpace
 from expdesign.values import Array, seal
 from expdesign.vessel import VesselModel
@@ -54,6 +56,8 @@ class Estimate:
         null_space: what the data cannot see, or see faintly.
         refinements: number of repeated simulations of the instruments.
         warnings: one sentence each.
+        steered: samples marked as steered, and what became of them.
+        feedback: the test whether inputs that instruments are simulated from follow disturbances; None without one.
     """
 
     method: str
@@ -68,6 +72,8 @@ class Estimate:
     null_space: NullSpace
     refinements: int
     warnings: tuple[str, ...]
+    steered: Steered
+    feedback: Feedback | None
 
     def __post_init__(self) -> None:
         seal(self, values="p", covariance="p p", nuisance_values="q", joint_covariance="r r")

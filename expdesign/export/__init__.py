@@ -19,6 +19,7 @@ if TYPE_CHECKING:
         parameter_entries,
         parameter_table,
         plan_json,
+        steered_entry,
         track_csv,
         vessel_toml,
     )
@@ -60,6 +61,7 @@ __all__ = [
     "planned_track",
     "read_plan",
     "route_files",
+    "steered_entry",
     "track_csv",
     "vessel_toml",
     "write_files",
@@ -82,6 +84,7 @@ if not TYPE_CHECKING:
                 "limit_table",
                 "parameter_entries",
                 "parameter_table",
+                "steered_entry",
                 "plan_json",
                 "track_csv",
                 "vessel_toml",

@@ -9,7 +9,18 @@ from pathlib import Path
 
 from expdesign.conventions import OUTPUTS, POSE_COLUMNS
 from expdesign.errors import InputError, UnknownName
-from expdesign.records.file import Clock, Inputs, Table, check_ranges, check_wind, read_clock, read_table, relative_wind
+from expdesign.records.file import (
+    PLANNED,
+    STEERED,
+    Clock,
+    Inputs,
+    Table,
+    check_ranges,
+    check_wind,
+    read_clock,
+    read_table,
+    relative_wind,
+)
 from expdesign.records.pose import (
     MEASURED,
     VELOCITY_METHODS,
@@ -163,7 +174,8 @@ class _File:
 def _batch(file: _File, part: slice, name: str) -> Batch:
     table, clock, inputs, origins = file.table, file.clock, file.inputs, file.origins
     kept = kept_samples(part, origins)
-    wind, depth = relative_wind(table), table.columns.get("depth_m")
+    wind, depth, steered = relative_wind(table), table.columns.get("depth_m"), table.columns.get(STEERED)
+    planned = [name for column in inputs.columns if (name := PLANNED + column) in table.columns]
     return Batch(
         name=name,
         sample_time_s=clock.sample_time_s,
@@ -175,4 +187,6 @@ def _batch(file: _File, part: slice, name: str) -> Batch:
         depth_m=depth[kept] if depth is not None else None,
         derived=tuple(output for output, origin in origins.items() if origin != MEASURED),
         first_row=table.first_row + kept.start,
+        steered=steered[kept] if steered is not None else None,
+        planned=table.stack(*planned)[kept] if planned else None,
     )

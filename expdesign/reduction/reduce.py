@@ -123,8 +123,12 @@ def with_delivered_inputs(record: Record, model: VesselModel, *, standing: Array
 
 def _delivered(batch: Batch, responses: Mapping[str, Response], standing: Array | None) -> Batch:
     own = [responses.get(name, IDEAL) for name in batch.input_names]
-    steps = deliver(own, batch.inputs, sample_time_s=batch.sample_time_s, substeps=SUBSTEPS, standing=standing)
-    return replace(batch, inputs=steps.mean(axis=1), delivered=steps)
+    how: dict[str, Any] = {"sample_time_s": batch.sample_time_s, "substeps": SUBSTEPS}
+    steps = deliver(own, batch.inputs, standing=standing, **how)
+    planned = batch.planned
+    if planned is not None:
+        planned = deliver(own[: planned.shape[1]], planned, standing=None, **how).mean(axis=1)
+    return replace(batch, inputs=steps.mean(axis=1), delivered=steps, planned=planned)
 
 
 def at_reference_point(record: Record, sensors: Sensors, *, smoothed: bool = False) -> Record:

@@ -2,16 +2,32 @@
 
 from expdesign.estimation.replay.instruments import InstrumentModel, apart_from_start, instrument_wind
 from expdesign.estimation.replay.replay import Integration, build_replay, simulate_batch
+from expdesign.estimation.replay.steered import (
+    LEAVE_OUT,
+    PLANNED,
+    STEERED,
+    Steered,
+    as_planned,
+    open_loop,
+    treatment_of,
+)
 from expdesign.estimation.replay.stretches import Compiled, Stretches, compiled
 
 __all__ = [
+    "LEAVE_OUT",
+    "PLANNED",
+    "STEERED",
     "Compiled",
     "InstrumentModel",
     "Integration",
+    "Steered",
     "Stretches",
     "apart_from_start",
+    "as_planned",
     "build_replay",
     "compiled",
     "instrument_wind",
+    "open_loop",
     "simulate_batch",
+    "treatment_of",
 ]

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
         fit_entries,
         limit_entries,
         parameter_entries,
+        steered_entry,
     )
     from expdesign.export.files.known import Known, Purchase, replan_json
     from expdesign.export.files.plan_files import commands_csv, plan_json, track_csv
@@ -56,6 +57,7 @@ __all__ = [
     "record_csv",
     "recorded_dictionary_json",
     "replan_json",
+    "steered_entry",
     "strict_json",
     "subsets_json",
     "track_csv",
@@ -79,7 +81,14 @@ if not TYPE_CHECKING:
                 "plus_minus",
                 "unstable_warning",
             ),
-            "estimates": ("estimate_json", "estimated_vessel", "fit_entries", "limit_entries", "parameter_entries"),
+            "estimates": (
+                "estimate_json",
+                "estimated_vessel",
+                "fit_entries",
+                "limit_entries",
+                "parameter_entries",
+                "steered_entry",
+            ),
             "known": ("Known", "Purchase", "replan_json"),
             "plan_files": ("commands_csv", "plan_json", "track_csv"),
             "record_file": ("record_csv",),

@@ -43,6 +43,8 @@ def _method_entry(found: Assessment, item: Assessed, vessel: Vessel) -> dict[str
         "not_simulated": {run.batch.name: run.problem for run in item.runs if run.problem},
         "one_step_r2": named_finite(item.one_step.outputs, item.one_step.explained),
         "residuals": _residual_entry(item),
+        "steered": steered_entry(item),
+        "feedback_test": _feedback(item),
         "null_space": {
             "singular_values": [finite(value) for value in estimate.null_space.singular_values.tolist()],
             "faint": [_direction(direction) for direction in estimate.null_space.faint],
@@ -114,6 +116,24 @@ def _residual_entry(item: Assessed) -> dict[str, Any]:
         "rows": found.rows,
         "left_out": found.left_out,
         "lags_in_covariance": found.lags,
+    }
+
+
+def steered_entry(item: Assessed) -> dict[str, Any]:
+    """Number of samples marked as steered, of all, and what became of them."""
+    found = item.estimate.steered
+    return {"samples": found.samples, "of": found.of, "treatment": found.treatment if found.samples else None}
+
+
+def _feedback(item: Assessed) -> dict[str, Any] | None:
+    found = item.estimate.feedback
+    if found is None:
+        return None
+    return {
+        "statistic": finite(found.statistic),
+        "degrees_of_freedom": found.freedom,
+        "p_value": finite(found.chance),
+        "samples": found.samples,
     }
 
 

@@ -34,10 +34,15 @@ def _columns(batch: Batch) -> dict[str, Array]:
         (("north_m", "east_m", "heading_rad"), batch.pose),
         (tuple(map(column_name, batch.input_names)), batch.inputs),
         (("wind_u_mps", "wind_v_mps"), batch.wind),
+        (("steered",), None if batch.steered is None else batch.steered[:, None]),
+        (tuple(f"planned_{column_name(name)}" for name in batch.input_names), batch.planned),
         (("depth_m",), None if batch.depth_m is None else batch.depth_m[:, None]),
     ]
     columns = {
-        name: values[:, index] for names, values in parts if values is not None for index, name in enumerate(names)
+        name: column
+        for names, values in parts
+        if values is not None
+        for name, column in zip(names, values.T, strict=False)
     }
     if "heading_rad" in columns:
         columns["heading_rad"] = wrap_angle(columns["heading_rad"])

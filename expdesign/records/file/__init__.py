@@ -3,7 +3,7 @@
 from expdesign.records.file.cells import FIRST_ROW, read_cells
 from expdesign.records.file.choice import Inputs, mistyped
 from expdesign.records.file.clock import Clock, read_clock
-from expdesign.records.file.names import COLUMNS, LABEL, is_input
+from expdesign.records.file.names import COLUMNS, LABEL, PLANNED, STEERED, is_input
 from expdesign.records.file.ranges import check_ranges
 from expdesign.records.file.table import Table, read_table
 from expdesign.records.file.wind import check_wind, relative_wind
@@ -12,6 +12,8 @@ __all__ = [
     "COLUMNS",
     "FIRST_ROW",
     "LABEL",
+    "PLANNED",
+    "STEERED",
     "Clock",
     "Inputs",
     "Table",

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from expdesign.errors import FileError, nearest
-from expdesign.records.file.names import LABEL, Source, Unitless, is_input, meaning
+from expdesign.records.file.names import LABEL, PLANNED, Source, Unitless, is_input, meaning
 
 PAIRS = (
     ("north_m", "east_m"),
@@ -56,8 +56,10 @@ def choose_columns(path: Path, header: tuple[str, ...], *, inputs: Inputs | None
     chosen = {
         name: source
         for name, source in used.items()
-        if not (is_input(name) and name not in wanted) and not any(name == a and b in used for a, b in INSTEAD)
+        if not (is_input(own := name.removeprefix(PLANNED)) and own not in wanted)
+        and not any(name == a and b in used for a, b in INSTEAD)
     }
+    _check_planned(path, chosen, wanted)
     return chosen, (*_conversions(chosen), *_ignored(header, chosen, meanings))
 
 
@@ -109,6 +111,14 @@ def _check_pair(path: Path, used: Sources, pair: tuple[str, str], header: tuple[
     if len(there) == 1:
         missing = pair[1 - pair.index(there[0])]
         problem = f"names {used[there[0]].header} but no {missing}, expected both{mistyped(missing, header)}"
+        raise FileError(path, "row 1", problem)
+
+
+def _check_planned(path: Path, chosen: Sources, wanted: tuple[str, ...]) -> None:
+    there = [name for name in chosen if name.startswith(PLANNED)]
+    missing = [PLANNED + name for name in wanted if PLANNED + name not in chosen]
+    if there and missing:
+        problem = f"names {chosen[there[0]].header} but no {' '.join(missing)}, expected all or none of them"
         raise FileError(path, "row 1", problem)
 
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from expdesign.conventions import KNOTS_PER_MPS, METRES_PER_NAUTICAL_MILE
 
 FORCES = ("tau_x", "tau_y", "tau_psi")
-PLAIN = ("batch", *FORCES)
+STEERED, PLANNED = "steered", "planned_"
+PLAIN = ("batch", STEERED, *FORCES)
 LABEL = "manoeuvre"
 """A column of texts, which only `records.labels` reads."""
 """Names without a unit."""
@@ -77,6 +78,19 @@ COLUMNS = (
     *QUANTITIES,
     Quantity("", {}, "tau_x, tau_y, tau_psi", "generalised forces in the model's unit, instead of actuator signals"),
     Quantity("", {}, "batch", "a change of its value starts a new batch"),
+    Quantity(
+        "",
+        {},
+        STEERED,
+        "1 where the inputs follow the ship's motion (an autopilot, a helmsman on a track), 0 where they were set "
+        "beforehand; optional, see --steered of expdesign estimate",
+    ),
+    Quantity(
+        "",
+        {},
+        "planned_n1_rps, planned_tau_x",
+        "what an input was planned to be, whatever the ship did; optional, for every input or none",
+    ),
     Quantity("", {}, LABEL, "label of the manoeuvre, a text; only expdesign mine --labels column reads it"),
 )
 """All columns that are read."""
@@ -130,6 +144,8 @@ class Unitless:
 def meaning(header: str, column: int) -> Source | Unitless | None:
     """The quantity of a column, or None for an unknown name."""
     name = re.sub(r"[\s\[\]()]+", "_", header.lower()).strip("_")
+    if name.startswith(PLANNED):
+        return _planned(meaning(name.removeprefix(PLANNED), column), header)
     if name in PLAIN:
         return Source(column, header, name)
     for quantity in QUANTITIES:
@@ -144,6 +160,13 @@ def meaning(header: str, column: int) -> Source | Unitless | None:
         if unit in units:
             return Source(column, header, f"{stem}_{own}", units[unit])
     return None
+
+
+def _planned(source: Source | Unitless | None, header: str) -> Source | None:
+    """The planned input, where the rest of its name is an input's."""
+    if not isinstance(source, Source) or not is_input(source.name):
+        return None
+    return replace(source, header=header, name=PLANNED + source.name)
 
 
 def is_input(name: str) -> bool:

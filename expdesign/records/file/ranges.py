@@ -38,8 +38,11 @@ RANGES = (
     Range(pattern="wind_[uv]_mps", low=-120, high=120, expected="-120 to 120 m/s"),
     Range(pattern="wind_speed_mps", low=0, high=120, expected="0 to 120 m/s"),
     Range(pattern="wind_angle_rad", low=-TURN, high=TURN, expected="-6.28 to 6.28 rad", degrees=True),
-    Range(pattern=r"a\d+_rad", low=-4 * TURN, high=4 * TURN, expected="-25.1 to 25.1 rad", degrees=True),
-    Range(pattern=r"rudder\d+_rad", low=-TURN / 4, high=TURN / 4, expected="-1.57 to 1.57 rad", degrees=True),
+    Range(pattern="steered", low=0, high=1, expected="0 or 1"),
+    Range(pattern=r"(?:planned_)?a\d+_rad", low=-4 * TURN, high=4 * TURN, expected="-25.1 to 25.1 rad", degrees=True),
+    Range(
+        pattern=r"(?:planned_)?rudder\d+_rad", low=-TURN / 4, high=TURN / 4, expected="-1.57 to 1.57 rad", degrees=True
+    ),
     Range(pattern="depth_m", low=1e-9, high=12000, expected="more than 0, counted downwards, at most 12000 m"),
     Range(pattern="lat_deg", low=-90, high=90, expected="-90 to 90 degrees"),
     Range(pattern="lon_deg", low=-180, high=180, expected="-180 to 180 degrees"),
@@ -63,6 +66,7 @@ def check_ranges(table: Table) -> None:
                 raise table.error(name, f"{found}, expected {allowed.expected}{_hint(table, name, allowed)}")
     _check_fix(table)
     _check_heading(table)
+    _check_marks(table)
 
 
 def _hint(table: Table, name: str, allowed: Range) -> str:
@@ -85,6 +89,15 @@ def _check_fix(table: Table) -> None:
     nowhere = (table.columns["lat_deg"] == 0) & (table.columns["lon_deg"] == 0)
     if nowhere.any():
         raise table.error("lat_deg", f"is 0 with lon_deg 0 in {table.rows(nowhere)}, expected a position fix")
+
+
+def _check_marks(table: Table) -> None:
+    marks = table.columns.get("steered")
+    if marks is None:
+        return
+    between = (marks != 0) & (marks != 1)
+    if between.any():
+        raise table.error("steered", f"{table.found('steered', between, 'neither')}, expected 0 or 1")
 
 
 def _check_heading(table: Table) -> None:

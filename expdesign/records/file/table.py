@@ -18,7 +18,7 @@ from expdesign.records.tuning import TUNING
 from expdesign.values import Array
 
 MISSING = ("", "na", "n/a", "nan", "-nan", "null", "none")
-OPTIONAL = (("wind_u_mps", "wind_v_mps"), ("wind_speed_mps", "wind_angle_rad"), ("depth_m",))
+OPTIONAL = (("wind_u_mps", "wind_v_mps"), ("wind_speed_mps", "wind_angle_rad"), ("depth_m",), ("steered",))
 
 Mask = NDArray[np.bool_]
 

@@ -18,6 +18,7 @@ from expdesign.export import (
     limit_table,
     parameter_entries,
     parameter_table,
+    steered_entry,
     write_files,
 )
 from expdesign.export.estimate_page import EstimateContent, estimate_html
@@ -26,6 +27,8 @@ from expdesign.scenario import load_vessel
 from expdesign.workflows.command_text import command_text
 from expdesign.workflows.outcome import Outcome, TextTable
 from expdesign.workflows.steps.measured import reduced_data
+
+STEERED_WORDS = {"use": "used", "leave-out": "left out", "planned": "instruments from planned inputs"}
 
 
 def estimate(
@@ -42,6 +45,7 @@ def estimate(
     motion: str = "continuous",
     horizon_s: float | None = None,
     constant: bool = False,
+    steered: str = "auto",
     tests: Sequence[Path] = (),
     progress: Progress = silent,
 ) -> Outcome:
@@ -62,6 +66,7 @@ def estimate(
         motion=motion,
         horizon_s=horizon_s,
         constant=constant,
+        steered=steered,
     )
     record = reduced_data(data, ship, velocity=velocity)
     apart = reduced_data(tests, ship, velocity=velocity) if tests else NO_TESTS
@@ -82,6 +87,7 @@ def estimate(
             "--motion": options.motion,
             "--horizon": options.horizon_s,
             "--constant": options.constant,
+            "--steered": options.steered,
         },
         usual={
             "--velocity": "auto",
@@ -89,6 +95,7 @@ def estimate(
             "--blocks": "one",
             "--start": "auto",
             "--motion": "continuous",
+            "--steered": "auto",
         },
     )
     files = {
@@ -115,6 +122,8 @@ def _estimate_summary(found: Assessment) -> dict[str, object]:
             item.method.name: {
                 "parameters": parameter_entries(item),
                 "fit": fit_entries(item),
+                "samples_used": item.estimate.residuals.rows,
+                "steered": steered_entry(item),
                 "warnings": len(estimate_warnings(found, item)),
             }
             for item in found.methods
@@ -128,4 +137,16 @@ def _estimate_tables(found: Assessment) -> tuple[TextTable, ...]:
         ("Fit of the simulated output to the measured one, in per cent", fit_table(found)),
         (f"Causes of misfit of {found.best.method.name}", limit_table(found)),
     )
+    if any(batch.steered is not None for batch in found.record.batches):
+        tables = (*tables, ("Samples used", _used_samples(found)))
     return tuple(TextTable(title=title, header=header, rows=tuple(rows)) for title, (header, rows) in tables)
+
+
+def _used_samples(found: Assessment) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Header and rows: samples used by each method, those marked as steered, and what became of these."""
+    rows = [
+        (item.method.name, str(item.estimate.residuals.rows), str(steered.samples), STEERED_WORDS[steered.treatment])
+        for item in found.methods
+        for steered in (item.estimate.steered,)
+    ]
+    return ("method", "samples used", "marked as steered", "treatment of these"), rows

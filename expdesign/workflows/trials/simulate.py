@@ -55,6 +55,7 @@ def simulate(
     begin, met = track.trajectory, _met(weather, track.commands, rng)
     sailed = simulate_run(vessel, track.commands, pose=begin.pose[0], velocity=begin.velocity[0], environment=met)
     columns = measure(vessel, track.commands, sailed, environment=met, rng=rng)
+    columns["steered"] = np.zeros(len(track.commands))  # the commands of legs too are those of the plan
     kept = len(track.commands) if until_s is None else math.ceil(until_s / track.commands.sample_time_s - 1e-9)
     columns = {name: values[:kept] for name, values in columns.items()}
     apart = np.hypot(*(sailed.pose - begin.pose)[: kept + 1, :2].T)
