@@ -139,6 +139,7 @@ def test_export_and_rehearsal_work_on_the_files_alone(result, tmp_path):
     assert outcome.summary["samples"] == len(measured["time_s"]) == len(commands["time_s"])
     for name in set(commands) - {"time_s", "leg"}:
         np.testing.assert_allclose(measured[name], commands[name], rtol=1e-9)
+    assert not measured["steered"].any(), "legs too are sailed by the commands of the plan"
 
 
 def test_same_seed_same_files_another_seed_another_measurement(result, tmp_path):

@@ -175,7 +175,7 @@ def _batch(file: _File, part: slice, name: str) -> Batch:
     table, clock, inputs, origins = file.table, file.clock, file.inputs, file.origins
     kept = kept_samples(part, origins)
     wind, depth, steered = relative_wind(table), table.columns.get("depth_m"), table.columns.get(STEERED)
-    planned = [name for column in inputs.columns if (name := PLANNED + column) in table.columns]
+    planned = [PLANNED + column for column in inputs.columns if PLANNED + column in table.columns]
     return Batch(
         name=name,
         sample_time_s=clock.sample_time_s,

@@ -132,19 +132,19 @@ def _estimate_summary(found: Assessment) -> dict[str, object]:
 
 
 def _estimate_tables(found: Assessment) -> tuple[TextTable, ...]:
-    tables = (
+    tables = [
         ("Estimates, with standard deviations", parameter_table(found)),
         ("Fit of the simulated output to the measured one, in per cent", fit_table(found)),
         (f"Causes of misfit of {found.best.method.name}", limit_table(found)),
-    )
+    ]
     if any(batch.steered is not None for batch in found.record.batches):
-        tables = (*tables, ("Samples used", _used_samples(found)))
+        tables.append(("Samples used", _used_samples(found)))
     return tuple(TextTable(title=title, header=header, rows=tuple(rows)) for title, (header, rows) in tables)
 
 
 def _used_samples(found: Assessment) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Header and rows: samples used by each method, those marked as steered, and what became of these."""
-    rows = [
+    rows: list[tuple[str, ...]] = [
         (item.method.name, str(item.estimate.residuals.rows), str(steered.samples), STEERED_WORDS[steered.treatment])
         for item in found.methods
         for steered in (item.estimate.steered,)
