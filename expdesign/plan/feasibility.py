@@ -41,9 +41,12 @@ def place_of(space: SearchSpace, index: int) -> Fit:
     half_m, half_rad, whole = _first_half_m(space), np.pi / PLAN.first_headings, True
     boxes = _first_boxes(space, half_m)
     outline = _outline(run.discs)
-    while True:
+    back = np.array([-middle[0], -middle[1], 0.0])
+    spread = moved(np.random.default_rng(0).choice(boxes, min(PLAN.first_tries, len(boxes)), replace=False), back)
+    found = _first_clear(space, index, spread)
+    while found is None:
         slack_m = np.sqrt(2.0) * (half_m + space.field.cell_m) + reach_m * half_rad
-        poses = moved(boxes, np.array([-middle[0], -middle[1], 0.0]))
+        poses = moved(boxes, back)
         for some in (outline, np.arange(len(run.discs))):
             part = replace(run, discs=run.discs[some], times_s=run.times_s[some], room_m=run.room_m[some] - slack_m)
             looser = replace(space, footprints=(part,), leg_margin_m=space.leg_margin_m - slack_m)
@@ -51,15 +54,14 @@ def place_of(space: SearchSpace, index: int) -> Fit:
             boxes, poses = boxes[kept], poses[kept]
         if not len(boxes):
             return Fit(impossible=whole)
-        found = next((some[clear][0] for some, clear in _clear(space, index, poses) if clear.any()), None)
-        if found is not None:
-            return Fit(pose=found)
-        if slack_m < PLAN.least_slack_cells * space.field.cell_m:
-            return Fit()
+        found = _first_clear(space, index, poses)
+        if found is not None or slack_m < PLAN.least_slack_cells * space.field.cell_m:
+            break
         most = PLAN.boxes // 8
         whole, boxes = whole and len(boxes) <= most, boxes[:: -(-len(boxes) // most)]
         half_m, half_rad = half_m / 2, half_rad / 2
         boxes = np.concatenate([boxes + np.multiply(step, (half_m, half_m, half_rad)) for step in _CORNERS])
+    return Fit(pose=found)
 
 
 _CORNERS = tuple((north, east, turn) for north in (-1, 1) for east in (-1, 1) for turn in (-1, 1))
@@ -94,6 +96,11 @@ def _clear(space: SearchSpace, index: int, poses: Array) -> Iterator[tuple[Array
     for first in range(0, len(poses), at_once):
         some = poses[first : first + at_once]
         yield some, runs_clear(space, np.full(len(some), index), some)
+
+
+def _first_clear(space: SearchSpace, index: int, poses: Array) -> Array | None:
+    """The first of the poses (n, 3) from which a run keeps its margins."""
+    return next((some[clear][0] for some, clear in _clear(space, index, poses) if clear.any()), None)
 
 
 def check_room(space: SearchSpace, *, strict: bool = False) -> None:

@@ -15,6 +15,7 @@ class Tuning:
             place.
         first_places, first_headings: places and headings at which a run is tried first, before boxes round them are
             halved.
+        first_tries: poses drawn among these and tried before all others: in wide water one of them has room.
         boxes: of places and headings at most; with more of them it stays open whether the run has a place.
         least_slack_cells: slack in cells of the clearance grid at which that stays open, too.
         lookups: clearances looked up at a time.
@@ -50,6 +51,7 @@ class Tuning:
     finer_grid: float = 4.0
     first_places: int = 2000
     first_headings: int = 24
+    first_tries: int = 500
     boxes: int = 400_000
     least_slack_cells: float = 3.0
     lookups: int = 200_000
