@@ -92,6 +92,7 @@ class Batch:
             or None when not measured.
         depth_m: (k,) water depth, or None.
         derived: those of u, v, r that are known to be derived from pose, not measured.
+        smoothed: whether those are smoothed, so that they hold motion of many samples before and after.
         first_row: row of the first sample in its file (the header is row 1), 0 when not from a file.
         interpolated: (k, 3) 1 where a velocity lies between the readings of its sensor, 0 where it is one; None where
             all are readings.
@@ -113,6 +114,7 @@ class Batch:
     wind: Array | None = None
     depth_m: Array | None = None
     derived: tuple[str, ...] = ()
+    smoothed: bool = False
     first_row: int = 0
     interpolated: Array | None = None
     vane_std_rad: float = 0.0

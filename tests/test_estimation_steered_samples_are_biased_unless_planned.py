@@ -118,5 +118,11 @@ def test_what_cannot_be_done_is_refused() -> None:
     unplanned = sailed(0, 600, steered=np.ones(600), planned_known=False)
     with pytest.raises(NotInformative, match="all samples are marked as steered"):
         estimate(unplanned, MODEL)
-    with pytest.raises(InputError, match="no columns of planned inputs"):
+    with pytest.raises(InputError, match="no planned inputs, expected planned_tau_x"):
         estimate(unplanned, MODEL, settings=Settings(steered="planned"))
+
+
+def test_smoothed_velocities_are_not_tested_as_they_know_what_follows() -> None:
+    (batch,) = sailed(0, 600, steered=np.zeros(600)).batches
+    assert estimate(Record(batches=(batch,)), MODEL).feedback is not None
+    assert estimate(Record(batches=(replace(batch, smoothed=True),)), MODEL).feedback is None

@@ -39,6 +39,11 @@ def test_files_without_marks_say_nothing(tmp_path: Path) -> None:
     assert batch.planned is None
 
 
+def test_batches_say_whether_their_velocities_are_smoothed(tmp_path: Path) -> None:
+    path = write_trial(tmp_path / "one.csv", motion())
+    assert [load_records(path, velocity=how).batches[0].smoothed for how in ("difference", "smoothed")] == [False, True]
+
+
 def test_records_are_written_with_their_marks(tmp_path: Path) -> None:
     record = load_records(marked(tmp_path / "one.csv", **planned()))
     again = tmp_path / "again.csv"

@@ -10,9 +10,10 @@ and one on these and the inputs u(k+g) ... u(k+g+L-1) that follow. Past residual
 what the model has wrong. Where the inputs are external, Wilks' ratio of the residuals' determinants has Bartlett's
 distribution, -(N - c) log ratio ~ chi-square with one degree of freedom for every output and direction of later inputs.
 
-What else makes inputs seem to follow: a clock of the inputs that lags behind that of the motion. The gap g is one
-sample; it is three where velocities are central differences of the pose, which hold motion of the sample after.
-Velocities between the readings of a slow sensor hold motion of many samples after, and are not tested.
+What else makes inputs seem to follow: a clock of the inputs that lags behind that of the motion, and velocities that a
+logger has smoothed. The gap g is one sample; it is three where velocities are central differences of the pose, which
+hold motion of the sample after. Velocities smoothed from the pose, or between the readings of a slow sensor, hold
+motion of many samples after, and are not tested.
 
 Where inputs do follow the motion, at the true parameters,
 
@@ -85,7 +86,7 @@ def feedback_in(
     pieces = []
     for rows in batch_slices(regression.batch_of):
         batch = record.batches[int(regression.batch_of[rows.start])]
-        if batch.interpolated is None:
+        if batch.interpolated is None and not batch.smoothed:
             tested = (
                 batch.steered == 0 if known_steered and batch.steered is not None else np.ones(len(batch), dtype=bool)
             )
@@ -148,5 +149,5 @@ def feedback_notes(found: Feedback | None) -> Sequence[str]:
     return [
         f"Inputs follow earlier disturbances (chance {found.chance:.1g}): the data look steered, and instruments "
         "simulated from these inputs are biased. Mark steered samples in a column steered, and give planned inputs "
-        "(planned_...) where they are known."
+        "(planned_...) where they are known. A late clock of inputs, or smoothed velocities, look the same."
     ]

@@ -23,6 +23,7 @@ from expdesign.records.file import (
 )
 from expdesign.records.pose import (
     MEASURED,
+    SMOOTHED,
     VELOCITY_METHODS,
     LocalMetres,
     Request,
@@ -186,6 +187,7 @@ def _batch(file: _File, part: slice, name: str) -> Batch:
         wind=wind[kept] if wind is not None else None,
         depth_m=depth[kept] if depth is not None else None,
         derived=tuple(output for output, origin in origins.items() if origin != MEASURED),
+        smoothed=SMOOTHED in origins.values(),
         first_row=table.first_row + kept.start,
         steered=steered[kept] if steered is not None else None,
         planned=table.stack(*planned)[kept] if planned else None,

@@ -23,6 +23,7 @@ import numpy as np
 from expdesign.errors import InputError, NotInformative
 from expdesign.estimation.tuning import TUNING
 from expdesign.signals import Batch, Record
+from expdesign.vessel import column_name
 
 AUTO, USE, LEAVE_OUT, PLANNED = "auto", "use", "leave-out", "planned"
 STEERED = (AUTO, USE, LEAVE_OUT, PLANNED)
@@ -56,9 +57,11 @@ def treatment_of(record: Record, choice: str, *, instruments: bool) -> Steered:
         InputError: planned commands are asked for and a batch with steered samples has none.
     """
     marked = [batch for batch in record.batches if batch.steered is not None and batch.steered.any()]
-    planned = all(batch.planned is not None for batch in marked)
-    if choice == PLANNED and not planned:
-        raise InputError("--steered is planned and the data have no columns of planned inputs, expected planned_...")
+    unplanned = [batch for batch in marked if batch.planned is None]
+    planned = not unplanned
+    if choice == PLANNED and unplanned:
+        columns = ", ".join(f"planned_{column_name(name)}" for name in unplanned[0].input_names)
+        raise InputError(f"{unplanned[0].name} has steered samples and no planned inputs, expected {columns}")
     treatment = choice
     if choice == AUTO:
         treatment = (PLANNED if planned else LEAVE_OUT) if instruments else USE

@@ -4,6 +4,7 @@ from expdesign.records.pose.agreement import check_agreement
 from expdesign.records.pose.fix import Fix, last_fix
 from expdesign.records.pose.motion import (
     MEASURED,
+    SMOOTHED,
     Request,
     batch_velocity,
     kept_samples,
@@ -18,6 +19,7 @@ from expdesign.records.pose.velocity import VELOCITY_METHODS, central_difference
 
 __all__ = [
     "MEASURED",
+    "SMOOTHED",
     "VELOCITY_METHODS",
     "Fix",
     "LocalMetres",
