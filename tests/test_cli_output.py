@@ -33,6 +33,7 @@ ESTIMATE = {
     "motion": "continuous",
     "horizon_s": None,
     "constant": False,
+    "steered": "auto",
     "tests": (),
 }
 PLAIN = {"departure": None, "tolerance_m": None, "fine": False, "name": None}
