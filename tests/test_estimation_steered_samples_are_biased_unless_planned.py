@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from expdesign.errors import InputError, NotInformative
+from expdesign.estimation.feedback import feedback_in
 from expdesign.estimation.methods import Settings, estimate
+from expdesign.estimation.regression import Regression
 from expdesign.estimation.values import Estimate
 from expdesign.signals import Record
 from expdesign.vessel import Term
@@ -126,3 +128,18 @@ def test_smoothed_velocities_are_not_tested_as_they_know_what_follows() -> None:
     (batch,) = sailed(0, 600, steered=np.zeros(600)).batches
     assert estimate(Record(batches=(batch,)), MODEL).feedback is not None
     assert estimate(Record(batches=(replace(batch, smoothed=True),)), MODEL).feedback is None
+
+
+def test_long_data_are_compared_in_part() -> None:
+    (batch,) = sailed(0, 120_000, steered=np.zeros(120_000)).batches
+    rows = len(batch) - 1
+    regression = Regression(parameters=("a",), Phi=np.ones((rows, 1, 1)), y=np.zeros((rows, 1)))
+    noise = np.random.default_rng(0).standard_normal((rows, 1))
+    apart = feedback_in(Record(batches=(batch,)), regression, noise)
+    following = np.roll(batch.inputs[1:, :1], -1, axis=0) + noise  # row k holds the input of k + 2
+    assert apart is not None
+    assert apart.samples <= 50_000
+    assert not apart.found
+    followed = feedback_in(Record(batches=(batch,)), regression, following)
+    assert followed is not None
+    assert followed.found

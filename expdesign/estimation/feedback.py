@@ -15,6 +15,8 @@ logger has smoothed. The gap g is one sample; it is three where velocities are c
 hold motion of the sample after. Velocities smoothed from the pose, or between the readings of a slow sensor, hold
 motion of many samples after, and are not tested.
 
+As e(k) given the past is white, any samples will do: of long data every second, third ... is compared.
+
 Where inputs do follow the motion, at the true parameters,
 
 - instruments Z(k), simulated from inputs before k, are uncorrelated with e(k) only if those inputs are: planned ones;
@@ -83,22 +85,22 @@ def feedback_in(
     Returns:
         None where inputs hardly change or samples in a row are too few.
     """
-    pieces = []
+    pieces, every = [], -(-len(regression) // TUNING.feedback_samples)
     for rows in batch_slices(regression.batch_of):
         batch = record.batches[int(regression.batch_of[rows.start])]
         if batch.interpolated is None and not batch.smoothed:
             tested = (
                 batch.steered == 0 if known_steered and batch.steered is not None else np.ones(len(batch), dtype=bool)
             )
-            pieces += _windows(batch, tested, regression.step_of[rows], residuals[rows])
+            pieces += _windows(batch, tested, regression.step_of[rows], residuals[rows], every=every)
     if not pieces:
         return None
     e, known, later = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
     return _compared(e, known, later)
 
 
-def _windows(batch: Batch, tested: Mask, step: Integers, eps: Array) -> list[tuple[Array, Array, Array]]:
-    """Per stretch, of samples to be tested: e (t, n), what is known then (t, a), and later inputs (t, b)."""
+def _windows(batch: Batch, tested: Mask, step: Integers, eps: Array, *, every: int) -> list[tuple[Array, Array, Array]]:
+    """Per stretch, of every so many samples: e (t, n), what is known then (t, a), and later inputs (t, b)."""
     lags = TUNING.feedback_lags
     gap = TUNING.feedback_gap_of_differences if batch.derived else 1
     after = gap + lags - 1
@@ -109,7 +111,7 @@ def _windows(batch: Batch, tested: Mask, step: Integers, eps: Array) -> list[tup
         inputs = batch.inputs[begin : begin + len(e)]
         at = np.arange(lags, len(e) - after)
         places = begin + at[:, None] + np.arange(gap, after + 1)
-        at = at[tested[places].all(axis=1)]
+        at = at[tested[places].all(axis=1)][::every]
         if not len(at):
             continue
         past = [e[at - lag] for lag in range(1, lags + 1)] + [inputs[at - lag] for lag in range(lags + 1)]

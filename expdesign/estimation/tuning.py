@@ -42,6 +42,7 @@ class Tuning:
         shortest_stretch: samples between steered ones that are worth a batch.
         feedback_lags: past samples known to the test for feedback, and later ones tested.
         feedback_gap_of_differences: first later sample tested where velocities are differences of the pose.
+        feedback_samples: compared by that test at most, which bounds its time and memory.
         feedback_level: chance below which inputs are said to follow disturbances.
         feedback_rounding: size of a direction of inputs, relative to theirs, below which it is rounding errors.
         few_lags: up to this number, sums of products are faster than Fourier transforms.
@@ -79,6 +80,7 @@ class Tuning:
     shortest_stretch: int = 3
     feedback_lags: int = 8
     feedback_gap_of_differences: int = 3
+    feedback_samples: int = 50_000
     feedback_level: float = 0.01
     feedback_rounding: float = 1e-6
     few_lags: int = 10
