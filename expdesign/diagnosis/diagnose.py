@@ -160,8 +160,9 @@ def _cross_validated(found: Selection, as_stated: HeldOut, windows: Windows, pro
     """Of the model before any cause, then after every step.
 
     The gain of uncertain parameters within their standard deviations is not attributed to a cause. So the model in use
-    has them fitted, unless it simulates held-out units better as it is: what a cause repairs of a worse fit is no gain.
-    If the first cause is that they exceed their standard deviations, it gets their gain, and the model is not fitted.
+    has them fitted, unless it simulates held-out units well as it is, and better: what a cause repairs of a worse fit
+    is no gain. If the first cause is that they exceed their standard deviations, it gets their gain, and the model is
+    not fitted.
     """
     fitted = bool(found.first.keys) and not any(only_nuisance(step, found) for step in found.steps[:1])
     fits = [*[found.first] * fitted, *(step.chosen.fit for step in found.steps)]
@@ -170,8 +171,13 @@ def _cross_validated(found: Selection, as_stated: HeldOut, windows: Windows, pro
         part = within(progress, number / len(fits), (number + 1) / len(fits))
         results.append(cross_validate(item, item.ship, windows, part))
     if fitted:
-        results[:2] = [max(results[:2], key=lambda held: float(np.nan_to_num(held.fit, nan=-np.inf).mean()))]
+        results[:2] = [results[0] if _simulates_better(*results[:2]) else results[1]]
     return results
+
+
+def _simulates_better(as_stated: HeldOut, fitted: HeldOut) -> bool:
+    one, other = (np.nan_to_num(held.fit, nan=-np.inf) for held in (as_stated, fitted))
+    return bool(one.min() >= LITTLE_FIT and one.mean() > other.mean())
 
 
 def _gains_within_std(chosen: _Selected, ship: ExtendedModel, seed: int) -> tuple[ErrorReduction, ...]:
