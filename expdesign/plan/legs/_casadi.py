@@ -29,6 +29,8 @@ from expdesign.values import Array
 from expdesign.vessel import Operators, Vessel
 
 CASADI = Operators(ca.fabs, ca.sin, ca.cos)
+RELAXED = 1e-8
+"""IPOPT may exceed bounds by this (its `bound_relax_factor`); rates of actuators keep as much away from theirs."""
 
 
 class Program:
@@ -65,7 +67,7 @@ class Program:
         for index in self._rated:
             step = (inputs[int(index), 1:] - inputs[int(index), :-1]).T / self.input_scale[index]
             reach = self.limits[index].rate * self.block * h / self.input_scale[index]
-            rows += [step - reach, -step - reach]
+            rows += [step - reach + RELAXED, RELAXED - step - reach]
         through = x[3:5, 1:-1] - self._current_b(x[2, 1:-1])
         others = ca.vertcat(*rows, ca.sum1(through**2).T, (through[0, :] * x[5, 1:-1]).T)
         constraints = ca.vertcat(motion, others)
