@@ -5,32 +5,39 @@ A model without any term of the wind is fitted to some runs by least squares and
 that were used for neither are predicted 30 s ahead, anew every 30 s from what is measured: by the model as fitted, by
 one fitted in the same way with terms of the wind, where wind is found, and by the vessel file with all findings. What
 a vessel file cannot hold, such as a roll mode, takes no part in that prediction.
+
+`--study triples` does so for drawn triples of the pond's runs (`--trials`, `--seed`), and predicts all other runs.
+`--study faults` injects faults into the records of drawn triples of zig-zags in the towing tank, or into the model that
+was fitted to them, and asks for the right name first. Both say what it took (processor seconds), in Markdown.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import sys
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from diagnosis_real_faults import AHEAD_S, FAULTS, error_ahead
 from expdesign.assessment import EstimateOptions, assess
 from expdesign.diagnosis import Diagnosis, diagnose
-from expdesign.diagnosis.data.windows import cut_windows
-from expdesign.diagnosis.motion.simulation import simulate_from_measured
-from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.errors import InputError
 from expdesign.estimation.regression import AIR
+from expdesign.processes import as_finished
 from expdesign.records import load_records
 from expdesign.signals import Batch, Record
 from expdesign.values import Array
 from expdesign.vessel import Vessel
 from real_data_cases import POND, TANK, Case, vessel_of
+from shared_work import add_sharing, shared_work
 
-AHEAD_S = 30.0
 PACE_S = 0.5
 """Time between samples after averaging: the ships need seconds for anything they do."""
 LONGEST_S = 300.0
@@ -44,6 +51,10 @@ HELD_OUT: dict[str, dict[str, tuple[str, ...]]] = {
     },
 }
 """Folder -> name of a group of runs -> how the names of its files begin."""
+WINDY = ("random", "turn_14", "zigzag")
+"""Runs of the pond under way in wind; berthing is slow and short, cut turns are parts of others."""
+TRIPLE, VISIBLE = 3, 0.01
+"""Runs of a trial; reduction of an error below which a finding improves nothing."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -123,13 +134,6 @@ def fitted_vessel(case: Case, record: Record, *, wind: bool) -> Vessel:
     )
 
 
-def error_ahead(vessel: Vessel, record: Record) -> Array:
-    """(3,) root mean square error of u, v, r predicted 30 s ahead, anew every 30 s, over all samples."""
-    ship = extended_model(vessel, record)
-    windows = cut_windows(ship.model, record, longest_s=AHEAD_S)
-    return np.asarray(np.sqrt(np.nanmean(simulate_from_measured(ship, windows).error[..., :3] ** 2, axis=(0, 1))))
-
-
 def tried(case: Case, data: Path, *, seed: int = 0) -> Tried:
     """Fit, diagnose, and predict runs that were not used.
 
@@ -172,18 +176,155 @@ def told(case: Case, result: Tried) -> Iterator[str]:
                 yield f"  {name:18} {title:13}{''.join(f'{value:9.4f}' for value in rows[name])}"
 
 
+def drawn_names(case: Case, data: Path, kinds: tuple[str, ...], rng: np.random.Generator) -> tuple[str, ...]:
+    """Three runs whose names begin so."""
+    names = [file.stem for file in sorted((data / case.folder).glob("*.csv")) if file.stem.startswith(kinds)]
+    return tuple(sorted(rng.choice(names, TRIPLE, replace=False).tolist()))
+
+
+def row_of(found: Diagnosis, seconds: float) -> dict[str, object]:
+    """What is told of a diagnosis, and its processor time."""
+    return {
+        "seconds": seconds,
+        "findings": [
+            (item.cause, item.gain, max((one.share for one in item.error_reductions), default=0.0))
+            for item in found.findings
+        ],
+        "verdict": found.verdict,
+    }
+
+
+def timed(vessel: Vessel, record: Record, seed: int) -> tuple[Diagnosis, float]:
+    """A diagnosis, and its processor time."""
+    begin = time.process_time()
+    found = diagnose(vessel, record, seed=seed)
+    return found, time.process_time() - begin
+
+
+def triple(data: Path, number: int, seed: int) -> dict[str, object]:
+    """Three runs of the pond: is wind named first, and how do the others' errors ahead change by what is found?"""
+    names = drawn_names(POND, data, WINDY, np.random.default_rng([seed, number]))
+    record = runs(POND, data, names)
+    fitted = fitted_vessel(POND, record, wind=False)
+    found, seconds = timed(fitted, record, number)
+    others = tuple(
+        file.stem for file in sorted((data / POND.folder).glob("*.csv"))
+        if file.stem.startswith(WINDY) and file.stem not in names
+    )  # fmt: skip
+    unused = runs(POND, data, others)
+    before, after = (error_ahead(vessel, unused) for vessel in (fitted, found.extended))
+    with_wind = error_ahead(fitted_vessel(POND, record, wind=True), unused)
+    return row_of(found, seconds) | {
+        "number": number, "runs": names, "ratio": (after / before).tolist(), "wind": (with_wind / before).tolist(),
+    }  # fmt: skip
+
+
+def fault(data: Path, place: int, number: int, seed: int) -> dict[str, object]:
+    """Three zig-zags of the towing tank with a fault: is it named first?"""
+    rng = np.random.default_rng([seed, number])
+    names = drawn_names(TANK, data, ("zigzag",), rng)
+    record = runs(TANK, data, names)
+    trial = FAULTS[place].inject(fitted_vessel(TANK, record, wind=False), record, rng)
+    row = {"number": number, "runs": names, "fault": FAULTS[place].name}
+    if trial is None:
+        return row | {"seconds": 0.0, "findings": [], "verdict": "no such fault", "right": None}
+    vessel, faulty, right = trial
+    found, seconds = timed(vessel, faulty, number)
+    return row | row_of(found, seconds) | {"right": bool(found.findings) and right(found.findings[0])}
+
+
+def told_triples(rows: Sequence[dict[str, Any]]) -> Iterator[str]:
+    """A row per triple, and the counts."""
+    yield "| triple | runs | found | error ahead after / before: u, v, r | fitted with wind / before | processor |"
+    yield "|---|---|---|---|---|---|"
+    for row in rows:
+        names = ", ".join(short(name) for name in row["runs"])
+        ratios = ["{:.2f} {:.2f} {:.2f}".format(*row[key]) for key in ("ratio", "wind")]
+        yield f"| {row['number']} | {names} | {found_words(row)} | {' | '.join(ratios)} | {row['seconds']:.1f} s |"
+    first = sum(row["findings"][:1] != [] and row["findings"][0][0] == "wind" for row in rows)
+    sway = [row["ratio"][1] for row in rows]
+    yield f"Wind first in {first} of {len(rows)}; sway error ahead less in {sum(np.array(sway) < 1)}, " + (
+        f"median ratio {np.median(sway):.2f}; {seconds_words(rows)}."
+    )
+
+
+def told_faults(rows: Sequence[dict[str, Any]]) -> Iterator[str]:
+    """A row per fault, and what was named wrongly."""
+    yield "| fault | named first | others beside it | without visible gain | named instead | processor |"
+    yield "|---|---|---|---|---|---|"
+    for name in dict.fromkeys(row["fault"] for row in rows):
+        some = [row for row in rows if row["fault"] == name and row["right"] is not None]
+        if not some:
+            continue
+        beside = sum(len(row["findings"]) > bool(row["right"]) for row in some)
+        small = sum(any(gain < VISIBLE for *_, gain in row["findings"]) for row in some)
+        instead = "; ".join(f"{row['number']}: {found_words(row)}" for row in some if not row["right"])
+        count = f"{sum(row['right'] for row in some)} of {len(some)}"
+        yield f"| {name} | {count} | {beside} | {small} | {instead} | {seconds_words(some)} |"
+
+
+def found_words(row: dict[str, Any]) -> str:
+    """Causes with their gains in points."""
+    return ", ".join(f"{cause} {gain:+.1f}" for cause, gain, _ in row["findings"]) or "nothing"
+
+
+def seconds_words(rows: Sequence[dict[str, Any]]) -> str:
+    """Median and largest processor time."""
+    times = [row["seconds"] for row in rows]
+    return f"median {np.median(times):.1f} s, largest {max(times):.1f} s"
+
+
+def short(name: str) -> str:
+    """A run's name without date."""
+    kind, *_, rest = name.partition("_")
+    return f"{kind} {rest.split('_', 1)[-1]}"
+
+
+def counted(chosen: argparse.Namespace) -> Iterator[str]:
+    """The studies that count."""
+    with shared_work(chosen):
+        if chosen.study == "triples":
+            tasks: Iterator[tuple[int, ...]] = ((number, chosen.seed) for number in range(chosen.trials))
+            work = as_finished(triple, (chosen.data,), tasks)
+        else:
+            places = [at for at, item in enumerate(FAULTS) if chosen.fault in (None, item.name)]
+            tasks = ((at, number, chosen.seed) for number in range(chosen.trials) for at in places)
+            work = as_finished(fault, (chosen.data,), tasks)
+        rows = []
+        for row in work:
+            rows.append(row)
+            if chosen.log:
+                with chosen.log.open("a") as file:
+                    file.write(json.dumps(row) + "\n")
+    order = {item.name: at for at, item in enumerate(FAULTS)}
+    rows.sort(key=lambda row: (order.get(row.get("fault", ""), 0), row["number"]))
+    yield from told_triples(rows) if chosen.study == "triples" else told_faults(rows)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the study for the data in a folder."""
     parser = argparse.ArgumentParser(prog="python tests/benchmarks/published/diagnosis_real.py", description=__doc__)
     parser.add_argument("--data", type=Path, required=True, help="folder with the folders of the two ships")
     parser.add_argument("--ship", choices=[case.folder for case in (POND, TANK)], help="only this one")
     parser.add_argument("--seed", type=int, default=0, help="of all chance")
+    parser.add_argument("--study", choices=("groups", "triples", "faults"), default="groups")
+    parser.add_argument("--trials", type=int, default=20, help="triples of runs")
+    parser.add_argument("--fault", choices=[item.name for item in FAULTS], help="only this one")
+    parser.add_argument("--log", type=Path, help="file to add a line of JSON for each trial to")
+    add_sharing(parser)
     chosen = parser.parse_args(arguments)
-    for case in (POND, TANK):
-        if chosen.ship in (None, case.folder):
-            for line in told(case, tried(case, chosen.data, seed=chosen.seed)):
-                sys.stdout.write(f"{line}\n")
-                sys.stdout.flush()
+    if not all((chosen.data / case.folder).is_dir() for case in (POND, TANK)):
+        sys.stdout.write(f"{chosen.data} lacks {POND.folder} or {TANK.folder}: nothing is measured\n")
+        return 0
+    lines = counted(chosen) if chosen.study != "groups" else (
+        line
+        for case in (POND, TANK)
+        if chosen.ship in (None, case.folder)
+        for line in told(case, tried(case, chosen.data, seed=chosen.seed))
+    )  # fmt: skip
+    for line in lines:
+        sys.stdout.write(f"{line}\n")
+        sys.stdout.flush()
     return 0
 
 
