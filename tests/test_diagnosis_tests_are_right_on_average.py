@@ -13,7 +13,7 @@ from expdesign.diagnosis.data.noise import Noise, fit_ar_noise, linear_basis, wh
 from expdesign.diagnosis.data.tuning import TUNING
 from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.fit.gauss_newton import fit
-from expdesign.diagnosis.motion.linearisation import disturbance_of, linearise, responses
+from expdesign.diagnosis.motion.linearisation import disturbance_of, linearise, responses, term_disturbances
 from expdesign.diagnosis.motion.simulation import initial_states, simulate_windows
 from expdesign.diagnosis.select.fitted_candidate import fit_candidate
 from expdesign.diagnosis.select.forward_selection import fit_nuisance
@@ -262,3 +262,24 @@ def test_uncertain_parameters_beyond_their_bounds_are_still_tested_as_causes():
     assert base.ship.get("theta:X_kappa") < -2 * 0.00025  # beyond two of its standard deviations
     (found,) = score_tests(base, own)
     assert found.p_value < 1e-6
+
+
+def test_regressors_are_the_derivatives_by_parameters_and_terms():
+    """Along a path with a factor on everything: current, load, thrust, shallow water, a change of the ship."""
+    effects = {
+        "current:north": 0.1, "inertia:v": 0.2, "gain": 0.1, "shallow:damping": 0.3, "shallow:inertia": 0.2,
+        "change:time": 90.0, "change:gain": 0.1, "change:damping": -0.1, "asymmetry": 0.01,
+    }  # fmt: skip
+    for ship, roll in (("barge", {"roll:period": 9.0, "roll:damping": 0.1, "roll:sway": 0.3}), ("coaster", {})):
+        extended, windows = case(ship, shoaling=True)
+        changed = extended.with_effects(effects | roll)
+        linear = linearise(simulate_windows(changed, windows, initial_states(windows, changed.states)))
+        found = term_disturbances(linear, (*extended.unit_terms, "gain"))
+        assert {"gain"}.isdisjoint(found)
+        assert any(key.startswith("term:") for key in found)
+        for key, exact in found.items():
+            changed = linear.motion.ship.with_effects({key: linear.motion.ship.get(key) + 1e-3})
+            other = disturbance_of(linear, changed, 1e-3)
+            size = np.abs(exact.force).max()
+            assert size > 0, key
+            np.testing.assert_allclose(exact.force, other.force, atol=1e-6 * size, err_msg=f"{ship} {key}")

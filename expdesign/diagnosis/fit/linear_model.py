@@ -14,7 +14,14 @@ import numpy as np
 from expdesign.diagnosis.data import linear_basis
 from expdesign.diagnosis.fit.tuning import TUNING
 from expdesign.diagnosis.model import ExtendedModel
-from expdesign.diagnosis.motion import Disturbance, LinearisedMotion, disturbance_of, responses, start_responses
+from expdesign.diagnosis.motion import (
+    Disturbance,
+    LinearisedMotion,
+    disturbance_of,
+    responses,
+    start_responses,
+    term_disturbances,
+)
 from expdesign.values import Array
 
 
@@ -70,13 +77,15 @@ def build_sensitivities(
 
 
 def effect_disturbances(linear: LinearisedMotion, keys: Sequence[str]) -> list[Disturbance]:
-    """Disturbances per unit of each effect, by finite differences."""
+    """Disturbances per unit of each effect: regressors of those that act linearly, finite differences by others."""
+    exact = term_disturbances(linear, keys)
+    return [exact[key] if key in exact else _by_difference(linear, key) for key in keys]
+
+
+def _by_difference(linear: LinearisedMotion, key: str) -> Disturbance:
     ship = linear.motion.ship
-    steps = [difference_step(ship, key) for key in keys]
-    return [
-        disturbance_of(linear, ship.with_effects({key: ship.get(key) + step}), step)
-        for key, step in zip(keys, steps, strict=True)
-    ]
+    step = difference_step(ship, key)
+    return disturbance_of(linear, ship.with_effects({key: ship.get(key) + step}), step)
 
 
 def sensitivities_to(linear: LinearisedMotion, keys: Sequence[str]) -> Sensitivities:

@@ -5,6 +5,7 @@ from expdesign.diagnosis.model.input_groups import RESPONSES, group_columns, inp
 from expdesign.diagnosis.model.term_library import ADVANCE_LOSS, AIR, own_advance_terms, own_air_terms, term_library
 from expdesign.diagnosis.model.terms import (
     Effects,
+    ScaledTerm,
     ahead_force,
     ahead_force_text,
     asymmetry_terms,
@@ -24,6 +25,7 @@ __all__ = [
     "ROLL",
     "Effects",
     "ExtendedModel",
+    "ScaledTerm",
     "ahead_force",
     "ahead_force_text",
     "asymmetry_terms",

@@ -29,7 +29,7 @@ from collections.abc import Mapping, Set
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-from expdesign.diagnosis.model.terms import Effects, ScaledTerm, library_terms, own_terms
+from expdesign.diagnosis.model.terms import Effects, ScaledTerm, library_terms, own_terms, unit_terms
 from expdesign.vessel import Roll, Term, VesselModel
 
 ANGLE_STEMS = ("a", "rudder")
@@ -67,6 +67,11 @@ class ExtendedModel:
             *library_terms(self.model, self.library, self.effects),
         )
         object.__setattr__(self, "scaled_terms", parts)
+
+    @cached_property
+    def unit_terms(self) -> Mapping[str, ScaledTerm]:
+        """Effect -> term by which its unit changes the rates, for parameters and library terms: they act linearly."""
+        return unit_terms(self.model, self.library, self.effects)
 
     def with_effects(self, effects: Effects) -> ExtendedModel:
         """The same with some effects set to other values."""

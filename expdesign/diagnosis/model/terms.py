@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -103,6 +103,18 @@ def library_terms(model: VesselModel, library: Mapping[str, Term], effects: Effe
                 )
             )
     return parts
+
+
+def unit_terms(model: VesselModel, library: Mapping[str, Term], effects: Effects) -> dict[str, ScaledTerm]:
+    """Effect -> what a unit more of it adds to the terms, for every parameter and every library term."""
+    more = {**effects, **{f"theta:{name}": effects.get(f"theta:{name}", 0.0) + 1.0 for name in model.names}}
+    pairs = zip(model.names, own_terms(model, more), own_terms(model, effects), strict=True)
+    own = {
+        f"theta:{name}": replace(one, factor=one.factor - now.factor, after=one.after - now.after)
+        for name, one, now in pairs
+    }
+    keys = [f"term:{name}" for name in library]
+    return own | dict(zip(keys, library_terms(model, library, dict.fromkeys(keys, 1.0)), strict=True))
 
 
 @lru_cache(maxsize=512)

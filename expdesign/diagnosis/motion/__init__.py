@@ -1,6 +1,13 @@
 """Simulation of the extended model over all windows, and its linearisation."""
 
-from expdesign.diagnosis.motion.linearisation import Disturbance, disturbance_of, linearise, responses, start_responses
+from expdesign.diagnosis.motion.linearisation import (
+    Disturbance,
+    disturbance_of,
+    linearise,
+    responses,
+    start_responses,
+    term_disturbances,
+)
 from expdesign.diagnosis.motion.motion import LinearisedMotion, Motion
 from expdesign.diagnosis.motion.simulation import initial_states, simulate_from_measured, simulate_windows
 from expdesign.diagnosis.motion.window_length import stable_windows
@@ -17,4 +24,5 @@ __all__ = [
     "simulate_windows",
     "stable_windows",
     "start_responses",
+    "term_disturbances",
 ]

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 
 from expdesign.conventions import OUTPUTS
-from expdesign.diagnosis.model import ExtendedModel, ahead_force
+from expdesign.diagnosis.model import ExtendedModel, ScaledTerm, ahead_force
 from expdesign.diagnosis.motion.exogenous_inputs import ExogenousInputs
 from expdesign.values import Array
 from expdesign.vessel import NUMPY
@@ -21,8 +23,38 @@ def state_rates(ship: ExtendedModel, state: tuple[Array, ...], exogenous: Exogen
     return ship.roll.rates(tuple(totals), u * r, state[3:])
 
 
+def rates_by_term(
+    ship: ExtendedModel, parts: Sequence[ScaledTerm], state: tuple[Array, ...], exogenous: ExogenousInputs
+) -> list[tuple[Array, ...]]:
+    """Change of the rates by each of several terms, were it added to the model."""
+    u, v, r = state[:3]
+    signals = _signals(ship, u, v, r, exogenous)
+    still = np.zeros_like(u)
+    result = []
+    for part in parts:
+        value = _value(ship, part, signals, exogenous)
+        value = value if part.coriolis else value / _heavier(ship, part.equation, exogenous)
+        plain = tuple(value if name == part.equation else still for name in OUTPUTS)
+        result.append(plain if ship.roll is None else ship.roll.rates(plain, still, (still, still)))
+    return result
+
+
 def _accelerations(ship: ExtendedModel, u: Array, v: Array, r: Array, exogenous: ExogenousInputs) -> list[Array]:
     """d/dt (u, v, r) without roll."""
+    signals = _signals(ship, u, v, r, exogenous)
+    totals = {name: np.zeros_like(u) for name in OUTPUTS}
+    steady = dict(totals)
+    for part in ship.scaled_terms:
+        into = steady if part.coriolis else totals
+        into[part.equation] = into[part.equation] + _value(ship, part, signals, exogenous)
+    lean = ship.get("asymmetry")
+    if lean and not any(part.reads_turn for part in ship.scaled_terms):
+        totals["r"] = totals["r"] + lean * ahead_force(signals, ship.model)
+    return [totals[n] / _heavier(ship, n, exogenous) + steady[n] for n in OUTPUTS]
+
+
+def _signals(ship: ExtendedModel, u: Array, v: Array, r: Array, exogenous: ExogenousInputs) -> dict[str, Array]:
+    """What terms read: motion through water and air, inputs and their forces."""
     signals: dict[str, Array] = {**exogenous, "u": u, "v": v, "r": r}
     if "u_c" in exogenous:
         signals["u"], signals["v"] = u - exogenous["u_c"], v - exogenous["v_c"]
@@ -31,17 +63,19 @@ def _accelerations(ship: ExtendedModel, u: Array, v: Array, r: Array, exogenous:
     lean = ship.get("asymmetry")
     if lean:
         signals["tau_psi"] = signals["tau_psi"] + lean * ahead_force(signals, ship.model)
-    totals = {name: np.zeros_like(u) for name in OUTPUTS}
-    steady = dict(totals)
-    for part in ship.scaled_terms:
-        value = part.factor * part.evaluate(signals, NUMPY)
-        if part.after:
-            value = value + part.after_factor(exogenous) * part.evaluate(signals, NUMPY)
-        if part.damping and SHOAL in exogenous:
-            value = value * (1 + ship.get("shallow:damping") * exogenous[SHOAL])
-        into = steady if part.coriolis else totals
-        into[part.equation] = into[part.equation] + value
-    if lean and not any(part.reads_turn for part in ship.scaled_terms):
-        totals["r"] = totals["r"] + lean * ahead_force(signals, ship.model)
-    heavier = 1.0 if SHOAL not in exogenous else 1 + ship.get("shallow:inertia") * exogenous[SHOAL]
-    return [totals[n] / ((1 + ship.get(f"inertia:{n}")) * heavier) + steady[n] for n in OUTPUTS]
+    return signals
+
+
+def _value(ship: ExtendedModel, part: ScaledTerm, signals: Mapping[str, Array], exogenous: ExogenousInputs) -> Array:
+    """One term, before inertia."""
+    factor = part.factor + part.after_factor(exogenous) if part.after else part.factor
+    value = factor * part.evaluate(signals, NUMPY)
+    if part.damping and SHOAL in exogenous:
+        value = value * (1 + ship.get("shallow:damping") * exogenous[SHOAL])
+    return np.asarray(value)
+
+
+def _heavier(ship: ExtendedModel, equation: str, exogenous: ExogenousInputs) -> Array | float:
+    """Factor of inertia."""
+    factor = 1 + ship.get(f"inertia:{equation}")
+    return factor if SHOAL not in exogenous else factor * (1 + ship.get("shallow:inertia") * exogenous[SHOAL])

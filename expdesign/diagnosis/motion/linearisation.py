@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.diagnosis.model import ExtendedModel
+from expdesign.diagnosis.motion.equations_of_motion import rates_by_term
 from expdesign.diagnosis.motion.exogenous_inputs import exogenous_inputs
 from expdesign.diagnosis.motion.integration import stacked_rates, state_jacobian, transition_matrices
 from expdesign.diagnosis.motion.motion import LinearisedMotion, Motion
@@ -65,6 +66,32 @@ def disturbance_of(linear: LinearisedMotion, changed: ExtendedModel, per: float)
         force=force / per if np.any(force) else None,
         sensor=sensor / per if np.any(sensor) else None,
     )
+
+
+def term_disturbances(linear: LinearisedMotion, keys: Sequence[str]) -> dict[str, Disturbance]:
+    """Effect -> disturbance per unit, exactly, for those that add to a term along the path: its regressor.
+
+    Left out are other effects, and terms that read a wind or a yaw moment which the path does not have.
+    """
+    motion, ship = linear.motion, linear.motion.ship
+    units = {key: ship.unit_terms[key] for key in keys if key in ship.unit_terms}
+    parts = {
+        key: part
+        for key, part in units.items()
+        if not (part.reads_air and "u_w" not in motion.exogenous)
+        and not (part.reads_turn and ship.get("asymmetry") and key.startswith("term:"))
+    }
+    if not parts:
+        return {}
+    exogenous = motion.exogenous.without_last_step()
+    ends = [
+        rates_by_term(ship, tuple(parts.values()), tuple(np.moveaxis(end, -1, 0)), exogenous)
+        for end in (motion.states[:, :-1], motion.states[:, 1:])
+    ]
+    return {
+        key: Disturbance(force=np.stack([(a + b) / 2 for a, b in zip(*rates, strict=True)], axis=-1), sensor=None)
+        for key, *rates in zip(parts, *ends, strict=True)
+    }
 
 
 def _differing(one: ExtendedModel, other: ExtendedModel) -> set[str]:

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from expdesign.diagnosis.causes import Candidate
-from expdesign.diagnosis.fit import difference_step
+from expdesign.diagnosis.fit import difference_step, effect_disturbances
 from expdesign.diagnosis.motion import Disturbance, LinearisedMotion, disturbance_of
 from expdesign.values import Array
 
@@ -31,7 +31,9 @@ def candidate_disturbances(
 
 
 def _smooth_disturbance(linear: LinearisedMotion, candidate: Candidate, key: str) -> Disturbance:
-    """By a finite difference of one effect."""
+    """Per unit of one effect; beside fixed effects that the path lacks by a finite difference."""
+    if not candidate.fixed:
+        return effect_disturbances(linear, [key])[0]
     ship = linear.motion.ship
     size = difference_step(ship, key)
     return disturbance_of(linear, ship.with_effects({**candidate.fixed, key: ship.get(key) + size}), size)
