@@ -8,6 +8,7 @@ import shapely
 
 from expdesign.errors import FileError
 from expdesign.scenario import load_area
+from expdesign.scenario.charts.geojson_dangers import LANGUAGES
 from scenario_files import collection, feature, square
 
 PLACE = [0.002, 0.001]
@@ -39,12 +40,25 @@ def closed_m2(loaded, *features, chart=""):
     return loaded(chart=chart).water.area - loaded(*features, chart=chart).water.area
 
 
+NATIONAL = {
+    "French": ("Épaves", "haut-fond", "ROCHE", "Hauts-fonds", "récif", "Bouées"),
+    "German": ("Wracks", "Untiefe", "Unterwasserfelsen", "Unterwasserhindernis", "Klippen", "Tonnen"),
+    "Swedish": ("Vrak", "Grund", "undervattensgrund", "Sten_P", "Grynnor", "prickar"),
+    "Norwegian": ("Grunne", "Skjær", "SKJAER", "Båe", "skipsvrak", "Bøyer"),
+    "Finnish": ("Hylky_P", "Vesikivi_P", "kari", "Matalikko", "viitat"),
+    "Dutch": ("wrakken", "ondiepte", "Rotsen", "obstakels", "boeien"),
+}
+"""Layers as national charts name them."""
 DISC = shapely.Point(0, 0).buffer(MARGIN_M, quad_segs=8).area
 
 
 @pytest.mark.parametrize(
     "point",
     [
+        *(danger(layer) for layers in NATIONAL.values() for layer in layers),
+        danger(objtype="Skjær"),
+        danger(historic="wreck"),
+        danger("Grunne", dybde=2.0),
         *(danger(layer) for layer in ("UWTROC", "uwtroc", "rocks", "underwater_rock", "Wrecks", "SHOALS", "OBSTRN")),
         danger(type="wreck"),
         danger(**{"seamark:type": "obstruction"}),
@@ -76,7 +90,12 @@ def test_a_point_of_danger_is_kept_clear_of_by_the_margin(loaded, point):
     assert not any("not used" in note for note in area.notes)
 
 
-@pytest.mark.parametrize("kind", ["obstruction", "unsurveyed", "UNSARE", "shoal"])
+def test_no_word_stands_for_two_kinds_of_danger():
+    words = [word for words in LANGUAGES.values() for word in words.split()]
+    assert len(set(words)) == len(words)
+
+
+@pytest.mark.parametrize("kind", ["obstruction", "unsurveyed", "UNSARE", "shoal", "IkkeKartlagtSjømåltOmråde"])
 def test_areas_of_danger_are_closed_as_they_are(loaded, kind):
     area = feature(kind if kind.isupper() else "areas", square(0.001))
     area["properties"]["kind"] = kind

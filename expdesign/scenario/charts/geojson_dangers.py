@@ -1,13 +1,15 @@
 """Dangers of GeoJSON charts by layer or property: rocks, wrecks, shoals, obstructions, unsurveyed areas, buoys.
 
-Names of object classes of S-57 are understood as they are, other names word by word.
+Names of object classes of S-57 are understood as they are, other names word by word, in the languages of the table.
 """
 
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections import Counter
 from collections.abc import Container, Iterable, Iterator, Mapping
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -20,18 +22,46 @@ from expdesign.scenario.charts.geojson import POLYGON_TYPES, Feature
 from expdesign.scenario.tables import LARGEST, Entry
 
 CLASSES = (*SOLID, *BUOYS, *DANGERS, *OVERHEAD, UNSURVEYED)
-WORDS = {
-    **dict.fromkeys(("rock", "reef", "boulder", "skerry", "skerries", "pinnacle"), "UWTROC"),
-    **dict.fromkeys(("wreck", "shipwreck"), "WRECKS"),
-    **dict.fromkeys(("shoal", "obstruction", "obstructed", "foul", "snag", "danger", "dangerous", "hazard"), "OBSTRN"),
-    "sounding": "SOUNDG",
-    **dict.fromkeys(("unsurveyed", "uncharted", "unsounded"), UNSURVEYED),
-    "buoy": "BOYSPP",
-    "beacon": "BCNSPP",
-    **dict.fromkeys(("pile", "dolphin", "pylon"), "PILPNT"),
-    "bridge": "BRIDGE",
+LANGUAGES = {
+    "UWTROC": (
+        "rock reef boulder skerry skerries pinnacle rocher roche recif ecueil fels felsen unterwasserfelsen klippe "
+        "klippen riff riffe stein steine sten stenar skar revet undervattensskar skjaer undervannsskjaer bae baa "
+        "baer grunne grunner kari karit kivi kivet vesikivi vesikivet vedenalainenkivi luoto rots rotsen rif riffen"
+    ),
+    "WRECKS": (
+        "wreck shipwreck epave wrack wracks wracke schiffswrack vrak vraket vraken skeppsvrak skipsvrak hylky hylyt "
+        "wrak wrakken scheepswrak"
+    ),
+    "OBSTRN": (
+        "shoal obstruction obstructed foul snag danger dangerous hazard obstacle croche hautfond hautsfonds untiefe "
+        "untiefen hindernis hindernisse unterwasserhindernis gefahr gefahrenstelle grund grundet grynna grynnor "
+        "undervattensgrund hinder fara matala matalikko esteet vaara vedenalainen hinderomrade hindring "
+        "fareomrade obstakel obstakels ondiepte ondiepten droogte gevaar"
+    ),
+    "SOUNDG": (
+        "sounding sonde lotung lotungen tiefenpunkt tiefenpunkte lodning djuppunkt djupsiffra syvyyspiste "
+        "syvyyspisteet dybdepunkt lodding loding lodingen dieptepunt peiling peilingen"
+    ),
+    UNSURVEYED: (
+        "unsurveyed uncharted unsounded nonhydrographie nonleve nonleves unvermessen nichtvermessen osjomatt omatt "
+        "ejsjomatt mittaamaton mittaamattomat ikkekartlagt ikkesjomalt ongekarteerd nietopgenomen"
+    ),
+    "BOYSPP": (
+        "buoy bouee tonne tonnen boje bojen boj bojar prick prickar poiju poijut viitta viitat boye boyer boei boeien"
+    ),
+    "BCNSPP": "beacon balise bake baken bakens remmare reimari reimarit lysboye stake staker",
+    "PILPNT": (
+        "pile dolphin pylon pieu ducdalbe pfahl pfahle pfaehle dalben dykdalb paalu paalut pel peler "
+        "duckdalbe paal palen dukdalf dukdalven meerpaal"
+    ),
+    "BRIDGE": "bridge pont ponts brucke brucken bruecke bruecken bro broar silta sillat bru bruer brug bruggen",
+    "SLCONS": "breakwater groyne jetty pier briselames mole molen buhne buhnen vagbrytare aallonmurtaja molo moloer",
 }
-"""Words for dangers and obstacles, and their object class."""
+"""Words for dangers and obstacles by object class, without accents: English, French, German, Swedish, Norwegian and
+Danish, Finnish, Dutch. Two words of a name that belong together are written as one."""
+WORDS = {word: kind for kind, words in LANGUAGES.items() for word in words.split()}
+LETTERS = str.maketrans({"ø": "o", "Ø": "O", "æ": "ae", "Æ": "Ae", "œ": "oe", "Œ": "Oe", "ß": "ss"})
+"""Letters that have no accent to be left out."""
 SEAMARKS = {
     **{"cable_overhead": "CBLOHD", "pipeline_overhead": "PIPOHD", "conveyor": "CONVYR", "platform": "OFSPLF"},
     **{"fishing_facility": "FSHFAC", "marine_farm": "MARCUL", "mooring": "MORFAC", "hulk": "HULKES"},
@@ -45,13 +75,20 @@ Source: OpenSeaMap, seamarks and their object classes in S-57 (wiki.openstreetma
 """
 SEAMARK_KEYS = ("seamark:type", "seamark_type", "seamark-type")
 """The property as it is, and as file formats without colons in names write it."""
-KIND_KEYS = ("kind", "type", "class", "category", "object", "feature", "acronym", "natural", "hazard", *SEAMARK_KEYS)
-"""Properties that may say what a feature is."""
+KIND_KEYS = (
+    *("kind", "type", "class", "category", "object", "feature", "acronym", "natural", "hazard", "historic", "man_made"),
+    *("objtype", "objekttype", "objektart", "objekttyp", "featuretype", "feature_type", "nature", "categorie", "art"),
+    *("typ", "laji", "tyyppi", "kohdeluokka", "soort", "objectsoort", *SEAMARK_KEYS),
+)
+"""Properties that may say what a feature is, in the languages of the words."""
 CLASS_OF_KEY = {"catwrk": "WRECKS", "catobs": "OBSTRN", "valsou": "OBSTRN"}
 """Attributes that only dangers have."""
 NUMBERS = {86: "OBSTRN", 129: "SOUNDG", 153: "UWTROC", 154: UNSURVEYED, 159: "WRECKS"}
 """Numbers of object classes, attribute OBJL."""
-DEPTH_KEYS = ("depth_m", "depth", "least_depth_m", "least_depth", "valsou", "drval1")
+DEPTH_KEYS = (
+    *("depth_m", "depth", "least_depth_m", "least_depth", "valsou", "drval1"),
+    *("profondeur", "tiefe", "djup", "dybde", "syvyys", "diepte"),
+)
 
 
 def kind_of(feature: Feature, table: ChartTable) -> str:
@@ -135,8 +172,21 @@ def _class(name: str) -> str:
     """The object class of a name, or ""."""
     if name.upper() in CLASSES:
         return name.upper()
-    words = (word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+", name))
-    return next((WORDS[found] for word in words for found in (word, word.removesuffix("s")) if found in WORDS), "")
+    words = _words(name)
+    joined = (first + second for first, second in pairwise(words))
+    return next((WORDS[found] for word in (*words, *joined) for found in _singular(word) if found in WORDS), "")
+
+
+def _words(name: str) -> list[str]:
+    """The words of a name in lower case and without accents."""
+    plain = unicodedata.normalize("NFKD", name.translate(LETTERS))
+    letters = "".join(letter for letter in plain if not unicodedata.combining(letter))
+    return [word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+", letters)]
+
+
+def _singular(word: str) -> tuple[str, str]:
+    """A word, and without the plural's s."""
+    return word, word.removesuffix("s")
 
 
 def _depth(feature: Feature, kind: str, table: ChartTable, geometry: shapely.Geometry) -> float:

@@ -26,10 +26,10 @@ VESSELS = (
 AREAS = (
     "Allowed water is inside the bounds and deep enough, and is neither land, danger nor a no-go zone. Dangers in a "
     "GeoJSON chart are rocks, wrecks, shoals, obstructions, soundings, unsurveyed areas, buoys, beacons and bridges: "
-    "points, lines or areas. They are known by their layer, or by a property kind, type, class, natural or "
-    "seamark:type, in English, as an object class of S-57 or as OpenSeaMap writes it. A property depth_m, depth or "
-    "VALSOU states their least depth [m]; without one they count as at the surface. Results name every "
-    "layer that is not used."
+    "points, lines or areas. They are known by their layer, or by a property kind, type, class, natural, objtype or "
+    "seamark:type: an object class of S-57, as OpenSeaMap writes it, or a word in English, French, German, Swedish, "
+    "Norwegian, Danish, Finnish or Dutch. A property depth_m, depth or VALSOU states their least depth [m]; without "
+    "one they count as at the surface. Results name every layer that is not used; danger_layers in [chart] adds others."
 )
 REFUSED = (
     "A plan that is refused ends with exit status 3 and leaves a draft, refused.html and refused.json: what stands in "
