@@ -9,9 +9,10 @@ import shapely
 from expdesign.plan import PlanSettings
 from expdesign.plan.chart.clearance_grid import clearance_field
 from expdesign.plan.control.capability import capability
-from expdesign.plan.legs import LegTask, LegWater
-from expdesign.plan.legs._ompl import dubins_curve
+from expdesign.plan.legs import LegTask, LegWater, _ompl, dubins
+from expdesign.plan.legs._ompl import dubins_curve, search_dubins
 from expdesign.plan.legs.dubins import find_path
+from expdesign.plan.legs.tuning import LEGS
 from expdesign.plan.legs.water import nearest_turns
 from expdesign.scenario import load_vessel
 from expdesign.simulation import CALM
@@ -47,6 +48,27 @@ def test_a_path_round_a_wall_is_found_and_its_hull_is_clear():
     assert shapely.contains_properly(water.safe, swept_area(path, water.vessel.hull_b))
     shortest = 2 * np.hypot(100 + 20, 150 - 20) + 2 * 20  # taut string round the wall's end at the clearance
     assert shortest < length(path) < 1.4 * shortest
+
+
+def test_a_path_to_a_place_without_room_is_not_searched_for(monkeypatch):
+    water = leg_water(BASIN)
+    monkeypatch.setattr(dubins, "search_dubins", lambda *ends, **rest: pytest.fail("searched"))
+    for place in (at_rest(345, 0, 0.0), at_rest(0, 400, 1.0)):
+        assert find_path(task(at_rest(0, 0, 0.0), place), water) is None
+        assert find_path(task(place, at_rest(0, 0, 0.0)), water) is None
+
+
+def test_a_search_without_a_way_on_draws_no_more_than_its_batches(monkeypatch):
+    drawn, batches = [], _ompl._batches
+    monkeypatch.setattr(_ompl, "_batches", lambda planner: drawn.append(batches(planner)) or drawn[-1])
+
+    def free(poses: np.ndarray) -> bool:
+        return bool(np.hypot(*(poses[:, :2] - (300.0, 0.0)).T).min() > 5.0)
+
+    low, high = np.array([-200.0, -300.0]), np.array([500.0, 300.0])
+    ends = np.zeros(3), np.array([300.0, 0.0, 0.0])
+    assert search_dubins(*ends, radius_m=40.0, spacing_m=10.0, low=low, high=high, holds=free, seed=1) is None
+    assert max(drawn) == LEGS.search_batches + 1  # ended by these, not by iterations
 
 
 def test_a_walled_in_vessel_has_no_leg():

@@ -42,8 +42,10 @@ def search_dubins(
 ) -> Array | None:
     """(k, 3) poses along a short Dubins path on which the swept hull is clear, or None when none is found.
 
-    BIT* is counted in iterations, not seconds, so the same seed gives the same path on any machine. Its motions are
-    checked by the hull they sweep, so every path it returns is clear as a whole, up to the spacing of poses.
+    BIT* is counted in iterations, not seconds, so the same seed gives the same path on any machine. It draws another
+    batch of samples whenever no motion is left to try, and each batch costs more than the one before: a search that
+    draws very many has no way on from one of its ends, and is given up. Its motions are checked by the hull they sweep,
+    so every path it returns is clear as a whole, up to the spacing of poses.
 
     Args:
         start, end: (3,) poses.
@@ -65,13 +67,14 @@ def search_dubins(
     setup.setStateValidityChecker(lambda state: True)  # every pose of a path ends a motion, which is checked
     information.setMotionValidator(_SweptHull(information, space, holds, spacing_m))
     setup.setStartAndGoalStates(_state(space, start), _state(space, end))
-    setup.setPlanner(og.BITstar(information))
+    planner = og.BITstar(information)
+    setup.setPlanner(planner)
     # the planner reports a solution only between calls of solve, so it is called in slices and continues where it was
     solved = 0
     for _ in range(LEGS.search_slices):
-        setup.solve(ob.PlannerTerminationCondition(_after(LEGS.search_iterations)))
+        setup.solve(ob.PlannerTerminationCondition(_after(LEGS.search_iterations, planner)))
         solved += bool(setup.haveExactSolutionPath())
-        if solved > LEGS.improving_slices:
+        if solved > LEGS.improving_slices or _batches(planner) > LEGS.search_batches:
             break
     if not solved:
         return None
@@ -105,10 +108,15 @@ def _curve(
     return rows
 
 
-def _after(iterations: int) -> Callable[[], bool]:
-    """A condition that becomes true after being asked a number of times."""
+def _after(iterations: int, planner: og.BITstar) -> Callable[[], bool]:
+    """A condition that becomes true after being asked a number of times, or when too many batches were drawn."""
     count = iter(range(iterations))
-    return lambda: next(count, None) is None
+    return lambda: next(count, None) is None or _batches(planner) > LEGS.search_batches
+
+
+def _batches(planner: og.BITstar) -> int:
+    """Batches of samples that the planner has drawn."""
+    return int(planner.numBatches())
 
 
 def _state(space: ob.DubinsStateSpace, pose: Array) -> ob.State:

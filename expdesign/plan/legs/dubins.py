@@ -40,6 +40,8 @@ def find_path(task: LegTask, water: LegWater) -> Array | None:
     direct = dubins_curve(task.start[:3], task.end[:3], radius_m=radius, spacing_m=spacing)
     if water.holds(direct):
         return direct
+    if not all(water.holds(end) for end in (direct[:1], direct[-1:])):  # then no path does
+        return None
     for attempt, reach in enumerate(LEGS.search_boxes):
         box = reach * (radius + water.vessel.length_m)
         path = search_dubins(

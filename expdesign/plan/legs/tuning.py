@@ -14,6 +14,7 @@ class Tuning:
             lengths.
         search_iterations, search_slices: iterations of the path planner between looks for a solution, and how often
             at most.
+        search_batches: batches of samples after which it gives up.
         improving_slices: spent on a shorter path after the first solution.
         corridor_hulls: width of corridors to either side at most, in hull lengths.
         memory_time_constants: after which a lagging actuator has forgotten: two parts in a thousand million are left.
@@ -50,6 +51,7 @@ class Tuning:
     search_boxes: tuple[float, ...] = (4.0, 40.0)
     search_iterations: int = 1500
     search_slices: int = 4
+    search_batches: int = 100
     improving_slices: int = 1
     corridor_hulls: float = 3.0
     memory_time_constants: float = 20.0
