@@ -63,7 +63,7 @@ def test_a_search_without_a_way_on_draws_no_more_than_its_batches(monkeypatch):
     monkeypatch.setattr(_ompl, "_batches", lambda planner: drawn.append(batches(planner)) or drawn[-1])
 
     def free(poses: np.ndarray) -> bool:
-        return bool(np.hypot(*(poses[:, :2] - (300.0, 0.0)).T).min() > 5.0)
+        return bool((np.abs(poses[:, :2] - (30.0, 0.0)) > (25.0, 100.0)).any(axis=1).all())  # a wall ahead of the start
 
     low, high = np.array([-200.0, -300.0]), np.array([500.0, 300.0])
     ends = np.zeros(3), np.array([300.0, 0.0, 0.0])
