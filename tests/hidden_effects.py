@@ -124,8 +124,8 @@ def sail(trials: list[Trial], orders: np.ndarray, step_s: float, weather: Weathe
         orders: (n, b, k, m).
         depth: (n, b, k) water depth, or None for deep water.
 
-    Effects: gain, kappa, asymmetry (yaw moment per ahead force), angle_offset (all azimuths or the rudder), lag_s,
-    delay_s, deadband, load_u load_v load_r, shallow_damping shallow_inertia
+    Effects: gain, kappa, asymmetry (yaw moment per ahead force), angle_offset (all azimuths or the rudder),
+    rudder_scale, lag_s, delay_s, deadband, load_u load_v load_r, shallow_damping shallow_inertia
     (times draught/depth, draught 2.5 m), roll_period_s roll_damping roll_sway roll_yaw, change_s (batches laid end to
     end) with change_gain change_damping, and any name of TERMS. lag and delay act on the inputs named by `acts_on`,
     the dead band on those named by `dead_on` (bit masks).
@@ -188,9 +188,9 @@ def sail(trials: list[Trial], orders: np.ndarray, step_s: float, weather: Weathe
 
 
 EFFECTS = (
-    "gain", "kappa", "asymmetry", "angle_offset", "lag_s", "delay_s", "deadband", "acts_on", "dead_on", "load_u",
-    "load_v", "load_r", "shallow_damping", "shallow_inertia", "roll_period_s", "roll_damping", "roll_sway", "roll_yaw",
-    "change_s", "change_gain", "change_damping", *(name for name in TERMS),
+    "gain", "kappa", "asymmetry", "angle_offset", "rudder_scale", "lag_s", "delay_s", "deadband", "acts_on", "dead_on",
+    "load_u", "load_v", "load_r", "shallow_damping", "shallow_inertia", "roll_period_s", "roll_damping", "roll_sway",
+    "roll_yaw", "change_s", "change_gain", "change_damping", *(name for name in TERMS),
 )  # fmt: skip
 
 
@@ -227,7 +227,7 @@ def _rates(ship, x, acting, th, e, present, shoal, after, current, wind):
         gain = gain * (1 + after * e["change_gain"])
         damp = (1 + after * e["change_damping"]) * damp
     if ship == "coaster":
-        n, rudder = acting[0], acting[1] + e["angle_offset"]
+        n, rudder = acting[0], (1 + e["rudder_scale"]) * acting[1] + e["angle_offset"]
         push, side, turn = ca.fabs(n) * n, ur * ca.fabs(ur) * rudder, ur * ca.fabs(ur) * rudder
         fx = th["X_nn"] * push + th["X_dd"] * ur * ca.fabs(ur) * rudder * rudder
         fy, fn = th["Y_rud"] * side, th["N_rud"] * turn

@@ -91,7 +91,8 @@ def as_found(clean, cause: str):
 
 
 def test_every_cause_of_the_catalogue_is_tried():
-    assert set(EFFECTS) == {cause.name for cause in CAUSES}
+    """That of a rudder, which the tug does not have, in `test_diagnosis_tests_are_right_on_average`."""
+    assert {*EFFECTS, "actuator_scale"} == {cause.name for cause in CAUSES}
 
 
 @pytest.mark.parametrize("cause", EFFECTS)

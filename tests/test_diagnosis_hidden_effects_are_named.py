@@ -21,9 +21,10 @@ CASES = (
     ("barge", "gyro_scale", {}, {"gyro": 0.08}, "factor", 1.08),
     ("barge", "sensor_delay", {}, {"late_v": 2.0}, "v_delay_s", 2.0),
     ("tug", "thruster_asymmetry", {"angle_offset": 0.06}, {}, "angle_offset_a_rad", 0.06),
+    ("coaster", "actuator_scale", {"rudder_scale": -0.1}, {}, "angle_factor_rudder", 0.9),
     ("coaster", "actuator_lag", {"lag_s": 5.0, "acts_on": 0b10}, {}, "lag_rudder_s", 5.0),
 )
-DEFAULT = (0, 7)
+DEFAULT = (0, 7, 12)
 """Tried in every run of the tests; the others take minutes."""
 
 

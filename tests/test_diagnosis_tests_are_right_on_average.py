@@ -160,6 +160,7 @@ TOGETHER = (
     ("barge", {"asymmetry": 0.6, "gain": -0.2, "gain:propeller": 0.1, "inertia:r": 0.3}),
     ("barge", {"asymmetry": 0.6, "change:time": 0.0, "change:gain": 0.3, "change:damping_r": -0.2}),
     ("barge", {"term:Y_abs_v_v": -0.05, "inertia:v": 0.3, "change:time": 0.0, "change:damping": 0.2}),
+    ("coaster", {"scale:rudder": -0.1, "gain": 0.1, "inertia:r": 0.2}),
     ("coaster", SENSED | {"asymmetry": 2e-4, "inertia:r": 0.5, "gain": 0.1}),
     ("coaster", {"gain:propeller": 0.2, "gain": 0.1, "inertia:u": 0.2, "term:X_unn": -3e-4, "theta:X_nn": 1e-4}),
 )

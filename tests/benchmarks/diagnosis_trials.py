@@ -98,7 +98,7 @@ class Hidden:
             **{f"{kind}_{group}_s": e.get(f"{kind}_s", 0.0) for kind in ("lag", "delay") for group in groups},
             **{f"deadband_{group}{'' if ship == 'barge' else '_rad'}": e.get("deadband", 0.0) for group in angled},
             **{f"angle_offset_{group}_rad": e.get("angle_offset", 0.0) for group in angled},
-            "thrust_offset_m": e.get("asymmetry", 0.0),
+            "angle_factor_rudder": 1 + e.get("rudder_scale", 0.0), "thrust_offset_m": e.get("asymmetry", 0.0),
             **{f"inertia_factor_{axis}": 1 + e.get(f"load_{axis}", 0.0) for axis in "uvr"},
             "damping_growth": e.get("shallow_damping", 0.0), "inertia_growth": e.get("shallow_inertia", 0.0),
             "roll_period_s": e.get("roll_period_s", 0.0), "roll_damping_ratio": e.get("roll_damping", 0.0),
@@ -165,6 +165,7 @@ def drawn_effect(cause: str, ship: str, rng: np.random.Generator, length_s: floa
                       effects={"shallow_damping": 0.8 * size, "shallow_inertia": 0.3 * size})  # fmt: skip
     loss = 0.0003 if ship == "coaster" else 0.002
     return {
+        "actuator_scale": Hidden(cause=cause, effects={"rudder_scale": 0.12 * sign * size}),
         "thrust_gain": Hidden(cause=cause, effects={"gain": 0.12 * sign * size}),
         "thrust_advance_loss": Hidden(cause=cause, effects={"kappa": -loss * size}),
         "heading_bias": Hidden(cause=cause, faults={"heading_bias": 0.04 * sign * size}),
@@ -180,6 +181,8 @@ def drawn_ship(cause: str, rng: np.random.Generator, only: str | None) -> str:
     """A ship that can have the effect, the one asked for if it can; the tug's simulations cost most."""
     if cause == "wind":
         return "tug"
+    if cause == "actuator_scale":
+        return "coaster"
     return only or str(rng.choice(("barge", "barge", "coaster", "tug")))
 
 

@@ -23,6 +23,7 @@ MISSING_EFFECTS = {
     "actuator_lag": "the lag of the actuators",
     "actuator_delay": "the dead time of the actuators",
     "actuator_deadband": "the dead band of the actuators",
+    "actuator_scale": "the scale of the rudder angle",
     "load_change": "the correct inertia",
     "heading_bias": "the misalignment of a sensor",
     "lever_arm": "the distance of a sensor from amidships",

@@ -41,7 +41,7 @@ def within_bounds(ship: ExtendedModel, effects: dict[str, float]) -> dict[str, f
         if kind in ("lag", "delay", "deadband") or key in ("roll:period", "roll:damping"):
             before, ratio = ship.get(key), TUNING.largest_ratio
             value = min(max(value, before / ratio, 1e-6), before * ratio + 1e-6)
-        elif kind in ("inertia", "gain", "gyro"):
+        elif kind in ("inertia", "gain", "gyro", "scale"):
             value = max(value, TUNING.smallest_factor_change)
         result[key] = value
     return result

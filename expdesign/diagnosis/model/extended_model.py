@@ -6,7 +6,8 @@ Effects, by key:
     lacks current:north/east    steady current [m/s] wind:north/east       mean wind where none is measured [m/s];
     wind:speed [m/s] and wind:toward [rad] likewise gain, gain:propeller  thrust too strong by this share; all terms of
     inputs, or those without a rudder asymmetry             yaw moment per unit of ahead force: the thrust's line of
-    action passes this far to port [m] offset:GROUP          added to the angles of a group of inputs [rad] lag:GROUP,
+    action passes this far to port [m] offset:GROUP          added to the angles of a group of inputs [rad] scale:GROUP
+    share by which rudder angles exceed what is ordered, offset included lag:GROUP,
     delay:GROUP, deadband:GROUP    of a group of inputs [s], [s], [unit of the input] inertia:u/v/r         inertia too
     small by this share shallow:damping, shallow:inertia          growth per unit of draught over depth roll:sway,
     roll:yaw   acceleration per unit of roll; roll:period [s] and roll:damping are of the mode (`vessel.roll`)

@@ -1,4 +1,7 @@
-"""Inputs as the actuators of an extended model deliver them: dead band, dead time, lag and offset, in this order."""
+"""Inputs as the actuators of an extended model deliver them.
+
+Dead band, dead time, lag, offset and scale, in this order.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +27,16 @@ def delivered_inputs(ship: ExtendedModel, windows: Windows) -> tuple[tuple[Array
             if key.startswith(kind + ":") and value != 0.0:
                 columns, response = group_columns(key.split(":", 1)[1], inputs), _response(field, value)
                 delivered = tuple(_through(rows, columns, response, windows.step_s / finer) for rows in delivered)
-    return tuple((rows, finer) for rows in delivered)
+    return tuple((rows * _scales(ship), finer) for rows in delivered)
+
+
+def _scales(ship: ExtendedModel) -> Array:
+    """(m,) factors of the inputs."""
+    factors = np.ones(len(ship.model.inputs))
+    for key, value in ship.effects.items():
+        if key.startswith("scale:"):
+            factors[group_columns(key.split(":", 1)[1], ship.model.inputs)] *= 1.0 + value
+    return factors
 
 
 def _response(field: str, value: float) -> Response:

@@ -13,7 +13,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from expdesign.diagnosis.model import ExtendedModel, ahead_force_text, is_coriolis, is_damping, is_thrust, reads_rudder
+from expdesign.diagnosis.model import (
+    ExtendedModel,
+    ahead_force_text,
+    group_columns,
+    is_coriolis,
+    is_damping,
+    is_thrust,
+    reads_rudder,
+)
 from expdesign.diagnosis.vessel_file.shallow_water import in_shallow_water
 from expdesign.vessel import Term, VesselModel
 from expdesign.vessel.expressions import Expression
@@ -44,6 +52,7 @@ def found_model(
         std: standard errors of effects.
     """
     rows = [*_own(model, ship, std), *_added(ship, std)]
+    rows = [_scaled(row, ship, std) for row in rows]
     if ship.get("asymmetry"):
         rows = _leaning(rows, model, ship, std.get("asymmetry", 0.0))
     notes = []
@@ -76,6 +85,21 @@ def _own(model: VesselModel, ship: ExtendedModel, std: Mapping[str, float]) -> l
         whole = factor * (value + ship.get(key))
         rows.append(Row(term=term, value=whole, std=math.hypot(factor * std.get(key, known), whole * relative)))
     return rows
+
+
+def _scaled(row: Row, ship: ExtendedModel, std: Mapping[str, float]) -> Row:
+    """A term that reads rudder angles, with their scale; its parameter is as uncertain as if it were linear in them."""
+    text, relative = row.term.expression, 0.0
+    for key, value in ship.effects.items():
+        if not key.startswith("scale:"):
+            continue
+        names = [ship.model.inputs[column] for column in group_columns(key.split(":", 1)[1], ship.model.inputs)]
+        changed = re.sub(rf"\b({'|'.join(names)})\b", rf"({1.0 + value:.9g}*\1)", text)
+        relative += 0.0 if changed == text else std.get(key, 0.0) / (1.0 + value)
+        text = changed
+    if text == row.term.expression:
+        return row
+    return replace(row, term=replace(row.term, expression=text), std=math.hypot(row.std, row.value * relative))
 
 
 def _added(ship: ExtendedModel, std: Mapping[str, float]) -> list[Row]:

@@ -24,7 +24,7 @@ RATES = {
     "v": (f"rate of change of v [m/s{SQUARED}]", 1.0),
     "r": (f"rate of change of r [\N{DEGREE SIGN}/s{SQUARED}]", DEGREES),
 }
-FORCES = ("term", "theta", "gain", "asymmetry", "deadband", "offset", "shallow")
+FORCES = ("term", "theta", "gain", "asymmetry", "deadband", "offset", "scale", "shallow")
 """Kinds of effects that are forces."""
 SHOWN_BY = {"late:psi": "r", "late:position": "u", "heading_bias": "u", "gyro": "r", "lever": "r"}
 """Effect, or kind of effect, of a sensor -> the velocity that it depends on."""
@@ -55,7 +55,7 @@ def suspected_force(found: Diagnosis, item: Finding, at: Mapping[str, Array]) ->
         return np.hypot(at["u_q"], at["v_q"]), "wind over deck [m/s]"
     if kind == "shallow":
         return at["depth"], "water depth [m]"
-    if kind in ("deadband", "offset"):
+    if kind in ("deadband", "offset", "scale"):
         name = ship.model.inputs[group_columns(rest, ship.model.inputs)[0]]
         return at[name], f"{name} [{column_name(name).removeprefix(name).strip('_') or 'force'}]"
     table = signals(ship, at)

@@ -168,7 +168,7 @@ FAULTS = (
     Fault(name="untouched", inject=lambda vessel, record, _rng: (vessel, record, lambda _item: False)),
     Fault(
         name="rudder gain 0.9",
-        inject=in_record(lambda batch, _rng: _rudder(batch, lambda angle: GAIN * angle), "actuator_gain"),
+        inject=in_record(lambda batch, _rng: _rudder(batch, lambda angle: GAIN * angle), "actuator_scale"),
     ),
     Fault(
         name="rudder offset 2 deg",
