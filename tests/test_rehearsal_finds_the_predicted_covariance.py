@@ -92,6 +92,26 @@ def test_parameters_without_excitation_are_named():
         expected_covariance(QUIET, straight, NAMES, mean_subtraction="none")
 
 
+def test_parameters_of_continuous_motion_are_those_estimated_from_it():
+    """The yaw damping, 0.35 per sample, is estimated without the 15 % that Euler's map would be off."""
+    trials = 30
+    rehearsal = Rehearsal(
+        truth=QUIET,
+        nominal=NOMINAL,
+        primitives=PRIMITIVES,
+        designs={"mixed": RUNS},
+        total_s=200.0,
+        environment=CURRENT,
+        parameters=NAMES,
+        trials=trials,
+    )
+    (result,) = validate(rehearsal)
+    known = result.found / np.abs(result.truth) < 0.1
+    assert known.sum() >= 6
+    assert (np.abs(result.bias / result.truth)[known] < 0.02).all()
+    assert (np.abs(result.found / result.theory - 1.0) < 0.15 + 2.8 / np.sqrt(2 * trials)).all()
+
+
 @pytest.mark.parametrize("trials", [pytest.param(1000, marks=pytest.mark.slow), 100])
 def test_predicted_standard_deviations_are_those_of_simulated_trials(trials):
     rehearsal = Rehearsal(

@@ -33,6 +33,7 @@ class Tuning:
         spectrum_iterations: of reweighted non-negative least squares.
         spectrum_misfit: Bartlett's statistic at 1 % (Kolmogorov's distribution).
         least_left: share of a part of the noise that parameters leave in residuals at a frequency, at least.
+        least_freedom: degrees of freedom that a variance is taken to have at least.
         rounding: expected periodogram of a part with unit variance below which it is rounding errors.
         long_gap_samples: missing samples in a row after which the noise starts again.
         slowest_pole: bound on the autoregressive coefficient of a whitening filter.
@@ -71,6 +72,7 @@ class Tuning:
     spectrum_iterations: int = 12
     spectrum_misfit: float = 1.628
     least_left: float = 0.05
+    least_freedom: float = 2.0
     rounding: float = 1e-9
     long_gap_samples: int = 500
     slowest_pole: float = 0.98

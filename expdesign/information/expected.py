@@ -1,12 +1,14 @@
 """The covariance of instrumental-variable estimates, predicted before any data are taken.
 
-    y(k+1) - y(k) = Phi(y(k))^T theta + eps(k)
-    eps(k) = e(k+1) - (I + J(k)) e(k) - Ja(k) a(k) - Jc(k) c(k)
+    y(k+1) - y(k) = (1 - w) Phi(k)^T theta + w Phi(k+1)^T theta + eps(k)
+    eps(k) = (I - w J(k+1)) e(k+1) - (I + (1 - w) J(k)) e(k) - (1 - w) Ja(k) a(k) - w Ja(k+1) a(k+1) - Jc(k) c(k)
 
-e is the noise of the velocity sensors; it enters at both ends of a sample and, through J = d(Phi^T theta)/d nu, the
-regressors. a is the noise of the wind sensor and c the white part of the current, each with its own derivative. In the
-sum with instruments Z every noise sample is multiplied by a known matrix, so the covariance Omega of sum Z eps is exact
-to first order, without estimated autocorrelations. With G = sum Z Phi^T the estimate has covariance G^-1 Omega G^-T.
+w is 0 for Euler's map and 1/2 for the trapezoidal rule, by which parameters of continuous motion are estimated. Inputs
+are those held from k to k+1. e is the noise of the velocity sensors; it enters at both ends of a sample and, through
+J = d(Phi^T theta)/d nu, the regressors. a is the noise of the wind sensor and c the white part of the current, each
+with its own derivative. In the sum with instruments Z every noise sample is multiplied by a known matrix, so the
+covariance Omega of sum Z eps is exact to first order, without estimated autocorrelations. With G = sum Z Phi^T the
+estimate has covariance G^-1 Omega G^-T.
 
 It is valid for noise small enough for a first-order expansion that changes no sign inside a modulus. Disturbances that
 are constant for a whole trial, such as a mean current, cause a bias, which is not included.
@@ -73,7 +75,7 @@ def expected_covariance(
         environment: mean current and wind, and the current's white variation from sample to sample.
         mean_subtraction: from the instruments: "none", "batch" (each part's own mean) or "complete".
         instruments: model that simulates the instruments; the vessel's own by default, as after refinement.
-        integrator: "rk4" for the motion of a ship, "euler" for the map that defines discrete parameters.
+        integrator: "rk4" for the motion of a ship and its parameters, "euler" for the map that defines discrete ones.
 
     Raises:
         NotInformative: the trial contains no information about some parameters.
@@ -97,7 +99,11 @@ def expected_covariance(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Rows:
-    """Regressors and instruments (k, p, n), and the derivatives and variances of the residual's disturbances."""
+    """Regressors and instruments (k, p, n), and the derivatives and variances of the residual's disturbances.
+
+    Derivatives by velocity (2, k, n, n) and air (2, k, n, 2) are those at the begin and at the end of samples, times
+    the share that each end has in the regressors.
+    """
 
     regressors: Array
     instruments: Array
@@ -135,19 +141,34 @@ def _rows(
     own = sailed(vessel)
     other = own if second is vessel else sailed(second)
     given, given_second = (delivered(which, part.commands, standing=part.standing) for which in (vessel, second))
-    by_water, by_air = _derivatives(model, own, given, environment)
+    shares = (1.0, 0.0) if integrator == "euler" else (0.5, 0.5)
+    ends = [(share, begin) for begin, share in enumerate(shares) if share]
+    slopes = [_derivatives(model, _from(own, begin), given, environment) for begin in range(2)]
+    by_water, by_air = (
+        np.stack([share * by for share, by in zip(shares, pair, strict=True)]) for pair in zip(*slopes, strict=True)
+    )
+
+    def blocks(which: VesselModel, motion: Trajectory, inputs: Commands) -> Array:
+        parts = [share * _blocks(which, _from(motion, begin), inputs, environment, parameters) for share, begin in ends]
+        return np.asarray(sum(parts[1:], start=parts[0]))
+
     noise = vessel.sensors
     chosen = [("u", "v", "r").index(name) for name in outputs]
     return _Rows(
-        regressors=_blocks(model, own, given, environment, parameters),
-        instruments=_blocks(instruments, other, given_second, environment, parameters),
-        by_velocity=by_water[:, chosen][:, :, chosen],
-        by_air=by_air[:, chosen],
-        by_current=by_water[:, chosen, :2],
+        regressors=blocks(model, own, given),
+        instruments=blocks(instruments, other, given_second),
+        by_velocity=by_water[:, :, chosen][..., chosen],
+        by_air=by_air[:, :, chosen],
+        by_current=slopes[0][0][:, chosen, :2],
         sensor=np.array([noise.velocity_mps, noise.velocity_mps, noise.yaw_rate_radps])[chosen] ** 2,
         air=noise.wind_mps**2,
         current=environment.current_variation.std_mps**2,
     )
+
+
+def _from(motion: Trajectory, sample: int) -> Trajectory:
+    """The motion from a sample on."""
+    return Trajectory(sample_time_s=motion.sample_time_s, pose=motion.pose[sample:], velocity=motion.velocity[sample:])
 
 
 def _blocks(
@@ -186,14 +207,22 @@ def _derivatives(
 def _score_covariance(Z: Array, rows: _Rows) -> Array:
     """(p, p) covariance of sum Z(k) eps(k)."""
     eye = np.eye(Z.shape[2])
-    leaving = Z @ (eye + rows.by_velocity)  # what multiplies -e(k)
-    meets = np.concatenate([np.zeros_like(Z[:1]), Z]) - np.concatenate([leaving, np.zeros_like(Z[:1])])
+    begin, end = rows.by_velocity
     parts = (
-        (meets, rows.sensor),
-        (Z @ rows.by_air, np.full(2, rows.air)),
+        (_meeting(Z @ (end - eye), Z @ (begin + eye)), rows.sensor),
+        (_meeting(*(Z @ by for by in rows.by_air[::-1])), np.full(2, rows.air)),
         (Z @ rows.by_current, np.full(2, rows.current)),
     )
-    return np.asarray(sum(np.einsum("kpo,o,kqo->pq", matrix, variance, matrix) for matrix, variance in parts))
+    sums = [np.einsum("kpo,o,kqo->pq", matrix, variance, matrix) for matrix, variance in parts]
+    return np.asarray(np.sum(sums, axis=0))
+
+
+def _meeting(entering: Array, leaving: Array) -> Array:
+    """(k + 1, p, n) what multiplies the noise of each sample: as the end of one residual and the begin of the next."""
+    nothing = np.zeros_like(entering[:1])
+    met: Array = np.concatenate([nothing, entering])
+    met += np.concatenate([leaving, nothing])
+    return met
 
 
 def _sandwich(G: Array, Omega: Array, parameters: Sequence[str]) -> Array:

@@ -119,7 +119,6 @@ def estimates_alone(
         parameters=tuple(parameters),
         method=method,
         mean_subtraction=mean_subtraction,
-        continuous=continuous,
         integrator="rk4" if continuous else "euler",
         trials=trials,
         seed=seed,

@@ -55,9 +55,8 @@ class Rehearsal:
         environment: weather; its mean is drawn for each trial with its standard deviation.
         parameters: names of the estimated parameters; the others are fixed at the nominal model's values.
         method, mean_subtraction: of the estimator.
-        continuous: whether parameters of the continuous motion are estimated, as by `expdesign estimate`; else those
-            of Euler's map at the sample time.
-        integrator: of the true ship, "rk4" or "euler", the map that defines discrete parameters.
+        integrator: of the true ship: "rk4", and parameters of the continuous motion are estimated, as by `expdesign
+            estimate`; or "euler", the map that defines discrete parameters, and those of the map are.
         trials: number for each design.
         seed: of all random numbers.
     """
@@ -71,7 +70,6 @@ class Rehearsal:
     parameters: tuple[str, ...]
     method: str = "iv"
     mean_subtraction: str = "complete"
-    continuous: bool = False
     integrator: str = "rk4"
     trials: int = 100
     seed: int = 0
@@ -269,8 +267,8 @@ def _estimated(rehearsal: Rehearsal, record: Record) -> Array:
     model = rehearsal.nominal.model
     fixed = tuple(name for name in model.names if name not in rehearsal.parameters)
     settings = Settings(fixed=fixed, weighting=Weighting(mean=rehearsal.mean_subtraction))
-    if rehearsal.continuous:
-        settings = replace(settings, integration=Integration("rk4", 1), quadrature="trapezoid")
+    if rehearsal.integrator == "rk4":
+        settings = replace(settings, integration=Integration("rk4", SUBSTEPS), quadrature="trapezoid")
     try:
         found = estimate(record, model, method=rehearsal.method, settings=settings)
     except NoAnswer:

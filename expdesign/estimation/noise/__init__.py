@@ -2,12 +2,13 @@
 
 from expdesign.estimation.noise.components import Components, Fitted, fit_components, score_covariance
 from expdesign.estimation.noise.long_run import automatic_lags, long_run_covariance, lost_share
-from expdesign.estimation.noise.timeline import Timeline, stretches, timeline
+from expdesign.estimation.noise.timeline import Stretch, Timeline, stretches, timeline
 from expdesign.estimation.noise.whitening import white_parts
 
 __all__ = [
     "Components",
     "Fitted",
+    "Stretch",
     "Timeline",
     "automatic_lags",
     "fit_components",

@@ -1,22 +1,23 @@
 """Residual noise as a sum of independent parts, each with a known shape in time, and their effect on an estimate.
 
-    cov eps(i), eps(j) = white [i = j] + sensor (2 [i = j] - [|i - j| = 1]) + sum over m of slow_m exp(-|i - j| / m)
+    cov eps(i), eps(j) = white [i = j] + sensor (2 [i = j] - [|i - j| = 1])
+        + sum over m of (slow_m + turning_m cos(psi(i) - psi(j))) exp(-|i - j| / m)
 
 White are gusts and eddies new at every sample, and the part of the sensor noise that damping lets through; sensor is
 noise that enters at one sample and leaves at the next, eps(k) = e(k + 1) - (1 + J) e(k), whose low frequencies cancel;
-slow are disturbances that last m samples, or
-as long as a batch. The variances are none of them negative. They are estimated from the
-periodograms of the batches, whose expectations for batches of finite length, with or without gaps, are linear in them,
-by Whittle's likelihood. Slow parts count only if they earn more likelihood than one parameter may by chance (Schwarz's
-criterion). The covariance of sum W eps then follows for any W, ends of batches included, without kernel or lags.
+slow are disturbances that last m samples, or as long as a batch, and keep their side of the ship; turning are those
+that keep their side of the chart, as currents and winds do, seen from a ship with heading psi: north and east vary
+alike and independently, so that any fixed combination of their components along and across the ship has this
+covariance. The variances are none of them negative. They are estimated from the periodograms of the batches, whose
+expectations for batches of finite length, with or without gaps, are linear in them, by Whittle's likelihood. Slow parts
+count only if they earn more likelihood than one parameter may by chance (Schwarz's criterion), and then those of the
+ship or those of the chart, whichever are likelier: from few turns both together can hardly be told apart. The
+covariance of sum W eps then follows for any W, ends of batches included, without kernel or lags.
 
 Residuals are less than the noise by what the parameters take up: r = eps - Phi sum W eps. From few data that is much of
 the slow noise. With Sigma the covariance matrix of a part, the expected periodogram is that of
 
     Sigma - Phi W^T Sigma - Sigma W Phi^T + Phi W^T Sigma W Phi^T
-
-Turns of the ship modulate a disturbance that comes from one side, which no slow part describes quite: with a current
-that wanders for 100 s stated standard deviations were 0.95 to 1.05 of those found, but 0.86 for one thrust parameter.
 
 Whether the parts fit is tested: the periodogram over its expectation must spread its sum evenly over frequencies
 (Bartlett's test, 1 %).
@@ -34,7 +35,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from expdesign.estimation.noise.timeline import spread
+from expdesign.estimation.noise.timeline import Stretch, Turn
 from expdesign.estimation.regression import Integers
 from expdesign.estimation.tuning import TUNING
 from expdesign.values import Array
@@ -43,19 +44,34 @@ MEMORIES = 2.0 ** np.arange(1, 11)
 """Of the slow parts [samples]; a quarter of the longest stretch at most, and one that lasts for ever."""
 
 
+@dataclass(frozen=True)
+class Slow:
+    """A disturbance that lasts.
+
+    Attributes:
+        memory: how long [samples].
+        turning: whether it keeps its side of the chart while the ship turns, not its side of the ship.
+    """
+
+    memory: float
+    turning: bool = False
+
+
 @dataclass(frozen=True, eq=False)
 class Components:
     """The parts of one output's noise.
 
     Attributes:
         variances: (2 + m,) white, sensor, slow.
-        memories: (m,) of the slow parts [samples].
+        slow: the m slow parts.
         misfit: Bartlett's statistic.
+        uncertainty: (2 + m, 2 + m) covariance of the variances, zero for parts that are not there.
     """
 
     variances: Array
-    memories: Array
+    slow: tuple[Slow, ...]
     misfit: float
+    uncertainty: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,45 +87,56 @@ class Fitted:
     W: Array
 
 
-def fit_components(
-    residuals: Array, parts: Sequence[tuple[slice, Integers]], by: Sequence[Fitted] = ()
-) -> list[Components]:
+def fit_components(residuals: Array, parts: Sequence[Stretch], by: Sequence[Fitted] = ()) -> list[Components]:
     """The parts of the noise in each output's residuals (k, n).
 
     Args:
         residuals: of an estimate.
-        parts: `stretches`.
+        parts: `stretches`; without headings there are no turning parts.
         by: what the estimate took from each output's noise; () for noise of which nothing was taken.
     """
-    longest = max(int(places[-1]) + 1 for _, places in parts)
-    memories = np.append(MEMORIES[longest / 4 >= MEMORIES], np.inf)
-    expected: dict[bytes, Array] = {}
-    for _, places in parts:
-        if (key := places.tobytes()) not in expected:
-            expected[key] = _expected(places, memories)
-    shapes = [expected[places.tobytes()] for _, places in parts]
-    left = [_less(shapes, parts, memories, own) for own in by] or [shapes] * residuals.shape[1]
-    return [_fitted(column, parts, own, memories) for column, own in zip(residuals.T, left, strict=True)]
+    slow = _slow_parts(parts)
+    shapes = _shapes(parts, slow)
+    left = [_less(shapes, parts, slow, own) for own in by] or [shapes] * residuals.shape[1]
+    return [_fitted(column, parts, own, slow) for column, own in zip(residuals.T, left, strict=True)]
 
 
-def _less(
-    expected: Sequence[Array], parts: Sequence[tuple[slice, Integers]], memories: Array, by: Fitted
-) -> list[Array]:
+def _slow_parts(parts: Sequence[Stretch]) -> tuple[Slow, ...]:
+    longest = max(part.samples for part in parts)
+    memories = MEMORIES[longest / 4 >= MEMORIES].tolist()
+    turns = any(part.turn is not None and np.ptp(part.turn) > TUNING.rounding for part in parts)
+    ship, chart = [Slow(memory) for memory in (*memories, np.inf)], [Slow(memory, turning=True) for memory in memories]
+    return (*ship, *chart) if turns else tuple(ship)
+
+
+def _shapes(parts: Sequence[Stretch], slow: tuple[Slow, ...]) -> list[Array]:
+    """Expected periodograms (2 + m, f) of each stretch; those of stretches alike are computed once."""
+    known: dict[bytes, Array] = {}
+    result = []
+    for part in parts:
+        key = part.places.tobytes() + (b"" if part.turn is None else part.turn.tobytes())
+        if key not in known:
+            known[key] = _expected(part, slow)
+        result.append(known[key])
+    return result
+
+
+def _less(expected: Sequence[Array], parts: Sequence[Stretch], slow: tuple[Slow, ...], by: Fitted) -> list[Array]:
     """Expected periodograms (2 + m, f) of each stretch, less what the parameters took; not below a share of it."""
     p = by.Phi.shape[1]
     if not p:
         return list(expected)
-    wide = [(spread(by.Phi[rows], places), spread(by.W[rows], places)) for rows, places in parts]
-    spectra = [np.fft.rfft(Phi, axis=0) for Phi, _ in wide]
+    wide = [part.spread(by.W[part.rows]) for part in parts]
+    spectra = [np.fft.rfft(part.spread(by.Phi[part.rows]), axis=0) for part in parts]
     result = [np.array(shape) for shape in expected]
-    for index in range(2 + len(memories)):
-        turned = [filtered(index, memories, W) for _, W in wide]
-        C = sum((W.T @ own for (_, W), own in zip(wide, turned, strict=True)), start=np.zeros((p, p)))
-        for number, (_, places) in enumerate(parts):
+    for index in range(2 + len(slow)):
+        turned = [filtered(index, slow, W, part.turn) for W, part in zip(wide, parts, strict=True)]
+        C = sum((W.T @ own for W, own in zip(wide, turned, strict=True)), start=np.zeros((p, p)))
+        for number, part in enumerate(parts):
             Phi = spectra[number]
-            there = turned[number] if len(places) == len(turned[number]) else _where(turned[number], places)
+            there = turned[number] if len(part.places) == part.samples else _where(turned[number], part.places)
             mixed = 0.5 * Phi @ C - np.fft.rfft(there, axis=0)
-            result[number][index] += 2.0 * (Phi.conj() * mixed).real.sum(axis=1) / len(places)
+            result[number][index] += 2.0 * (Phi.conj() * mixed).real.sum(axis=1) / len(part.places)
     left = [np.maximum(new, TUNING.least_left * old) for new, old in zip(result, expected, strict=True)]
     return [np.where(np.abs(shape) > TUNING.rounding, shape, 0.0) for shape in left]
 
@@ -121,28 +148,48 @@ def _where(rows: Array, places: Integers) -> Array:
     return result
 
 
-def _fitted(
-    eps: Array, parts: Sequence[tuple[slice, Integers]], expected: Sequence[Array], memories: Array
-) -> Components:
+def _fitted(eps: Array, parts: Sequence[Stretch], expected: Sequence[Array], slow: tuple[Slow, ...]) -> Components:
     power = float(eps @ eps) / len(eps)
-    variances = np.zeros(2 + len(memories))
+    variances = np.zeros(2 + len(slow))
     variances[0] = power
     frequency, ordinates, shapes = _periodograms(eps, parts, expected)
     if not power > 0 or not (frequency > 0).any():
-        return Components(variances, memories, 0.0)
-    binned = _binned(frequency, ordinates / power, shapes)
-    quick, quick_cost = _most_likely(*binned, 2)
-    slow, slow_cost = _most_likely(*binned, len(variances))
-    variances[:2] = power * quick
-    if quick_cost - slow_cost > np.log(len(frequency)) / 2:
-        variances = power * slow
+        return Components(variances, slow, 0.0, np.zeros((len(variances),) * 2))
+    binned_power, binned_shapes, count = _binned(frequency, ordinates / power, shapes)
+    cost = np.inf
+    for places, penalty in _alternatives(slow, len(frequency)):
+        found, own_cost = _most_likely(binned_power, binned_shapes[places], count)
+        if own_cost + penalty < cost:
+            variances[:], cost = 0.0, own_cost + penalty
+            variances[places] = power * found
     level = variances @ shapes
     ratio = ordinates / np.maximum(level, 1e-12 * level.max())
-    return Components(variances, memories, _misfit(frequency, ratio))
+    return Components(
+        variances, slow, _misfit(frequency, ratio), power**2 * _uncertainty(variances / power, binned_shapes, count)
+    )
 
 
-def filtered(index: int, memories: Array, W: Array) -> Array:
-    """(t, p) covariance matrix of a part, with unit variance, times W (t, p)."""
+def _alternatives(slow: Sequence[Slow], ordinates: int) -> list[tuple[Integers, float]]:
+    """Parts that noise may consist of, and what they must earn: no slow ones, those of the ship, those of the chart."""
+    quick = np.arange(2)
+    kinds = [2 + np.flatnonzero([part.turning == kind for part in slow]) for kind in (False, True)]
+    earned = np.log(ordinates) / 2
+    return [(quick, 0.0), *((np.append(quick, kind), earned) for kind in kinds if len(kind))]
+
+
+def _uncertainty(variances: Array, shapes: Array, count: Array) -> Array:
+    """Covariance of variances (2 + m,), by Fisher's information of Whittle's likelihood; zero for parts not there."""
+    there = np.flatnonzero(variances)
+    own = shapes[there] / (variances @ shapes)
+    size = np.sqrt((own**2) @ count)
+    result = np.zeros((len(variances),) * 2)
+    information = (own * count) @ own.T / np.outer(size, size)
+    result[np.ix_(there, there)] = np.linalg.pinv(information, hermitian=True) / np.outer(size, size)
+    return result
+
+
+def filtered(index: int, slow: Sequence[Slow], W: Array, turn: Turn | None = None) -> Array:
+    """(t, p) covariance matrix of a part, with unit variance, times W (t, p), under headings exp(i psi) (t,)."""
     if index == 0:
         return W
     if index == 1:
@@ -150,15 +197,37 @@ def filtered(index: int, memories: Array, W: Array) -> Array:
         result[1:] -= W[:-1]
         result[:-1] -= W[1:]
         return result
-    keep = np.exp(-1.0 / memories[index - 2])
+    part = slow[index - 2]
+    if not part.turning:
+        return _remembered(W, part.memory)
+    assert turn is not None  # without headings there are no turning parts
+    c, s = turn.real[:, None], turn.imag[:, None]
+    return np.asarray(c * _remembered(c * W, part.memory) + s * _remembered(s * W, part.memory))
+
+
+def _remembered(W: Array, memory: float) -> Array:
+    keep = np.exp(-1.0 / memory)
     past = scipy.signal.lfilter([1.0], [1.0, -keep], W, axis=0)
     return np.asarray(past + scipy.signal.lfilter([1.0], [1.0, -keep], W[::-1], axis=0)[::-1] - W)
 
 
+@dataclass(frozen=True, eq=False)
+class Scores:
+    """How sums over samples of W eps vary, for outputs o with W (k, p_o).
+
+    Attributes:
+        blocks: (p_o, p_o') covariances of the sums of outputs o and o'.
+        doubts: (p_o,) variance of each estimated variance.
+    """
+
+    blocks: list[list[Array]]
+    doubts: list[Array]
+
+
 def score_covariance(
-    W: Sequence[Array], residuals: Array, fitted: Sequence[Components], parts: Sequence[tuple[slice, Integers]]
-) -> list[list[Array]]:
-    """Blocks (p_o, p_o') of the covariance of sum W_o eps_o, for outputs o and o'.
+    W: Sequence[Array], residuals: Array, fitted: Sequence[Components], parts: Sequence[Stretch]
+) -> Scores:
+    """The covariance of sum W_o eps_o, and how well the variances are known that it is made of.
 
     Parts of different outputs are as correlated as the outputs' residuals are at the same sample.
 
@@ -170,18 +239,21 @@ def score_covariance(
     """
     common = _correlation(residuals, fitted)
     blocks = [[np.zeros((a.shape[1], b.shape[1])) for b in W] for a in W]
-    for rows, places in parts:
-        wide = [spread(item[rows], places) for item in W]
+    unit = [np.zeros((len(fitted[0].variances), a.shape[1])) for a in W]
+    for part in parts:
+        wide = [part.spread(item[part.rows]) for item in W]
         for index in range(len(fitted[0].variances)):
             scale = np.sqrt([item.variances[index] for item in fitted])
             for o in np.flatnonzero(scale).tolist():
-                turned = filtered(index, fitted[o].memories, wide[o])
+                turned = filtered(index, fitted[o].slow, wide[o], part.turn)
+                unit[o][index] += np.einsum("kp,kp->p", wide[o], turned)
                 for other in np.flatnonzero(scale[: o + 1] * common[o, : o + 1]).tolist():
                     blocks[other][o] += scale[o] * scale[other] * common[o, other] * (wide[other].T @ turned)
     for o in range(len(W)):
         for other in range(o):
             blocks[o][other] = blocks[other][o].T
-    return blocks
+    doubts = [np.einsum("ip,ij,jp->p", own, item.uncertainty, own) for own, item in zip(unit, fitted, strict=True)]
+    return Scores(blocks, doubts)
 
 
 def _correlation(residuals: Array, fitted: Sequence[Components]) -> Array:
@@ -197,39 +269,43 @@ def _correlation(residuals: Array, fitted: Sequence[Components]) -> Array:
     return found if least >= 0 else np.asarray((found - least * np.eye(len(found))) / (1.0 - least))
 
 
-def _periodograms(
-    eps: Array, parts: Sequence[tuple[slice, Integers]], expected: Sequence[Array]
-) -> tuple[Array, Array, Array]:
+def _periodograms(eps: Array, parts: Sequence[Stretch], expected: Sequence[Array]) -> tuple[Array, Array, Array]:
     """Frequencies (f,), the periodogram there, and each part's expected one (2 + m, f), of all stretches in a row.
 
     Frequency zero is there only where the mean is, not where it was subtracted.
     """
     found = []
-    for (rows, places), shapes in zip(parts, expected, strict=True):
-        count, own = int(places[-1]) + 1, eps[rows]
-        ordinates = np.abs(np.fft.rfft(spread(own, places))) ** 2 / len(places)
-        frequency = 2 * np.pi * np.arange(len(ordinates)) / count
+    for part, shapes in zip(parts, expected, strict=True):
+        own = eps[part.rows]
+        ordinates = np.abs(np.fft.rfft(part.spread(own))) ** 2 / len(part.places)
+        frequency = 2 * np.pi * np.arange(len(ordinates)) / part.samples
         first = int(abs(own.sum()) <= 1e-9 * np.sqrt(len(own)) * np.linalg.norm(own))
         found.append((frequency[first:], ordinates[first:], shapes[:, first:]))
     frequency, ordinates, shapes = (np.concatenate(items, axis=-1) for items in zip(*found, strict=True))
     return frequency, ordinates, shapes
 
 
-def _expected(places: Integers, memories: Array) -> Array:
-    """(2 + m, f) expected periodogram of every part with unit variance, where the samples at `places` are there."""
-    count = int(places[-1]) + 1
+def _expected(part: Stretch, slow: Sequence[Slow]) -> Array:
+    """(2 + m, f) expected periodogram of every part of the noise with unit variance, at the samples of a stretch."""
+    count = part.samples
     lags = np.arange(count)
-    pairs = np.asarray(count - lags, dtype=float)
-    if count > len(places):
-        spectrum = np.fft.rfft(spread(np.ones(len(places)), places), 2 * count)
-        pairs = np.fft.irfft(np.abs(spectrum) ** 2, 2 * count)[:count]
-    covariances = np.zeros((2 + len(memories), count))
+    straight = _pairs(part.spread(np.ones(len(part.places))))
+    turning = straight if part.turn is None else _pairs(part.turn.real) + _pairs(part.turn.imag)
+    covariances = np.zeros((2 + len(slow), count))
     covariances[:2, 0] = 1.0, 2.0
     covariances[1, 1:2] = -1.0
-    covariances[2:] = np.exp(-lags / memories[:, None])
-    covariances *= pairs / len(places)
+    covariances[:2] *= straight
+    for row, own in zip(covariances[2:], slow, strict=True):
+        row[:] = np.exp(-lags / own.memory) * (turning if own.turning else straight)
+    covariances /= len(part.places)
     covariances[:, 1:] += covariances[:, :0:-1].copy()
     return np.asarray(np.fft.rfft(covariances, axis=1).real)
+
+
+def _pairs(weights: Array) -> Array:
+    """(t,) sum of products of weights (t,) so many samples apart."""
+    count = len(weights)
+    return np.asarray(np.fft.irfft(np.abs(np.fft.rfft(weights, 2 * count)) ** 2, 2 * count)[:count])
 
 
 def _binned(frequency: Array, ordinates: Array, shapes: Array) -> tuple[Array, Array, Array]:
@@ -243,13 +319,12 @@ def _binned(frequency: Array, ordinates: Array, shapes: Array) -> tuple[Array, A
     return means[0], np.array(means[1:]), weight
 
 
-def _most_likely(ordinates: Array, shapes: Array, count: Array, parts: int) -> tuple[Array, float]:
-    """Variances (parts,) of the first parts, and minus the logarithm of their likelihood."""
-    shapes = shapes[:parts]
+def _most_likely(ordinates: Array, shapes: Array, count: Array) -> tuple[Array, float]:
+    """Variances (parts,) of parts with these shapes, and minus the logarithm of their likelihood."""
     expected = shapes[0] + shapes[1]
     for _ in range(TUNING.spectrum_iterations):
         weight = np.sqrt(count) / expected
-        variances, _ = scipy.optimize.nnls((shapes * weight).T, ordinates * weight, maxiter=100 * parts)
+        variances, _ = scipy.optimize.nnls((shapes * weight).T, ordinates * weight, maxiter=100 * len(shapes))
         expected = np.maximum(variances @ shapes, 1e-9 * np.max(variances @ shapes))
     return variances, float(count @ (np.log(expected) + ordinates / expected))
 

@@ -4,16 +4,46 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from expdesign.estimation.regression import Integers, batch_slices
 from expdesign.estimation.tuning import TUNING
 from expdesign.values import Array
 
+Turn = NDArray[np.complex128]
+"""exp(i psi) of headings psi."""
+Numbers = TypeVar("Numbers", NDArray[np.float64], Turn)
 
-def stretches(batch: Integers, step: Integers) -> list[tuple[slice, Integers]]:
-    """Rows of every stretch, and their sample numbers from its begin; long gaps part a batch."""
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """Rows in a row, with short gaps at most.
+
+    Attributes:
+        rows: of the data.
+        places: (k,) their sample numbers from the begin of the stretch.
+        turn: (t,) exp(i psi) of the heading psi at every sample, zero where one was left out; None without headings.
+    """
+
+    rows: slice
+    places: Integers
+    turn: Turn | None = None
+
+    @property
+    def samples(self) -> int:
+        """From the first to the last, those left out included."""
+        return int(self.places[-1]) + 1
+
+    def spread(self, rows: Array) -> Array:
+        """(t, ...) from (k, ...), zero where a sample was left out."""
+        return spread(rows, self.places)
+
+
+def stretches(batch: Integers, step: Integers, heading: Array | None = None) -> list[Stretch]:
+    """Every stretch; long gaps part a batch."""
     result = []
     for rows in batch_slices(batch):
         edges = [
@@ -23,15 +53,17 @@ def stretches(batch: Integers, step: Integers) -> list[tuple[slice, Integers]]:
         ]
         for low, high in pairwise(edges):
             part = slice(rows.start + low, rows.start + high)
-            result.append((part, step[part] - step[part][0]))
+            places = step[part] - step[part][0]
+            turn = None if heading is None else spread(np.exp(1j * heading[part]), places)
+            result.append(Stretch(part, places, turn))
     return result
 
 
-def spread(rows: Array, places: Integers) -> Array:
+def spread(rows: Numbers, places: Integers) -> Numbers:
     """(t, ...) from (k, ...), zero where a sample was left out."""
     if len(rows) == places[-1] + 1:
         return rows
-    result = np.zeros((places[-1] + 1, *rows.shape[1:]))
+    result = np.zeros((places[-1] + 1, *rows.shape[1:]), dtype=rows.dtype)
     result[places] = rows
     return result
 
@@ -64,11 +96,10 @@ def timeline(batch: Integers, step: Integers) -> Timeline:
     """The timeline of rows (k,) with their batch and sample numbers."""
     place, numbers, steps, owner, begin = [], [], [], [], 0
     known = np.unique(batch)
-    for number, (rows, offset) in enumerate(stretches(batch, step)):
-        count = int(offset[-1]) + 1
-        place.append(begin + offset)
-        numbers.append(np.full(count, number))
-        steps.append(np.arange(count))
-        owner.append(int(np.searchsorted(known, batch[rows.start])))
-        begin += count
+    for number, part in enumerate(stretches(batch, step)):
+        place.append(begin + part.places)
+        numbers.append(np.full(part.samples, number))
+        steps.append(np.arange(part.samples))
+        owner.append(int(np.searchsorted(known, batch[part.rows.start])))
+        begin += part.samples
     return Timeline(np.concatenate(place), np.concatenate(numbers), np.concatenate(steps), np.array(owner))

@@ -30,7 +30,7 @@ from expdesign.estimation.regression.intervals import mean_between_readings
 from expdesign.estimation.regression.nuisance import Nuisance, batch_signs, headings, nuisance_regressors, symbolic
 from expdesign.estimation.regression.polynomial import Algebra
 from expdesign.estimation.regression.regression import Integers, Regression
-from expdesign.estimation.regression.tables import AIR, VANE, Table, measured_table
+from expdesign.estimation.regression.tables import AIR, VANE, Table, heading_of, measured_table
 from expdesign.estimation.regression.vane import unbiased_value
 from expdesign.signals import Batch, Record
 from expdesign.values import Array
@@ -237,8 +237,22 @@ def build_regression(layout: Layout, record: Record) -> Rows:
         batch=np.repeat(np.arange(len(used)), [len(rows) for rows in used]),
         step=np.concatenate(used),
         outputs=layout.model.outputs,
+        heading=_headings(record, used),
     )
     return Rows(regression=regression, used=tuple(used), left_out=left_out)
+
+
+def _headings(record: Record, used: Sequence[Integers]) -> Array | None:
+    """(k,) heading at the rows used; the last one measured where one is missing, None where a batch has none."""
+    found = []
+    for batch, places in zip(record.batches, used, strict=True):
+        heading = heading_of(batch)
+        seen = np.isfinite(heading)
+        if not seen.any():
+            return None
+        latest = np.maximum.accumulate(np.where(seen, np.arange(len(seen)), int(seen.argmax())))
+        found.append(heading[latest][places])
+    return np.concatenate(found)
 
 
 def _checked_table(model: VesselModel, batch: Batch, predictor: Predictor) -> Table:

@@ -31,6 +31,8 @@ class Regression:
         batch: (k,) number of the batch of each row, rising; all zeros when left out.
         step: (k,) sample number within the batch, so that lags skip rows left out; counted when left out.
         outputs: names of the n outputs, "y1", "y2" ... when left out.
+        heading: (k,) of the ship [rad], by which the covariance knows disturbances that keep their side of the chart
+            while the ship turns; None where it is not known.
     """
 
     parameters: tuple[str, ...]
@@ -39,6 +41,7 @@ class Regression:
     batch: Integers | None = None
     step: Integers | None = None
     outputs: tuple[str, ...] = ()
+    heading: Array | None = None
 
     def __post_init__(self) -> None:
         seal(self, Phi="k n p", y="k n")
@@ -53,6 +56,10 @@ class Regression:
         step = _count(batch) if self.step is None else np.array(self.step, dtype=np.int64)
         if step.shape != (k,) or ((np.diff(step) <= 0) & (np.diff(batch) == 0)).any():
             raise InputError(f"Regression.step needs {k} sample numbers that rise within every batch")
+        if self.heading is not None:
+            seal(self, heading="k", Phi="k n p")
+            if not np.isfinite(self.heading).all():
+                raise InputError("Regression.heading holds numbers that are not finite; give none")
         frozen_set(self, "batch", batch)
         frozen_set(self, "step", step)
         frozen_set(self, "outputs", self.outputs or tuple(f"y{i + 1}" for i in range(n)))

@@ -118,6 +118,7 @@ def apart_from_start(rows: Rows) -> Rows:
         y=regression.y[kept],
         batch=regression.batch_of[kept],
         step=regression.step_of[kept],
+        heading=None if regression.heading is None else regression.heading[kept],
     )
     return replace(rows, regression=shorter, used=tuple(places[places > 0] for places in rows.used))
 

@@ -9,6 +9,10 @@ by the least of some weights w at which the simulation stays bounded. Combinatio
 others come near the first model. With such instruments the estimate itself is not biased, as they depend on the noise
 no more than others do; most become stable. One that stays unstable is given as drawn, with the covariance before that.
 
+From few data refinement may also wander: a poor estimate simulates weak instruments, which give a poor estimate.
+Outputs whose parameters do not settle keep the first instruments, which do not depend on the noise at all where they
+come from the vessel file. (The strongest instruments met would: they follow what disturbances did to the ship.)
+
 Source: F. Ljungberg, doctoral thesis, Linköping University, (4.37)-(4.39); P. C. Young, refined instrumental variables,
 Automatica 51 (2015), 35-46.
 """
@@ -88,7 +92,7 @@ def refine_iv(
     """
     equations = build_equations(regression, first, weighting)
     instruments, (values, covariance) = first, solve_quick(equations, first)
-    moved, count, weight, warnings = 0.0, 0, 0.0, []
+    moved, count, weight, warnings = np.zeros(len(values)), 0, 0.0, []
     while count < most:
         try:
             newer_instruments, weight = _bounded(simulate, values, covariance, prior)
@@ -100,20 +104,31 @@ def refine_iv(
             warnings.append(f"Refinement stopped: {error}.")
             break
         deviations = np.sqrt(np.diag(covariance))
-        moved = float(np.max(np.abs(newer - values) / np.maximum(deviations, 1e-150)))
+        moved = np.abs(newer - values) / np.maximum(deviations, 1e-150)
         instruments, values, count = newer_instruments, newer, count + 1
-        if moved < settled:
+        if moved.max() < settled:
             break
-    if count == most and moved >= settled:
-        warnings.append(f"The estimate still changes by {moved:.2g} standard deviations after {most} refinements.")
+    newest = instruments
+    if count == most and moved.max() >= settled:
+        warnings.append(
+            f"The estimate still changes by {moved.max():.2g} standard deviations after {most} refinements; equations "
+            "that do not settle keep their first instruments."
+        )
+        restless = (equations.uses[:, moved >= settled] > 0).any(axis=1, keepdims=True)  # (n, 1)
+        instruments = np.where(restless, first, instruments)
     solution = solve(equations, instruments)
+    if instruments is not newest:
+        try:
+            _, weight = _bounded(simulate, solution.values, solution.covariance, prior)
+        except Diverged as error:
+            warnings.append(f"The estimated model is unstable ({error}).")
     if prior is None or not weight:
         return Refined(solution, count, tuple(warnings))
     drawn = prior.drawn(solution.values, solution.covariance, weight)
-    moved = float(np.max(np.abs(drawn - solution.values) / np.maximum(np.sqrt(np.diag(solution.covariance)), 1e-150)))
+    shift = float(np.max(np.abs(drawn - solution.values) / np.maximum(np.sqrt(np.diag(solution.covariance)), 1e-150)))
     warnings.append(
         "The data alone give an unstable model. What they show least is drawn towards the first model, by up to "
-        f"{moved:.2g} standard deviations."
+        f"{shift:.2g} standard deviations."
     )
     return Refined(replace(solution, values=drawn, residuals=regression.residuals(drawn)), count, tuple(warnings))
 
