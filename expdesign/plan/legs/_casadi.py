@@ -5,7 +5,8 @@ and each sample is integrated with the simulation's Runge-Kutta steps. Programs 
 everything that differs from leg to leg is a bound or a parameter.
 
 Derivatives follow the structure: those of the map over a block of samples are worked out symbolically, once for each
-size of block, and placed by the constant matrix that gives the map's arguments from the variables.
+size of block, and placed by the constant matrix that gives the map's arguments from the variables. Second derivatives
+are those of a coarser map, with a quarter of the operations or less: they choose IPOPT's direction, not its answer.
 
 Source: H. G. Bock and K. J. Plitt, A multiple shooting algorithm for direct solution of optimal control problems,
 IFAC Proc. 17 (1984), 1603-1608.
@@ -257,7 +258,8 @@ class BlockMap:
     Attributes:
         value: argument -> (6 + c,).
         jacobian: argument -> (6 + c, n).
-        hessian: argument, weights (6 + c,) -> (n, n) of the weighted sum.
+        hessian: argument, weights (6 + c,) -> (n, n) of the weighted sum, by one step of the midpoint rule a sample.
+            IPOPT needs second derivatives for its direction only: what it finds is optimal by the exact first ones.
     """
 
     value: ca.Function
@@ -268,33 +270,45 @@ class BlockMap:
 @lru_cache(maxsize=LEGS.programs)
 def _block_map(ship: _Ship, block: int) -> BlockMap:
     """The map over so many samples of a vessel in an environment's mean current and wind, with its derivatives."""
-    vessel, environment = ship.vessel, ship.environment
-    responses, m = vessel.responses, len(vessel.limits)
-    maps = [sample_map(x, sample_time_s=vessel.sample_time_s, substeps=SUBSTEPS) for x in responses]
-    lagging = [index for index, response in enumerate(responses) if response.lag_s > 0]
-    x, d, h = ca.SX.sym("x", 6), ca.SX.sym("d", len(lagging)), ca.SX.sym("h")
+    vessel = ship.vessel
+    lagging, m = sum(response.lag_s > 0 for response in vessel.responses), len(vessel.limits)
+    x, d, h = ca.SX.sym("x", 6), ca.SX.sym("d", lagging), ca.SX.sym("h")
     early, late = ca.SX.sym("early", m, block), ca.SX.sym("late", m, block)
-    state: tuple[Any, ...] = tuple(ca.vertsplit(x))
-    lagged: dict[int, Any] = dict(zip(lagging, ca.vertsplit(d), strict=True)) if lagging else {}
-    current, wind = environment.current_to.tolist(), environment.wind_to.tolist()
-    for sample in range(block):
-        start, after = early[:, sample], late[:, sample]
-        for step in range(SUBSTEPS):
-            given = [
-                _mixed(through.means[step], lagged.get(i, 0.0), start[i], after[i]) + through.offset
-                for i, through in enumerate(maps)
-            ]
-            rates = partial(_rates, vessel, given, current, wind)
-            state = rk4_step(rates, state, h / SUBSTEPS)
-        lagged = {i: _mixed(maps[i].end, value, start[i], after[i]) for i, value in lagged.items()}
     argument = ca.vertcat(x, d, ca.vec(early), ca.vec(late), h)
-    value = ca.vertcat(*state, *lagged.values())
+    value = _after(ship, x, d, early, late, h, rk4_step, SUBSTEPS)
     weights = ca.SX.sym("weights", value.numel())
+    bent = ca.dot(weights, _after(ship, x, d, early, late, h, _midpoint_step, 1))
     return BlockMap(
         value=ca.Function("block", [argument], [value]),
         jacobian=ca.Function("block_jacobian", [argument], [ca.jacobian(value, argument)]),
-        hessian=ca.Function("block_hessian", [argument, weights], [ca.hessian(ca.dot(weights, value), argument)[0]]),
+        hessian=ca.Function("block_hessian", [argument, weights], [ca.hessian(bent, argument)[0]]),
     )
+
+
+def _after(ship: _Ship, x: ca.SX, d: ca.SX, early: ca.SX, late: ca.SX, h: ca.SX, step: Any, substeps: int) -> ca.SX:
+    """State and what lagging actuators deliver after samples (m, block), each of so many integrator steps."""
+    vessel, environment = ship.vessel, ship.environment
+    maps = [sample_map(r, sample_time_s=vessel.sample_time_s, substeps=substeps) for r in vessel.responses]
+    lagging = [index for index, response in enumerate(vessel.responses) if response.lag_s > 0]
+    state: tuple[Any, ...] = tuple(ca.vertsplit(x))
+    lagged: dict[int, Any] = dict(zip(lagging, ca.vertsplit(d), strict=True)) if lagging else {}
+    current, wind = environment.current_to.tolist(), environment.wind_to.tolist()
+    for sample in range(early.size2()):
+        start, after = early[:, sample], late[:, sample]
+        for part in range(substeps):
+            given = [
+                _mixed(through.means[part], lagged.get(i, 0.0), start[i], after[i]) + through.offset
+                for i, through in enumerate(maps)
+            ]
+            state = step(partial(_rates, vessel, given, current, wind), state, h / substeps)
+        lagged = {i: _mixed(maps[i].end, value, start[i], after[i]) for i, value in lagged.items()}
+    return ca.vertcat(*state, *lagged.values())
+
+
+def _midpoint_step(rates: Any, state: tuple[Any, ...], step_s: Any) -> tuple[Any, ...]:
+    """The state after one step of the explicit midpoint rule, which is accurate enough for second derivatives."""
+    halfway = tuple(x + step_s / 2 * rate for x, rate in zip(state, rates(state), strict=True))
+    return tuple(x + step_s * rate for x, rate in zip(state, rates(halfway), strict=True))
 
 
 def _rates(vessel: Vessel, given: list[Any], current: Any, wind: Any, state: tuple[Any, ...]) -> tuple[Any, ...]:
