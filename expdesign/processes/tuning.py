@@ -23,3 +23,17 @@ class Tuning:
 
 
 CLUSTER = Tuning()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Telling:
+    """How closely tasks in other processes are followed.
+
+    Attributes:
+        look_s: between two looks at what they tell.
+    """
+
+    look_s: float = 0.2
+
+
+TELLING = Telling()

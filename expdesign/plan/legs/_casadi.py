@@ -6,7 +6,7 @@ everything that differs from leg to leg is a bound or a parameter.
 
 Derivatives follow the structure: those of the map over a block of samples are worked out symbolically, once for each
 size of block, and placed by the constant matrix that gives the map's arguments from the variables. Second derivatives
-are those of a coarser map, with a quarter of the operations or less: they choose IPOPT's direction, not its answer.
+are those of a map with one integrator step a sample: they choose IPOPT's direction, not its answer.
 
 Source: H. G. Bock and K. J. Plitt, A multiple shooting algorithm for direct solution of optimal control problems,
 IFAC Proc. 17 (1984), 1603-1608.
@@ -258,7 +258,7 @@ class BlockMap:
     Attributes:
         value: argument -> (6 + c,).
         jacobian: argument -> (6 + c, n).
-        hessian: argument, weights (6 + c,) -> (n, n) of the weighted sum, by one step of the midpoint rule a sample.
+        hessian: argument, weights (6 + c,) -> (n, n) of the weighted sum, by one integrator step a sample.
             IPOPT needs second derivatives for its direction only: what it finds is optimal by the exact first ones.
     """
 
@@ -275,9 +275,9 @@ def _block_map(ship: _Ship, block: int) -> BlockMap:
     x, d, h = ca.SX.sym("x", 6), ca.SX.sym("d", lagging), ca.SX.sym("h")
     early, late = ca.SX.sym("early", m, block), ca.SX.sym("late", m, block)
     argument = ca.vertcat(x, d, ca.vec(early), ca.vec(late), h)
-    value = _after(ship, x, d, early, late, h, rk4_step, SUBSTEPS)
+    value = _after(ship, x, d, early, late, h, SUBSTEPS)
     weights = ca.SX.sym("weights", value.numel())
-    bent = ca.dot(weights, _after(ship, x, d, early, late, h, _midpoint_step, 1))
+    bent = ca.dot(weights, _after(ship, x, d, early, late, h, 1))
     return BlockMap(
         value=ca.Function("block", [argument], [value]),
         jacobian=ca.Function("block_jacobian", [argument], [ca.jacobian(value, argument)]),
@@ -285,7 +285,7 @@ def _block_map(ship: _Ship, block: int) -> BlockMap:
     )
 
 
-def _after(ship: _Ship, x: ca.SX, d: ca.SX, early: ca.SX, late: ca.SX, h: ca.SX, step: Any, substeps: int) -> ca.SX:
+def _after(ship: _Ship, x: ca.SX, d: ca.SX, early: ca.SX, late: ca.SX, h: ca.SX, substeps: int) -> ca.SX:
     """State and what lagging actuators deliver after samples (m, block), each of so many integrator steps."""
     vessel, environment = ship.vessel, ship.environment
     maps = [sample_map(r, sample_time_s=vessel.sample_time_s, substeps=substeps) for r in vessel.responses]
@@ -300,15 +300,10 @@ def _after(ship: _Ship, x: ca.SX, d: ca.SX, early: ca.SX, late: ca.SX, h: ca.SX,
                 _mixed(through.means[part], lagged.get(i, 0.0), start[i], after[i]) + through.offset
                 for i, through in enumerate(maps)
             ]
-            state = step(partial(_rates, vessel, given, current, wind), state, h / substeps)
+            state = rk4_step(partial(_rates, vessel, given, current, wind), state, h / substeps)
         lagged = {i: _mixed(maps[i].end, value, start[i], after[i]) for i, value in lagged.items()}
-    return ca.vertcat(*state, *lagged.values())
-
-
-def _midpoint_step(rates: Any, state: tuple[Any, ...], step_s: Any) -> tuple[Any, ...]:
-    """The state after one step of the explicit midpoint rule, which is accurate enough for second derivatives."""
-    halfway = tuple(x + step_s / 2 * rate for x, rate in zip(state, rates(state), strict=True))
-    return tuple(x + step_s * rate for x, rate in zip(state, rates(halfway), strict=True))
+    moved: ca.SX = ca.vertcat(*state, *lagged.values())
+    return moved
 
 
 def _rates(vessel: Vessel, given: list[Any], current: Any, wind: Any, state: tuple[Any, ...]) -> tuple[Any, ...]:

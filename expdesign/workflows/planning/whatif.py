@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +16,7 @@ from expdesign.export.whatif_page.page import table_header, table_row
 from expdesign.information import PrimitiveInformation, estimated_parameters
 from expdesign.information.expected import expected_covariance
 from expdesign.memory import Memory, recalled, remembering, user_memory
-from expdesign.processes import as_finished
+from expdesign.processes import as_finished, told_together
 from expdesign.progress import Progress, in_phases, silent, within
 from expdesign.rehearsal import trial_parts
 from expdesign.scenario import Scenario, load_scenario, load_variant
@@ -72,12 +72,16 @@ def whatif(
     for name in names:
         if names.count(name) > 1:
             raise InputError(f"the name {name!r} is given to {names.count(name)} cases, expected different names")
-    memory = user_memory() if cache else None
-    with remembering(memory), workers(jobs, scheduler=scheduler, load=load_plans):
-        done = {}
-        for found in _cases(cases, with_plan, seed, memory, progress, one_by_one=with_plan and scheduler is None):
+    memory, done = user_memory() if cache else None, {}
+    with (
+        remembering(memory),
+        workers(jobs, scheduler=scheduler, load=load_plans),
+        told_together(within(progress, 0.0, WORKED), len(cases)) as tellers,
+    ):
+        tasks = [(*case, teller) for case, teller in zip(cases, tellers, strict=True)]
+        for found in as_finished(_case, (with_plan, seed, memory), tasks):
             done[found.name] = found
-            progress(f"{found.name} is done", WORKED * len(done) / len(cases))
+            tellers[names.index(found.name)](f"{found.name} is done", 1.0)
     content = WhatIfContent(
         cases=tuple(done[name] for name in names),
         planned=with_plan,
@@ -92,32 +96,13 @@ def whatif(
     return Outcome(files=written, summary=_summary(content), tables=_tables(content))
 
 
-def _cases(
-    cases: Sequence[tuple[Scenario, tuple[str, ...]]],
-    with_plan: bool,
-    seed: int,
-    memory: Memory | None,
-    progress: Progress,
-    *,
-    one_by_one: bool,
-) -> Iterator[Case]:
-    """The cases as they are done: at once, or one by one, each using what those before it found."""
-    shared = with_plan, seed, memory
-    if not one_by_one:
-        yield from as_finished(_case, shared, cases)
-        return
-    for case, part in zip(cases, in_phases(within(progress, 0.0, WORKED), *(1.0,) * len(cases)), strict=True):
-        yield _case(*shared, *case, progress=part)
-
-
 def _case(
     with_plan: bool,
     seed: int,
     memory: Memory | None,
     case: Scenario,
     changes: tuple[str, ...],
-    *,
-    progress: Progress = silent,
+    progress: Progress,
 ) -> Case:
     """One case, perhaps in another process."""
     with remembering(memory):

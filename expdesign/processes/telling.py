@@ -1,0 +1,64 @@
+"""Progress of tasks in other processes: each writes into a file how far it is, and the process that waits reads it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from threading import Event, Thread
+
+from expdesign.processes.tuning import TELLING
+from expdesign.progress import Progress
+
+
+@dataclass(frozen=True)
+class Teller:
+    """Progress of one task, in whatever process.
+
+    Attributes:
+        path: of its file; elsewhere than on this machine there is none, and nothing is told.
+    """
+
+    path: Path
+
+    def __call__(self, activity: str, share: float) -> None:
+        """Write a line."""
+        with suppress(OSError), self.path.open("r+", encoding="utf-8") as file:
+            file.seek(0, 2)
+            file.write(f"{share!r} {activity}\n")
+
+    def last(self) -> tuple[float, str]:
+        """What was told last; nothing at first."""
+        *_, line = "", *self.path.read_text("utf-8").splitlines()
+        share, _, activity = line.partition(" ")
+        return (float(share), activity) if activity else (0.0, "")
+
+
+@contextmanager
+def told_together(progress: Progress, count: int) -> Iterator[tuple[Teller, ...]]:
+    """Progress of so many tasks; the mean of their shares is told while this block lasts."""
+    with TemporaryDirectory(prefix="expdesign-") as folder:
+        tellers = tuple(Teller(Path(folder) / str(number)) for number in range(count))
+        for teller in tellers:
+            teller.path.touch()
+        ended = Event()
+        listener = Thread(target=_listen, args=(progress, tellers, ended), daemon=True)
+        listener.start()
+        try:
+            yield tellers
+        finally:
+            ended.set()
+            listener.join()
+
+
+def _listen(progress: Progress, tellers: tuple[Teller, ...], ended: Event) -> None:
+    """Tell what is new, the last of it after the end."""
+    known, listening = [teller.last() for teller in tellers], True
+    while listening:
+        listening = not ended.wait(TELLING.look_s)
+        for number, teller in enumerate(tellers):
+            if (new := teller.last()) != known[number]:
+                known[number] = new
+                progress(new[1], sum(share for share, _ in known) / len(known))

@@ -1,0 +1,36 @@
+"""Tasks in other processes tell how far they are to the process that waits for them."""
+
+import time
+
+import pytest
+
+from expdesign.processes import as_finished, local_processes, told_together
+
+STEPS = 4
+
+
+def told_work(name, progress):
+    for step in range(STEPS):
+        progress(f"{name} at work", step / STEPS)
+        time.sleep(0.3)  # the one that waits looks more often
+    return step
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_shares_of_all_tasks_are_told_together_and_never_fall(jobs):
+    told = []
+    with local_processes(jobs), told_together(lambda *what: told.append(what), 2) as tellers:
+        for number in as_finished(told_work, (), zip("ab", tellers, strict=True)):
+            assert number == STEPS - 1
+    activities, shares = zip(*told, strict=True)
+    assert set(activities) == {"a at work", "b at work"}
+    assert shares == tuple(sorted(shares))
+    assert max(shares) <= (STEPS - 1) / STEPS
+    assert len(set(shares)) > 2  # more than two finished tasks could tell
+
+
+def test_tasks_without_a_way_back_work_in_silence(tmp_path):
+    with told_together(lambda *_: None, 1) as (teller,):
+        pass
+    teller("at work", 0.5)  # as on another machine: the file is not there
+    assert not teller.path.exists()
