@@ -2,6 +2,7 @@
 
 import time
 
+import numpy as np
 import pytest
 
 from expdesign.processes import as_finished, local_processes, told_together
@@ -11,7 +12,7 @@ STEPS = 4
 
 def told_work(name, progress):
     for step in range(STEPS):
-        progress(f"{name} at work", step / STEPS)
+        progress(f"{name} at work", np.float64(step) / STEPS)
         time.sleep(0.3)  # the one that waits looks more often
     return step
 

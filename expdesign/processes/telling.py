@@ -27,7 +27,7 @@ class Teller:
         """Write a line."""
         with suppress(OSError), self.path.open("r+", encoding="utf-8") as file:
             file.seek(0, 2)
-            file.write(f"{share!r} {activity}\n")
+            file.write(f"{float(share)!r} {activity}\n")
 
     def last(self) -> tuple[float, str]:
         """What was told last; nothing at first."""
