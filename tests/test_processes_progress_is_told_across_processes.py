@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from expdesign.processes import as_finished, local_processes, told_together
+from expdesign.processes.telling import _elapsed
 
 STEPS = 4
 
@@ -28,6 +29,13 @@ def test_shares_of_all_tasks_are_told_together_and_never_fall(jobs):
     assert shares == tuple(sorted(shares))
     assert max(shares) <= (STEPS - 1) / STEPS
     assert len(set(shares)) > 2  # more than two finished tasks could tell
+
+
+def test_the_share_is_that_of_the_time():
+    two_of_three_at_once = [_elapsed(done, 3, 2) for done in (0.0, 1.0, 2.0, 2.5, 3.0)]
+    assert two_of_three_at_once == [0.0, 0.25, 0.5, 0.75, 1.0]
+    assert _elapsed(1.5, 4, 2) == 1.5 / 4
+    assert _elapsed(1.0, 2, 8) == 1.0 / 2
 
 
 def test_tasks_without_a_way_back_work_in_silence(tmp_path):

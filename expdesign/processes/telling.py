@@ -9,6 +9,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Event, Thread
 
+from joblib import effective_n_jobs
+
 from expdesign.processes.tuning import TELLING
 from expdesign.progress import Progress
 
@@ -38,13 +40,13 @@ class Teller:
 
 @contextmanager
 def told_together(progress: Progress, count: int) -> Iterator[tuple[Teller, ...]]:
-    """Progress of so many tasks; the mean of their shares is told while this block lasts."""
+    """Progress of so many tasks, begun in this order, of about the same length: told while this block lasts."""
     with TemporaryDirectory(prefix="expdesign-") as folder:
         tellers = tuple(Teller(Path(folder) / str(number)) for number in range(count))
         for teller in tellers:
             teller.path.touch()
         ended = Event()
-        listener = Thread(target=_listen, args=(progress, tellers, ended), daemon=True)
+        listener = Thread(target=_listen, args=(progress, tellers, effective_n_jobs(None), ended), daemon=True)
         listener.start()
         try:
             yield tellers
@@ -53,7 +55,7 @@ def told_together(progress: Progress, count: int) -> Iterator[tuple[Teller, ...]
             listener.join()
 
 
-def _listen(progress: Progress, tellers: tuple[Teller, ...], ended: Event) -> None:
+def _listen(progress: Progress, tellers: tuple[Teller, ...], at_once: int, ended: Event) -> None:
     """Tell what is new, the last of it after the end."""
     known, listening = [teller.last() for teller in tellers], True
     while listening:
@@ -61,4 +63,12 @@ def _listen(progress: Progress, tellers: tuple[Teller, ...], ended: Event) -> No
         for number, teller in enumerate(tellers):
             if (new := teller.last()) != known[number]:
                 known[number] = new
-                progress(new[1], sum(share for share, _ in known) / len(known))
+                progress(new[1], _elapsed(sum(share for share, _ in known), len(known), at_once))
+
+
+def _elapsed(done: float, count: int, at_once: int) -> float:
+    """Share of the time gone when so much of equal tasks is done, so many at once: the last may be fewer."""
+    rounds, rest = divmod(count, at_once)
+    before = min(done / at_once, rounds)
+    after = max(done - rounds * at_once, 0.0) / rest if rest else 0.0
+    return (before + after) / (rounds + bool(rest))
