@@ -149,7 +149,8 @@ class LegOutcome:
             before the run that follows.
         go_arounds: mean number of go-arounds for the run that follows, over the ships that sailed the leg.
         median_s, most_s: median and 95th percentile of the time it took [s].
-        position_m: distance from the planned start within which a run begins.
+        position_m, speed_mps: distance from the planned start, and difference from the planned velocity over ground,
+            within which a run begins.
     """
 
     left: float
@@ -158,6 +159,7 @@ class LegOutcome:
     median_s: float
     most_s: float
     position_m: float
+    speed_mps: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -175,7 +177,7 @@ class RiskEstimate:
         extra_median_s, extra_most_s: median and 95th percentile of the time beyond the plan's, over the trials that
             reached the goal [s]; nan when none did.
         go_arounds: largest number of go-arounds for one run.
-        heading_rad, speed_mps, yaw_rate_radps: tolerances within which runs begin, besides the position's of each leg.
+        heading_rad, yaw_rate_radps: tolerances within which runs begin, besides those of each leg.
         legs: what happened on each.
     """
 
@@ -188,7 +190,6 @@ class RiskEstimate:
     extra_most_s: float
     go_arounds: int
     heading_rad: float
-    speed_mps: float
     yaw_rate_radps: float
     legs: tuple[LegOutcome, ...]
 

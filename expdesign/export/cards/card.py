@@ -157,13 +157,13 @@ def _within(plan: Plan, first: int) -> list[tuple[str, str]]:
     risk = plan.risk
     if risk is None:
         return []
-    off_m = next(item.position_m for leg, item in zip(plan.legs, risk.legs, strict=True) if leg.first == first)
+    begun = next(item for leg, item in zip(plan.legs, risk.legs, strict=True) if leg.first == first)
     heading, rate = (words.significant(math.degrees(value), 2) for value in (risk.heading_rad, risk.yaw_rate_radps))
     return [
         (
             "Start tolerance",
-            f"{words.distance(off_m)}; {heading}\N{DEGREE SIGN}; "
-            f"{words.speed(risk.speed_mps)}; {rate}{words.NB}\N{DEGREE SIGN}/s; else go-around",
+            f"{words.distance(begun.position_m)}; {heading}\N{DEGREE SIGN}; "
+            f"{words.speed(begun.speed_mps)}; {rate}{words.NB}\N{DEGREE SIGN}/s; else go-around",
         )
     ]
 

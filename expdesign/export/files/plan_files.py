@@ -130,7 +130,6 @@ def _risk_entry(risk: RiskEstimate | None) -> dict[str, Any] | None:
         "goes_round_at_most": risk.go_arounds,
         "run_begins_within": {
             "heading_rad": risk.heading_rad,
-            "velocity_mps": risk.speed_mps,
             "yaw_rate_radps": risk.yaw_rate_radps,
         },
     }
@@ -144,6 +143,7 @@ def _sailed_entry(plan: Plan, index: int) -> dict[str, float | None]:
     return {
         "leave_water_probability": leg.left,
         "begins_within_m": leg.position_m,
+        "begins_within_mps": leg.speed_mps,
         "aborted_share": leg.aborted,
         "goes_round_mean": leg.go_arounds,
         "sailed_median_s": leg.median_s,

@@ -27,13 +27,16 @@ def procedure_sentences(plan: Plan) -> list[str]:
 
 def _tolerances(risk: RiskEstimate, runs: list[bool]) -> str:
     """Tolerances at the start of a run, in words."""
-    off = [leg.position_m for leg, run in zip(risk.legs, runs, strict=True) if run] or [math.nan]
+    begun = [leg for leg, run in zip(risk.legs, runs, strict=True) if run]
+    off, differs = [leg.position_m for leg in begun] or [math.nan], [leg.speed_mps for leg in begun] or [math.nan]
     least, most = words.distance(min(off)), words.distance(max(off))
     position = least if least == most else f"the distance on its card ({least} to {most}, depending on the sea room)"
+    least, most = words.speed(min(differs)), words.speed(max(differs))
+    speed = least if least == most else f"the speed on its card ({least} to {most})"
     return (
         f"the position is within {position} of the planned start, the heading within "
         f"{words.significant(math.degrees(risk.heading_rad), 2)}\N{DEGREE SIGN}, the velocity over ground "
-        f"within {words.speed(risk.speed_mps)} and the yaw rate within "
+        f"within {speed} and the yaw rate within "
         f"{words.significant(math.degrees(risk.yaw_rate_radps), 2)}{words.NB}\N{DEGREE SIGN}/s of the planned ones"
     )
 

@@ -17,10 +17,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.conventions import wrap_angle
+from expdesign.dictionary.build import drift
 from expdesign.plan.control import CONTROL, Helmsman, over_ground
 from expdesign.plan.legs import LegWater
 from expdesign.plan.monte_carlo.tuning import MONTE_CARLO
 from expdesign.values import Array, seal
+from expdesign.vessel import Vessel
 
 ABORT_CAUSES = ("position", "heading", "speed", "yaw rate", "time", "no go-around path")
 """What can keep a ship from beginning a run: a tolerance, the time, or that no go-around path is found."""
@@ -57,21 +59,37 @@ def tolerances(water: LegWater, spare_m: float = 0.0) -> Tolerances:
     """Of a run, by the vessel's length and its speeds on legs, and by the room beyond the clearance.
 
     Information does not depend on where a run begins. So where there is room, the position may use a share of it, at
-    most a hull length.
+    most a hull length. A speed that differs at the start soon decays to that of the run, and its information is
+    nearly all told after that: so the speed may differ by what moves the run by a share of the position's tolerance.
     """
     ship, length_m = water.ship, water.vessel.length_m
+    position_m = float(
+        np.clip(
+            MONTE_CARLO.position_room * spare_m,
+            MONTE_CARLO.position_hulls * length_m,
+            MONTE_CARLO.position_most_hulls * length_m,
+        )
+    )
+    moved_mps = MONTE_CARLO.speed_moves * position_m / speed_decay_s(water.vessel, ship.transit_speed_mps)
+    least, most = MONTE_CARLO.speed_share, MONTE_CARLO.speed_most_share
     return Tolerances(
-        position_m=float(
-            np.clip(
-                MONTE_CARLO.position_room * spare_m,
-                MONTE_CARLO.position_hulls * length_m,
-                MONTE_CARLO.position_most_hulls * length_m,
-            )
-        ),
+        position_m=position_m,
         heading_rad=MONTE_CARLO.heading_rad,
-        speed_mps=MONTE_CARLO.speed_share * ship.transit_speed_mps,
+        speed_mps=float(np.clip(moved_mps, least * ship.transit_speed_mps, most * ship.transit_speed_mps)),
         yaw_rate_radps=MONTE_CARLO.yaw_rate_share * ship.turn_rate_radps,
     )
+
+
+def speed_decay_s(vessel: Vessel, speed_mps: float) -> float:
+    """Larger time constant of a difference in surge and in sway at a speed ahead, by the nominal model; inf for none.
+
+    A ship that is faster by dv at first is dv times this farther in the end [s].
+    """
+    ahead, step = np.array([speed_mps, 0.0, 0.0]), 1e-3 * speed_mps
+    idle = np.zeros(len(vessel.limits))
+    away = [drift(vessel, ahead + side * step * np.eye(3), idle) for side in (1.0, -1.0)]
+    damping = -float(np.diag((away[0] - away[1]) / (2 * step))[:2].max())
+    return 1.0 / damping if damping > 0 else np.inf
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -57,7 +57,6 @@ def estimate_risk(
         extra_most_s=float(np.quantile(extra, MONTE_CARLO.upper_share)) if len(extra) else float("nan"),
         go_arounds=MONTE_CARLO.go_arounds,
         heading_rad=within.heading_rad,
-        speed_mps=within.speed_mps,
         yaw_rate_radps=within.yaw_rate_radps,
         legs=tuple(_leg_outcome(trials, index, sample_s) for index in range(len(legs))),
     )
@@ -134,6 +133,7 @@ def _leg_outcome(trials: Trials, index: int, sample_s: float) -> LegOutcome:
     times: Array = trials.samples[index][sailed] * sample_s if sailed.any() else np.zeros(1)
     return LegOutcome(
         position_m=trials.within[index].position_m,
+        speed_mps=trials.within[index].speed_mps,
         left=float(trials.left[index].mean()),
         aborted=float(trials.aborted[index].mean()),
         go_arounds=float(trials.go_arounds[index][sailed].mean()) if sailed.any() else 0.0,

@@ -21,6 +21,8 @@ class Tuning:
             and its limit in hull lengths.
         heading_rad: tolerance of a run's start heading.
         speed_share, yaw_rate_share: tolerances of its velocity in transit speeds, of its yaw rate in the largest.
+        speed_moves, speed_most_share: share of the position's tolerance by which another speed at the start may move
+            the run instead, and its limit in transit speeds.
         run_up_shares: of a run-up that are tried, where a whole one has no room.
         past_start_hulls: hull lengths past the start over which a reference continues steadily.
         rest_share: speed over ground in transit speeds, and yaw rate in the largest, up to which a run begins from
@@ -61,6 +63,8 @@ class Tuning:
     position_most_hulls: float = 1.0
     heading_rad: float = radians(3.0)
     speed_share: float = 0.1
+    speed_moves: float = 0.5
+    speed_most_share: float = 0.3
     yaw_rate_share: float = 0.1
     run_up_shares: tuple[float, ...] = (1.0, 0.75, 0.5, 0.35, 0.25)
     past_start_hulls: float = 1.0
