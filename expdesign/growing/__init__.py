@@ -8,11 +8,13 @@ if TYPE_CHECKING:
     from expdesign.growing.loop import grow_dictionary, motion_limits, searched_spaces
     from expdesign.growing.optimal_design import optimum, shared
     from expdesign.growing.search import Archive, Candidate, Measure, Worth, pool_of, refined
+    from expdesign.growing.space import FamilySpace
     from expdesign.growing.values import GrowRound, GrowSettings, Growth
 
 __all__ = [
     "Archive",
     "Candidate",
+    "FamilySpace",
     "GrowRound",
     "GrowSettings",
     "Growth",
@@ -34,6 +36,7 @@ if not TYPE_CHECKING:
             "loop": ("grow_dictionary", "motion_limits", "searched_spaces"),
             "optimal_design": ("optimum", "shared"),
             "search": ("Archive", "Candidate", "Measure", "Worth", "pool_of", "refined"),
+            "space": ("FamilySpace",),
             "values": ("GrowRound", "GrowSettings", "Growth"),
         },
     )

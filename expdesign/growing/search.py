@@ -63,7 +63,7 @@ class Runs:
     def __post_init__(self) -> None:
         seal(self, matrices="n d d", excess="n", made_good_m="n")
 
-    def __getitem__(self, rows: slice) -> Runs:
+    def __getitem__(self, rows: slice | np.ndarray) -> Runs:
         return Runs(matrices=self.matrices[rows], excess=self.excess[rows], made_good_m=self.made_good_m[rows])
 
     @staticmethod
@@ -92,10 +92,17 @@ class Measure:
     limits: Array
 
     def __call__(self, specs: Sequence[PrimitiveSpec]) -> Runs:
-        """The runs of specifications of one duration."""
-        return Runs.joined(
-            [self._some(specs[first : first + TUNING.batch]) for first in range(0, len(specs), TUNING.batch)]
-        )
+        """The runs of specifications; those of one duration are simulated together."""
+        durations = np.array([spec.settings["duration_s"] for spec in specs])
+        order = np.argsort(durations, kind="stable")
+        ends = np.flatnonzero(np.diff(durations[order])) + 1
+        batches = [
+            rows[first : first + TUNING.batch]
+            for rows in np.split(order, ends)
+            for first in range(0, len(rows), TUNING.batch)
+        ]
+        found = Runs.joined([self._some([specs[index] for index in rows]) for rows in batches])
+        return found[np.argsort(order, kind="stable")]
 
     def _some(self, specs: Sequence[PrimitiveSpec]) -> Runs:
         runs = excite_many(self.vessel, specs)

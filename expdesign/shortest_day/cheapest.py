@@ -132,6 +132,26 @@ def cheapest_shares(accuracy: Accuracy, offer: Offer, *, level: float = 0.0) -> 
     return _relaxed(_Cuts(accuracy=accuracy, offer=offer, level=level))
 
 
+def fullest_level(accuracy: Accuracy, offer: Offer, most_s: float) -> float:
+    """The largest level of the margin f that runs, whole or not, reach at a cost of `most_s`.
+
+    Levels are searched from `Tuning.least_level` to that of the most runs; the least where even it costs more.
+    """
+    low, high = TUNING.least_level, accuracy.margin(offer.information(offer.most))
+    for _ in range(TUNING.level_halvings):
+        middle = (low + high) / 2
+        low, high = (middle, high) if shares_cost_s(accuracy, offer, middle) <= most_s else (low, middle)
+    return low
+
+
+def shares_cost_s(accuracy: Accuracy, offer: Offer, level: float) -> float:
+    """Least cost of runs, whole or not, that reach a level; inf where none do [s]."""
+    try:
+        return cheapest_shares(accuracy, offer, level=level).bound_s
+    except NoAnswer:
+        return np.inf
+
+
 def _refuse(accuracy: Accuracy, information: Array) -> None:
     name, margin = accuracy.scarcest(information), accuracy.margin(information)
     most = f"with {TUNING.most_runs} runs of every manoeuvre, or as many as the limits on durations allow"

@@ -19,6 +19,7 @@ from expdesign.dictionary import PrimitiveSpec
 from expdesign.growing import (
     Archive,
     Candidate,
+    FamilySpace,
     GrowSettings,
     Measure,
     Worth,
@@ -31,24 +32,31 @@ from expdesign.plan.assembly import ship_on_legs
 from expdesign.plan.problem import PlanProblem
 from expdesign.progress import Progress, silent
 from expdesign.shortest_day.accuracy import Accuracy
-from expdesign.shortest_day.cheapest import Offer, Relaxed, cheapest_shares
+from expdesign.shortest_day.cheapest import Offer, Relaxed, cheapest_shares, fullest_level
 from expdesign.shortest_day.prices import first_prices, offered
 from expdesign.shortest_day.tuning import TUNING
 from expdesign.values import Array
 
 
 def manoeuvres_worth_adding(
-    problem: PlanProblem, accuracy: Accuracy, settings: GrowSettings, *, progress: Progress = silent
+    problem: PlanProblem,
+    accuracy: Accuracy,
+    settings: GrowSettings,
+    day_s: float | None = None,
+    *,
+    progress: Progress = silent,
 ) -> tuple[PrimitiveSpec, ...]:
     """Manoeuvres that the cheapest runs for an accuracy would use, found by their worth in seconds.
 
-    Velocities keep to the range of the dictionary, and nearly reach the speed of legs, unless the settings limit them.
-    They last as long as the longest run of the dictionary, unless the settings say how long.
+    Velocities keep to the range of the dictionary, to both sides alike, and nearly reach the speed of legs, unless the
+    settings limit them. They last as long as the longest run of the dictionary or a share of that, unless the settings
+    say how long: what tells of one parameter alone is soon told.
 
     Args:
         problem: gives the dictionary, the limits on runs, and the way from start to goal.
         accuracy: to be reached.
         settings: of the search; seconds worth take the place of sensitivity.
+        day_s: length of a day whose runs tell as much as can be [s], instead of the accuracy.
         progress: of the search.
 
     Raises:
@@ -58,11 +66,13 @@ def manoeuvres_worth_adding(
     progress("simulating candidates", 0.0)
     offer, transit_mps = offered(problem, first_prices(problem)), ship_on_legs(problem).transit_speed_mps
     limits = _limits(problem, settings, transit_mps)
-    settings = replace(settings, run_s=settings.run_s or max(item.duration_s for item in problem.primitives))
-    spaces = searched_spaces(problem.vessel, problem.primitives, settings, limits)
     measure, seed = _measure(problem, limits), settings.seed or 0
+    spaces = _spaces(problem, settings, limits)
     archives, rng = pool_of(spaces, measure, pool=settings.pool, seed=seed), np.random.default_rng(seed)
-    level, given, specs = float(np.log(TUNING.first_share)), len(offer.cost_s), list[PrimitiveSpec]()
+    given, specs = len(offer.cost_s), list[PrimitiveSpec]()
+    level = float(np.log(TUNING.first_share))
+    if day_s is not None:
+        level = fullest_level(accuracy, offer, day_s - offer.way_s)
     for number in range(TUNING.growth_rounds):
         worth = _worth(cheapest_shares(accuracy, offer, level=level), problem, transit_mps)
         progress("searching for manoeuvres that shorten the day", (number + 0.5) / (TUNING.growth_rounds + 1))
@@ -79,11 +89,25 @@ def manoeuvres_worth_adding(
     return tuple(replace(spec, name=_unused(number, spec, taken)) for number, spec in enumerate(chosen, start=1))
 
 
+def _spaces(problem: PlanProblem, settings: GrowSettings, limits: Array) -> list[FamilySpace]:
+    """Families of every duration."""
+    longest_s = max(item.duration_s for item in problem.primitives)
+    durations_s = [settings.run_s] if settings.run_s else [share * longest_s for share in TUNING.added_durations]
+    return [
+        space
+        for run_s in durations_s
+        for space in searched_spaces(problem.vessel, problem.primitives, replace(settings, run_s=run_s), limits)
+    ]
+
+
 def _limits(problem: PlanProblem, settings: GrowSettings, transit_mps: float) -> Array:
-    """(3, 2) of u, v, r: of the dictionary, nearly as fast ahead as legs are, and what is stated."""
+    """(3, 2) of u, v, r: of the dictionary, to both sides alike, nearly as fast as legs ahead, and what is stated."""
     limits = motion_limits(settings, problem.primitives)
     if "u_mps" not in settings.limits:
         limits[0, 1] = max(limits[0, 1], TUNING.added_speed * transit_mps)
+    for row, key in ((1, "v_mps"), (2, "r_radps")):
+        if key not in settings.limits:
+            limits[row] = np.abs(limits[row]).max() * np.array([-1.0, 1.0])
     return limits
 
 

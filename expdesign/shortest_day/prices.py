@@ -1,8 +1,9 @@
 """What one more run costs and tells, its leg included, learnt from the days that were planned.
 
 A run takes its own time, and a share of the repositioning that plans have beyond the direct way. Its way made good
-saves time of that way. The leg that leads to a run tells, too; where no day had the run, it is taken to tell nothing.
-These are estimates for the next plan; the next plan itself says what is true.
+saves time of that way. The legs that lead to runs tell, too. Each is taken to tell what legs did on average: how long
+a leg is, and so what it tells, depends on its place in the day more than on the run that it leads to. These are
+estimates for the next plan; the next plan itself says what is true.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ class Prices:
         cost_s: (q,) of one more whole run, its leg included.
         saved_s: (q,) time at transit speed of its way made good.
         way_s: time at transit speed of the way from start to goal.
-        legs: (q, d, d) information of the leg that leads to it.
+        legs: (q, d, d) information of the leg that leads to each.
         goal: (d, d) information of the leg to the goal.
         level: margin of the accuracy that runs and legs must reach by these estimates.
     """
@@ -119,22 +120,21 @@ def learnt_prices(primitives: Sequence[Primitive], days: Sequence[DraftedDay]) -
         primitives: of the dictionary.
         days: one at least.
     """
-    names = [item.name for item in primitives]
-    told = np.zeros((len(names), *days[0].information.shape[1:]))
-    found = np.zeros(len(names))
-    goal = np.mean([day.information[-1] for day in days], axis=0)
-    for day in days:
-        for leg, matrix in zip(day.draft.sailed.legs[:-1], day.information, strict=False):
-            if leg.kind == "reposition":
-                told[names.index(leg.name)] += matrix
-                found[names.index(leg.name)] += 1
-    draft = days[0].draft
+    told = np.array(
+        [
+            matrix
+            for day in days
+            for leg, matrix in zip(day.draft.sailed.legs[:-1], day.information[:-1], strict=True)
+            if leg.kind == "reposition"
+        ]
+    )
+    goal, draft = np.mean([day.information[-1] for day in days], axis=0), days[0].draft
     saved_s = _made_good_s(primitives, draft.transit_mps)
     return Prices(
         cost_s=np.array([item.duration_s for item in primitives]) + _leg_s(days, saved_s),
         saved_s=saved_s,
         way_s=draft.direct_s,
-        legs=told / np.maximum(found, 1)[:, None, None],
+        legs=np.broadcast_to(told.mean(axis=0), (len(primitives), *told.shape[1:])),
         goal=goal,
     )
 

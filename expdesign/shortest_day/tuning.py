@@ -15,12 +15,15 @@ class Tuning:
         first_leg_s: time of repositioning for each run, before a day has been planned [s].
         level_step, level_steps: margin that is asked for besides where the cheapest runs were tried already, at most so
             many times.
+        least_level, level_halvings: least margin of a day of a given length, and steps in search of the largest.
         least_leg_s: least of it once days have been planned [s].
+        added_durations: durations of manoeuvres that are searched for, in that of the longest run of the dictionary.
         growth_rounds: searches for manoeuvres that are worth more than they cost.
         growth_families: searched in each of them, the most promising; the best of each may be added.
-        added_speed: largest surge speed of a manoeuvre that is added, in transit speeds; ships that are a little slower
-            than the model must still reach it.
+        added_speed: largest surge speed of a manoeuvre that is added, in transit speeds, which leaves some thrust for
+            sway.
         used: least runs of a manoeuvre found, in the cheapest runs not made whole, for it to be added.
+        curve_shares: information, in shares of what is needed, for which the day is estimated.
         cuts: most linear bounds on the accuracy in the choice of runs.
         halvings: of the way to inner runs, in search of the boundary.
         reached: shortfall of the accuracy's margin that counts as reached.
@@ -34,11 +37,15 @@ class Tuning:
     first_leg_s: float = 30.0
     level_step: float = 0.05
     level_steps: int = 10
+    least_level: float = -4.0
+    level_halvings: int = 12
     least_leg_s: float = 5.0
-    growth_rounds: int = 4
-    growth_families: int = 3
-    added_speed: float = 0.9
-    used: float = 0.2
+    added_durations: tuple[float, ...] = (0.25, 0.5, 1.0)
+    growth_rounds: int = 8
+    growth_families: int = 6
+    added_speed: float = 0.95
+    used: float = 0.1
+    curve_shares: tuple[float, ...] = (0.4, 0.5, 0.65, 0.8, 1.0, 1.25, 1.6, 2.0)
     cuts: int = 200
     halvings: int = 20
     reached: float = 1e-9
