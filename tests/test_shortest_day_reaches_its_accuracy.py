@@ -86,3 +86,17 @@ def test_no_day_found_is_shorter_than_the_bound(day):
     for item in found["tried"]:
         assert item["day_s"] >= bound["way_s"]
         assert item["day_s"] / item["information"] >= bound["information_s"]
+
+
+def test_files_and_report_say_where_the_minutes_go(day):
+    folder, _ = day
+    found = json.loads((folder / "day.json").read_text(encoding="utf-8"))
+    parts, page = found["goes_to"], (folder / "report.html").read_text(encoding="utf-8")
+    assert sum(parts.values()) == pytest.approx(found["day_s"])
+    assert parts["way_s"] == pytest.approx(found["bound"]["way_s"], rel=0.02)  # both at about transit speed
+    assert found["day_s"] <= found["day_median_s"] + 5.0 <= found["day_95_s"] + 5.0
+    shares, days_s = ([item[name] for item in found["curve"]] for name in ("information", "day_s"))
+    assert shares == sorted(shares)
+    assert days_s == sorted(days_s)  # more information never takes less
+    assert "the way to the goal takes 7\N{NO-BREAK SPACE}min" in page
+    assert 'id="pareto-' in page

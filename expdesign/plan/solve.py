@@ -45,7 +45,7 @@ from expdesign.plan.verify import realised_efficiencies, verify_plan
 from expdesign.plan.work_budget import WorkBudget
 from expdesign.progress import Progress, never_falling, silent
 from expdesign.sea_area import SeaArea
-from expdesign.values import Array
+from expdesign.values import Array, seal
 
 Planned = TypeVar("Planned")
 
@@ -129,12 +129,22 @@ class Draft:
         direct_s: time of the shortest path from start to goal at transit speed [s].
         transit_mps: that speed [m/s].
         going_round_s: expected time of go-arounds before runs that follow others [s].
+        made_good_m: (legs,) by how much each run or leg shortens the way to the goal.
     """
 
     sailed: SailedTrial
     direct_s: float
     transit_mps: float
+    made_good_m: Array
     going_round_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        seal(self, made_good_m="legs")
+
+    def beyond_s(self, kind: str) -> float:
+        """Time of the legs of one kind beyond what the way that they make good takes at transit speed [s]."""
+        of_kind = [leg.kind == kind for leg in self.sailed.legs]
+        return self.sailed.seconds(kind) - float(self.made_good_m[of_kind].sum()) / self.transit_mps
 
 
 def draft_trial(problem: PlanProblem, *, progress: Progress = silent) -> Draft:
@@ -152,13 +162,20 @@ def _drafted(whole: PlanProblem, area: SeaArea, ship: Capability, progress: Prog
     water, room = roomy_water(problem, ship, progress)
     budget = WorkBudget(most_s=PLAN.replan_budgets * problem.settings.time_budget_s)
     sailed = sail_all(problem, room, progress, stated=water, budget=budget)
-    way_m = float(room.space.goal_distance.to_goal(problem.start[None, :2])[0])
+    ends = [0, *(leg.last for leg in sailed.legs)]
+    left_m = room.space.goal_distance.to_goal(sailed.trajectory.pose[ends, :2])
     speed = water.ship.transit_speed_mps
     go_around, sample_s = room.space.go_around, problem.vessel.sample_time_s
     legs = [leg for leg in sailed.legs[1:-1] if leg.kind == "reposition"]
     leg_s = sample_s * np.array([leg.last - leg.first for leg in legs])
     rounds_s = 0.0 if go_around is None else float(go_around.seconds(leg_s).sum())
-    return Draft(sailed=sailed, direct_s=way_m / speed, transit_mps=speed, going_round_s=rounds_s)
+    return Draft(
+        sailed=sailed,
+        direct_s=float(left_m[0]) / speed,
+        transit_mps=speed,
+        going_round_s=rounds_s,
+        made_good_m=-np.diff(left_m),
+    )
 
 
 def _check(problem: PlanProblem, water: LegWater, sailed: SailedTrial, check: Callable[..., Any]) -> Any:

@@ -210,6 +210,20 @@ class RiskEstimate:
         )
 
 
+@dataclass(frozen=True, kw_only=True)
+class DayLength:
+    """Everything between start and goal [s].
+
+    Attributes:
+        planned_s: by the plan.
+        median_s, most_s: median and 95th percentile of the drawn trials that reached the goal; nan without any.
+    """
+
+    planned_s: float
+    median_s: float
+    most_s: float
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Plan:
     """One continuous trial from start to goal.
@@ -257,6 +271,13 @@ class Plan:
         for number, leg in enumerate(self.legs):
             index[leg.first : leg.last] = number
         return index
+
+    @property
+    def day(self) -> DayLength:
+        """How long it takes from start to goal."""
+        planned_s, risk = self.commands.duration_s, self.risk
+        median_s, most_s = (np.nan, np.nan) if risk is None else (risk.extra_median_s, risk.extra_most_s)
+        return DayLength(planned_s=planned_s, median_s=planned_s + median_s, most_s=planned_s + most_s)
 
     def seconds(self, kind: str) -> float:
         """Total time of the legs of one kind [s]."""

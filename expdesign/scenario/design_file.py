@@ -139,6 +139,11 @@ class DesignTable(Table):
         description="a table [design.accuracy]: plan the shortest day whose whole track, legs included, is this "
         "accurate; total_s is then only the time that 'durations' means",
     )
+    day_s: Positive | None = Field(
+        default=None,
+        description="plan the day of this length [s], everything between start and goal included, whose whole track "
+        "tells most by the criterion; total_s is then only what that is compared with; instead of [design.accuracy]",
+    )
 
 
 def design_settings(table: DesignTable, vessel: Vessel, primitives: tuple[str, ...], entry: Entry) -> DesignSettings:
@@ -194,10 +199,22 @@ def design_settings(table: DesignTable, vessel: Vessel, primitives: tuple[str, .
         budgets=_budgets(table.budgets, primitives, entry.at("budgets")),
         balance=table.balance,
         grow=None if table.grow is None else build_grow(table.grow, entry.at("grow")),
-        accuracy=None
-        if table.accuracy is None
-        else _accuracy(table.accuracy, vessel, estimated, table.outcome_speed_mps, entry.at("accuracy")),
+        accuracy=_asked(table, vessel, estimated, entry),
     )
+
+
+def _asked(table: DesignTable, vessel: Vessel, estimated: tuple[str, ...], entry: Entry) -> AccuracySettings | None:
+    """What is asked of a day, if anything is."""
+    if table.day_s is not None:
+        if table.accuracy is not None:
+            raise entry.at("day_s").error("is given beside [design.accuracy], expected one of them")
+        if not 2 * vessel.sample_time_s <= table.day_s <= LONGEST_TOTAL_S:
+            least = f"{2 * vessel.sample_time_s:g}, two samples, to {LONGEST_TOTAL_S:.0f}, eleven days"
+            raise entry.at("day_s").error(f"is {shown(table.day_s)}, expected {least}")
+        return AccuracySettings(as_durations=True, day_s=table.day_s)
+    if table.accuracy is None:
+        return None
+    return _accuracy(table.accuracy, vessel, estimated, table.outcome_speed_mps, entry.at("accuracy"))
 
 
 def _accuracy(

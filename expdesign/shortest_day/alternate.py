@@ -6,8 +6,9 @@ prices says so. The prices decide only what is tried next.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -15,15 +16,16 @@ from expdesign.durations import DurationDesign, with_repeats
 from expdesign.errors import NoAnswer, NoPlan, NotInformative
 from expdesign.memory import recalled
 from expdesign.plan.problem import PlanProblem
-from expdesign.plan.solve import draft_trial, plan_trial
-from expdesign.plan.values import SailedTrial
+from expdesign.plan.solve import Draft, draft_trial, plan_trial
+from expdesign.plan.values import Plan, SailedTrial
 from expdesign.plan.verify import track_information
 from expdesign.progress import Progress, in_phases, silent
 from expdesign.shortest_day.accuracy import Accuracy
-from expdesign.shortest_day.cheapest import Choice, Offer, cheapest_runs
+from expdesign.shortest_day.bounds import fastest_mps, way_bound_s
+from expdesign.shortest_day.cheapest import Choice, Offer, cheapest_runs, fullest_level, shares_cost_s
 from expdesign.shortest_day.prices import DraftedDay, Prices, first_prices, learnt_prices, offered
 from expdesign.shortest_day.tuning import TUNING
-from expdesign.shortest_day.values import DayTried, ShortestDay
+from expdesign.shortest_day.values import DayParts, DayTried, ShortestDay
 from expdesign.values import Array
 
 
@@ -49,23 +51,61 @@ def shortest_day(
         NoPlan: no day was found at all.
     """
     search = _Search(problem=problem, accuracy=accuracy, added=tuple(added))
-    prices, days, choices = first_prices(problem), list[DraftedDay](), list[Choice]()
-    *rounds, last = in_phases(progress, *np.ones(TUNING.rounds + 1))
-    refused = NoPlan("no day was planned")
-    for told in rounds:
-        choice = search.untried(prices, choices)
-        if choice is None:
-            break
-        choices.append(choice)
-        try:
-            days.append(search.drafted(choice, told))
-        except NoPlan as error:  # other runs may find their places
-            refused = error
-            continue
-        prices = search.prices(days)
-    if not days:
-        raise refused
-    return search.best(days, choices[-1], most_s, last)
+    days, last, planning = search.rounds(lambda prices, _, tried: search.untried(prices, tried), progress)
+    reached = sorted((day for day in days if day.margin >= 0), key=lambda day: day.expected_s)
+    allowed = [day for day in reached if most_s is None or day.day_s <= most_s]
+    if reached and not allowed and most_s is not None:
+        raise NoAnswer(search.too_long(min(reached, key=lambda day: day.day_s), most_s))
+    found = search.planned(allowed, days, last, planning, good=lambda _, margin: margin >= 0)
+    if found is None:
+        raise NoPlan(search.falls_short(days))
+    return found
+
+
+def fullest_day(
+    problem: PlanProblem,
+    accuracy: Accuracy,
+    day_s: float,
+    *,
+    added: Sequence[str] = (),
+    progress: Progress = silent,
+) -> ShortestDay:
+    """The day found that tells most in a given length, planned and verified.
+
+    Runs are those that reach the largest margin at the prices learnt so far; so the margin takes the place of the cost.
+
+    Args:
+        problem, added, progress: as of `shortest_day`.
+        accuracy: its margin is made as large as can be.
+        day_s: length of the day as planned, at most [s].
+
+    Raises:
+        NoAnswer: every day found takes longer.
+        NoPlan: no day was found at all.
+    """
+    search = _Search(problem=problem, accuracy=accuracy, added=tuple(added))
+    days, last, planning = search.rounds(partial(search.filling, day_s), progress)
+    allowed = sorted((day for day in days if day.day_s <= day_s), key=lambda day: -day.margin)
+    if not allowed:
+        least_s = min(day.day_s for day in days)
+        raise NoAnswer(
+            f"design.day_s is {day_s:g}: the shortest of {len(days)} days found, with runs in it, takes "
+            f"{least_s:.0f} s; a larger day_s, or shorter manoeuvres, would do"
+        )
+    found = search.planned(allowed, days, last, planning, good=lambda plan, _: plan.commands.duration_s <= day_s)
+    if found is None:
+        raise NoPlan(f"no day within design.day_s = {day_s:g} was planned as it was drafted; a larger day_s would do")
+    return replace(found, most_s=day_s)
+
+
+def check_way_fits(problem: PlanProblem, day_s: float) -> None:
+    """Raise NoAnswer where the way to the goal alone takes longer than a day [s]."""
+    speed_mps = fastest_mps(problem)
+    if (way_s := way_bound_s(problem, speed_mps)) > day_s:
+        raise NoAnswer(
+            f"design.day_s is {day_s:g}: the way to the goal alone takes at least {way_s:.0f} s at {speed_mps:.3g} "
+            "m/s; a larger day_s, or a nearer goal, would do"
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -79,6 +119,51 @@ class _Search:
     problem: PlanProblem
     accuracy: Accuracy
     added: tuple[str, ...]
+
+    def rounds(
+        self, choose: Callable[[Prices, Sequence[DraftedDay], Sequence[Choice]], Choice | None], progress: Progress
+    ) -> tuple[list[DraftedDay], Choice, Progress]:
+        """Days drafted by turns, the runs chosen last, and the progress of what is left.
+
+        Args:
+            choose: runs not tried yet by prices, days and choices so far; None for none.
+            progress: of all rounds, and of what is left.
+
+        Raises:
+            NoPlan: no day was found at all.
+        """
+        prices, days, choices = first_prices(self.problem), list[DraftedDay](), list[Choice]()
+        *rounds, last = in_phases(progress, *np.ones(TUNING.rounds + 1))
+        refused = NoPlan("no day was planned")
+        for told in rounds:
+            choice = choose(prices, days, choices)
+            if choice is None:
+                break
+            choices.append(choice)
+            try:
+                days.append(self.drafted(choice, told))
+            except NoPlan as error:  # other runs may find their places
+                refused = error
+                continue
+            prices = self.prices(days)
+        if not days:
+            raise refused
+        return days, choices[-1], last
+
+    def filling(
+        self, day_s: float, prices: Prices, days: Sequence[DraftedDay], tried: Sequence[Choice]
+    ) -> Choice | None:
+        """Runs not tried yet that tell most and should fit into a day; the next best where they do not fit."""
+        offer = self.offer(prices)
+        left_s = day_s - prices.way_s - self.late_s(days, prices)
+        level, spare = fullest_level(self.accuracy, offer, left_s), list[Choice]()
+        for step in range(TUNING.level_steps):
+            choice = cheapest_runs(self.accuracy, offer, level=level - step * TUNING.level_step)
+            if all(choice.repeats != earlier.repeats for earlier in tried):
+                if choice.cost_s <= left_s:
+                    return choice
+                spare.append(choice)
+        return spare[-1] if spare else None
 
     def untried(self, prices: Prices, tried: Sequence[Choice]) -> Choice | None:
         """The cheapest runs not tried yet that should reach the accuracy with their legs, by some margin.
@@ -133,21 +218,36 @@ class _Search:
         except NotInformative:
             return replace(self.problem.design, repeats=tuple(repeats), efficiency_repeats=0.0, note="")
 
-    def best(self, days: Sequence[DraftedDay], last: Choice, most_s: float | None, progress: Progress) -> ShortestDay:
-        """The shortest day that reaches the accuracy, planned with its verification and its risk."""
+    def planned(
+        self,
+        best: Sequence[DraftedDay],
+        days: Sequence[DraftedDay],
+        last: Choice,
+        progress: Progress,
+        *,
+        good: Callable[[Plan, float], bool],
+    ) -> ShortestDay | None:
+        """The first good one of the best days, planned with its verification and its risk; None where none is good.
+
+        Args:
+            best: to be planned, the best first.
+            days: all that were drafted.
+            last: the runs chosen last.
+            progress: of planning.
+            good: whether a plan with this margin is what was asked for.
+
+        Raises:
+            NoPlan: what was planned last was refused.
+        """
         refused: NoPlan | None = None
-        reached = sorted((day for day in days if day.margin >= 0), key=lambda day: day.expected_s)
-        allowed = [day for day in reached if most_s is None or day.day_s <= most_s]
-        if reached and not allowed and most_s is not None:
-            raise NoAnswer(self._too_long(min(reached, key=lambda day: day.day_s), most_s))
-        for day in allowed:
+        for day in best:
             design = self.design(day.repeats)
             try:
                 plan = recalled(plan_trial, replace(self.problem, design=design), progress=progress)
             except NoPlan as error:  # a longer day may be less risky
                 refused = error
                 continue
-            if (margin := self.accuracy.margin(self._information(plan.sailed).sum(axis=0))) >= 0:
+            if good(plan, margin := self.accuracy.margin(self._information(plan.sailed).sum(axis=0))):
                 return ShortestDay(
                     plan=plan,
                     design=design,
@@ -155,16 +255,38 @@ class _Search:
                     cost_s=last.cost_s,
                     cost_bound_s=last.bound_s,
                     information=float(np.exp(margin)),
+                    parts=_parts(day.draft, plan),
+                    curve=self._curve(days),
                 )
         if refused is not None:
             raise refused
+        return None
+
+    def falls_short(self, days: Sequence[DraftedDay]) -> str:
+        """That no day reaches the accuracy, and what is scarcest."""
         short = max(days, key=lambda day: day.margin)
         name = self.accuracy.scarcest(short.information.sum(axis=0))
         about = f", {name} being the furthest from what is asked" if name else ""
-        raise NoPlan(
+        return (
             f"no day found reaches design.accuracy; the best of {len(days)} tells {np.exp(short.margin):.0%} of what "
             f"is needed{about}; less accuracy, or manoeuvres that need less room, would do"
         )
+
+    def _curve(self, days: Sequence[DraftedDay]) -> Array:
+        """(k, 2) day [s] and information of the cheapest choices by the prices learnt; days drafted were so late."""
+        prices = self.prices(days)
+        offer = self.offer(prices)
+        late_s = self.late_s(days, prices)
+        margins = np.log(TUNING.curve_shares)
+        costs_s = [shares_cost_s(self.accuracy, offer, prices.level + margin) for margin in margins]
+        points = np.column_stack([prices.way_s + late_s + np.array(costs_s), TUNING.curve_shares])
+        return np.asarray(points[np.isfinite(points[:, 0])])
+
+    def late_s(self, days: Sequence[DraftedDay], prices: Prices) -> float:
+        """How much longer days are than their prices say, on average [s]."""
+        offer = self.offer(prices)
+        predicted = [prices.way_s + offer.total_s(np.array(day.repeats, dtype=float)) for day in days]
+        return float(np.mean([day.day_s for day in days]) - np.mean(predicted)) if days else 0.0
 
     def _told(self, day: DraftedDay) -> DayTried:
         names = self.problem.design.problem.names
@@ -176,10 +298,16 @@ class _Search:
             information=float(np.exp(day.margin)),
         )
 
-    def _too_long(self, day: DraftedDay, most_s: float) -> str:
+    def too_long(self, day: DraftedDay, most_s: float) -> str:
         name = self.accuracy.scarcest(day.information.sum(axis=0))
         about = f"; {name} needs most of it" if name else ""
         return (
             f"design.accuracy.most_s is {most_s:g}: the shortest day found that reaches the accuracy takes "
             f"{day.day_s:.0f} s{about}; a larger most_s or less accuracy would do"
         )
+
+
+def _parts(draft: Draft, plan: Plan) -> DayParts:
+    """Where the time of a plan goes; runs are those of its draft, and legs may have been planned anew."""
+    runs_s = draft.beyond_s("primitive")
+    return DayParts(way_s=draft.direct_s, runs_s=runs_s, legs_s=plan.commands.duration_s - draft.direct_s - runs_s)

@@ -21,7 +21,8 @@ class AccuracySettings:
         outcomes_95: half-widths of the 95 % intervals of predicted outcomes of standard trials, by `indices.OUTCOMES`.
         outcome_speed_mps: approach speed of these trials, or None for the nominal model's.
         most_s: longest day [s], or None for no limit.
-        grow: whether manoeuvres are added that shorten the day.
+        grow: whether manoeuvres are added that shorten the day, or tell more in it.
+        day_s: length of the day [s] in which as much is to be told as can be, or None where an accuracy is asked for.
     """
 
     as_durations: bool = False
@@ -31,6 +32,7 @@ class AccuracySettings:
     outcome_speed_mps: float | None = None
     most_s: float | None = None
     grow: bool = True
+    day_s: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,6 +51,20 @@ class DayTried:
     informative_s: float
     expected_s: float
     information: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class DayParts:
+    """Where the time of a planned day goes [s].
+
+    Attributes:
+        way_s: the shortest way to the goal at transit speed.
+        runs_s, legs_s: runs, and the legs between them, beyond what the way that they make good takes.
+    """
+
+    way_s: float
+    runs_s: float
+    legs_s: float
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -92,7 +108,11 @@ class ShortestDay:
         cost_s, cost_bound_s: cost of the runs chosen last, at the prices of the day planned before, and what no choice
             of the same dictionary costs less than at these prices and with this information of legs [s].
         information: of the plan's track, as a share of what is needed.
+        parts: where its time goes.
+        curve: (k, 2) day [s] and information, as a share of what is needed, of the cheapest choices of runs, whole or
+            not, by the prices learnt: an estimate of what other accuracies would take.
         bound: on every day of a class that holds this one; None where it was not computed.
+        most_s: length of the day asked for, which tells most in it; None where an accuracy was asked for.
     """
 
     plan: Plan
@@ -101,4 +121,10 @@ class ShortestDay:
     cost_s: float
     cost_bound_s: float
     information: float
+    parts: DayParts
+    curve: Array
     bound: DayBound | None = None
+    most_s: float | None = None
+
+    def __post_init__(self) -> None:
+        seal(self, curve="k 2")

@@ -11,7 +11,7 @@ from expdesign.export.pages.figures import drawn
 from expdesign.export.report import tables
 from expdesign.export.report.content import ReportContent, primitive_runs
 from expdesign.export.report.figures.chart import chart, chart_legend
-from expdesign.export.report.procedure import day_sentence, procedure_sentences
+from expdesign.export.report.procedure import day_sentence, day_words, procedure_sentences
 from expdesign.export.routes import require_verified
 
 
@@ -36,8 +36,8 @@ def cards_html(content: ReportContent) -> str:
         legend=chart_legend(content),
         agenda=tables.agenda(content),
         procedure=procedure_sentences(content.plan),
-        day=day_sentence(content.plan.risk, content.plan.commands.duration_s),
-        total=words.duration(content.plan.commands.duration_s),
+        day=day_sentence(content.plan),
+        total=day_words(content.plan.day),
         current=words.current(content.environment.current_to, content.environment.current_std_mps),
         wind=words.wind(content.environment.wind_to, content.environment.wind_std_mps),
         clearance=words.distance(content.clearance_m),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -15,6 +16,7 @@ from expdesign.export.report.content import ReportContent, primitive_runs
 from expdesign.export.report.figures.chart import chart, chart_legend
 from expdesign.export.report.figures.design import durations_figure, information_figure
 from expdesign.export.report.figures.gallery import primitive_figure
+from expdesign.export.report.figures.pareto import pareto_figure
 from expdesign.export.report.figures.timeline import timeline_figure
 from expdesign.export.report.figures.uncertainty import uncertainty_figure
 from expdesign.export.report.glossary import GLOSSARY
@@ -23,7 +25,7 @@ from expdesign.export.report.parameters import Expected, equation_sentence, expe
 from expdesign.export.report.procedure import day_sentence, procedure_sentences
 from expdesign.export.report.progress import known_rows, known_sentences
 from expdesign.export.report.trust import chain
-from expdesign.plan.values import LatticeProof
+from expdesign.plan.values import DayLength, LatticeProof
 
 SUBTRACTION = {
     "none": "no mean is subtracted from the instruments",
@@ -96,6 +98,8 @@ def _figures(content: ReportContent, after: Expected) -> dict[str, object]:
         "information": partial(information_figure, content),
         "timeline": partial(timeline_figure, content.plan),
     }
+    if content.day is not None:
+        figures["pareto"] = partial(pareto_figure, content.day)
     if measures_velocity(content):
         figures["uncertainty"] = partial(uncertainty_figure, content, after)
     primitives: list[Callable[[], str]] = [
@@ -104,7 +108,7 @@ def _figures(content: ReportContent, after: Expected) -> dict[str, object]:
     ]
     results: list[str] = drawn([*figures.values(), *primitives])
     named = dict(zip(figures, results, strict=False))
-    return {"uncertainty": "", **named, "primitives": results[len(figures) :]}
+    return {"uncertainty": "", "pareto": "", **named, "primitives": results[len(figures) :]}
 
 
 def _origin(content: ReportContent) -> str:
@@ -133,7 +137,7 @@ def summary(content: ReportContent) -> list[str]:
         f"{words.duration(plan.seconds('primitive'))} in {words.counted(runs, 'informative run')}, and "
         f"{words.duration(plan.seconds('reposition'))} of repositioning.{bound if plan.reposition_bound_s > 0 else ''}",
         *lattice_sentences(plan.lattice),
-        *([day] if (day := day_sentence(plan.risk, total)) else []),
+        *([day] if (day := day_sentence(plan)) else []),
         verdict,
         *depths,
         _design_sentence(content),
@@ -160,10 +164,7 @@ def lattice_sentences(proof: LatticeProof | None) -> list[str]:
 def _design_sentence(content: ReportContent) -> str:
     design, realised = content.design, content.plan.design_efficiency_realised
     if content.day is not None:
-        return (
-            f"It is the shortest day found that is as accurate as asked for: its track holds "
-            f"{words.percent(content.day.information)} of the information needed."
-        )
+        return f"{tables.minutes_sentence(content.day)} {tables.found_sentence(content.day)}"
     text = (
         f"The durations are the best for estimating {words.counted(len(content.parameters), 'model parameter')}. "
         f"Rounded to whole runs they reach {words.percent(design.efficiency_repeats)} of the optimum. Equal time for "
@@ -186,9 +187,9 @@ def facts(content: ReportContent) -> list[Fact]:
     realised = plan.design_efficiency_realised
     return [
         Fact(
-            name="Time",
+            name="Day",
             value=words.duration(plan.commands.duration_s),
-            remark=f"{words.duration(plan.seconds('primitive'))} in informative runs",
+            remark=f"{_simulated(plan.day)}{words.duration(plan.seconds('primitive'))} in informative runs",
         ),
         Fact(
             name="Distance",
@@ -212,6 +213,14 @@ def facts(content: ReportContent) -> list[Fact]:
             remark=f"of {words.duration(design.problem.total_s)} of the optimal design, repositioning included",
         ),
     ]
+
+
+def _simulated(day: DayLength) -> str:
+    """The length of the day in simulated trials; "" without any."""
+    if math.isnan(day.median_s):
+        return ""
+    median, most = words.duration(day.median_s), words.duration(max(day.most_s, day.planned_s))
+    return f"median {median}, 95th percentile {most} of simulated trials; "
 
 
 def assumptions(content: ReportContent) -> list[tuple[str, str]]:

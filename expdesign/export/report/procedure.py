@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from expdesign.export import words
-from expdesign.plan.values import Plan, RiskEstimate
+from expdesign.plan.values import DayLength, Plan, RiskEstimate
 
 
 def procedure_sentences(plan: Plan) -> list[str]:
@@ -68,14 +68,24 @@ def _more(seconds: float) -> str:
     return words.duration(max(seconds, 0.0))
 
 
-def day_sentence(risk: RiskEstimate | None, planned_s: float) -> str:
+def day_words(day: DayLength) -> str:
+    """The day as planned, and in simulated trials."""
+    planned = words.duration(day.planned_s)
+    if math.isnan(day.median_s):
+        return planned
+    median, most = words.duration(day.median_s), words.duration(max(day.most_s, day.planned_s))
+    return f"{planned} as planned; median {median}, 95th percentile {most}"
+
+
+def day_sentence(plan: Plan) -> str:
     """The probability of an abort where it is high, and the time to reserve; "" where it is not known."""
+    risk, day = plan.risk, plan.day
     if risk is None or math.isnan(risk.extra_median_s):
         return ""
     warning = f"Warning: {risk.note}. " if risk.note else ""
-    whole = words.duration(planned_s + max(risk.extra_most_s, 0.0))
+    whole = words.duration(max(day.most_s, day.planned_s))
     return (
-        f"{warning}Returning to the start of each run takes time in addition to the plan: {_more(risk.extra_median_s)} "
-        f"in the middle of the simulated trials, and at most {_more(risk.extra_most_s)} in 95{words.NB}% of them. "
-        f"Reserve {whole} from start to goal, without breaks."
+        f"{warning}The day takes {words.duration(day.planned_s)} as planned, {words.duration(day.median_s)} in the "
+        f"middle of the simulated trials, which return to the start of some runs, and at most {whole} in "
+        f"95{words.NB}% of them. Reserve {whole} from start to goal, without breaks."
     )

@@ -207,17 +207,43 @@ def day_rows(content: ReportContent, day: ShortestDay) -> list[tuple[str, ...]]:
     ]
 
 
+def minutes_sentence(day: ShortestDay) -> str:
+    """Where the minutes go."""
+    parts, length = day.parts, day.plan.day
+    extra_s = length.median_s - length.planned_s
+    more = f"; slower ships and go-arounds add {words.duration(extra_s)} in the middle of simulated trials"
+    return (
+        f"Of the {words.duration(length.planned_s)} the way to the goal takes {words.duration(parts.way_s)} at transit "
+        f"speed, runs {words.duration(parts.runs_s)} beyond the way that they make good, and the legs between them "
+        f"{_signed(parts.legs_s)}{more if extra_s > 0 else ''}."
+    )
+
+
+def _signed(seconds: float) -> str:
+    """A time that may be less than nothing."""
+    return words.duration(seconds) if seconds >= 0 else f"{words.MINUS}{words.duration(-seconds)}"
+
+
+def found_sentence(day: ShortestDay) -> str:
+    """What the day is the best of, and how much it tells."""
+    tried = words.counted(len(day.tried), "day")
+    if day.most_s is not None:
+        return (
+            f"It tells most of {tried} planned to take at most {words.duration(day.most_s)}: its track, legs included, "
+            f"holds {words.percent(day.information)} of the information that the optimal durations would in "
+            f"{words.duration(day.design.problem.total_s)}."
+        )
+    return (
+        f"It is the shortest of {tried} planned that is as accurate as asked for: its track, legs included, holds "
+        f"{words.percent(day.information)} of the information needed."
+    )
+
+
 def day_sentences(day: ShortestDay) -> list[str]:
-    """Where the minutes go, and how far the choice of runs is proven."""
-    plan = day.plan
-    runs, legs = (words.duration(plan.seconds(kind)) for kind in ("primitive", "reposition"))
+    """How far the choice of runs is proven, and what no day can fall below."""
     return [
-        f"The day takes {words.duration(plan.commands.duration_s)}: {runs} in runs and {legs} in the "
-        "legs between them. Legs inform, too. The whole track holds "
-        f"{words.percent(day.information)} of the information that the accuracy asked for needs.",
-        f"It is the shortest that is so accurate, of {words.counted(len(day.tried), 'day')} planned. The runs tried "
-        f"last cost {words.duration(day.cost_s)} with their share of the repositioning; at these prices no "
-        f"choice of runs from the dictionary costs less than {words.duration(day.cost_bound_s)}.",
+        f"The runs tried last cost {words.duration(day.cost_s)} with their share of the repositioning. At these prices "
+        f"no choice of runs from the dictionary costs less than {words.duration(day.cost_bound_s)}.",
         *_bound_sentences(day),
     ]
 

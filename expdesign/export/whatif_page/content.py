@@ -167,11 +167,11 @@ def _runs(first: Case, case: Case) -> Iterator[str]:
 
 
 def _plan(first: Case, case: Case) -> Iterator[str]:
-    key = "trial_s"
+    key = "day_s"
     if key in first.plan and key in case.plan:
         difference = float(str(case.plan[key])) - float(str(first.plan[key]))
         yield (
-            f"The whole trial, repositioning included, takes {abs(difference) / 60:.1f} min "
+            f"The whole day, repositioning included, takes {abs(difference) / 60:.1f} min "
             f"{'more' if difference > 0 else 'less'}."
         )
 

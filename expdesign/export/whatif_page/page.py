@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 from expdesign.export.pages import page_templates
 from expdesign.export.pages.figures import report_style
 from expdesign.export.whatif_page.content import Case, WhatIfContent, explanations
 from expdesign.export.whatif_page.figures import ratio_figure, runs_figure, time_figure
+
+DAY = ("day_s", "day_median_s", "day_95_s")
+"""Of a plan: everything between start and goal, as planned and in simulated trials."""
 
 
 def whatif_html(content: WhatIfContent) -> str:
@@ -27,7 +32,9 @@ def whatif_html(content: WhatIfContent) -> str:
 
 def table_header(content: WhatIfContent) -> tuple[str, ...]:
     """Names of the columns of `table_row`."""
-    planned = ("repositioning [min]", "whole trial [min]", "clearance [m]") if content.planned else ()
+    planned = (
+        ("repositioning [min]", "day [min]", "median [min]", "95 % [min]", "clearance [m]") if content.planned else ()
+    )
     return (
         "Case",
         "criterion",
@@ -46,7 +53,7 @@ def table_row(content: WhatIfContent, case: Case) -> tuple[str, ...]:
         return (case.name, *("-",) * (len(table_header(content)) - 1))
     against = content.against(case)
     planned = (
-        (_minutes(case.plan.get("repositioning_s")), _minutes(case.plan.get("trial_s")), _metres(case.plan))
+        (*(_minutes(case.plan.get(key)) for key in ("repositioning_s", *DAY)), _metres(case.plan))
         if content.planned
         else ()
     )
@@ -72,7 +79,7 @@ def _short(gap: float) -> str:
 
 
 def _minutes(value: object) -> str:
-    return f"{value / 60:.1f}" if isinstance(value, float) else "-"
+    return f"{value / 60:.1f}" if isinstance(value, float) and math.isfinite(value) else "-"
 
 
 def _metres(plan: object) -> str:

@@ -1,8 +1,17 @@
 """What no day can fall below: the time of any motion of a class to tell enough, and to get to the goal."""
 
-from expdesign.shortest_day.bounds.day import day_bound
+from expdesign.shortest_day.bounds.day import day_bound, fastest_mps, way_bound_s
 from expdesign.shortest_day.bounds.fewest_samples import SampleBound, fewest_samples
 from expdesign.shortest_day.bounds.motions import Motions
 from expdesign.shortest_day.bounds.richest import Richest, richest_sample
 
-__all__ = ["Motions", "Richest", "SampleBound", "day_bound", "fewest_samples", "richest_sample"]
+__all__ = [
+    "Motions",
+    "Richest",
+    "SampleBound",
+    "day_bound",
+    "fastest_mps",
+    "fewest_samples",
+    "richest_sample",
+    "way_bound_s",
+]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from expdesign.errors import InputError
+from expdesign.plan.assembly import ship_on_legs
 from expdesign.plan.bounds import Headway, time_to_sail_s
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.values import Plan
@@ -42,7 +43,7 @@ def day_bound(problem: PlanProblem, accuracy: Accuracy, plan: Plan) -> DayBound:
     return DayBound(
         information_s=samples.least * second if samples else 0.0,
         searched_s=samples.estimate * second if samples else 0.0,
-        way_s=_way_s(problem, speed_mps),
+        way_s=way_bound_s(problem, speed_mps),
         velocities=velocities,
         speed_mps=speed_mps,
     )
@@ -62,7 +63,13 @@ def velocity_limits(seen: Array) -> Array:
     return np.array([[u.min(), u.max()], [-most[1], most[1]], [-most[2], most[2]]])
 
 
-def _way_s(problem: PlanProblem, speed_mps: float) -> float:
+def fastest_mps(problem: PlanProblem) -> float:
+    """Largest speed through water of legs and of the runs of the dictionary."""
+    runs = np.concatenate([item.trajectory.velocity for item in problem.primitives])
+    return max(ship_on_legs(problem).transit_speed_mps, float(np.hypot(*runs[:, :2].T).max()))
+
+
+def way_bound_s(problem: PlanProblem, speed_mps: float) -> float:
     """Least time of the way to the goal in safe water at a speed through it; 0 where the current is faster."""
     if speed_mps <= problem.current_mps:
         return 0.0

@@ -121,7 +121,8 @@ def _computed(case: Scenario, changes: tuple[str, ...], with_plan: bool, seed: i
         if with_plan:
             day = planned_day(case, information, design, seed=seed, progress=planning)
             information, design, plan = day.information, day.design, dict(plan_summary(day.plan))
-            plan["trial_s"] = float(str(plan["informative_s"])) + float(str(plan["repositioning_s"]))
+            length = day.plan.day
+            plan |= {"day_s": length.planned_s, "day_median_s": length.median_s, "day_95_s": length.most_s}
         comparing("comparing criteria", 0.0)
         return _described(case, changes, information, design, plan)
     except NoAnswer as error:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
 from expdesign.dictionary import PrimitiveSpec
 from expdesign.durations import DurationDesign
 from expdesign.errors import InputError
-from expdesign.export.files import dictionary_files
+from expdesign.export.files import dictionary_files, finite
 from expdesign.growing import GrowSettings
 from expdesign.information import PrimitiveInformation
 from expdesign.memory import recalled
@@ -75,18 +75,25 @@ def planned_day(
     if asked is None:
         plan = planned(case, information, design, seed=seed, progress=progress)
         return Day(information=information, design=design, plan=plan)
-    from expdesign.shortest_day import day_bound, shortest_day, stated_accuracy
+    from expdesign.shortest_day import check_way_fits, day_bound, fullest_day, shortest_day, stated_accuracy
 
     accuracy = stated_accuracy(asked, design, case.vessel)
     searching, planning = in_phases(progress, *WORK)
-    added = _added(case, plan_problem(case, information, design, seed=seed), accuracy, seed, searching)
+    problem = plan_problem(case, information, design, seed=seed)
+    if asked.day_s is not None:
+        check_way_fits(problem, asked.day_s)
+    added = _added(case, problem, accuracy, seed, searching)
     if added:
         case = _with_additions(case, added)
         information = scored(case)
         design = designed(case, information, seed=seed)
     problem = replace(plan_problem(case, information, design, seed=seed), expected=True)
     names = tuple(spec.name for spec in added)
-    found = shortest_day(problem, accuracy, added=names, most_s=asked.most_s, progress=planning)
+    found = (
+        shortest_day(problem, accuracy, added=names, most_s=asked.most_s, progress=planning)
+        if asked.day_s is None
+        else fullest_day(problem, accuracy, asked.day_s, added=names, progress=planning)
+    )
     found = replace(found, bound=recalled(day_bound, problem, accuracy, found.plan))
     return Day(information=information, design=found.design, plan=found.plan, shortest=found, added=added)
 
@@ -103,7 +110,8 @@ def _added(
     if settings.seed is None:
         settings = replace(settings, seed=seed)
     try:
-        return recalled(manoeuvres_worth_adding, problem, accuracy, settings, progress=progress)
+        day_s = case.design.accuracy.day_s
+        return recalled(manoeuvres_worth_adding, problem, accuracy, settings, day_s, progress=progress)
     except InputError:
         if case.design.grow is None:  # not asked for, so no fault of the scenario
             return ()
@@ -123,11 +131,16 @@ def day_files(case: Scenario, day: Day) -> dict[str, str | bytes]:
         return {}
     content = {
         "day_s": found.plan.commands.duration_s,
+        "day_median_s": finite(found.plan.day.median_s),
+        "day_95_s": finite(found.plan.day.most_s),
+        "goes_to": asdict(found.parts),
         "information": found.information,
+        **({} if found.most_s is None else {"most_s": found.most_s, **_most_told(found)}),
         **_bound(found),
         "added": {spec.name: {"family": spec.family, **spec.settings} for spec in day.added},
         "cost_of_runs_s": found.cost_s,
         "cost_of_runs_bound_s": found.cost_bound_s,
+        "curve": [{"day_s": day_s, "information": share} for day_s, share in found.curve.tolist()],
         "tried": [
             {
                 "runs": dict(item.runs),
@@ -173,6 +186,14 @@ def _bound(found: ShortestDay) -> dict[str, object]:
     }
 
 
+def _most_told(found: ShortestDay) -> dict[str, object]:
+    """No day of the class and of this length holds more; nothing where that is not known."""
+    bound = found.bound
+    if bound is None or not bound.information_s > 0 or found.most_s is None or found.design.problem.prior.any():
+        return {}
+    return {"information_bound": found.most_s / bound.information_s}
+
+
 def day_summary(day: Day) -> dict[str, object]:
     """Key numbers of the durations and of the day."""
     found, summary = day.shortest, design_summary(day.design)
@@ -181,8 +202,11 @@ def day_summary(day: Day) -> dict[str, object]:
     return {
         **{key: value for key, value in summary.items() if key != "efficiency_of_whole_runs"},
         "day_s": found.plan.commands.duration_s,
+        "day_median_s": found.plan.day.median_s,
+        "day_95_s": found.plan.day.most_s,
         "information_of_what_was_asked": found.information,
         **{name: value for name, value in _bound(found).items() if name != "bound"},
+        **_most_told(found),
         "manoeuvres_added": len(day.added),
         "days_tried": len(found.tried),
     }
