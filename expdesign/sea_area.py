@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 import pyproj
@@ -29,6 +29,8 @@ REACHES = {"round": 1.1, "mitre": 5.5}
 """Distances moved within which a shore matters: moved shores err by a hundredth, mitres are 5 long at most."""
 MOST_CORNERS, THINNED = 200_000, 0.005
 """Corners of a shore above which plans keep to a coarser one, and its tolerance as a share of the clearance."""
+KEPT = 16
+"""Eroded waters that a process keeps: those of a plan, and of a remedy or two."""
 NARROW = 4.0
 """Reaches in a tile that is not halved again, however many corners it has."""
 
@@ -99,10 +101,16 @@ class SeaArea:
 
         Corners within a tolerance of the shore without them are then left out, and the clearance is greater by as much.
         """
-        if shapely.get_num_coordinates(self.water) <= MOST_CORNERS:
-            return self.safe_water(clearance_m)
-        tolerance_m = THINNED * clearance_m
-        return as_multipolygon(eroded(shapely.simplify(self.water, tolerance_m), clearance_m + tolerance_m))
+        return _water_to_plan_in(self.water, clearance_m)
+
+
+@lru_cache(maxsize=KEPT)
+def _water_to_plan_in(water: shapely.MultiPolygon, clearance_m: float) -> shapely.MultiPolygon:
+    """Kept, as attempts and remedies ask for the same water again; waters with the same corners are the same."""
+    if shapely.get_num_coordinates(water) <= MOST_CORNERS:
+        return as_multipolygon(eroded(water, clearance_m))
+    tolerance_m = THINNED * clearance_m
+    return as_multipolygon(eroded(shapely.simplify(water, tolerance_m), clearance_m + tolerance_m))
 
 
 def eroded(water: shapely.Geometry, distance_m: float, *, join_style: str = "round") -> shapely.Geometry:

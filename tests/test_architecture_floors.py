@@ -62,7 +62,7 @@ FLOORS = {
         ("bounds", "legs_ahead"),
         ("search", "monte_carlo"),
         ("feasibility",),
-        ("assembly",),
+        ("assembly", "checked"),
         ("sailing",),
         ("remedies",),
         ("solve",),

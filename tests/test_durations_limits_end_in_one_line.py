@@ -1,10 +1,15 @@
 """Limits that cannot be satisfied end `expdesign durations` with one line and its status, never with a traceback."""
 
+import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from expdesign.cli import main
+from expdesign.durations import Budget, Constraints
+from expdesign.durations.limits import feasible_set
+from expdesign.errors import NoAnswer
 from scenario_files import spoil, write_scenario
 
 TINY = 'most_s = {acceleration = 1e-9, "zz-speed-0.5" = 600.0, "zz-speed-0.4" = 1e-9}'
@@ -38,3 +43,32 @@ def test_limits_end_in_one_line(
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == (status != 0)
     assert all(words in line for line in lines)
+
+
+@pytest.mark.parametrize(
+    "limits",
+    [
+        Constraints(least_s={"a": 412.3456789, "b": 300.0}),
+        Constraints(least_s={"a": 580.0}, required=("b",)),
+        Constraints(most_s={"a": 123.456789, "b": 34.56, "c": 1.0}),
+        Constraints(most_s={"a": 300.0}, excluded=("b", "c")),
+    ],
+)
+def test_the_total_named_for_limits_that_leave_no_durations_leaves_some(limits: Constraints) -> None:
+    run_s = np.array([60.0, 90.0, 30.0])
+    with pytest.raises(NoAnswer) as caught:
+        feasible_set(limits, "abc", run_s=run_s, total_s=600.0)
+    total_s = float(re.search(r"with design\.total_s = ([\d.]+) they", str(caught.value))[1])
+    assert feasible_set(limits, "abc", run_s=run_s, total_s=total_s).feasible()
+
+
+def test_the_limit_named_for_a_budget_that_leaves_no_durations_leaves_some() -> None:
+    def limits(limit: float) -> Constraints:
+        budget = Budget(name="fuel", cost_per_s={"a": 0.7, "b": 0.31, "c": 1.0}, limit=limit)
+        return Constraints(budgets=(budget,), least_s={"c": 100.0})
+
+    run_s = np.array([60.0, 90.0, 30.0])
+    with pytest.raises(NoAnswer) as caught:
+        feasible_set(limits(17.0), "abc", run_s=run_s, total_s=600.0)
+    limit = float(re.search(r"with the limit ([\d.]+) there", str(caught.value))[1])
+    assert feasible_set(limits(limit), "abc", run_s=run_s, total_s=600.0).feasible()

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,22 +15,28 @@ import pytest
 import shapely
 
 from expdesign.errors import NoPlan
-from expdesign.plan import PlanSettings, solve
+from expdesign.plan import PlanSettings, checked, remedies, solve
 from expdesign.plan.assembly import check_connected, leg_water, plan_room, search_space, ship_on_legs
 from expdesign.plan.feasibility import place_of
-from expdesign.plan.legs import escapes
+from expdesign.plan.legs import LegWater, escapes
 from expdesign.plan.legs.escape_check import check_ends
 from expdesign.plan.local_planner import local_planner
+from expdesign.plan.local_planner.agile import AgilePlanner
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.remedies import advised
 from expdesign.plan.runs import draws_for
 from expdesign.plan.solve import plan_trial
 from expdesign.progress import silent
+from expdesign.scenario import load_scenario
 from expdesign.simulation import CALM, Environment
+from expdesign.workflows.steps.design_problem import designed
+from expdesign.workflows.steps.planned import plan_problem
+from expdesign.workflows.steps.scored import scored
 from helm_case import catamaran
 from plan_case import acceleration, area, ship
 
 WIDE = shapely.box(-400, -400, 400, 400)
+SCENARIOS = Path(__file__).parents[1] / "scenarios"
 
 
 def problem(
@@ -154,6 +161,54 @@ def test_a_run_without_a_place_is_refused_before_anything_is_searched_and_one_wi
         else:
             with pytest.raises(NoPlan, match="fits nowhere"):
                 plan_room(case, water, silent)
+
+
+def test_the_clearance_named_where_no_leg_is_found_is_one_with_which_runs_are_sailed(monkeypatch):
+    leg = AgilePlanner.leg
+    monkeypatch.setattr(AgilePlanner, "leg", lambda self, task, water: leg(self, task, water) if wide(water) else None)
+
+    def wide(water: LegWater) -> bool:
+        return water.clearance_m < 0.8
+
+    case = problem(WIDE, clearance_m=1.0, time_budget_s=5.0)
+    text = refusal(case)
+    assert "places were tried: no leg leads to 'go'" in text
+    assert "every run is sailed" in text
+    assert "not tried: more plan.time_budget_s" in text
+    plan_trial(changed(case, clearance_m=setting(text, "clearance_m")))
+
+
+def test_the_seed_named_where_verification_fails_gives_a_plan_that_passes(monkeypatch):
+    verify, asked = checked.verify_plan, []
+
+    def first_fails(*what, **how):
+        found = verify(*what, **how)
+        asked.append(found)
+        return replace(found, problems=("planted",)) if len(asked) == 1 else found
+
+    monkeypatch.setattr(checked, "verify_plan", first_fails)
+    case = problem(WIDE)
+    text = refusal(case)
+    assert "does not pass its own verification: planted" in text
+    seed = int(re.search(r"with --seed (\d+) the plan passes its verification", text)[1])
+    plan_trial(replace(case, seed=seed))
+
+
+def test_the_run_named_where_trials_are_aborted_is_left_out_of_a_design_that_is_accepted(monkeypatch):
+    case = load_scenario(SCENARIOS / "story.toml")
+    information = scored(case)
+    whole = plan_problem(case, information, designed(case, information))
+    monkeypatch.setattr(remedies, "_sailed", lambda other: ())
+    refused = {"what": "risk", "which": "deceleration"}
+
+    monkeypatch.setattr(remedies, "accepted", lambda other: other.repeats["deceleration"] == 0)
+    text = str(advised(whole, NoPlan("too risky", **refused)))
+    assert text == 'too risky; with design.excluded = ["deceleration"] drawn trials accept the plan'
+    monkeypatch.setattr(remedies, "accepted", lambda other: False)
+    text = str(advised(whole, NoPlan("too risky", **refused)))
+    assert text == 'too risky; no single change of those tried helps (design.excluded = ["deceleration"])'
+    text = str(advised(whole, NoPlan("too risky", what="risk", which="goal")))
+    assert text == "too risky; no remedy could be checked"
 
 
 def test_a_thousand_runs_can_be_planned_for_at_the_usual_confidence():

@@ -10,8 +10,10 @@ import pytest
 
 from expdesign.cli import main
 from expdesign.errors import NoPlan, NotInformative
+from expdesign.progress import silent
 from expdesign.scenario import load_scenario
-from expdesign.workflows.steps.case import DRAFT, drafted
+from expdesign.workflows.outcome import Outcome
+from expdesign.workflows.steps.case import DRAFT, drafted, written
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 RESULTS = {"plan.json", "track.csv", "commands.csv", "report.html", "cards.html", "route.rtz", "durations.json"}
@@ -52,17 +54,41 @@ def test_earlier_results_stay_and_are_named_as_such(tmp_path):
     assert "of an earlier attempt, not of this one: plan.json" in (tmp_path / "refused.html").read_text("utf-8")
 
 
-def test_a_plan_that_is_found_takes_an_earlier_draft_away(tmp_path):
+def finished(folder: Path, name: str) -> Outcome:
+    """A command that writes one file into a folder."""
+    return written(load_scenario(SCENARIOS / "story.toml"), folder, {name: "{}"}, {}, silent)
+
+
+def test_a_plan_that_is_found_takes_an_earlier_draft_away_and_other_results_do_not(tmp_path):
     refused(tmp_path)
-    with drafted(load_scenario(SCENARIOS / "story.toml"), tmp_path, command="expdesign"):
-        pass
-    assert list(tmp_path.iterdir()) == []
+    finished(tmp_path, "durations.json")
+    assert {path.name for path in tmp_path.iterdir()} == {*DRAFT, "durations.json"}
+    assert "note_on_earlier_draft" not in finished(tmp_path, "plan.json").summary
+    assert {path.name for path in tmp_path.iterdir()} == {"plan.json", "durations.json"}
 
 
-def test_other_refusals_leave_nothing(tmp_path):
-    with pytest.raises(NotInformative), drafted(load_scenario(SCENARIOS / "story.toml"), tmp_path / "out", command=""):
-        raise NotInformative("nothing is known")
-    assert not (tmp_path / "out").exists()
+def test_a_draft_that_cannot_be_deleted_is_named_in_one_line(tmp_path, monkeypatch):
+    refused(tmp_path)
+    unlink = Path.unlink
+
+    def locked(path: Path, missing_ok: bool = False) -> None:
+        if path.name == "refused.html":
+            raise PermissionError(13, "Permission denied")
+        unlink(path, missing_ok=missing_ok)
+
+    monkeypatch.setattr(Path, "unlink", locked)
+    note = finished(tmp_path, "plan.json").summary["note_on_earlier_draft"]
+    assert note == f"cannot be deleted, is of no use: {tmp_path / 'refused.html'} (Permission denied)"
+
+
+def test_refusals_of_other_steps_leave_a_draft_with_the_chart(tmp_path):
+    with (
+        pytest.raises(NotInformative) as caught,
+        drafted(load_scenario(SCENARIOS / "story.toml"), tmp_path, command=""),
+    ):
+        raise NotInformative("nothing is known", parameters=("X_u",))
+    assert str(caught.value) == f"nothing is known; the draft is {tmp_path / 'refused.html'}"
+    assert json.loads((tmp_path / "refused.json").read_text("utf-8"))["obstacle"] == "nothing is known"
 
 
 def test_a_refused_command_ends_with_status_3_one_line_and_the_draft(tmp_path, capsys):

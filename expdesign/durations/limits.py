@@ -216,15 +216,30 @@ def _check_box(polytope: Polytope, names: Sequence[str], total_s: float) -> None
             f"primitive {names[index]!r} must get at least {polytope.least[index] * total_s:g} s and may get at most "
             f"{polytope.most[index] * total_s:g} s"
         )
+    needed_s = float(polytope.least.sum()) * total_s
     if polytope.least.sum() > 1 + 1e-12:
         raise NoAnswer(
             f"design.total_s is {total_s:g}, but the least times and required runs take "
-            f"{polytope.least.sum() * total_s:g} s"
+            f"{needed_s:g} s; with design.total_s = {_up(needed_s):g} they fit"
         )
     if polytope.most.sum() < 1 - 1e-12:
         raise NoAnswer(
             f"design.total_s is {total_s:g}, but most times and budgets allow only {polytope.most.sum() * total_s:g} s"
+            + _fitting(polytope.most * total_s)
         )
+
+
+def _fitting(most_s: Array) -> str:
+    """The total that most times (q,) [s] allow, if any."""
+    total_s = float(f"{most_s.sum():.4g}")
+    total_s = total_s if total_s <= most_s.sum() else np.floor(most_s.sum() * 1e3) / 1e3
+    return f"; with design.total_s = {total_s:g} they are enough" if total_s > 0 else ""
+
+
+def _up(value: float) -> float:
+    """A value rounded up to six digits."""
+    unit = 10.0 ** (np.floor(np.log10(value)) - 5)
+    return float(np.ceil(value / unit) * unit)
 
 
 def _check_budgets(polytope: Polytope, budgets: Sequence[Budget]) -> None:
@@ -238,7 +253,7 @@ def _check_budgets(polytope: Polytope, budgets: Sequence[Budget]) -> None:
             scale = budget.limit / limit if limit else 1.0
             raise NoAnswer(
                 f"budget {budget.name!r} has the limit {budget.limit:g}, but any feasible durations use at least "
-                f"{needed * scale:g}"
+                f"{needed * scale:g}; with the limit {_up(needed * scale):g} there are some, as far as this budget goes"
             )
     if len(budgets) and not polytope.loosened().feasible():
         raise NoAnswer(

@@ -1,12 +1,14 @@
 """Remedies of a refusal: changes of one key for which the test that failed passes, each checked by that test.
 
-What takes a whole plan to check is not tried, and the refusal says so.
+Few changes are tried, the most promising first, so that looking for a remedy takes no longer than planning. The refusal
+says what was not tried, and where no remedy could be checked.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -14,18 +16,39 @@ import shapely
 
 from expdesign.durations import DurationDesign, solve_durations
 from expdesign.errors import InputError, NoAnswer, NoPlan
-from expdesign.plan.assembly import confidence_of_run, dispersions, leg_water, open_space, ship_on_legs
+from expdesign.plan.assembly import (
+    confidence_of_run,
+    dispersions,
+    footprints,
+    leg_water,
+    open_space,
+    roomy_water,
+    ship_on_legs,
+)
+from expdesign.plan.checked import accepted, verified
 from expdesign.plan.feasibility import place_of
 from expdesign.plan.legs import LegWater, escapes
 from expdesign.plan.local_planner import SearchSpace, local_planner
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.runs import draws_for
+from expdesign.plan.sailing import sail_all
 from expdesign.plan.search import place_runs
 from expdesign.plan.tuning import PLAN
+from expdesign.plan.values import SailedTrial
+from expdesign.plan.work_budget import WorkBudget
+from expdesign.progress import silent
 from expdesign.values import Array
 
 NONE = "no single change of those tried helps ({})"
 REST = "the rest of the plan was not tried with it"
+UNCHECKED = "no remedy could be checked"
+UNTRIED = "not tried: less design.total_s, wider [bounds] of the area"
+PLACES = "the search finds a place for every run"
+SAILED = "every run is sailed"
+VERIFIED = "the plan passes its verification"
+ACCEPTED = "drawn trials accept the plan"
+REST_OPEN = {PLACES: True, SAILED: True, VERIFIED: True, ACCEPTED: False}
+"""What a remedy was checked to do, and whether more of a plan was left unchecked."""
 
 
 def advised(problem: PlanProblem, refused: NoPlan) -> NoPlan:
@@ -36,13 +59,14 @@ def advised(problem: PlanProblem, refused: NoPlan) -> NoPlan:
         refused: by the planner.
     """
     check = CHECKS.get(refused.what)
-    if check is None or refused.remedies:
+    if check is None:
+        refused.remedies = refused.remedies or (UNCHECKED,)
         return refused
     try:
         found = tuple(check(problem, refused))
     except NoPlan as error:  # another obstacle behind this one
         found = (f"a remedy cannot be checked: {error.obstacle}",)
-    refused.remedies = found
+    refused.remedies = (*found, *refused.remedies)
     return refused
 
 
@@ -82,72 +106,169 @@ def _for_passage(problem: PlanProblem, refused: NoPlan) -> Iterator[str]:
 def _for_room(problem: PlanProblem, refused: NoPlan) -> Iterator[str]:
     """A clearance or a confidence with which the runs find places, or the runs to leave out."""
     water = leg_water(problem, ship_on_legs(problem))
-    planner, off_m = local_planner(water, problem.used), dispersions(problem)
-    lacking = _without_place(open_space(problem, water, planner, off_m))
-    asked = problem.settings.clearance_m
+    space = open_space(problem, water, local_planner(water, problem.used))
+    lacking = _without_place(space)
+    changes = chain(_clearances(problem, water, space, lacking), _confidences(problem, space, lacking))
+    yield from _first(chain(changes, _exclusions(problem, lacking or {refused.which})), _found, PLACES, UNTRIED)
 
-    def changed(**settings: float) -> PlanProblem:
-        return _with(problem, **settings)
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Change:
+    """A change of one key.
+
+    Attributes:
+        words: the key and its value.
+        problem: with the change; None where runs then still have no place by themselves.
+    """
+
+    words: str
+    problem: PlanProblem | None
+
+
+def _first(
+    changes: Iterable[Change], passes: Callable[[PlanProblem], bool], says: str, untried: str = "", *, most: int = 0
+) -> Iterator[str]:
+    """The first change with which a test passes; what was tried, where none of them does.
+
+    Changes come with the most promising first. Only so many are tried that this takes no longer than planning: a narrow
+    search for places keeps a quarter of the partial plans.
+    """
+    tried, left = [], most or PLAN.most_searches
+    for change in changes:
+        if change.problem is not None and passes(change.problem):
+            yield f"with {change.words} {says}; {REST}" if REST_OPEN[says] else f"with {change.words} {says}"
+            return
+        tried.append(change.words)
+        left -= change.problem is not None
+        if not left:
+            break
+    yield "; ".join(filter(None, (NONE.format(", ".join(tried)) if tried else UNCHECKED, untried)))
+
+
+def _clearances(problem: PlanProblem, water: LegWater, space: SearchSpace, lacking: set[str]) -> Iterator[Change]:
+    """Shares of the largest clearance with which every run has a place by itself.
+
+    The grid tells distances to the shore, whatever the clearance, and room for runs only grows as that falls.
+    """
+    asked = problem.settings.clearance_m
+    off_m = dispersions(problem)
 
     def fits(clearance_m: float) -> bool:
-        other = replace(water, clearance_m=clearance_m)
-        return not _without_place(open_space(changed(clearance_m=clearance_m), other, planner, off_m))
+        other = _with(problem, clearance_m=clearance_m)
+        margin_m = replace(water, clearance_m=clearance_m).leg_margin_m + water.field.cell_m / 2
+        return not _without_place(_only(space, other, off_m, lacking, margin_m))
 
     most = _largest(fits, asked) if lacking else asked
-    for share in PLAN.clearance_shares if most is not None else ():
-        clearance_m = float(f"{share * (most or 0.0):.2g}")
-        if clearance_m < asked and _found(changed(clearance_m=clearance_m), off_m):
-            yield f"with plan.clearance_m = {clearance_m:g} the search finds a place for every run; {REST}"
-            return
-    tried = ["plan.clearance_m down to 0"]
+    if most is None:
+        yield Change(words="plan.clearance_m down to 0", problem=None)
+        return
+    for share in PLAN.clearance_shares:
+        clearance_m = float(f"{share * most:.2g}")
+        if clearance_m < asked:
+            yield Change(words=f"plan.clearance_m = {clearance_m:g}", problem=_with(problem, clearance_m=clearance_m))
+
+
+def _confidences(problem: PlanProblem, space: SearchSpace, lacking: set[str]) -> Iterator[Change]:
+    """Lower confidences with which every run has a place by itself, where they leave runs more room."""
+    if not any((off > problem.settings.clearance_m).any() for off in dispersions(problem)):
+        return
     for confidence in PLAN.lower_confidences:
-        if confidence < problem.settings.confidence and any((off > asked).any() for off in off_m):
-            tried.append(f"plan.confidence = {confidence:g}")
-            if _found(changed(confidence=confidence)):
-                yield f"with {tried[-1]} the search finds a place for every run; {REST}"
-                return
-    yield from _leaving_out(problem, lacking or {refused.which}, tried)
+        if confidence < problem.settings.confidence:
+            other = _with(problem, confidence=confidence)
+            none = _without_place(_only(space, other, dispersions(other), lacking, space.leg_margin_m))
+            yield Change(words=f"plan.confidence = {confidence:g}", problem=None if none else other)
+
+
+def _only(
+    space: SearchSpace, problem: PlanProblem, off_m: Sequence[Array], names: set[str], margin_m: float
+) -> SearchSpace:
+    """The space with some of the runs, and the room that another problem leaves them."""
+    runs = tuple(run for run in footprints(problem, space.field, off_m) if run.name in names)
+    return replace(space, footprints=runs, leg_margin_m=margin_m)
+
+
+def _exclusions(problem: PlanProblem, lacking: set[str]) -> Iterator[Change]:
+    """Designs without the runs that have no place, and without those that then come in and have none."""
+    if not isinstance(problem.design, DurationDesign):
+        return
+    limits = problem.design.problem.constraints
+    water = leg_water(problem, ship_on_legs(problem))
+    for _ in range(PLAN.most_left_out):
+        excluded = (*limits.excluded, *sorted(lacking - set(limits.excluded)))
+        try:
+            task = replace(problem.design.problem, constraints=replace(limits, excluded=excluded))
+            other = replace(problem, design=solve_durations(task))
+            more = _without_place(open_space(other, water, local_planner(water, other.used)))
+        except (InputError, NoAnswer):  # no design without them
+            break
+        if not more:
+            names = ", ".join(f'"{name}"' for name in excluded)
+            yield Change(words=f"design.excluded = [{names}]", problem=other)
+            return
+        lacking = lacking | more
+    yield Change(words=f"design.excluded with {', '.join(sorted(lacking))}", problem=None)
 
 
 def _for_lattice(problem: PlanProblem, refused: NoPlan) -> Iterator[str]:
     """The other planner, if it finds places for the runs."""
-    if _found(problem):
-        yield f"with plan.planner = 'beam' the search finds a place for every run; {REST}"
-    else:
-        yield NONE.format("plan.planner = 'beam'")
+    yield from _first([Change(words="plan.planner = 'beam'", problem=problem)], _found, PLACES)
 
 
-def _leaving_out(problem: PlanProblem, lacking: set[str], tried: list[str]) -> Iterator[str]:
-    """Runs without which the design exists, and the search finds a place for each of its runs."""
-    if isinstance(problem.design, DurationDesign):
-        limits = problem.design.problem.constraints
-        water = leg_water(problem, ship_on_legs(problem))
-        for _ in range(PLAN.most_left_out):
-            excluded = (*limits.excluded, *sorted(lacking - set(limits.excluded)))
-            try:
-                task = replace(problem.design.problem, constraints=replace(limits, excluded=excluded))
-                other = replace(problem, design=solve_durations(task))
-                more = _without_place(open_space(other, water, local_planner(water, other.used)))
-            except (InputError, NoAnswer):
-                break
-            if more:
-                lacking = lacking | more
-            elif _found(other):
-                names = ", ".join(f'"{name}"' for name in excluded)
-                yield f"with design.excluded = [{names}] the search finds a place for every run; {REST}"
-                return
-            else:
-                break
-        tried = [*tried, "design.excluded with " + ", ".join(sorted(lacking))]
-    yield NONE.format(", ".join(tried)) + "; not tried: less design.total_s, wider [bounds] of the area"
+def _for_sailing(problem: PlanProblem, refused: NoPlan) -> Iterator[str]:
+    """Less clearance, or a design without the run that no leg led to, with which every run is sailed."""
+    asked = problem.settings.clearance_m
+    halves = [float(f"{share * asked:.2g}") for share in PLAN.sailed_shares] if asked > 0 else []
+    changes = [
+        Change(words=f"plan.clearance_m = {value:g}", problem=_with(problem, clearance_m=value)) for value in halves
+    ]
+    names = {refused.which} - {"", "goal"}
+    tries = chain(changes[:1], _exclusions(problem, names) if names else (), changes[1:])
+    yield from _first(tries, lambda other: _sailed(other) is not None, SAILED, most=PLAN.most_plans)
 
 
-def _found(problem: PlanProblem, off_m: Sequence[Array] | None = None) -> bool:
+def _for_risk(problem: PlanProblem, refused: NoPlan) -> Iterator[str]:
+    """A design without the run that most trials fail at, of which drawn trials accept the plan."""
+
+    def passes(other: PlanProblem) -> bool:
+        made = _sailed(other)
+        return made is not None and accepted(other, *made)
+
+    names = {refused.which} - {"", "goal"}
+    more = "the planner has tried more room" if len(refused.tried) > 1 else ""
+    yield from _first(_exclusions(problem, names) if names else (), passes, ACCEPTED, more, most=PLAN.most_plans)
+
+
+def _for_verification(problem: PlanProblem, refused: NoPlan) -> Iterator[str]:
+    """Another seed, whose plan passes."""
+
+    def passes(other: PlanProblem) -> bool:
+        made = _sailed(other)
+        try:
+            return made is not None and verified(other, *made).verified
+        except NoPlan:
+            return False
+
+    seeds = range(problem.seed + 1, problem.seed + 1 + PLAN.most_plans)
+    changes = (Change(words=f"--seed {seed}", problem=replace(problem, seed=seed)) for seed in seeds)
+    yield from _first(changes, passes, VERIFIED, most=PLAN.most_plans)
+
+
+def _sailed(problem: PlanProblem) -> tuple[LegWater, SailedTrial] | None:
+    """The first plan, as far as sailing it, with a part of the time budget; None where there is none."""
+    part = _with(problem, time_budget_s=PLAN.remedy_budget * problem.settings.time_budget_s)
+    try:
+        water, room = roomy_water(part, ship_on_legs(part), silent)
+        return water, sail_all(part, room, silent, stated=water, budget=WorkBudget())
+    except NoPlan:
+        return None
+
+
+def _found(problem: PlanProblem) -> bool:
     """Whether a narrow search finds places for all runs."""
     try:
         draws_for(confidence_of_run(problem))
         water = leg_water(problem, ship_on_legs(problem))
-        space = open_space(problem, water, local_planner(water, problem.used), off_m)
+        space = open_space(problem, water, local_planner(water, problem.used))
         if _without_place(space):
             return False
         repeats = [problem.repeats[run.name] for run in space.footprints]
@@ -199,17 +320,12 @@ def _for_berth(problem: PlanProblem, refused: NoPlan) -> Iterator[str]:
 
 def _for_confidence(problem: PlanProblem, refused: NoPlan) -> Iterator[str]:
     """The largest confidence of those tried at which the room of runs can be estimated, and every run has a place."""
-    tried = []
-    for confidence in PLAN.lower_confidences:
-        if confidence < problem.settings.confidence:
-            tried.append(f"plan.confidence = {confidence:g}")
-            if _found(_with(problem, confidence=confidence)):
-                yield f"with {tried[-1]} the search finds a place for every run; {REST}"
-                return
-    if refused.what == "unstable":
-        yield from _leaving_out(problem, {refused.which}, tried)
-    else:
-        yield NONE.format(", ".join(tried))
+    lower = [value for value in PLAN.lower_confidences if value < problem.settings.confidence]
+    changes = (
+        Change(words=f"plan.confidence = {value:g}", problem=_with(problem, confidence=value)) for value in lower
+    )
+    without = _exclusions(problem, {refused.which}) if refused.what == "unstable" else ()
+    yield from _first(chain(changes, without), _found, PLACES, most=len(lower) + 1)
 
 
 def _for_settings(problem: PlanProblem, refused: NoPlan) -> Iterator[str]:
@@ -262,8 +378,11 @@ CHECKS: Mapping[str, Callable[[PlanProblem, NoPlan], Iterator[str]]] = {
     "parted": _for_parted,
     "passage": _for_passage,
     "radius": _for_settings,
+    "risk": _for_risk,
     "room": _for_room,
+    "sailing": _for_sailing,
     "speed": _for_settings,
     "unstable": _for_confidence,
+    "verification": _for_verification,
 }
 """Remedies by the kind of obstacle, as `NoPlan.what` names it."""

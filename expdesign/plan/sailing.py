@@ -64,17 +64,17 @@ def _sailed(voyage: _Voyage, space: SearchSpace, progress: Progress) -> SailedTr
             phases.sailing(f"sailing {placement.primitive}", 1.0 - (sum(left.values()) + 1) / stretches)
             spent_s = budget.spent_s
             if stuck := voyage.sail_run(placement, next(legs)):
-                space = space.refusing(voyage.line.last, placement)
+                space, failed = space.refusing(voyage.line.last, placement), placement
                 break
             left[placement.primitive] -= 1
         else:
             phases.sailing("sailing to the goal", 1.0 - 1 / stretches)
             if voyage.sail_home(next(legs)):
                 return replace(voyage.sailed, lattice=proof and replace(proof, refused=failures.tries))
-            undone = voyage.undo_run()
-            space, stuck = space.refusing(voyage.line.last, undone), "no leg leads from the last run to the goal"
-            left[undone.primitive] += 1
-        failures.count(placed.work_s + budget.spent_s - spent_s, stuck, space.refused[-1, :2])
+            failed, stuck = voyage.undo_run(), "no leg leads from the last run to the goal"
+            space = space.refusing(voyage.line.last, failed)
+            left[failed.primitive] += 1
+        failures.count(placed.work_s + budget.spent_s - spent_s, stuck, failed)
 
 
 def _placed(
@@ -86,7 +86,7 @@ def _placed(
     except NoPlan as error:
         if not stuck:
             raise
-        error.obstacle = f"{error.obstacle}; before that, {stuck}"
+        error.obstacle, error.what = f"{error.obstacle}; before that, {stuck}", "sailing"
         raise
 
 
@@ -97,14 +97,16 @@ class _Failures:
         self._budget_s, self._deadline = budget_s, time.monotonic() + PLAN.clock_budgets * budget_s
         self.tries, self._lost_s = 0, 0.0
 
-    def count(self, cost_s: float, stuck: str, place: Array) -> None:
-        """Count one failure at a place (2,), and raise NoPlan where it was one too many."""
+    def count(self, cost_s: float, stuck: str, failed: Placement) -> None:
+        """Count one failure, and raise NoPlan where it was one too many."""
         self.tries += 1
         self._lost_s += max(PLAN.failure_s, cost_s)
         if self._lost_s > self._budget_s or time.monotonic() > self._deadline:
             raise NoPlan(
                 f"no plan within plan.time_budget_s = {self._budget_s:g}, {self.tries} places were tried: {stuck}",
-                place=place,
+                what="sailing",
+                which=failed.primitive,
+                place=failed.pose[:2],
                 remedy="not tried: more plan.time_budget_s, less design.total_s",
             )
 

@@ -25,11 +25,11 @@ from expdesign.plan.assembly import (
 )
 from expdesign.plan.bounds import reposition_bound_s
 from expdesign.plan.chart import reachable
+from expdesign.plan.checked import drawn_risk, verified
 from expdesign.plan.control import Capability
 from expdesign.plan.legs import LegWater
 from expdesign.plan.monte_carlo import (
     Trials,
-    estimate_risk,
     failed_chance_constraint,
     trials_needed,
     violates_chance_constraint,
@@ -41,7 +41,7 @@ from expdesign.plan.runs import draws_for
 from expdesign.plan.sailing import sail_all
 from expdesign.plan.tuning import PLAN
 from expdesign.plan.values import Leg, Plan, RiskEstimate, SailedTrial, Verification
-from expdesign.plan.verify import realised_efficiencies, verify_plan
+from expdesign.plan.verify import realised_efficiencies
 from expdesign.plan.work_budget import WorkBudget
 from expdesign.progress import Progress, never_falling, silent
 from expdesign.sea_area import SeaArea
@@ -100,11 +100,9 @@ def _planned(whole: PlanProblem, area: SeaArea, ship: Capability, progress: Prog
             raise _not_again(error, made) from None
         checking = phases_of(problem, room.space.planner, progress).trials
         checking("verifying", 0.0)
-        checks = in_order(_check, (whole, water, sailed), ((_verified,), (_bound_s,)))
-        # random streams independent of planning and of earlier attempts
-        rng = np.random.default_rng((problem.seed, PLAN.trials_stream, attempt))
+        checks = in_order(_check, (whole, water, sailed), ((verified,), (_bound_s,)))
         verification = next(checks)
-        risk, trials = estimate_risk(water, sailed, rng=rng, draws=trials_needed(confidence), progress=checking)
+        risk, trials = drawn_risk(problem, water, sailed, attempt=attempt, progress=checking)
         failed = failed_chance_constraint(risk, trials, sailed.legs, problem.area, confidence=confidence)
         if not failed:
             return _plan(whole, sailed, verification=verification, risk=risk, bound_s=next(checks))
@@ -182,25 +180,6 @@ def _check(problem: PlanProblem, water: LegWater, sailed: SailedTrial, check: Ca
     return check(problem, water, sailed)
 
 
-def _verified(problem: PlanProblem, water: LegWater, sailed: SailedTrial) -> Verification:
-    """The independent check of a plan; NoPlan where it fails."""
-    verification = verify_plan(
-        problem.vessel,
-        problem.area,
-        problem.environment,
-        sailed,
-        clearance_m=problem.settings.clearance_m,
-        transit_mps=water.ship.transit_speed_mps,
-        primitives={item.name: item for item in problem.primitives},
-        repeats=problem.repeats,
-        start=problem.start,
-        goal=problem.goal,
-    )
-    if not verification.verified:
-        raise NoPlan("the plan found does not pass its own verification: " + "; ".join(verification.problems))
-    return verification
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Refused:
     """A plan that is too risky.
@@ -223,6 +202,12 @@ class Refused:
         left = ~np.isnan(places[:, 0])
         return np.median(places[left], axis=0) if left.any() else None
 
+    @property
+    def worst(self) -> str:
+        """The run that, with the leg to it, leaves the water or is aborted in most trials."""
+        failing = (self.trials.left | self.trials.aborted).mean(axis=1)
+        return self.sailed.legs[int(failing.argmax())].name
+
 
 def _worth_replanning(
     problem: PlanProblem, risk: RiskEstimate, budget: WorkBudget, *, attempt: int, before_s: float
@@ -237,19 +222,23 @@ def _too_risky(problem: PlanProblem, first: PlanRoom, made: list[Refused], more:
     """The refusal of plans of which too many drawn trials fail, with the confidence that accepts the first of them."""
     last, best = made[-1], min(made, key=lambda plan: plan.risk.left)
     again = f"; planned {len(made)} times, each with more room than before" if len(made) > 1 else ""
-    error = NoPlan(f"the plan found is too risky: {best.failed}{again}{more}", what="risk", place=best.place)
+    error = NoPlan(f"the plan found is too risky: {best.failed}{again}{more}", place=best.place)
     error.tried = tuple(f"plan {number}: {plan.failed}" for number, plan in enumerate(made, start=1))
     error.poses = last.sailed.trajectory.pose
-    error.remedies = (_accepting(problem, first, made[0]),)
+    accepting = _accepting(problem, first, made[0])
+    if accepting:
+        error.remedies = (accepting,)
+    else:  # no share of trials that leave the water is the reason, or it is far too large
+        error.what, error.which = "risk", last.worst
     return error
 
 
 def _accepting(problem: PlanProblem, first: PlanRoom, plan: Refused) -> str:
-    """The confidence with which the planner makes the first plan once more, and accepts it."""
+    """The confidence with which the planner makes the first plan once more, and accepts it; "" for none."""
     risk, confidence = plan.risk, problem.settings.confidence
     lower = np.floor(1000.0 * (1.0 - risk.left - risk.error)) / 1000.0
     if not PLAN.least_confidence <= lower < confidence:
-        return "the planner has tried more room, no other change was tried"
+        return ""
     changed = replace(problem, settings=replace(problem.settings, confidence=lower))
     same = trials_needed(lower) == trials_needed(confidence)
     if same and not failed_chance_constraint(risk, plan.trials, plan.sailed.legs, problem.area, confidence=lower):

@@ -21,6 +21,10 @@ class Tuning:
         lookups: clearances looked up at a time.
         least_confidence: below which none is named as a remedy.
         clearance_shares: of the largest clearance with which every run has a place, tried as remedies.
+        sailed_shares: of the clearance asked for, tried as remedies where legs fail.
+        most_searches: narrow searches for places, each with a quarter of the partial plans, to check remedies.
+        most_plans: plans made to check remedies.
+        remedy_budget: share of the time budget that such a plan may spend on failures.
         lower_confidences: tried as remedies of a refusal, the highest first.
         most_left_out: designs tried as remedies, each without the runs that had no place in the one before.
         turns_deg: from the heading asked for at start and goal, tried as remedies to both sides [deg].
@@ -56,7 +60,11 @@ class Tuning:
     least_slack_cells: float = 3.0
     lookups: int = 200_000
     least_confidence: float = 0.5
-    clearance_shares: tuple[float, ...] = (1.0, 0.9, 0.75, 0.5, 0.25, 0.0)
+    clearance_shares: tuple[float, ...] = (1.0, 0.75, 0.5, 0.0)
+    sailed_shares: tuple[float, ...] = (0.5, 0.0)
+    most_searches: int = 8
+    most_plans: int = 2
+    remedy_budget: float = 0.2
     lower_confidences: tuple[float, ...] = (0.9999, 0.9995, 0.999, 0.995, 0.99, 0.98, 0.95, 0.9, 0.8)
     most_left_out: int = 8
     turns_deg: tuple[float, ...] = tuple(15.0 * count for count in range(1, 13))

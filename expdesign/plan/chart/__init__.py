@@ -16,6 +16,7 @@ from expdesign.plan.chart.visibility_graph import (
     polyline_length,
     sight_lines,
     simplified,
+    visibility_graph_of,
 )
 
 __all__ = [
@@ -36,4 +37,5 @@ __all__ = [
     "sight_lines",
     "simplified",
     "taut_bends",
+    "visibility_graph_of",
 ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import scipy
@@ -72,14 +73,19 @@ def clearance_field(area: SeaArea, *, resolution_m: float) -> ClearanceField:
         area: allowed water.
         resolution_m: desired spacing; coarser where the area would need more than `Tuning.grid_cells`.
     """
-    west, south, east, north = area.water.bounds
-    cell = grid_cell_m(area, resolution_m)
+    return _clearance_field(area.water, grid_cell_m(area, resolution_m))
+
+
+@lru_cache(maxsize=CHART.kept_grids)
+def _clearance_field(water: shapely.MultiPolygon, cell: float) -> ClearanceField:
+    """The field of a water on cells of a size [m]; kept, as remedies ask for it again."""
+    west, south, east, north = water.bounds
     norths = np.arange(south - cell, north + 2 * cell, cell)
     easts = np.arange(west - cell, east + 2 * cell, cell)
-    shapely.prepare(area.water)
-    free = shapely.contains_xy(area.water, *np.meshgrid(easts, norths))
+    shapely.prepare(water)
+    free = shapely.contains_xy(water, *np.meshgrid(easts, norths))
     # a pier thinner than a cell hides between the centres: every cell that a shore passes through is forbidden
-    shore = shapely.get_coordinates(shapely.segmentize(shapely.boundary(area.water), cell / 2))
+    shore = shapely.get_coordinates(shapely.segmentize(shapely.boundary(water), cell / 2))
     free[
         np.rint((shore[:, 1] - norths[0]) / cell).astype(int), np.rint((shore[:, 0] - easts[0]) / cell).astype(int)
     ] = False

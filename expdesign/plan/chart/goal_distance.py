@@ -6,7 +6,7 @@ Paths are those of the visibility graph, so the distance prefers no direction; t
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 import scipy
@@ -71,7 +71,13 @@ def build_goal_distance(graph: VisibilityGraph, field: ClearanceField, goal: Arr
         field: its grid; thinned to `Tuning.table_cells`.
         goal: position.
     """
-    nodes, distance, next_node = shortest_path_tree(graph, goal)
+    return _goal_distance(graph, field, (float(goal[0]), float(goal[1])))
+
+
+@lru_cache(maxsize=CHART.kept_tables)
+def _goal_distance(graph: VisibilityGraph, field: ClearanceField, goal: tuple[float, float]) -> GoalDistance | None:
+    """The table; kept, as remedies ask for it again."""
+    nodes, distance, next_node = shortest_path_tree(graph, np.array(goal))
     grid = field.thinned(CHART.table_cells)
     cells = grid.centre(np.arange(grid.clearance_m.size))
     wet = np.flatnonzero(shapely.contains_xy(graph.water, cells[:, 1], cells[:, 0]))

@@ -21,6 +21,8 @@ class Tuning:
         straight: share of the tolerance by which moved shores are straightened; the rest is for moving them.
         dense: corners of a water above which a coarser one is made of a finer one that was tried, not of the water.
         pairs: of corners that are tested for sight at a time.
+        kept_graphs, kept_grids, kept_tables: visibility graphs, clearance grids and tables of distances that a process
+            keeps.
         slit_m: growth of the water before lines of sight are tested, as a path may touch the shore.
         glances: shares of a line of sight at which it is tested first.
         taut: share of the water's size by which a path may miss a corner that it bends at.
@@ -37,6 +39,9 @@ class Tuning:
     straight: float = 0.98
     dense: int = 16_000
     pairs: int = 1_000_000
+    kept_graphs: int = 12
+    kept_grids: int = 3
+    kept_tables: int = 6
     slit_m: float = 1e-3
     glances: tuple[float, ...] = (0.5, 0.75, 0.25, 0.9, 0.1, 0.625, 0.375)
     taut: float = 1e-3

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import scipy
@@ -121,6 +122,12 @@ class VisibilityGraph:
             normal = side[:, None] * np.stack([-directions[:, k, 1], directions[:, k, 0]], axis=1)
             found &= points @ normal.T >= (place * normal).sum(axis=1) - spare_m
         return found
+
+
+@lru_cache(maxsize=CHART.kept_graphs)
+def visibility_graph_of(water: shapely.MultiPolygon, tolerance_m: float) -> VisibilityGraph:
+    """The visibility graph of a water, shrunk until its shore is simple; kept, as remedies ask for it again."""
+    return build_visibility_graph(simplified(water, grow=False, tolerance_m=tolerance_m))
 
 
 def build_visibility_graph(water: shapely.Geometry) -> VisibilityGraph:

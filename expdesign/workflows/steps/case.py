@@ -7,7 +7,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from expdesign import __version__
-from expdesign.errors import FileError, NoPlan
+from expdesign.errors import FileError, NoAnswer, NoPlan
 from expdesign.export import write_files
 from expdesign.progress import Progress
 from expdesign.scenario import Scenario, load_scenario
@@ -15,6 +15,8 @@ from expdesign.workflows.outcome import Outcome, TextTable
 
 DRAFT = ("refused.json", "refused.html")
 """Names of the files of a draft; no results have them."""
+PLAN = "plan.json"
+"""Name of a file that every plan has."""
 
 
 def loaded(scenario: Path, progress: Progress) -> Scenario:
@@ -31,30 +33,49 @@ def written(
     progress: Progress,
     tables: tuple[TextTable, ...] = (),
 ) -> Outcome:
-    """Write files into `out` or runs/<scenario>, and report them."""
-    paths = write_files(out or Path("runs") / case.name, files)
+    """Write files into `out` or runs/<scenario>, and report them. A plan takes an earlier draft away."""
+    folder = out or Path("runs") / case.name
+    paths = write_files(folder, files)
+    left = _undeleted(folder) if PLAN in files else ()
+    note = {"note_on_earlier_draft": f"cannot be deleted, is of no use: {', '.join(left)}"} if left else {}
     progress("done", 1.0)
-    return Outcome(files=paths, summary={"scenario": case.name, **summary}, tables=tables)
+    return Outcome(files=paths, summary={"scenario": case.name, **summary, **note}, tables=tables)
+
+
+def _undeleted(folder: Path) -> tuple[str, ...]:
+    """The files of an earlier draft in a folder that cannot be deleted; the others are."""
+    left = []
+    for name in DRAFT:
+        try:
+            (folder / name).unlink(missing_ok=True)
+        except OSError as error:
+            left.append(f"{folder / name} ({error.strerror})")
+    return tuple(left)
 
 
 @contextmanager
 def drafted(case: Scenario, out: Path | None, *, command: str) -> Iterator[None]:
     """Leave a draft in `out`, or in runs/<scenario>, where the block refuses a plan; the refusal names it.
 
-    Results of an earlier attempt stay there, and the draft says that they are none of this one. A plan that is found
-    takes an earlier draft away.
+    So do other refusals, such as of limits of the design. Results of an earlier attempt stay there, and the draft says
+    that they are none of this one.
     """
     folder = out or Path("runs") / case.name
     try:
         yield
     except NoPlan as error:
         with suppress(FileError):  # the refusal matters more
-            path = write_files(folder, _files(case, folder, error, command))[-1]
-            error.remedies += (f"the draft is {path}",)
+            error.remedies += (f"the draft is {_draft(case, folder, error, command)}",)
         raise
-    for name in DRAFT:
-        with suppress(OSError):
-            (folder / name).unlink(missing_ok=True)
+    except NoAnswer as error:
+        with suppress(FileError):
+            error.args = (f"{error}; the draft is {_draft(case, folder, NoPlan(str(error)), command)}",)
+        raise
+
+
+def _draft(case: Scenario, folder: Path, error: NoPlan, command: str) -> Path:
+    """The page of a draft, written."""
+    return write_files(folder, _files(case, folder, error, command))[-1]
 
 
 def _files(case: Scenario, folder: Path, error: NoPlan, command: str) -> dict[str, str | bytes]:

@@ -1,0 +1,58 @@
+"""The tests that a plan made has to pass: its verification, and the risk by drawn trials."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from expdesign.errors import NoPlan
+from expdesign.plan.legs import LegWater
+from expdesign.plan.monte_carlo import Trials, estimate_risk, failed_chance_constraint, trials_needed
+from expdesign.plan.problem import PlanProblem
+from expdesign.plan.tuning import PLAN
+from expdesign.plan.values import RiskEstimate, SailedTrial, Verification
+from expdesign.plan.verify import verify_plan
+from expdesign.progress import Progress, silent
+
+
+def verified(problem: PlanProblem, water: LegWater, sailed: SailedTrial) -> Verification:
+    """The independent check of a plan.
+
+    Raises:
+        NoPlan: it does not pass.
+    """
+    verification = verify_plan(
+        problem.vessel,
+        problem.area,
+        problem.environment,
+        sailed,
+        clearance_m=problem.settings.clearance_m,
+        transit_mps=water.ship.transit_speed_mps,
+        primitives={item.name: item for item in problem.primitives},
+        repeats=problem.repeats,
+        start=problem.start,
+        goal=problem.goal,
+    )
+    if not verification.verified:
+        error = NoPlan(
+            "the plan found does not pass its own verification: " + "; ".join(verification.problems),
+            what="verification",
+        )
+        error.poses = sailed.trajectory.pose
+        raise error
+    return verification
+
+
+def drawn_risk(
+    problem: PlanProblem, water: LegWater, sailed: SailedTrial, *, attempt: int = 0, progress: Progress = silent
+) -> tuple[RiskEstimate, Trials]:
+    """The risk of the plan of some attempt; random streams are independent of planning and of other attempts."""
+    rng = np.random.default_rng((problem.seed, PLAN.trials_stream, attempt))
+    draws = trials_needed(problem.settings.confidence)
+    return estimate_risk(water, sailed, rng=rng, draws=draws, progress=progress)
+
+
+def accepted(problem: PlanProblem, water: LegWater, sailed: SailedTrial) -> bool:
+    """Whether drawn trials accept a first plan."""
+    risk, trials = drawn_risk(problem, water, sailed)
+    confidence = problem.settings.confidence
+    return not failed_chance_constraint(risk, trials, sailed.legs, problem.area, confidence=confidence)
