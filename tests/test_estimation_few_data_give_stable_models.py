@@ -3,10 +3,22 @@
 import numpy as np
 import pytest
 
-from estimation_case import NOMINAL, STEADY_CURRENT, commands, estimated_trials, truth
+from estimation_case import (
+    CALM_CURRENT,
+    NOMINAL,
+    STEADY_CURRENT,
+    TRUE,
+    commands,
+    estimated_trials,
+    measured,
+    record,
+    truth,
+)
 from expdesign.errors import Diverged
+from expdesign.estimation.methods import Settings, estimate
 from expdesign.estimation.replay import simulate_batch
 from expdesign.estimation.solve import Prior
+from expdesign.estimation.tuning import TUNING
 from expdesign.signals import Batch
 
 
@@ -59,3 +71,15 @@ def test_a_combination_of_normal_values_is_bayes_rule():
     precision = np.linalg.inv(P) + 0.7 * np.diag(spread**-2)
     exact = np.linalg.solve(precision, np.linalg.solve(P, values) + 0.7 * mean / spread**2)
     np.testing.assert_allclose(Prior(mean, spread).drawn(values, P, 0.7), exact, rtol=1e-10)
+
+
+def test_equations_that_do_not_settle_keep_their_first_instruments() -> None:
+    """After one refinement nothing has settled: the estimate is that of the first instruments, and a warning tells."""
+    data = record(measured(TRUE, commands(2000, np.random.default_rng(7)), weather=CALM_CURRENT, seed=8))
+    first, restless, settled = (
+        estimate(data, NOMINAL, settings=Settings(most_refinements=most)) for most in (0, 1, TUNING.most_refinements)
+    )
+    np.testing.assert_array_equal(restless.values, first.values)
+    assert any("keep their first instruments" in warning for warning in restless.warnings)
+    assert not any("keep their first instruments" in warning for warning in settled.warnings)
+    assert not np.allclose(settled.values, first.values)

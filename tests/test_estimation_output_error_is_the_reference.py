@@ -10,6 +10,7 @@ from estimation_case import NOMINAL, QUIET, TRUE, commands, measured, record
 from expdesign.errors import InputError
 from expdesign.estimation.fit import fit_percent
 from expdesign.estimation.methods import Settings, estimate
+from expdesign.estimation.output_error import gauss_newton, minimise
 from expdesign.estimation.replay import Stretches, compiled
 from expdesign.estimation.replay.replay import Integration, build_replay, simulate_batch, start_state
 from expdesign.signals import Batch, Record
@@ -180,3 +181,26 @@ def test_runge_kutta_gives_the_parameters_of_the_motion_and_euler_those_of_its_m
     np.testing.assert_allclose(exact.values, model.parameters, rtol=1e-3)
     euler = estimate(record(batch), model, method="oe")
     assert euler.value("N_r") == pytest.approx(np.expm1(exact.value("N_r")), rel=0.01)
+
+
+def test_thinner_samples_on_the_way_do_not_change_where_the_search_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    data = trials(TRUE)
+    found = estimate(data, NOMINAL, method="oe")
+    for room in (minimise, gauss_newton):
+        monkeypatch.setattr(room, "TUNING", replace(minimise.TUNING, rough_samples=300, rough_step_s=3.0))
+    thinned = []
+    build = minimise.build_problem
+    monkeypatch.setattr(minimise, "build_problem", lambda *args: thinned.append(args[3].every) or build(*args))
+    other = estimate(data, NOMINAL, method="oe")
+    assert max(thinned) == 3
+    assert (np.abs(other.values - found.values) < 0.05 * found.std).all()
+
+
+def test_steps_of_the_search_are_told_as_they_are_taken() -> None:
+    """Shares rise to nearly one, in more than ten steps, none of them larger than a third."""
+    shares: list[float] = []
+    estimate(trials(TRUE), NOMINAL, method="oe", progress=lambda activity, share: shares.append(share))
+    rises = np.diff([*shares, 1.0])
+    assert (rises >= 0).all()
+    assert rises.max() < 1 / 3
+    assert (rises > 0).sum() > 10

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from expdesign.assessment.limits import Limits, decomposed
 from expdesign.assessment.residuals import one_step
 from expdesign.assessment.runs import ESTIMATION, TEST, check_run
+from expdesign.assessment.tuning import TUNING
 from expdesign.assessment.values import INSTRUMENTAL, Assessed, Assessment, Current
 from expdesign.errors import Diverged, InputError, NoAnswer, NotInformative, UnknownName
 from expdesign.estimation.disturbance import mean_current, tells_current
@@ -17,7 +18,7 @@ from expdesign.estimation.regression import AIR, MEANS, PREDICTORS
 from expdesign.estimation.replay import STEERED, Integration
 from expdesign.estimation.solve import BLOCKS, Weighting
 from expdesign.estimation.values import Estimate
-from expdesign.progress import Progress, silent
+from expdesign.progress import Progress, in_phases, silent
 from expdesign.signals import Record
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.vessel import Vessel
@@ -119,17 +120,18 @@ def assess(
     chosen = named or tuple(method_named(name) for name in default_methods(vessel, record))
     done: list[Assessed] = []
     left_out: list[str] = []
-    for index, method in enumerate(chosen):
-        progress(f"estimating by {method.title}", index / len(chosen))
+    each = in_phases(progress, *[TUNING.method_work] * len(chosen), TUNING.decomposition_work)
+    for method, own in zip(chosen, each, strict=False):
+        own(f"estimating by {method.title}", 0.0)
         try:
-            done.append(_assessed(vessel, record, tests, method, options))
+            done.append(_assessed(vessel, record, tests, method, options, own))
         except (InputError, NoAnswer) as error:
             spare = USES_WIND[method.predictor] or isinstance(error, Diverged)
             if named or not spare or (method is chosen[-1] and not done):
                 raise _prefixed(error, method) from None
             left_out.append(f"Method {method.name} gave no estimate: {error}.")
     chosen_one = preferred(done)
-    progress("decomposing the misfit", 1.0)
+    each[-1]("decomposing the misfit", 0.0)
     return Assessment(
         record=record,
         tests=tests,
@@ -139,14 +141,18 @@ def assess(
         mean=options.mean,
         fixed=options.fixed,
         motion=options.motion,
-        limits=limits_of(done[chosen_one], options.integration),
+        limits=limits_of(done[chosen_one], options.integration, progress=each[-1]),
     )
 
 
-def limits_of(item: Assessed, integration: Integration) -> tuple[Limits, ...]:
+def limits_of(item: Assessed, integration: Integration, *, progress: Progress = silent) -> tuple[Limits, ...]:
     """The decomposed misfit of every run simulated with an estimate."""
-    wind = USES_WIND[item.method.predictor]
-    return tuple(decomposed(item.model, run, item.estimate, wind=wind, integration=integration) for run in item.runs)
+    wind, found = USES_WIND[item.method.predictor], []
+    total = sum(len(run.batch) for run in item.runs)
+    for run in item.runs:
+        found.append(decomposed(item.model, run, item.estimate, wind=wind, integration=integration))
+        progress("decomposing the misfit", sum(len(done.batch) for done in item.runs[: len(found)]) / total)
+    return tuple(found)
 
 
 def preferred(found: Sequence[Assessed]) -> int:
@@ -169,8 +175,10 @@ def _prefixed(error: InputError | NoAnswer, method: Method) -> InputError | NoAn
     return error
 
 
-def _assessed(vessel: Vessel, record: Record, tests: Record, method: Method, options: EstimateOptions) -> Assessed:
-    found, start = _estimated(vessel, record, method, options)
+def _assessed(
+    vessel: Vessel, record: Record, tests: Record, method: Method, options: EstimateOptions, progress: Progress
+) -> Assessed:
+    found, start = _estimated(vessel, record, method, options, progress)
     wind = USES_WIND[method.predictor]
     model = found.model(vessel.model)
     runs = [
@@ -198,7 +206,9 @@ def _current(found: Estimate, vessel: Vessel) -> Current | None:
     return Current(to_mps=to_mps, std_mps=covariance.diagonal() ** 0.5)
 
 
-def _estimated(vessel: Vessel, record: Record, method: Method, options: EstimateOptions) -> tuple[Estimate, str]:
+def _estimated(
+    vessel: Vessel, record: Record, method: Method, options: EstimateOptions, progress: Progress
+) -> tuple[Estimate, str]:
     """The estimate, and the start of its first instruments: the vessel's values, or least squares where they fail."""
 
     def attempt(start: str) -> Estimate:
@@ -213,7 +223,7 @@ def _estimated(vessel: Vessel, record: Record, method: Method, options: Estimate
             constant=options.constant,
             steered=options.steered,
         )
-        return estimate(record, vessel.model, method=method.name, settings=settings)
+        return estimate(record, vessel.model, method=method.name, settings=settings, progress=progress)
 
     nominal, ls = STARTS
     if not method.name.startswith(INSTRUMENTAL):

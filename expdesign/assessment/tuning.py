@@ -16,6 +16,8 @@ class Tuning:
         unstable_growth: growth of an error over a run above which the ship is unstable.
         cancelling_share: share of the squared misfit above which its parts nearly cancel, so that their sizes have no
             meaning.
+        method_work, decomposition_work: how long one method takes to how long the decomposition does, for the progress
+            told.
     """
 
     lags: int = 60
@@ -23,6 +25,8 @@ class Tuning:
     ahead_s: float = 30.0
     unstable_growth: float = 5.0
     cancelling_share: float = 2.0
+    method_work: float = 0.9
+    decomposition_work: float = 0.1
 
 
 TUNING = Tuning()

@@ -35,6 +35,7 @@ from expdesign.estimation.replay import (
 from expdesign.estimation.solve import NullSpace, Prior, Refined, Solution, Weighting, refine_iv, solve_ls
 from expdesign.estimation.tuning import TUNING
 from expdesign.estimation.values import Estimate, Residuals
+from expdesign.progress import Progress, silent
 from expdesign.signals import Record
 from expdesign.values import Array
 from expdesign.vessel import VesselModel
@@ -135,7 +136,14 @@ def method_named(name: str) -> Method:
     raise UnknownName("method", name, known=[method.name for method in METHODS])
 
 
-def estimate(record: Record, model: VesselModel, *, method: str = "iv", settings: Settings | None = None) -> Estimate:
+def estimate(
+    record: Record,
+    model: VesselModel,
+    *,
+    method: str = "iv",
+    settings: Settings | None = None,
+    progress: Progress = silent,
+) -> Estimate:
     """Parameters of a model from measured data.
 
     Args:
@@ -143,6 +151,7 @@ def estimate(record: Record, model: VesselModel, *, method: str = "iv", settings
         model: structure; its values start the instruments and stand for parameters held fixed.
         method: a name in `METHODS`.
         settings: the rest.
+        progress: of output error; the others are quick.
 
     Raises:
         InputError: the data lack what the method needs, or the model has a roll mode.
@@ -171,7 +180,9 @@ def estimate(record: Record, model: VesselModel, *, method: str = "iv", settings
     driving = as_planned(record) if planned else record
     refined = _instrumental(layout, driving, rows, choices) if chosen.solver == "iv" else _least_squares(rows, choices)
     if chosen.solver == "oe":
-        solution, regression = minimise_output_error(layout, record, refined.solution, _fitting(choices))
+        solution, regression = minimise_output_error(
+            layout, record, refined.solution, _fitting(choices), progress=progress
+        )
         left_out = sum(map(len, record.batches)) - len(regression)
         rows = Rows(regression=regression, used=(), left_out=left_out)
         return _estimate(chosen, layout, rows, Refined(solution, 0, ()), steered)

@@ -24,6 +24,13 @@ class Tuning:
         horizon_growth: ratio of successive horizons of output error.
         most_steps: of Gauss and Newton at one horizon.
         rough_samples: compared at earlier horizons than the last, spread over the data.
+        rough_step_s: longest step of simulations that compare some samples only.
+        most_correlated: correlation of residuals from sample to sample that counts, at most.
+        expected_steps: of Gauss and Newton on all data, for the progress told; twice as many on part of them.
+        covariance_steps: how many such steps the covariance takes as long as.
+        loading_samples, compiling_samples: how many samples a step could do while libraries are loaded, and while a
+            stage is compiled.
+        slowest_convergence: least ratio of successive expected decreases that the progress told counts on.
         settled_cost: expected decrease of the cost, in squared standard deviations, that ends the last horizons.
         rough_cost: the same for earlier horizons.
         block_instructions: size of the flat CasADi functions that simulations are cut into.
@@ -63,6 +70,13 @@ class Tuning:
     horizon_growth: int = 4
     most_steps: int = 40
     rough_samples: int = 10_000
+    rough_step_s: float = 0.5
+    most_correlated: float = 0.9999
+    expected_steps: int = 3
+    covariance_steps: float = 4.0
+    loading_samples: float = 7e4
+    compiling_samples: float = 7e3
+    slowest_convergence: float = 1.5
     settled_cost: float = 1e-4
     rough_cost: float = 0.1
     block_instructions: int = 20_000

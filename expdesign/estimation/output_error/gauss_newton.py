@@ -5,6 +5,7 @@ Source: J. J. More, Lecture Notes in Mathematics 630 (1978), 105-116.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,8 +21,24 @@ def _cost(problem: Problem, residuals: Array) -> float:
     return cost if np.isfinite(cost) else np.inf
 
 
-def minimised(problem: Problem, values: Array, *, settled: float) -> tuple[Array, Array]:
-    """Values and starts (W, n) of least cost, from values and the measured starts."""
+Step = Callable[[float], None]
+"""Is told, at each step of Gauss and Newton, its expected decrease over the one that ends the search."""
+
+
+def minimised(
+    problem: Problem, values: Array, *, settled: float, told: Step = lambda excess: None
+) -> tuple[Array, Array]:
+    """Values and starts (W, n) of least cost, from values and the measured starts.
+
+    Args:
+        problem: to be solved.
+        values: to begin with.
+        settled: expected decrease of the cost that ends the search, in squared standard deviations of the estimate.
+        told: of every step.
+
+    Raises:
+        NoAnswer: the model to begin with diverges.
+    """
     starts, damping = first_states(problem), 1e-4
     with np.errstate(over="ignore", invalid="ignore"):
         states = problem.states(values, starts)
@@ -29,11 +46,12 @@ def minimised(problem: Problem, values: Array, *, settled: float) -> tuple[Array
         if not np.isfinite(cost):
             raise NoAnswer(_RUNS_AWAY.format(seconds=len(states) * problem.compiled.stretches.sample_time_s))
         for _ in range(TUNING.most_steps):
-            normal = _normal(problem, values, states)
+            normal, least = _normal(problem, values, states), settled * _unit(problem, states)
             while damping < 1e10:
                 step, shift, expected = _step(normal, damping)
                 step = np.append(step, np.zeros(len(values) - len(step)))  # constants that are not estimated
-                if expected < settled:
+                told(expected / least)
+                if expected < least:
                     return values, starts
                 newer = problem.states(values + step, starts + shift)
                 lower = _cost(problem, problem.residuals(newer))
@@ -44,6 +62,20 @@ def minimised(problem: Problem, values: Array, *, settled: float) -> tuple[Array
                 return values, starts
             values, starts, states, cost, damping = values + step, starts + shift, newer, lower, damping / 10
     return values, starts
+
+
+def _unit(problem: Problem, states: Array) -> float:
+    """The cost of a squared standard deviation of the estimate; 1 for white residuals of the variance of the weights.
+
+    Residuals with correlation rho from sample to sample tell (1 - rho) / (1 + rho) as much as white ones: errors of a
+    simulation last for hundreds of samples. The least correlated output counts.
+    """
+    residuals = problem.residuals(states)
+    power = np.einsum("lwn,lwn->n", residuals, residuals)
+    joined = np.einsum("lwn,lwn->n", residuals[1:], residuals[:-1])
+    rho = np.clip(np.divide(joined, power, out=np.zeros_like(power), where=power > 0), 0.0, TUNING.most_correlated)
+    level = float(power @ problem.weights) / max(1, int(np.isfinite(problem.measured).sum()))
+    return float(np.min((1 + rho) / (1 - rho))) * max(1.0, level)
 
 
 _RUNS_AWAY = "output error: the best model found diverges within {seconds:.0f} s; try a shorter horizon (--horizon)"

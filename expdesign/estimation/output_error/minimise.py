@@ -9,9 +9,9 @@ Measured wind acts through the b-frame velocity of the air, ship velocity minus 
 
 The method is Levenberg and Marquardt with exact derivatives. It starts from least squares with a short horizon, which
 grows by `TUNING.horizon_growth` until it is the requested one: a poor model diverges over a whole run, but not over few
-samples. Of long data only some stretches are compared until then. The weight of an output is the inverse residual
-variance of the stage before. The covariance uses the derivatives of the simulation and is robust to coloured residuals,
-as for IV.
+samples. Of long data only some stretches are compared until then, and of fast ones only some samples. The weight of an
+output is the inverse residual variance of the stage before. The covariance uses the derivatives of the simulation and
+is robust to coloured residuals, as for IV.
 
 Source: L. Ljung, System Identification, 2nd ed. (1999), 4.2 and 9.3; H. G. Bock, in Modelling of Chemical Reaction
 Systems (1981), 102-125, for the stretches.
@@ -19,22 +19,24 @@ Systems (1981), 102-125, for the stretches.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from expdesign.conventions import OUTPUTS
 from expdesign.estimation.output_error.gauss_newton import minimised, regular, slopes_of, stretchwise
-from expdesign.estimation.output_error.problem import Fitting, Problem, build_problem, sample_time
+from expdesign.estimation.output_error.problem import Excerpt, Fitting, Problem, build_problem, sample_time
+from expdesign.estimation.output_error.steps import Steps
 from expdesign.estimation.regression import Integers, Layout, Regression
 from expdesign.estimation.solve import Solution, Weighting, solve_ls
 from expdesign.estimation.tuning import TUNING
+from expdesign.progress import Progress, silent
 from expdesign.signals import Record
 from expdesign.values import Array
 
 
 def minimise_output_error(
-    layout: Layout, record: Record, start: Solution, fitting: Fitting
+    layout: Layout, record: Record, start: Solution, fitting: Fitting, *, progress: Progress = silent
 ) -> tuple[Solution, Regression]:
     """The estimate of the layout's parameters; then, if requested, one constant per run and output.
 
@@ -45,6 +47,7 @@ def minimise_output_error(
         record: batches of one sample time.
         start: a regression's solution, for the first guess.
         fitting: how simulations are compared with the data.
+        progress: of the search.
 
     Raises:
         InputError: batches of different sample times, or inputs or wind that are not numbers.
@@ -55,16 +58,53 @@ def minimise_output_error(
     values = np.concatenate(
         [start.values[: len(layout.parameters)], np.zeros(len(record.batches) * len(layout.model.outputs))]
     )
-    longest = max(len(batch) for batch in record.batches)
-    full = longest if fitting.horizon_s is None else max(2, round(fitting.horizon_s / sample_time(record)) + 1)
-    horizons = _horizons(min(full, longest))
-    for stage, samples in enumerate([*horizons, horizons[-1]]):
-        rough = stage < len(horizons) - 1
-        most = TUNING.rough_samples if rough else np.inf
-        problem = build_problem(layout, record, fitting, samples, weights, most=most)
-        values, starts = minimised(problem, values, settled=TUNING.rough_cost if rough else TUNING.settled_cost)
+    stages = _stages(record, fitting)
+    steps = Steps([(stage.work(record), stage.steps) for stage in stages], progress)
+    for stage in stages:
+        problem = build_problem(layout, record, fitting, stage.excerpt, weights)
+        steps.begin()
+        values, starts = minimised(problem, values, settled=stage.settled, told=steps.told)
         weights = 1.0 / _at_least(_variance(problem, values, starts), record, layout)
+    steps.end()
     return _with_covariance(problem, layout, values, starts)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stage:
+    """One search.
+
+    Attributes:
+        excerpt: what is compared.
+        settled: ends the search, see `minimised`.
+        steps: expected number.
+    """
+
+    excerpt: Excerpt
+    settled: float
+    steps: int
+
+    def work(self, record: Record) -> float:
+        """Samples simulated in a step."""
+        return min(sum(map(len, record.batches)) / self.excerpt.every, self.excerpt.most)
+
+
+def _stages(record: Record, fitting: Fitting) -> list[Stage]:
+    """Growing horizons on part of the data; the last one on every so manieth sample of fast data, then on all, twice.
+
+    A rough search of whole runs takes most steps; what thinner samples leave to find takes two or three.
+    """
+    longest, total, time_s = max(map(len, record.batches)), sum(map(len, record.batches)), sample_time(record)
+    full = longest if fitting.horizon_s is None else max(2, round(fitting.horizon_s / time_s) + 1)
+    *growing, last = _horizons(min(full, longest))
+    rough = [Excerpt(samples=samples, most=TUNING.rough_samples) for samples in growing]
+    thinner = int(min(total / TUNING.rough_samples, TUNING.rough_step_s / time_s, last / TUNING.first_horizon_samples))
+    if thinner > 1:
+        rough.append(Excerpt(samples=-(-last // thinner), every=thinner))
+    whole = Stage(excerpt=Excerpt(samples=last), settled=TUNING.settled_cost, steps=TUNING.expected_steps)
+    return [
+        *(Stage(excerpt=item, settled=TUNING.rough_cost, steps=2 * TUNING.expected_steps) for item in rough),
+        *[whole] * 2,
+    ]
 
 
 def _horizons(full: int) -> list[int]:

@@ -85,16 +85,30 @@ def sample_time(record: Record) -> float:
     return times.pop()
 
 
-def build_problem(
-    layout: Layout, record: Record, fitting: Fitting, samples: int, weights: Array, *, most: float = np.inf
-) -> Problem:
-    """The problem with stretches of so many samples and output weights (n,), of `most` samples in all or some more."""
-    model, time_s = layout.model, sample_time(record)
+@dataclass(frozen=True, kw_only=True)
+class Excerpt:
+    """What of the data is compared.
+
+    Attributes:
+        samples: of a stretch, as they are compared.
+        every: compares every so manieth sample, with the mean inputs until the next.
+        most: samples in all, or some more; the stretches between are left out.
+    """
+
+    samples: int
+    every: int = 1
+    most: float = np.inf
+
+
+def build_problem(layout: Layout, record: Record, fitting: Fitting, excerpt: Excerpt, weights: Array) -> Problem:
+    """The problem of an excerpt with output weights (n,)."""
+    model, time_s, samples = layout.model, excerpt.every * sample_time(record), excerpt.samples
     states = tuple(OUTPUTS.index(name) for name in model.outputs)
-    cuts = [(number, first) for number, b in enumerate(record.batches) for first in _firsts(len(b), samples)]
-    cuts = cuts[:: max(1, int(sum(map(len, record.batches)) / most))]
-    drives = [_drive(layout, batch, fitting.integration.substeps) for batch in record.batches]
-    ends = [_end(first, samples, len(record.batches[number])) for number, first in cuts]
+    read = [_read(batch)[:: excerpt.every, states] for batch in record.batches]
+    drives = [_means(_drive(layout, batch, fitting.integration.substeps), excerpt.every) for batch in record.batches]
+    cuts = [(number, first) for number, rows in enumerate(read) for first in _firsts(len(rows), samples)]
+    cuts = cuts[:: max(1, int(sum(map(len, read)) / excerpt.most))]
+    ends = [_end(first, samples, len(read[number])) for number, first in cuts]
     length = max(end - first for (_, first), end in zip(cuts, ends, strict=True))
 
     def stacked(rows: list[Array], fill: bool) -> Array:
@@ -116,12 +130,18 @@ def build_problem(
                 counts=np.array([end - first for (_, first), end in zip(cuts, ends, strict=True)]),
             )
         ),
-        measured=stacked([_read(batch)[:, states] for batch in record.batches], fill=False),
+        measured=stacked(read, fill=False),
         weights=weights,
         batch=np.array([number for number, _ in cuts]),
         first=np.array([first for _, first in cuts]),
         constant=fitting.constant,
     )
+
+
+def _means(rows: Array, every: int) -> Array:
+    """(k / every, c) means of so many rows (k, c)."""
+    firsts = np.arange(0, len(rows), every)
+    return np.asarray(np.add.reduceat(rows, firsts) / np.diff(np.append(firsts, len(rows)))[:, None])
 
 
 def _firsts(count: int, samples: int) -> range:

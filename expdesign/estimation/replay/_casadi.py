@@ -13,7 +13,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from expdesign.estimation.replay.stretches import INTEGRATORS, Simulate, Stretches
+from expdesign.estimation.replay.stretches import INTEGRATORS, Called, Simulate, Stretches
 from expdesign.estimation.tuning import TUNING
 from expdesign.simulation import motion_rates
 from expdesign.values import Array
@@ -68,15 +68,45 @@ def _chained(step: ca.Function, samples: int) -> Simulate:
     return simulate
 
 
-def stretch_functions(stretches: Stretches, steps: int, count: int, points: int) -> tuple[ca.Function, ca.Function]:
-    """Simulation of so many samples of so many stretches, and derivatives of the next states of so many points."""
+def stretch_functions(stretches: Stretches, steps: int, count: int, points: int) -> tuple[Called, Called]:
+    """Simulation of so many samples of so many stretches, and derivatives of the next states of so many points.
+
+    The first takes starts (count, n), drives (count steps, m) and values (count steps, p + n), and gives states
+    (count steps, n); the second states, drives and values of points, and gives (points, n, n) and (points, p + n, n),
+    the transposes of derivatives by state and by values.
+    """
     m, n = stretches.drive.shape[2], len(stretches.states)
     step = velocity_step(stretches)
     x, u, values = ca.SX.sym("x", n), ca.SX.sym("u", m), ca.SX.sym("t", len(stretches.sought) + n)
     after = step(x, u, values)
-    by_x, by_values = (ca.densify(ca.jacobian(after, seen)) for seen in (x, values))
+    # reverse mode: there are three outputs and some thirty values
+    reverse = {"helper_options": {"ad_weight": 1}}
+    by_x, by_values = (ca.densify(ca.jacobian(after, seen, reverse)) for seen in (x, values))
     slopes = ca.Function("slopes", [x, u, values], [by_x, by_values], {"cse": True})
-    return step.mapaccum("stretch", steps).map(count), slopes.map(points)
+    q = values.size1()
+    simulate = called(step.mapaccum("stretch", steps).map(count), ((count * steps, n),))
+    return simulate, called(slopes.map(points), ((points, n, n), (points, q, n)))
+
+
+def called(function: ca.Function, shapes: tuple[tuple[int, ...], ...]) -> Called:
+    """The function from arrays of numbers to new arrays of these shapes, without CasADi's matrices in between.
+
+    Arrays lie in memory as CasADi's columns do: the last index counts rows.
+    """
+    buffer: Any
+    buffer, run = function.buffer()
+
+    def call(*arguments: Array) -> tuple[Array, ...]:
+        given = [np.ascontiguousarray(rows, dtype=float) for rows in arguments]
+        results = tuple(np.empty(shape) for shape in shapes)
+        for place, rows in enumerate(given):
+            buffer.set_arg(place, rows.data)
+        for place, rows in enumerate(results):
+            buffer.set_res(place, rows.data)
+        run()
+        return results
+
+    return call
 
 
 def velocity_step(problem: Stretches) -> ca.Function:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -15,6 +14,8 @@ from expdesign.values import Array, frozen_set
 from expdesign.vessel import VesselModel
 
 INTEGRATORS = {"euler": euler_step, "rk4": rk4_step}
+Called = Callable[..., tuple[Array, ...]]
+"""A compiled function of arrays."""
 Simulate = Callable[[Array, Array, Array], Array]
 """(parameters (p,), start state (6 or 8,), inputs (k, m)) -> states (k, 6 or 8); calm water."""
 
@@ -73,14 +74,13 @@ class Compiled:
     Attributes:
         stretches: the simulated stretches.
         block: samples and stretches of one call of `run`, points of one call of `slopes`.
-        run: (starts, drives, values) -> states after each sample, of a block.
-        slopes: (states, drives, values) -> derivatives of the next state by state and by values, of a block of points.
+        run, slopes: see `stretch_functions`.
     """
 
     stretches: Stretches
     block: tuple[int, int, int]
-    run: Any
-    slopes: Any
+    run: Called
+    slopes: Called
 
     def states(self, values: Array, start: Array) -> Array:
         """(L, W, n) velocities from start velocities (W, n) and values (W, p + n): parameters, then accelerations.
@@ -99,8 +99,8 @@ class Compiled:
                 part = active[begin : begin + many]
                 whole = np.resize(part, many)
                 held = drive[rows[:, None], whole].transpose(1, 0, 2).reshape(steps * many, -1)
-                after = self.run(result[first, whole].T, held.T, np.repeat(values[whole], steps, axis=0).T)
-                after = after.full().T.reshape(many, steps, n)[: len(part), : end - first]
+                (rows_after,) = self.run(result[first, whole], held, np.repeat(values[whole], steps, axis=0))
+                after = rows_after.reshape(many, steps, n)[: len(part), : end - first]
                 result[first + 1 : end + 1, part] = after.transpose(1, 0, 2)
         return result
 
@@ -143,8 +143,8 @@ class Compiled:
         flat = states.reshape(-1, n), drive.reshape(length * count, -1), held
         found = []
         for begin in range(0, length * count, points):
-            part = [np.resize(rows[begin : begin + points], (points, rows.shape[1])).T for rows in flat]
-            found.append([each.full().reshape(n, points, -1).transpose(1, 0, 2) for each in self.slopes(*part)])
+            part = [np.resize(rows[begin : begin + points], (points, rows.shape[1])) for rows in flat]
+            found.append([each.transpose(0, 2, 1) for each in self.slopes(*part)])
         A, B = (
             np.concatenate(parts)[: length * count].reshape(length, count, n, -1) for parts in zip(*found, strict=True)
         )
