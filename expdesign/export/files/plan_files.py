@@ -130,6 +130,7 @@ def _risk_entry(risk: RiskEstimate | None) -> dict[str, Any] | None:
         "goes_round_at_most": risk.go_arounds,
         "run_begins_within": {
             "heading_rad": risk.heading_rad,
+            "velocity_mps": min(leg.speed_mps for leg in risk.legs),  # at every start; each leg tells its own
             "yaw_rate_radps": risk.yaw_rate_radps,
         },
     }
