@@ -6,8 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from expdesign.information import regressor_rows
 from expdesign.plan.solve import plan_trial
+from expdesign.plan.verify import track_covariance
 from expdesign.scenario import load_scenario
+from expdesign.simulation import delivered
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.planned import plan_problem
 from expdesign.workflows.steps.scored import scored
@@ -21,11 +24,17 @@ FIRST_ORDER = 0.1
 
 
 @pytest.fixture(scope="module")
-def days():
+def planned():
     case = load_scenario(STORY)
     case = replace(case, design=replace(case.design, total_s=240.0))
     information = scored(case)
-    plan = plan_trial(plan_problem(case, information, designed(case, information), seed=1))
+    design = designed(case, information)
+    return case, design, plan_trial(plan_problem(case, information, design, seed=1))
+
+
+@pytest.fixture(scope="module")
+def days(planned):
+    case, _, plan = planned
     return simulated_days(case, plan, trials=TRIALS)
 
 
@@ -42,3 +51,15 @@ def test_estimates_are_right_on_average_and_their_intervals_hold_the_truth(days)
     assert (np.abs(error) < 3.5 + FIRST_ORDER * np.sqrt(TRIALS)).all()
     binomial = np.sqrt(0.95 * 0.05 / TRIALS)
     assert (days.coverage > 0.95 - 0.02 - 3.5 * binomial).all()
+
+
+def test_the_covariance_of_a_track_is_the_inverse_of_its_centred_regressors(planned):
+    case, design, plan = planned
+    found = track_covariance(case.vessel, design, case.environment, plan.sailed)
+    rows = regressor_rows(case.vessel.model, plan.trajectory, delivered(case.vessel, plan.commands), case.environment)
+    equation = {term.name: term.equation for term in case.vessel.model.terms}
+    for output in case.vessel.model.outputs:
+        own = [k for k, name in enumerate(design.problem.parameters) if equation[name] == output]
+        part = rows[:, [case.vessel.model.names.index(design.problem.parameters[k]) for k in own]]
+        centred = part - part.mean(axis=0)
+        np.testing.assert_allclose(found[np.ix_(own, own)], np.linalg.inv(centred.T @ centred), rtol=1e-6)

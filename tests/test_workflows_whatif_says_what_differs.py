@@ -7,6 +7,7 @@ import pytest
 from expdesign import workflows
 from expdesign.cli import main
 from expdesign.errors import FileError, InputError
+from expdesign.export.whatif_page import Case, WhatIfContent, whatif_html
 from expdesign.scenario import load_scenario, load_variant
 from scenario_files import write_scenario
 
@@ -106,3 +107,33 @@ def test_two_of_one_name_and_none_at_all_are_refused(tmp_path):
         workflows.whatif(MODEL_SHIP, [], tmp_path, jobs=1)
     with pytest.raises(FileError, match="does not exist"):
         workflows.whatif(MODEL_SHIP, [tmp_path / "none.toml"], tmp_path, jobs=1)
+
+
+def case_of(name, *, track, day_s):
+    plan = {"day_s": day_s, "day_median_s": day_s + 60.0, "day_95_s": day_s + 120.0}
+    return Case(
+        name=name,
+        criterion="D",
+        runs={"circle": 1},
+        informative_s=100.0,
+        efficiencies={},
+        parameters=("X_u", "Y_v"),
+        covariance=np.eye(2),
+        plan=plan,
+        track=track,
+    )
+
+
+def test_days_are_compared_by_what_their_whole_tracks_tell():
+    first, half, unknown = (
+        case_of(name, track=track, day_s=day_s)
+        for name, track, day_s in (("first", np.eye(2), 900.0), ("half", 2 * np.eye(2), 600.0), ("none", None, 300.0))
+    )
+    content = WhatIfContent(cases=(first, half, unknown), planned=True, command="", version="")
+    assert content.against(half).track == pytest.approx(0.5)
+    assert content.against(half).accuracy == pytest.approx(1.0)
+    assert content.against(unknown).track is None
+    page = whatif_html(content)
+    assert 'id="days-' in page
+    for minutes in ("15.0", "16.0", "17.0", "10.0"):  # planned, median, 95 %
+        assert f">{minutes}<" in page

@@ -37,7 +37,6 @@ def simulated_days(
         environment=environment,
         parameters=estimated_parameters(vessel.model, case.design.fixed_parameters),
         mean_subtraction=case.design.mean_subtraction,
-        continuous=vessel.model.form == "continuous",
         integrator="rk4" if vessel.model.form == "continuous" else "euler",
         trials=trials,
         seed=seed,

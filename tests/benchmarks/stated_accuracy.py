@@ -31,7 +31,9 @@ from whole_days import chance, simulated_days
 STORY = Path(__file__).parents[2] / "scenarios" / "story.toml"
 WEATHERS = {
     "calm": CALM,
-    "current that wanders by 0.02 m/s in 30 s": Environment(current_variation=Variation(0.02, 30.0)),
+    "current that wanders by 0.02 m/s in 30 s": Environment(
+        current_variation=Variation(std_mps=0.02, correlation_s=30.0)
+    ),
     "unknown steady current, 0.15 m/s": Environment(current_std_mps=0.15),
 }
 

@@ -11,6 +11,9 @@ from expdesign.export.files import strict_json
 from expdesign.export.tuning import TUNING
 from expdesign.values import Array
 
+DAY = ("day_s", "day_median_s", "day_95_s")
+"""Of a plan: everything between start and goal, as planned and in simulated trials."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Case:
@@ -28,6 +31,7 @@ class Case:
         parameters: estimated ones.
         covariance: (p, p) expected of estimates from the runs alone.
         plan: numbers of the planned trial, units in the names; empty when none was planned.
+        track: (p, p) inverse information of the whole planned track, in units of the noise; None where it is not known.
     """
 
     name: str
@@ -41,6 +45,7 @@ class Case:
     parameters: tuple[str, ...] = ()
     covariance: Array
     plan: Mapping[str, object]
+    track: Array | None = None
 
     @property
     def std(self) -> Array:
@@ -58,12 +63,14 @@ class Against:
         accuracy: ratio of information determinants to the power 1/c: 2 means half the variance.
         same_accuracy_s: informative time in which the runs of the variant, in the same proportions, are as accurate as
             the first case [s].
+        track: ratio of information, as `accuracy`, of the whole tracks, legs included; None where they are not known.
     """
 
     common: tuple[str, ...]
     ratios: tuple[float, ...]
     accuracy: float
     same_accuracy_s: float
+    track: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -87,22 +94,29 @@ class WhatIfContent:
         common = tuple(name for name in first.parameters if name in case.parameters)
         if first.problem or case.problem or not common:
             return None
-        mine, theirs = (_part(item, common) for item in (case, first))
-        ratios = np.sqrt(np.diag(mine) / np.diag(theirs))
-        scale = np.sqrt(np.outer(np.diag(theirs), np.diag(theirs)))
-        gain = np.linalg.slogdet(theirs / scale)[1] - np.linalg.slogdet(mine / scale)[1]
-        accuracy = float(np.exp(gain / len(common)))
+        mine, theirs = (_part(item, item.covariance, common) for item in (case, first))
+        ratios, accuracy, track = np.sqrt(np.diag(mine) / np.diag(theirs)), _gain(mine, theirs), None
+        if case.track is not None and first.track is not None:
+            track = _gain(_part(case, case.track, common), _part(first, first.track, common))
         return Against(
             common=common,
             ratios=tuple(ratios.tolist()),
             accuracy=accuracy,
             same_accuracy_s=case.informative_s / accuracy,
+            track=track,
         )
 
 
-def _part(case: Case, names: tuple[str, ...]) -> Array:
+def _part(case: Case, covariance: Array, names: tuple[str, ...]) -> Array:
     chosen = [case.parameters.index(name) for name in names]
-    return np.asarray(case.covariance[np.ix_(chosen, chosen)])
+    return np.asarray(covariance[np.ix_(chosen, chosen)])
+
+
+def _gain(mine: Array, theirs: Array) -> float:
+    """Ratio of the determinants of two covariances (c, c), to the power 1/c."""
+    scale = np.sqrt(np.outer(np.diag(theirs), np.diag(theirs)))
+    gain = np.linalg.slogdet(theirs / scale)[1] - np.linalg.slogdet(mine / scale)[1]
+    return float(np.exp(gain / len(mine)))
 
 
 def explanations(content: WhatIfContent) -> tuple[tuple[str, tuple[str, ...]], ...]:
@@ -202,6 +216,7 @@ def _entry(content: WhatIfContent, case: Case, sentences: tuple[str, ...]) -> di
         "std": dict(zip(case.parameters, case.std.tolist(), strict=True)),
         "accuracy": None if against is None else against.accuracy,
         "same_accuracy_s": None if against is None else against.same_accuracy_s,
+        "track_accuracy": None if against is None else against.track,
         "std_ratio": None if against is None else dict(zip(against.common, against.ratios, strict=True)),
         "plan": dict(case.plan) or None,
         "differences": list(sentences),

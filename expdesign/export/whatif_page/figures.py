@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from expdesign.export.pages.figures import LINES, REPOSITION, VERMILION, light_grid, new_figure, plain, round_ticks, svg
-from expdesign.export.whatif_page.content import WhatIfContent
+from expdesign.export.whatif_page.content import DAY, WhatIfContent
 
 
 def time_figure(content: WhatIfContent) -> str:
@@ -27,6 +27,26 @@ def time_figure(content: WhatIfContent) -> str:
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=9)
     light_grid(axes, "x")
     return svg(figure, key="times", label="Time of each variant, and time for the accuracy of the scenario")
+
+
+def day_figure(content: WhatIfContent) -> str | None:
+    """Length of the day against what its whole track tells, a point for each case; None where no day is known."""
+    known = [(case, against.track) for case in content.cases if (against := content.against(case)) and against.track]
+    if not known:
+        return None
+    figure = new_figure(6.4, 3.6)
+    axes = figure.subplots()
+    for (case, told), colour in zip(known, LINES * 9, strict=False):
+        planned, median, most = (float(str(case.plan[key])) / 60 for key in DAY)
+        axes.plot([planned, most], [told, told], "-", color=colour, linewidth=1.2)
+        axes.plot(median, told, "|", color=colour, markersize=9)
+        axes.plot(planned, told, "o", color=colour, label=plain(case.name))
+    axes.set_xlabel("day [min]")
+    axes.set_ylabel("information / that of the scenario")
+    axes.set_ylim(bottom=0.0)
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=9)
+    light_grid(axes)
+    return svg(figure, key="days", label="Length of the day against what its whole track tells, for each case")
 
 
 def ratio_figure(content: WhatIfContent) -> str | None:

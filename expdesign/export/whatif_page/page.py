@@ -6,17 +6,19 @@ import math
 
 from expdesign.export.pages import page_templates
 from expdesign.export.pages.figures import report_style
-from expdesign.export.whatif_page.content import Case, WhatIfContent, explanations
-from expdesign.export.whatif_page.figures import ratio_figure, runs_figure, time_figure
-
-DAY = ("day_s", "day_median_s", "day_95_s")
-"""Of a plan: everything between start and goal, as planned and in simulated trials."""
+from expdesign.export.whatif_page.content import DAY, Case, WhatIfContent, explanations
+from expdesign.export.whatif_page.figures import day_figure, ratio_figure, runs_figure, time_figure
 
 
 def whatif_html(content: WhatIfContent) -> str:
     """One HTML page without any outside reference."""
     with report_style():
-        figures = {"times": time_figure(content), "ratios": ratio_figure(content), "runs": runs_figure(content)}
+        figures = {
+            "times": time_figure(content),
+            "days": day_figure(content),
+            "ratios": ratio_figure(content),
+            "runs": runs_figure(content),
+        }
     return (
         page_templates("expdesign.export.whatif_page")
         .get_template("whatif.html")

@@ -50,6 +50,24 @@ def track_information(vessel: Vessel, problem: DurationProblem, environment: Env
     return np.array(matrices)
 
 
+def track_covariance(
+    vessel: Vessel, design: DurationDesign, environment: Environment, sailed: SailedTrial
+) -> Array | None:
+    """(p, p) inverse information of a whole trial about the parameters, means left out, in units of the noise.
+
+    None where the design has nuisance regressors, or the track does not determine every parameter.
+    """
+    problem = design.problem
+    p = len(problem.parameters)
+    if not set(problem.parameters) <= set(vessel.model.names):
+        return None
+    M = track_information(vessel, problem, environment, sailed).sum(axis=0)
+    scale = np.sqrt(np.maximum(np.diag(M), 0.0))
+    if not (scale > 0).all() or np.linalg.matrix_rank(M / np.outer(scale, scale)) < len(M):
+        return None
+    return np.asarray((np.linalg.inv(M / np.outer(scale, scale)) / np.outer(scale, scale))[:p, :p])
+
+
 def _bordered(vessel: Vessel, rows: Array, parameters: Sequence[str], mean_subtraction: str) -> Array:
     X, Y = moments(vessel.model, rows, parameters)
     return bordered_moments(X, Y, Y, Y @ Y.T, mean_subtraction)

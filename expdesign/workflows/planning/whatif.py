@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,10 +17,12 @@ from expdesign.export.whatif_page.page import table_header, table_row
 from expdesign.information import PrimitiveInformation, estimated_parameters
 from expdesign.information.expected import expected_covariance
 from expdesign.memory import Memory, recalled, remembering, user_memory
+from expdesign.plan.verify import track_covariance
 from expdesign.processes import as_finished, told_together
 from expdesign.progress import Progress, in_phases, silent, within
 from expdesign.rehearsal import trial_parts
 from expdesign.scenario import Scenario, load_scenario, load_variant
+from expdesign.values import Array
 from expdesign.workflows.command_text import command_text
 from expdesign.workflows.outcome import Outcome, TextTable
 from expdesign.workflows.steps.day import planned_day
@@ -118,13 +121,15 @@ def _computed(case: Scenario, changes: tuple[str, ...], with_plan: bool, seed: i
         information, _ = ready(case, seed=seed, progress=scoring)
         design = designed(case, information, seed=seed, progress=sharing)
         plan: dict[str, object] = {}
+        track: Array | None = None
         if with_plan:
             day = planned_day(case, information, design, seed=seed, progress=planning)
             information, design, plan = day.information, day.design, dict(plan_summary(day.plan))
             length = day.plan.day
+            track = track_covariance(case.vessel, design, case.environment, day.plan.sailed)
             plan |= {"day_s": length.planned_s, "day_median_s": length.median_s, "day_95_s": length.most_s}
         comparing("comparing criteria", 0.0)
-        return _described(case, changes, information, design, plan)
+        return replace(_described(case, changes, information, design, plan), track=track)
     except NoAnswer as error:
         empty = np.zeros((0, 0))
         return Case(
