@@ -17,8 +17,8 @@ from expdesign.workflows.steps.scored import scored
 from whole_days import chance, simulated_days
 
 STORY = Path(__file__).parents[1] / "scenarios" / "story.toml"
-TRIALS = 100
-"""More take minutes: `tests/benchmarks/stated_accuracy.py` has 500."""
+TRIALS = 70
+"""More take long: `tests/benchmarks/stated_accuracy.py` has 500."""
 FIRST_ORDER = 0.1
 """What the noise beyond first order may add or take."""
 

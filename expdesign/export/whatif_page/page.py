@@ -9,6 +9,8 @@ from expdesign.export.pages.figures import report_style
 from expdesign.export.whatif_page.content import DAY, Case, WhatIfContent, explanations
 from expdesign.export.whatif_page.figures import day_figure, ratio_figure, runs_figure, time_figure
 
+DAY_COLUMNS = ("day [min]", "median [min]", "95 % [min]")
+
 
 def whatif_html(content: WhatIfContent) -> str:
     """One HTML page without any outside reference."""
@@ -33,20 +35,10 @@ def whatif_html(content: WhatIfContent) -> str:
 
 
 def table_header(content: WhatIfContent) -> tuple[str, ...]:
-    """Names of the columns of `table_row`."""
-    planned = (
-        ("repositioning [min]", "day [min]", "median [min]", "95 % [min]", "clearance [m]") if content.planned else ()
-    )
-    return (
-        "Case",
-        "criterion",
-        "runs",
-        "time [min]",
-        "information",
-        "same accuracy [min]",
-        "short of optimum",
-        *planned,
-    )
+    """Names of the columns of `table_row`; of the day where one was planned."""
+    days, clearance = (DAY_COLUMNS, ("clearance [m]",)) if content.planned else ((), ())
+    runs = ("time [min]", "information", "same accuracy [min]", "short of optimum")
+    return ("Case", "criterion", "runs", *days, *runs, *clearance)
 
 
 def table_row(content: WhatIfContent, case: Case) -> tuple[str, ...]:
@@ -54,20 +46,16 @@ def table_row(content: WhatIfContent, case: Case) -> tuple[str, ...]:
     if case.problem:
         return (case.name, *("-",) * (len(table_header(content)) - 1))
     against = content.against(case)
-    planned = (
-        (*(_minutes(case.plan.get(key)) for key in ("repositioning_s", *DAY)), _metres(case.plan))
-        if content.planned
-        else ()
-    )
     return (
         case.name,
         case.criterion,
         str(sum(case.runs.values())),
+        *(_minutes(case.plan.get(key)) for key in DAY if content.planned),
         f"{case.informative_s / 60:.1f}",
         "-" if against is None else f"{against.accuracy:.2f} \N{MULTIPLICATION SIGN}",
         "-" if against is None else f"{against.same_accuracy_s / 60:.1f}",
         _short(case.gap_relative),
-        *planned,
+        *((_metres(case.plan),) if content.planned else ()),
     )
 
 
