@@ -160,3 +160,19 @@ def test_passages_between_a_thousand_islands_remain():
     assert water.covers(simple)
     lanes = pitch_m * np.stack([np.arange(1, side), np.full(side - 1, 0.5)], axis=1)
     assert shapely.covers(simple, sight_lines(lanes, lanes + np.array([0.0, pitch_m * (side - 1)]))).all()
+
+
+def test_narrow_passages_among_islands_remain_with_more_corners():
+    """Few corners are reached by a tolerance that is wider than the passages."""
+    pitch_m, side = 100.0, 12
+    middles = pitch_m * (np.stack(np.divmod(np.arange(side**2), side), axis=1) + 0.5)
+    islands = shapely.union_all(shapely.buffer(shapely.points(middles), 40.0, quad_segs=4))
+    water = shapely.MultiPolygon([shapely.box(0, 0, pitch_m * side, pitch_m * side).difference(islands)])
+    few, many = (
+        simplified(water, grow=False, tolerance_m=0.5, corners=((1.0, 50), (4.0, count))) for count in (300, 2000)
+    )
+    lane = sight_lines(*(pitch_m * np.array([[side / 2, share * side]]) for share in (0.05, 0.95)))
+    assert water.covers(few)
+    assert water.covers(many)
+    assert not shapely.covers(few, lane).all()
+    assert shapely.covers(many, lane).all()

@@ -7,9 +7,11 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+import shapely
 
 from expdesign.errors import NoPlan, NoRoom
 from expdesign.plan.chart import (
+    CHART,
     ClearanceField,
     build_goal_distance,
     clearance_field,
@@ -86,7 +88,7 @@ def plan_room(problem: PlanProblem, water: LegWater, progress: Progress, *, stri
 
 
 def roomy_water(problem: PlanProblem, ship: Capability, progress: Progress) -> tuple[LegWater, PlanRoom]:
-    """The water, and what the first plan is made in; on a finer grid where passages or places are too narrow for it.
+    """The water, and what the first plan is made in; on a finer grid and with more corners of the shore where need be.
 
     Raises:
         NoPlan: as `plan_room`.
@@ -96,7 +98,9 @@ def roomy_water(problem: PlanProblem, ship: Capability, progress: Progress) -> t
         return water, plan_room(problem, water, progress, strict=True)
     except NoRoom:
         finer = leg_water(problem, ship, finer=PLAN.finer_grid)
-    if finer.field.cell_m < 0.75 * water.field.cell_m:  # else the area is too large for it
+    if finer.field.cell_m >= 0.75 * water.field.cell_m:  # the area is too large for it
+        finer = replace(finer, field=water.field)
+    if finer.field is not water.field or shapely.get_num_coordinates(problem.area.water) > CHART.corners[1][1]:
         water = finer
     return water, plan_room(problem, water, progress)
 
@@ -135,7 +139,10 @@ def ship_on_legs(problem: PlanProblem) -> Capability:
 
 
 def leg_water(problem: PlanProblem, ship: Capability, *, finer: float = 1.0) -> LegWater:
-    """Vessel, weather and water that all legs of the problem share, on a grid so many times finer than usual."""
+    """Vessel, weather and water that all legs of the problem share, on a grid so many times finer than usual.
+
+    A finer water also keeps passages between more islands.
+    """
     return LegWater(
         vessel=problem.vessel,
         environment=problem.environment,
@@ -143,6 +150,7 @@ def leg_water(problem: PlanProblem, ship: Capability, *, finer: float = 1.0) -> 
         area=problem.area,
         clearance_m=problem.settings.clearance_m,
         field=clearance_field(problem.area, resolution_m=problem.vessel.length_m / 8 / finer),
+        corners=CHART.corners if finer == 1.0 else CHART.more_corners,
     )
 
 

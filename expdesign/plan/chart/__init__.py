@@ -10,7 +10,9 @@ from expdesign.plan.chart.goal_distance import (
     taut_bends,
 )
 from expdesign.plan.chart.reachable import connects, reachable, resolved
+from expdesign.plan.chart.tuning import CHART
 from expdesign.plan.chart.visibility_graph import (
+    Corners,
     VisibilityGraph,
     build_visibility_graph,
     polyline_length,
@@ -20,7 +22,9 @@ from expdesign.plan.chart.visibility_graph import (
 )
 
 __all__ = [
+    "CHART",
     "ClearanceField",
+    "Corners",
     "GoalDistance",
     "VisibilityGraph",
     "build_goal_distance",

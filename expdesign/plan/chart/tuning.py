@@ -18,6 +18,7 @@ class Tuning:
         corners: of a simplified water at most, by the least tolerance, in those asked for, at which so many are
             accepted: more make the graph slow, but water that shrinks further loses its passages. A thousand islands
             have four thousand corners, however straight their shores. Water that grows has the first number at most.
+        more_corners: the same, where no path was found through water with so few.
         straight: share of the tolerance by which moved shores are straightened; the rest is for moving them.
         dense: corners of a water above which a coarser one is made of a finer one that was tried, not of the water.
         pairs: of corners that are tested for sight at a time.
@@ -36,6 +37,7 @@ class Tuning:
     least_reach_hulls: float = 60.0
     routing_cells: int = 400_000
     corners: tuple[tuple[float, int], ...] = ((1.0, 700), (16.0, 2500), (128.0, 5000))
+    more_corners: tuple[tuple[float, int], ...] = ((1.0, 700), (16.0, 12000))
     straight: float = 0.98
     dense: int = 16_000
     pairs: int = 1_000_000

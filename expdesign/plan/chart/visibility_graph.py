@@ -20,6 +20,9 @@ from expdesign.plan.chart.tuning import CHART
 from expdesign.sea_area import as_multipolygon, moved
 from expdesign.values import Array
 
+Corners = tuple[tuple[float, int], ...]
+"""Most corners by the least tolerance, in those asked for, at which so many are accepted."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class VisibilityGraph:
@@ -125,9 +128,9 @@ class VisibilityGraph:
 
 
 @lru_cache(maxsize=CHART.kept_graphs)
-def visibility_graph_of(water: shapely.MultiPolygon, tolerance_m: float) -> VisibilityGraph:
+def visibility_graph_of(water: shapely.MultiPolygon, tolerance_m: float, corners: Corners) -> VisibilityGraph:
     """The visibility graph of a water, shrunk until its shore is simple; kept, as remedies ask for it again."""
-    return build_visibility_graph(simplified(water, grow=False, tolerance_m=tolerance_m))
+    return build_visibility_graph(simplified(water, grow=False, tolerance_m=tolerance_m, corners=corners))
 
 
 def build_visibility_graph(water: shapely.Geometry) -> VisibilityGraph:
@@ -156,8 +159,10 @@ def _pairs_in_sight(
     return np.stack([tail[seen], head[seen]])
 
 
-def simplified(water: shapely.MultiPolygon, *, grow: bool, tolerance_m: float) -> shapely.MultiPolygon:
-    """Water with at most `Tuning.corners` corners that contains the given water (`grow`), or lies inside it.
+def simplified(
+    water: shapely.MultiPolygon, *, grow: bool, tolerance_m: float, corners: Corners = ()
+) -> shapely.MultiPolygon:
+    """Water with at most so many corners that contains the given water (`grow`), or lies inside it.
 
     The shore is moved by a tolerance, and straightened by less than that. The tolerance is doubled until few enough
     corners are left: passages narrower than four tolerances may then be lost, or, grown, islands.
@@ -166,14 +171,15 @@ def simplified(water: shapely.MultiPolygon, *, grow: bool, tolerance_m: float) -
         water: polygons.
         grow: whether the result contains the water; else it lies inside.
         tolerance_m: at first.
+        corners: as `Tuning.corners`, which are the default.
     """
-    least_m = tolerance_m
+    least_m, corners = tolerance_m, corners or CHART.corners
     source, moved_m, made = water, 0.0, [(water, 0.0)]
     while True:
         step_m = tolerance_m - moved_m
         simple = _straightened(moved(source, step_m if grow else -step_m), CHART.straight * step_m)
-        most = max(count for times, count in CHART.corners if times * least_m <= tolerance_m)
-        if len(_corners(simple)[0]) <= (CHART.corners[0][1] if grow else most):
+        most = max(count for times, count in corners if times * least_m <= tolerance_m)
+        if len(_corners(simple)[0]) <= (corners[0][1] if grow else most):
             return simple
         made.append((simple, tolerance_m))
         if shapely.get_num_coordinates(source) > CHART.dense:

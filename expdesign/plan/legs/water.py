@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 
 from expdesign.conventions import whole_turns
-from expdesign.plan.chart import ClearanceField, VisibilityGraph, polyline_length, visibility_graph_of
+from expdesign.plan.chart import CHART, ClearanceField, Corners, VisibilityGraph, polyline_length, visibility_graph_of
 from expdesign.plan.control import Capability, arc_spare_m
 from expdesign.plan.legs.tuning import LEGS
 from expdesign.plan.work_budget import WorkBudget
@@ -67,6 +67,7 @@ class LegWater:
         area: allowed water.
         clearance_m: least distance of the hull from anything forbidden.
         field: the same water on a grid.
+        corners: that paths may bend at, as `Tuning.corners` of charts.
     """
 
     vessel: Vessel
@@ -75,6 +76,7 @@ class LegWater:
     area: SeaArea
     clearance_m: float
     field: ClearanceField
+    corners: Corners = CHART.corners
 
     @cached_property
     def safe(self) -> shapely.MultiPolygon:
@@ -101,7 +103,7 @@ class LegWater:
         """For the centre lines of hulls that point along their path, from wide to narrow margins."""
         spares, tolerance_m = self.ship.path_spares_m(self.vessel), self.vessel.length_m / 60
         waters = [self.area.water_to_plan_in(self.clearance_m + spare) for spare in spares]
-        return tuple(visibility_graph_of(water, tolerance_m) for water in waters)
+        return tuple(visibility_graph_of(water, tolerance_m, self.corners) for water in waters)
 
     @property
     def narrowest_graph(self) -> VisibilityGraph:
