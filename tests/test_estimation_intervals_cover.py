@@ -7,6 +7,7 @@ current that wanders for 100 s. Thresholds are the binomial chance error of as m
 
 import numpy as np
 import pytest
+import scipy
 
 from coverage_cases import METHODS, Case, tried
 from estimation_case import (
@@ -76,23 +77,29 @@ def test_intervals_of_every_method_cover_small(case: Case) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("case", TABLE, ids=str)
 def test_intervals_of_every_method_cover(case: Case) -> None:
-    """Each parameter in 88 to 98 of 100 trials, give or take two standard errors; on average in 92 to 97."""
+    """Each parameter in 93 of 100 trials or more, all together in 93 to 97.5; half a per cent of false alarms each.
+
+    The chance of a share is that of so many trials, and of the least of all shares of the table; parameters of an
+    equation err together, so that of the mean of a case is half of one share's.
+    """
     trials = 300
     found = tried(case, trials, seed=33)
-    chance = 2 * np.sqrt(0.95 * 0.05 / trials)
+    chance = np.sqrt(0.95 * 0.05 / trials)
+    worst = -scipy.stats.norm.ppf(0.005 / (len(TABLE) * len(found.names)))
+    sure = -scipy.stats.norm.ppf(0.005 / len(TABLE))
     assert found.failed <= 0.01 * trials
-    assert ((found.held > 0.88 - chance) & (found.held < 0.98 + chance)).all(), found.held
-    assert 0.92 < found.held.mean() < 0.97
+    assert (found.held > 0.93 - worst * chance).all(), found.held
+    assert 0.93 - sure * chance / 2 < found.held.mean() < 0.975 + sure * chance / 2, found.held.mean()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("case", "least"), [("iv", 0.93), ("iv-augmented", 0.93), ("short", 0.93), ("wandering", 0.90)]
+    ("case", "least"), [("iv", 0.93), ("iv-augmented", 0.93), ("short", 0.93), ("wandering", 0.92)]
 )
 def test_intervals_of_every_parameter_cover_between_93_and_97_in_100(case: str, least: float) -> None:
     """Each parameter by itself, give or take two standard errors of the count; all together without any.
 
-    With a wandering current, which the ship's turns modulate, the promise is less: Y_mu was found at 0.91.
+    With a wandering current, of which few memories are seen, the promise is less: X_vr was found at 0.92.
     """
     trials = 1000
     shares = covered(case, trials)

@@ -78,7 +78,10 @@ def _unit(problem: Problem, states: Array) -> float:
     return float(np.min((1 + rho) / (1 - rho))) * max(1.0, level)
 
 
-_RUNS_AWAY = "output error: the best model found diverges within {seconds:.0f} s; try a shorter horizon (--horizon)"
+_RUNS_AWAY = (
+    "output error: the best model found diverges within {seconds:.0f} s, as it does where a current turns the model's "
+    "terms into its own; try a shorter horizon (--horizon), or method iv-augmented, which estimates a mean current"
+)
 
 
 @dataclass(frozen=True, eq=False)
