@@ -64,7 +64,7 @@ class Tuning:
     sailed_shares: tuple[float, ...] = (0.5, 0.0)
     most_searches: int = 8
     most_plans: int = 2
-    remedy_budget: float = 0.2
+    remedy_budget: float = 0.1
     lower_confidences: tuple[float, ...] = (0.9999, 0.9995, 0.999, 0.995, 0.99, 0.98, 0.95, 0.9, 0.8)
     most_left_out: int = 8
     turns_deg: tuple[float, ...] = tuple(15.0 * count for count in range(1, 13))
