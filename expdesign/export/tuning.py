@@ -55,6 +55,7 @@ class Tuning:
         fence_halvings: of the slack by which the fence is simplified, until it keeps to the water.
         draft_poses: of the track of a refused plan at most.
         noticed: relative differences below this are not reported.
+        drawing_loads: how many figures could be drawn while the library for them loads, for the progress told.
     """
 
     agreeing_std: float = 0.10
@@ -100,6 +101,7 @@ class Tuning:
     fence_halvings: int = 12
     draft_poses: int = 2000
     noticed: float = 0.02
+    drawing_loads: float = 3.0
 
 
 TUNING = Tuning()

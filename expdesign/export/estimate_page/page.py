@@ -15,7 +15,9 @@ from expdesign.export.files import fit_table, motion_words, plus_minus
 from expdesign.export.pages import page_templates
 from expdesign.export.pages.figures import report_style
 from expdesign.export.tuning import TUNING
+from expdesign.progress import Progress, in_phases, silent
 
+DRAWING = "drawing the report"
 FACTOR = 1.959964
 """Standard deviations to either side that hold 95 % of a normal distribution."""
 
@@ -44,7 +46,7 @@ class MethodNotes:
     warnings: tuple[str, ...]
 
 
-def estimate_html(content: EstimateContent) -> str:
+def estimate_html(content: EstimateContent, *, progress: Progress = silent) -> str:
     """One HTML page without any outside reference."""
     found = content.found
     methods = [_notes(content, item) for item in found.methods]
@@ -65,21 +67,30 @@ def estimate_html(content: EstimateContent) -> str:
         conditions=conditions(content),
         advice=advice(content),
         notes=[*found.record.notes, *found.tests.notes, *found.left_out],
-        figures=_figures(content),
+        figures=_figures(content, progress),
         sample_time_s=found.record.batches[0].sample_time_s,
     )
 
 
-def _figures(content: EstimateContent) -> dict[str, object]:
+def _figures(content: EstimateContent, progress: Progress) -> dict[str, object]:
     found = content.found
     step = found.record.batches[0].sample_time_s
     names = tuple(batch.name for batch in found.record.batches)
+    loading, drawing = in_phases(progress, TUNING.drawing_loads, 3 + len(found.best.runs))
     with report_style():
+        loading(DRAWING, 1.0)
+        figures: list[object] = []
+
+        def drawn(figure: object) -> object:
+            figures.append(figure)
+            drawing(DRAWING, len(figures) / (3 + len(found.best.runs)))
+            return figure
+
         return {
-            "intervals": interval_figure(found.methods, found.best),
-            "runs": [run_figure(index, content.drawn) for index in range(len(found.best.runs))],
-            "residuals": residual_figure(found.best, names, step),
-            "autocorrelation": autocorrelation_figure(found.best, step),
+            "intervals": drawn(interval_figure(found.methods, found.best)),
+            "runs": [drawn(run_figure(index, content.drawn)) for index in range(len(found.best.runs))],
+            "residuals": drawn(residual_figure(found.best, names, step)),
+            "autocorrelation": drawn(autocorrelation_figure(found.best, step)),
         }
 
 

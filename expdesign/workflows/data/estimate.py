@@ -70,8 +70,8 @@ def estimate(
     )
     record = reduced_data(data, ship, velocity=velocity)
     apart = reduced_data(tests, ship, velocity=velocity) if tests else NO_TESTS
-    found = assess(ship, record, options, tests=apart, progress=within(progress, 0.01, 0.6))
-    progress("drawing the report", 0.65)
+    found = assess(ship, record, options, tests=apart, progress=within(progress, 0.01, 0.7))
+    progress("drawing the report", 0.7)
     command = command_text(
         "estimate",
         data,
@@ -101,7 +101,10 @@ def estimate(
     files = {
         "estimate.json": estimate_json(found, ship),
         "vessel-estimated.toml": estimated_vessel(found, ship, command=command),
-        "estimate.html": estimate_html(EstimateContent(vessel=ship, found=found, command=command, version=__version__)),
+        "estimate.html": estimate_html(
+            EstimateContent(vessel=ship, found=found, command=command, version=__version__),
+            progress=within(progress, 0.7, 0.98),
+        ),
     }
     written = write_files(out or Path("runs") / data[0].stem, files)
     progress("done", 1.0)
