@@ -12,9 +12,10 @@ from expdesign.diagnosis.causes.candidate import Candidate
 from expdesign.diagnosis.data.noise import Noise, fit_ar_noise, linear_basis, whitened
 from expdesign.diagnosis.data.tuning import TUNING
 from expdesign.diagnosis.data.windows import cut_windows
+from expdesign.diagnosis.fit.fit import best_step, continuing, likeliest, log_likelihood_gain, within_stated_std
 from expdesign.diagnosis.fit.gauss_newton import fit
 from expdesign.diagnosis.motion.linearisation import disturbance_of, linearise, responses, term_disturbances
-from expdesign.diagnosis.motion.simulation import initial_states, simulate_windows
+from expdesign.diagnosis.motion.simulation import initial_states, simulate_nearby, simulate_windows
 from expdesign.diagnosis.select.fitted_candidate import fit_candidate
 from expdesign.diagnosis.select.forward_selection import fit_nuisance
 from expdesign.diagnosis.select.score_tests import ScoreTest, _effective_tests, score_tests
@@ -73,7 +74,12 @@ def test_a_warm_start_changes_no_result():
             one = simulate_windows(changed, windows, start + 0.1)
             other = simulate_windows(changed, windows, start + 0.1, warm_start=warm_start)
             assert np.abs(one.states - other.states).max() < 1e-7, (ship, effects)
+            near = simulate_nearby(changed, windows, start + 0.1, warm_start)
+            assert near is None or np.abs(one.states - near.states).max() < 1e-7, (ship, effects)
             assert np.abs(one.heading_change - other.heading_change).max() < 1e-6, (ship, effects)
+        little = extended.with_effects({"gain": 1e-3})
+        assert simulate_nearby(little, windows, start, warm_start) is not None
+        assert simulate_nearby(little, windows, start + 1e6, warm_start) is None
 
 
 def test_shorter_windows_hold_the_same_data():
@@ -92,10 +98,68 @@ def test_shorter_windows_hold_the_same_data():
 def test_causes_have_equal_shares_of_false_alarms():
     """One candidate against twenty, all independent: closed forms; quantiles of 2000 draws have 10 % standard error."""
     roots = [(np.array([index]), np.ones((1, 1))) for index in range(21)]
-    factors = _effective_tests(np.eye(21), roots, ["one", *["many"] * 20], np.random.default_rng(0))
+    candidates = [Candidate(cause=name, free={"gain": 0.0}) for name in ("one", *["many"] * 20)]
+    factors = _effective_tests(np.eye(21), roots, candidates, np.random.default_rng(0))
     every = 0.05 / (1 - 0.95**0.5)
     assert np.allclose(factors[0], every, rtol=0.4)
     assert np.allclose(factors[1:], every * 0.05 / (1 - 0.95**0.05), rtol=0.4)
+
+
+def test_times_that_cannot_be_negative_have_uniform_one_sided_p_values(clean_scores):
+    """In clean data half of the estimates are negative, which is no sign of a dead time or a lag."""
+    for rows in clean_scores.values():
+        one_sided = [p / 2 if step > 0 else 1.0 - p / 2 for p, step in rows]
+        assert kstest(one_sided, "uniform").pvalue > 0.01
+    record = hidden_record("barge", seed=1, batches=3, samples=150)
+    ship = extended_model(vessel_of("barge"), record)
+    windows = cut_windows(ship.model, record)
+    base = fit_nuisance(ship, windows, initial_states(windows))
+    for seconds in (0.5, 2.0):
+        two, one = (
+            score_tests(
+                base, [Candidate(cause="actuator_lag", free={"lag:all": seconds}, finite=True, positive=positive)]
+            )[0]
+            for positive in (False, True)
+        )
+        np.testing.assert_allclose(one.step, two.step)
+        positive = two.step[0] > 0
+        assert one.statistic == pytest.approx(two.statistic if positive else 0.0)
+        assert one.p_value == pytest.approx(two.p_value / 2 if positive else 1.0 - two.p_value / 2)
+
+
+def test_a_step_ends_at_its_bound_and_the_rest_follows():
+    """Two correlated effects, the first of which may not fall: the other takes its own optimum there."""
+    A, score = np.array([[2.0, 1.0], [1.0, 2.0]]), np.array([-3.0, 1.0])
+    free, gain = best_step(A, score, np.array([-np.inf, -np.inf]))
+    np.testing.assert_allclose(free, np.linalg.solve(A, score))
+    assert gain == pytest.approx(score @ free)
+    held, less = best_step(A, score, np.array([-0.5, -np.inf]))
+    np.testing.assert_allclose(held, [-0.5, 0.75])
+    assert less == pytest.approx(2 * score @ held - held @ A @ held)
+    assert less < gain
+
+
+def test_fits_are_compared_under_one_noise_whichever_is_asked_first():
+    """The likelier of two noises: the one with the better model, and a gain is a loss the other way round."""
+    record = hidden_record("barge", seed=5, batches=2, samples=120, effects={"gain": -0.2})
+    ship = extended_model(vessel_of("barge"), record)
+    windows = cut_windows(ship.model, record)
+    base = fit_nuisance(ship, windows, initial_states(windows))
+    found = fit(ship, windows, ("gain",), starts=base.starts, options=continuing(base))
+    assert likeliest((base, found)) is likeliest((found, base)) is found
+    gain = log_likelihood_gain(base, found)
+    assert gain > 100.0
+    assert gain == pytest.approx(-log_likelihood_gain(found, base))
+
+
+def test_parameters_far_beyond_their_standard_deviations_are_told_from_those_within():
+    """Stated to 2 %, N_r is within it where the file is right, and beyond it where the ship's is half as large more."""
+    for factor in (1.0, 1.5):
+        record = hidden_record("barge", seed=5, batches=2, samples=150, factors={"N_r": factor})
+        ship = extended_model(vessel_of("barge", relative_std=0.02), record)
+        windows = cut_windows(ship.model, record)
+        found = fit_nuisance(ship, windows, initial_states(windows))
+        assert within_stated_std(found) == (factor == 1.0)
 
 
 def test_an_autoregression_with_its_white_share_is_whitened():

@@ -31,7 +31,7 @@ from expdesign.diagnosis.conclusions import (
 )
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.discriminating_manoeuvre import Proposal, most_discriminating, standard_proposals
-from expdesign.diagnosis.fit import HeldOut, cross_validate, held_out_gain, unmeasured_force_share
+from expdesign.diagnosis.fit import HeldOut, cross_validate, held_out_gain, unmeasured_force_share, within_stated_std
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import initial_states, simulate_from_measured, stable_windows
 from expdesign.diagnosis.select import (
@@ -162,9 +162,11 @@ def _cross_validated(found: Selection, as_stated: HeldOut, windows: Windows, pro
     The gain of uncertain parameters within their standard deviations is not attributed to a cause. So the model in use
     has them fitted, unless it simulates held-out units well as it is, and better: what a cause repairs of a worse fit
     is no gain. If the first cause is that they exceed their standard deviations, it gets their gain, and the model is
-    not fitted.
+    not fitted. Neither is it where a fit without any cause needs parameters far beyond them: that fit is no model that
+    the vessel file allows.
     """
     fitted = bool(found.first.keys) and not any(only_nuisance(step, found) for step in found.steps[:1])
+    fitted = fitted and (within_stated_std(found.first) or not found.steps)
     fits = [*[found.first] * fitted, *(step.chosen.fit for step in found.steps)]
     results = [as_stated]
     for number, item in enumerate(fits):
@@ -183,7 +185,7 @@ def _simulates_better(as_stated: HeldOut, fitted: HeldOut) -> bool:
 def _gains_within_std(chosen: _Selected, ship: ExtendedModel, seed: int) -> tuple[ErrorReduction, ...]:
     """What uncertain parameters gain within their standard deviations on held-out units; none where that is unclear."""
     gain, (low, _) = held_out_gain(chosen.as_stated, chosen.held[0], seed)
-    if not (gain > LEAST_GAIN_WITHIN_STD and low > 0):
+    if not within_stated_std(chosen.kept.first) or not (gain > LEAST_GAIN_WITHIN_STD and low > 0):
         return ()
     return error_reductions_of(ship.model.outputs, chosen.as_stated, chosen.held[0], seed)
 

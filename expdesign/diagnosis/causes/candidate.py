@@ -18,6 +18,7 @@ class Candidate:
         free: effects to estimate, with a first guess each; zero where the effect is smooth around zero.
         fixed: effects that say which candidate it is, e.g. the roll period.
         finite: the effect is not smooth at zero; it is tried at the first guess as a whole.
+        positive: its size cannot be below zero, so that only a positive one counts as a sign of it.
         grid: effect whose value is found by trying these once the candidate is singled out, as the likelihood has
             corners in it.
         drags: effects that slow the ship down, so that a fit with a positive one is against physics.
@@ -28,6 +29,7 @@ class Candidate:
     free: Mapping[str, float]
     fixed: Mapping[str, float] = field(default_factory=dict)
     finite: bool = False
+    positive: bool = False
     grid: tuple[str, tuple[float, ...]] | None = None
     drags: tuple[str, ...] = ()
     imitates: bool = False

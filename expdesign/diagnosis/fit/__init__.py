@@ -13,7 +13,16 @@ from expdesign.diagnosis.fit.cross_validation import (
     on_common_units,
     validation_units,
 )
-from expdesign.diagnosis.fit.fit import Fit, FitOptions, continuing, deviations_of, log_likelihood_gain, profile_cost
+from expdesign.diagnosis.fit.fit import (
+    Fit,
+    FitOptions,
+    continuing,
+    deviations_of,
+    likeliest,
+    log_likelihood_gain,
+    profile_cost,
+    within_stated_std,
+)
 from expdesign.diagnosis.fit.gauss_newton import fit
 from expdesign.diagnosis.fit.gram_matrices import gram_matrices, information
 from expdesign.diagnosis.fit.linear_model import (
@@ -40,10 +49,12 @@ __all__ = [
     "gram_matrices",
     "held_out_gain",
     "information",
+    "likeliest",
     "log_likelihood_gain",
     "on_common_units",
     "profile_cost",
     "sensitivities_to",
     "unmeasured_force_share",
     "validation_units",
+    "within_stated_std",
 ]

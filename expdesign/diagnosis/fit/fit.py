@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 
 from expdesign.diagnosis.data import Noise
 from expdesign.diagnosis.fit.gram_matrices import GramMatrices, gram_matrices, marginalised
@@ -13,6 +15,11 @@ from expdesign.diagnosis.fit.tuning import TUNING
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import LinearisedMotion
 from expdesign.values import Array
+
+POSITIVE = ("lag:", "delay:")
+"""Effects that are times, from zero on."""
+LEAST_TIME_S = 1e-6
+"""Taken for zero: derivatives are differences upward."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -26,10 +33,11 @@ class Fit:
         covariance: (c, c).
         starts: (w, n) initial states.
         noise: of the remainder.
-        cost: weighted squared error at the end, while fitting.
+        cost: weighted squared error at the end, while fitting; deviance: twice its negative log likelihood, with the
+            size of its own noise.
         linear, sensitivities: at the end; grams: of the sensitivities, under the noise.
         precision: (c,) of the effects' priors.
-        step: (c,) to the optimum of the linear model.
+        step: (c,) to the optimum of the linear model within bounds.
         converged: a further step would not lower the cost noticeably.
         simulations: of all windows that the fit took.
     """
@@ -41,6 +49,7 @@ class Fit:
     starts: Array
     noise: Noise
     cost: float
+    deviance: float
     linear: LinearisedMotion
     sensitivities: Sensitivities
     grams: GramMatrices
@@ -107,9 +116,44 @@ def _prior_std(ship: ExtendedModel) -> dict[str, float]:
     return {**parameters, **ship.stated_std}
 
 
+def lowest_steps(ship: ExtendedModel, keys: tuple[str, ...]) -> Array:
+    """(c,) steps to the bounds of effects that cannot be below zero; -inf for others."""
+    return np.array([LEAST_TIME_S - ship.get(key) if key.startswith(POSITIVE) else -np.inf for key in keys])
+
+
+def best_step(A: Array, score: Array, lowest: Array) -> tuple[Array, float]:
+    """(c,) step to the least cost of a linear model within the bounds, and by how much it lowers the cost.
+
+    What leaves its bounds is held there, and the rest is solved again: an active set that only grows.
+
+    Args:
+        A: (c, c) information.
+        score: (c,).
+        lowest: (c,) least step allowed.
+    """
+    step = np.zeros(len(score))
+    held = np.zeros(len(score), dtype=bool)
+    while len(score):
+        free = ~held
+        step[held] = lowest[held]
+        left = score[free] - A[np.ix_(free, held)] @ step[held]
+        step[free] = np.linalg.lstsq(A[np.ix_(free, free)], left, rcond=None)[0]
+        if not (step < lowest).any():
+            break
+        held |= step < lowest
+    return step, float(2.0 * score @ step - step @ A @ step)
+
+
 def deviations_of(ship: ExtendedModel, keys: tuple[str, ...]) -> Array:
     """(c,) effects less what the vessel file states of them."""
     return np.array([ship.get(key) - ship.stated.get(key, 0.0) for key in keys])
+
+
+def within_stated_std(found: Fit) -> bool:
+    """Whether all effects with a standard deviation in the vessel file are within it, by Bonferroni's inequality."""
+    stated = found.precision > 0.0
+    apart = np.abs(deviations_of(found.ship, found.keys)[stated]) * np.sqrt(found.precision[stated])
+    return bool((2.0 * scipy.stats.norm.sf(apart) * max(stated.sum(), 1) > TUNING.beyond_std_level).all())
 
 
 def profile_cost(found: Fit, noise: Noise) -> float:
@@ -118,10 +162,20 @@ def profile_cost(found: Fit, noise: Noise) -> float:
     m = marginalised(grams, found.sensitivities, noise)
     now = deviations_of(found.ship, found.keys)
     score = m.s - found.precision * now
-    best = score @ np.linalg.lstsq(m.A + np.diag(found.precision), score, rcond=None)[0] if len(now) else 0.0
+    _, best = best_step(m.A + np.diag(found.precision), score, lowest_steps(found.ship, found.keys))
     return float(m.quadratic + found.precision @ now**2 - best)
 
 
-def log_likelihood_gain(base: Fit, found: Fit, judge: Fit) -> float:
-    """Likelihood ratio statistic of `found` against `base`, both under the noise of a third fit."""
-    return profile_cost(base, judge.noise) - profile_cost(found, judge.noise)
+def log_likelihood_gain(base: Fit, found: Fit) -> float:
+    """Likelihood ratio statistic of `found` against `base`, both under the likelier noise of the two."""
+    noise = likeliest((base, found)).noise
+    return profile_cost(base, noise) - profile_cost(found, noise)
+
+
+def likeliest(fits: Sequence[Fit]) -> Fit:
+    """The fit with the largest likelihood, its own noise counted.
+
+    Its noise is the one to compare fits under. Under the noise of a fit that leaves large errors in some channels and
+    small ones in another, that fit would seem to gain.
+    """
+    return min(fits, key=lambda item: item.deviance)

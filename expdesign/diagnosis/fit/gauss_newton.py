@@ -7,14 +7,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from expdesign.diagnosis.data import Noise, Windows
-from expdesign.diagnosis.fit.fit import Fit, FitOptions, deviations_of, prior_precision, uncertain_keys
+from expdesign.diagnosis.fit.fit import (
+    Fit,
+    FitOptions,
+    best_step,
+    deviations_of,
+    lowest_steps,
+    prior_precision,
+    uncertain_keys,
+)
 from expdesign.diagnosis.fit.gram_matrices import gram_matrices, information, marginalised
 from expdesign.diagnosis.fit.linear_model import Sensitivities, sensitivities_to
 from expdesign.diagnosis.fit.noise_estimation import Prior, estimate_noise
 from expdesign.diagnosis.fit.step_limits import after_step
 from expdesign.diagnosis.fit.tuning import TUNING
 from expdesign.diagnosis.model import ExtendedModel
-from expdesign.diagnosis.motion import LinearisedMotion, Motion, linearise, simulate_windows
+from expdesign.diagnosis.motion import LinearisedMotion, Motion, linearise, simulate_nearby, simulate_windows
 from expdesign.values import Array
 
 
@@ -96,27 +104,39 @@ def _weighted(problem: _Problem, point: _Point | Fit, noise: Noise) -> Fit:
     now = deviations_of(point.ship, problem.keys)
     score = m.s - problem.precision * now
     A = m.A + np.diag(problem.precision)
-    gain = float(score @ np.linalg.lstsq(A, score, rcond=None)[0]) if problem.keys else 0.0
-    covariance = _inverse(A)
+    step, gain = best_step(A, score, lowest_steps(point.ship, problem.keys))
+    cost = m.quadratic + float(problem.precision @ now**2)
     return Fit(
         ship=point.ship,
         keys=problem.keys,
         free_count=problem.free_count,
-        covariance=covariance,
+        covariance=_inverse(A),
         starts=point.starts,
         noise=noise,
-        cost=m.quadratic + float(problem.precision @ now**2),
+        cost=cost,
+        deviance=cost + m.log_det + _log_size(point.sensitivities.error, noise),
         linear=point.linear,
         sensitivities=point.sensitivities,
         grams=grams,
         precision=problem.precision,
-        step=covariance @ score,
+        step=step,
         converged=gain < TUNING.converged_below,
     )
 
 
+def _log_size(error: Array, noise: Noise) -> float:
+    """Log determinant of the white noise of all measured samples."""
+    counts = np.isfinite(error[:, noise.order :]).sum(axis=(0, 1))
+    used = (counts > 0) & np.isfinite(noise.std)
+    return float(2.0 * counts[used] @ np.log(noise.std[used]))
+
+
 def _noise(problem: _Problem, point: _Point | Fit, guess: Noise | None) -> Noise:
-    prior = Prior(precision=problem.precision, now=deviations_of(point.ship, problem.keys))
+    prior = Prior(
+        precision=problem.precision,
+        now=deviations_of(point.ship, problem.keys),
+        lowest=lowest_steps(point.ship, problem.keys),
+    )
     grams = point.grams if isinstance(point, Fit) else None
     return estimate_noise(point.sensitivities, prior, guess, grams, ar_order=problem.options.ar_order)
 
@@ -139,8 +159,12 @@ def _line_search(problem: _Problem, best: Fit) -> tuple[Fit | None, int]:
         share = 0.5**halvings
         ship = best.ship.with_effects(after_step(best.ship, best.keys, share * best.step))
         starts = best.starts + share * start_step
-        motion = simulate_windows(ship, problem.windows, starts, warm_start=best.linear)
-        if motion.diverged or (held and _cost_with_weights_of(problem, best, ship, motion.error) > limit):
+        motion = simulate_nearby(ship, problem.windows, starts, best.linear)
+        if (
+            motion is None
+            or motion.diverged
+            or (held and _cost_with_weights_of(problem, best, ship, motion.error) > limit)
+        ):
             continue
         point = _linearised(problem, ship, starts, motion)
         ahead = None if point is None else _weighted(problem, point, best.noise)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from expdesign.diagnosis.data import Noise, channel_std, fit_ar_noise, white_noise
+from expdesign.diagnosis.fit.fit import best_step
 from expdesign.diagnosis.fit.gram_matrices import (
     GramMatrices,
     current_prior,
@@ -29,6 +30,7 @@ class Prior:
 
     precision: Array
     now: Array
+    lowest: Array
 
 
 def estimate_noise(
@@ -65,7 +67,7 @@ def _estimate_random_current(grams: GramMatrices, found: Sensitivities, noise: N
             trial = replace(noise, current_std_mps=std_mps, current_time_s=time_s)
             m = marginalised(grams, found, trial)
             A = m.A + np.diag(prior.precision)
-            cost = m.log_det + m.quadratic - float(m.s @ np.linalg.lstsq(A, m.s, rcond=None)[0])
+            cost = m.log_det + m.quadratic - best_step(A, m.s - prior.precision * prior.now, prior.lowest)[1]
             cost += float(np.linalg.slogdet(A + 1e-12 * np.diag(np.diag(A) + 1e-30))[1])
             if cost < best[0] - 1e-9:
                 best = (cost, trial)
@@ -82,7 +84,7 @@ def _remainder(grams: GramMatrices, found: Sensitivities, noise: Noise, prior: P
     m = marginalised(grams, found, noise)
     c = found.numbers
     score = m.s - prior.precision * prior.now
-    step = np.linalg.lstsq(m.A + np.diag(prior.precision), score, rcond=None)[0] if c else np.zeros(0)
+    step, _ = best_step(m.A + np.diag(prior.precision), score, prior.lowest)
     effects = np.broadcast_to(step, (len(grams.Xe), c))
     if noise.current_std_mps > 0 and found.knot_count:
         ZZ = grams.XX[:, c:, c:] + np.linalg.inv(current_prior(found, noise))

@@ -34,13 +34,14 @@ def after_step(ship: ExtendedModel, keys: Sequence[str], step: Array) -> dict[st
 
 
 def within_bounds(ship: ExtendedModel, effects: dict[str, float]) -> dict[str, float]:
-    """Times and widths stay positive and change by a limited ratio; factors stay positive."""
+    """Times and widths stay positive and change by a limited ratio, but lags and dead times may vanish at once."""
     result = {}
     for key, value in effects.items():
         kind = key.split(":")[0]
         if kind in ("lag", "delay", "deadband") or key in ("roll:period", "roll:damping"):
             before, ratio = ship.get(key), TUNING.largest_ratio
-            value = min(max(value, before / ratio, 1e-6), before * ratio + 1e-6)
+            least = 0.0 if kind in ("lag", "delay") else before / ratio
+            value = min(max(value, least, 1e-6), max(before, 1e-3) * ratio)
         elif kind in ("inertia", "gain", "gyro", "scale"):
             value = max(value, TUNING.smallest_factor_change)
         result[key] = value

@@ -23,6 +23,7 @@ class Tuning:
     largest_sensitivity: beyond it the model counts as unstable.
         smallest_factor_change: factors of inertia, thrust and gyro stay above one plus this.
         largest_ratio: times and widths change by this factor in a step, at most.
+        beyond_std_level: of the test whether parameters are within their stated standard deviations.
         fewest_runs: for cluster-robust standard errors.
         folds: of the cross-validation.
         fold_steps: Gauss-Newton steps from the fit to all units to the fit without a fold.
@@ -44,6 +45,7 @@ class Tuning:
     largest_sensitivity: float = 1e30
     smallest_factor_change: float = -0.8
     largest_ratio: float = 3.0
+    beyond_std_level: float = 1e-3
     fewest_runs: int = 10
     folds: int = 3
     fold_steps: int = 6

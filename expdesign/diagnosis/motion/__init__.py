@@ -9,7 +9,12 @@ from expdesign.diagnosis.motion.linearisation import (
     term_disturbances,
 )
 from expdesign.diagnosis.motion.motion import LinearisedMotion, Motion
-from expdesign.diagnosis.motion.simulation import initial_states, simulate_from_measured, simulate_windows
+from expdesign.diagnosis.motion.simulation import (
+    initial_states,
+    simulate_from_measured,
+    simulate_nearby,
+    simulate_windows,
+)
 from expdesign.diagnosis.motion.window_length import stable_windows
 
 __all__ = [
@@ -21,6 +26,7 @@ __all__ = [
     "linearise",
     "responses",
     "simulate_from_measured",
+    "simulate_nearby",
     "simulate_windows",
     "stable_windows",
     "start_responses",

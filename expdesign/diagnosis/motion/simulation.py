@@ -30,6 +30,25 @@ def simulate_windows(
     with np.errstate(over="ignore", invalid="ignore"):
         states = None if warm_start is None else _newton_over_all_steps(ship, windows, exogenous, start, warm_start)
         states = _step_by_step(ship, windows, exogenous, start) if states is None else states
+    return _motion(ship, windows, exogenous, states)
+
+
+def simulate_nearby(ship: ExtendedModel, windows: Windows, start: Array, near: LinearisedMotion) -> Motion | None:
+    """The same from a similar motion; None where Newton's method does not converge from there, so that it is not near.
+
+    A motion with another number of states is simulated step by step.
+    """
+    if near.motion.states.shape != (len(start), windows.steps, ship.states):
+        return simulate_windows(ship, windows, start)
+    exogenous = exogenous_inputs(ship, windows)
+    with np.errstate(over="ignore", invalid="ignore"):
+        states = _newton_over_all_steps(ship, windows, exogenous, start, near)
+    return None if states is None else _motion(ship, windows, exogenous, states)
+
+
+def _motion(ship: ExtendedModel, windows: Windows, exogenous: ExogenousInputs, states: Array) -> Motion:
+    """Heading and sensor outputs along the states."""
+    with np.errstate(over="ignore", invalid="ignore"):
         turns = runge_kutta_step(
             ship, tuple(np.moveaxis(states[:, :-1], -1, 0)), exogenous.without_last_step(), windows.step_s
         )[1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,7 +10,7 @@ import scipy
 
 from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.data import Windows
-from expdesign.diagnosis.fit import Fit, FitOptions, continuing, fit, log_likelihood_gain, profile_cost
+from expdesign.diagnosis.fit import Fit, FitOptions, continuing, fit, likeliest, log_likelihood_gain, profile_cost
 from expdesign.diagnosis.select.short_windows import start_nearer
 from expdesign.diagnosis.select.starting_point import StartingPoint, joint_keys
 from expdesign.diagnosis.select.tuning import TUNING
@@ -67,7 +68,7 @@ def fit_candidate(
         ship, starts = start_nearer(base, windows, point) if far else nearby
         options = continuing(base, steps=steps)
         found = fit(ship, windows, joint_keys(base, point.keys), starts=starts, options=options)
-        gain = log_likelihood_gain(base, found, found)
+        gain = log_likelihood_gain(base, found)
     except (FloatingPointError, np.linalg.LinAlgError):
         return None
     estimated = len(point.keys) + (point.profiled is not None)
@@ -91,14 +92,12 @@ def fit_to_convergence(base: Fit, windows: Windows, rough: FittedCandidate) -> F
         found = fit(rough.fit.ship, windows, rough.fit.free_keys, starts=rough.fit.starts, options=options)
     except (FloatingPointError, np.linalg.LinAlgError):
         return rough
-    return replace(rough, fit=found).with_gain(log_likelihood_gain(base, found, found))
+    return replace(rough, fit=found).with_gain(log_likelihood_gain(base, found))
 
 
-def ranked_by_gain(base: Fit, fitted: list[FittedCandidate]) -> list[FittedCandidate]:
-    """Candidates by penalised gain, all under the noise of the best."""
-    if not fitted:
-        return []
-    judge = max(fitted, key=lambda item: item.penalised_gain).fit
-    without = profile_cost(base, judge.noise)
-    results = [item.with_gain(without - profile_cost(item.fit, judge.noise)) for item in fitted]
+def ranked_by_gain(base: Fit, fitted: Sequence[FittedCandidate]) -> list[FittedCandidate]:
+    """Candidates by penalised gain, all under the noise of the likeliest."""
+    noise = likeliest([base, *(item.fit for item in fitted)]).noise
+    without = profile_cost(base, noise)
+    results = [item.with_gain(without - profile_cost(item.fit, noise)) for item in fitted]
     return sorted(results, key=lambda item: -item.penalised_gain)

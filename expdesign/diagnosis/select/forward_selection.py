@@ -120,9 +120,7 @@ def _smaller_causes(block: Step, search: _Search) -> list[Step]:
         base = step.chosen.fit
     if all(step.chosen.candidate.cause == "parameters" for step in path):
         return [block]
-    whole, other = block.chosen.fit, base
-    advantage = max(log_likelihood_gain(whole, other, judge) for judge in (whole, other))
-    return path if advantage - TUNING.price * (count - size) > 0 else [block]
+    return path if log_likelihood_gain(block.chosen.fit, base) - TUNING.price * (count - size) > 0 else [block]
 
 
 def _exchange(steps: list[Step], search: _Search) -> list[Step] | None:
@@ -139,11 +137,11 @@ def _exchange(steps: list[Step], search: _Search) -> list[Step] | None:
 
 
 def _gains_more(new: FittedCandidate, old: FittedCandidate, whole: Fit) -> bool:
-    """Whether the new cause gains more under the noise of either fit; `whole` is the fit with the old one."""
+    """Whether the new cause gains more; `whole` is the fit with the old one."""
     if same_effects_as_any(new.candidate, [old.candidate]):
         return False
     extra_price = (new.likelihood_gain - new.penalised_gain) - (old.likelihood_gain - old.penalised_gain)
-    return min(log_likelihood_gain(whole, new.fit, judge) for judge in (whole, new.fit)) > extra_price
+    return log_likelihood_gain(whole, new.fit) > extra_price
 
 
 def _with_joint_profiles(steps: list[Step]) -> list[Step]:

@@ -38,7 +38,7 @@ def with_profile_estimate(chosen: FittedCandidate, base: Fit) -> FittedCandidate
         return chosen
     key, std = chosen.profiled
     found, std = profile_estimate(chosen.fit, key, std)
-    return replace(chosen, fit=found, profiled=(key, std)).with_gain(log_likelihood_gain(base, found, found))
+    return replace(chosen, fit=found, profiled=(key, std)).with_gain(log_likelihood_gain(base, found))
 
 
 def profile_estimate(found: Fit, key: str, std: float) -> tuple[Fit, float]:

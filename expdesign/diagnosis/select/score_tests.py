@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import scipy
@@ -81,13 +82,20 @@ def score_tests(
             continue  # indistinguishable from the effects that the model already has
         root = vectors / np.sqrt(values)
         z = root.T @ (scores.s[index] / size)
-        statistic = float(z @ z)
-        p_value = float(scipy.stats.chi2.sf(statistic, len(index)))
-        tests.append(ScoreTest(candidate=candidate, statistic=statistic, p_value=p_value, step=(root @ z) / size))
+        step = (root @ z) / size
+        against = candidate.positive and step[0] < 0.0
+        beyond = _p_value(float(z @ z), len(index), positive=candidate.positive)
+        tests.append(
+            ScoreTest(
+                candidate=candidate,
+                statistic=0.0 if against else float(z @ z),
+                p_value=1.0 - beyond if against else beyond,
+                step=step,
+            )
+        )
         roots.append((index, root / size[:, None]))
     if tests and rng is not None:
-        causes = [item.candidate.cause.split(":")[0] for item in tests]
-        multiplicity = _effective_tests(scores.A, roots, causes, rng)
+        multiplicity = _effective_tests(scores.A, roots, [item.candidate for item in tests], rng)
         tests = [replace(item, multiplicity=number) for item, number in zip(tests, multiplicity, strict=True)]
     return tuple(sorted(tests, key=lambda item: item.p_value * item.multiplicity))
 
@@ -118,21 +126,31 @@ def _scores(base: Fit, candidates: Sequence[Candidate]) -> _Scores:
     return _Scores(A=A, s=s, size=size, index=tuple(np.array(rows) - c for rows in places))
 
 
+def _p_value(statistic: Any, freedom: int, *, positive: bool) -> Any:
+    """Of a chi-squared statistic; of sizes that cannot be below zero, one-sided.
+
+    Source: H. Chernoff, Annals of Mathematical Statistics 25 (1954), 573-578, for a size at its bound.
+    """
+    return scipy.stats.chi2.sf(statistic, freedom) / (2.0 if positive else 1.0)
+
+
 def _effective_tests(
-    A: Array, roots: list[tuple[Array, Array]], causes: Sequence[str], rng: np.random.Generator
+    A: Array, roots: list[tuple[Array, Array]], candidates: Sequence[Candidate], rng: np.random.Generator
 ) -> list[float]:
     """Factor of every p-value, for the candidates of its cause and for the number of causes."""
     size = np.sqrt(np.maximum(np.diag(A), 1e-300))  # sizes may span more digits than floating-point numbers
     values, vectors = np.linalg.eigh((A + A.T) / 2 / np.outer(size, size))
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     drawn = rng.standard_normal((TUNING.draws, len(A))) @ root.T * size
-    largest: dict[tuple[str, int], Array] = {}
-    for cause, (index, own_root) in zip(causes, roots, strict=True):
-        statistic, key = ((drawn[:, index] @ own_root) ** 2).sum(axis=1), (cause, len(index))
+    causes = [item.cause.split(":")[0] for item in candidates]
+    largest: dict[tuple[str, int, bool], Array] = {}
+    for cause, candidate, (index, own_root) in zip(causes, candidates, roots, strict=True):
+        z, key = drawn[:, index] @ own_root, (cause, len(index), candidate.positive)
+        statistic = ((z * np.sign(own_root).T > 0.0)[:, 0] if candidate.positive else 1.0) * (z**2).sum(axis=1)
         largest[key] = np.maximum(largest[key], statistic) if key in largest else statistic
     smallest: dict[str, Array] = {}
-    for (cause, freedom), statistic in largest.items():
-        p_values = scipy.stats.chi2.sf(statistic, freedom)
+    for (cause, freedom, positive), statistic in largest.items():
+        p_values = np.where(statistic > 0.0, _p_value(statistic, freedom, positive=positive), 1.0)
         smallest[cause] = np.minimum(smallest[cause], p_values) if cause in smallest else p_values
     own = {cause: _inflation(p_values) for cause, p_values in smallest.items()}
     every = _inflation(np.min([own[cause] * p_values for cause, p_values in smallest.items()], axis=0))

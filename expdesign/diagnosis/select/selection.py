@@ -70,7 +70,7 @@ def redundant_step(steps: list[Step], windows: Windows) -> int | None:
         reduced = _fit_without(whole, step, windows)
         if reduced is None:
             continue
-        lost, count = log_likelihood_gain(reduced, whole, whole), len(_own_effects(step))
+        lost, count = log_likelihood_gain(reduced, whole), len(_own_effects(step))
         p_value = step.chosen.multiplicity * float(scipy.stats.chi2.sf(max(lost, 0.0), max(1, count)))
         if p_value > TUNING.level or lost < TUNING.price * count:
             return index

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from expdesign.diagnosis.data import Windows, channel_std
-from expdesign.diagnosis.fit import Fit, FitOptions, fit, log_likelihood_gain
+from expdesign.diagnosis.fit import Fit, FitOptions, fit, likeliest, profile_cost
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import initial_states, simulate_windows
 from expdesign.diagnosis.select.score_tests import ScoreTest
@@ -45,11 +45,9 @@ def start_in_short_windows(short_fit: Fit, shortlist: Sequence[ScoreTest], certa
     """
     points = [starting_point(short_fit, test) for test in shortlist]
     fits = [_fit_in_short_windows(short_fit, point) for point in points]
-    own = [-np.inf if found is None else log_likelihood_gain(short_fit, found, found) for found in fits]
-    judge = fits[int(np.argmax(own))]
-    if judge is None:
-        return points
-    gains = [-np.inf if found is None else log_likelihood_gain(short_fit, found, judge) for found in fits]
+    noise = likeliest([short_fit, *(found for found in fits if found is not None)]).noise
+    without = profile_cost(short_fit, noise)
+    gains = [-np.inf if found is None else without - profile_cost(found, noise) for found in fits]
     return [
         point
         if found is None

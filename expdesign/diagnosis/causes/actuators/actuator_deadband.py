@@ -35,7 +35,7 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
         key = f"deadband:{group}"
         grid = tuple(between(np.quantile(levels, np.linspace(0.0, SHARE, COUNT)), levels))
         found += [
-            Candidate(cause="actuator_deadband", free={key: float(width)}, finite=True, grid=(key, grid))
+            Candidate(cause="actuator_deadband", free={key: float(width)}, finite=True, positive=True, grid=(key, grid))
             for width in between(np.quantile(sizes[sizes > 0], QUANTILES), levels)
         ]
     return tuple(found)

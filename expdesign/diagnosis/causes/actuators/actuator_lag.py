@@ -31,7 +31,7 @@ def followers(situation: Situation, kind: str, cause: str) -> tuple[Candidate, .
         key = f"{kind}:{group}"
         stated = situation.ship.stated.get(key)
         times = [sample * number for number in SAMPLES] if stated is None else [stated * share for share in SHARES]
-        found += [Candidate(cause=cause, free={key: time}, finite=True) for time in times]
+        found += [Candidate(cause=cause, free={key: time}, finite=True, positive=stated is None) for time in times]
     return tuple(found)
 
 
