@@ -10,6 +10,7 @@ import scipy.optimize
 from expdesign.durations import Collected, DurationProblem, optimal_shares
 from expdesign.errors import NoAnswer
 from expdesign.shortest_day import Accuracy, cheapest_runs
+from expdesign.shortest_day.alternate import promised_at_zero
 from expdesign.shortest_day.cheapest import Offer, cheapest_shares
 
 PARAMETERS = ("X_u", "Y_v", "N_r")
@@ -185,3 +186,9 @@ def test_an_outcome_is_as_accurate_as_the_parameters_along_its_gradient():
     draws = rng.multivariate_normal(np.zeros(3), np.linalg.inv(M), size=200_000) @ gradient
     assert asked.margin(M) == pytest.approx(-np.log(draws.var()), abs=5 * np.sqrt(2 / len(draws)))
     assert asked.scarcest(M) == "advance_m"
+
+
+def test_the_promise_of_a_day_that_just_reaches_lies_between_the_nearest_on_both_sides():
+    assert promised_at_zero([0.3, 0.8, 0.5], [-0.5, 0.8, -0.1]) == pytest.approx(0.5 + 0.3 * 0.1 / 0.9)
+    assert promised_at_zero([0.3, 0.5], [-0.5, -0.1]) == pytest.approx(0.6)
+    assert promised_at_zero([0.3], [0.2]) == pytest.approx(0.1)

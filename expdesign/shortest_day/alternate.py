@@ -203,13 +203,12 @@ class _Search:
         return track_information(self.problem.vessel, durations, weather, sailed)
 
     def prices(self, days: Sequence[DraftedDay]) -> Prices:
-        """Prices by the days so far; the level is raised by what they promised too much on average."""
+        """Prices by the days so far; the level is what they promise where the accuracy is just reached."""
         prices = learnt_prices(self.problem.primitives, days)
         promised = [
             self.accuracy.margin(self.offer(prices).information(np.array(day.repeats, dtype=float))) for day in days
         ]
-        short = np.mean([more - day.margin for more, day in zip(promised, days, strict=True)])
-        return replace(prices, level=float(short))
+        return replace(prices, level=promised_at_zero(promised, [day.margin for day in days]))
 
     def design(self, repeats: Sequence[int]) -> DurationDesign:
         """The reference with other runs; together with legs they may tell what they cannot alone."""
@@ -305,6 +304,20 @@ class _Search:
             f"design.accuracy.most_s is {most_s:g}: the shortest day found that reaches the accuracy takes "
             f"{day.day_s:.0f} s{about}; a larger most_s or less accuracy would do"
         )
+
+
+def promised_at_zero(promised: Sequence[float], margins: Sequence[float]) -> float:
+    """The promise of a day whose margin is zero: between the nearest days that reach it and that do not.
+
+    Where all days are on one side, the nearest one's promise less its margin.
+    """
+    order = np.argsort(np.abs(margins), kind="stable").tolist()
+    short, enough = ([k for k in order if (margins[k] >= 0) == reached] for reached in (False, True))
+    if not (short and enough):
+        return float(promised[order[0]] - margins[order[0]])
+    low, high = short[0], enough[0]
+    share = -margins[low] / (margins[high] - margins[low])
+    return float(promised[low] + share * (promised[high] - promised[low]))
 
 
 def _parts(draft: Draft, plan: Plan) -> DayParts:
