@@ -54,7 +54,7 @@ def test_motion_astern_is_reported_astern():
 
 
 @pytest.mark.parametrize("command", ["score", "durations", "plan", "run"])
-def test_the_commands_end_with_status_3_and_write_no_results(command, tmp_path, capsys):
+def test_the_commands_end_with_status_3_and_write_nothing(command, tmp_path, capsys):
     (tmp_path / "fast.toml").write_text(
         '[dictionary]\nname = "fast"\n[[primitives]]\nname = "too-fast"\nfamily = "zigzag_heading"\n'
         "duration_s = 100.0\nspeed_mps = 8.5\n"
@@ -68,5 +68,4 @@ def test_the_commands_end_with_status_3_and_write_no_results(command, tmp_path, 
     assert "primitive 'too-fast'" in line
     assert "cannot hold 8.5 m/s" in line
     assert re.search(r"reaches 6\.95\d? m/s", line)
-    left = {path.name for path in (tmp_path / "out").iterdir()} if (tmp_path / "out").exists() else set()
-    assert left == ({"refused.html", "refused.json"} if command in ("plan", "run") else set())
+    assert not (tmp_path / "out").exists()

@@ -273,6 +273,15 @@ def test_uncertainties_are_those_of_the_whole_track_and_of_the_runs() -> None:
     assert [row.less for row in rows] == [0 < a < b for a, b in zip(found.before, found.track, strict=True)]
 
 
+@pytest.mark.usefixtures("_no_figures")
+@pytest.mark.parametrize("std_mps", [0.0, 0.15])
+def test_a_steady_current_that_nobody_knows_is_said_not_to_be_counted(std_mps: float) -> None:
+    content = noisy_content()
+    forecast = replace(content.environment, current_std_mps=std_mps)
+    told = Page(report_html(replace(content, environment=forecast))).text
+    assert ("No accuracy on this page counts it" in told) == (std_mps > 0)
+
+
 def growth_of(name: str) -> Growth:
     """Two additions; the numbers are only to be found again."""
     rounds = tuple(

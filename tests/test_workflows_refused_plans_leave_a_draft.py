@@ -81,14 +81,10 @@ def test_a_draft_that_cannot_be_deleted_is_named_in_one_line(tmp_path, monkeypat
     assert note == f"cannot be deleted, is of no use: {tmp_path / 'refused.html'} (Permission denied)"
 
 
-def test_refusals_of_other_steps_leave_a_draft_with_the_chart(tmp_path):
-    with (
-        pytest.raises(NotInformative) as caught,
-        drafted(load_scenario(SCENARIOS / "story.toml"), tmp_path, command=""),
-    ):
-        raise NotInformative("nothing is known", parameters=("X_u",))
-    assert str(caught.value) == f"nothing is known; the draft is {tmp_path / 'refused.html'}"
-    assert json.loads((tmp_path / "refused.json").read_text("utf-8"))["obstacle"] == "nothing is known"
+def test_other_refusals_leave_nothing(tmp_path):
+    with pytest.raises(NotInformative), drafted(load_scenario(SCENARIOS / "story.toml"), tmp_path / "out", command=""):
+        raise NotInformative("nothing is known")
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_refused_command_ends_with_status_3_one_line_and_the_draft(tmp_path, capsys):

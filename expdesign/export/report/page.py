@@ -21,7 +21,14 @@ from expdesign.export.report.figures.timeline import timeline_figure
 from expdesign.export.report.figures.uncertainty import uncertainty_figure
 from expdesign.export.report.glossary import GLOSSARY
 from expdesign.export.report.growth import growth_rows, growth_sentences
-from expdesign.export.report.parameters import Expected, equation_sentence, expected, measures_velocity, parameter_rows
+from expdesign.export.report.parameters import (
+    Expected,
+    equation_sentence,
+    expected,
+    measures_velocity,
+    parameter_rows,
+    unknown_current_sentence,
+)
 from expdesign.export.report.procedure import day_sentence, procedure_sentences
 from expdesign.export.report.progress import known_rows, known_sentences
 from expdesign.export.report.trust import chain
@@ -86,6 +93,7 @@ def report_html(content: ReportContent) -> str:
         origin=_origin(content),
         percent=words.percent,
         equation=equation_sentence(content),
+        unknown_current=unknown_current_sentence(content),
         less=any(row.less for row in rows),
         excitation=tables.excitation_sentence(content),
     )

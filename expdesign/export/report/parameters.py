@@ -78,6 +78,17 @@ def equation_sentence(content: ReportContent) -> str:
     return units
 
 
+def unknown_current_sentence(content: ReportContent) -> str:
+    """That an unknown steady current is not counted; "" where the forecast leaves none."""
+    std_mps = content.environment.current_std_mps
+    if std_mps <= 0:
+        return ""
+    return (
+        f"The forecast leaves a steady current of {words.speed(std_mps)} (standard deviation) unknown. No accuracy on "
+        "this page counts it. Unless it is measured or estimated with the parameters, errors can be many times larger."
+    )
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Expected:
     """Standard deviations (p,) in the order of the parameters.

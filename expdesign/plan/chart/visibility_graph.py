@@ -160,7 +160,7 @@ def _pairs_in_sight(
 
 
 def simplified(
-    water: shapely.MultiPolygon, *, grow: bool, tolerance_m: float, corners: Corners = ()
+    water: shapely.MultiPolygon, *, grow: bool, tolerance_m: float, corners: Corners = CHART.corners
 ) -> shapely.MultiPolygon:
     """Water with at most so many corners that contains the given water (`grow`), or lies inside it.
 
@@ -171,9 +171,9 @@ def simplified(
         water: polygons.
         grow: whether the result contains the water; else it lies inside.
         tolerance_m: at first.
-        corners: as `Tuning.corners`, which are the default.
+        corners: as `Tuning.corners`.
     """
-    least_m, corners = tolerance_m, corners or CHART.corners
+    least_m = tolerance_m
     source, moved_m, made = water, 0.0, [(water, 0.0)]
     while True:
         step_m = tolerance_m - moved_m

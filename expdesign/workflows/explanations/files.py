@@ -35,8 +35,8 @@ REFUSED = (
     "A plan that is refused ends with exit status 3 and leaves a draft, refused.html and refused.json: what stands in "
     "the way and where, what was tried, and a change of one key with which the test that failed passes. A draft is no "
     "plan and has no route. Remedies are checked with a part of the work of planning; what was not tried is named. "
-    "Limits that leave no durations leave a draft, too. Results of an earlier attempt in the same folder stay; "
-    "the draft names them. A plan that is found takes the draft away, or a note says why it stays."
+    "Results of an earlier attempt in the same folder stay; the draft names them. A plan that is found takes "
+    "the draft away, or a note says why it stays."
 )
 
 

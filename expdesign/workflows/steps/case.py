@@ -7,7 +7,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from expdesign import __version__
-from expdesign.errors import FileError, NoAnswer, NoPlan
+from expdesign.errors import FileError, NoPlan
 from expdesign.export import write_files
 from expdesign.progress import Progress
 from expdesign.scenario import Scenario, load_scenario
@@ -57,25 +57,17 @@ def _undeleted(folder: Path) -> tuple[str, ...]:
 def drafted(case: Scenario, out: Path | None, *, command: str) -> Iterator[None]:
     """Leave a draft in `out`, or in runs/<scenario>, where the block refuses a plan; the refusal names it.
 
-    So do other refusals, such as of limits of the design. Results of an earlier attempt stay there, and the draft says
-    that they are none of this one.
+    Results of an earlier attempt stay there, and the draft says that they are none of this one. Other refusals have
+    nothing to show on a chart.
     """
     folder = out or Path("runs") / case.name
     try:
         yield
     except NoPlan as error:
         with suppress(FileError):  # the refusal matters more
-            error.remedies += (f"the draft is {_draft(case, folder, error, command)}",)
+            path = write_files(folder, _files(case, folder, error, command))[-1]
+            error.remedies += (f"the draft is {path}",)
         raise
-    except NoAnswer as error:
-        with suppress(FileError):
-            error.args = (f"{error}; the draft is {_draft(case, folder, NoPlan(str(error)), command)}",)
-        raise
-
-
-def _draft(case: Scenario, folder: Path, error: NoPlan, command: str) -> Path:
-    """The page of a draft, written."""
-    return write_files(folder, _files(case, folder, error, command))[-1]
 
 
 def _files(case: Scenario, folder: Path, error: NoPlan, command: str) -> dict[str, str | bytes]:
