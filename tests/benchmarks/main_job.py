@@ -1,10 +1,10 @@
 """Processor seconds of the main job by phase, release by release, beside a fixed baseline measured in the same run.
 
 ``python tests/benchmarks/main_job.py [SCENARIO.toml ...]``, by default all examples; each is run by a process of its
-own. The phases are those of `counted_work`, after the start of Python. Seconds count all processes of the job, whatever
-else the machine does meanwhile; work that other processes have begun ahead counts where it is done. The last column but
-two is the sum in multiples of the baseline (`baseline.py`), by which machines compare; memory is that of the largest
-process, and of all together, what they share counted once (Linux).
+own, without remembered results. The phases are those of `counted_work`, after the start of Python. Seconds count all
+processes of the job, whatever else the machine does meanwhile; work that other processes have begun ahead counts where
+it is done. The last column but two is the sum in multiples of the baseline (`baseline.py`), by which machines compare;
+memory is that of the largest process, and of all together, what they share counted once (Linux).
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ def measured(scenario: Path) -> MainJob:
     with tempfile.TemporaryDirectory() as folder:
         run = workflows.run
         reach("design")
-        outcome = run(scenario, Path(folder), jobs=0, progress=progress)
+        outcome = run(scenario, Path(folder), jobs=0, cache=False, progress=progress)
         reach("files")
     usage = [resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return MainJob(phase_s=dict(spent), peak_mib=max(usage) / 1024, summary=dict(outcome.summary))
