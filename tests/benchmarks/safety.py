@@ -13,6 +13,7 @@ ship is. The last shows what the procedure is worth. A table in Markdown ends th
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -22,7 +23,7 @@ import numpy as np
 
 from expdesign import workflows
 from expdesign.plan import Plan
-from expdesign.plan.assembly import leg_water
+from expdesign.plan.assembly import leg_water, ship_on_legs
 from expdesign.plan.legs.water import LegWater
 from expdesign.plan.monte_carlo import trials
 from expdesign.plan.monte_carlo.procedure import Tolerances
@@ -75,7 +76,8 @@ def sailed(water: LegWater, plan: Plan, *, draws: int, breaks: bool, rng: np.ran
 def water_of(case: Scenario, plan: Plan) -> LegWater:
     """Vessel, weather and water of the plan."""
     information = workflows.scored(case)
-    return leg_water(plan_problem(case, information, workflows.designed(case, information)))
+    problem = plan_problem(case, information, workflows.designed(case, information))
+    return leg_water(problem, ship_on_legs(problem))
 
 
 def row(name: str, kind: str, found: RiskEstimate, planned_s: float) -> str:
@@ -118,6 +120,6 @@ if __name__ == "__main__":
     with shared_work(chosen):
         for rows, told in in_order(report, (chosen.draws,), ((path,) for path in chosen.scenarios)):
             lines += rows
-            print(*told, sep="\n", flush=True)
+            print(*told, sep="\n", file=sys.stderr, flush=True)
     print("\n| scenario | weather | left water (95 %) | aborted | plan | extra time, median | extra time, 95 % |")
     print("|---|---|---|---|---|---|---|", *lines, sep="\n")
