@@ -18,9 +18,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import Bounds, LinearConstraint, linprog, milp
+from scipy.optimize import linprog
 
 from expdesign.errors import NoAnswer
+from expdesign.shortest_day._highs import cheapest_whole
 from expdesign.shortest_day.accuracy import Accuracy
 from expdesign.shortest_day.tuning import TUNING
 from expdesign.values import Array, seal
@@ -106,14 +107,8 @@ def cheapest_runs(accuracy: Accuracy, offer: Offer, *, level: float = 0.0) -> Ch
     bound_s = _relaxed(cuts).bound_s
     for _ in range(TUNING.cuts):
         A, b = cuts.rows
-        found = milp(
-            cuts.cost_s,
-            constraints=LinearConstraint(A, lb=b),
-            bounds=Bounds(*cuts.bounds),
-            integrality=np.r_[np.ones(len(offer.cost_s)), 0.0],
-            options={"mip_rel_gap": TUNING.choice_gap, "node_limit": TUNING.choice_nodes, "presolve": False},
-        )
-        runs = offer.most if found.x is None else np.rint(found.x[:-1])  # most reaches the level, and is thinned out
+        found = cheapest_whole(cuts.cost_s, A, b, cuts.bounds, len(offer.cost_s))
+        runs = offer.most if found is None else np.rint(found[:-1])  # most reaches the level, and is thinned out
         if accuracy.margin(offer.information(runs)) >= level - TUNING.reached:
             break
         cuts.add(runs)
