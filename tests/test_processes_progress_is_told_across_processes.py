@@ -21,8 +21,8 @@ def told_work(name, progress):
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_shares_of_all_tasks_are_told_together_and_never_fall(jobs):
     told = []
-    with local_processes(jobs), told_together(lambda *what: told.append(what), 2) as tellers:
-        for number in as_finished(told_work, (), zip("ab", tellers, strict=True)):
+    with local_processes(jobs), told_together(lambda *what: told.append(what), 2) as together:
+        for number in as_finished(told_work, (), zip("ab", together.tellers, strict=True)):
             assert number == STEPS - 1
     activities, shares = zip(*told, strict=True)
     assert set(activities) == {"a at work", "b at work"}
@@ -38,8 +38,15 @@ def test_the_share_is_that_of_the_time():
     assert _elapsed(1.0, 2, 8) == 1.0 / 2
 
 
+def test_a_finished_task_is_told_at_once():
+    told = []
+    with told_together(lambda *what: told.append(what), 2) as together:
+        together.finished(1, "b is done")
+        assert told == [("b is done", 0.5)]
+
+
 def test_tasks_without_a_way_back_work_in_silence(tmp_path):
-    with told_together(lambda *_: None, 1) as (teller,):
-        pass
+    with told_together(lambda *_: None, 1) as together:
+        (teller,) = together.tellers
     teller("at work", 0.5)  # as on another machine: the file is not there
     assert not teller.path.exists()

@@ -7,7 +7,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from threading import Event, Thread
+from threading import Event, Lock, Thread
 
 from joblib import effective_n_jobs
 
@@ -38,32 +38,56 @@ class Teller:
         return (float(share), activity) if activity else (0.0, "")
 
 
+class Together:
+    """Progress of tasks begun in this order, of about the same length.
+
+    Attributes:
+        tellers: one for each task.
+    """
+
+    def __init__(self, progress: Progress, tellers: tuple[Teller, ...], at_once: int) -> None:
+        """Nothing is told yet; so many tasks are worked on at once."""
+        self.tellers, self._progress, self._at_once = tellers, progress, at_once
+        self._known, self._looking = [teller.last() for teller in tellers], Lock()
+
+    def look(self) -> None:
+        """Tell what is new."""
+        with self._looking:
+            for number, teller in enumerate(self.tellers):
+                if (new := teller.last()) != self._known[number]:
+                    self._known[number] = new
+                    done = sum(share for share, _ in self._known)
+                    self._progress(new[1], _elapsed(done, len(self._known), self._at_once))
+
+    def finished(self, number: int, activity: str) -> None:
+        """Tell at once that a task is finished."""
+        self.tellers[number](activity, 1.0)
+        self.look()
+
+
 @contextmanager
-def told_together(progress: Progress, count: int) -> Iterator[tuple[Teller, ...]]:
+def told_together(progress: Progress, count: int) -> Iterator[Together]:
     """Progress of so many tasks, begun in this order, of about the same length: told while this block lasts."""
     with TemporaryDirectory(prefix="expdesign-") as folder:
         tellers = tuple(Teller(Path(folder) / str(number)) for number in range(count))
         for teller in tellers:
             teller.path.touch()
-        ended = Event()
-        listener = Thread(target=_listen, args=(progress, tellers, effective_n_jobs(None), ended), daemon=True)
+        together, ended = Together(progress, tellers, effective_n_jobs(None)), Event()
+        listener = Thread(target=_listen, args=(together, ended), daemon=True)
         listener.start()
         try:
-            yield tellers
+            yield together
         finally:
             ended.set()
             listener.join()
 
 
-def _listen(progress: Progress, tellers: tuple[Teller, ...], at_once: int, ended: Event) -> None:
-    """Tell what is new, the last of it after the end."""
-    known, listening = [teller.last() for teller in tellers], True
+def _listen(together: Together, ended: Event) -> None:
+    """Look for what is new until the end, and once after it."""
+    listening = True
     while listening:
         listening = not ended.wait(TELLING.look_s)
-        for number, teller in enumerate(tellers):
-            if (new := teller.last()) != known[number]:
-                known[number] = new
-                progress(new[1], _elapsed(sum(share for share, _ in known), len(known), at_once))
+        together.look()
 
 
 def _elapsed(done: float, count: int, at_once: int) -> float:

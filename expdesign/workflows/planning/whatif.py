@@ -79,12 +79,12 @@ def whatif(
     with (
         remembering(memory),
         workers(jobs, scheduler=scheduler, load=load_plans),
-        told_together(within(progress, 0.0, WORKED), len(cases)) as tellers,
+        told_together(within(progress, 0.0, WORKED), len(cases)) as together,
     ):
-        tasks = [(*case, teller) for case, teller in zip(cases, tellers, strict=True)]
+        tasks = [(*case, teller) for case, teller in zip(cases, together.tellers, strict=True)]
         for found in as_finished(_case, (with_plan, seed, memory), tasks):
             done[found.name] = found
-            tellers[names.index(found.name)](f"{found.name} is done", 1.0)
+            together.finished(names.index(found.name), f"{found.name} is done")
     content = WhatIfContent(
         cases=tuple(done[name] for name in names),
         planned=with_plan,
