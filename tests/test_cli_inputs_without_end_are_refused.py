@@ -6,6 +6,7 @@ import os
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -31,6 +32,12 @@ def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
     return line
 
 
+def _device(path: Path) -> None:
+    path.symlink_to("/dev/zero")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="makes devices and pipes")
+@pytest.mark.parametrize(("make", "kind"), [(_device, "a device"), (os.mkfifo, "a pipe")])
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -46,14 +53,19 @@ def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
     ],
     ids=lambda arguments: arguments[0],
 )
-def test_a_device_is_no_input(
-    arguments: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def test_devices_and_pipes_are_no_input(
+    make: Callable[[Path], None],
+    kind: str,
+    arguments: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
     endless = tmp_path / "endless.rtz"
-    endless.symlink_to("/dev/zero")
+    make(endless)
     line = refused([part.format(endless) for part in arguments], capsys)
-    assert "endless.rtz: is a device, expected" in line
+    assert f"endless.rtz: is {kind}, expected" in line
     assert list(tmp_path.iterdir()) == [endless]
 
 
@@ -85,8 +97,9 @@ def test_a_list_of_very_many_settings_is_counted_in_linear_time(tmp_path: Path) 
 
 
 def test_more_simulated_trials_than_end_in_a_day_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    line = refused(["validate", str(SCENARIOS / "harbour.toml"), "--trials", "200000"], capsys)
-    assert "'--trials': Input should be less than or equal to 100000" in line
+    for command, option in (("validate", "--trials"), ("durations", "--monte-carlo")):
+        line = refused([command, str(SCENARIOS / "harbour.toml"), option, "200000"], capsys)
+        assert f"'{option}': Input should be less than or equal to 100000" in line
 
 
 def test_a_route_of_very_many_waypoints_is_checked_in_linear_time() -> None:
@@ -162,6 +175,7 @@ def test_what_is_no_plan_is_told_which_command_makes_one(
     path.write_text("[scenario]\n" if name.endswith("toml") else '{"criterion": "D"}')
     line = refused(["export", str(path), "--format", "rtz"], capsys)
     assert "expected a plan.json as expdesign plan and expdesign run write it" in line
+    assert ("is a TOML file" in line) == name.endswith("toml")
 
 
 def test_a_toml_given_for_durations_is_told_which_command_makes_them(capsys: pytest.CaptureFixture[str]) -> None:

@@ -177,7 +177,7 @@ def in_row(number: int, cell: int, value: str) -> Edit:
          "frame.projection"),
         ("plan.json", in_leg(2, index=7), "legs.2.index: is 7, expected 2"),
         ("plan.json", in_leg(2, kind="drift"), "legs.2.kind: is 'drift'"),
-        ("plan.json", lambda text: text[: len(text) // 2], "plan.json: invalid JSON"),
+        ("plan.json", lambda text: text[: len(text) // 2], "plan.json: is no readable JSON"),
         ("plan.json", lambda text: text.replace('"sample_time_s": 1.0', '"sample_time_s": NaN'), "sample_time_s"),
         ("track.csv", in_row(5, 1, "nan"), "row 5, north_m: is 'nan', expected a number"),
         ("track.csv", in_row(5, 0, "4.5"), "row 5, time_s: is 4.5, expected 3"),

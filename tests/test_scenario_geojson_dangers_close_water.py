@@ -143,6 +143,21 @@ def test_everything_that_is_not_used_is_named_in_one_line_each(loaded):
     ]
 
 
+@pytest.mark.parametrize("key", ["name", "navn", "namn", "nimi", "nom", "naam", "OBJNAM", "label", "title"])
+@pytest.mark.parametrize("name", ["Grund", "Stein", "Mole", "Kari", "Pont Harbour", "Port of Rock", "Wreck Bay"])
+def test_proper_names_are_no_dangers(loaded, key, name):
+    for place in (danger("harbours", **{key: name}), danger("places", type="harbour", **{key: name})):
+        assert closed_m2(loaded, place) == 0.0
+
+
+def test_everything_that_closes_water_is_named_with_what_it_is_taken_for(loaded):
+    area = loaded(danger("Grund"), danger("Grund"), danger("points", type="stein"), danger("points", type="tree"))
+    assert [note for note in area.notes if "taken for" in note] == [
+        "chart.geojson: taken for OBSTRN: 2 Point in layer 'Grund'",
+        "chart.geojson: taken for UWTROC: 1 Point in layer 'points' of type 'stein'",
+    ]
+
+
 def test_the_layers_of_dangers_can_be_stated(loaded):
     stones, rocks = danger("steiner"), danger("rocks", at=[-0.002, 0.0])
     area = loaded(stones, rocks, chart='danger_layers = ["steiner"]')

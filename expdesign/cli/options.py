@@ -41,6 +41,8 @@ Seed = Annotated[
     int,
     typer.Option("--seed", parser=parse_seed, metavar="N", help="Seed of all random numbers; same seed, same result."),
 ]
+MOST_TRIALS = 100_000
+"""Simulated trials of a design, or of a manoeuvre, at most."""
 Jobs = Annotated[
     int, typer.Option("--jobs", parser=parse_jobs, metavar="N", help="Number of processes; 0 for one per core.")
 ]

@@ -8,7 +8,18 @@ from typing import Annotated
 import typer
 
 from expdesign.cli.app import Asked, ask, command
-from expdesign.cli.options import Jobs, NoCache, Out, OutBesidePlan, OutWhatIf, PlanFile, ScenarioFile, Scheduler, Seed
+from expdesign.cli.options import (
+    MOST_TRIALS,
+    Jobs,
+    NoCache,
+    Out,
+    OutBesidePlan,
+    OutWhatIf,
+    PlanFile,
+    ScenarioFile,
+    Scheduler,
+    Seed,
+)
 
 
 @command("run")
@@ -49,6 +60,8 @@ def durations(
         typer.Option(
             "--monte-carlo",
             metavar="N",
+            min=0,
+            max=MOST_TRIALS,
             help="Share out time by covariances of estimates, bias counted, from N simulated trials of each manoeuvre "
             "alone, instead of by information. Only manoeuvres that inform about every parameter on their own count.",
         ),

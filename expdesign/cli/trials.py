@@ -8,9 +8,17 @@ from typing import Annotated
 import typer
 
 from expdesign.cli.app import Asked, ask, command
-from expdesign.cli.options import Jobs, NoCache, Out, OutBesidePlan, PlanFile, ScenarioFile, Scheduler, Seed
-
-MOST_TRIALS = 100_000
+from expdesign.cli.options import (
+    MOST_TRIALS,
+    Jobs,
+    NoCache,
+    Out,
+    OutBesidePlan,
+    PlanFile,
+    ScenarioFile,
+    Scheduler,
+    Seed,
+)
 
 
 @command("simulate")

@@ -78,9 +78,9 @@ def _parse(path: Path) -> PlanFile:
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         if first["type"] == "json_invalid" or not first["loc"]:
-            raise FileError(
-                path, "", f"invalid JSON, expected {EXPECTED} ({first['msg'].removeprefix('Invalid JSON: ')})"
-            ) from None
+            why = first["msg"].removeprefix("Invalid JSON: ")
+            kind = "a TOML file" if path.suffix == ".toml" else f"no readable JSON ({why})"
+            raise FileError(path, "", f"is {kind}, expected {EXPECTED}") from None
         problem = first["msg"][:1].lower() + first["msg"][1:]
         found = first.get("input")
         if isinstance(found, str | int | float | bool):

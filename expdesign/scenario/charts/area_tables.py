@@ -36,7 +36,8 @@ class ChartTable(Table):
     )
     danger_layers: list[Text] | None = Field(
         default=None,
-        description="the GeoJSON layers of dangers; when not given, all features whose layer or properties name one",
+        description="the GeoJSON layers of dangers; when not given, features whose layer or type is a word for one; "
+        "the report says what each is taken for",
     )
     hazard_margin_m: Positive = Field(default=25.0, description="the distance kept from points of danger [m]")
     air_draught_m: Positive | None = Field(

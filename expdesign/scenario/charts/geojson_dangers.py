@@ -133,6 +133,19 @@ def dangers(features: tuple[Feature, ...], table: ChartTable, near_lon_deg: floa
     )
 
 
+def taken_for(features: Iterable[Feature], table: ChartTable) -> tuple[str, ...]:
+    """One line for each layer of features, and kind in it, that closes water, with the object class it is taken for."""
+    counts = Counter(
+        (kind, feature.layer, _kind_words(feature), feature.geometry["type"])
+        for feature in features
+        if (kind := kind_of(feature, table))
+    )
+    return tuple(
+        f"taken for {kind}: {count} {geometry} in layer {layer!r}{words and f' of {words}'}"
+        for (kind, layer, words, geometry), count in counts.items()
+    )
+
+
 def not_used(features: Iterable[Feature], used: Container[str]) -> tuple[str, ...]:
     """One line for each layer of features, and kind in it, that is not used.
 

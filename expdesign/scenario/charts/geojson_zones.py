@@ -13,7 +13,7 @@ from expdesign.scenario.charts.area_tables import AreaTable, ChartTable
 from expdesign.scenario.charts.chart import Chart, read_layers
 from expdesign.scenario.charts.dangers import ShipRules, closed_water
 from expdesign.scenario.charts.geojson import LAYER_OF_BARE_POLYGONS, POLYGON_TYPES, Feature, read_features
-from expdesign.scenario.charts.geojson_dangers import dangers, kind_of, not_used
+from expdesign.scenario.charts.geojson_dangers import dangers, kind_of, not_used, taken_for
 from expdesign.scenario.charts.metres import Box, around, in_metres
 from expdesign.scenario.charts.zones import ChartZones, OpenChart, rule_text
 from expdesign.scenario.tables import LARGEST, Entry, shown
@@ -49,6 +49,7 @@ def open_geojson(file: AreaTable, *, draught_m: float, given: Box | None, entry:
             depth_rule=rule,
             notes=(
                 *(f"{path.name}: {note}" for note in (*_assumed(areas, file.chart), *chart.notes, *found.notes)),
+                *(f"{path.name}: {note}" for note in taken_for(features, file.chart)),
                 *(f"{path.name}: {note}" for note in not_used(unused, {*file.chart.land_layers, *depths})),
                 *_beyond_chart(box, chart, deep),
             ),
