@@ -21,11 +21,12 @@ from expdesign.plan.chart import (
     resolved,
 )
 from expdesign.plan.control import Capability, capability
-from expdesign.plan.feasibility import check_room
+from expdesign.plan.feasibility import without_room
 from expdesign.plan.legs import LegWater
 from expdesign.plan.local_planner import (
     GoAroundTime,
     LocalPlanner,
+    RunSpace,
     SearchSpace,
     TransitionTrials,
     local_planner,
@@ -157,38 +158,42 @@ def leg_water(problem: PlanProblem, ship: Capability, *, finer: float = 1.0) -> 
 def search_space(problem: PlanProblem, water: LegWater, planner: LocalPlanner, *, strict: bool = False) -> SearchSpace:
     """What the search for places works on.
 
+    Runs without room are told before paths are looked for, which takes longer, if the grid leaves a passage.
+
     Raises:
         NoPlan: no path leads from start to goal, or a run surely has no place; says where and how much is lacking.
     """
-    space = open_space(problem, water, planner)
-    check_room(space, strict=strict)
-    return space
-
-
-def open_space(
-    problem: PlanProblem, water: LegWater, planner: LocalPlanner, off_m: Sequence[Array] | None = None
-) -> SearchSpace:
-    """The search space, whether or not every run has a place in it; `off_m` are the dispersions, where known.
-
-    Raises:
-        NoPlan: no path leads from start to goal.
-    """
-    grid = water.field
-    margin = water.leg_margin_m + grid.cell_m / 2
-    goal_distance = build_goal_distance(water.narrowest_graph, grid, problem.goal[:2])
-    if goal_distance is None or not water.candidate_paths(problem.start[:2], problem.goal[:2]):
-        raise _no_path(problem, grid, margin)
+    runs = run_space(problem, water)
+    ends, lacking = (problem.start[:2], problem.goal[:2]), without_room(runs, strict=strict)
+    if lacking is not None and narrowest_passage(water.field, *ends)[0] > runs.leg_margin_m:
+        raise lacking
+    goal_distance = build_goal_distance(water.narrowest_graph, water.field, problem.goal[:2])
+    if goal_distance is None or not water.candidate_paths(*ends):
+        raise _no_path(problem, water.field, runs.leg_margin_m)
+    if lacking is not None:
+        raise lacking
     return SearchSpace(
-        footprints=footprints(problem, grid, dispersions(problem) if off_m is None else off_m),
-        frame=problem.area.frame,
-        field=grid,
+        footprints=runs.footprints,
+        frame=runs.frame,
+        field=runs.field,
         goal_distance=goal_distance,
         goal=problem.goal,
         planner=planner,
         hull_m=problem.vessel.length_m,
-        leg_margin_m=margin,
-        current_to=problem.environment.current_to,
+        leg_margin_m=runs.leg_margin_m,
+        current_to=runs.current_to,
         go_around=GoAroundTime.of(water.ship, problem.vessel) if problem.expected else None,
+    )
+
+
+def run_space(problem: PlanProblem, water: LegWater, off_m: Sequence[Array] | None = None) -> RunSpace:
+    """Where runs may be placed in a water; `off_m` are the dispersions, where known."""
+    return RunSpace(
+        footprints=footprints(problem, water.field, dispersions(problem) if off_m is None else off_m),
+        frame=problem.area.frame,
+        field=water.field,
+        leg_margin_m=water.leg_margin_m + water.field.cell_m / 2,
+        current_to=problem.environment.current_to,
     )
 
 

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from expdesign.errors import NoRoom
-from expdesign.plan.local_planner import SearchSpace, moved
-from expdesign.plan.search import runs_clear
+from expdesign.plan.local_planner import RunSpace, moved
+from expdesign.plan.search import have_room
 from expdesign.plan.tuning import PLAN
 from expdesign.values import Array
 
@@ -32,7 +32,7 @@ class Fit:
     impossible: bool = False
 
 
-def place_of(space: SearchSpace, index: int) -> Fit:
+def place_of(space: RunSpace, index: int) -> Fit:
     """A place for one of the space's runs, taken by itself: legs to and from it are not looked at."""
     run = space.footprints[index]
     points = np.vstack([run.discs, (0.0, 0.0), run.displacement[:2]])
@@ -67,13 +67,13 @@ def place_of(space: SearchSpace, index: int) -> Fit:
 _CORNERS = tuple((north, east, turn) for north in (-1, 1) for east in (-1, 1) for turn in (-1, 1))
 
 
-def _first_half_m(space: SearchSpace) -> float:
+def _first_half_m(space: RunSpace) -> float:
     """Half the side of the boxes of places looked at first [m]."""
     rows, columns = space.field.clearance_m.shape
     return space.field.cell_m * max(1.0, math.sqrt(rows * columns / PLAN.first_places) / 2)
 
 
-def _first_boxes(space: SearchSpace, half_m: float) -> Array:
+def _first_boxes(space: RunSpace, half_m: float) -> Array:
     """(n, 3) middles of boxes of places and headings that cover the grid."""
     low = space.field.origin
     north, east = (
@@ -90,32 +90,32 @@ def _outline(discs: Array) -> np.ndarray:
     return np.unique((discs @ np.stack([np.cos(angles), np.sin(angles)])).argmax(axis=0))
 
 
-def _clear(space: SearchSpace, index: int, poses: Array) -> Iterator[tuple[Array, np.ndarray]]:
+def _clear(space: RunSpace, index: int, poses: Array) -> Iterator[tuple[Array, np.ndarray]]:
     """Poses (n, 3), some at a time, and whether a run from them keeps its margins."""
     at_once = max(1, PLAN.lookups // len(space.footprints[index].discs))
     for first in range(0, len(poses), at_once):
         some = poses[first : first + at_once]
-        yield some, runs_clear(space, np.full(len(some), index), some)
+        yield some, have_room(space, np.full(len(some), index), some)
 
 
-def _first_clear(space: SearchSpace, index: int, poses: Array) -> Array | None:
+def _first_clear(space: RunSpace, index: int, poses: Array) -> Array | None:
     """The first of the poses (n, 3) from which a run keeps its margins."""
     return next((some[clear][0] for some, clear in _clear(space, index, poses) if clear.any()), None)
 
 
-def check_room(space: SearchSpace, *, strict: bool = False) -> None:
-    """Raise NoRoom where a run surely has no place, before anything is searched; `strict` also where none was found."""
+def without_room(space: RunSpace, *, strict: bool = False) -> NoRoom | None:
+    """The refusal where a run surely has no place; with `strict` also where none was found. None where all have one."""
     fits = [place_of(space, index) for index in range(len(space.footprints))]
     lacking = [fit.impossible or (strict and fit.pose is None) for fit in fits]
     names = tuple(run.name for run, lacks in zip(space.footprints, lacking, strict=True) if lacks)
     if not names:
-        return
+        return None
     run = max((item for item in space.footprints if item.name in names), key=lambda item: _size_m(item.discs))
     row, column = np.unravel_index(int(space.field.clearance_m.argmax()), space.field.clearance_m.shape)
     widest = space.field.origin + space.field.cell_m * np.array([row, column])
     lat, lon = space.frame.to_degrees(widest)
     others = f", nor do {', '.join(map(repr, sorted(set(names) - {run.name})))}" if len(names) > 1 else ""
-    raise NoRoom(
+    return NoRoom(
         f"no room for {run.name!r}: {run.needs}; it fits nowhere in the water that can be reached, at any "
         f"heading{others}; the shore is farthest near {lat:.5f}, {lon:.5f}, {space.field.clearance_m.max():.4g} m",
         what="room",

@@ -21,14 +21,15 @@ from expdesign.plan.assembly import (
     dispersions,
     footprints,
     leg_water,
-    open_space,
     roomy_water,
+    run_space,
+    search_space,
     ship_on_legs,
 )
 from expdesign.plan.checked import accepted, verified
 from expdesign.plan.feasibility import place_of
 from expdesign.plan.legs import LegWater, escapes
-from expdesign.plan.local_planner import SearchSpace, local_planner
+from expdesign.plan.local_planner import RunSpace, local_planner
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.runs import draws_for
 from expdesign.plan.sailing import sail_all
@@ -106,7 +107,7 @@ def _for_passage(problem: PlanProblem, refused: NoPlan) -> Iterator[str]:
 def _for_room(problem: PlanProblem, refused: NoPlan) -> Iterator[str]:
     """A clearance or a confidence with which the runs find places, or the runs to leave out."""
     water = leg_water(problem, ship_on_legs(problem))
-    space = open_space(problem, water, local_planner(water, problem.used))
+    space = run_space(problem, water)
     lacking = _without_place(space)
     changes = chain(_clearances(problem, water, space, lacking), _confidences(problem, space, lacking))
     yield from _first(chain(changes, _exclusions(problem, lacking or {refused.which})), _found, PLACES, UNTRIED)
@@ -145,7 +146,7 @@ def _first(
     yield "; ".join(filter(None, (NONE.format(", ".join(tried)) if tried else UNCHECKED, untried)))
 
 
-def _clearances(problem: PlanProblem, water: LegWater, space: SearchSpace, lacking: set[str]) -> Iterator[Change]:
+def _clearances(problem: PlanProblem, water: LegWater, space: RunSpace, lacking: set[str]) -> Iterator[Change]:
     """Shares of the largest clearance with which every run has a place by itself.
 
     The grid tells distances to the shore, whatever the clearance, and room for runs only grows as that falls.
@@ -168,7 +169,7 @@ def _clearances(problem: PlanProblem, water: LegWater, space: SearchSpace, lacki
             yield Change(words=f"plan.clearance_m = {clearance_m:g}", problem=_with(problem, clearance_m=clearance_m))
 
 
-def _confidences(problem: PlanProblem, space: SearchSpace, lacking: set[str]) -> Iterator[Change]:
+def _confidences(problem: PlanProblem, space: RunSpace, lacking: set[str]) -> Iterator[Change]:
     """Lower confidences with which every run has a place by itself, where they leave runs more room."""
     if not any((off > problem.settings.clearance_m).any() for off in dispersions(problem)):
         return
@@ -179,9 +180,7 @@ def _confidences(problem: PlanProblem, space: SearchSpace, lacking: set[str]) ->
             yield Change(words=f"plan.confidence = {confidence:g}", problem=None if none else other)
 
 
-def _only(
-    space: SearchSpace, problem: PlanProblem, off_m: Sequence[Array], names: set[str], margin_m: float
-) -> SearchSpace:
+def _only(space: RunSpace, problem: PlanProblem, off_m: Sequence[Array], names: set[str], margin_m: float) -> RunSpace:
     """The space with some of the runs, and the room that another problem leaves them."""
     runs = tuple(run for run in footprints(problem, space.field, off_m) if run.name in names)
     return replace(space, footprints=runs, leg_margin_m=margin_m)
@@ -198,7 +197,7 @@ def _exclusions(problem: PlanProblem, lacking: set[str]) -> Iterator[Change]:
         try:
             task = replace(problem.design.problem, constraints=replace(limits, excluded=excluded))
             other = replace(problem, design=solve_durations(task))
-            more = _without_place(open_space(other, water, local_planner(water, other.used)))
+            more = _without_place(run_space(other, water))
         except (InputError, NoAnswer):  # no design without them
             break
         if not more:
@@ -268,9 +267,7 @@ def _found(problem: PlanProblem) -> bool:
     try:
         draws_for(confidence_of_run(problem))
         water = leg_water(problem, ship_on_legs(problem))
-        space = open_space(problem, water, local_planner(water, problem.used))
-        if _without_place(space):
-            return False
+        space = search_space(problem, water, local_planner(water, problem.used), strict=True)
         repeats = [problem.repeats[run.name] for run in space.footprints]
         place_runs(space, repeats, start=problem.start, width=PLAN.transition_beam, orders=0)
     except NoPlan:
@@ -282,7 +279,7 @@ def _with(problem: PlanProblem, **settings: Any) -> PlanProblem:
     return replace(problem, settings=replace(problem.settings, **settings))
 
 
-def _without_place(space: SearchSpace) -> set[str]:
+def _without_place(space: RunSpace) -> set[str]:
     """Names of runs for which no place was found."""
     return {run.name for index, run in enumerate(space.footprints) if place_of(space, index).pose is None}
 

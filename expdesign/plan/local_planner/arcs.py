@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.conventions import wrap_angle
-from expdesign.plan.local_planner.protocol import SearchSpace, Successors
+from expdesign.plan.local_planner.protocol import RunSpace, SearchSpace, Successors
 from expdesign.plan.local_planner.tuning import LOCAL
 from expdesign.values import Array
 
@@ -158,7 +158,7 @@ def between(start: Array, end: Array, spacing_m: float) -> Array:
     return np.linspace(start[:2], end[:2], count + 1)
 
 
-def run_ends(space: SearchSpace, primitive: np.ndarray | int, start: Array) -> Array:
+def run_ends(space: RunSpace | SearchSpace, primitive: np.ndarray | int, start: Array) -> Array:
     """(n, 3) poses at the ends of runs (n,), or of one run, that begin at poses (n, 3)."""
     end = moved(start, np.array([item.displacement for item in space.footprints])[primitive])
     lasting_s = np.array([item.duration_s for item in space.footprints])[primitive]

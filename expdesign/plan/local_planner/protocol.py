@@ -73,6 +73,28 @@ class GoAroundTime:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class RunSpace:
+    """Where runs may be placed, whatever leads to them.
+
+    Attributes:
+        footprints: the primitives to place.
+        frame: for messages.
+        field: clearance.
+        leg_margin_m: clearance that leg centre lines need on the grid [m].
+        current_to: (2,) mean current [m/s].
+    """
+
+    footprints: tuple[Footprint, ...]
+    frame: LocalFrame
+    field: ClearanceField
+    leg_margin_m: float
+    current_to: Array
+
+    def __post_init__(self) -> None:
+        seal(self, current_to="2")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class SearchSpace:
     """Data of the search for places and orders.
 

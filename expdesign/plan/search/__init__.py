@@ -3,10 +3,11 @@
 from expdesign.plan.search.beam import place_runs
 from expdesign.plan.search.heuristic import path_exceeds_displacement
 from expdesign.plan.search.planners import PlacementSearch, placement_search
-from expdesign.plan.search.successors import runs_clear
+from expdesign.plan.search.successors import have_room, runs_clear
 
 __all__ = [
     "PlacementSearch",
+    "have_room",
     "path_exceeds_displacement",
     "place_runs",
     "placement_search",

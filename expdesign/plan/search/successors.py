@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from expdesign.plan.local_planner import SearchSpace, Successors, arc_end, run_ends
+from expdesign.plan.local_planner import RunSpace, SearchSpace, Successors, arc_end, run_ends
 from expdesign.values import Array
 
 
 def clear_successors(space: SearchSpace, found: Successors) -> np.ndarray:
     """(n,) whether legs, runs and their ends keep their margins on the grid."""
     start, turn = found.start, found.turn
-    clear = _ends_clear(space, start, found.end)
+    clear: np.ndarray = _ends_clear(space, start, found.end) & ~space.is_refused(start)
     arcs = np.flatnonzero(clear & ~np.isnan(turn))
     clear[arcs] = _arcs_clear(space, found.departure[found.parent[arcs]], turn[arcs], start[arcs])
     lines = np.flatnonzero(clear & found.straight)
@@ -23,13 +23,18 @@ def clear_successors(space: SearchSpace, found: Successors) -> np.ndarray:
 
 
 def runs_clear(space: SearchSpace, primitive: np.ndarray, start: Array) -> np.ndarray:
+    """(n,) whether runs (n,) from poses (n, 3) have room, and none of the poses was refused."""
+    return np.asarray(have_room(space, primitive, start) & ~space.is_refused(start))
+
+
+def have_room(space: RunSpace | SearchSpace, primitive: np.ndarray, start: Array) -> np.ndarray:
     """(n,) whether runs (n,) from poses (n, 3) and their ends keep their margins on the grid."""
     ends_clear = _ends_clear(space, start, run_ends(space, primitive, start))
     return np.asarray(ends_clear & _hulls_clear(space, primitive, start))
 
 
-def _ends_clear(space: SearchSpace, start: Array, end: Array) -> np.ndarray:
-    clear = (space.field.at(start[:, :2]) >= space.leg_margin_m) & ~space.is_refused(start)
+def _ends_clear(space: RunSpace | SearchSpace, start: Array, end: Array) -> np.ndarray:
+    clear = space.field.at(start[:, :2]) >= space.leg_margin_m
     return np.asarray(clear & (space.field.at(end[:, :2]) >= space.leg_margin_m))
 
 
@@ -45,7 +50,7 @@ def _surely_clear(space: SearchSpace, primitive: np.ndarray, start: Array) -> np
     return found
 
 
-def _hulls_clear(space: SearchSpace, primitive: np.ndarray, start: Array) -> np.ndarray:
+def _hulls_clear(space: RunSpace | SearchSpace, primitive: np.ndarray, start: Array) -> np.ndarray:
     clear = np.ones(len(start), dtype=bool)
     for q in np.unique(primitive):
         some, item = np.flatnonzero(primitive == q), space.footprints[q]

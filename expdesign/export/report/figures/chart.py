@@ -93,8 +93,8 @@ def draw_sea(axes: Axes, area: SeaArea, box: Box, *, clearance_m: float, draught
     axes.set_facecolor(FORBIDDEN)
     around = shapely.box(*box).buffer(3 * clearance_m + 1.0, join_style="mitre")
     detail = (box[2] - box[0]) / 2000
-    near = as_multipolygon(shapely.intersection(area.water, around))
-    axes.add_patch(_patch(shapely.simplify(near, detail), facecolor=WATER, edgecolor="#7aa6c2", linewidth=0.5))
+    near = as_multipolygon(shapely.simplify(shapely.intersection(area.water, around), detail))
+    axes.add_patch(_patch(near, facecolor=WATER, edgecolor="#7aa6c2", linewidth=0.5))
     for shade, polygons in _depth_shades(area, draught_m, around):
         axes.add_patch(_patch(shapely.simplify(polygons, detail), facecolor=shade, edgecolor="none"))
     contour = safety_contour(area)
