@@ -48,6 +48,43 @@ def test_nuisance_regressors_are_the_published_ones() -> None:
     assert set(wind.parameters) - set(layout.parameters) == set(MERGED.values())
 
 
+def test_reduced_sets_are_the_published_ones_for_still_water() -> None:
+    """(6.5)-(6.7) of the same, but for sway's factor v, which the thesis leaves out because that fitted better."""
+    data = record(calm_trial())
+    still = build_layout(TRUE.model, data, predictor="no-current")
+    both = ("cos psi", "sin psi")
+    first = {f"{e}: {x} {c}" for e, x in (("u", "u"), ("v", "v"), ("r", "v"), ("r", "u")) for c in both}
+    second = {f"{e}: {c}" for e in "uvr" for c in ("cos^2 psi", "sin 2psi")}
+    assert {item.name for item in still.nuisance} == first | second
+    everything = {item.name for item in build_layout(TRUE.model, data, predictor="augmented").nuisance}
+    calm_air = {item.name for item in build_layout(TRUE.model, data, predictor="no-wind").nuisance}
+    assert calm_air | {item.name for item in still.nuisance} == everything
+
+
+@pytest.mark.parametrize(
+    ("method", "weather"),
+    [
+        ("iv-no-current", Environment(wind_to=np.array([0.2, -0.15]))),
+        ("iv-no-wind", Environment(current_to=CURRENT)),
+    ],
+)
+def test_reduced_sets_remove_exactly_what_they_are_for(method: str, weather: Environment) -> None:
+    batches = [calm_trial(seed, samples=900, weather=weather) for seed in (4, 5)]
+    assert_true(estimate(record(*batches), NOMINAL, method=method), rtol=1e-5)
+
+
+def test_still_water_without_terms_of_air_has_nothing_to_add() -> None:
+    kept = [index for index, name in enumerate(NOMINAL.names) if name not in MERGED.values()]
+    waterborne = replace(
+        NOMINAL,
+        terms=tuple(NOMINAL.terms[index] for index in kept),
+        parameters=NOMINAL.parameters[kept],
+        parameter_std=NOMINAL.parameter_std[kept],
+    )
+    with pytest.raises(InputError, match="needs terms of the velocity through the air"):
+        estimate(record(calm_trial()), waterborne, method="iv-no-current")
+
+
 @pytest.mark.parametrize("method", ["ls", "iv"])
 def test_calm_noise_free_data_give_the_truth(method: str) -> None:
     batches = calm_trial(1), calm_trial(2, velocity=(1.0, 0.3, 0.05)), calm_trial(3, samples=90)

@@ -14,7 +14,7 @@ from expdesign.errors import Diverged, InputError, NoAnswer, NotInformative, Unk
 from expdesign.estimation.disturbance import mean_current, tells_current
 from expdesign.estimation.excitation import check_excitation, worst_case
 from expdesign.estimation.methods import STARTS, Method, Settings, estimate, method_named
-from expdesign.estimation.regression import AIR, MEANS, PREDICTORS
+from expdesign.estimation.regression import AIR, CURRENT, MEANS, PREDICTORS
 from expdesign.estimation.replay import STEERED, Integration
 from expdesign.estimation.solve import BLOCKS, Weighting
 from expdesign.estimation.values import Estimate
@@ -28,6 +28,7 @@ CONTINUOUS, EULER = "continuous", "euler"
 MOTIONS = (CONTINUOUS, EULER)
 NO_TESTS = Record(batches=())
 USES_WIND = {item.name: item.wind for item in PREDICTORS}
+TELL_CURRENT = tuple(item.name for item in PREDICTORS if CURRENT in item.unknown)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -195,7 +196,7 @@ def _assessed(
         runs=tuple(runs),
         one_step=one_step(record, vessel.model, found, fixed=options.fixed, quadrature=options.quadrature),
         breaches=breaches,
-        current=_current(found, vessel),
+        current=_current(found, vessel) if method.predictor in TELL_CURRENT else None,
     )
 
 

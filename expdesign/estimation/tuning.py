@@ -35,7 +35,7 @@ class Tuning:
         rough_cost: the same for earlier horizons.
         block_instructions: size of the flat CasADi functions that simulations are cut into.
         block_samples: of a stretch, simulated at once.
-        block_points: samples of all stretches, simulated or differentiated at once.
+        simulated_points, block_points: samples of all stretches, simulated or differentiated at once.
         spectrum_bins: bins of the periodogram, of equal width in the logarithm of frequency.
         spectrum_iterations: of reweighted non-negative least squares.
         spectrum_misfit: Bartlett's statistic at 1 % (Kolmogorov's distribution).
@@ -81,6 +81,7 @@ class Tuning:
     rough_cost: float = 0.1
     block_instructions: int = 20_000
     block_samples: int = 256
+    simulated_points: int = 1024
     block_points: int = 4096
     spectrum_bins: int = 80
     spectrum_iterations: int = 12

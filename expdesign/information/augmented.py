@@ -58,7 +58,7 @@ def score_augmented(
     Args:
         vessel: nominal.
         primitives: the dictionary.
-        predictor: "augmented" or "wind", see `estimation.predictors`.
+        predictor: one with nuisance regressors, see `estimation.predictors`.
         environment: mean current and wind.
         fixed_parameters: held at the nominal values.
         mean_subtraction: "none", "batch" or "complete".

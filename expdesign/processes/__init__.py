@@ -1,6 +1,14 @@
 """Independent work, shared among processes of this machine or the workers of a Dask scheduler."""
 
-from expdesign.processes.sharing import as_finished, begin, in_order, leaving_interruptions, local_processes, on_cluster
+from expdesign.processes.sharing import (
+    as_finished,
+    begin,
+    in_order,
+    leaving_interruptions,
+    local_processes,
+    on_cluster,
+    shared_among,
+)
 from expdesign.processes.telling import told_together
 
 __all__ = [
@@ -10,5 +18,6 @@ __all__ = [
     "leaving_interruptions",
     "local_processes",
     "on_cluster",
+    "shared_among",
     "told_together",
 ]

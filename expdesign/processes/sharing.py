@@ -82,6 +82,11 @@ def local_processes(count: int, *, load: Callable[[], None] | None = None) -> It
         list(chain(*started))
 
 
+def shared_among() -> int:
+    """How many processes or threads of this machine work of this block may be shared among."""
+    return 1 if _CLUSTER.get() is not None else int(effective_n_jobs(None))
+
+
 def begin() -> None:
     """Start the processes of this block, if they are not: there will be work to share."""
     _START.get()()

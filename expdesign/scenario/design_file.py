@@ -98,10 +98,11 @@ class DesignTable(Table):
         default=None,
         description="the approach speed of the predicted standard trials [m/s]; at 85 % of power when not given",
     )
-    predictor: Literal["model", "augmented", "wind"] = Field(
+    predictor: Literal["model", "augmented", "wind", "no-current", "no-wind"] = Field(
         default="model",
-        description="the terms that are estimated: the model's; 'augmented' with those of an unknown current; 'wind' "
-        "with those of an unknown current and measured wind; use the last two with criterion D_s",
+        description="the terms that are estimated: the model's; 'augmented' with those of an unknown current and wind; "
+        "'no-current' with those of the wind alone, 'no-wind' with those of the current alone; 'wind' with measured "
+        "wind and those of an unknown current; use all but the first with criterion D_s",
     )
     robust: Literal["nominal", "average", "worst"] = Field(
         default="nominal",

@@ -50,7 +50,8 @@ class DesignSettings:
         outcomes: predicted outcomes in V, keys of `indices.OUTCOMES`.
         outcome_units: unit of error of an outcome; its nominal size where not given.
         outcome_speed_mps: approach speed of the predicted trials, or None for the nominal one.
-        predictor: "model" for the model's terms, "augmented" or "wind" with nuisance regressors, too.
+        predictor: "model" for the model's terms; with nuisance regressors, too, "augmented", "wind", "no-current" or
+            "no-wind".
         robust: "nominal", "average" or "worst".
         prior_samples: models drawn from the prior.
         prior: prior information, "none" or "parameter_std".

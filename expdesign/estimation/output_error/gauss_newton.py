@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.errors import NoAnswer
-from expdesign.estimation.output_error.problem import Problem, first_states
+from expdesign.estimation.output_error.problem import Problem
 from expdesign.estimation.tuning import TUNING
 from expdesign.values import Array
 
@@ -26,20 +26,20 @@ Step = Callable[[float], None]
 
 
 def minimised(
-    problem: Problem, values: Array, *, settled: float, told: Step = lambda excess: None
+    problem: Problem, values: Array, starts: Array, *, settled: float, told: Step = lambda excess: None
 ) -> tuple[Array, Array]:
-    """Values and starts (W, n) of least cost, from values and the measured starts.
+    """Values and starts (W, n) of least cost.
 
     Args:
         problem: to be solved.
-        values: to begin with.
+        values, starts: to begin with.
         settled: expected decrease of the cost that ends the search, in squared standard deviations of the estimate.
         told: of every step.
 
     Raises:
         NoAnswer: the model to begin with diverges.
     """
-    starts, damping = first_states(problem), 1e-4
+    damping = 1e-4
     with np.errstate(over="ignore", invalid="ignore"):
         states = problem.states(values, starts)
         cost = _cost(problem, problem.residuals(states))

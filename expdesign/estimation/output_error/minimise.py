@@ -25,7 +25,15 @@ import numpy as np
 
 from expdesign.conventions import OUTPUTS
 from expdesign.estimation.output_error.gauss_newton import minimised, regular, slopes_of, stretchwise
-from expdesign.estimation.output_error.problem import Excerpt, Fitting, Problem, build_problem, sample_time
+from expdesign.estimation.output_error.problem import (
+    Excerpt,
+    Fitting,
+    Place,
+    Problem,
+    build_problem,
+    first_states,
+    sample_time,
+)
 from expdesign.estimation.output_error.steps import Steps
 from expdesign.estimation.regression import Integers, Layout, Regression
 from expdesign.estimation.solve import Solution, Weighting, solve_ls
@@ -60,10 +68,14 @@ def minimise_output_error(
     )
     stages = _stages(record, fitting)
     steps = Steps([(stage.work(record), stage.steps) for stage in stages], progress)
+    found: dict[Place, Array] = {}
     for stage in stages:
         problem = build_problem(layout, record, fitting, stage.excerpt, weights)
         steps.begin()
-        values, starts = minimised(problem, values, settled=stage.settled, told=steps.told)
+        values, starts = minimised(
+            problem, values, first_states(problem, found), settled=stage.settled, told=steps.told
+        )
+        found = dict(zip(problem.places, starts, strict=True))
         weights = 1.0 / _at_least(_variance(problem, values, starts), record, layout)
     steps.end()
     return _with_covariance(problem, layout, values, starts)
@@ -91,7 +103,8 @@ class Stage:
 def _stages(record: Record, fitting: Fitting) -> list[Stage]:
     """Growing horizons on part of the data; the last one on every so manieth sample of fast data, then on all, twice.
 
-    A rough search of whole runs takes most steps; what thinner samples leave to find takes two or three.
+    A rough search of whole runs takes most steps; what thinner samples leave to find takes two or three. All data are
+    first searched roughly, for the weights of the outputs: these change with the square of what is left to find.
     """
     longest, total, time_s = max(map(len, record.batches)), sum(map(len, record.batches)), sample_time(record)
     full = longest if fitting.horizon_s is None else max(2, round(fitting.horizon_s / time_s) + 1)
@@ -100,10 +113,11 @@ def _stages(record: Record, fitting: Fitting) -> list[Stage]:
     thinner = int(min(total / TUNING.rough_samples, TUNING.rough_step_s / time_s, last / TUNING.first_horizon_samples))
     if thinner > 1:
         rough.append(Excerpt(samples=-(-last // thinner), every=thinner))
-    whole = Stage(excerpt=Excerpt(samples=last), settled=TUNING.settled_cost, steps=TUNING.expected_steps)
+    whole = Excerpt(samples=last)
     return [
         *(Stage(excerpt=item, settled=TUNING.rough_cost, steps=2 * TUNING.expected_steps) for item in rough),
-        *[whole] * 2,
+        Stage(excerpt=whole, settled=TUNING.rough_cost, steps=TUNING.expected_steps),
+        Stage(excerpt=whole, settled=TUNING.settled_cost, steps=TUNING.expected_steps),
     ]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,6 +34,10 @@ class Fitting:
             raise InputError(f"horizon is {self.horizon_s:g} s, expected more than 0")
 
 
+Place = tuple[int, float]
+"""Number of the run, and time since its start [s], at which a stretch begins."""
+
+
 @dataclass(frozen=True, eq=False)
 class Problem:
     """Least squares over W stretches of L samples.
@@ -57,6 +62,12 @@ class Problem:
     def parameters(self) -> int:
         """Number of estimated parameters, without constants."""
         return len(self.compiled.stretches.sought)
+
+    @property
+    def places(self) -> list[Place]:
+        """Where the stretches begin."""
+        times = self.first * self.compiled.stretches.sample_time_s
+        return list(zip(self.batch.tolist(), np.round(times, 9).tolist(), strict=True))
 
     def local(self, values: Array) -> Array:
         """(W, p + n) the values that act on each stretch."""
@@ -175,8 +186,9 @@ def _drive(layout: Layout, batch: Batch, substeps: int) -> Array:
     return np.concatenate([inputs, wind[places]], axis=1)
 
 
-def first_states(problem: Problem) -> Array:
-    """(W, n) first measured velocities, for a first guess."""
+def first_states(problem: Problem, found: Mapping[Place, Array]) -> Array:
+    """(W, n) first velocities for a first guess: those found before at the same places, else the first measured."""
     seen = np.isfinite(problem.measured)
     first = np.take_along_axis(problem.measured, np.argmax(seen, axis=0)[None], axis=0)[0]
-    return np.where(seen.any(axis=0), first, 0.0)
+    guess = np.where(seen.any(axis=0), first, 0.0)
+    return np.stack([found.get(place, own) for place, own in zip(problem.places, guess, strict=True)])

@@ -2,7 +2,7 @@
 
 from expdesign.estimation.regression.nuisance import batch_signs
 from expdesign.estimation.regression.polynomial import Polynomial, SignalTable, lift, symbol
-from expdesign.estimation.regression.predictors import PREDICTORS, Layout, Rows, build_layout, build_regression
+from expdesign.estimation.regression.predictors import CURRENT, PREDICTORS, Layout, Rows, build_layout, build_regression
 from expdesign.estimation.regression.regression import Integers, Regression, batch_slices, single_output
 from expdesign.estimation.regression.tables import (
     AIR,
@@ -22,6 +22,7 @@ from expdesign.estimation.regression.zero_mean import MEANS, subtract_mean
 
 __all__ = [
     "AIR",
+    "CURRENT",
     "MEANS",
     "PREDICTORS",
     "VANE",

@@ -13,8 +13,12 @@ left side.
 - basic-wind: the same with air velocities from the anemometer.
 - augmented: basic plus nuisance regressors for unknown current and wind, (5.68)-(5.70).
 - wind: basic-wind plus nuisance regressors for unknown current, (5.74)-(5.76).
+- no-current: basic plus those of an unknown wind alone, the derivatives of air terms, as (6.5)-(6.7) for still water.
+- no-wind: basic plus those of an unknown current alone, the derivatives of water terms, for still air.
 
-Source: F. Ljungberg, doctoral thesis, Linköping University, (5.63)-(5.76).
+Fewer regressors leave more information about the ship, and a bias where the disturbance is there after all.
+
+Source: F. Ljungberg, doctoral thesis, Linköping University, (5.63)-(5.76), (6.5)-(6.10).
 """
 
 from __future__ import annotations
@@ -45,19 +49,27 @@ class Predictor:
     Attributes:
         name: as users type it.
         wind: whether measured wind is used.
-        nuisance: whether nuisance regressors are added.
+        unknown: disturbances that nuisance regressors are added for, of `CURRENT` and `WIND`.
     """
 
     name: str
     wind: bool
-    nuisance: bool
+    unknown: tuple[str, ...]
+
+    @property
+    def nuisance(self) -> bool:
+        """Whether there are nuisance regressors."""
+        return bool(self.unknown)
 
 
+CURRENT, WIND = "current", "wind"
 PREDICTORS = (
-    Predictor("basic", wind=False, nuisance=False),
-    Predictor("basic-wind", wind=True, nuisance=False),
-    Predictor("augmented", wind=False, nuisance=True),
-    Predictor("wind", wind=True, nuisance=True),
+    Predictor("basic", wind=False, unknown=()),
+    Predictor("basic-wind", wind=True, unknown=()),
+    Predictor("augmented", wind=False, unknown=(CURRENT, WIND)),
+    Predictor("wind", wind=True, unknown=(CURRENT,)),
+    Predictor("no-current", wind=False, unknown=(WIND,)),
+    Predictor("no-wind", wind=False, unknown=(CURRENT,)),
 )
 
 
@@ -178,7 +190,10 @@ def build_layout(
         raise InputError("all parameters are fixed, none is left to estimate")
     nuisance: tuple[Nuisance, ...] = ()
     if chosen.nuisance:
-        nuisance = nuisance_regressors(model, model.names, tables, wind_measured=chosen.wind)
+        disturbed = [name for name in model.names if (WIND if name in reads_air else CURRENT) in chosen.unknown]
+        nuisance = nuisance_regressors(model, disturbed, tables, wind_measured=chosen.wind)
+        if not nuisance:
+            raise InputError(f"predictor {predictor!r} needs terms of the velocity through the air, the model has none")
     notes = tuple(_merged_note(model, name) for name in merged)
     return Layout(
         model=model,

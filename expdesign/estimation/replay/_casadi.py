@@ -68,12 +68,14 @@ def _chained(step: ca.Function, samples: int) -> Simulate:
     return simulate
 
 
-def stretch_functions(stretches: Stretches, steps: int, count: int, points: int) -> tuple[Called, Called]:
+def stretch_functions(
+    stretches: Stretches, steps: int, count: int, points: int, *, threads: int = 1
+) -> tuple[Called, Called]:
     """Simulation of so many samples of so many stretches, and derivatives of the next states of so many points.
 
     The first takes starts (count, n), drives (count steps, m) and values (count steps, p + n), and gives states
     (count steps, n); the second states, drives and values of points, and gives (points, n, n) and (points, p + n, n),
-    the transposes of derivatives by state and by values.
+    the transposes of derivatives by state and by values. Results do not depend on the number of threads.
     """
     m, n = stretches.drive.shape[2], len(stretches.states)
     step = velocity_step(stretches)
@@ -84,8 +86,15 @@ def stretch_functions(stretches: Stretches, steps: int, count: int, points: int)
     by_x, by_values = (ca.densify(ca.jacobian(after, seen, reverse)) for seen in (x, values))
     slopes = ca.Function("slopes", [x, u, values], [by_x, by_values], {"cse": True})
     q = values.size1()
-    simulate = called(step.mapaccum("stretch", steps).map(count), ((count * steps, n),))
-    return simulate, called(slopes.map(points), ((points, n, n), (points, q, n)))
+    simulate = called(_mapped(step.mapaccum("stretch", steps), count, threads), ((count * steps, n),))
+    return simulate, called(_mapped(slopes, points, threads), ((points, n, n), (points, q, n)))
+
+
+def _mapped(function: ca.Function, count: int, threads: int) -> ca.Function:
+    """The function, so many times, on as many threads."""
+    shared: ca.Function
+    shared = function.map(count, "thread", threads) if min(count, threads) > 1 else function.map(count)
+    return shared
 
 
 def called(function: ca.Function, shapes: tuple[tuple[int, ...], ...]) -> Called:

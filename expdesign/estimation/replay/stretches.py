@@ -9,6 +9,7 @@ import numpy as np
 
 from expdesign.estimation.regression import Integers
 from expdesign.estimation.tuning import TUNING
+from expdesign.processes import shared_among
 from expdesign.simulation import euler_step, rk4_step
 from expdesign.values import Array, frozen_set
 from expdesign.vessel import VesselModel
@@ -120,10 +121,10 @@ class Compiled:
         yield Slopes(
             samples=slice(0, 1), active=np.arange(count), by_values=carried[0][None], by_start=carried[1][None]
         )
-        size = max(1, TUNING.block_points // count)
-        for first in range(1, length, size):
-            samples = slice(first, min(first + size, length))
+        first = 1
+        while first < length:
             active = np.flatnonzero(counts > first)
+            samples = slice(first, min(first + max(1, self.block[2] // len(active)), length))
             before = slice(first - 1, samples.stop - 1)
             A, B = self._steps(values[active], states[before, active], self.stretches.drive[before, active])
             by_values, by_start = B, A  # both become sums in place
@@ -135,6 +136,7 @@ class Compiled:
                 was = by_values[index], by_start[index]
             carried[0][active], carried[1][active] = was
             yield Slopes(samples=samples, active=active, by_values=by_values, by_start=by_start)
+            first = samples.stop
 
     def _steps(self, values: Array, states: Array, drive: Array) -> tuple[Array, Array]:
         """Derivatives of each next state: (l, w, n, n) by the state, (l, w, n, q) by the values."""
@@ -157,5 +159,6 @@ def compiled(stretches: Stretches) -> Compiled:
 
     length, count = stretches.drive.shape[:2]
     steps = min(max(1, length - 1), TUNING.block_samples)
-    block = (steps, min(count, -(-TUNING.block_points // steps)), min(max(1, length - 1) * count, TUNING.block_points))
-    return Compiled(stretches, block, *stretch_functions(stretches, *block))
+    side_by_side = min(count, -(-TUNING.simulated_points // steps))
+    block = (steps, side_by_side, min(max(1, length - 1) * count, TUNING.block_points))
+    return Compiled(stretches, block, *stretch_functions(stretches, *block, threads=shared_among()))

@@ -138,8 +138,11 @@ def _of_weather(rehearsal: Rehearsal) -> Iterator[str]:
         )
     if current and allows == "air":
         yield f"no current. Method {method} accounts for measured wind only; {solver}-wind also for current."
-    if allows in ("wind", "augmented"):
-        what = "the current" if allows == "wind" else "current and wind"
+    if (current and allows == "no-current") or (wind and allows == "no-wind"):
+        yield f"{allows.replace('-', ' ')}. Method {method} leaves it out; {solver}-augmented accounts for both."
+    known = {"wind": "the current", "no-wind": "the current", "no-current": "the wind", "augmented": "current and wind"}
+    if allows in known:
+        what = known[allows]
         yield (
             f"{what} known. Method {method} estimates additional parameters for it; the prediction does not include "
             "the "

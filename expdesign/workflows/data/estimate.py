@@ -27,6 +27,7 @@ from expdesign.scenario import load_vessel
 from expdesign.workflows.command_text import command_text
 from expdesign.workflows.outcome import Outcome, TextTable
 from expdesign.workflows.steps.measured import reduced_data
+from expdesign.workflows.steps.workers import workers
 
 STEERED_WORDS = {"use": "used", "leave-out": "left out", "planned": "instruments from planned inputs"}
 
@@ -70,7 +71,8 @@ def estimate(
     )
     record = reduced_data(data, ship, velocity=velocity)
     apart = reduced_data(tests, ship, velocity=velocity) if tests else NO_TESTS
-    found = assess(ship, record, options, tests=apart, progress=within(progress, 0.01, 0.7))
+    with workers(0, load=None):
+        found = assess(ship, record, options, tests=apart, progress=within(progress, 0.01, 0.7))
     progress("drawing the report", 0.7)
     command = command_text(
         "estimate",
