@@ -142,17 +142,17 @@ def _sentences(content: WhatIfContent, case: Case) -> Iterator[str]:
         yield f"It does not estimate {', '.join(missing)}."
     if added:
         yield f"It also estimates {', '.join(added)}."
-    yield from _plan(first, case)
+    yield from _plan(first, case, against)
 
 
 def _accuracy(first: Case, case: Case, against: Against) -> str:
     minutes, needed = case.informative_s / 60, against.same_accuracy_s / 60
+    theirs = f"that the scenario's runs collect in {first.informative_s / 60:.1f} min"
     if abs(against.accuracy - 1) < TUNING.noticed:
-        scenario = f"the scenario in {first.informative_s / 60:.1f} min"
-        return f"In {minutes:.1f} min it collects the same information as {scenario}."
+        return f"In {minutes:.1f} min its runs collect the information {theirs}."
     return (
-        f"In {minutes:.1f} min it collects {against.accuracy:.2f} times the information of the scenario in "
-        f"{first.informative_s / 60:.1f} min. The same accuracy takes {needed:.1f} min."
+        f"In {minutes:.1f} min its runs collect {against.accuracy:.2f} times the information {theirs}. "
+        f"The same accuracy takes {needed:.1f} min."
     )
 
 
@@ -180,7 +180,7 @@ def _runs(first: Case, case: Case) -> Iterator[str]:
         yield f"Runs: {', '.join((*more, *less))}."
 
 
-def _plan(first: Case, case: Case) -> Iterator[str]:
+def _plan(first: Case, case: Case, against: Against) -> Iterator[str]:
     key = "day_s"
     if key in first.plan and key in case.plan:
         difference = float(str(case.plan[key])) - float(str(first.plan[key]))
@@ -188,6 +188,8 @@ def _plan(first: Case, case: Case) -> Iterator[str]:
             f"The whole day, repositioning included, takes {abs(difference) / 60:.1f} min "
             f"{'more' if difference > 0 else 'less'}."
         )
+    if against.track is not None:
+        yield f"Legs included, the day tells {against.track:.2f} times what the scenario's day tells."
 
 
 def whatif_json(content: WhatIfContent) -> str:

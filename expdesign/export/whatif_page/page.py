@@ -37,7 +37,7 @@ def whatif_html(content: WhatIfContent) -> str:
 def table_header(content: WhatIfContent) -> tuple[str, ...]:
     """Names of the columns of `table_row`; of the day where one was planned."""
     days, clearance = (DAY_COLUMNS, ("clearance [m]",)) if content.planned else ((), ())
-    runs = ("time [min]", "information", "same accuracy [min]", "short of optimum")
+    runs = ("time of runs [min]", "information", "same accuracy [min]", "short of optimum")
     return ("Case", "criterion", "runs", *days, *runs, *clearance)
 
 
