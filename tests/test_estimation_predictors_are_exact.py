@@ -102,6 +102,17 @@ def test_a_steady_current_is_removed_exactly_and_read_out(mean: str) -> None:
     np.testing.assert_allclose(mean_current(found)[0], CURRENT, rtol=1e-5)
 
 
+@pytest.mark.parametrize("mean", ["none", "complete", "batch"])
+def test_a_steady_current_of_two_parameters_is_found_whatever_the_moduli_do(mean: str) -> None:
+    """Moduli change their sign here, which the nuisance regressors of (5.68)-(5.70) do not allow."""
+    weather = Environment(current_to=CURRENT, wind_to=np.array([3.0, 2.0]))
+    batches = [calm_trial(seed, samples=400, weather=weather, velocity=(0.0, 0.0, 0.0)) for seed in (4, 5)]
+    weighting = Weighting(mean=mean)
+    found = estimate(record(*batches), NOMINAL, method="iv-air-current", settings=Settings(weighting=weighting))
+    assert_true(found, rtol=1e-6)
+    np.testing.assert_allclose(mean_current(found)[0], CURRENT, rtol=1e-6)
+
+
 @pytest.mark.parametrize("lost", ["X_u", "Y_v"])
 def test_surge_and_sway_each_tell_the_current(lost: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Without the damping of one equation the other one's reading is left; both together are no less certain."""

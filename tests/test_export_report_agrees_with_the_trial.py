@@ -264,7 +264,11 @@ def test_uncertainties_are_those_of_the_whole_track_and_of_the_runs() -> None:
     content = noisy_content()
     found = expected(content)
     part = TrialPart(commands=content.plan.commands, velocity=np.zeros(3), heading_rad=0.0)
-    covariance = expected_covariance(content.vessel, [part], content.parameters, environment=content.environment)
+    forecast = content.environment
+    unknown = forecast.current_std_mps > 0
+    covariance = expected_covariance(
+        content.vessel, [part], content.parameters, environment=forecast, unknown_current=unknown
+    )
     assert found.track == pytest.approx(np.sqrt(np.diag(covariance)))
     assert np.array_equal(found.before, content.parameter_std)
     assert (found.runs >= 0.999 * found.track).all()  # more data never tell less
@@ -275,11 +279,11 @@ def test_uncertainties_are_those_of_the_whole_track_and_of_the_runs() -> None:
 
 @pytest.mark.usefixtures("_no_figures")
 @pytest.mark.parametrize("std_mps", [0.0, 0.15])
-def test_a_steady_current_that_nobody_knows_is_said_not_to_be_counted(std_mps: float) -> None:
+def test_a_steady_current_that_nobody_knows_is_said_to_be_estimated_with_the_parameters(std_mps: float) -> None:
     content = noisy_content()
     forecast = replace(content.environment, current_std_mps=std_mps)
     told = Page(report_html(replace(content, environment=forecast))).text
-    assert ("No accuracy on this page counts it" in told) == (std_mps > 0)
+    assert ("hold where it is estimated with the parameters" in told) == (std_mps > 0)
 
 
 def growth_of(name: str) -> Growth:

@@ -13,9 +13,9 @@ from expdesign.simulation import CALM, Environment, simulate
 
 
 def simulated_days(
-    case: Scenario, plan: Plan, *, trials: int, environment: Environment = CALM, seed: int = 0
+    case: Scenario, plan: Plan, *, trials: int, environment: Environment = CALM, method: str = "iv", seed: int = 0
 ) -> Validated:
-    """Estimates by instrumental variables from so many days of a plan, legs included, beside what is predicted.
+    """Estimates by a method from so many days of a plan, legs included, beside what is predicted.
 
     The commands are those of the plan; the whole day is one batch of data.
     """
@@ -35,6 +35,7 @@ def simulated_days(
         designs={"day": (1,)},
         total_s=commands.duration_s,
         environment=environment,
+        method=method,
         parameters=estimated_parameters(vessel.model, case.design.fixed_parameters),
         mean_subtraction=case.design.mean_subtraction,
         integrator="rk4" if vessel.model.form == "continuous" else "euler",

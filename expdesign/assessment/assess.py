@@ -14,7 +14,7 @@ from expdesign.errors import Diverged, InputError, NoAnswer, NotInformative, Unk
 from expdesign.estimation.disturbance import mean_current, tells_current
 from expdesign.estimation.excitation import check_excitation, worst_case
 from expdesign.estimation.methods import STARTS, Method, Settings, estimate, method_named
-from expdesign.estimation.regression import AIR, CURRENT, MEANS, PREDICTORS
+from expdesign.estimation.regression import CURRENT, MEANS, PREDICTORS
 from expdesign.estimation.replay import STEERED, Integration
 from expdesign.estimation.solve import BLOCKS, Weighting
 from expdesign.estimation.values import Estimate
@@ -28,7 +28,7 @@ CONTINUOUS, EULER = "continuous", "euler"
 MOTIONS = (CONTINUOUS, EULER)
 NO_TESTS = Record(batches=())
 USES_WIND = {item.name: item.wind for item in PREDICTORS}
-TELL_CURRENT = tuple(item.name for item in PREDICTORS if CURRENT in item.unknown)
+TELL_CURRENT = tuple(item.name for item in PREDICTORS if CURRENT in item.unknown or item.steady)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,8 +85,7 @@ class EstimateOptions:
 
 def default_methods(vessel: Vessel, record: Record) -> tuple[str, ...]:
     """Least squares and instrumental variables; before them those that use the wind, when measured and modelled."""
-    reads_air = any(set(AIR) & set(expression.signals) for expression in vessel.model.expressions)
-    if reads_air and all(batch.wind is not None for batch in record.batches):
+    if vessel.model.reads_air and all(batch.wind is not None for batch in record.batches):
         return ("iv-wind", "iv-air", "ls-air", "iv", "ls")
     return ("ls", "iv")
 

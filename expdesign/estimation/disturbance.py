@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from expdesign.errors import InputError
+from expdesign.estimation.regression import STEADY_CURRENT
 from expdesign.estimation.values import Estimate
 from expdesign.values import Array
 
@@ -24,16 +25,16 @@ READINGS = (
 
 
 def tells_current(estimate: Estimate) -> bool:
-    """Whether an estimate has what one of the readings needs."""
+    """Whether an estimate has the current itself, or what one of the readings needs."""
     names = {*estimate.names, *estimate.nuisance_names}
-    return any(_needs(reading) <= names for reading in READINGS)
+    return set(STEADY_CURRENT) <= names or any(_needs(reading) <= names for reading in READINGS)
 
 
 def mean_current(estimate: Estimate, *, heading_std_rad: float = 0.0) -> tuple[Array, Array]:
     """(2,) mean current to north/east [m/s] and its covariance (2, 2), to first order.
 
     Args:
-        estimate: of an augmented method, with X_u or Y_v among its parameters.
+        estimate: of a method with a steady current, or of an augmented one with X_u or Y_v among its parameters.
         heading_std_rad: of white Gaussian heading noise, to correct for.
 
     Raises:
@@ -44,6 +45,9 @@ def mean_current(estimate: Estimate, *, heading_std_rad: float = 0.0) -> tuple[A
         lacking = next(name for name in ("X_u", "u: cos psi", "u: sin psi") if name not in names)
         raise InputError(f"method {estimate.method!r} does not estimate the current: it has no {lacking!r}")
     joint = np.concatenate([estimate.values, estimate.nuisance_values])
+    if set(STEADY_CURRENT) <= set(names):
+        places = [names.index(name) for name in STEADY_CURRENT]
+        return joint[places], estimate.joint_covariance[np.ix_(places, places)]
     factor = float(np.exp(-0.5 * heading_std_rad**2))
     readings, slopes = [], []
     for damping, columns in (reading for reading in READINGS if _needs(reading) <= set(names)):

@@ -11,6 +11,8 @@ from expdesign.errors import Diverged, InputError, UnknownName
 from expdesign.estimation.feedback import Feedback, feedback_in, feedback_notes
 from expdesign.estimation.output_error import Fitting, minimise_output_error
 from expdesign.estimation.regression import (
+    PREDICTORS,
+    Guess,
     Layout,
     Regression,
     Rows,
@@ -25,6 +27,7 @@ from expdesign.estimation.replay import (
     STEERED,
     InstrumentModel,
     Integration,
+    Replay,
     Steered,
     apart_from_start,
     as_planned,
@@ -57,6 +60,11 @@ class Method:
     predictor: str
     solver: str
 
+    @property
+    def estimates_steady_current(self) -> bool:
+        """Whether the current itself is a parameter, so that terms keep their own."""
+        return next(item.steady for item in PREDICTORS if item.name == self.predictor)
+
 
 METHODS = (
     Method("ls", "least squares", "basic", solver="ls"),
@@ -71,6 +79,8 @@ METHODS = (
     Method("iv-wind", "instrumental variables, augmented, with measured wind", "wind", solver="iv"),
     Method("iv-no-current", "instrumental variables, augmented for wind alone", "no-current", solver="iv"),
     Method("iv-no-wind", "instrumental variables, augmented for a current alone", "no-wind", solver="iv"),
+    Method("iv-current", "instrumental variables with an unknown steady current", "steady-current", solver="iv"),
+    Method("iv-air-current", "the same with measured wind", "steady-current-wind", solver="iv"),
     Method("oe", "output error", "basic", solver="oe"),
     Method("oe-air", "output error with measured wind", "basic-wind", solver="oe"),
 )
@@ -177,12 +187,13 @@ def estimate(
     )
     notes = (*layout.notes, *_vane_notes(measured, layout, chosen), *_steered_notes(steered, chosen))
     layout = replace(layout, notes=notes)
-    rows = build_regression(layout, record)
-    if chosen.solver == "iv":
-        rows = apart_from_start(rows)
     planned = steered.treatment == PLANNED
     driving = as_planned(record) if planned else record
-    refined = _instrumental(layout, driving, rows, choices) if chosen.solver == "iv" else _least_squares(rows, choices)
+    if chosen.solver == "iv":
+        layout, rows, refined = _instrumental(layout, record, driving, choices)
+    else:
+        rows = build_regression(layout, record)
+        refined = _least_squares(rows, choices)
     if chosen.solver == "oe":
         solution, regression = minimise_output_error(
             layout, record, refined.solution, _fitting(choices), progress=progress
@@ -231,9 +242,40 @@ def _least_squares(rows: Rows, choices: Settings) -> Refined:
     return Refined(solve_ls(rows.regression, weighting), 0, ())
 
 
-def _instrumental(layout: Layout, record: Record, rows: Rows, choices: Settings) -> Refined:
+def _instrumental(layout: Layout, record: Record, driving: Record, choices: Settings) -> tuple[Layout, Rows, Refined]:
+    """The estimate, with the layout and the rows that it is from; where a current is sought, those around the last.
+
+    Args:
+        layout: columns, linearised around the first guess of a current.
+        record: the data.
+        driving: whose inputs the instruments are simulated with.
+        choices: settings.
+    """
     windy = layout.predictor.wind and choices.wind != "measured"
-    replay = build_replay(layout.model, record, choices.integration, windy=windy)
+    replay = build_replay(layout.model, driving, choices.integration, windy=windy, flowing=layout.predictor.steady)
+    rows = apart_from_start(build_regression(layout, record))
+    refined = _with_instruments(layout, driving, rows, replay, choices)
+    for _ in range(TUNING.most_currents if layout.guess else 0):
+        assert layout.guess is not None
+        moved, parameters = refined.solution.values[-2:], full_parameters(layout, refined.solution.values)
+        layout = replace(layout, guess=Guess(to_mps=layout.guess.to_mps + moved, parameters=parameters))
+        weighting = replace(choices.weighting, output_weights=_by_residuals(rows, refined))
+        rows = apart_from_start(build_regression(layout, record))
+        refined = _with_instruments(layout, driving, rows, replay, replace(choices, weighting=weighting))
+        std = np.sqrt(np.diag(refined.solution.covariance)[-2:])
+        if (np.abs(refined.solution.values[-2:]) <= TUNING.settled_deviations * std).all():
+            break
+    return layout, rows, refined
+
+
+def _by_residuals(rows: Rows, refined: Refined) -> tuple[float, ...]:
+    """Weights of the outputs, which the current couples: one over the variance of their residuals."""
+    left, data = (np.mean(values**2, axis=0) for values in (refined.solution.residuals, rows.regression.y))
+    variance = np.maximum(left, TUNING.exact_share * data)
+    return tuple(np.where(variance > 0, variance, variance.max()) ** -1.0) if variance.any() else ()
+
+
+def _with_instruments(layout: Layout, record: Record, rows: Rows, replay: Replay, choices: Settings) -> Refined:
     simulation = InstrumentModel(layout, record, rows, replay, choices.heading, choices.wind)
     start = layout.model.parameters
     if choices.start == "ls":
@@ -258,7 +300,7 @@ def _prior(layout: Layout, start: Array) -> Prior:
     places = [model.names.index(name) for name in layout.parameters]
     stated, sizes = model.parameter_std[places], TUNING.prior_share * np.abs(start[places])
     spread = np.where(stated > 0, stated, np.where(sizes > 0, sizes, np.inf))
-    others = len(layout.nuisance)
+    others = len(layout.names) - len(layout.parameters)
     return Prior(values=np.append(start[places], np.zeros(others)), spread=np.append(spread, np.full(others, np.inf)))
 
 
@@ -276,6 +318,7 @@ def _estimate(
     method: Method, layout: Layout, rows: Rows, refined: Refined, steered: Steered, feedback: Feedback | None = None
 ) -> Estimate:
     solution, p = refined.solution, len(layout.parameters)
+    guessed = np.zeros(len(solution.values) - p) if layout.guess is None else layout.guess.to_mps
     full = dict(zip(layout.model.names, full_parameters(layout, solution.values).tolist(), strict=True))
     return Estimate(
         method=method.name,
@@ -284,7 +327,7 @@ def _estimate(
         covariance=solution.covariance[:p, :p],
         held={name: full[name] for name in layout.model.names if name not in layout.parameters},
         nuisance_names=rows.regression.parameters[p:],
-        nuisance_values=solution.values[p:],
+        nuisance_values=guessed + solution.values[p:],
         joint_covariance=solution.covariance,
         residuals=_statistics(rows.regression, solution, rows.left_out),
         null_space=solution.null_space,

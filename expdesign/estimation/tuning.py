@@ -17,6 +17,8 @@ class Tuning:
         small_weight: least weight of a parameter that a message names.
         named_parameters: most parameters of a combination that a message names.
         most_refinements: of simulated instruments.
+        most_currents: guesses of an unknown steady current after the first.
+        exact_share: of the data's power, which residuals have at least where equations are weighed by them.
         settled_deviations: change of an estimate, in standard deviations, that ends the refinement.
         stabilising_weights: of the first model, tried one after the other where an estimate is unstable.
         prior_share: spread of a parameter without a stated standard deviation, relative to its size.
@@ -63,6 +65,8 @@ class Tuning:
     small_weight: float = 0.05
     named_parameters: int = 4
     most_refinements: int = 30
+    most_currents: int = 6
+    exact_share: float = 1e-12
     settled_deviations: float = 1e-3
     stabilising_weights: tuple[float, ...] = (0.01, 0.1, 1.0, 10.0, 100.0, 1e4)
     prior_share: float = 1.0

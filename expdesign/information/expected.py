@@ -11,7 +11,8 @@ covariance Omega of sum Z eps is exact to first order, without estimated autocor
 estimate has covariance G^-1 Omega G^-T.
 
 It is valid for noise small enough for a first-order expansion that changes no sign inside a modulus. Disturbances that
-are constant for a whole trial, such as a mean current, cause a bias, which is not included.
+are constant for a whole trial, such as a mean current, cause a bias, which is not included; a steady current may be
+estimated along, though, by two regressors more (see `estimation.regression.current`), which couple the equations.
 
 Source: F. Ljungberg, doctoral thesis, Linköping University, (2.21), (5.3), (5.61), (7.9); the first-order form is
 derived here.
@@ -25,10 +26,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from expdesign.errors import NotInformative
+from expdesign.estimation.regression import STEADY_CURRENT
 from expdesign.information.moments import regressor_rows
 from expdesign.information.tuning import TUNING
 from expdesign.signals import Commands, Trajectory
-from expdesign.simulation import CALM, Environment, delivered, relative_velocity, simulate
+from expdesign.simulation import CALM, Environment, delivered, relative_velocity, simulate, to_body
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array, seal
 from expdesign.vessel import NUMPY, Vessel, VesselModel
@@ -65,6 +67,7 @@ def expected_covariance(
     mean_subtraction: str = "complete",
     instruments: VesselModel | None = None,
     integrator: str = "rk4",
+    unknown_current: bool = False,
 ) -> Array:
     """(p, p) covariance of the estimates of the named parameters from a trial.
 
@@ -76,11 +79,16 @@ def expected_covariance(
         mean_subtraction: from the instruments: "none", "batch" (each part's own mean) or "complete".
         instruments: model that simulates the instruments; the vessel's own by default, as after refinement.
         integrator: "rk4" for the motion of a ship and its parameters, "euler" for the map that defines discrete ones.
+        unknown_current: whether a steady current is estimated with the parameters, as by methods iv-current and
+            iv-air-current.
 
     Raises:
         NotInformative: the trial contains no information about some parameters.
     """
-    rows = [_rows(vessel, part, parameters, environment, instruments or vessel.model, integrator) for part in parts]
+    rows = [
+        _rows(vessel, part, parameters, environment, instruments or vessel.model, integrator, unknown_current)
+        for part in parts
+    ]
     weights = np.array([part.repeats for part in parts], dtype=float)
     means = [item.instruments.mean(axis=0) for item in rows]
     counts = np.array([len(item.instruments) for item in rows]) * weights
@@ -88,13 +96,14 @@ def expected_covariance(
         means = [np.average(means, axis=0, weights=counts)] * len(rows)
     elif mean_subtraction == "none":
         means = [np.zeros_like(means[0])] * len(rows)
-    size = len(parameters)
+    size = rows[0].regressors.shape[1]
     G, Omega = np.zeros((size, size)), np.zeros((size, size))
     for item, mean, weight in zip(rows, means, weights, strict=True):
         Z = item.instruments - mean
         G += weight * np.einsum("kpo,kqo->pq", Z, item.regressors)
         Omega += weight * _score_covariance(Z, item)
-    return _sandwich(G, Omega, parameters)
+    names = (*parameters, *(STEADY_CURRENT if unknown_current else ()))
+    return _sandwich(G, Omega, names)[: len(parameters), : len(parameters)]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -122,6 +131,7 @@ def _rows(
     environment: Environment,
     instruments: VesselModel,
     integrator: str,
+    unknown_current: bool,
 ) -> _Rows:
     model, outputs = vessel.model, vessel.model.outputs
 
@@ -149,18 +159,25 @@ def _rows(
     )
 
     def blocks(which: VesselModel, motion: Trajectory, inputs: Commands) -> Array:
-        parts = [share * _blocks(which, _from(motion, begin), inputs, environment, parameters) for share, begin in ends]
+        parts = []
+        for share, begin in ends:
+            moved = _from(motion, begin)
+            block = _blocks(which, moved, inputs, environment, parameters)
+            if unknown_current:
+                block = np.concatenate([block, _by_current(which, moved, inputs, environment)[..., chosen]], axis=1)
+            parts.append(share * block)
         return np.asarray(sum(parts[1:], start=parts[0]))
 
     noise = vessel.sensors
     chosen = [("u", "v", "r").index(name) for name in outputs]
+    sensor = np.array([noise.velocity_mps, noise.velocity_mps, noise.yaw_rate_radps])[chosen] ** 2
     return _Rows(
         regressors=blocks(model, own, given),
-        instruments=blocks(instruments, other, given_second),
+        instruments=blocks(instruments, other, given_second) * (_weights(sensor) if unknown_current else 1.0),
         by_velocity=by_water[:, :, chosen][..., chosen],
         by_air=by_air[:, :, chosen],
         by_current=slopes[0][0][:, chosen, :2],
-        sensor=np.array([noise.velocity_mps, noise.velocity_mps, noise.yaw_rate_radps])[chosen] ** 2,
+        sensor=sensor,
         air=noise.wind_mps**2,
         current=environment.current_variation.std_mps**2,
     )
@@ -179,6 +196,21 @@ def _blocks(
     values = regressor_rows(model, trajectory, commands, environment)[:, chosen]
     member = np.array([[model.terms[index].equation == output for output in model.outputs] for index in chosen])
     return np.asarray(values[:, :, None] * member * (commands.sample_time_s / model.time_scale_s))
+
+
+def _by_current(model: VesselModel, trajectory: Trajectory, commands: Commands, environment: Environment) -> Array:
+    """(k, 2, 3) change of Phi^T theta with a steady current to north and to east, times the sample time."""
+    by_velocity, _ = _derivatives(model, trajectory, commands, environment)
+    heading = trajectory.pose[: len(commands), 2]
+    moved = np.array([to_body(direction, heading, NUMPY) for direction in np.eye(2)])  # (2, 2, k), of the water
+    return np.asarray(-np.einsum("kod,cdk->kco", by_velocity[:, :, :2], moved))
+
+
+def _weights(variance: Array) -> Array:
+    """(n,) of the outputs, which the current couples: one over the variance of the noise; all alike without noise."""
+    if not variance.any():
+        return np.ones(len(variance))
+    return np.asarray(1.0 / np.maximum(variance, TUNING.ideal_share * variance.max()))
 
 
 def _derivatives(

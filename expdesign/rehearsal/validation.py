@@ -22,7 +22,7 @@ import numpy as np
 
 from expdesign.dictionary import Primitive
 from expdesign.errors import InputError, NoAnswer
-from expdesign.estimation.methods import Settings, estimate
+from expdesign.estimation.methods import Settings, estimate, method_named
 from expdesign.estimation.replay import Integration
 from expdesign.estimation.solve import Weighting
 from expdesign.information.expected import TrialPart, expected_covariance
@@ -308,13 +308,14 @@ def _predicted(rehearsal: Rehearsal, design: str, vessel: Vessel) -> Array:
         environment=rehearsal.environment,
         mean_subtraction=rehearsal.mean_subtraction,
         integrator=rehearsal.integrator,
+        unknown_current=method_named(rehearsal.method).estimates_steady_current,
     )
     return np.asarray(np.sqrt(np.diag(covariance)))
 
 
 def _rehearsed_parts(rehearsal: Rehearsal, runs: Sequence[int]) -> tuple[TrialPart, ...]:
     """Every run of a trial at its heading; runs are combined in isotropic weather."""
-    if rehearsal.environment.isotropic:
+    if rehearsal.environment.isotropic and not method_named(rehearsal.method).estimates_steady_current:
         return trial_parts(rehearsal.primitives, runs)
     order = [item for item, count in zip(rehearsal.primitives, runs, strict=True) for _ in range(count)]
     return tuple(

@@ -18,7 +18,7 @@ from expdesign.memory import recalled
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import Draft, draft_trial, plan_trial
 from expdesign.plan.values import Plan, SailedTrial
-from expdesign.plan.verify import track_information
+from expdesign.plan.verify import about_ship, track_information
 from expdesign.progress import Progress, in_phases, silent
 from expdesign.shortest_day.accuracy import Accuracy
 from expdesign.shortest_day.bounds import fastest_mps, way_bound_s
@@ -194,13 +194,20 @@ class _Search:
         """The day with these runs."""
         problem = replace(self.problem, design=self.design(choice.repeats))
         draft = recalled(draft_trial, problem, progress=progress)
-        information = self._information(draft.sailed)
-        margin = self.accuracy.margin(information.sum(axis=0))
-        return DraftedDay(repeats=choice.repeats, draft=draft, information=information, margin=margin)
+        information, whole = self._information(draft.sailed)
+        return DraftedDay(
+            repeats=choice.repeats,
+            draft=draft,
+            information=information,
+            whole=whole,
+            margin=self.accuracy.margin(whole),
+        )
 
-    def _information(self, sailed: SailedTrial) -> Array:
+    def _information(self, sailed: SailedTrial) -> tuple[Array, Array]:
+        """Of each leg (legs, d, d) if the current is known, and of the track (d, d) beside an unknown one."""
         durations, weather = self.problem.design.problem, self.problem.environment
-        return track_information(self.problem.vessel, durations, weather, sailed)
+        legs, d = track_information(self.problem.vessel, durations, weather, sailed), durations.dimension
+        return legs[:, :d, :d], about_ship(durations, legs.sum(axis=0))
 
     def prices(self, days: Sequence[DraftedDay]) -> Prices:
         """Prices by the days so far; the level is what they promise where the accuracy is just reached."""
@@ -246,7 +253,7 @@ class _Search:
             except NoPlan as error:  # a longer day may be less risky
                 refused = error
                 continue
-            if good(plan, margin := self.accuracy.margin(self._information(plan.sailed).sum(axis=0))):
+            if good(plan, margin := self.accuracy.margin(self._information(plan.sailed)[1])):
                 return ShortestDay(
                     plan=plan,
                     design=design,
@@ -264,7 +271,7 @@ class _Search:
     def falls_short(self, days: Sequence[DraftedDay]) -> str:
         """That no day reaches the accuracy, and what is scarcest."""
         short = max(days, key=lambda day: day.margin)
-        name = self.accuracy.scarcest(short.information.sum(axis=0))
+        name = self.accuracy.scarcest(short.whole)
         about = f", {name} being the furthest from what is asked" if name else ""
         return (
             f"no day found reaches design.accuracy; the best of {len(days)} tells {np.exp(short.margin):.0%} of what "
@@ -298,7 +305,7 @@ class _Search:
         )
 
     def too_long(self, day: DraftedDay, most_s: float) -> str:
-        name = self.accuracy.scarcest(day.information.sum(axis=0))
+        name = self.accuracy.scarcest(day.whole)
         about = f"; {name} needs most of it" if name else ""
         return (
             f"design.accuracy.most_s is {most_s:g}: the shortest day found that reaches the accuracy takes "

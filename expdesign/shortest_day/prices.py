@@ -53,13 +53,15 @@ class DraftedDay:
     Attributes:
         repeats: (q,) runs.
         draft: the day.
-        information: (legs, d, d) of each leg of its track.
+        information: (legs, d, d) of each leg of its track, were the current known.
+        whole: (d, d) of the whole track, beside a steady current that the forecast leaves unknown.
         margin: of the accuracy, by the whole track.
     """
 
     repeats: tuple[int, ...]
     draft: Draft
     information: Array
+    whole: Array
     margin: float
 
     @property

@@ -89,6 +89,11 @@ class VesselModel:
         return self.sample_time_s if self.form == "discrete" else 1.0
 
     @property
+    def reads_air(self) -> bool:
+        """Whether a term reads a velocity through air."""
+        return any({"u_q", "v_q"} & set(expression.signals) for expression in self.expressions)
+
+    @property
     def reads_depth(self) -> bool:
         """Whether a term depends on the depth of the water."""
         return any(SHOAL in expression.signals for expression in self.expressions)

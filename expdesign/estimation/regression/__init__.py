@@ -1,5 +1,6 @@
 """Measured batches as a linear regression."""
 
+from expdesign.estimation.regression.current import STEADY_CURRENT, Guess, slopes
 from expdesign.estimation.regression.nuisance import batch_signs
 from expdesign.estimation.regression.polynomial import Polynomial, SignalTable, lift, symbol
 from expdesign.estimation.regression.predictors import CURRENT, PREDICTORS, Layout, Rows, build_layout, build_regression
@@ -25,7 +26,9 @@ __all__ = [
     "CURRENT",
     "MEANS",
     "PREDICTORS",
+    "STEADY_CURRENT",
     "VANE",
+    "Guess",
     "Integers",
     "Layout",
     "Polynomial",
@@ -46,6 +49,7 @@ __all__ = [
     "model_for",
     "signal_table",
     "single_output",
+    "slopes",
     "subtract_mean",
     "symbol",
     "with_depth",

@@ -15,6 +15,7 @@ left side.
 - wind: basic-wind plus nuisance regressors for unknown current, (5.74)-(5.76).
 - no-current: basic plus those of an unknown wind alone, the derivatives of air terms, as (6.5)-(6.7) for still water.
 - no-wind: basic plus those of an unknown current alone, the derivatives of water terms, for still air.
+- steady-current, steady-current-wind: basic and basic-wind through water that moves steadily, see `current`.
 
 Fewer regressors leave more information about the ship, and a bias where the disturbance is there after all.
 
@@ -30,6 +31,7 @@ import numpy as np
 
 from expdesign.conventions import OUTPUTS
 from expdesign.errors import InputError, NotInformative, UnknownName
+from expdesign.estimation.regression.current import STEADY_CURRENT, Guess, slopes, through_water
 from expdesign.estimation.regression.intervals import mean_between_readings
 from expdesign.estimation.regression.nuisance import Nuisance, batch_signs, headings, nuisance_regressors, symbolic
 from expdesign.estimation.regression.polynomial import Algebra
@@ -50,11 +52,13 @@ class Predictor:
         name: as users type it.
         wind: whether measured wind is used.
         unknown: disturbances that nuisance regressors are added for, of `CURRENT` and `WIND`.
+        steady: whether a steady current itself is estimated with the parameters.
     """
 
     name: str
     wind: bool
     unknown: tuple[str, ...]
+    steady: bool = False
 
     @property
     def nuisance(self) -> bool:
@@ -70,6 +74,8 @@ PREDICTORS = (
     Predictor("wind", wind=True, unknown=(CURRENT,)),
     Predictor("no-current", wind=False, unknown=(WIND,)),
     Predictor("no-wind", wind=False, unknown=(CURRENT,)),
+    Predictor("steady-current", wind=False, unknown=(), steady=True),
+    Predictor("steady-current-wind", wind=True, unknown=(), steady=True),
 )
 
 
@@ -90,6 +96,8 @@ class Layout:
         nuisance: further regressors.
         notes: one sentence for each thing that a reader of the estimate must know.
         quadrature: one of `QUADRATURES`.
+        guess: what the columns of a steady current are linearised around; their parameters are what it lacks. None
+            where no current is estimated.
     """
 
     model: VesselModel
@@ -100,14 +108,16 @@ class Layout:
     nuisance: tuple[Nuisance, ...]
     notes: tuple[str, ...] = field(default=())
     quadrature: str = "euler"
+    guess: Guess | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
         """Parameters, then nuisance parameters."""
-        return self.parameters + tuple(item.name for item in self.nuisance)
+        return self.parameters + tuple(item.name for item in self.nuisance) + (STEADY_CURRENT if self.guess else ())
 
     def rows(self, table: Table, signs: dict[str, float], *, used: Integers | slice, scale: float) -> Array:
         """(k, n, p) regressors of a table of signals, times a scale, at the samples used."""
+        table = self._in_water(table)
         rows = self._rows(table, signs, used, scale)
         if self.quadrature == "euler":
             return rows
@@ -121,14 +131,21 @@ class Layout:
         turned = {**table, **signs, **headings(table["psi"])} if self.nuisance else {}
         columns += [(item.equation, item.evaluate(turned)) for item in self.nuisance]
         count = len(table["psi"][used])
-        rows = np.zeros((len(self.model.outputs), len(columns), count)).transpose(2, 0, 1)  # columns lie in one piece
+        rows = np.zeros((len(self.model.outputs), len(self.names), count)).transpose(2, 0, 1)  # columns in one piece
         row_of = {name: index for index, name in enumerate(self.model.outputs)}
         for index, (equation, values) in enumerate(columns):
             np.multiply(np.broadcast_to(values, table["psi"].shape)[used], scale, out=rows[:, row_of[equation], index])
+        if self.guess is not None:
+            moved = slopes(self.model, self.guess.parameters, table)[:, used]  # (2, k, n)
+            np.multiply(moved.transpose(1, 2, 0), scale, out=rows[:, :, len(columns) :])
         return rows
+
+    def _in_water(self, table: Table) -> Table:
+        return table if self.guess is None else through_water(table, self.guess.to_mps)
 
     def known(self, table: Table) -> Array:
         """(k, n) part explained by the parameters held fixed."""
+        table = self._in_water(table)
         if self.quadrature == "euler":
             return self._known(table)
         return np.asarray(0.5 * (self._known(table) + self._known(ahead(table))))
@@ -195,6 +212,7 @@ def build_layout(
         if not nuisance:
             raise InputError(f"predictor {predictor!r} needs terms of the velocity through the air, the model has none")
     notes = tuple(_merged_note(model, name) for name in merged)
+    guess = Guess(to_mps=np.zeros(2), parameters=model.parameters) if chosen.steady else None
     return Layout(
         model=model,
         predictor=chosen,
@@ -204,6 +222,7 @@ def build_layout(
         nuisance=nuisance,
         notes=notes,
         quadrature=quadrature,
+        guess=guess,
     )
 
 
@@ -272,8 +291,8 @@ def _headings(record: Record, used: Sequence[Integers]) -> Array | None:
 
 def _checked_table(model: VesselModel, batch: Batch, predictor: Predictor) -> Table:
     table = measured_table(model, batch, wind_measured=predictor.wind)
-    if predictor.nuisance and not np.isfinite(table["psi"]).any():
-        raise InputError(f"{batch.name} has no measured heading; use a predictor without nuisance regressors")
+    if (predictor.nuisance or predictor.steady) and not np.isfinite(table["psi"]).any():
+        raise InputError(f"{batch.name} has no measured heading; use a method that estimates no current")
     return table
 
 

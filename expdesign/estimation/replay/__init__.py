@@ -1,7 +1,7 @@
 """Batches simulated again: instruments, and fast simulation for output error."""
 
 from expdesign.estimation.replay.instruments import InstrumentModel, apart_from_start, instrument_wind
-from expdesign.estimation.replay.replay import Integration, build_replay, simulate_batch
+from expdesign.estimation.replay.replay import Integration, Replay, build_replay, simulate_batch
 from expdesign.estimation.replay.steered import (
     LEAVE_OUT,
     PLANNED,
@@ -20,6 +20,7 @@ __all__ = [
     "Compiled",
     "InstrumentModel",
     "Integration",
+    "Replay",
     "Steered",
     "Stretches",
     "apart_from_start",

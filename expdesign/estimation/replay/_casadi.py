@@ -23,17 +23,27 @@ CASADI = Operators(ca.fabs, ca.sin, ca.cos)
 
 
 def batch_simulator(
-    model: VesselModel, *, samples: int, sample_time_s: float, integrator: str, substeps: int, width: int, windy: bool
+    model: VesselModel,
+    *,
+    samples: int,
+    sample_time_s: float,
+    integrator: str,
+    substeps: int,
+    width: int,
+    windy: bool,
+    flowing: bool = False,
 ) -> Simulate:
     """A function that simulates batches of so many samples; numbers that run away come back as inf or nan.
 
-    Its inputs have `width` columns: those of `drive_of`, and where `windy` the n-frame wind to north and east [m/s].
+    Its inputs have `width` columns: those of `drive_of`, where `windy` the n-frame wind to north and east [m/s], and
+    where `flowing` the current.
     """
     x, theta, drive = ca.SX.sym("x", model.states), ca.SX.sym("p", len(model.terms)), ca.SX.sym("i", width)
-    held, wind = _split(drive, len(model.inputs), windy)
+    current = (drive[width - 2], drive[width - 1]) if flowing else (0.0, 0.0)
+    held, wind = _split(drive[: width - 2 * flowing], len(model.inputs), windy)
 
     def rates(state: tuple[Any, ...], inputs: list[ca.SX]) -> tuple[Any, ...]:
-        return motion_rates(model, state, inputs, wind_to=wind, ops=CASADI, parameters=theta)
+        return motion_rates(model, state, inputs, current_to=current, wind_to=wind, ops=CASADI, parameters=theta)
 
     after = _stepped(rates, x, held, sample_time_s, integrator, substeps)
     return _chained(ca.Function("step", [x, drive, theta], [after]), samples)

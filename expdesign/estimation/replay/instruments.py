@@ -4,7 +4,7 @@ Velocities come from the simulated model in calm water; where wind is used in th
 that drifts in the wind more than she sails is not followed by a model in calm air, and what does not follow her is a
 weak instrument.) Heading is the measured one of the sample before, carried on by the simulated yaw rate: a simulated
 heading alone drifts away within minutes, while the measured one of the same sample shares its noise with the
-regressors. Relative wind is, by choice,
+regressors. A steady current that is estimated carries the simulated ship, too. Relative wind is, by choice,
 
 - "lagged": the simulated velocity less the n-frame wind measured a sample before, whose noise the regressors do not
   share. Right for real winds, which last.
@@ -84,7 +84,9 @@ class InstrumentModel:
         batch, wind = self.record.batches[index], self.layout.predictor.wind
         blown = wind and self.wind != "measured"
         air_n = instrument_wind(batch, self.wind) if blown else None
-        states = self.replay.states(batch, parameters, None if air_n is None else air_n.T)
+        guess = self.layout.guess
+        current_to = None if guess is None else guess.to_mps
+        states = self.replay.states(batch, parameters, None if air_n is None else air_n.T, current_to)
         psi = states[:, 2] if self.heading == "simulated" else carried_heading(heading_of(batch), states[:, 2])
         u, v, r = states[:, 3:].T
         air = u, v

@@ -46,21 +46,25 @@ class Replay:
         model: driven by the recorded inputs.
         simulators: (samples, sample time, columns of `drive_of`) of a batch -> compiled simulation.
         substeps: integrator steps per sample.
-        windy: whether simulations are given wind.
+        windy, flowing: whether simulations are given wind, and a current.
     """
 
     model: VesselModel
     simulators: Mapping[tuple[int, float, int], Simulate]
     substeps: int
     windy: bool = False
+    flowing: bool = False
 
-    def states(self, batch: Batch, parameters: Array, wind_to: Array | None = None) -> Array:
+    def states(
+        self, batch: Batch, parameters: Array, wind_to: Array | None = None, current_to: Array | None = None
+    ) -> Array:
         """(k, 6) pose and velocity from the batch's first state; outputs without an equation stay zero.
 
         Args:
             batch: gives inputs and start.
             parameters: all (all,) of the model.
             wind_to: (k, 2) wind to north and east [m/s], where the replay is windy.
+            current_to: (2,) current to north and east [m/s], where it is flowing.
 
         Raises:
             Diverged: a speed passed what ships reach, or stopped being a number.
@@ -71,6 +75,9 @@ class Replay:
         simulator = self.simulators[len(batch), batch.sample_time_s, inputs.shape[1]]
         if self.windy:
             inputs = np.concatenate([inputs, np.zeros((len(batch), 2)) if wind_to is None else wind_to], axis=1)
+        if self.flowing:
+            steady = np.zeros(2) if current_to is None else current_to
+            inputs = np.concatenate([inputs, np.tile(steady, (len(batch), 1))], axis=1)
         if not np.isfinite(inputs).all():
             raise InputError(f"{batch.name} has inputs that are not numbers, which cannot be simulated")
         states = simulator(parameters, start, inputs)
@@ -82,7 +89,12 @@ class Replay:
 
 
 def build_replay(
-    model: VesselModel, record: Record, integration: Integration | None = None, *, windy: bool = False
+    model: VesselModel,
+    record: Record,
+    integration: Integration | None = None,
+    *,
+    windy: bool = False,
+    flowing: bool = False,
 ) -> Replay:
     """Compile the simulation of every length of batch in a record, for a model from `tables.model_for`."""
     from expdesign.estimation.replay._casadi import batch_simulator  # CasADi takes a second to load
@@ -101,13 +113,15 @@ def build_replay(
                 sample_time_s=time_s,
                 integrator=how.integrator,
                 substeps=how.substeps,
-                width=columns + 2 * windy,
+                width=columns + 2 * windy + 2 * flowing,
                 windy=windy,
+                flowing=flowing,
             )
             for samples, time_s, columns in kinds
         },
         how.substeps,
         windy,
+        flowing,
     )
 
 

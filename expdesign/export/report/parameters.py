@@ -79,13 +79,15 @@ def equation_sentence(content: ReportContent) -> str:
 
 
 def unknown_current_sentence(content: ReportContent) -> str:
-    """That an unknown steady current is not counted; "" where the forecast leaves none."""
+    """Which estimate the accuracies are of where the forecast leaves a steady current unknown; "" where it does not."""
     std_mps = content.environment.current_std_mps
     if std_mps <= 0:
         return ""
+    method = "iv-air-current" if content.vessel.model.reads_air else "iv-current"
     return (
-        f"The forecast leaves a steady current of {words.speed(std_mps)} (standard deviation) unknown. No accuracy on "
-        "this page counts it. Unless it is measured or estimated with the parameters, errors can be many times larger."
+        f"The forecast leaves a steady current of {words.speed(std_mps)} (standard deviation) unknown. Accuracies on "
+        f"this page hold where it is estimated with the parameters, by expdesign estimate --method {method}. By a "
+        "method that knows nothing of it, errors can be many times larger."
     )
 
 
@@ -139,6 +141,7 @@ def _deviations(content: ReportContent, parts: list[TrialPart]) -> Array:
             content.parameters,
             environment=content.environment,
             mean_subtraction=content.design.problem.mean_subtraction,
+            unknown_current=content.environment.current_std_mps > 0,
         )
     except NoAnswer:
         return np.full(len(content.parameters), np.nan)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from expdesign.estimation.methods import method_named
 from expdesign.export.files import finite, strict_json
 from expdesign.export.tuning import TUNING
 from expdesign.rehearsal import Rehearsal, Validated
@@ -134,7 +135,7 @@ def _of_weather(rehearsal: Rehearsal) -> Iterator[str]:
     if (current or wind) and not allows:
         yield (
             f"no current and wind. Method {method} removes only a constant; --method {solver}-air, {solver}-wind or "
-            f"{solver}-augmented accounts for weather."
+            f"{solver}-augmented accounts for weather" + (", iv-current for a steady current." if current else ".")
         )
     if current and allows == "air":
         yield f"no current. Method {method} accounts for measured wind only; {solver}-wind also for current."
@@ -149,7 +150,8 @@ def _of_weather(rehearsal: Rehearsal) -> Iterator[str]:
             'loss of accuracy. Design for it with predictor = "'
             f'{allows}" in the scenario.'
         )
-    if weather.current_std_mps > 0 or weather.wind_std_mps > 0:
+    drawn = weather.current_std_mps > 0 and not method_named(method).estimates_steady_current
+    if drawn or weather.wind_std_mps > 0:
         yield "every trial has the mean weather of the forecast. Here the weather of each trial is random."
 
 

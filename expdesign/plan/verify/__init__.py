@@ -1,6 +1,13 @@
 """Independent verification of a plan; imports nothing of the planner but its values."""
 
 from expdesign.plan.verify.checks import hull_clearance, verify_plan
-from expdesign.plan.verify.efficiency import realised_efficiencies, track_covariance, track_information
+from expdesign.plan.verify.efficiency import about_ship, realised_efficiencies, track_covariance, track_information
 
-__all__ = ["hull_clearance", "realised_efficiencies", "track_covariance", "track_information", "verify_plan"]
+__all__ = [
+    "about_ship",
+    "hull_clearance",
+    "realised_efficiencies",
+    "track_covariance",
+    "track_information",
+    "verify_plan",
+]

@@ -9,6 +9,7 @@ import numpy as np
 
 from expdesign.durations import Collected, DurationDesign, DurationProblem, bordered_moments
 from expdesign.information import moments, regressor_rows
+from expdesign.information.unknown_current import beside_current, bordered_by_current, current_rows
 from expdesign.plan.values import SailedTrial
 from expdesign.simulation import Environment, delivered
 from expdesign.values import Array
@@ -26,7 +27,9 @@ def realised_efficiencies(
     By the design's criterion and the nominal model, of the information collected, not per second. What the runs lose
     against the design's whole runs is due to their places: headings in wind, and entries that a leg reached within its
     tolerance. What the whole trial has more is due to its legs; above 1 where they add more than rounding and places
-    take. None where the design has nuisance regressors or recorded primitives: of these the track says nothing.
+    take. A steady current that the forecast leaves unknown is estimated along; the optimum is for runs of any heading,
+    which tell the same then. None where the design has nuisance regressors or recorded primitives: of these the track
+    says nothing.
     """
     problem = replace(design.problem, robust="nominal", sampled=np.zeros((0, 0, 0, 0)))
     if not set(problem.parameters) <= set(vessel.model.names) or not problem.symmetric:
@@ -35,19 +38,37 @@ def realised_efficiencies(
     legs = track_information(vessel, problem, environment, sailed)
     runs = legs[[leg.kind == "primitive" for leg in sailed.legs]].sum(axis=0)
     placed, realised = (
-        collected.efficiency_of(share * matrix, design.fractions) for matrix in (runs, legs.sum(axis=0))
+        collected.efficiency_of(share * about_ship(problem, matrix), design.fractions)
+        for matrix in (runs, legs.sum(axis=0))
     )
     return placed, realised
 
 
 def track_information(vessel: Vessel, problem: DurationProblem, environment: Environment, sailed: SailedTrial) -> Array:
-    """(legs, d, d) information of each leg of a trial: sums over its samples, bordered as B_q."""
-    rows = regressor_rows(vessel.model, sailed.trajectory, delivered(vessel, sailed.commands), environment)
-    batches = [rows[leg.first : leg.last] for leg in sailed.legs]
-    matrices = [
-        len(batch) * _bordered(vessel, batch, problem.parameters, problem.mean_subtraction) for batch in batches
-    ]
+    """(legs, d, d) information of each leg of a trial: sums over its samples, bordered as B_q.
+
+    Where the forecast leaves a steady current unknown, it is (legs, d + 2, d + 2), about the current, too. What a sum
+    of them tells of the ship is `about_ship`.
+    """
+    names, mean = problem.parameters, problem.mean_subtraction
+    commands = delivered(vessel, sailed.commands)
+    rows = regressor_rows(vessel.model, sailed.trajectory, commands, environment)
+    parts = [slice(leg.first, leg.last) for leg in sailed.legs]
+    matrices = [(part.stop - part.start) * _bordered(vessel, rows[part], names, mean) for part in parts]
+    if environment.current_std_mps:
+        J = current_rows(vessel, sailed.trajectory, commands, environment)
+        matrices = [
+            bordered_by_current(vessel, M, rows[part], J[part], names, mean)
+            for M, part in zip(matrices, parts, strict=True)
+        ]
     return np.array(matrices)
+
+
+def about_ship(problem: DurationProblem, information: Array) -> Array:
+    """(d, d) what information (d, d), or with an unknown current (d + 2, d + 2), tells of the ship."""
+    if len(information) == problem.dimension:
+        return information
+    return beside_current(information, len(problem.parameters))
 
 
 def track_covariance(
@@ -61,7 +82,7 @@ def track_covariance(
     p = len(problem.parameters)
     if not set(problem.parameters) <= set(vessel.model.names):
         return None
-    M = track_information(vessel, problem, environment, sailed).sum(axis=0)
+    M = about_ship(problem, track_information(vessel, problem, environment, sailed).sum(axis=0))
     scale = np.sqrt(np.maximum(np.diag(M), 0.0))
     if not (scale > 0).all() or np.linalg.matrix_rank(M / np.outer(scale, scale)) < len(M):
         return None

@@ -1,0 +1,77 @@
+"""Regressors of an unknown steady current, exact to first order around a first guess of it.
+
+The acceleration is Phi(nu - R(psi)^T c)^T theta with the current c to north and east. Around c_0 and theta_0
+
+    Phi(nu - R^T c)^T theta ~ Phi(nu - R^T c_0)^T theta + J(c_0, theta_0) (c - c_0),   J = d(Phi^T theta) / dc
+
+so two columns stand for all that the current does, whatever the terms are, and the estimate is repeated around what it
+found until the current stays. Beside the regressors of (5.68)-(5.70), which leave every product of a parameter and the
+current free, the two cost less information; they need no excitation condition.
+
+Source: Gauss's and Newton's linearisation of the model of T. I. Fossen, Handbook of Marine Craft Hydrodynamics and
+Motion Control (2011), 8.3; the predictor of F. Ljungberg, doctoral thesis, Linköping University, (5.63), with it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from expdesign.estimation.regression.tables import Table
+from expdesign.values import Array, seal
+from expdesign.vessel import NUMPY, VesselModel
+
+STEADY_CURRENT = ("current to north", "current to east")
+"""Names of the nuisance parameters [m/s]."""
+STEP_MPS = 1e-4
+"""Of the central difference, which is exact for terms of second order away from a modulus that changes its sign."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Guess:
+    """What regressors are linearised around.
+
+    Attributes:
+        to_mps: (2,) current to north and east [m/s].
+        parameters: (all,) of the model.
+    """
+
+    to_mps: Array
+    parameters: Array
+
+    def __post_init__(self) -> None:
+        seal(self, to_mps="2", parameters="p")
+
+
+def through_water(table: Table, to_mps: Array) -> Table:
+    """The table with velocities u and v through water that moves to north and east [m/s]; those through air stay."""
+    c, s = np.cos(table["psi"]), np.sin(table["psi"])
+    north, east = to_mps
+    return {**table, "u": table["u"] - (north * c + east * s), "v": table["v"] - (east * c - north * s)}
+
+
+def slopes(model: VesselModel, parameters: Array, table: Table) -> Array:
+    """(2, k, n) change of the accelerations, in the model's own scale, with the current to north and to east [1/s].
+
+    Args:
+        model: gives terms and outputs.
+        parameters: (all,) of it.
+        table: signals through water.
+    """
+    columns = []
+    for direction in np.eye(2):
+        ahead, back = (_accelerations(model, parameters, through_water(table, sign * direction)) for sign in STEPS)
+        columns.append((ahead - back) / (2 * STEP_MPS))
+    return np.array(columns)
+
+
+STEPS = (STEP_MPS, -STEP_MPS)
+
+
+def _accelerations(model: VesselModel, parameters: Array, table: Table) -> Array:
+    """(k, n) by all terms."""
+    total = np.zeros((len(table["psi"]), len(model.outputs)))
+    for term, expression, value in zip(model.terms, model.expressions, parameters, strict=True):
+        total[:, model.outputs.index(term.equation)] += value * np.asarray(expression.evaluate(table, NUMPY))
+    return total

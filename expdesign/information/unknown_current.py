@@ -1,0 +1,94 @@
+"""What a steady current that nobody knows leaves of the information about a ship.
+
+The current enters as two parameters more, c to north and to east, by the regressors of `estimation.regression.current`.
+What remains about the ship's parameters is the Schur complement of their block. Runs of which nobody knows the heading
+tell the same with and without it: over evenly spread headings the products of J(psi), which turns with the ship, and
+the regressors, which do not, are zero on average.
+
+Source: F. Pukelsheim, Optimal Design of Experiments (2006), 3.10 for the information about a subsystem.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from expdesign.estimation.regression import STEADY_CURRENT, slopes
+from expdesign.information.moments import signals_of
+from expdesign.information.tuning import TUNING
+from expdesign.signals import Commands, Trajectory
+from expdesign.simulation import Environment
+from expdesign.values import Array
+from expdesign.vessel import Vessel
+
+
+def current_rows(vessel: Vessel, trajectory: Trajectory, commands: Commands, environment: Environment) -> Array:
+    """(k, n, 2) J at every command's start, in units of the noise of each equation.
+
+    Equations count alike where the noise of one is not stated.
+    """
+    k = len(commands)
+    pose, velocity = trajectory.pose[:k], trajectory.velocity[:k]
+    table = signals_of(vessel.model, (*pose.T, *velocity.T), commands.values.T, environment)
+    signals = {name: np.broadcast_to(values, k) for name, values in table.items()}
+    moved = slopes(vessel.model, vessel.model.parameters, {**signals, "psi": pose[:, 2]})
+    return np.asarray(moved.transpose(1, 2, 0) / _noise(vessel)[:, None])
+
+
+def bordered_by_current(vessel: Vessel, M: Array, rows: Array, J: Array, parameters: Sequence[str], mean: str) -> Array:
+    """(d + 2, d + 2) information about parameters, means and a steady current.
+
+    Args:
+        vessel: gives the terms.
+        M: (d, d) sum over samples with the current known, as of `durations.bordered_moments`.
+        rows: (k, all) values of terms.
+        J: (k, n, 2) from `current_rows`.
+        parameters: names of the p estimated ones.
+        mean: subtraction, "none", "batch" or "complete".
+    """
+    model = vessel.model
+    chosen = [model.names.index(name) for name in parameters]
+    outputs = [model.outputs.index(model.terms[index].equation) for index in chosen]
+    own = rows[:, chosen]
+    if mean == "batch":
+        own, J = own - own.mean(axis=0), J - J.mean(axis=0)
+    cross = np.einsum("kp,kpc->pc", own, J[:, outputs])
+    if mean == "complete":
+        cross = np.concatenate([cross, J.sum(axis=0)])
+    return np.block([[M, cross], [cross.T, np.einsum("knc,knd->cd", J, J)]])
+
+
+def beside_current(whole: Array, parameters: int) -> Array:
+    """(d, d) information that is left where the current is unknown; that of the means stays.
+
+    Args:
+        whole: (d + 2, d + 2) sum of `bordered_by_current`.
+        parameters: number p of them; d - p means follow, then the current.
+
+    Concave in `whole`, and zero between parameters and means, as both are eliminated at once: in data with one heading
+    the current cannot be told from the means.
+    """
+    p, d = parameters, len(whole) - len(STEADY_CURRENT)
+    left = np.zeros((d, d))
+    left[p:, p:] = whole[p:d, p:d]
+    left[:p, :p] = whole[:p, :p] - whole[:p, p:] @ _pseudo_inverse(whole[p:, p:]) @ whole[p:, :p]
+    return left
+
+
+def _pseudo_inverse(M: Array) -> Array:
+    """Of a positive semidefinite matrix, by its correlations."""
+    scale = np.sqrt(np.diag(M))
+    scale = np.where(scale > 0, scale, 1.0)
+    inverse = np.linalg.pinv(M / np.outer(scale, scale), rcond=TUNING.unseen_current, hermitian=True)
+    return np.asarray(inverse / np.outer(scale, scale))
+
+
+def _noise(vessel: Vessel) -> Array:
+    """(n,) of each output's equation, see `equation_noise`."""
+    sensors, model = vessel.sensors, vessel.model
+    of = {"u": sensors.velocity_mps, "v": sensors.velocity_mps, "r": sensors.yaw_rate_radps}
+    noise = np.array([of[name] for name in model.outputs])
+    return (
+        np.sqrt(2.0) * noise * model.time_scale_s / vessel.sample_time_s if (noise > 0).all() else np.ones(len(noise))
+    )
