@@ -43,7 +43,7 @@ def day_figure(content: WhatIfContent) -> str | None:
         axes.plot(planned, told, "o", color=colour, label=plain(case.name))
     axes.set_xlabel("day [min]")
     axes.set_ylabel("information / that of the scenario")
-    axes.set_ylim(bottom=0.0)
+    axes.set_ylim(0.0, 1.08 * max(told for _, told in known))
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=9)
     light_grid(axes)
     return svg(figure, key="days", label="Length of the day against what its whole track tells, for each case")
