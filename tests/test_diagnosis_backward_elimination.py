@@ -11,7 +11,7 @@ from expdesign.diagnosis.causes import CAUSES
 from expdesign.diagnosis.causes.candidate import Candidate, Situation
 from expdesign.diagnosis.conclusions.notes import note_on_unconverged, notes_on_rejected
 from expdesign.diagnosis.data.windows import cut_windows
-from expdesign.diagnosis.fit.cross_validation import HeldOut, _fitted, held_out_gain
+from expdesign.diagnosis.fit.cross_validation import CrossValidation, HeldOut, _fitted, held_out_gain, judged
 from expdesign.diagnosis.fit.gauss_newton import fit
 from expdesign.diagnosis.motion.simulation import initial_states
 from expdesign.diagnosis.select.backward_elimination import before_first_without_gain, improves_held_out
@@ -19,7 +19,12 @@ from expdesign.diagnosis.select.fitted_candidate import fit_candidate
 from expdesign.diagnosis.select.forward_selection import fit_nuisance, select_forward, to_take_out
 from expdesign.diagnosis.select.score_tests import ScoreTest, score_tests
 from expdesign.diagnosis.select.selection import Selection, Step, least_significant_step, wald_p_value, without_step
-from expdesign.diagnosis.select.selection_round import _starting_points, selection_round, simplest
+from expdesign.diagnosis.select.selection_round import (
+    _best_on_held_out,
+    _starting_points,
+    selection_round,
+    simplest,
+)
 from expdesign.diagnosis.select.starting_point import starting_point
 from expdesign.diagnosis.select.tuning import TUNING
 from expdesign.diagnosis.select.work import Work
@@ -77,10 +82,10 @@ def test_a_cause_that_imitates_others_costs_no_output_more_than_it_gains_on_aver
 def test_a_cause_that_imitates_others_does_not_make_a_simpler_one_redundant():
     """Unless it gains much more than the simpler one: then that was an approximation."""
 
-    def step(keys: int, gain: float, *, imitates: bool = False) -> Step:
+    def step(keys: int, gain: float, *, imitates: bool = False, outranked: tuple[Candidate, ...] = ()) -> Step:
         candidate = Candidate(cause="any", free={}, imitates=imitates)
         chosen = SimpleNamespace(keys=("key",) * keys, likelihood_gain=gain, candidate=candidate)
-        return SimpleNamespace(chosen=chosen)  # type: ignore[return-value]
+        return SimpleNamespace(chosen=chosen, outranked=outranked)  # type: ignore[return-value]
 
     simple, block = step(1, 70.0), step(3, 70.0)
     for gain, taken in ((29.0, 1), (31.0, 0)):  # `simple` is more or less than 0.7 of what both gain
@@ -88,6 +93,8 @@ def test_a_cause_that_imitates_others_does_not_make_a_simpler_one_redundant():
         assert to_take_out([simple, wind], 0) == taken
         assert to_take_out([block, wind], 0) == 0
         assert to_take_out([simple, step(3, gain)], 0) == 0
+        better = step(1, 70.0, outranked=(wind.chosen.candidate,))  # on held-out data
+        assert to_take_out([better, wind], 0) == 1
 
 
 def test_what_takes_less_than_a_hundredth_off_every_error_is_no_finding():
@@ -216,14 +223,18 @@ def test_a_block_of_parameters_is_replaced_by_the_one_effect_behind_it(monkeypat
     rounds = iter((block, change))
     real = select_forward.__globals__["selection_round"]
 
-    def scripted(base, windows, rejected, rng, work, *, most=99):
+    def scripted(base, windows, rejected, rng, work, validation, *, most=99):
         if most < 99:
             return None, ()
         candidate = next(rounds, None)
-        return real(base, windows, rejected, rng, work) if candidate is None else (added(base, windows, candidate), ())
+        if candidate is not None:
+            return added(base, windows, candidate), ()
+        return real(base, windows, rejected, rng, work, validation)
 
     monkeypatch.setitem(select_forward.__globals__, "selection_round", scripted)
-    found = select_forward(extended, windows, start, np.random.default_rng(0), Estimated(silent))
+    found = select_forward(
+        extended, windows, start, np.random.default_rng(0), Estimated(silent), CrossValidation(windows)
+    )
     causes = {step.chosen.candidate.cause for step in found.steps}
     assert {"change_point", "load_change"} <= causes
     assert "parameters" not in causes
@@ -247,6 +258,33 @@ def test_a_cause_with_fewer_numbers_comes_before_one_that_imitates_many():
     assert simplest([block, near]) is block
 
 
+def test_a_cause_with_fewer_numbers_comes_first_where_it_simulates_held_out_data_better():
+    """By more than a point; one of the same cause, or with as many numbers, is no rival."""
+
+    def item(cause: str, numbers: int, fit_percent: float) -> SimpleNamespace:
+        return SimpleNamespace(candidate=Candidate(cause=cause, free={}), numbers=numbers, fit=fit_percent)
+
+    validation = SimpleNamespace(of=errors)
+    wind = item("wind", 3, 60.0)
+    for fit_percent, better in ((60.5, False), (61.5, True)):
+        scale = item("actuator_scale", 1, fit_percent)
+        accepted = [wind, item("wind", 1, 90.0), item("current", 3, 90.0), scale]
+        chosen = _best_on_held_out(wind, accepted, validation)  # type: ignore[arg-type,list-item]
+        assert chosen is (scale if better else wind)
+
+
+def test_gains_are_those_of_stretches_where_a_whole_run_leads_astray():
+    """Where a model with causes simulates worse than a constant; the model in use may be as bad as it is."""
+    ahead = [errors(value) for value in (70.0, 75.0, 80.0)]
+
+    def of(*whole: float) -> list[float]:
+        held = [replace(errors(value), ahead=short) for value, short in zip(whole, ahead, strict=True)]
+        return [item.fit[0] for item in judged(held)]
+
+    assert of(-50.0, 20.0, 30.0) == pytest.approx([-50.0, 20.0, 30.0])
+    assert of(50.0, 20.0, -30.0) == pytest.approx([70.0, 75.0, 80.0])
+
+
 def test_air_that_pushes_against_the_wind_is_no_cause():
     """Candidates of a wind that nobody measured state which of their numbers must not be positive."""
     record = hidden_record("tug", seed=1, batches=2, samples=120)
@@ -268,7 +306,8 @@ def test_candidates_that_converge_to_zero_make_room_for_the_next_best(monkeypatc
 
     def remaining(gains: tuple[float, ...], zero: tuple[int, ...] = ()) -> list[float]:
         rough = [
-            SimpleNamespace(likelihood_gain=gain, fit=None, zero=number in zero) for number, gain in enumerate(gains)
+            SimpleNamespace(likelihood_gain=gain, numbers=1, fit=SimpleNamespace(converged=True), zero=number in zero)
+            for number, gain in enumerate(gains)
         ]
         return [item.likelihood_gain for item in names["_significant"](None, None, rough, Work())]
 

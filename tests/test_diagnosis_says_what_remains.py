@@ -10,6 +10,7 @@ from expdesign.diagnosis import Lead, Unexplained, diagnose
 from expdesign.diagnosis.accuracy.simulated_fit import accuracy
 from expdesign.diagnosis.conclusions.verdict import verdict
 from expdesign.diagnosis.data.windows import cut_windows
+from expdesign.diagnosis.fit import CrossValidation
 from expdesign.diagnosis.fit.unmeasured_force import unmeasured_force_share
 from expdesign.diagnosis.motion import linearise
 from expdesign.diagnosis.motion.simulation import initial_states, simulate_from_measured
@@ -83,7 +84,12 @@ def test_a_limit_of_nothing_leaves_all_causes_untried(monkeypatch: pytest.Monkey
     ship = extended_model(vessel_of("barge"), record)
     windows = cut_windows(ship.model, record)
     found = forward_selection.select_forward(
-        ship, windows, initial_states(windows), np.random.default_rng(0), Estimated(silent)
+        ship,
+        windows,
+        initial_states(windows),
+        np.random.default_rng(0),
+        Estimated(silent),
+        CrossValidation(windows),
     )
     assert found.steps == ()
     assert found.untried == ("further causes",)

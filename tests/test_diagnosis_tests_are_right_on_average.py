@@ -12,7 +12,14 @@ from expdesign.diagnosis.causes.candidate import Candidate
 from expdesign.diagnosis.data.noise import Noise, fit_ar_noise, linear_basis, whitened
 from expdesign.diagnosis.data.tuning import TUNING
 from expdesign.diagnosis.data.windows import cut_windows
-from expdesign.diagnosis.fit.fit import best_step, continuing, likeliest, log_likelihood_gain, within_stated_std
+from expdesign.diagnosis.fit.fit import (
+    best_step,
+    continuing,
+    likeliest,
+    log_likelihood_gain,
+    prior_precision,
+    within_stated_std,
+)
 from expdesign.diagnosis.fit.gauss_newton import fit
 from expdesign.diagnosis.motion.linearisation import disturbance_of, linearise, responses, term_disturbances
 from expdesign.diagnosis.motion.simulation import initial_states, simulate_nearby, simulate_windows
@@ -160,6 +167,44 @@ def test_parameters_far_beyond_their_standard_deviations_are_told_from_those_wit
         windows = cut_windows(ship.model, record)
         found = fit_nuisance(ship, windows, initial_states(windows))
         assert within_stated_std(found) == (factor == 1.0)
+
+
+def test_the_prior_of_parameters_is_their_covariance():
+    """Of effects without a prior it has nothing, and of the others what is left when these are unknown."""
+    rng = np.random.default_rng(3)
+    vessel = vessel_of("barge", relative_std=0.1)
+    root = rng.standard_normal((len(vessel.model.names), 20))
+    covariance = root @ root.T * np.outer(vessel.model.parameter_std, vessel.model.parameter_std)
+    vessel = replace(vessel, model=vessel.model.with_covariance(vessel.model.names, covariance))
+    record = hidden_record("barge", seed=5, batches=1, samples=60)
+    keys = tuple(f"theta:{name}" for name in vessel.model.names)
+    ship = extended_model(vessel, record)
+    whole = prior_precision(ship, (*keys, "current:north"))
+    assert np.allclose(whole[:-1, :-1] @ covariance, np.eye(len(keys)), atol=1e-6)
+    assert not whole[-1].any()
+    rest = prior_precision(ship, keys, free=2)
+    assert np.allclose(rest[2:, 2:] @ covariance[2:, 2:], np.eye(len(keys) - 2), atol=1e-6)
+    assert not rest[:2].any()
+    drawn = vessel.model.drawn_parameters(20000, rng) - vessel.model.parameters
+    scale = np.sqrt(np.diag(covariance))
+    assert (
+        np.abs(drawn.T @ drawn / len(drawn) / np.outer(scale, scale) - covariance / np.outer(scale, scale)).max() < 0.05
+    )
+
+
+def test_a_factor_that_standard_deviations_allow_may_contradict_the_covariance():
+    """Thrust is 20 % weaker in every direction. Parameters are known to 10 %, their common factor to a tenth."""
+    record = hidden_record("barge", seed=5, batches=2, samples=150, effects={"gain": -0.2})
+    alone = vessel_of("barge", relative_std=0.1)
+    reads_force = [bool({"tau_x", "tau_y", "tau_psi"} & set(item.signals)) for item in alone.model.expressions]
+    thrust = np.sign(alone.model.parameters) * reads_force
+    common = np.outer(thrust, thrust) / (thrust @ thrust)
+    root = np.diag(alone.model.parameter_std) @ (np.eye(len(thrust)) - 0.9 * common)
+    known = replace(alone, model=alone.model.with_covariance(alone.model.names, root @ root.T))
+    for vessel, within in ((alone, True), (known, False)):
+        ship = extended_model(vessel, record)
+        windows = cut_windows(ship.model, record)
+        assert within_stated_std(fit_nuisance(ship, windows, initial_states(windows))) == within
 
 
 def test_an_autoregression_with_its_white_share_is_whitened():

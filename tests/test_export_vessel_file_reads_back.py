@@ -49,6 +49,17 @@ def test_a_custom_structure_comes_back_the_same(tmp_path: Path) -> None:
     assert "[[model.terms]]" in vessel_toml(vessel)
 
 
+def test_the_covariance_of_parameters_comes_back(tmp_path: Path) -> None:
+    vessel = load_vessel(write_vessel(tmp_path / "custom.toml", KVLCC2))
+    names = vessel.model.names[1:]
+    root = np.random.default_rng(0).standard_normal((len(names), len(names))) * 10.0 ** np.linspace(-6, 3, len(names))
+    known = replace(vessel, model=vessel.model.with_covariance(names, root.T @ root))
+    found = read_back(known, tmp_path).model.parameter_covariance
+    scale = np.maximum(known.model.parameter_std, 1e-300)
+    assert np.allclose(found[1:, 1:] / np.outer(scale[1:], scale[1:]), (root.T @ root) / np.outer(scale[1:], scale[1:]))
+    assert not found[0].any()
+
+
 def test_numbers_and_names_of_any_kind_come_back(tmp_path: Path) -> None:
     vessel = load_vessel(write_vessel(tmp_path / "custom.toml", KVLCC2))
     scales = 10.0 ** np.linspace(-300, 11, len(vessel.model.names))

@@ -96,6 +96,30 @@ VESSEL_CASES = [
     ),
     ("X_u = 0.06", "X_u = -0.06", "model.parameter_std.X_u", "is -0.06, expected at least 0"),
     ("X_u = 0.06", "Z = 0.06", "model.parameter_std", "'Z' is not a parameter of the structure, expected one of"),
+    (
+        "[sensors]",
+        "[model.parameter_correlation]\nX_u = { X_mu = 1.5 }\n[sensors]",
+        "model.parameter_correlation.X_u.X_mu",
+        "is 1.5, expected -1 to 1",
+    ),
+    (
+        "[sensors]",
+        "[model.parameter_correlation]\nX_u = { Z = 0.5 }\n[sensors]",
+        "model.parameter_correlation.X_u",
+        "'Z' is not a parameter of the structure, expected one of",
+    ),
+    (
+        "[sensors]",
+        "[model.parameter_correlation]\nX_u = { X_mu = 0.5 }\nX_mu = { X_u = 0.5 }\n[sensors]",
+        "model.parameter_correlation.X_mu.X_u",
+        "is given already, expected each pair of parameters once",
+    ),
+    (
+        "[sensors]",
+        "[model.parameter_correlation]\nX_u = { X_mu = 0.9, X_abs_u_u = 0.9 }\nX_mu = { X_abs_u_u = -0.9 }\n[sensors]",
+        "model.parameter_correlation",
+        "contradicts itself: no parameters have such correlations",
+    ),
     ("velocity_mps = 0.01", "velocity_mps = -1", "sensors.velocity_mps", "is -1, expected at least 0"),
     ("velocity_mps = 0.01", "speed_mps = 0.01", "sensors.speed_mps", "is not a known key, did you mean"),
 ]

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from expdesign.cli.app import Asked, ask, command
-from expdesign.cli.options import DataFiles, Fixed, Mean, OutByData, OutByVessel, Seed, Velocity
+from expdesign.cli.options import DataFiles, Fixed, Jobs, Mean, OutByData, OutByVessel, Seed, Velocity
 
 
 @command("estimate")
@@ -126,6 +126,7 @@ def diagnose(
     ] = None,
     velocity: Velocity = "auto",
     out: OutByData = None,
+    jobs: Jobs = 0,
     seed: Seed = 0,
 ) -> Asked:
     """Find the causes of the simulation error and extend the model by them.
@@ -134,7 +135,7 @@ def diagnose(
 
     Example: expdesign diagnose zigzag.csv circle.csv --vessel ship.toml
     """
-    return ask("diagnose", data, out, vessel=vessel, scenario=scenario, velocity=velocity, seed=seed)
+    return ask("diagnose", data, out, vessel=vessel, scenario=scenario, velocity=velocity, jobs=jobs, seed=seed)
 
 
 @command("indices")

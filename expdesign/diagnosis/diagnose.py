@@ -21,6 +21,7 @@ from expdesign.diagnosis.conclusions import (
     finding_of,
     note_on_nuisance,
     note_on_random_current,
+    note_on_stretches,
     note_on_unconverged,
     note_on_work,
     notes_on_data,
@@ -31,7 +32,15 @@ from expdesign.diagnosis.conclusions import (
 )
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.discriminating_manoeuvre import Proposal, most_discriminating, standard_proposals
-from expdesign.diagnosis.fit import HeldOut, cross_validate, held_out_gain, unmeasured_force_share, within_stated_std
+from expdesign.diagnosis.fit import (
+    CrossValidation,
+    HeldOut,
+    cross_validate,
+    held_out_gain,
+    judged,
+    unmeasured_force_share,
+    within_stated_std,
+)
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import initial_states, simulate_from_measured, stable_windows
 from expdesign.diagnosis.select import (
@@ -101,19 +110,26 @@ def diagnose(
     within = () if findings else _gains_within_std(chosen, ship, seed)
     refined = steps or ship.stated_std or within
     final = chosen.kept.last.ship if refined else ship
-    extended, not_written = extend(vessel, final, _standard_errors(chosen.kept) if refined else {})
+    last = chosen.kept.last
+    extended, not_written = (
+        extend(vessel, final, _standard_errors(chosen.kept), (last.keys, last.covariance))
+        if refined
+        else extend(vessel, final, {})
+    )
     before, after = accuracy(ship, record), accuracy(final, record)
     unexplained = _unexplained(chosen, after, windows, seed)
+    unit = unit_name(windows, in_stretches=chosen.held[0].in_stretches)
     concluding("measuring the gain on held-out runs", 1.0)
     return Diagnosis(
         vessel=vessel,
         extended=extended,
         record=record,
         windows=windows,
+        unit=unit,
         before=before,
         after=after,
         findings=ranked,
-        verdict=verdict(ranked, before, unit_name(windows), unexplained, within),
+        verdict=verdict(ranked, before, unit, unexplained, within),
         unexplained=unexplained,
         simulated_before=motion.predicted,
         simulated_after=simulate_from_measured(final, windows).predicted,
@@ -122,7 +138,7 @@ def diagnose(
         step_residuals=tuple(one_step_residuals(step.before.ship, windows) for step in steps),
         notes=(
             *notes_on_data(vessel, record, windows, constant_inputs(ship, windows)),
-            *_notes_on_selection(chosen, windows, seed),
+            *_notes_on_selection(chosen, unit, seed),
             *not_written,
         ),
         screened=_smallest_p_values(chosen.kept),
@@ -143,20 +159,29 @@ class _Selected:
     as_stated: HeldOut
     held: list[HeldOut]
 
+    @property
+    def before(self) -> HeldOut:
+        """`as_stated` as `held` was measured: of whole units or of short stretches."""
+        stretches = self.as_stated.ahead
+        return stretches if self.held[0].in_stretches and stretches is not None else self.as_stated
+
 
 def _select(ship: ExtendedModel, windows: Windows, seed: int, told: Estimated) -> _Selected:
     rng = np.random.default_rng(seed)
-    found = select_forward(ship, windows, initial_states(windows), rng, told)
+    validation = CrossValidation(windows)
+    found = select_forward(ship, windows, initial_states(windows), rng, told, validation)
     as_stated = cross_validate(None, ship, windows, silent)
 
     def cross_validated(found: Selection) -> list[HeldOut]:
-        return _cross_validated(found, as_stated, windows, told.part(VALIDATED * (1 + len(found.steps)), CONCLUDED))
+        return _cross_validated(found, as_stated, validation, told.part(VALIDATED * (1 + len(found.steps)), CONCLUDED))
 
     kept, held = eliminate_backward(found, windows, cross_validated, seed)
     return _Selected(found=found, kept=kept, as_stated=as_stated, held=held)
 
 
-def _cross_validated(found: Selection, as_stated: HeldOut, windows: Windows, progress: Progress) -> list[HeldOut]:
+def _cross_validated(
+    found: Selection, as_stated: HeldOut, validation: CrossValidation, progress: Progress
+) -> list[HeldOut]:
     """Of the model before any cause, then after every step.
 
     The gain of uncertain parameters within their standard deviations is not attributed to a cause. So the model in use
@@ -171,10 +196,10 @@ def _cross_validated(found: Selection, as_stated: HeldOut, windows: Windows, pro
     results = [as_stated]
     for number, item in enumerate(fits):
         part = within(progress, number / len(fits), (number + 1) / len(fits))
-        results.append(cross_validate(item, item.ship, windows, part))
+        results.append(validation.of(item, part))
     if fitted:
         results[:2] = [results[0] if _simulates_better(*results[:2]) else results[1]]
-    return results
+    return judged(results)
 
 
 def _simulates_better(as_stated: HeldOut, fitted: HeldOut) -> bool:
@@ -184,10 +209,10 @@ def _simulates_better(as_stated: HeldOut, fitted: HeldOut) -> bool:
 
 def _gains_within_std(chosen: _Selected, ship: ExtendedModel, seed: int) -> tuple[ErrorReduction, ...]:
     """What uncertain parameters gain within their standard deviations on held-out units; none where that is unclear."""
-    gain, (low, _) = held_out_gain(chosen.as_stated, chosen.held[0], seed)
+    gain, (low, _) = held_out_gain(chosen.before, chosen.held[0], seed)
     if not within_stated_std(chosen.kept.first) or not (gain > LEAST_GAIN_WITHIN_STD and low > 0):
         return ()
-    return error_reductions_of(ship.model.outputs, chosen.as_stated, chosen.held[0], seed)
+    return error_reductions_of(ship.model.outputs, chosen.before, chosen.held[0], seed)
 
 
 def _unexplained(chosen: _Selected, after: Accuracy, windows: Windows, seed: int) -> Unexplained | None:
@@ -199,6 +224,7 @@ def _unexplained(chosen: _Selected, after: Accuracy, windows: Windows, seed: int
     base, leads = chosen.held[len(chosen.kept.steps)], []
     for item in leading_candidates(chosen.kept.last, windows, chosen.kept.last_tests):
         held = cross_validate(item.fit, item.fit.ship, windows, silent)
+        held = held.ahead if base.in_stretches and held.ahead is not None else held
         leads.append(Lead(item.candidate.cause, *held_out_gain(base, held, seed)))
     return Unexplained(
         outputs=after.outputs,
@@ -231,10 +257,10 @@ def _discriminating(step: Step, proposals: Sequence[Proposal], windows: Windows)
     return most_discriminating(found.ship, [other.fit.ship for other in step.alternatives], proposals, std, windows)
 
 
-def _notes_on_selection(chosen: _Selected, windows: Windows, seed: int) -> tuple[str, ...]:
-    notes = [*notes_on_rejected(chosen.found, chosen.kept, unit_name(windows))]
+def _notes_on_selection(chosen: _Selected, unit: str, seed: int) -> tuple[str, ...]:
+    notes = [*note_on_stretches(chosen.held), *notes_on_rejected(chosen.found, chosen.kept, unit)]
     if chosen.kept.first.keys:
-        notes += note_on_nuisance(chosen.as_stated, chosen.held[0], seed)
+        notes += note_on_nuisance(chosen.before, chosen.held[0], seed)
     notes += (*notes_on_found_again(chosen.kept), *note_on_work(chosen.found))
     return (*notes, *note_on_unconverged(chosen.held), *note_on_random_current(chosen.kept.last.noise))
 

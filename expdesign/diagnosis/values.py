@@ -109,6 +109,7 @@ class Diagnosis:
         extended: the same with all findings.
         record: the data.
         windows: the data as compared.
+        unit: what gains are measured on, in words.
         before, after: accuracy of both on all batches, in sample.
         findings: in the order of the selection; each gain is relative to the model with the earlier ones.
         verdict: one sentence.
@@ -125,6 +126,7 @@ class Diagnosis:
     extended: Vessel
     record: Record
     windows: Windows
+    unit: str
     before: Accuracy
     after: Accuracy
     findings: tuple[Finding, ...]

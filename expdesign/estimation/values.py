@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -99,9 +99,5 @@ class Estimate:
         return self.assignments[name]
 
     def model(self, model: VesselModel) -> VesselModel:
-        """A model with these values, and these standard deviations as its prior; held parameters count as known."""
-        std = dict(zip(self.names, self.std.tolist(), strict=True))
-        return replace(
-            model.with_parameters(self.assignments),
-            parameter_std=np.array([std.get(name, 0.0) for name in model.names]),
-        )
+        """A model with these values and this covariance as its prior; held parameters count as known."""
+        return model.with_parameters(self.assignments).with_covariance(self.names, self.covariance)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -68,7 +69,7 @@ def drawn_parameters(model: VesselModel, parameters: Sequence[str], count: int, 
     std = np.array([s if n in parameters else 0.0 for n, s in zip(model.names, model.parameter_std, strict=True)])
     if not std.any():
         raise InputError("robust durations need model.parameter_std of the parameters, found none")
-    return np.asarray(model.parameters + std * rng.standard_normal((count, len(model.names))))
+    return replace(model, parameter_std=std).drawn_parameters(count, rng)
 
 
 def score_prior(

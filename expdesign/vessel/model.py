@@ -9,9 +9,12 @@ Source: F. Ljungberg, doctoral thesis, Linköping University, (3.58)-(3.64).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
+
+import numpy as np
 
 from expdesign.conventions import OUTPUTS
 from expdesign.errors import InputError, UnknownName
@@ -30,6 +33,8 @@ class VesselModel:
         terms: the rows of the regressor matrix, in parameter order.
         parameters: (p,) parameter values in that order.
         parameter_std: (p,) prior standard deviations, zero where the value counts as known.
+        parameter_correlation: of pairs of them, by their names; zero for others. Names that are no parameters are
+            ignored.
         form: "discrete" (parameters hold the sample time) or "continuous".
         sample_time_s: of the discrete form [s].
         actuators: they turn commands into generalised forces.
@@ -43,6 +48,7 @@ class VesselModel:
     sample_time_s: float
     actuators: tuple[Actuator, ...]
     roll: Roll | None = None
+    parameter_correlation: Mapping[tuple[str, str], float] = field(default_factory=dict)
     expressions: tuple[Expression, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -67,6 +73,21 @@ class VesselModel:
     def names(self) -> tuple[str, ...]:
         """Parameter names in order."""
         return tuple(term.name for term in self.terms)
+
+    @property
+    def parameter_covariance(self) -> Array:
+        """(p, p) prior covariance of the parameters."""
+        return np.asarray(self.parameter_correlation_matrix * np.outer(self.parameter_std, self.parameter_std))
+
+    @cached_property
+    def parameter_correlation_matrix(self) -> Array:
+        """(p, p) prior correlation of the parameters."""
+        index = {name: place for place, name in enumerate(self.names)}
+        correlation = np.eye(len(index))
+        for (one, other), value in self.parameter_correlation.items():
+            if one in index and other in index:
+                correlation[index[one], index[other]] = correlation[index[other], index[one]] = value
+        return readonly(correlation)
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -108,6 +129,34 @@ class VesselModel:
         return replace(
             self, parameters=readonly([values.get(n, old) for n, old in zip(self.names, self.parameters, strict=True)])
         )
+
+    def with_covariance(self, names: Sequence[str], covariance: Array) -> VesselModel:
+        """The same with another prior covariance of its parameters; those not named count as known.
+
+        Args:
+            names: of parameters.
+            covariance: (n, n) of these.
+        """
+        std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        scale = np.where(std > 0, std, np.inf)
+        correlation = covariance / np.outer(scale, scale)
+        own = dict(zip(names, std.tolist(), strict=True))
+        return replace(
+            self,
+            parameter_std=np.array([own.get(name, 0.0) for name in self.names]),
+            parameter_correlation={
+                (names[i], names[j]): float(correlation[i, j])
+                for i, j in zip(*np.nonzero(np.tril(correlation, -1)), strict=True)
+            },
+        )
+
+    def drawn_parameters(self, count: int, rng: np.random.Generator) -> Array:
+        """(count, p) parameters drawn from the normal prior."""
+        drawn = rng.standard_normal((count, len(self.terms)))
+        if not self.parameter_correlation:
+            return np.asarray(self.parameters + self.parameter_std * drawn)
+        values, vectors = np.linalg.eigh(self.parameter_covariance)
+        return np.asarray(self.parameters + drawn @ (vectors * np.sqrt(np.maximum(values, 0.0))).T)
 
     def regressors(self, velocity_r: Any, velocity_q: Any, inputs: Any, ops: Operators = NUMPY) -> tuple[Any, ...]:
         """Value of every term, in parameter order.

@@ -4,6 +4,7 @@ from expdesign.diagnosis.conclusions.findings import error_reductions_of, findin
 from expdesign.diagnosis.conclusions.notes import (
     note_on_nuisance,
     note_on_random_current,
+    note_on_stretches,
     note_on_unconverged,
     note_on_work,
     notes_on_data,
@@ -32,6 +33,7 @@ __all__ = [
     "missing_effect",
     "note_on_nuisance",
     "note_on_random_current",
+    "note_on_stretches",
     "note_on_unconverged",
     "note_on_work",
     "notes_on_data",

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from expdesign.diagnosis.causes import rounded
 from expdesign.diagnosis.conclusions.verdict import missing_effect
 from expdesign.diagnosis.data import Noise, Windows, missing_wind_share
-from expdesign.diagnosis.fit import HeldOut, held_out_gain
+from expdesign.diagnosis.fit import AHEAD_S, HeldOut, held_out_gain
 from expdesign.diagnosis.select import SELECTION_TUNING, Selection
 from expdesign.diagnosis.vessel_file import public_name
 from expdesign.signals import Record
@@ -116,6 +116,16 @@ def note_on_nuisance(unfitted: HeldOut, fitted: HeldOut, seed: int) -> tuple[str
     return (
         f"Fitting the parameters within their stated standard deviations changes the fit on held-out runs by "
         f"{gain:+.1f} points. The gains of causes come on top of that.",
+    )
+
+
+def note_on_stretches(held: Sequence[HeldOut]) -> tuple[str, ...]:
+    """Gains that are not those of whole runs."""
+    if not held[0].in_stretches:
+        return ()
+    return (
+        "Fitted to the other runs, a model leads away from the ship in a whole run. So gains are measured in stretches "
+        f"of {AHEAD_S:g} s, each simulated from its first measured state.",
     )
 
 

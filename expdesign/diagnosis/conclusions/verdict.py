@@ -8,7 +8,7 @@ import numpy as np
 
 from expdesign.diagnosis.accuracy import Accuracy
 from expdesign.diagnosis.data import Windows
-from expdesign.diagnosis.fit import validation_units
+from expdesign.diagnosis.fit import AHEAD_S, validation_units
 from expdesign.diagnosis.values import ErrorReduction, Finding, Unexplained
 
 DIVERGED_FIT = -300.0
@@ -85,8 +85,10 @@ def _reduction(best: ErrorReduction, verbs: tuple[str, str] = ("halves", "cuts")
     return f"{cuts} the {WORDS[best.output]} error by {_percent(best.share)} % {interval}"
 
 
-def unit_name(windows: Windows) -> str:
-    """Unit of held-out data: runs, or stretches where there are too few runs."""
+def unit_name(windows: Windows, *, in_stretches: bool = False) -> str:
+    """Unit of held-out data: runs, stretches where there are too few runs, or short stretches of either."""
+    if in_stretches:
+        return f"{AHEAD_S:g} s stretches of runs"
     return "runs" if np.array_equal(validation_units(windows), windows.batch) else "stretches"
 
 

@@ -6,10 +6,12 @@ compares two, `cluster_robust` corrects standard errors, `cross_validate` measur
 
 from expdesign.diagnosis.fit.cluster_robust import cluster_robust
 from expdesign.diagnosis.fit.cross_validation import (
+    CrossValidation,
     HeldOut,
     bootstrap_sums,
     cross_validate,
     held_out_gain,
+    judged,
     on_common_units,
     validation_units,
 )
@@ -31,9 +33,15 @@ from expdesign.diagnosis.fit.linear_model import (
     effect_disturbances,
     sensitivities_to,
 )
+from expdesign.diagnosis.fit.tuning import TUNING
 from expdesign.diagnosis.fit.unmeasured_force import unmeasured_force_share
 
+AHEAD_S = TUNING.ahead_s
+"""Length of the stretches that held-out data are also simulated in [s]."""
+
 __all__ = [
+    "AHEAD_S",
+    "CrossValidation",
     "Fit",
     "FitOptions",
     "HeldOut",
@@ -49,6 +57,7 @@ __all__ = [
     "gram_matrices",
     "held_out_gain",
     "information",
+    "judged",
     "likeliest",
     "log_likelihood_gain",
     "on_common_units",

@@ -41,6 +41,6 @@ def cluster_covariance(found: Fit, run: Array) -> Array:
     names = np.unique(run)
     scores = np.stack([m.each[run == name].sum(axis=0) for name in names])
     scores = scores - scores.mean(axis=0)
-    meat = len(names) / (len(names) - 1) * scores.T @ scores + np.diag(found.precision)
-    bread = np.linalg.pinv(m.A + np.diag(found.precision), rcond=1e-14, hermitian=True)
+    meat = len(names) / (len(names) - 1) * scores.T @ scores + found.precision
+    bread = np.linalg.pinv(m.A + found.precision, rcond=1e-14, hermitian=True)
     return np.asarray(bread @ meat @ bread, dtype=float)

@@ -4,10 +4,14 @@ Data are held out in units: batches, or windows where there are fewer than three
 units that they are evaluated on. Where such a fit does not improve on the fit to all units, the effects of the latter
 are kept; `unconverged` counts these folds. The selection of causes and the grid searches (width of a dead band, time of
 a change, direction of the wind) used all units.
+
+Every unit is simulated as a whole, and besides in short stretches, each from its first measured state. A fit of many
+parameters to few units may lead away from the ship in a whole unit; then only the stretches tell what it is worth.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +25,8 @@ from expdesign.diagnosis.fit.gauss_newton import fit
 from expdesign.diagnosis.fit.tuning import TUNING
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import simulate_from_measured
-from expdesign.progress import Progress
+from expdesign.processes import in_order
+from expdesign.progress import Progress, silent
 from expdesign.values import Array
 
 
@@ -33,11 +38,15 @@ class HeldOut:
         squared_error: (b, n) sum per unit and output; nan for units whose fold could not be fitted.
         squared_deviation: (b, n) of the measurements from their mean, likewise.
         unconverged: folds that kept the effects fitted to all units.
+        ahead: of the same units in stretches of `Tuning.ahead_s`, where they were simulated so besides.
+        in_stretches: whether these are such errors.
     """
 
     squared_error: Array
     squared_deviation: Array
     unconverged: int = 0
+    ahead: HeldOut | None = None
+    in_stretches: bool = False
 
     @property
     def fit(self) -> Array:
@@ -56,6 +65,21 @@ def validation_units(windows: Windows) -> Array:
     return windows.batch if len(np.unique(windows.batch)) >= 3 else np.arange(len(windows.batch), dtype=float)
 
 
+class CrossValidation:
+    """Errors of fits on held-out units, each measured once."""
+
+    def __init__(self, windows: Windows) -> None:
+        """Of all data."""
+        self._windows = windows
+        self._known: dict[int, tuple[Fit, HeldOut]] = {}
+
+    def of(self, found: Fit, progress: Progress = silent) -> HeldOut:
+        """Of a model whose effects are fitted."""
+        if id(found) not in self._known:
+            self._known[id(found)] = found, cross_validate(found, found.ship, self._windows, progress)
+        return self._known[id(found)][1]
+
+
 def cross_validate(found: Fit | None, ship: ExtendedModel, windows: Windows, progress: Progress) -> HeldOut:
     """Errors of a model whose effects are fitted to the other units.
 
@@ -70,21 +94,50 @@ def cross_validate(found: Fit | None, ship: ExtendedModel, windows: Windows, pro
     folds = [names[index :: TUNING.folds] for index in range(min(TUNING.folds, len(names)))]
     columns = [OUTPUTS.index(name) for name in ship.model.outputs]
     error = np.zeros((len(names), len(columns)))
-    deviation, unconverged = np.zeros_like(error), 0
-    for number, fold in enumerate(folds):
+    ahead, deviation, unconverged = np.zeros_like(error), np.zeros_like(error), 0
+    kept_out = [np.isin(unit, fold) for fold in folds]
+    refitted = [test for test in kept_out if found is not None and not test.all()]
+    models = in_order(_fitted, (found, windows), [(~test,) for test in refitted])
+    for number, (fold, test) in enumerate(zip(folds, kept_out, strict=True)):
         progress("measuring the gain on held-out runs", number / len(folds))
-        test = np.isin(unit, fold)
-        model = ship if found is None or test.all() else _fitted(found, windows, ~test)
+        model = ship if found is None or test.all() else next(models)
         if model is None:
-            error[np.isin(names, fold)], deviation[np.isin(names, fold)] = np.nan, np.nan
+            for total in (error, ahead, deviation):
+                total[np.isin(names, fold)] = np.nan
             continue
-        unconverged += found is not None and model is found.ship
+        unconverged += found is not None and model.effects == found.ship.effects
         part = windows.selected(test)
         motion = simulate_from_measured(model, part, None if found is None else found.linear.selected(test))
         sums = squared_sums(motion.error[..., columns], part.measured[..., columns])
-        for total, rows in zip((error, deviation), sums, strict=True):
-            np.add.at(total, np.searchsorted(names, unit[test]), rows)
-    return HeldOut(squared_error=error, squared_deviation=deviation, unconverged=unconverged)
+        short, parent = _stretches(part)
+        begun_anew = simulate_from_measured(model, short).error[..., columns]
+        place = np.searchsorted(names, unit[test])
+        np.add.at(error, place, sums[0])
+        np.add.at(deviation, place, sums[1])
+        np.add.at(ahead, place[parent], squared_sums(begun_anew, short.measured[..., columns])[0])
+    stretches = HeldOut(squared_error=ahead, squared_deviation=deviation, unconverged=unconverged, in_stretches=True)
+    return HeldOut(squared_error=error, squared_deviation=deviation, unconverged=unconverged, ahead=stretches)
+
+
+def judged(held: Sequence[HeldOut], *, first: int = 1) -> list[HeldOut]:
+    """Errors by which models are compared: of whole units, or of short stretches.
+
+    Stretches count where a model simulates some output of whole units worse than a constant.
+
+    Args:
+        held: errors of the models.
+        first: the first whose simulation decides so; the model before any cause may be as bad as it is.
+    """
+    stretches = [item.ahead for item in held if item.ahead is not None]
+    astray = any(not (item.fit >= TUNING.least_fit).all() for item in held[first:])
+    return stretches if astray and len(stretches) == len(held) else [*held]
+
+
+def _stretches(windows: Windows) -> tuple[Windows, NDArray[np.int64]]:
+    """The data in short stretches, and the number of the window that each is a part of."""
+    short = windows.cut_shorter(max(2, round(TUNING.ahead_s / windows.sample_s)))
+    within = (windows.batch == short.batch[:, None]) & (windows.first <= short.first[:, None])
+    return short, np.asarray(np.where(within, windows.first, -1.0).argmax(axis=1))
 
 
 def _fitted(found: Fit, windows: Windows, train: NDArray[np.bool_]) -> ExtendedModel | None:

@@ -36,7 +36,7 @@ class Fit:
         cost: weighted squared error at the end, while fitting; deviance: twice its negative log likelihood, with the
             size of its own noise.
         linear, sensitivities: at the end; grams: of the sensitivities, under the noise.
-        precision: (c,) of the effects' priors.
+        precision: (c, c) of the effects' priors.
         step: (c,) to the optimum of the linear model within bounds.
         converged: a further step would not lower the cost noticeably.
         simulations: of all windows that the fit took.
@@ -104,10 +104,38 @@ def uncertain_keys(ship: ExtendedModel) -> tuple[str, ...]:
     return tuple(key for key, std in _prior_std(ship).items() if std > 0)
 
 
-def prior_precision(ship: ExtendedModel, keys: tuple[str, ...]) -> Array:
-    """(c,) of effects: 1 / std^2 of those with a standard deviation in the vessel file, else zero."""
-    std = _prior_std(ship)
-    return np.array([1.0 / std[key] ** 2 if std.get(key, 0.0) > 0 else 0.0 for key in keys])
+def prior_precision(ship: ExtendedModel, keys: tuple[str, ...], *, free: int = 0) -> Array:
+    """(c, c) inverse covariance of effects with a standard deviation in the vessel file, zero for others.
+
+    Args:
+        ship: the model in use.
+        keys: effects.
+        free: this many of the first have no prior; that of the others is their marginal one.
+    """
+    whitening = _prior_whitening(ship, keys, free)
+    return np.asarray(whitening.T @ whitening)
+
+
+def _prior_whitening(ship: ExtendedModel, keys: tuple[str, ...], free: int) -> Array:
+    """(c, c) symmetric square root of the inverse prior correlation, times the inverse standard deviations."""
+    known = _prior_std(ship)
+    std = np.array([0.0] * free + [known.get(key, 0.0) for key in keys[free:]])
+    index = np.flatnonzero(std > 0)
+    values, vectors = np.linalg.eigh(_prior_correlation(ship, [keys[place] for place in index]))
+    root = (vectors / np.sqrt(np.maximum(values, TUNING.least_correlation_eigenvalue))) @ vectors.T
+    whitening = np.zeros((len(keys), len(keys)))
+    whitening[np.ix_(index, index)] = root / std[index]
+    return whitening
+
+
+def _prior_correlation(ship: ExtendedModel, keys: Sequence[str]) -> Array:
+    """(c, c) of effects: that of parameters is in the vessel file, others are independent."""
+    names = [f"theta:{name}" for name in ship.model.names]
+    correlation = np.eye(len(keys))
+    rows = [row for row, key in enumerate(keys) if key in names]
+    places = [names.index(keys[row]) for row in rows]
+    correlation[np.ix_(rows, rows)] = ship.model.parameter_correlation_matrix[np.ix_(places, places)]
+    return correlation
 
 
 def _prior_std(ship: ExtendedModel) -> dict[str, float]:
@@ -151,9 +179,10 @@ def deviations_of(ship: ExtendedModel, keys: tuple[str, ...]) -> Array:
 
 def within_stated_std(found: Fit) -> bool:
     """Whether all effects with a standard deviation in the vessel file are within it, by Bonferroni's inequality."""
-    stated = found.precision > 0.0
-    apart = np.abs(deviations_of(found.ship, found.keys)[stated]) * np.sqrt(found.precision[stated])
-    return bool((2.0 * scipy.stats.norm.sf(apart) * max(stated.sum(), 1) > TUNING.beyond_std_level).all())
+    whitening = _prior_whitening(found.ship, found.keys, found.free_count)
+    apart = np.abs(whitening @ deviations_of(found.ship, found.keys))
+    stated = int((np.diag(whitening) > 0).sum())
+    return bool((2.0 * scipy.stats.norm.sf(apart) * max(stated, 1) > TUNING.beyond_std_level).all())
 
 
 def profile_cost(found: Fit, noise: Noise) -> float:
@@ -161,9 +190,9 @@ def profile_cost(found: Fit, noise: Noise) -> float:
     grams = found.grams if noise is found.noise else gram_matrices(found.sensitivities, noise)
     m = marginalised(grams, found.sensitivities, noise)
     now = deviations_of(found.ship, found.keys)
-    score = m.s - found.precision * now
-    _, best = best_step(m.A + np.diag(found.precision), score, lowest_steps(found.ship, found.keys))
-    return float(m.quadratic + found.precision @ now**2 - best)
+    score = m.s - found.precision @ now
+    _, best = best_step(m.A + found.precision, score, lowest_steps(found.ship, found.keys))
+    return float(m.quadratic + now @ found.precision @ now - best)
 
 
 def log_likelihood_gain(base: Fit, found: Fit) -> float:

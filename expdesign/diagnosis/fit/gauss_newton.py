@@ -64,8 +64,7 @@ def fit(
     """
     options = FitOptions() if options is None else options
     keys = (*free, *(key for key in uncertain_keys(ship) if key not in free))
-    precision = prior_precision(ship, keys)
-    precision[: len(free)] = 0.0
+    precision = prior_precision(ship, keys, free=len(free))
     problem = _Problem(windows=windows, keys=keys, free_count=len(free), precision=precision, options=options)
     starts = _resized(starts, ship.states)
     point = _linearised(problem, ship, starts, simulate_windows(ship, windows, starts, warm_start=options.warm_start))
@@ -102,10 +101,10 @@ def _weighted(problem: _Problem, point: _Point | Fit, noise: Noise) -> Fit:
     grams = gram_matrices(point.sensitivities, noise)
     m = marginalised(grams, point.sensitivities, noise)
     now = deviations_of(point.ship, problem.keys)
-    score = m.s - problem.precision * now
-    A = m.A + np.diag(problem.precision)
+    score = m.s - problem.precision @ now
+    A = m.A + problem.precision
     step, gain = best_step(A, score, lowest_steps(point.ship, problem.keys))
-    cost = m.quadratic + float(problem.precision @ now**2)
+    cost = m.quadratic + float(now @ problem.precision @ now)
     return Fit(
         ship=point.ship,
         keys=problem.keys,
@@ -176,7 +175,8 @@ def _line_search(problem: _Problem, best: Fit) -> tuple[Fit | None, int]:
 def _cost_with_weights_of(problem: _Problem, best: Fit, ship: ExtendedModel, error: Array) -> float:
     """Cost of another ship's error with the weights of the best fit so far."""
     quadratic = information(replace(best.sensitivities, error=error), best.noise).quadratic
-    return quadratic + float(problem.precision @ deviations_of(ship, problem.keys) ** 2)
+    now = deviations_of(ship, problem.keys)
+    return quadratic + float(now @ problem.precision @ now)
 
 
 def _inverse(A: Array) -> Array:

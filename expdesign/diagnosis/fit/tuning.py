@@ -24,9 +24,12 @@ class Tuning:
         smallest_factor_change: factors of inertia, thrust and gyro stay above one plus this.
         largest_ratio: times and widths change by this factor in a step, at most.
         beyond_std_level: of the test whether parameters are within their stated standard deviations.
+        least_correlation_eigenvalue: of stated parameters; smaller ones count as rounded.
         fewest_runs: for cluster-robust standard errors.
         folds: of the cross-validation.
         fold_steps: Gauss-Newton steps from the fit to all units to the fit without a fold.
+        ahead_s: length of the stretches that held-out data are also simulated in [s].
+        least_fit: of simulations of whole held-out units [%]; where one is worse, the stretches count.
         force_spacing_s: between the knots of a force that nobody measured [s].
         force_penalties: sizes of such a force that are tried, as ridge penalties.
         bootstrap_draws: of units, for intervals.
@@ -46,9 +49,12 @@ class Tuning:
     smallest_factor_change: float = -0.8
     largest_ratio: float = 3.0
     beyond_std_level: float = 1e-3
+    least_correlation_eigenvalue: float = 1e-6
     fewest_runs: int = 10
     folds: int = 3
     fold_steps: int = 6
+    ahead_s: float = 30.0
+    least_fit: float = 0.0
     force_spacing_s: float = 60.0
     force_penalties: tuple[float, ...] = (1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0, 1e3, 1e4)
     bootstrap_draws: int = 1000

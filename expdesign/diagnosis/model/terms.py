@@ -10,7 +10,7 @@ import numpy as np
 
 from expdesign.values import Array
 from expdesign.vessel import Term, VesselModel, stem
-from expdesign.vessel.expressions import Evaluate, Expression, parse_expression
+from expdesign.vessel.expressions import Expression, parse_expression
 from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS
 
 Effects = Mapping[str, float]
@@ -24,14 +24,14 @@ class ScaledTerm:
 
     Attributes:
         equation: u, v or r.
-        evaluate: its regressor.
+        expression: its regressor.
         factor: its parameter with all factors, as an acceleration.
         after: change of the factor after the change point.
         coriolis, damping, reads_air, reads_turn: its kind.
     """
 
     equation: str
-    evaluate: Evaluate
+    expression: Expression
     factor: float
     after: float = 0.0
     coriolis: bool = False
@@ -62,7 +62,7 @@ def own_terms(model: VesselModel, effects: Effects) -> list[ScaledTerm]:
         parts.append(
             ScaledTerm(
                 equation=equation,
-                evaluate=kind.evaluate,
+                expression=kind.expression,
                 factor=whole / model.time_scale_s,
                 after=changed / model.time_scale_s,
                 coriolis=kind.coriolis,
@@ -96,7 +96,7 @@ def library_terms(model: VesselModel, library: Mapping[str, Term], effects: Effe
             parts.append(
                 ScaledTerm(
                     equation=term.equation,
-                    evaluate=expression.evaluate,
+                    expression=expression,
                     factor=value / model.time_scale_s,
                     reads_air=bool(AIR_SIGNALS & set(expression.signals)),
                     reads_turn="tau_psi" in expression.signals,
@@ -128,7 +128,7 @@ class TermKind:
 
     name: str
     equation: str
-    evaluate: Evaluate
+    expression: Expression
     thrust: bool
     rudder: bool
     damping: bool
@@ -143,7 +143,7 @@ def _term_kinds(model: VesselModel) -> tuple[TermKind, ...]:
         TermKind(
             name=term.name,
             equation=term.equation,
-            evaluate=expression.evaluate,
+            expression=expression,
             thrust=is_thrust(expression, model),
             rudder=reads_rudder(expression),
             damping=is_damping(term, expression, model),

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.model import ExtendedModel, ScaledTerm, ahead_force
 from expdesign.diagnosis.motion.exogenous_inputs import ExogenousInputs
 from expdesign.values import Array
-from expdesign.vessel import NUMPY
+from expdesign.vessel.common_subexpressions import evaluated_together
 from expdesign.vessel.structures import SHOAL
 
 
@@ -31,8 +32,10 @@ def rates_by_term(
     signals = _signals(ship, u, v, r, exogenous)
     still = np.zeros_like(u)
     result = []
-    for part in parts:
-        value = _value(ship, part, signals, exogenous)
+    for part, regressor in zip(
+        parts, evaluated_together([part.expression for part in parts]).values(signals), strict=True
+    ):
+        value = _value(ship, part, regressor, exogenous)
         value = value if part.coriolis else value / _heavier(ship, part.equation, exogenous)
         plain = tuple(value if name == part.equation else still for name in OUTPUTS)
         result.append(plain if ship.roll is None else ship.roll.rates(plain, still, (still, still)))
@@ -42,11 +45,11 @@ def rates_by_term(
 def _accelerations(ship: ExtendedModel, u: Array, v: Array, r: Array, exogenous: ExogenousInputs) -> list[Array]:
     """d/dt (u, v, r) without roll."""
     signals = _signals(ship, u, v, r, exogenous)
-    totals = {name: np.zeros_like(u) for name in OUTPUTS}
+    totals = dict.fromkeys(OUTPUTS, np.zeros_like(u))
     steady = dict(totals)
-    for part in ship.scaled_terms:
+    for part, regressor in zip(ship.scaled_terms, ship.regressors.values(signals), strict=True):
         into = steady if part.coriolis else totals
-        into[part.equation] = into[part.equation] + _value(ship, part, signals, exogenous)
+        into[part.equation] = into[part.equation] + _value(ship, part, regressor, exogenous)
     lean = ship.get("asymmetry")
     if lean and not any(part.reads_turn for part in ship.scaled_terms):
         totals["r"] = totals["r"] + lean * ahead_force(signals, ship.model)
@@ -66,13 +69,12 @@ def _signals(ship: ExtendedModel, u: Array, v: Array, r: Array, exogenous: Exoge
     return signals
 
 
-def _value(ship: ExtendedModel, part: ScaledTerm, signals: Mapping[str, Array], exogenous: ExogenousInputs) -> Array:
+def _value(ship: ExtendedModel, part: ScaledTerm, regressor: Any, exogenous: ExogenousInputs) -> Any:
     """One term, before inertia."""
-    factor = part.factor + part.after_factor(exogenous) if part.after else part.factor
-    value = factor * part.evaluate(signals, NUMPY)
+    value = (part.factor + part.after_factor(exogenous) if part.after else part.factor) * regressor
     if part.damping and SHOAL in exogenous:
         value = value * (1 + ship.get("shallow:damping") * exogenous[SHOAL])
-    return np.asarray(value)
+    return value
 
 
 def _heavier(ship: ExtendedModel, equation: str, exogenous: ExogenousInputs) -> Array | float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 import scipy
 
@@ -25,17 +27,25 @@ class ExogenousInputs(dict[str, Array]):
     of each step to its end.
     """
 
+    @cached_property
+    def rising(self) -> tuple[tuple[str, str], ...]:
+        """Names of signals that change within steps, and of their rises."""
+        return tuple((name.removeprefix(RISE), name) for name in self if name.startswith(RISE))
+
     def at(self, step: int) -> ExogenousInputs:
         """One integrator step of every window."""
-        return ExogenousInputs({name: values[:, step] for name, values in self.items()})
+        result = ExogenousInputs({name: values[:, step] for name, values in self.items()})
+        result.__dict__["rising"] = self.rising
+        return result
 
     def at_fraction(self, share: float) -> ExogenousInputs:
         """Values within the steps, from -0.5 at their beginning to 0.5 at their end."""
-        rises = [name for name in self if name.startswith(RISE)]
-        if not rises:
+        if not self.rising:
             return self
-        moved = {name.removeprefix(RISE): self[name.removeprefix(RISE)] + share * self[name] for name in rises}
-        return ExogenousInputs({**self, **moved})
+        result = ExogenousInputs(self)
+        for name, rise in self.rising:
+            result[name] = self[name] + share * self[rise]
+        return result
 
     def without_last_step(self) -> ExogenousInputs:
         """All steps but the last."""

@@ -35,7 +35,7 @@ def _rk4_part(
     begin, middle, end = exogenous
 
     def ahead(slope: tuple[Array, ...], share: float) -> tuple[Array, ...]:
-        return tuple(np.clip(a + share * h * b, -1e3, 1e3) for a, b in zip(x, slope, strict=True))
+        return tuple(np.minimum(np.maximum(a + share * h * b, -1e3), 1e3) for a, b in zip(x, slope, strict=True))
 
     k1 = state_rates(ship, x, begin)
     k2 = state_rates(ship, x2 := ahead(k1, 0.5), middle)

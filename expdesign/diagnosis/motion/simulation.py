@@ -28,7 +28,8 @@ def simulate_windows(
     """
     exogenous = exogenous_inputs(ship, windows)
     with np.errstate(over="ignore", invalid="ignore"):
-        states = None if warm_start is None else _newton_over_all_steps(ship, windows, exogenous, start, warm_start)
+        states = None if warm_start is None else _newton_from(ship, windows, exogenous, start, warm_start)
+        states = _newton_from_measured(ship, windows, exogenous, start) if states is None else states
         states = _step_by_step(ship, windows, exogenous, start) if states is None else states
     return _motion(ship, windows, exogenous, states)
 
@@ -42,7 +43,7 @@ def simulate_nearby(ship: ExtendedModel, windows: Windows, start: Array, near: L
         return simulate_windows(ship, windows, start)
     exogenous = exogenous_inputs(ship, windows)
     with np.errstate(over="ignore", invalid="ignore"):
-        states = _newton_over_all_steps(ship, windows, exogenous, start, near)
+        states = _newton_from(ship, windows, exogenous, start, near)
     return None if states is None else _motion(ship, windows, exogenous, states)
 
 
@@ -78,21 +79,48 @@ def _step_by_step(ship: ExtendedModel, windows: Windows, exogenous: ExogenousInp
     return states
 
 
+def _newton_from(
+    ship: ExtendedModel, windows: Windows, exogenous: ExogenousInputs, start: Array, near: LinearisedMotion
+) -> Array | None:
+    """(w, k, n) by Newton's method from a similar motion; None where that does not converge."""
+    if near.motion.states.shape != (len(start), windows.steps, ship.states):
+        return None
+    return _newton_over_all_steps(ship, windows, exogenous, start, near.motion.states, near.transition)
+
+
+def _newton_from_measured(
+    ship: ExtendedModel, windows: Windows, exogenous: ExogenousInputs, start: Array
+) -> Array | None:
+    """(w, k, n) by Newton's method from the measured velocities; None where that does not converge, and with roll."""
+    if ship.has_roll:
+        return None
+    states = _measured_states(windows)
+    jacobian = state_jacobian(ship, (states[:, :-1] + states[:, 1:]) / 2, exogenous.without_last_step())
+    transition, _ = transition_matrices(jacobian, windows.step_s)
+    return _newton_over_all_steps(ship, windows, exogenous, start, states, transition)
+
+
+def _measured_states(windows: Windows) -> Array:
+    """(w, k, 3) measured velocities at the integrator steps, the last measured one in gaps, zero before the first."""
+    seen = np.isfinite(windows.measured[..., :3])
+    sample = np.arange(seen.shape[1])[None, :, None]
+    last = np.maximum.accumulate(np.where(seen, sample, -1), axis=1)
+    held = np.take_along_axis(np.nan_to_num(windows.measured[..., :3]), np.maximum(last, 0), axis=1)
+    return np.repeat(np.where(last < 0, 0.0, held), windows.steps_per_sample, axis=1)[:, : windows.steps]
+
+
 def _newton_over_all_steps(
-    ship: ExtendedModel, windows: Windows, exogenous: ExogenousInputs, start: Array, warm_start: LinearisedMotion
+    ship: ExtendedModel, windows: Windows, exogenous: ExogenousInputs, start: Array, states: Array, transition: Array
 ) -> Array | None:
     """(w, k, n) by Newton's method for all steps as one system of equations, or None without convergence.
 
-    Each iteration computes all steps from the last states and propagates the gaps between them by the transition
-    matrices of the similar motion (multiple shooting). At convergence the gaps vanish, and the result is the stepwise
+    Each iteration computes all steps from the last states and propagates the gaps between them by transition matrices
+    of a similar motion (multiple shooting). At convergence the gaps vanish, and the result is the stepwise
     one.
 
     Source: P. Bellen and M. Zennaro, Journal of Computational and Applied Mathematics 25 (1989), 341-350.
     """
-    states = warm_start.motion.states
-    if states.shape != (len(start), windows.steps, ship.states):
-        return None
-    middle, last, transition = exogenous.without_last_step(), np.inf, warm_start.transition
+    middle, last = exogenous.without_last_step(), np.inf
     for number in range(TUNING.newton_rounds):
         made = np.stack(
             runge_kutta_step(ship, tuple(np.moveaxis(states[:, :-1], -1, 0)), middle, windows.step_s)[0], axis=-1

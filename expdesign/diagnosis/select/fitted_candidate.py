@@ -39,6 +39,11 @@ class FittedCandidate:
     multiplicity: float = 1.0
 
     @property
+    def numbers(self) -> int:
+        """How many it takes from the data."""
+        return len(self.keys) + (self.profiled is not None)
+
+    @property
     def p_value(self) -> float:
         """Of the likelihood ratio test, adjusted for multiple tests."""
         return min(

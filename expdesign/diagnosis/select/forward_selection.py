@@ -4,18 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
 from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.data import Windows
-from expdesign.diagnosis.fit import Fit, FitOptions, fit, log_likelihood_gain
+from expdesign.diagnosis.fit import (
+    CrossValidation,
+    Fit,
+    FitOptions,
+    fit,
+    held_out_gain,
+    judged,
+    log_likelihood_gain,
+)
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.select.fitted_candidate import FittedCandidate
 from expdesign.diagnosis.select.profile_likelihood import profile_estimate
 from expdesign.diagnosis.select.score_tests import ScoreTest
 from expdesign.diagnosis.select.selection import Selection, Step, redundant_step, without_step
-from expdesign.diagnosis.select.selection_round import listed_causes, same_effects_as_any, selection_round
+from expdesign.diagnosis.select.selection_round import (
+    listed_causes,
+    round_tests,
+    same_effects_as_any,
+    selection_round,
+)
 from expdesign.diagnosis.select.tuning import TUNING
 from expdesign.diagnosis.select.work import Work
 from expdesign.progress import Estimated
@@ -23,25 +37,33 @@ from expdesign.values import Array
 
 
 def select_forward(
-    ship: ExtendedModel, windows: Windows, starts: Array, rng: np.random.Generator, progress: Estimated
+    ship: ExtendedModel,
+    windows: Windows,
+    starts: Array,
+    rng: np.random.Generator,
+    progress: Estimated,
+    validation: CrossValidation,
 ) -> Selection:
     """Add causes until nothing significant is left, and take out those that later ones make redundant.
 
     A cause that approximated another one becomes redundant once that one is found. The selection then returns to the
     step where it was added and continues without it, so that no later finding depends on it. Many parameters at once
     explain nearly any data. So before such a block is added, causes with fewer effects are tried one after the other.
-    At the end, every cause is compared once more with its best replacement beside the others.
+    At the end, every cause is compared once more with its best replacement beside the others. The search ends where the
+    last causes improve nothing on held-out data: no model of a real ship is exact, and tests always find more.
     """
     base = first = fit_nuisance(ship, windows, starts)
     steps: list[Step] = []
     rejected: list[Candidate] = []
     exchanges, work = 0, Work(progress=progress)
     while True:
-        search = _Search(windows=windows, rejected=tuple(rejected), rng=rng, work=work)
-        step, tests = search.round(base)
+        search = _Search(windows=windows, rejected=tuple(rejected), rng=rng, work=work, validation=validation)
+        idle = _is_idle([first, *(step.chosen.fit for step in steps)], validation)
+        step, tests = (None, search.tests(base)) if idle else search.round(base)
         work.rounds_left = listed_causes(tests) + len(steps)  # each step is compared with others at the end
         if (
             step is None
+            and not idle
             and exchanges < TUNING.most_exchanges
             and (len(steps) < 2 or work.allows("exchanges of causes"))
         ):
@@ -65,12 +87,24 @@ def select_forward(
             del steps[redundant:]
 
 
+def _is_idle(fits: Sequence[Fit], validation: CrossValidation) -> bool:
+    """Whether none of the last causes improves the simulation of held-out data."""
+    last = fits[-TUNING.idle_causes - 1 :]
+    if len(last) <= TUNING.idle_causes:
+        return False
+    held = judged([validation.of(item) for item in last])
+    return all(held_out_gain(*pair, 0)[0] <= TUNING.least_gain_points for pair in pairwise(held))
+
+
 def to_take_out(steps: Sequence[Step], redundant: int) -> int:
     """The step to take out where one is redundant: the last one, if that only imitates what the other explains.
 
-    A cause with many numbers makes simpler ones redundant whether or not it acts. It has to gain more than they do.
+    A cause with many numbers makes simpler ones redundant whether or not it acts. It has to gain more than they do, and
+    to simulate held-out data better.
     """
     simple, last = steps[redundant].chosen, steps[-1].chosen
+    if same_effects_as_any(last.candidate, steps[redundant].outranked):
+        return len(steps) - 1
     if not last.candidate.imitates or simple.candidate.imitates or len(simple.keys) >= len(last.keys):
         return redundant
     both = simple.likelihood_gain + last.likelihood_gain
@@ -85,10 +119,15 @@ class _Search:
     rejected: tuple[Candidate, ...]
     rng: np.random.Generator
     work: Work
+    validation: CrossValidation
+
+    def tests(self, base: Fit) -> tuple[ScoreTest, ...]:
+        """Tests of what is left."""
+        return round_tests(base, self.windows, self.rejected, self.rng, self.work)
 
     def round(self, base: Fit, *, most: int = 99) -> tuple[Step | None, tuple[ScoreTest, ...]]:
         """One round from a fit, with candidates of at most so many effects."""
-        return selection_round(base, self.windows, list(self.rejected), self.rng, self.work, most=most)
+        return selection_round(base, self.windows, self.rejected, self.rng, self.work, self.validation, most=most)
 
 
 def fit_nuisance(ship: ExtendedModel, windows: Windows, starts: Array) -> Fit:

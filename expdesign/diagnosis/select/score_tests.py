@@ -117,9 +117,9 @@ def _scores(base: Fit, candidates: Sequence[Candidate]) -> _Scores:
     c = len(base.keys)
     now = deviations_of(base.ship, base.keys)
     A, s = m.A.copy(), m.s.copy()
-    own = A[:c, :c] + np.diag(base.precision)
+    own = A[:c, :c] + base.precision
     if c:
-        solved = np.linalg.lstsq(own, np.column_stack([A[:c, c:], s[:c] - base.precision * now]), rcond=None)[0]
+        solved = np.linalg.lstsq(own, np.column_stack([A[:c, c:], s[:c] - base.precision @ now]), rcond=None)[0]
         s = s[c:] - A[c:, :c] @ solved[:, -1]
         A = A[c:, c:] - A[c:, :c] @ solved[:, :-1]
     size = np.sqrt(np.maximum(np.diag(m.A)[c:], 1e-300))

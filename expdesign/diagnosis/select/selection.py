@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
+from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.fit import Fit, continuing, fit, log_likelihood_gain
 from expdesign.diagnosis.select.fitted_candidate import FittedCandidate
@@ -26,6 +27,7 @@ class Step:
         p_value: adjusted for multiple tests.
         alternatives: candidates of other causes that explain the data as well, best first.
         before: the fit without it.
+        outranked: candidates with more numbers that fit better, and simulate held-out data worse.
         tests: all score tests of the round.
     """
 
@@ -34,6 +36,7 @@ class Step:
     alternatives: tuple[FittedCandidate, ...]
     before: Fit
     tests: tuple[ScoreTest, ...]
+    outranked: tuple[Candidate, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

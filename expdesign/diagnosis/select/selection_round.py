@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from expdesign.diagnosis.causes import CAUSES, Candidate, Situation
 from expdesign.diagnosis.data import Windows
-from expdesign.diagnosis.fit import Fit
+from expdesign.diagnosis.fit import CrossValidation, Fit, judged
 from expdesign.diagnosis.select.fitted_candidate import (
     FittedCandidate,
     fit_candidate,
@@ -22,14 +23,16 @@ from expdesign.diagnosis.select.short_windows import fit_short_windows, start_in
 from expdesign.diagnosis.select.starting_point import StartingPoint, starting_point
 from expdesign.diagnosis.select.tuning import TUNING
 from expdesign.diagnosis.select.work import Work, work_of_simulation
+from expdesign.processes import in_order
 
 
 def selection_round(
     base: Fit,
     windows: Windows,
-    rejected: list[Candidate],
+    rejected: Sequence[Candidate],
     rng: np.random.Generator,
     work: Work,
+    validation: CrossValidation,
     *,
     most: int = 99,
 ) -> tuple[Step | None, tuple[ScoreTest, ...]]:
@@ -41,19 +44,31 @@ def selection_round(
         rejected: candidates that are not tried again.
         rng: of the null distribution.
         work: of the search.
+        validation: of its fits.
         most: effects that a candidate may have.
     """
+    tests = round_tests(base, windows, rejected, rng, work, most=most)
+    return _step(base, windows, tests, work, validation), tests
+
+
+def round_tests(
+    base: Fit,
+    windows: Windows,
+    rejected: Sequence[Candidate],
+    rng: np.random.Generator,
+    work: Work,
+    *,
+    most: int = 99,
+) -> tuple[ScoreTest, ...]:
+    """Score tests of a round, with arguments as in `selection_round`."""
     work.tell("testing causes", TUNING.round_work)
-    tests = score_tests(
-        base,
-        [c for c in _candidates(base, windows) if not same_effects_as_any(c, rejected) and len(c.free) <= most],
-        rng,
-    )
+    candidates = [c for c in _candidates(base, windows) if not same_effects_as_any(c, rejected) and len(c.free) <= most]
+    tests = score_tests(base, candidates, rng)
     work.progress.done += TUNING.tests_work
-    return _step(base, windows, tests, work), tests
+    return tests
 
 
-def same_effects_as_any(candidate: Candidate, others: list[Candidate]) -> bool:
+def same_effects_as_any(candidate: Candidate, others: Sequence[Candidate]) -> bool:
     """Whether another candidate has the same cause and effects, with any first guess."""
     return any(candidate.cause == other.cause and set(candidate.free) == set(other.free) for other in others)
 
@@ -68,17 +83,20 @@ def _candidates(base: Fit, windows: Windows) -> list[Candidate]:
     ]
 
 
-def _step(base: Fit, windows: Windows, tests: tuple[ScoreTest, ...], work: Work) -> Step | None:
+def _step(
+    base: Fit, windows: Windows, tests: tuple[ScoreTest, ...], work: Work, validation: CrossValidation
+) -> Step | None:
     if not work.allows("further causes"):
         return None
     points, far = _starting_points(base, windows, tests)
     rough: list[FittedCandidate] = []
     fits = [(TUNING.first_steps + 1) * work_of_simulation(base.ship.with_effects(point.effects)) for point in points]
+    results = in_order(_rough_fit, (base, windows, far), [(point,) for point in points])
     for index, point in enumerate(points):
         work.tell(f"fitting {point.test.candidate.cause}", sum(fits[index:]))
         if not work.allows(f"{point.test.candidate.cause} beside {len(base.free_keys)} effects"):
-            continue
-        candidate = fit_candidate(base, windows, point, far=far, steps=TUNING.first_steps)
+            continue  # nor will it allow the others
+        candidate = next(results)
         if candidate is not None:
             work.spend(candidate.fit.simulations, work_of_simulation(candidate.fit.ship))
             rough.append(candidate)
@@ -87,14 +105,45 @@ def _step(base: Fit, windows: Windows, tests: tuple[ScoreTest, ...], work: Work)
     accepted = [item for item in fitted if item.p_value <= TUNING.accepted_p_value]
     if not accepted:
         return None
-    chosen = simplest(accepted)
+    first = simplest(accepted)
+    chosen = _best_on_held_out(first, accepted, validation)
     return Step(
         chosen=with_profile_estimate(chosen, base),
         p_value=chosen.p_value,
         alternatives=_alternatives(chosen, fitted),
         before=base,
         tests=tests,
+        outranked=() if chosen is first else (first.candidate,),
     )
+
+
+def _best_on_held_out(
+    first: FittedCandidate, accepted: Sequence[FittedCandidate], validation: CrossValidation
+) -> FittedCandidate:
+    """The best candidate, or one with fewer numbers that simulates data held out of the fit better.
+
+    Many numbers explain errors of the model's structure in the data that they are fitted to, and in no others.
+    """
+    rivals = _rivals(first, accepted)
+    if not rivals:
+        return first
+    held = judged([validation.of(item.fit) for item in (first, *rivals)], first=0)
+    means = [float(np.nan_to_num(item.fit, nan=-np.inf).mean()) for item in held]
+    best = int(np.argmax(means))
+    return rivals[best - 1] if best and means[best] > means[0] + TUNING.clear_gain_points else first
+
+
+def _rivals(first: FittedCandidate, accepted: Sequence[FittedCandidate]) -> list[FittedCandidate]:
+    """The best candidate of each other cause that has fewer numbers."""
+    found: dict[str, FittedCandidate] = {}
+    for item in accepted:
+        if item.numbers < first.numbers and item.candidate.cause != first.candidate.cause:
+            found.setdefault(item.candidate.cause, item)
+    return [*found.values()][: TUNING.rivals]
+
+
+def _rough_fit(base: Fit, windows: Windows, far: bool, point: StartingPoint) -> FittedCandidate | None:
+    return fit_candidate(base, windows, point, far=far, steps=TUNING.first_steps)
 
 
 def simplest(accepted: list[FittedCandidate]) -> FittedCandidate:
@@ -127,19 +176,28 @@ def _significant(base: Fit, windows: Windows, rough: list[FittedCandidate], work
     A candidate may converge to zero in the nonlinear fit. Then the next best are fitted.
     """
     while rough:
-        most = max(item.likelihood_gain for item in rough)
-        leading = [
-            item for item in rough if item.likelihood_gain > TUNING.leading_share * most - TUNING.statistic_margin
-        ]
-        converged = [fit_to_convergence(base, windows, item) for item in leading]
+        leading = _leading(rough)
+        converged = list(in_order(fit_to_convergence, (base, windows), [(item,) for item in leading]))
         for new, old in zip(converged, leading, strict=True):
-            if new is not old:
+            if not old.fit.converged:
                 work.spend(new.fit.simulations, work_of_simulation(new.fit.ship))
         significant = [item for item in converged if wald_p_value(item, item.fit) <= TUNING.level]
         if significant or not leading:  # nothing gains anything
             return ranked_by_gain(base, significant)
         rough = [item for item in rough if item not in leading]
     return []
+
+
+def _leading(rough: list[FittedCandidate]) -> list[FittedCandidate]:
+    """Those that gain nearly as much as the best, and those with fewer numbers that gain a good share of it."""
+    best = max(rough, key=lambda item: item.likelihood_gain)
+    return [
+        item
+        for item in rough
+        if item.likelihood_gain
+        > (TUNING.simple_share if item.numbers < best.numbers else TUNING.leading_share) * best.likelihood_gain
+        - TUNING.statistic_margin
+    ]
 
 
 def _starting_points(base: Fit, windows: Windows, tests: tuple[ScoreTest, ...]) -> tuple[list[StartingPoint], bool]:

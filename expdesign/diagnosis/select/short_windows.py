@@ -14,6 +14,7 @@ from expdesign.diagnosis.motion import initial_states, simulate_windows
 from expdesign.diagnosis.select.score_tests import ScoreTest
 from expdesign.diagnosis.select.starting_point import StartingPoint, joint_keys, starting_point
 from expdesign.diagnosis.select.tuning import TUNING
+from expdesign.processes import in_order
 from expdesign.values import Array
 
 FROM_NOTHING = FitOptions(steps=TUNING.short_steps, ar_order=0)
@@ -43,8 +44,8 @@ def start_in_short_windows(short_fit: Fit, shortlist: Sequence[ScoreTest], certa
         shortlist: tests of the candidates.
         certain: this many of the first are never left out.
     """
-    points = [starting_point(short_fit, test) for test in shortlist]
-    fits = [_fit_in_short_windows(short_fit, point) for point in points]
+    points = list(in_order(starting_point, (short_fit,), [(test,) for test in shortlist]))
+    fits = list(in_order(_fit_in_short_windows, (short_fit,), [(point,) for point in points]))
     noise = likeliest([short_fit, *(found for found in fits if found is not None)]).noise
     without = profile_cost(short_fit, noise)
     gains = [-np.inf if found is None else without - profile_cost(found, noise) for found in fits]

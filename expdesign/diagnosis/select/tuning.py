@@ -25,6 +25,8 @@ class Tuning:
             d comes out ahead by more than this with a probability below Phi(-sqrt(equivalent_within)).
         first_steps: Gauss-Newton steps of every candidate.
         leading_share: candidates that then gain less than this share of the best are dropped.
+        simple_share: the same of those with fewer numbers than the best.
+        rivals: candidates with fewer numbers that are compared with the best on held-out data, at most.
         nearly_as_much: share of the gain of a candidate that imitates many causes which one with fewer numbers needs to
             come first.
         nuisance_steps: Gauss-Newton steps of the fit before anything is tested, at most.
@@ -37,6 +39,7 @@ class Tuning:
             ones.
         large_current_mps: standard deviation of the random current above which a steady current is fitted too.
         most_simulations: of all data in fits of candidates, before the search leaves the rest untried.
+        idle_causes: causes one after the other that improve nothing on held-out data, after which the search ends.
         most_findings: causes, at most.
         most_rejected: causes that are removed again, at most.
         most_exchanges: of a cause for another that gains more beside the rest, at most.
@@ -67,6 +70,8 @@ class Tuning:
     equivalent_within: float = 5.0
     first_steps: int = 3
     leading_share: float = 0.6
+    simple_share: float = 0.3
+    rivals: int = 3
     nearly_as_much: float = 0.7
     nuisance_steps: int = 12
     large_share: float = 0.15
@@ -78,6 +83,7 @@ class Tuning:
     least_gain_share: float = 0.75
     large_current_mps: float = 0.1
     most_simulations: int = 250
+    idle_causes: int = 2
     most_findings: int = 6
     most_rejected: int = 4
     most_exchanges: int = 2

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,18 +10,26 @@ import numpy as np
 from expdesign.diagnosis.model import RESPONSES, ExtendedModel, group_columns, mean_wind
 from expdesign.diagnosis.vessel_file.found_terms import found_model
 from expdesign.diagnosis.vessel_file.stated_std import found_std, with_std
-from expdesign.vessel import Actuator, Response, Sensors, Vessel, std_keys
+from expdesign.values import Array
+from expdesign.vessel import Actuator, Response, Sensors, Vessel, VesselModel, std_keys
 
 
-def extend(vessel: Vessel, ship: ExtendedModel, std: Mapping[str, float]) -> tuple[Vessel, tuple[str, ...]]:
+def extend(
+    vessel: Vessel,
+    ship: ExtendedModel,
+    std: Mapping[str, float],
+    estimated: tuple[Sequence[str], Array] = ((), np.zeros((0, 0))),
+) -> tuple[Vessel, tuple[str, ...]]:
     """The vessel with the effects of `ship`, and notes on those that it cannot hold, one sentence each.
 
     Args:
         vessel: the model in use.
         ship: with effects found.
         std: standard errors of effects.
+        estimated: effects, and the covariance (c, c) of their estimates.
     """
     model, missing = found_model(vessel.model, ship, std)
+    model = _correlated(model, *estimated)
     actuators, more = _actuators(model.actuators, ship)
     if "u" not in ship.derived and ship.get("late:u") != ship.get("late:v"):
         more = (*more, "The delay of u or v alone is written as one of the whole velocity sensor.")
@@ -46,6 +54,16 @@ def extend(vessel: Vessel, ship: ExtendedModel, std: Mapping[str, float]) -> tup
         ),
         (*missing, *more),
     )
+
+
+def _correlated(model: VesselModel, keys: Sequence[str], covariance: Array) -> VesselModel:
+    """The model with the correlations of what was estimated in place of its prior ones; its stds stay."""
+    places = [place for place, key in enumerate(keys) if key.startswith(("theta:", "term:"))]
+    if not places:
+        return model
+    names = [keys[place].split(":", 1)[1] for place in places]
+    found = model.with_covariance(names, covariance[np.ix_(places, places)]).parameter_correlation
+    return replace(model, parameter_correlation=found)
 
 
 def _has(ship: ExtendedModel, prefix: str) -> bool:

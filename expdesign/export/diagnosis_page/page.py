@@ -16,7 +16,6 @@ from expdesign.diagnosis.conclusions import (
     has_diverged,
     manoeuvre,
     missing_effect,
-    unit_name,
 )
 from expdesign.diagnosis.select import SELECTION_TUNING
 from expdesign.diagnosis.values import ErrorReduction
@@ -46,7 +45,7 @@ def diagnosis_html(found: Diagnosis, *, command: str, version: str, progress: Pr
     return page.render(
         found=found,
         alarm=f"{SELECTION_TUNING.accepted_p_value:g}",
-        apart=unit_name(found.windows),
+        apart=found.unit,
         findings=[_finding(item, found) for item in found.findings],
         before=accuracy_in_words(found.before),
         astray=has_diverged(found.before) or has_diverged(found.after),

@@ -119,8 +119,24 @@ def _model(model: VesselModel) -> Iterator[str]:
     known = {name: std for name, std in zip(model.names, stds, strict=True) if std > 0}
     if known:
         yield from ("", *_table("[model.parameter_std]", known))
+    yield from _correlation(model)
     if model.roll is not None:
         yield from ("", *_table("[model.roll]", vars(model.roll)))
+
+
+def _correlation(model: VesselModel) -> Iterator[str]:
+    """Correlations of parameters with standard deviations, a line for each parameter with those before it."""
+    correlation, known = model.parameter_correlation_matrix, model.parameter_std > 0
+    rows = []
+    for place, name in enumerate(model.names):
+        pairs = [
+            f"{_key(model.names[other])} = {value:.9g}"
+            for other, value in enumerate(correlation[place, :place].tolist())
+            if value and known[place] and known[other]
+        ]
+        rows += [f"{_key(name)} = {{ {', '.join(pairs)} }}"] * bool(pairs)
+    if rows:
+        yield from ("", "[model.parameter_correlation]", *rows)
 
 
 def _table(head: str, entries: Mapping[str, str | float]) -> list[str]:

@@ -18,10 +18,9 @@ from expdesign.vessel.hull import disc_points
 def draw_truths(vessel: Vessel, environment: Environment, draws: int, rng: np.random.Generator) -> Truths:
     """Parameters, mean currents and mean winds drawn from the prior and the forecast.
 
-    Parameters are normal and independent with the vessel file's standard deviations.
+    Parameters are normal with the vessel file's standard deviations and correlations.
     """
-    p = len(vessel.model.parameters)
-    parameters = vessel.model.parameters + vessel.model.parameter_std * rng.standard_normal((draws, p))
+    parameters = vessel.model.drawn_parameters(draws, rng)
     weather = [draw_environment(environment, rng) for _ in range(draws)]
     return Truths(
         parameters=parameters,

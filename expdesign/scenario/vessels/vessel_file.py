@@ -46,6 +46,8 @@ from expdesign.vessel.expressions import parse_expression
 from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS
 
 MOUNTING_KEYS = tuple(field.name for field in fields(Mounting))
+CORRELATION_ROUNDING = 1e-6
+"""Negative eigenvalue that rounded correlations may have."""
 
 
 def load_vessel(path: Path | str) -> Vessel:
@@ -166,7 +168,7 @@ def _model(table: ModelTable, actuators: tuple[Actuator, ...], sample_time_s: fl
         raise entry.at("parameters").error(f"{found}, expected every parameter of structure {table.structure!r}")
     if table.roll is not None and not {"v", "r"} <= {term.equation for term in terms}:
         raise entry.at("roll").error("needs terms of v and r, which roll acts on")
-    return VesselModel(
+    model = VesselModel(
         terms=terms,
         parameters=np.array([table.parameters[name] for name in names]),
         parameter_std=np.array([table.parameter_std.get(name, 0.0) for name in names]),
@@ -174,7 +176,26 @@ def _model(table: ModelTable, actuators: tuple[Actuator, ...], sample_time_s: fl
         sample_time_s=sample_time_s,
         actuators=actuators,
         roll=None if table.roll is None else Roll(**table.roll.model_dump()),
+        parameter_correlation=_correlation(table, names, entry.at("parameter_correlation")),
     )
+    if np.linalg.eigvalsh(model.parameter_correlation_matrix)[0] < -CORRELATION_ROUNDING:
+        raise entry.at("parameter_correlation").error("contradicts itself: no parameters have such correlations")
+    return model
+
+
+def _correlation(table: ModelTable, names: list[str], entry: Entry) -> dict[tuple[str, str], float]:
+    """Correlations of pairs of parameters."""
+    _check_names(table.parameter_correlation, names, entry)
+    found: dict[tuple[str, str], float] = {}
+    for one, row in table.parameter_correlation.items():
+        _check_names(row, names, entry.at(one))
+        for other, value in row.items():
+            if one == other or (other, one) in found:
+                raise entry.at(one).at(other).error("is given already, expected each pair of parameters once")
+            if not -1.0 <= value <= 1.0:
+                raise entry.at(one).at(other).error(f"is {value:g}, expected -1 to 1")
+            found[one, other] = value
+    return found
 
 
 def _check_terms(terms: list[TermTable], actuators: tuple[Actuator, ...], entry: Entry) -> None:

@@ -162,6 +162,11 @@ class ModelTable(Table):
     parameter_std: dict[str, NonNegative] = Field(
         default={}, description="the standard deviation of each parameter; 0, for known, when not given"
     )
+    parameter_correlation: dict[str, dict[str, Number]] = Field(
+        default={},
+        description="the correlation of the errors of two parameters, by the names of both, each pair once, e.g. "
+        "Y_v = { X_u = 0.3 }; 0 when not given",
+    )
     terms: list[TermTable] = Field(default=[], description="the tables [[model.terms]] of structure 'custom'")
     roll: RollTable | None = Field(
         default=None, description="a table [model.roll]; simulations follow it, estimates and plans do not"

@@ -25,9 +25,13 @@ from expdesign.vessel.structures import FORCE_SIGNALS, SHOAL
 from expdesign.workflows.command_text import command_text
 from expdesign.workflows.outcome import Outcome, TextTable
 from expdesign.workflows.steps.measured import measured
+from expdesign.workflows.steps.workers import workers
 
 MOST_PAGE_WORK, PAGE_SAMPLES = 270.0, 375.0
 """Simulations of few data that take as long as drawing the page, and the samples from which on they take longer."""
+
+FEW_SAMPLES = 1000
+"""With up to so many, other processes take longer to start than they save."""
 
 
 def diagnose(
@@ -37,6 +41,7 @@ def diagnose(
     vessel: Path,
     scenario: Path | None = None,
     velocity: str = "auto",
+    jobs: int = 1,
     seed: int = 0,
     progress: Progress = silent,
 ) -> Outcome:
@@ -48,6 +53,7 @@ def diagnose(
         vessel: the model in use.
         scenario: whose dictionary is searched for manoeuvres that distinguish causes; standard ones by default.
         velocity: where velocities come from, as in `estimate`.
+        jobs: processes; 0 for one per core. The results do not depend on it, and few data take one.
         seed: of all chance.
         progress: of the command.
     """
@@ -60,7 +66,8 @@ def diagnose(
     samples = sum(len(batch.inputs) for batch in record.batches)
     drawing = MOST_PAGE_WORK / (1.0 + samples / PAGE_SAMPLES)
     told = Estimated(progress, after=drawing)
-    found = diagnose_record(ship, record, seed=seed, proposals=proposals, progress=told)
+    with workers(jobs if samples > FEW_SAMPLES else 1, load=None):
+        found = diagnose_record(ship, record, seed=seed, proposals=proposals, progress=told)
     told.after = 0.0
     command = command_text(
         "diagnose",

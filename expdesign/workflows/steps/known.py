@@ -88,18 +88,19 @@ def combined(vessel: Vessel, estimate: Estimate, *, prior_counts: bool) -> Vesse
         prior_counts: whether to combine it with values that have a stated standard deviation.
     """
     model = vessel.model
-    before = dict(zip(model.names, zip(model.parameters, model.parameter_std, strict=True), strict=True))
+    places = [model.names.index(name) for name in estimate.names]
     values, covariance = estimate.values, estimate.covariance
-    index = [place for place, name in enumerate(estimate.names) if before[name][1] > 0]
-    if prior_counts and index:
-        stated = np.array([before[estimate.names[place]] for place in index])
-        gain = np.linalg.solve(covariance[np.ix_(index, index)] + np.diag(stated[:, 1] ** 2), covariance[index]).T
-        values = values + gain @ (stated[:, 0] - values[index])
+    index = np.flatnonzero(model.parameter_std[places] > 0)
+    if prior_counts and len(index):
+        known = np.array(places)[index]
+        stated = model.parameter_covariance[np.ix_(known, known)]
+        gain = np.linalg.solve(covariance[np.ix_(index, index)] + stated, covariance[index]).T
+        values = values + gain @ (model.parameters[known] - values[index])
         covariance = covariance - gain @ covariance[index]
-    std = dict(zip(estimate.names, np.sqrt(np.maximum(np.diag(covariance), 0.0)).tolist(), strict=True))
-    known = [std.get(name, own) for name, own in zip(model.names, model.parameter_std.tolist(), strict=True)]
+    whole = np.diag(model.parameter_std**2)
+    whole[np.ix_(places, places)] = covariance
     assigned = model.with_parameters(dict(zip(estimate.names, values.tolist(), strict=True)))
-    return replace(vessel, model=replace(assigned, parameter_std=np.array(known)))
+    return replace(vessel, model=assigned.with_covariance(model.names, whole))
 
 
 def data_parts(record: Record, vessel: Vessel) -> tuple[TrialPart, ...]:

@@ -7,8 +7,9 @@ one fitted in the same way with terms of the wind, where wind is found, and by t
 a vessel file cannot hold, such as a roll mode, takes no part in that prediction.
 
 `--study triples` does so for drawn triples of the pond's runs (`--trials`, `--seed`), and predicts all other runs.
-`--study faults` injects faults into the records of drawn triples of zig-zags in the towing tank, or into the model that
-was fitted to them, and asks for the right name first. Both say what it took (processor seconds), in Markdown.
+`--study faults` injects faults into the records of drawn triples of each ship's runs, or into the model that was fitted
+to them, on the pond with terms of the wind, and asks for the right name first. Both say what it took (processor
+seconds), in Markdown.
 """
 
 from __future__ import annotations
@@ -219,12 +220,12 @@ def triple(data: Path, number: int, seed: int) -> dict[str, object]:
     }  # fmt: skip
 
 
-def fault(data: Path, place: int, number: int, seed: int) -> dict[str, object]:
-    """Three zig-zags of the towing tank with a fault: is it named first?"""
+def fault(data: Path, case: Case, place: int, number: int, seed: int) -> dict[str, object]:
+    """Three runs of a ship with a fault: is it named first?"""
     rng = np.random.default_rng([seed, number])
-    names = drawn_names(TANK, data, ("zigzag",), rng)
-    record = runs(TANK, data, names)
-    trial = FAULTS[place].inject(fitted_vessel(TANK, record, wind=False), record, rng)
+    names = drawn_names(case, data, WINDY if case.folder == POND.folder else ("zigzag",), rng)
+    record = runs(case, data, names)
+    trial = FAULTS[place].inject(fitted_vessel(case, record, wind=case.folder == POND.folder), record, rng)
     row = {"number": number, "runs": names, "fault": FAULTS[place].name}
     if trial is None:
         return row | {"seconds": 0.0, "findings": [], "verdict": "no such fault", "right": None}
@@ -284,11 +285,12 @@ def counted(chosen: argparse.Namespace) -> Iterator[str]:
     """The studies that count."""
     with shared_work(chosen):
         if chosen.study == "triples":
-            tasks: Iterator[tuple[int, ...]] = ((number, chosen.seed) for number in range(chosen.trials))
+            tasks: Iterator[tuple[Any, ...]] = ((number, chosen.seed) for number in range(chosen.trials))
             work = as_finished(triple, (chosen.data,), tasks)
         else:
             places = [at for at, item in enumerate(FAULTS) if chosen.fault in (None, item.name)]
-            tasks = ((at, number, chosen.seed) for number in range(chosen.trials) for at in places)
+            case = POND if chosen.ship == POND.folder else TANK
+            tasks = ((case, at, number, chosen.seed) for number in range(chosen.trials) for at in places)
             work = as_finished(fault, (chosen.data,), tasks)
         rows = []
         for row in work:
@@ -305,7 +307,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Print the study for the data in a folder."""
     parser = argparse.ArgumentParser(prog="python tests/benchmarks/published/diagnosis_real.py", description=__doc__)
     parser.add_argument("--data", type=Path, required=True, help="folder with the folders of the two ships")
-    parser.add_argument("--ship", choices=[case.folder for case in (POND, TANK)], help="only this one")
+    parser.add_argument(
+        "--ship", choices=[case.folder for case in (POND, TANK)], help="only this one; of --study faults the tank's"
+    )
     parser.add_argument("--seed", type=int, default=0, help="of all chance")
     parser.add_argument("--study", choices=("groups", "triples", "faults"), default="groups")
     parser.add_argument("--trials", type=int, default=20, help="triples of runs")
