@@ -194,20 +194,48 @@ def test_the_seed_named_where_verification_fails_gives_a_plan_that_passes(monkey
     plan_trial(replace(case, seed=seed))
 
 
-def test_the_run_named_where_trials_are_aborted_is_left_out_of_a_design_that_is_accepted(monkeypatch):
+@pytest.fixture(scope="module")
+def story() -> PlanProblem:
     case = load_scenario(SCENARIOS / "story.toml")
     information = scored(case)
-    whole = plan_problem(case, information, designed(case, information))
+    return plan_problem(case, information, designed(case, information))
+
+
+def in_current(case: PlanProblem, std_mps: float) -> PlanProblem:
+    return replace(case, environment=replace(case.environment, current_std_mps=std_mps))
+
+
+@pytest.mark.slow
+def test_the_forecast_named_where_most_trials_are_aborted_is_one_with_which_the_plan_is_accepted(story):
+    """With a current so uncertain, more than half of the ships do not get to the first runs in time."""
+    text = refusal(in_current(story, 1.4))
+    assert "were aborted because a run could not be begun" in text
+    std_mps = float(
+        re.search(r"with environment\.current_to\.std_mps = ([\d.]+) \(a better forecast\) drawn trials accept", text)[
+            1
+        ]
+    )
+    assert std_mps == pytest.approx(0.7)
+    plan_trial(in_current(story, std_mps))
+
+
+def test_what_is_named_where_trials_are_aborted_is_what_they_accept(monkeypatch, story):
+    whole = in_current(story, 1.4)
     monkeypatch.setattr(remedies, "_sailed", lambda other: ())
     refused = {"what": "risk", "which": "deceleration"}
 
     monkeypatch.setattr(remedies, "accepted", lambda other: other.repeats["deceleration"] == 0)
     text = str(advised(whole, NoPlan("too risky", **refused)))
     assert text == 'too risky; with design.excluded = ["deceleration"] drawn trials accept the plan'
+    monkeypatch.setattr(remedies, "accepted", lambda other: other.environment.current_std_mps < 1.0)
+    forecast = "environment.current_to.std_mps = 0.7 (a better forecast)"
+    text = str(advised(whole, NoPlan("too risky", **refused)))
+    assert text == f"too risky; with {forecast} drawn trials accept the plan"
     monkeypatch.setattr(remedies, "accepted", lambda other: False)
     text = str(advised(whole, NoPlan("too risky", **refused)))
-    assert text == 'too risky; no single change of those tried helps (design.excluded = ["deceleration"])'
-    text = str(advised(whole, NoPlan("too risky", what="risk", which="goal")))
+    assert text == f'too risky; no single change of those tried helps ({forecast}, design.excluded = ["deceleration"])'
+    known = in_current(story, 0.0)
+    text = str(advised(known, NoPlan("too risky", what="risk", which="goal")))
     assert text == "too risky; no remedy could be checked"
 
 

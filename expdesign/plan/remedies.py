@@ -226,7 +226,7 @@ def _for_sailing(problem: PlanProblem, refused: NoPlan) -> Iterator[str]:
 
 
 def _for_risk(problem: PlanProblem, refused: NoPlan) -> Iterator[str]:
-    """A design without the run that most trials fail at, of which drawn trials accept the plan."""
+    """A better forecast, or a design without the run at which most trials fail, that drawn trials accept."""
 
     def passes(other: PlanProblem) -> bool:
         made = _sailed(other)
@@ -234,7 +234,19 @@ def _for_risk(problem: PlanProblem, refused: NoPlan) -> Iterator[str]:
 
     names = {refused.which} - {"", "goal"}
     more = "the planner has tried more room" if len(refused.tried) > 1 else ""
-    yield from _first(_exclusions(problem, names) if names else (), passes, ACCEPTED, more, most=PLAN.most_plans)
+    forecasts = tuple(_forecasts(problem))
+    tries = chain(forecasts[:1], _exclusions(problem, names) if names else (), forecasts[1:])
+    yield from _first(tries, passes, ACCEPTED, more, most=PLAN.most_plans)
+
+
+def _forecasts(problem: PlanProblem) -> Iterator[Change]:
+    """Current and wind known twice as well, as far as they are uncertain."""
+    for key, name in (("current_to", "current_std_mps"), ("wind_to", "wind_std_mps")):
+        std_mps = float(f"{getattr(problem.environment, name) / 2:.3g}")
+        if std_mps > 0:
+            better: dict[str, Any] = {name: std_mps}
+            words = f"environment.{key}.std_mps = {std_mps:g} (a better forecast)"
+            yield Change(words=words, problem=replace(problem, environment=replace(problem.environment, **better)))
 
 
 def _for_verification(problem: PlanProblem, refused: NoPlan) -> Iterator[str]:

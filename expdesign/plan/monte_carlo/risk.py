@@ -89,11 +89,7 @@ def failed_chance_constraint(
             f"more than plan.confidence = {confidence:g} allows, most of them ({trials.left[worst].mean():.1%}) "
             f"{described(legs, worst)} near {lat:.5f}, {lon:.5f}"
         )
-    return (
-        ""
-        if found.aborted < MONTE_CARLO.no_plan_aborted
-        else f"{found.note}; more room, or a vessel known better, may help"
-    )
+    return "" if found.aborted < MONTE_CARLO.no_plan_aborted else found.note
 
 
 def violates_chance_constraint(found: RiskEstimate, confidence: float) -> bool:
