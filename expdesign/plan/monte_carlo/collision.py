@@ -92,7 +92,7 @@ class CollisionCheck:
     @cached_property
     def _deeper(self) -> shapely.Geometry:
         """Water round whose places a square cell as wide as the hull's radius is deep."""
-        inner = self.area.safe_water((1.05 + 0.75) * self._radius)
+        inner = self.area.water_to_plan_in((1.05 + 0.75) * self._radius)
         shapely.prepare(inner)
         return inner
 
@@ -102,7 +102,7 @@ class CollisionCheck:
 
         From the middle of a step of half a radius a corner is sqrt(1.05**2 - 0.25**2) > 1 radii away.
         """
-        inner = self.area.safe_water(1.05 * self._radius)
+        inner = self.area.water_to_plan_in(1.05 * self._radius)
         shapely.prepare(inner)
         return inner
 
