@@ -25,6 +25,8 @@ class Tuning:
         first_horizon_samples: of output error.
         horizon_growth: ratio of successive horizons of output error.
         most_steps: of Gauss and Newton at one horizon.
+        most_damping: of such a step, relative to the diagonal; with more, nothing is left to find.
+        remembered_steps: that the next one is mixed with.
         rough_samples: compared at earlier horizons than the last, spread over the data.
         rough_step_s: longest step of simulations that compare some samples only.
         most_correlated: correlation of residuals from sample to sample that counts, at most.
@@ -73,6 +75,8 @@ class Tuning:
     first_horizon_samples: int = 8
     horizon_growth: int = 4
     most_steps: int = 40
+    most_damping: float = 1e10
+    remembered_steps: int = 5
     rough_samples: int = 10_000
     rough_step_s: float = 0.5
     most_correlated: float = 0.9999

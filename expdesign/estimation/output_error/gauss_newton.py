@@ -1,11 +1,11 @@
 """Levenberg and Marquardt for output error, with the first velocities of the stretches eliminated.
 
-Source: J. J. More, Lecture Notes in Mathematics 630 (1978), 105-116.
+Source: J. J. More, Lecture Notes in Mathematics 630 (1978), 105-116; steps are mixed with earlier ones, see `_mixed`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,27 +40,82 @@ def minimised(
         NoAnswer: the model to begin with diverges.
     """
     damping = 1e-4
+    before: list[tuple[Point, Move]] = []
     with np.errstate(over="ignore", invalid="ignore"):
-        states = problem.states(values, starts)
-        cost = _cost(problem, problem.residuals(states))
-        if not np.isfinite(cost):
-            raise NoAnswer(_RUNS_AWAY.format(seconds=len(states) * problem.compiled.stretches.sample_time_s))
+        point = _point(problem, values, starts)
+        if not np.isfinite(point.cost):
+            raise NoAnswer(_RUNS_AWAY.format(seconds=len(point.states) * problem.compiled.stretches.sample_time_s))
         for _ in range(TUNING.most_steps):
-            normal, least = _normal(problem, values, states), settled * _unit(problem, states)
-            while damping < 1e10:
-                step, shift, expected = _step(normal, damping)
-                step = np.append(step, np.zeros(len(values) - len(step)))  # constants that are not estimated
-                told(expected / least)
-                if expected < least:
-                    return values, starts
-                newer = problem.states(values + step, starts + shift)
-                lower = _cost(problem, problem.residuals(newer))
-                if lower < cost:
-                    break
-                damping *= 10
-            else:
-                return values, starts
-            values, starts, states, cost, damping = values + step, starts + shift, newer, lower, damping / 10
+            normal, least = _normal(problem, point.values, point.states), settled * _unit(problem, point.states)
+            newer = None
+            while newer is None:
+                move = _step(normal, damping)
+                told(move.expected / least)
+                if move.expected < least or damping > TUNING.most_damping:
+                    return point.values, point.starts
+                newer = _lower(problem, point, move, before)
+                damping *= 10 if newer is None else 0.1
+            before = [*before, (point, move)][-TUNING.remembered_steps :]
+            point = newer
+    return point.values, point.starts
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """Values and starts (W, n), the states (L, W, n) that they give, and their cost."""
+
+    values: Array
+    starts: Array
+    states: Array
+    cost: float
+
+
+@dataclass(frozen=True, eq=False)
+class Move:
+    """A step of Gauss and Newton.
+
+    Attributes:
+        values, starts: changes (q,) and (W, n).
+        expected: decrease of the cost, of a linear problem.
+        metric: (q, q) second derivative of half the cost by the values, with the starts eliminated.
+    """
+
+    values: Array
+    starts: Array
+    expected: float
+    metric: Array
+
+
+def _point(problem: Problem, values: Array, starts: Array) -> Point:
+    states = problem.states(values, starts)
+    return Point(values, starts, states, _cost(problem, problem.residuals(states)))
+
+
+def _lower(problem: Problem, point: Point, move: Move, before: Sequence[tuple[Point, Move]]) -> Point | None:
+    """A point of less cost: by the mixed step if there is one, else by the plain one; None if neither leads there."""
+    changes = [_mixed(point, move, before)] if before else []
+    for values, starts in (*changes, (move.values, move.starts)):
+        idle = np.zeros(len(point.values) - len(values))  # constants that are not estimated
+        newer = _point(problem, point.values + np.append(values, idle), point.starts + starts)
+        if newer.cost < point.cost:
+            return newer
+    return None
+
+
+def _mixed(point: Point, move: Move, before: Sequence[tuple[Point, Move]]) -> tuple[Array, Array]:
+    """Changes of values and starts to where the steps before and this one would, linearly, vanish.
+
+    Where residuals are large, steps of Gauss and Newton shrink slowly, by much the same share each.
+
+    Source: D. G. Anderson, Journal of the ACM 12 (1965), 547-560.
+    """
+    D = np.stack([move.values - old.values for _, old in before], axis=1)
+    share = np.linalg.lstsq(D.T @ move.metric @ D, D.T @ move.metric @ move.values, rcond=1e-12)[0]
+    values, starts = move.values, move.starts
+    for weight, (place, old) in zip(share, before, strict=True):
+        moved = (point.values - place.values)[: len(values)]
+        values = values - weight * (moved + move.values - old.values)
+        starts = starts - weight * (point.starts - place.starts + move.starts - old.starts)
     return values, starts
 
 
@@ -143,11 +198,8 @@ def slopes_of(problem: Problem, values: Array, states: Array) -> tuple[Array, Ar
     return Jv, Js
 
 
-def _step(normal: Normal, damping: float) -> tuple[Array, Array, float]:
-    """Damped Gauss-Newton step with the starts eliminated, and the expected decrease of the cost.
-
-    The damping is relative to each diagonal entry.
-    """
+def _step(normal: Normal, damping: float) -> Move:
+    """Damped step with the starts eliminated; the damping is relative to each diagonal entry."""
     inverse = np.linalg.inv(regular(normal.S) * (1 + damping * np.eye(normal.S.shape[1])))
     carried = inverse @ normal.C  # (W, n, q)
     scale = np.sqrt(np.where(np.diag(normal.V) > 0, np.diag(normal.V), 1.0))
@@ -155,7 +207,7 @@ def _step(normal: Normal, damping: float) -> tuple[Array, Array, float]:
     right = normal.gradient_v - np.einsum("wna,wn->a", carried, normal.gradient_s)
     step = np.linalg.lstsq(reduced / np.outer(scale, scale), right / scale, rcond=1e-14)[0] / scale
     shift = np.einsum("wab,wb->wa", inverse, normal.gradient_s) - carried @ step
-    return step, shift, float(normal.gradient_v @ step + (normal.gradient_s * shift).sum())
+    return Move(step, shift, float(normal.gradient_v @ step + (normal.gradient_s * shift).sum()), reduced)
 
 
 def regular(S: Array) -> Array:
