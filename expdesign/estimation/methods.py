@@ -191,20 +191,16 @@ def estimate(
     driving = as_planned(record) if planned else record
     if chosen.solver == "iv":
         layout, rows, refined = _instrumental(layout, record, driving, choices)
-    else:
-        rows = build_regression(layout, record)
-        refined = _least_squares(rows, choices)
-    if chosen.solver == "oe":
-        solution, regression = minimise_output_error(
-            layout, record, refined.solution, _fitting(choices), progress=progress
-        )
-        left_out = sum(map(len, record.batches)) - len(regression)
-        rows = Rows(regression=regression, used=(), left_out=left_out)
-        return _estimate(chosen, layout, rows, Refined(solution, 0, ()), steered)
-    feedback = None
-    if chosen.solver == "iv":
         feedback = feedback_in(record, rows.regression, refined.solution.residuals, known_steered=planned)
-    return _estimate(chosen, layout, rows, refined, steered, feedback)
+        return _estimate(chosen, layout, rows, refined, steered, feedback)
+    rows = build_regression(layout, record)
+    if chosen.solver == "ls":
+        return _estimate(chosen, layout, rows, _least_squares(rows, choices), steered)
+    start, fitting = _start(rows, choices), _fitting(choices)
+    solution, regression = minimise_output_error(layout, record, start, fitting, progress=progress)
+    left_out = sum(map(len, record.batches)) - len(regression)
+    rows = Rows(regression=regression, used=(), left_out=left_out)
+    return _estimate(chosen, layout, rows, Refined(solution, 0, ()), steered)
 
 
 def as_read(record: Record, method: Method) -> Record:
@@ -240,6 +236,12 @@ def _fitting(choices: Settings) -> Fitting:
 def _least_squares(rows: Rows, choices: Settings) -> Refined:
     weighting = replace(choices.weighting, mean="none", blocks="one")
     return Refined(solve_ls(rows.regression, weighting), 0, ())
+
+
+def _start(rows: Rows, choices: Settings) -> Solution:
+    """Least squares for another method to start from, with a covariance that takes no time."""
+    quick = replace(choices.weighting, covariance="hc0")
+    return _least_squares(rows, replace(choices, weighting=quick)).solution
 
 
 def _instrumental(layout: Layout, record: Record, driving: Record, choices: Settings) -> tuple[Layout, Rows, Refined]:
@@ -279,7 +281,7 @@ def _with_instruments(layout: Layout, record: Record, rows: Rows, replay: Replay
     simulation = InstrumentModel(layout, record, rows, replay, choices.heading, choices.wind)
     start = layout.model.parameters
     if choices.start == "ls":
-        start = full_parameters(layout, _least_squares(rows, choices).solution.values)
+        start = full_parameters(layout, _start(rows, choices).values)
     try:
         first = simulation.instruments(start)
     except Diverged as error:

@@ -186,15 +186,17 @@ def nominal(model: VesselModel) -> VesselModel:
     return model.with_parameters({name: values[1] for name, values in PARAMETERS.items()})
 
 
-def simulate_case(case: Case, *, runs: int, rng: np.random.Generator) -> Ensemble:
-    """One set of measured trials of a case, all with the same input."""
+def simulate_case(
+    case: Case, *, runs: int, rng: np.random.Generator, pulses: Pulses | None = None, margin_mps: float = MARGIN_MPS
+) -> Ensemble:
+    """One set of measured trials of a case, all with the same input of `draw_inputs`."""
     vessel, environment = ship(), case.environment
     inputs = draw_inputs(
         vessel,
-        Pulses(),
+        pulses or Pulses(),
         samples=case.samples,
         environment=environment,
-        margin_mps=MARGIN_MPS,
+        margin_mps=margin_mps,
         velocity=START_MPS,
         rng=rng,
     )
@@ -208,12 +210,14 @@ def run_case(
     rng: np.random.Generator,
     estimators: Sequence[str] = tuple(ESTIMATORS),
     progress: Progress = silent,
+    pulses: Pulses | None = None,
+    margin_mps: float = MARGIN_MPS,
 ) -> list[Outcome]:
-    """Every estimator on every run of one set.
+    """Every estimator on every run of one set, whose input has these pulses and keeps u and v above this margin.
 
     The wind is white from sample to sample, so only the measured wind itself can be an instrument for it.
     """
-    trials = simulate_case(case, runs=runs, rng=rng)
+    trials = simulate_case(case, runs=runs, rng=rng, pulses=pulses, margin_mps=margin_mps)
     tasks = [(name, run) for name in estimators for run in range(runs)]
     found: dict[str, list[Estimate | None]] = {name: [] for name in estimators}
     for number, ((name, _), item) in enumerate(zip(tasks, in_order(_estimated, (trials,), tasks), strict=True), 1):
