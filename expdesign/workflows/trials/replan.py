@@ -172,17 +172,17 @@ def _stated(vessel: Vessel) -> dict[str, float]:
 
 
 def _summary(known: Known) -> dict[str, object]:
+    left = () if known.remaining_stated else ("remaining_s is design.total_s less the time of the data",)
     return {
         "data_s": known.sailed_s,
         "remaining_s": known.remaining_s,
-        "remaining_time_is": "as stated" if known.remaining_stated else "design.total_s less the time of the data",
         "model": known.model,
         "weather": known.weather,
         "current_to_north_mps": float(known.environment.current_to[0]),
         "current_to_east_mps": float(known.environment.current_to[1]),
         "start": f"{known.pose[0]:.1f} m north, {known.pose[1]:.1f} m east, assumed to be stopped",
         "new_parameters": list(known.new),
-        "notes": list(known.notes),
+        "notes": [*left, *known.notes],
     }
 
 
