@@ -11,7 +11,8 @@ from expdesign.durations import Collected, DurationProblem, optimal_shares
 from expdesign.errors import NoAnswer
 from expdesign.shortest_day import Accuracy, cheapest_runs
 from expdesign.shortest_day.alternate import promised_at_zero
-from expdesign.shortest_day.cheapest import Offer, cheapest_shares
+from expdesign.shortest_day.cheapest import cheapest_shares
+from expdesign.shortest_day.offer import Offer
 
 PARAMETERS = ("X_u", "Y_v", "N_r")
 SAMPLES = 100.0

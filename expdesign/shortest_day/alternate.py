@@ -22,7 +22,8 @@ from expdesign.plan.verify import about_ship, track_information
 from expdesign.progress import Progress, in_phases, silent
 from expdesign.shortest_day.accuracy import Accuracy
 from expdesign.shortest_day.bounds import fastest_mps, way_bound_s
-from expdesign.shortest_day.cheapest import Choice, Offer, cheapest_runs, fullest_level, shares_cost_s
+from expdesign.shortest_day.cheapest import Choice, cheapest_runs, fullest_level, shares_cost_s
+from expdesign.shortest_day.offer import Offer
 from expdesign.shortest_day.prices import DraftedDay, Prices, first_prices, learnt_prices, offered
 from expdesign.shortest_day.tuning import TUNING
 from expdesign.shortest_day.values import DayParts, DayTried, ShortestDay

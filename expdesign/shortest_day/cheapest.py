@@ -5,12 +5,11 @@
 
 s is the time of transit that the runs' own way made good saves, as far as there is a way to go. f is concave, so every
 supergradient G at any M gives a linear inequality that all solutions satisfy. They are added until the solution of the
-linear program with whole numbers satisfies f itself (outer approximation). The bound is that of the continuous problem.
-It is computed from the multipliers of its linear inequalities, scaled until they are dual feasible, and so holds
-whatever the solver's accuracy.
+linear program without whole numbers satisfies f itself (outer approximation). Its cost is a bound, which is computed
+from the multipliers of the linear inequalities by weak duality, and so holds whatever the solver's accuracy. Whole runs
+are found from its runs by exchanges, see `whole_runs`.
 
-Source: J. E. Kelley 1960; A. F. Veinott 1967 for cuts where the way to inner points meets the boundary; M. A. Duran and
-I. E. Grossmann 1986.
+Source: J. E. Kelley 1960; A. F. Veinott 1967 for cuts where the way to inner points meets the boundary.
 """
 
 from __future__ import annotations
@@ -21,10 +20,11 @@ import numpy as np
 from scipy.optimize import linprog
 
 from expdesign.errors import NoAnswer
-from expdesign.shortest_day._highs import cheapest_whole
 from expdesign.shortest_day.accuracy import Accuracy
+from expdesign.shortest_day.offer import Offer
 from expdesign.shortest_day.tuning import TUNING
-from expdesign.values import Array, seal
+from expdesign.shortest_day.whole_runs import exchanged
+from expdesign.values import Array
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,39 +40,6 @@ class Choice:
     repeats: tuple[int, ...]
     cost_s: float
     bound_s: float
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Offer:
-    """Runs to choose from.
-
-    Attributes:
-        matrices: (q, d, d) information of one whole run, summed over its samples.
-        cost_s: (q,) of one whole run.
-        saved_s: (q,) time of transit that its way made good saves.
-        way_s: most that all runs save together.
-        known: (d, d) information without runs.
-        fewest, most: (q,) limits on runs.
-    """
-
-    matrices: Array
-    cost_s: Array
-    saved_s: Array
-    way_s: float
-    known: Array
-    fewest: Array
-    most: Array
-
-    def __post_init__(self) -> None:
-        seal(self, matrices="q d d", cost_s="q", saved_s="q", known="d d", fewest="q", most="q")
-
-    def information(self, runs: Array) -> Array:
-        """(d, d) of runs (q,), and what is known."""
-        return np.asarray(self.known + np.tensordot(runs, self.matrices, axes=1))
-
-    def total_s(self, runs: Array) -> float:
-        """Cost of runs (q,), less what they save."""
-        return float(runs @ self.cost_s) - min(float(runs @ self.saved_s), self.way_s)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -93,7 +60,7 @@ class Relaxed:
 
 
 def cheapest_runs(accuracy: Accuracy, offer: Offer, *, level: float = 0.0) -> Choice:
-    """The cheapest whole runs that reach an accuracy.
+    """Whole runs that reach an accuracy at little cost.
 
     Args:
         accuracy: gives the margin f.
@@ -103,19 +70,12 @@ def cheapest_runs(accuracy: Accuracy, offer: Offer, *, level: float = 0.0) -> Ch
     Raises:
         NoAnswer: no runs within the limits reach it.
     """
-    cuts = _Cuts(accuracy=accuracy, offer=offer, level=level)
-    bound_s = _relaxed(cuts).bound_s
-    for _ in range(TUNING.cuts):
-        A, b = cuts.rows
-        found = cheapest_whole(cuts.cost_s, A, b, cuts.bounds, len(offer.cost_s))
-        runs = offer.most if found is None else np.rint(found[:-1])  # most reaches the level, and is thinned out
-        if accuracy.margin(offer.information(runs)) >= level - TUNING.reached:
-            break
-        cuts.add(runs)
-    else:
-        runs = offer.most
-    runs = _without_spare(cuts, runs)
-    return Choice(repeats=tuple(int(n) for n in runs), cost_s=offer.total_s(runs), bound_s=bound_s)
+    relaxed = cheapest_shares(accuracy, offer, level=level)
+    runs = np.clip(np.ceil(relaxed.runs - TUNING.choice_gap), offer.fewest, offer.most)
+    if not runs.any() or accuracy.margin(offer.information(runs)) < level:
+        runs = np.minimum(runs + 1.0, offer.most)
+    runs = exchanged(accuracy, offer, runs, level)
+    return Choice(repeats=tuple(int(n) for n in runs), cost_s=offer.total_s(runs), bound_s=relaxed.bound_s)
 
 
 def cheapest_shares(accuracy: Accuracy, offer: Offer, *, level: float = 0.0) -> Relaxed:
@@ -248,15 +208,3 @@ def _dual_bound(A: Array, b: Array, cuts: _Cuts, multipliers: Array) -> float:
     """Least cost within the limits by weak duality, for any multipliers that are not negative."""
     reduced, (low, high) = cuts.cost_s - multipliers @ A, cuts.bounds
     return float(multipliers @ b + np.where(reduced > 0, reduced * low, reduced * high).sum())
-
-
-def _without_spare(cuts: _Cuts, runs: Array) -> Array:
-    """Runs (q,) without those that can be left out, dearest first."""
-    offer, runs = cuts.offer, np.array(runs, dtype=float)
-    for index in np.argsort(-offer.cost_s):
-        while runs[index] > offer.fewest[index] and runs.sum() > 1:
-            fewer = runs - np.eye(len(runs))[index]
-            if cuts.accuracy.margin(offer.information(fewer)) < cuts.level - TUNING.reached:
-                break
-            runs = fewer
-    return runs

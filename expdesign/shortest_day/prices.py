@@ -17,7 +17,7 @@ from expdesign.dictionary import Primitive
 from expdesign.plan.assembly import ship_on_legs
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import Draft
-from expdesign.shortest_day.cheapest import Offer
+from expdesign.shortest_day.offer import Offer
 from expdesign.shortest_day.tuning import TUNING
 from expdesign.values import Array, seal
 

@@ -24,11 +24,10 @@ class Tuning:
             sway.
         used: least runs of a manoeuvre found, in the cheapest runs not made whole, for it to be added.
         curve_shares: information, in shares of what is needed, for which the day is estimated.
-        cuts: most linear bounds on the accuracy in the choice of runs.
+        cuts: most linear bounds on the accuracy in the choice of runs, not whole.
         halvings: of the way to inner runs, in search of the boundary.
         reached: shortfall of the accuracy's margin that counts as reached.
-        choice_gap: relative gap at which the choice of whole runs ends.
-        choice_nodes: most nodes of its tree.
+        choice_gap: relative gap at which the choice of runs ends.
         most_runs: of one primitive.
     """
 
@@ -50,7 +49,6 @@ class Tuning:
     halvings: int = 20
     reached: float = 1e-9
     choice_gap: float = 1e-3
-    choice_nodes: int = 2000
     most_runs: int = 200
 
 
