@@ -90,6 +90,12 @@ def test_without_a_wider_passage_the_refusal_names_the_share_the_leg_and_the_pla
     assert "on the leg to the goal" in text
     np.testing.assert_allclose(place_in(text), [STRAIT_M, 0.0], atol=30.0)
     assert "there is no path to the goal with more clearance; " in text
+    named = re.search(
+        r"with environment\.current_to\.std_mps = ([\d.]+\d) \(a better forecast\) drawn trials accept", text
+    )
+    assert named is not None, text
+    case = problem((0.0, GAP_M))
+    plan_trial(replace(case, environment=replace(case.environment, current_std_mps=float(named[1]))))
 
 
 def test_more_room_is_tried_once_whatever_the_work_budget(attempts):

@@ -225,31 +225,32 @@ def _too_risky(problem: PlanProblem, first: PlanRoom, made: list[Refused], more:
     error = NoPlan(f"the plan found is too risky: {best.failed}{again}{more}", place=best.place)
     error.tried = tuple(f"plan {number}: {plan.failed}" for number, plan in enumerate(made, start=1))
     error.poses = last.sailed.trajectory.pose
-    accepting = _accepting(problem, first, made[0])
-    if accepting:
-        error.remedies = (accepting,)
-    else:  # no share of trials that leave the water is the reason, or it is far too large
-        error.what, error.which = "risk", last.worst
+    lower = _met(problem, made[0].risk)
+    if lower is not None and _accepts(problem, first, made[0], lower):
+        error.remedies = (f"with plan.confidence = {lower:g} the first plan is made once more, and accepted",)
+        return error
+    error.what, error.which = "risk", last.worst
+    if lower is not None:
+        words = "which the first plan would meet, but with which runs would get less room"
+        error.remedies = (f"not tried: plan.confidence = {lower:g}, {words}",)
     return error
 
 
-def _accepting(problem: PlanProblem, first: PlanRoom, plan: Refused) -> str:
-    """The confidence with which the planner makes the first plan once more, and accepts it; "" for none."""
-    risk, confidence = plan.risk, problem.settings.confidence
-    lower = np.floor(1000.0 * (1.0 - risk.left - risk.error)) / 1000.0
-    if not PLAN.least_confidence <= lower < confidence:
-        return ""
-    changed = replace(problem, settings=replace(problem.settings, confidence=lower))
-    same = trials_needed(lower) == trials_needed(confidence)
-    if same and not failed_chance_constraint(risk, plan.trials, plan.sailed.legs, problem.area, confidence=lower):
-        runs = footprints(changed, first.space.field, dispersions(changed))
-        same = all(np.array_equal(a.room_m, b.room_m) for a, b in zip(runs, first.space.footprints, strict=True))
-        if same:
-            return f"with plan.confidence = {lower:g} the first plan is made once more, and accepted"
-    return (
-        f"not tried: plan.confidence = {lower:g}, which the first plan would meet, but with which runs would get less "
-        "room"
-    )
+def _met(problem: PlanProblem, risk: RiskEstimate) -> float | None:
+    """The lower confidence that a plan would meet; None where aborted trials are the reason, or far too many leave."""
+    lower = float(np.floor(1000.0 * (1.0 - risk.left - risk.error)) / 1000.0)
+    return lower if PLAN.least_confidence <= lower < problem.settings.confidence else None
+
+
+def _accepts(problem: PlanProblem, first: PlanRoom, plan: Refused, confidence: float) -> bool:
+    """Whether the planner makes the first plan once more with a lower confidence, and accepts it."""
+    if trials_needed(confidence) != trials_needed(problem.settings.confidence):
+        return False
+    if failed_chance_constraint(plan.risk, plan.trials, plan.sailed.legs, problem.area, confidence=confidence):
+        return False
+    changed = replace(problem, settings=replace(problem.settings, confidence=confidence))
+    runs = footprints(changed, first.space.field, dispersions(changed))
+    return all(np.array_equal(a.room_m, b.room_m) for a, b in zip(runs, first.space.footprints, strict=True))
 
 
 def _not_again(error: NoPlan, made: list[Refused]) -> NoPlan:
