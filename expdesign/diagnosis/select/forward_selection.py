@@ -49,8 +49,9 @@ def select_forward(
     A cause that approximated another one becomes redundant once that one is found. The selection then returns to the
     step where it was added and continues without it, so that no later finding depends on it. Many parameters at once
     explain nearly any data. So before such a block is added, causes with fewer effects are tried one after the other.
-    At the end, every cause is compared once more with its best replacement beside the others. The search ends where the
-    last causes improve nothing on held-out data: no model of a real ship is exact, and tests always find more.
+    At the end, causes are compared once more with their best replacement, where another one beside them improves the
+    simulation of held-out data too. The search ends where the last causes improve nothing on held-out data: no model of
+    a real ship is exact, and tests always find more.
     """
     base = first = fit_nuisance(ship, windows, starts)
     steps: list[Step] = []
@@ -58,12 +59,14 @@ def select_forward(
     exchanges, work = 0, Work(progress=progress)
     while True:
         search = _Search(windows=windows, rejected=tuple(rejected), rng=rng, work=work, validation=validation)
-        idle = _is_idle([first, *(step.chosen.fit for step in steps)], validation)
+        gains = _gains([first, *(step.chosen.fit for step in steps)], validation)
+        idle = len(gains) >= TUNING.idle_causes and not any(gains[-TUNING.idle_causes :])
         step, tests = (None, search.tests(base)) if idle else search.round(base)
         work.rounds_left = listed_causes(tests) + len(steps)  # each step is compared with others at the end
         if (
             step is None
             and not idle
+            and sum(gains) > 1
             and exchanges < TUNING.most_exchanges
             and (len(steps) < 2 or work.allows("exchanges of causes"))
         ):
@@ -87,13 +90,12 @@ def select_forward(
             del steps[redundant:]
 
 
-def _is_idle(fits: Sequence[Fit], validation: CrossValidation) -> bool:
-    """Whether none of the last causes improves the simulation of held-out data."""
-    last = fits[-TUNING.idle_causes - 1 :]
-    if len(last) <= TUNING.idle_causes:
-        return False
-    held = judged([validation.of(item) for item in last])
-    return all(held_out_gain(*pair, 0)[0] <= TUNING.least_gain_points for pair in pairwise(held))
+def _gains(fits: Sequence[Fit], validation: CrossValidation) -> list[bool]:
+    """Which fits improve on the one before them in simulations of held-out data; of one cause alone it is not asked."""
+    if len(fits) < 3:
+        return [True] * (len(fits) - 1)
+    held = judged([validation.of(item) for item in fits])
+    return [not held_out_gain(*pair, 0)[0] <= TUNING.least_gain_points for pair in pairwise(held)]
 
 
 def to_take_out(steps: Sequence[Step], redundant: int) -> int:
