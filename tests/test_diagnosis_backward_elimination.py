@@ -180,6 +180,22 @@ def test_runs_held_out_do_not_influence_the_estimates_they_validate(barge):
     assert abs(apart.get("gain") - alone.value("gain")) < alone.std("gain")
 
 
+def test_a_change_that_comes_after_the_data_of_a_fold_is_no_part_of_its_fit(barge):
+    """Nothing is known of it there. With data from before and after the change it is estimated."""
+    extended, windows = barge
+    last = windows.batch == windows.batch.max()
+    changing = extended.with_effects({"change:time": float(windows.time_s[last].min())})
+    whole = fit(changing, windows, ("gain", "change:gain"), starts=initial_states(windows))
+    assert abs(whole.value("change:gain")) > 0.0
+    before = _fitted(whole, windows, ~last)
+    assert before is not None
+    assert before.get("change:gain") == 0.0
+    assert before.get("gain") == pytest.approx(whole.value("gain"), abs=0.05)
+    both = _fitted(whole, windows, windows.batch > windows.batch.min())
+    assert both is not None
+    assert both.get("change:gain") != 0.0
+
+
 def test_folds_that_cannot_be_fitted_count_for_neither_model():
     before, after = errors(50.0), errors(60.0)
     lost, spread = after.squared_error.copy(), after.squared_deviation.copy()

@@ -143,8 +143,12 @@ def _stretches(windows: Windows) -> tuple[Windows, NDArray[np.int64]]:
 def _fitted(found: Fit, windows: Windows, train: NDArray[np.bool_]) -> ExtendedModel | None:
     """The model with its effects fitted to some windows, or None where that is impossible.
 
-    The effects stay if no step from the fit to all windows reduces the cost on these.
+    The effects stay if no step from the fit to all windows reduces the cost on these. Those that do nothing in these
+    windows, such as a change of the ship that comes later, are left out: nothing is known of them.
     """
+    seen = np.abs(found.sensitivities.values[: found.free_count, train]).max(axis=(1, 2, 3), initial=0.0)
+    unseen = {key for key, size in zip(found.free_keys, seen.tolist(), strict=True) if not size > 0.0}
+    ship, free = found.ship.without_effects(unseen), tuple(key for key in found.free_keys if key not in unseen)
     options = FitOptions(
         noise=found.noise,
         ar_order=found.noise.order,
@@ -154,7 +158,7 @@ def _fitted(found: Fit, windows: Windows, train: NDArray[np.bool_]) -> ExtendedM
     )
     part = windows.selected(train)
     try:
-        return fit(found.ship, part, found.free_keys, starts=found.starts[train], options=options).ship
+        return fit(ship, part, free, starts=found.starts[train], options=options).ship
     except (FloatingPointError, np.linalg.LinAlgError):
         return None
 

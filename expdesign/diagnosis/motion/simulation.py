@@ -91,10 +91,9 @@ def _newton_from(
 def _newton_from_measured(
     ship: ExtendedModel, windows: Windows, exogenous: ExogenousInputs, start: Array
 ) -> Array | None:
-    """(w, k, n) by Newton's method from the measured velocities; None where that does not converge, and with roll."""
-    if ship.has_roll:
-        return None
-    states = _measured_states(windows)
+    """(w, k, n) by Newton's method from the measured velocities, without roll; None where that does not converge."""
+    states = np.zeros((len(start), windows.steps, ship.states))
+    states[..., :3] = _measured_states(windows)
     jacobian = state_jacobian(ship, (states[:, :-1] + states[:, 1:]) / 2, exogenous.without_last_step())
     transition, _ = transition_matrices(jacobian, windows.step_s)
     return _newton_over_all_steps(ship, windows, exogenous, start, states, transition)

@@ -50,8 +50,8 @@ def select_forward(
     step where it was added and continues without it, so that no later finding depends on it. Many parameters at once
     explain nearly any data. So before such a block is added, causes with fewer effects are tried one after the other.
     At the end, causes are compared once more with their best replacement, where another one beside them improves the
-    simulation of held-out data too. The search ends where the last causes improve nothing on held-out data: no model of
-    a real ship is exact, and tests always find more.
+    simulation of held-out data too. The search ends where a cause after the first improves nothing on held-out data: no
+    model of a real ship is exact, and tests always find more.
     """
     base = first = fit_nuisance(ship, windows, starts)
     steps: list[Step] = []
@@ -60,12 +60,11 @@ def select_forward(
     while True:
         search = _Search(windows=windows, rejected=tuple(rejected), rng=rng, work=work, validation=validation)
         gains = _gains([first, *(step.chosen.fit for step in steps)], validation)
-        idle = len(gains) >= TUNING.idle_causes and not any(gains[-TUNING.idle_causes :])
+        idle = len(gains) > 1 and not gains[-1]
         step, tests = (None, search.tests(base)) if idle else search.round(base)
         work.rounds_left = listed_causes(tests) + len(steps)  # each step is compared with others at the end
         if (
             step is None
-            and not idle
             and sum(gains) > 1
             and exchanges < TUNING.most_exchanges
             and (len(steps) < 2 or work.allows("exchanges of causes"))

@@ -39,7 +39,6 @@ class Tuning:
             ones.
         large_current_mps: standard deviation of the random current above which a steady current is fitted too.
         most_simulations: of all data in fits of candidates, before the search leaves the rest untried.
-        idle_causes: causes one after the other that improve nothing on held-out data, after which the search ends.
         most_findings: causes, at most.
         most_rejected: causes that are removed again, at most.
         most_exchanges: of a cause for another that gains more beside the rest, at most.
@@ -83,7 +82,6 @@ class Tuning:
     least_gain_share: float = 0.75
     large_current_mps: float = 0.1
     most_simulations: int = 250
-    idle_causes: int = 2
     most_findings: int = 6
     most_rejected: int = 4
     most_exchanges: int = 2
