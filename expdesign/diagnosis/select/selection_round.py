@@ -107,13 +107,15 @@ def _step(
         return None
     first = simplest(accepted)
     chosen = _best_on_held_out(first, accepted, validation)
+    outranked = () if chosen is first else (first.candidate,)
+    others = [item for item in fitted if item.candidate.cause not in {one.cause for one in outranked}]
     return Step(
         chosen=with_profile_estimate(chosen, base),
         p_value=chosen.p_value,
-        alternatives=_alternatives(chosen, fitted),
+        alternatives=_alternatives(chosen, others),
         before=base,
         tests=tests,
-        outranked=() if chosen is first else (first.candidate,),
+        outranked=outranked,
     )
 
 
