@@ -52,15 +52,15 @@ def shortest_day(
         NoPlan: no day was found at all.
     """
     search = _Search(problem=problem, accuracy=accuracy, added=tuple(added))
-    days, last, planning = search.rounds(lambda prices, _, tried: search.untried(prices, tried), progress)
+    days, last, planning = search.rounds(search.untried, progress)
     reached = sorted((day for day in days if day.margin >= 0), key=lambda day: day.expected_s)
     allowed = [day for day in reached if most_s is None or day.day_s <= most_s]
     if reached and not allowed and most_s is not None:
         raise NoAnswer(search.too_long(min(reached, key=lambda day: day.day_s), most_s))
-    found = search.planned(allowed, days, last, planning, good=lambda _, margin: margin >= 0)
-    if found is None:
+    found = search.planned(allowed, days, last, planning, good=lambda _, margin: margin >= 0, most=TUNING.compared)
+    if not found:
         raise NoPlan(search.falls_short(days))
-    return found
+    return min(found, key=lambda day: day.plan.day.median_s)
 
 
 def fullest_day(
@@ -93,10 +93,12 @@ def fullest_day(
             f"design.day_s is {day_s:g}: the shortest of {len(days)} days found, with runs in it, takes "
             f"{least_s:.0f} s; a larger day_s, or shorter manoeuvres, would do"
         )
-    found = search.planned(allowed, days, last, planning, good=lambda plan, _: plan.commands.duration_s <= day_s)
-    if found is None:
+    found = search.planned(
+        allowed, days, last, planning, good=lambda plan, _: plan.commands.duration_s <= day_s, most=1
+    )
+    if not found:
         raise NoPlan(f"no day within design.day_s = {day_s:g} was planned as it was drafted; a larger day_s would do")
-    return replace(found, most_s=day_s)
+    return replace(found[0], most_s=day_s)
 
 
 def check_way_fits(problem: PlanProblem, day_s: float) -> None:
@@ -166,13 +168,19 @@ class _Search:
                 spare.append(choice)
         return spare[-1] if spare else None
 
-    def untried(self, prices: Prices, tried: Sequence[Choice]) -> Choice | None:
+    def untried(self, prices: Prices, days: Sequence[DraftedDay], tried: Sequence[Choice]) -> Choice | None:
         """The cheapest runs not tried yet that should reach the accuracy with their legs, by some margin.
+
+        Where all days so far reach it, runs that promise less are tried first: prices learnt from longer days say less
+        of shorter ones.
 
         Raises:
             NoAnswer: by the first prices, no runs within the limits reach it.
         """
-        for step in range(TUNING.level_steps):
+        steps = np.arange(TUNING.level_steps)
+        if days and all(day.margin >= 0 for day in days):
+            steps = np.r_[-steps, steps[1:]]
+        for step in steps.tolist():
             try:
                 choice = self.chosen(prices, level=prices.level + step * TUNING.level_step)
             except NoAnswer:
@@ -233,8 +241,9 @@ class _Search:
         progress: Progress,
         *,
         good: Callable[[Plan, float], bool],
-    ) -> ShortestDay | None:
-        """The first good one of the best days, planned with its verification and its risk; None where none is good.
+        most: int,
+    ) -> list[ShortestDay]:
+        """The first good ones of the best days, planned with their verification and their drawn trials.
 
         Args:
             best: to be planned, the best first.
@@ -242,12 +251,15 @@ class _Search:
             last: the runs chosen last.
             progress: of planning.
             good: whether a plan with this margin is what was asked for.
+            most: plans, at most.
 
         Raises:
-            NoPlan: what was planned last was refused.
+            NoPlan: none is good, and what was planned last was refused.
         """
-        refused: NoPlan | None = None
+        refused, found = None, list[ShortestDay]()
         for day in best:
+            if len(found) == most:
+                break
             design = self.design(day.repeats)
             try:
                 plan = recalled(plan_trial, replace(self.problem, design=design), progress=progress)
@@ -255,19 +267,21 @@ class _Search:
                 refused = error
                 continue
             if good(plan, margin := self.accuracy.margin(self._information(plan.sailed)[1])):
-                return ShortestDay(
-                    plan=plan,
-                    design=design,
-                    tried=tuple(self._told(item) for item in days),
-                    cost_s=last.cost_s,
-                    cost_bound_s=last.bound_s,
-                    information=float(np.exp(margin)),
-                    parts=_parts(day.draft, plan),
-                    curve=self._curve(days),
+                found.append(
+                    ShortestDay(
+                        plan=plan,
+                        design=design,
+                        tried=tuple(self._told(item) for item in days),
+                        cost_s=last.cost_s,
+                        cost_bound_s=last.bound_s,
+                        information=float(np.exp(margin)),
+                        parts=_parts(day.draft, plan),
+                        curve=self._curve(days),
+                    )
                 )
-        if refused is not None:
+        if refused is not None and not found:
             raise refused
-        return None
+        return found
 
     def falls_short(self, days: Sequence[DraftedDay]) -> str:
         """That no day reaches the accuracy, and what is scarcest."""

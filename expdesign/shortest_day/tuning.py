@@ -15,6 +15,8 @@ class Tuning:
         first_leg_s: time of repositioning for each run, before a day has been planned [s].
         level_step, level_steps: margin that is asked for besides where the cheapest runs were tried already, at most so
             many times.
+        compared: days that reach the accuracy and are planned, of which that with the least median of drawn trials is
+            taken: they know slow ships and go-arounds, which the expected time of a draft hardly does.
         least_level, level_halvings: least margin of a day of a given length, and steps in search of the largest.
         least_leg_s: least of it once days have been planned [s].
         added_durations: durations of manoeuvres that are searched for, in that of the longest run of the dictionary.
@@ -36,6 +38,7 @@ class Tuning:
     first_leg_s: float = 30.0
     level_step: float = 0.05
     level_steps: int = 10
+    compared: int = 2
     least_level: float = -4.0
     level_halvings: int = 12
     least_leg_s: float = 5.0
