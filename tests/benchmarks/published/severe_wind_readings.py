@@ -30,8 +30,8 @@ WIDTHS = ((5, 50), (20, 200))
 TOLD = ("X_u", "X_abs_u_u")
 
 
-def row(condition: str, pulses: Pulses, sets: list[Outcome]) -> str:
-    """Of the table."""
+def row(condition: str, pulses: Pulses, sets: list[Outcome], tried: int) -> str:
+    """Of the table, from the sets that settled among those tried."""
     cells = []
     for name in TOLD:
         place = sets[0].parameters.index(name) if sets else 0
@@ -39,7 +39,7 @@ def row(condition: str, pulses: Pulses, sets: list[Outcome]) -> str:
         cells.append(f"{min(means):+.3f} to {max(means):+.3f} ± {np.mean(spreads):.3f}" if sets else "-")
     widths = f"{pulses.shortest} to {pulses.longest}"
     reading = f"{condition} | {pulses.speed_share} | {pulses.angle_spread_rad} | {widths}"
-    return f"| {reading} | {' | '.join(cells)} |"
+    return f"| {reading} | {' | '.join(cells)} | {len(sets)} of {tried} |"
 
 
 def main() -> None:
@@ -49,8 +49,8 @@ def main() -> None:
     parser.add_argument("--sets", type=int, default=3)
     add_sharing(parser)
     chosen = parser.parse_args()
-    print("| (5.77) | speed share | angles [rad] | widths | X_u | X_abs_u_u |")
-    print("|---|---|---|---|---|---|")
+    print("| (5.77) | speed share | angles [rad] | widths | X_u | X_abs_u_u | inputs settled |")
+    print("|---|---|---|---|---|---|---|")
     with shared_work(chosen):
         for condition, share, angle, (shortest, longest) in product(MARGINS, SPEED_SHARES, ANGLES_RAD, WIDTHS):
             pulses = replace(Pulses(), speed_share=share, angle_spread_rad=angle, shortest=shortest, longest=longest)
@@ -68,7 +68,7 @@ def main() -> None:
                     )
                 except NoAnswer:
                     continue  # no such input keeps the condition, or none gives an estimate
-            print(row(condition, pulses, [item for item in found if item.settled > 1]), flush=True)
+            print(row(condition, pulses, [item for item in found if item.settled > 1], chosen.sets), flush=True)
 
 
 if __name__ == "__main__":

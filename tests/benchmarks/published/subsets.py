@@ -78,7 +78,7 @@ STUDIES = (
         kinds=((POND.used[:3], 2), (POND.used[4:7], 2)),
         tests=POND.tests,
         methods=("ls", "ls-no-current", "ls-air", "iv", "iv-no-current", "iv-air"),
-        stretch_s=60.0,
+        stretch_s=30.0,
         told=("X_u", "Y_v", "N_r", "W_abs_u_u", "W_abs_v_v", "W_uv"),
     ),
 )
