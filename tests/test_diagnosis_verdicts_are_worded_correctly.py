@@ -73,6 +73,12 @@ def test_an_invisible_improvement_is_given_no_number(share):
 
 def test_a_verdict_without_findings_states_the_accuracy():
     assert verdict([], BEFORE).startswith("These data show no error of the model: the fit is 60 % in surge")
+    assert verdict([], BEFORE, signs=("actuator_delay", "wind")).endswith(
+        "; signs of the dead time of the actuators and wind improve nothing for certain on runs held out."
+    )
+    assert verdict([], BEFORE, signs=("wind",)).startswith(
+        "No cause of the remaining error is certain: the fit is 60 %"
+    )
     lost = Accuracy(**{**vars(BEFORE), "fit": np.array([-66608676.0, 50.0, 10.0])})
     assert "diverges from the ship" in verdict([], lost)
     assert "66608676" not in verdict([], lost)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.accuracy import (
@@ -129,7 +130,7 @@ def diagnose(
         before=before,
         after=after,
         findings=ranked,
-        verdict=verdict(ranked, before, unit, unexplained, within),
+        verdict=verdict(ranked, before, unit, unexplained, within, _signs(chosen, after, windows)),
         unexplained=unexplained,
         simulated_before=motion.predicted,
         simulated_after=simulate_from_measured(final, windows).predicted,
@@ -217,9 +218,7 @@ def _gains_within_std(chosen: _Selected, ship: ExtendedModel, seed: int) -> tupl
 
 def _unexplained(chosen: _Selected, after: Accuracy, windows: Windows, seed: int) -> Unexplained | None:
     """What the simulation does not explain, where that is much more than noise; None elsewhere."""
-    columns = [OUTPUTS.index(name) for name in after.outputs]
-    noise = white_noise_std(windows.measured[..., columns])
-    if not ((after.fit < LITTLE_FIT) & (after.rmse > MORE_THAN_NOISE * noise)).any():
+    if not ((after.fit < LITTLE_FIT) & _more_than_noise(after, windows)).any():
         return None
     base, leads = chosen.held[len(chosen.kept.steps)], []
     for item in leading_candidates(chosen.kept.last, windows, chosen.kept.last_tests):
@@ -232,6 +231,21 @@ def _unexplained(chosen: _Selected, after: Accuracy, windows: Windows, seed: int
         force_share=unmeasured_force_share(chosen.kept.last.linear, after.outputs),
         leads=tuple(sorted((lead for lead in leads if lead.gain > 0), key=lambda lead: -lead.gain)),
     )
+
+
+def _more_than_noise(after: Accuracy, windows: Windows) -> NDArray[np.bool_]:
+    """(n,) whether the error of an output is much more than its noise."""
+    columns = [OUTPUTS.index(name) for name in after.outputs]
+    return np.asarray(after.rmse > MORE_THAN_NOISE * white_noise_std(windows.measured[..., columns]))
+
+
+def _signs(chosen: _Selected, after: Accuracy, windows: Windows) -> tuple[str, ...]:
+    """Causes that are significant in a test and no findings; none where little but noise is left."""
+    kept = {id(step.chosen.candidate) for step in chosen.kept.steps}
+    rejected = [step.chosen.candidate for step in chosen.found.steps if id(step.chosen.candidate) not in kept]
+    if not _more_than_noise(after, windows).any():
+        return ()
+    return tuple(dict.fromkeys(item.cause for item in rejected))
 
 
 def _findings(chosen: _Selected, windows: Windows, proposals: Sequence[Proposal], seed: int) -> tuple[Finding, ...]:

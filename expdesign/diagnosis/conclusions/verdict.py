@@ -98,6 +98,7 @@ def verdict(
     unit: str = "runs",
     unexplained: Unexplained | None = None,
     within_std: Sequence[ErrorReduction] = (),
+    signs: Sequence[str] = (),
 ) -> str:
     """The whole diagnosis in one sentence.
 
@@ -107,11 +108,17 @@ def verdict(
         unit: what gains are measured on.
         unexplained: what remains, if that is much.
         within_std: what uncertain parameters gain within their standard deviations, if that is clear.
+        signs: causes that are significant in a test and no findings, where the error is more than noise.
     """
     if not findings and within_std:
         return _within_std(within_std, unexplained, unit)
     if not findings and unexplained is not None:
         return f"The simulation explains little of these data and no cause is certain: {_remainder(unexplained, unit)}."
+    if not findings and signs:
+        return (
+            f"No cause of the remaining error is certain: {accuracy_in_words(before)}; signs of "
+            f"{listed([missing_effect(name) for name in signs])} improve nothing for certain on {unit} held out."
+        )
     if not findings:
         return f"These data show no error of the model: {accuracy_in_words(before)}."
     parts = [f"The simulation lacks {listed([lacking(item) for item in findings])}"]
