@@ -1,4 +1,4 @@
-"""Frozen values that hold arrays: shapes checked against shared letters, private read-only copies.
+"""Frozen values that hold arrays: shapes checked against shared letters, arrays that nobody can write to.
 
 A value with arrays is declared `@dataclass(frozen=True, kw_only=True, eq=False)` and calls `seal` once, at birth.
 """
@@ -16,10 +16,30 @@ Array = NDArray[np.float64]
 
 
 def readonly(values: ArrayLike) -> Array:
-    """A read-only copy as floats."""
+    """A read-only copy as floats; the array itself where it, and what it is a view of, are read-only already."""
+    if _sealed(values):
+        return np.asarray(values)
     array = np.array(values, dtype=float)
     array.setflags(write=False)
     return array
+
+
+def closed(array: Array) -> Array:
+    """The array, read-only from now on with what it is a view of, so that frozen values keep it without a copy."""
+    view: object = array
+    while isinstance(view, np.ndarray):
+        view.setflags(write=False)
+        view = view.base
+    return array
+
+
+def _sealed(values: object) -> bool:
+    """Whether nobody can write to an array of floats, nor to what it is a view of."""
+    while type(values) is np.ndarray and values.dtype == float and not values.flags.writeable:
+        if values.base is None:
+            return True
+        values = values.base
+    return False
 
 
 def seal(value: object, **shapes: str) -> None:

@@ -3,7 +3,15 @@
 from expdesign.estimation.regression.current import STEADY_CURRENT, Guess, slopes
 from expdesign.estimation.regression.nuisance import batch_signs
 from expdesign.estimation.regression.polynomial import Polynomial, SignalTable, lift, symbol
-from expdesign.estimation.regression.predictors import CURRENT, PREDICTORS, Layout, Rows, build_layout, build_regression
+from expdesign.estimation.regression.predictors import (
+    CURRENT,
+    PREDICTORS,
+    Layout,
+    Rows,
+    build_layout,
+    build_regression,
+    room_for,
+)
 from expdesign.estimation.regression.regression import Integers, Regression, batch_slices, single_output
 from expdesign.estimation.regression.tables import (
     AIR,
@@ -47,6 +55,7 @@ __all__ = [
     "lift",
     "measured_table",
     "model_for",
+    "room_for",
     "signal_table",
     "single_output",
     "slopes",

@@ -39,7 +39,7 @@ from expdesign.estimation.regression.regression import Integers, Regression
 from expdesign.estimation.regression.tables import AIR, VANE, Table, heading_of, measured_table
 from expdesign.estimation.regression.vane import unbiased_value
 from expdesign.signals import Batch, Record
-from expdesign.values import Array
+from expdesign.values import Array, closed
 from expdesign.vessel import NUMPY, VesselModel
 from expdesign.vessel.structures import MOTION_SIGNALS
 
@@ -247,33 +247,45 @@ def build_regression(layout: Layout, record: Record) -> Rows:
     Raises:
         NotInformative: no row is complete.
     """
-    parts, used, left_out = [], [], 0
+    used, left_out = [], 0
     columns = [layout.model.outputs.index(name) for name in layout.model.outputs]
     states = [OUTPUTS.index(layout.model.outputs[index]) for index in columns]
+    most = sum(len(batch) - 1 for batch in record.batches)
+    Phi, y = room_for(most, len(states), len(layout.names)), np.empty((most, len(states)))
+    end = 0
     for batch in record.batches:
         table = measured_table(layout.model, batch, wind_measured=layout.predictor.wind)
         ratio = batch.sample_time_s / layout.model.time_scale_s
         signs = batch_signs(layout.nuisance, table)
-        Phi = layout.rows(table, signs, used=slice(0, -1), scale=ratio)
-        y = np.diff(batch.velocity[:, states], axis=0) - ratio * layout.known(table)[:-1]
+        regressors = layout.rows(table, signs, used=slice(0, -1), scale=ratio)
+        explained = np.diff(batch.velocity[:, states], axis=0) - ratio * layout.known(table)[:-1]
         if batch.interpolated is not None:
-            Phi, y = (mean_between_readings(part, batch.interpolated[:, states]) for part in (Phi, y))
-        whole = np.flatnonzero(np.isfinite(Phi).all(axis=(1, 2)) & np.isfinite(y).all(axis=1))
-        parts.append((Phi, y) if len(whole) == len(y) else (Phi[whole], y[whole]))
+            regressors, explained = (
+                mean_between_readings(part, batch.interpolated[:, states]) for part in (regressors, explained)
+            )
+        whole = np.flatnonzero(np.isfinite(regressors).all(axis=(1, 2)) & np.isfinite(explained).all(axis=1))
+        places = slice(None) if len(whole) == len(explained) else whole
+        start, end = end, end + len(whole)
+        Phi[start:end], y[start:end] = regressors[places], explained[places]
         used.append(whole)
-        left_out += len(y) - len(whole)
-    if not sum(len(rows) for rows in used):
+        left_out += len(explained) - len(whole)
+    if not end:
         raise NotInformative("no pair of successive samples has every signal the predictor needs")
     regression = Regression(
         parameters=layout.names,
-        Phi=parts[0][0] if len(parts) == 1 else np.concatenate([Phi for Phi, _ in parts]),
-        y=np.concatenate([y for _, y in parts]),
+        Phi=closed(Phi)[:end],
+        y=y[:end],
         batch=np.repeat(np.arange(len(used)), [len(rows) for rows in used]),
         step=np.concatenate(used),
         outputs=layout.model.outputs,
         heading=_headings(record, used),
     )
     return Rows(regression=regression, used=tuple(used), left_out=left_out)
+
+
+def room_for(rows: int, outputs: int, columns: int) -> Array:
+    """(rows, outputs, columns) without values; every column lies in one piece, so that sums along it are quick."""
+    return np.empty((outputs, columns, rows)).transpose(2, 0, 1)
 
 
 def _headings(record: Record, used: Sequence[Integers]) -> Array | None:

@@ -28,11 +28,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from expdesign.errors import InputError, NotInformative, UnknownName
-from expdesign.estimation.regression import VANE, Integers, Layout, Rows, Table, batch_signs, heading_of, measured_table
+from expdesign.estimation.regression import (
+    VANE,
+    Integers,
+    Layout,
+    Rows,
+    Table,
+    batch_signs,
+    heading_of,
+    measured_table,
+    room_for,
+)
 from expdesign.estimation.replay.replay import Replay
 from expdesign.signals import Batch, Record
 from expdesign.simulation import to_body
-from expdesign.values import Array, frozen_set
+from expdesign.values import Array, closed, frozen_set
 from expdesign.vessel import NUMPY
 
 HEADINGS = ("measured", "simulated")
@@ -77,8 +87,15 @@ class InstrumentModel:
         Raises:
             Diverged: that model is unstable.
         """
-        parts = [self._batch(index, parameters) for index in range(len(self.record.batches))]
-        return parts[0] if len(parts) == 1 else np.concatenate(parts)
+        if len(self.record.batches) == 1:
+            return self._batch(0, parameters)
+        Phi = self.rows.regression.Phi
+        instruments, end = room_for(*Phi.shape), 0
+        for index in range(len(self.record.batches)):
+            part = self._batch(index, parameters)
+            start, end = end, end + len(part)
+            instruments[start:end] = part
+        return instruments
 
     def _batch(self, index: int, parameters: Array) -> Array:
         batch, wind = self.record.batches[index], self.layout.predictor.wind
@@ -116,7 +133,7 @@ def apart_from_start(rows: Rows) -> Rows:
     kept = _run(later)
     shorter = replace(
         regression,
-        Phi=regression.Phi[kept],
+        Phi=closed(regression.Phi[kept]),
         y=regression.y[kept],
         batch=regression.batch_of[kept],
         step=regression.step_of[kept],
