@@ -18,6 +18,7 @@ from expdesign.simulation import Environment, Variation, motion_rates, simulate
 from measured_trials import MODEL_SHIP_TRUE, model_ship_commands
 
 TRUTH = dict(zip(TRUE.model.names, TRUE.model.parameters.tolist(), strict=True))
+LASTING = "last from sample to sample"
 MERGED = {"X_abs_u_u": "W_abs_u_u", "Y_abs_v_v": "W_abs_v_v", "N_uv": "W_uv"}
 
 
@@ -45,6 +46,17 @@ def test_it_beats_instruments_and_both_agree_within_their_uncertainty() -> None:
     count = found.residuals.rows
     np.testing.assert_allclose(found.residuals.std, noise, rtol=4.5 / np.sqrt(2 * count) + 0.01)
     assert (np.abs(found.residuals.correlation) < 4.5 / np.sqrt(count)).all()
+    assert not any(LASTING in note for note in found.warnings)
+
+
+def test_forces_that_nobody_measured_shorten_its_intervals_and_it_says_so() -> None:
+    rng, weather = (
+        np.random.default_rng(41),
+        Environment(current_variation=Variation(std_mps=0.03, correlation_s=100.0)),
+    )
+    trial = measured(TRUE, commands(700, rng), weather=weather, seed=1)
+    found = estimate(record(trial), NOMINAL, method="oe")
+    assert any(LASTING in note for note in found.warnings)
 
 
 def test_no_neighbouring_model_simulates_the_data_better() -> None:

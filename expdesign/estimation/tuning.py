@@ -34,6 +34,8 @@ class Tuning:
         covariance_steps: how many such steps the covariance takes as long as.
         loading_samples, compiling_samples: how many samples a step could do while libraries are loaded, and while a
             stage is compiled.
+        remembered: correlation of successive residuals of output error from which they have a memory.
+        clear_deviations: standard deviations by which such a correlation is clearly not chance.
         slowest_convergence: least ratio of successive expected decreases that the progress told counts on.
         settled_cost: expected decrease of the cost, in squared standard deviations, that ends the last horizons.
         rough_cost: the same for earlier horizons.
@@ -84,6 +86,8 @@ class Tuning:
     covariance_steps: float = 4.0
     loading_samples: float = 7e4
     compiling_samples: float = 7e3
+    remembered: float = 0.2
+    clear_deviations: float = 4.0
     slowest_convergence: float = 1.5
     settled_cost: float = 1e-4
     rough_cost: float = 0.1
