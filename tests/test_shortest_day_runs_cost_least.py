@@ -193,3 +193,13 @@ def test_the_promise_of_a_day_that_just_reaches_lies_between_the_nearest_on_both
     assert promised_at_zero([0.3, 0.8, 0.5], [-0.5, 0.8, -0.1]) == pytest.approx(0.5 + 0.3 * 0.1 / 0.9)
     assert promised_at_zero([0.3, 0.5], [-0.5, -0.1]) == pytest.approx(0.6)
     assert promised_at_zero([0.3], [0.2]) == pytest.approx(0.1)
+
+
+def test_of_many_manoeuvres_whole_runs_cost_little_more_than_the_bound():
+    rng = np.random.default_rng(5)
+    matrices, cost_s = random_information(rng, 400), rng.uniform(60.0, 300.0, 400)
+    accuracy = std_accuracy(np.array([0.002, 0.002, 0.002]))
+    offer = offered(matrices, cost_s, known=np.zeros((3, 3)), most=np.full(400, 200.0))
+    choice = cheapest_runs(accuracy, offer)
+    assert accuracy.margin(offer.information(np.array(choice.repeats, dtype=float))) >= -1e-9
+    assert choice.bound_s <= choice.cost_s <= choice.bound_s + 60.0

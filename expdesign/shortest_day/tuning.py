@@ -30,6 +30,7 @@ class Tuning:
         halvings: of the way to inner runs, in search of the boundary.
         reached: shortfall of the accuracy's margin that counts as reached.
         choice_gap: relative gap at which the choice of runs ends.
+        exchanged: most manoeuvres of which runs are left out, and put in, in the search for whole runs.
         most_runs: of one primitive.
     """
 
@@ -52,6 +53,7 @@ class Tuning:
     halvings: int = 20
     reached: float = 1e-9
     choice_gap: float = 1e-3
+    exchanged: int = 24
     most_runs: int = 200
 
 

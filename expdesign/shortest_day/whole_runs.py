@@ -36,30 +36,40 @@ def exchanged(accuracy: Accuracy, offer: Offer, runs: Array, level: float) -> Ar
 def _cheaper(accuracy: Accuracy, offer: Offer, runs: Array, level: float) -> Iterator[Array]:
     """(q,) runs one exchange away that reach the level and are cheaper, the cheapest first."""
     least = level - TUNING.reached
-    others = _neighbours(offer, runs)
-    cost_s = others @ offer.cost_s - np.minimum(others @ offer.saved_s, offer.way_s)
     M = offer.information(runs)
     slope = offer.matrices.reshape(len(offer.matrices), -1) @ accuracy.supergradient(M).ravel()
-    tangent = accuracy.margin(M) + (others - runs) @ slope
-    kept = (cost_s < offer.total_s(runs) * (1 - TUNING.choice_gap)) & (tangent >= least)
-    for index in np.flatnonzero(kept)[np.argsort(cost_s[kept], kind="stable")]:
-        if accuracy.margin(offer.information(others[index])) >= least:
-            yield others[index]
+    out, put = _exchanges(offer, runs, slope)
+
+    def after(each: Array) -> Array:
+        """(o, i) sum over the runs after every exchange."""
+        return np.asarray(runs @ each + put @ each - (out @ each)[:, None])
+
+    cost_s = after(offer.cost_s) - np.minimum(after(offer.saved_s), offer.way_s)
+    tangent = accuracy.margin(M) + after(slope) - runs @ slope
+    kept = np.nonzero((cost_s < offer.total_s(runs) * (1 - TUNING.choice_gap)) & (tangent >= least))
+    order = np.argsort(cost_s[kept], kind="stable")
+    for left, taken in zip(*(places[order] for places in kept), strict=True):
+        other = runs + put[taken] - out[left]
+        if other.any() and accuracy.margin(offer.information(other)) >= least:
+            yield other
 
 
-def _neighbours(offer: Offer, runs: Array) -> Array:
-    """(m, q) with up to three runs left out and at most two put in, within the limits, one run at least."""
-    count = len(runs)
-    spare = np.flatnonzero(runs > offer.fewest)
-    out, put = _multisets(spare, (1, 2, 3), count), _multisets(np.arange(count), (0, 1, 2), count)
-    if not len(out):
-        return np.zeros((0, count))
-    others = (runs + put[None] - out[:, None]).reshape(-1, count)
-    allowed = (others >= offer.fewest).all(axis=1) & (others <= offer.most).all(axis=1) & (others.sum(axis=1) >= 1)
-    return np.asarray(others[allowed])
+def _exchanges(offer: Offer, runs: Array, slope: Array) -> tuple[Array, Array]:
+    """(o, q) up to three runs to leave out and (i, q) at most two to put in, within the limits.
+
+    Of many manoeuvres only those are left out that tell least in their time, and those put in that tell most.
+    """
+    order = np.argsort(slope / offer.cost_s, kind="stable")
+    spare = order[runs[order] > offer.fewest[order]][: TUNING.exchanged]
+    free = order[runs[order] < offer.most[order]][::-1][: TUNING.exchanged]
+    out, put = _multisets(spare, (1, 2, 3), len(runs)), _multisets(free, (0, 1, 2), len(runs))
+    return out[(runs - out >= offer.fewest).all(axis=1)], put[(runs + put <= offer.most).all(axis=1)]
 
 
 def _multisets(places: NDArray[np.int64], sizes: Sequence[int], count: int) -> Array:
     """(m, q) how often each of q runs is in every multiset of these places and sizes."""
     some = [chosen for size in sizes for chosen in combinations_with_replacement(places.tolist(), size)]
-    return np.array([np.bincount(np.array(chosen, dtype=int), minlength=count) for chosen in some], dtype=float)
+    counts = np.zeros((len(some), count))
+    for row, chosen in zip(counts, some, strict=True):
+        np.add.at(row, np.array(chosen, dtype=int), 1.0)
+    return counts
