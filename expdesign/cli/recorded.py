@@ -22,9 +22,9 @@ def estimate(
         typer.Option(
             "--method",
             metavar="M ...",
-            help="One or more of: ls ls-air ls-augmented ls-wind ls-no-current ls-no-wind; iv and the like; iv-current "
-            "iv-air-current oe oe-air. See expdesign explain methods. Default: ls and iv, and those with wind where "
-            "wind is measured and the model has terms for it.",
+            help="One or more of: ls ls-air ls-augmented ls-wind ls-no-current ls-no-wind iv iv-air iv-augmented "
+            "iv-wind iv-no-current iv-no-wind iv-current iv-air-current oe oe-air. See expdesign explain methods. "
+            "Default: ls and iv, and those with wind where wind is measured and the model has terms for it.",
         ),
     ] = None,
     fixed: Fixed = None,
