@@ -103,9 +103,16 @@ def test_a_prior_completes_a_dictionary_without_information_about_a_parameter():
 
 
 def test_a_stated_standard_deviation_counts_as_so_many_samples_with_that_noise():
-    prior = stated_information(np.array([0.1, 0.0]), np.array([0.5, 0.5]), dimension=3, samples=50.0)
+    prior = stated_information(np.diag([0.01, 0.0]), np.array([0.5, 0.5]), dimension=3, samples=50.0)
     # 50 samples of regressor 1 with noise 0.5 have information 50 / 0.25 = 200; the prior has 1 / 0.01 = 100.
     np.testing.assert_allclose(prior, np.diag([100 / 200, 0.0, 0.0]))
+
+
+def test_information_of_correlated_parameters_is_the_inverse_of_their_covariance():
+    covariance, noise = np.array([[0.04, 0.03], [0.03, 0.09]]), np.array([0.5, 2.0])
+    prior = stated_information(covariance, noise, dimension=2, samples=50.0)
+    # information of 50 samples about estimates in units of each equation's noise
+    np.testing.assert_allclose(50.0 * prior / np.outer(noise, noise), np.linalg.inv(covariance))
 
 
 def recorded(noise: float, draw: int) -> DurationProblem:

@@ -37,13 +37,13 @@ def equation_noise(vessel: Vessel, parameters: Sequence[str]) -> Array:
     return np.array([np.sqrt(2.0) * spread[equation[name]] / ratio for name in parameters])
 
 
-def stated_information(std: Array, noise: Array, *, dimension: int, samples: float) -> Array:
-    """(d, d) information of independent prior standard deviations (p,), per sample of the total time.
+def stated_information(covariance: Array, noise: Array, *, dimension: int, samples: float) -> Array:
+    """(d, d) information of a prior covariance (p, p), per sample of the total time.
 
     Parameters with a standard deviation of zero or infinity get none; known parameters should be fixed instead.
 
     Args:
-        std: (p,) of the parameters.
+        covariance: (p, p) of the parameters.
         noise: (p,) as from `equation_noise`.
         dimension: d, p or p plus the number of means, which have no prior.
         samples: in the total time.
@@ -51,12 +51,15 @@ def stated_information(std: Array, noise: Array, *, dimension: int, samples: flo
     Raises:
         InputError: a parameter with a prior whose equation's noise is not stated.
     """
+    std = np.sqrt(np.diag(covariance))
     stated = (std > 0) & np.isfinite(std)
     if not (noise[stated] > 0).all():
         raise InputError("a prior from standard deviations needs the sensors' noise of every equation")
     prior = np.zeros((dimension, dimension))
     index = np.flatnonzero(stated)
-    prior[index, index] = (noise[stated] / std[stated]) ** 2 / samples
+    correlation = covariance[np.ix_(index, index)] / np.outer(std[index], std[index])
+    size = noise[index] / std[index]
+    prior[np.ix_(index, index)] = np.outer(size, size) * np.linalg.pinv(correlation, hermitian=True) / samples
     return prior
 
 

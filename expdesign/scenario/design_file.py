@@ -114,7 +114,8 @@ class DesignTable(Table):
     )
     prior: Literal["none", "parameter_std"] = Field(
         default="none",
-        description="the prior information: none, or that of the vessel's [model.parameter_std]",
+        description="the prior information: none, or that of the vessel's [model.parameter_std] and "
+        "[model.parameter_correlation]",
     )
     prior_data: list[Text] = Field(
         default=[], description="the CSV files of earlier trials, whose information is prior information"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -28,6 +28,7 @@ from expdesign.reduction import at_reference_point
 from expdesign.scenario import Scenario
 from expdesign.scenario.values import BudgetSettings
 from expdesign.values import Array
+from expdesign.vessel import VesselModel
 from expdesign.workflows.steps.measured import measured
 
 
@@ -35,12 +36,12 @@ def designed(
     case: Scenario,
     information: Sequence[PrimitiveInformation],
     *,
-    stated_std: Mapping[str, float] | None = None,
+    stated: VesselModel | None = None,
     seed: int = 0,
     progress: Progress = silent,
 ) -> DurationDesign:
     """The certified durations of a scored scenario; arguments as of `duration_problem`."""
-    problem = duration_problem(case, information, stated_std=stated_std, seed=seed, progress=within(progress, 0.0, 0.8))
+    problem = duration_problem(case, information, stated=stated, seed=seed, progress=within(progress, 0.0, 0.8))
     progress("sharing out time", 0.8)
     return recalled(solve_durations, problem)
 
@@ -49,7 +50,7 @@ def duration_problem(
     case: Scenario,
     information: Sequence[PrimitiveInformation],
     *,
-    stated_std: Mapping[str, float] | None = None,
+    stated: VesselModel | None = None,
     seed: int = 0,
     progress: Progress = silent,
 ) -> DurationProblem:
@@ -58,8 +59,8 @@ def duration_problem(
     Args:
         case: the scenario.
         information: of its dictionary, by the nominal model.
-        stated_std: prior standard deviations by parameter that design.prior means, where the vessel's own already
-            count the prior data; None for the vessel's own.
+        stated: model whose prior covariance design.prior means, where the vessel's own already counts the prior data;
+            None for the vessel's own.
         seed: of the models drawn from the prior.
         progress: of the step.
 
@@ -105,7 +106,7 @@ def duration_problem(
         mean_subtraction=settings.mean_subtraction,
         aim=aim_of(case, parameters, interest, progress=within(progress, 0.4, 0.9)),
         constraints=constraints_of(case, primitives),
-        prior=_prior(case, parameters, stated_std),
+        prior=_prior(case, parameters, stated or case.vessel.model),
         sampled=sampled,
         robust=settings.robust,
         equations=equations,
@@ -197,19 +198,18 @@ def cubed_propeller_speed(primitive: Primitive) -> float:
     return float(sum(np.mean(np.abs(primitive.commands.column(name)) ** 3) for name in names))
 
 
-def _prior(case: Scenario, parameters: tuple[str, ...], stated: Mapping[str, float] | None) -> Array | None:
+def _prior(case: Scenario, parameters: tuple[str, ...], stated: VesselModel) -> Array | None:
     """Prior information per sample of the informative time; None without any."""
     settings, model = case.design, case.vessel.model
     means = len(model.outputs) if settings.mean_subtraction == MEAN_SUBTRACTIONS[-1] else 0
     dimension, samples = len(parameters) + means, settings.total_s / case.vessel.sample_time_s
     prior = np.zeros((dimension, dimension))
     if settings.prior == "parameter_std":
-        std = dict(zip(model.names, model.parameter_std.tolist(), strict=True)) if stated is None else stated
-        own = [name for name in parameters if name in std]
-        known = np.zeros(len(parameters))
-        noise = np.zeros(len(parameters))
-        index = [parameters.index(name) for name in own]
-        known[index], noise[index] = [std[name] for name in own], equation_noise(case.vessel, own)
+        own = [name for name in parameters if name in stated.names]
+        index, places = [parameters.index(name) for name in own], [stated.names.index(name) for name in own]
+        known, noise = np.zeros((len(parameters), len(parameters))), np.zeros(len(parameters))
+        known[np.ix_(index, index)] = stated.parameter_covariance[np.ix_(places, places)]
+        noise[index] = equation_noise(case.vessel, own)
         prior += stated_information(known, noise, dimension=dimension, samples=samples)
     if settings.prior_data:
         record = at_reference_point(measured(settings.prior_data, case.vessel), case.vessel.sensors)

@@ -98,7 +98,7 @@ def _replanned(
     case, notes = rest_of(state, interest=interest)
     information, growth = ready(case, seed=seed, progress=within(progress, 0.02, 0.05))
     design = designed(
-        case, information, stated_std=_stated(state.first.vessel), seed=seed, progress=within(progress, 0.05, 0.12)
+        case, information, stated=state.first.vessel.model, seed=seed, progress=within(progress, 0.05, 0.12)
     )
     _check_runs(design)
     plan = planned(case, information, design, seed=seed, progress=within(progress, 0.13, 0.74))
