@@ -109,7 +109,7 @@ def test_two_of_one_name_and_none_at_all_are_refused(tmp_path):
         workflows.whatif(MODEL_SHIP, [tmp_path / "none.toml"], tmp_path, jobs=1)
 
 
-def case_of(name, *, track, day_s):
+def case_of(name, *, track, day_s, legs_count=False):
     plan = {"day_s": day_s, "day_median_s": day_s + 60.0, "day_95_s": day_s + 120.0}
     return Case(
         name=name,
@@ -121,6 +121,7 @@ def case_of(name, *, track, day_s):
         covariance=np.eye(2),
         plan=plan,
         track=track,
+        legs_count=legs_count,
     )
 
 
@@ -138,3 +139,14 @@ def test_days_are_compared_by_what_their_whole_tracks_tell():
     assert page.count("Legs included, the day tells 0.50 times what the scenario") == 1
     for minutes in ("15.0", "16.0", "17.0", "10.0"):  # planned, median, 95 %
         assert f">{minutes}<" in page
+
+
+def test_where_legs_count_whole_days_are_compared_and_not_runs():
+    first = case_of("first", track=np.eye(2), day_s=900.0)
+    shortest = case_of("shortest", track=np.diag([2.0, 0.5]), day_s=600.0, legs_count=True)
+    content = WhatIfContent(cases=(first, shortest), planned=True, command="", version="")
+    against = content.against(shortest)
+    np.testing.assert_allclose(against.ratios, np.sqrt([2.0, 0.5]))
+    assert against.accuracy == against.track == pytest.approx(1.0)
+    assert against.same_accuracy_s is None
+    assert "Legs count in its accuracy, so whole days are compared." in whatif_html(content)

@@ -32,6 +32,7 @@ class Case:
         covariance: (p, p) expected of estimates from the runs alone.
         plan: numbers of the planned trial, units in the names; empty when none was planned.
         track: (p, p) inverse information of the whole planned track, in units of the noise; None where it is not known.
+        legs_count: whether the accuracy asked for is that of the whole track, not of the runs alone.
     """
 
     name: str
@@ -46,6 +47,7 @@ class Case:
     covariance: Array
     plan: Mapping[str, object]
     track: Array | None = None
+    legs_count: bool = False
 
     @property
     def std(self) -> Array:
@@ -62,14 +64,14 @@ class Against:
         ratios: (c,) standard deviation over the first case's.
         accuracy: ratio of information determinants to the power 1/c: 2 means half the variance.
         same_accuracy_s: informative time in which the runs of the variant, in the same proportions, are as accurate as
-            the first case [s].
+            the first case [s]; None where whole tracks are compared, because legs count in one of the two.
         track: ratio of information, as `accuracy`, of the whole tracks, legs included; None where they are not known.
     """
 
     common: tuple[str, ...]
     ratios: tuple[float, ...]
     accuracy: float
-    same_accuracy_s: float
+    same_accuracy_s: float | None
     track: float | None = None
 
 
@@ -95,14 +97,17 @@ class WhatIfContent:
         if first.problem or case.problem or not common:
             return None
         mine, theirs = (_part(item, item.covariance, common) for item in (case, first))
-        ratios, accuracy, track = np.sqrt(np.diag(mine) / np.diag(theirs)), _gain(mine, theirs), None
+        track, legs_count = None, False
         if case.track is not None and first.track is not None:
-            track = _gain(_part(case, case.track, common), _part(first, first.track, common))
+            whole = _part(case, case.track, common), _part(first, first.track, common)
+            track, legs_count = _gain(*whole), case.legs_count or first.legs_count
+            mine, theirs = whole if legs_count else (mine, theirs)
+        accuracy = _gain(mine, theirs)
         return Against(
             common=common,
-            ratios=tuple(ratios.tolist()),
+            ratios=tuple(np.sqrt(np.diag(mine) / np.diag(theirs)).tolist()),
             accuracy=accuracy,
-            same_accuracy_s=case.informative_s / accuracy,
+            same_accuracy_s=None if legs_count else case.informative_s / accuracy,
             track=track,
         )
 
@@ -146,13 +151,15 @@ def _sentences(content: WhatIfContent, case: Case) -> Iterator[str]:
 
 
 def _accuracy(first: Case, case: Case, against: Against) -> str:
-    minutes, needed = case.informative_s / 60, against.same_accuracy_s / 60
+    minutes = case.informative_s / 60
+    if against.same_accuracy_s is None:
+        return f"Its runs take {minutes:.1f} min. Legs count in its accuracy, so whole days are compared."
     theirs = f"that the scenario's runs collect in {first.informative_s / 60:.1f} min"
     if abs(against.accuracy - 1) < TUNING.noticed:
         return f"In {minutes:.1f} min its runs collect the information {theirs}."
     return (
         f"In {minutes:.1f} min its runs collect {against.accuracy:.2f} times the information {theirs}. "
-        f"The same accuracy takes {needed:.1f} min."
+        f"The same accuracy takes {against.same_accuracy_s / 60:.1f} min."
     )
 
 

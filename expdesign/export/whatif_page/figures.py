@@ -19,8 +19,9 @@ def time_figure(content: WhatIfContent) -> str:
         moving = [float(str(case.plan.get("repositioning_s", 0.0))) / 60 for case in cases]
         begin = [case.informative_s / 60 for case in cases]
         axes.barh(rows, moving, left=begin, height=0.55, color=REPOSITION, alpha=0.6, label="repositioning")
-    same = [against.same_accuracy_s / 60 if (against := content.against(case)) else np.nan for case in cases]
-    axes.plot(same, rows, "D", color="white", markeredgecolor="black", label="for the same accuracy")
+    same_s = [against.same_accuracy_s if (against := content.against(case)) else None for case in cases]
+    same_min = [np.nan if time_s is None else time_s / 60 for time_s in same_s]
+    axes.plot(same_min, rows, "D", color="white", markeredgecolor="black", label="for the same accuracy")
     axes.set_yticks(rows, [plain(case.name) for case in cases])
     axes.invert_yaxis()
     axes.set_xlabel("time [min]")

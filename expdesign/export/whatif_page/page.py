@@ -53,7 +53,7 @@ def table_row(content: WhatIfContent, case: Case) -> tuple[str, ...]:
         *(_minutes(case.plan.get(key)) for key in DAY if content.planned),
         f"{case.informative_s / 60:.1f}",
         "-" if against is None else f"{against.accuracy:.2f} \N{MULTIPLICATION SIGN}",
-        "-" if against is None else f"{against.same_accuracy_s / 60:.1f}",
+        "-" if against is None else _minutes(against.same_accuracy_s),
         _short(case.gap_relative),
         *((_metres(case.plan),) if content.planned else ()),
     )

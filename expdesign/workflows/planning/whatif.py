@@ -166,6 +166,7 @@ def _described(
         parameters=parameters,
         covariance=covariance,
         plan=plan,
+        legs_count=case.design.accuracy is not None,
     )
 
 
