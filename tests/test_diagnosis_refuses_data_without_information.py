@@ -7,7 +7,7 @@ import pytest
 
 from diagnosis_case import hidden_record, vessel_of
 from expdesign.diagnosis import diagnose
-from expdesign.errors import NotInformative
+from expdesign.errors import InputError, NotInformative
 from expdesign.signals import Record
 
 
@@ -15,6 +15,12 @@ def test_a_record_too_short_is_refused():
     record = hidden_record("barge", seed=0, batches=1, samples=60)
     with pytest.raises(NotInformative, match=r"too short.*60 samples"):
         diagnose(vessel_of("barge"), record)
+
+
+def test_more_data_than_memory_may_hold_are_refused_at_once():
+    (batch,) = hidden_record("barge", seed=0, batches=1, samples=200).batches
+    with pytest.raises(InputError, match=r"have 400200 samples, expected at most 400000: give fewer runs"):
+        diagnose(vessel_of("barge"), Record(batches=(batch,) * 2001))
 
 
 def test_a_steady_run_is_refused_and_the_inputs_are_named():

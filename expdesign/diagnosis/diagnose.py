@@ -55,7 +55,7 @@ from expdesign.diagnosis.select import (
 )
 from expdesign.diagnosis.values import Diagnosis, ErrorReduction, Finding, Lead, Unexplained
 from expdesign.diagnosis.vessel_file import extend, extended_model
-from expdesign.errors import Diverged
+from expdesign.errors import Diverged, InputError
 from expdesign.progress import Estimated, Progress, silent, within
 from expdesign.reduction import with_reduced_wind
 from expdesign.signals import Record
@@ -65,6 +65,8 @@ LITTLE_FIT, MORE_THAN_NOISE = 50.0, 2.0
 """Fit of an output [%] below which the simulation explains little, if its error is so many times the noise."""
 LEAST_GAIN_WITHIN_STD = 1.0
 """Gain of fit [points] from which parameters re-estimated within their standard deviations are the verdict."""
+MOST_SAMPLES = 400_000
+"""Eleven hours at 10 Hz. About 10 kB of memory are needed for each sample."""
 SIMULATED, VALIDATED, CONCLUDED = 18.0, 4.0, 25.0
 """Work before the selection, of the cross-validation of a model, and of conclusions, in simulations of all data."""
 
@@ -87,9 +89,13 @@ def diagnose(
         progress: of the diagnosis and of what follows it, in simulations of all data.
 
     Raises:
+        InputError: more than `MOST_SAMPLES` samples.
         NotInformative: the data cannot support a diagnosis; the message says what is missing.
         Diverged: the model in use cannot be simulated over the data.
     """
+    samples = sum(map(len, record.batches))
+    if samples > MOST_SAMPLES:
+        raise InputError(f"the data have {samples} samples, expected at most {MOST_SAMPLES}: give fewer runs at a time")
     told = Estimated(silent) if progress is None else progress
     told.tell("simulating the model in use", SIMULATED + SELECTION_TUNING.first_rounds * SELECTION_TUNING.round_work)
     record = with_reduced_wind(record, vessel.sensors)
