@@ -7,11 +7,15 @@ each operation once, however often the model repeats it, and none on constants a
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
+import numpy as np
+
 from expdesign.vessel import Operators
+from expdesign.vessel.expressions import Expression, parse_expression
 
 FUNCTIONS: dict[str, Callable[..., float]] = {
     "add": lambda a, b: a + b,
@@ -134,3 +138,51 @@ def _function(name: str) -> Callable[[Any], Any]:
 
 
 SYMBOLIC = Operators(_function("absolute"), _function("sin"), _function("cos"))
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Several expressions, to be evaluated at once.
+
+    Attributes:
+        signals: (place, name) of what is read.
+        constants: place -> number.
+        operations: (place, function, places of its operands), in order.
+        results: places of the values.
+    """
+
+    signals: tuple[tuple[int, str], ...]
+    constants: Mapping[int, float]
+    operations: tuple[tuple[int, Callable[..., Any], tuple[int, ...]], ...]
+    results: tuple[int, ...]
+
+    def values(self, signals: Mapping[str, Any]) -> list[Any]:
+        """Of all expressions, for signals that are numbers or arrays; what they share is computed once."""
+        found: dict[int, Any] = {**self.constants}
+        for place, name in self.signals:
+            found[place] = signals[name]
+        for place, function, operands in self.operations:
+            found[place] = function(*[found[operand] for operand in operands])
+        return [found[place] for place in self.results]
+
+
+def evaluation(expressions: Sequence[Expression]) -> Evaluation:
+    """The evaluation of expressions; the same ones are written down once."""
+    return _evaluation(tuple((item.text, item.signals) for item in expressions))
+
+
+@lru_cache(maxsize=256)
+def _evaluation(written: tuple[tuple[str, tuple[str, ...]], ...]) -> Evaluation:
+    tape, names = Tape(), sorted({name for _, own in written for name in own})
+    given = dict(zip(names, tape.given("signal", len(names)), strict=True))
+    values = [parse_expression(text, signals=own).evaluate(given, SYMBOLIC) for text, own in written]
+    results = [value if isinstance(value, Symbol) else tape.constant(value) for value in values]
+    entries = [(place, tape.entries[place]) for place in tape.needed(results)]
+    return Evaluation(
+        signals=tuple((place, names[int(entry.number)]) for place, entry in entries if entry.name == "signal"),
+        constants={place: entry.number for place, entry in entries if entry.name == "constant"},
+        operations=tuple(
+            (place, getattr(np, entry.name), entry.arguments) for place, entry in entries if entry.arguments
+        ),
+        results=tuple(result.place for result in results),
+    )

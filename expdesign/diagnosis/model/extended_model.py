@@ -31,8 +31,8 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from expdesign.diagnosis.model.terms import Effects, ScaledTerm, library_terms, own_terms, unit_terms
+from expdesign.simulation.tape import Evaluation, evaluation
 from expdesign.vessel import Roll, Term, VesselModel
-from expdesign.vessel.common_subexpressions import Program, evaluated_together
 
 ANGLE_STEMS = ("a", "rudder")
 ROLL = {"roll:period": "period_s", "roll:damping": "damping_ratio", "roll:sway": "Y_phi", "roll:yaw": "N_phi"}
@@ -71,9 +71,9 @@ class ExtendedModel:
         object.__setattr__(self, "scaled_terms", parts)
 
     @cached_property
-    def regressors(self) -> Program:
+    def regressors(self) -> Evaluation:
         """Of `scaled_terms`."""
-        return evaluated_together([part.expression for part in self.scaled_terms])
+        return evaluation([part.expression for part in self.scaled_terms])
 
     @cached_property
     def unit_terms(self) -> Mapping[str, ScaledTerm]:

@@ -10,8 +10,8 @@ import numpy as np
 from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.model import ExtendedModel, ScaledTerm, ahead_force
 from expdesign.diagnosis.motion.exogenous_inputs import ExogenousInputs
+from expdesign.simulation.tape import evaluation
 from expdesign.values import Array
-from expdesign.vessel.common_subexpressions import evaluated_together
 from expdesign.vessel.structures import SHOAL
 
 
@@ -32,9 +32,8 @@ def rates_by_term(
     signals = _signals(ship, u, v, r, exogenous)
     still = np.zeros_like(u)
     result = []
-    for part, regressor in zip(
-        parts, evaluated_together([part.expression for part in parts]).values(signals), strict=True
-    ):
+    regressors = evaluation([part.expression for part in parts]).values(signals)
+    for part, regressor in zip(parts, regressors, strict=True):
         value = _value(ship, part, regressor, exogenous)
         value = value if part.coriolis else value / _heavier(ship, part.equation, exogenous)
         plain = tuple(value if name == part.equation else still for name in OUTPUTS)

@@ -35,7 +35,7 @@ class ExogenousInputs(dict[str, Array]):
     def at(self, step: int) -> ExogenousInputs:
         """One integrator step of every window."""
         result = ExogenousInputs({name: values[:, step] for name, values in self.items()})
-        result.__dict__["rising"] = self.rising
+        result.__dict__["rising"] = self.rising  # the same signals at every step: not looked for again
         return result
 
     def at_fraction(self, share: float) -> ExogenousInputs:
