@@ -12,7 +12,7 @@ from expdesign import workflows
 from expdesign.cli import main
 from expdesign.durations import DurationProblem, optimal_shares, solve_durations
 from expdesign.estimation.methods import estimate
-from expdesign.information.expected import TrialPart
+from expdesign.information.expected import TrialPart, expected_covariance
 from expdesign.scenario import load_scenario, load_vessel
 from expdesign.signals import Batch, Commands, Record
 from expdesign.simulation import Environment, Variation, simulate
@@ -226,6 +226,18 @@ def test_the_rest_only_adds_information_and_unidentified_parameters_are_nan():
     assert np.allclose(
         expected_std(SHIP, twice, names, environment=Environment(), mean_subtraction="none"), after / np.sqrt(2)
     )
+
+
+def test_what_is_told_counts_that_a_steady_current_is_unknown():
+    """As designs and reports do: the current is estimated along, one for all parts."""
+    parts, names = (TrialPart(commands=wandering(), velocity=np.zeros(3)),) * 2, SHIP.model.names
+    known, unknown = (
+        expected_std(SHIP, parts, names, environment=Environment(current_std_mps=std), mean_subtraction="complete")
+        for std in (0.0, 0.15)
+    )
+    covariance = expected_covariance(SHIP, parts, names, unknown_current=True)
+    assert np.allclose(unknown, np.sqrt(np.diag(covariance)))
+    assert unknown[names.index("Y_v")] > 1.05 * known[names.index("Y_v")]
 
 
 def test_the_runs_credited_with_a_parameter_have_the_information_about_it():

@@ -9,10 +9,11 @@ import pytest
 from expdesign import workflows
 from expdesign.cli import main
 from expdesign.errors import InputError
+from expdesign.estimation.methods import method_named
 from expdesign.export import words
 from expdesign.rehearsal.validation import Rehearsal
 from expdesign.scenario import load_scenario
-from expdesign.workflows.trials.validate import _identity
+from expdesign.workflows.trials.validate import _identity, _method
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 MODEL_SHIP, TRUE = SCENARIOS / "model-ship.toml", SCENARIOS / "vessels" / "model-ship-true.toml"
@@ -61,6 +62,16 @@ def test_the_page_shows_what_the_file_holds(whole):
     assert all(count > 0 for count in runs.values())
     assert "http" not in page.replace("http://www.w3.org", "")
     assert np.isfinite(content["designs"]["optimised"]["normalised_error"]["median"])
+
+
+@pytest.mark.parametrize(
+    ("name", "method"), [("story", "iv-current"), ("helsinki", "iv-air-current"), ("model-ship", "iv")]
+)
+def test_designs_are_tested_by_the_method_whose_accuracy_they_count(name, method):
+    case = load_scenario(SCENARIOS / f"{name}.toml")
+    assert _method(case, None) == method
+    assert _method(case, "ls") == "ls"
+    assert method_named(method).estimates_steady_current == (case.environment.current_std_mps > 0)
 
 
 @pytest.mark.parametrize(

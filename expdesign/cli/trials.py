@@ -51,9 +51,15 @@ def validate(
     trials: Annotated[
         int, typer.Option("--trials", metavar="N", max=MOST_TRIALS, help="Simulated trials of each design.")
     ] = 100,
-    method: Annotated[str, typer.Option("--method", metavar="M", help="Estimator; see expdesign explain methods.")] = (
-        "iv"
-    ),
+    method: Annotated[
+        str | None,
+        typer.Option(
+            "--method",
+            metavar="M",
+            help="Estimator; see expdesign explain methods. Default: iv, or with a steady current where the forecast "
+            "leaves one unknown, iv-current or iv-air-current.",
+        ),
+    ] = None,
     integrator: Annotated[
         str,
         typer.Option(

@@ -150,6 +150,11 @@ def method_named(name: str) -> Method:
     raise UnknownName("method", name, known=[method.name for method in METHODS])
 
 
+def steady_current_method(model: VesselModel) -> str:
+    """The method whose accuracy designs and plans state where the forecast leaves a steady current unknown."""
+    return "iv-air-current" if model.reads_air else "iv-current"
+
+
 def estimate(
     record: Record,
     model: VesselModel,

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.errors import NoAnswer
+from expdesign.estimation.methods import steady_current_method
 from expdesign.export import words
 from expdesign.export.report.content import ReportContent
 from expdesign.information.expected import TrialPart, expected_covariance
@@ -83,7 +84,7 @@ def unknown_current_sentence(content: ReportContent) -> str:
     std_mps = content.environment.current_std_mps
     if std_mps <= 0:
         return ""
-    method = "iv-air-current" if content.vessel.model.reads_air else "iv-current"
+    method = steady_current_method(content.vessel.model)
     return (
         f"The forecast leaves a steady current of {words.speed(std_mps)} (standard deviation) unknown. Accuracies on "
         f"this page hold where it is estimated with the parameters, by expdesign estimate --method {method}. By a "

@@ -142,13 +142,21 @@ def expected_std(
     environment: Environment,
     mean_subtraction: str,
 ) -> Array:
-    """(p,) theoretical standard deviations of estimates from a trial; nan for parameters that it does not determine."""
+    """(p,) theoretical standard deviations of estimates from a trial; nan for parameters that it does not determine.
+
+    A steady current that the forecast leaves unknown, the same in all parts, is estimated with the parameters.
+    """
     determined = list(parameters)
     found: Mapping[str, float] = {}
     while determined:
         try:
             covariance = expected_covariance(
-                vessel, parts, determined, environment=environment, mean_subtraction=mean_subtraction
+                vessel,
+                parts,
+                determined,
+                environment=environment,
+                mean_subtraction=mean_subtraction,
+                unknown_current=environment.current_std_mps > 0,
             )
         except NotInformative as error:
             rest = [name for name in determined if name not in error.parameters]

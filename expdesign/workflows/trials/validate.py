@@ -11,12 +11,13 @@ import numpy as np
 
 from expdesign import __version__
 from expdesign.errors import InputError
+from expdesign.estimation.methods import steady_current_method
 from expdesign.export import vessel_toml, write_files
 from expdesign.export.validation_page import ValidationContent, judgements, validation_html, validation_json
 from expdesign.information import estimated_parameters
 from expdesign.progress import Progress, silent, within
 from expdesign.rehearsal import RANDOM, Rehearsal, equal_runs, validate
-from expdesign.scenario import load_scenario, load_vessel
+from expdesign.scenario import Scenario, load_scenario, load_vessel
 from expdesign.values import Array
 from expdesign.workflows.command_text import command_text
 from expdesign.workflows.outcome import Outcome, TextTable
@@ -34,7 +35,7 @@ def validate_design(
     *,
     truth: Path | None = None,
     trials: int = 100,
-    method: str = "iv",
+    method: str | None = None,
     integrator: str = "rk4",
     jobs: int = 0,
     scheduler: str | None = None,
@@ -43,11 +44,14 @@ def validate_design(
 ) -> Outcome:
     """The optimised design beside equal shares and random runs, in trials of a true ship or of the scenario's own.
 
-    An interrupted call goes on where it stopped: finished chunks of trials are kept in the folder until all are done.
+    Without a method it is that of the designs' accuracies: iv, or with a steady current where the forecast leaves one
+    unknown. An interrupted call goes on where it stopped: finished chunks of trials are kept in the folder until all
+    are done.
     """
     if integrator not in INTEGRATORS:
         raise InputError(f"--integrator is {integrator}, expected one of {', '.join(INTEGRATORS)}")
     case = load_scenario(scenario)
+    method = _method(case, method)
     if case.vessel.model.roll is not None:
         raise InputError(
             f"vessel {case.vessel.name!r} has a roll mode, [model.roll], which {method} does not estimate beside; "
@@ -96,6 +100,12 @@ def validate_design(
     forget()
     progress("done", 1.0)
     return Outcome(files=files, summary=_summary(content), tables=(_comparison(content), _table(content)))
+
+
+def _method(case: Scenario, stated: str | None) -> str:
+    """The estimator that is stated, or the one whose accuracy designs count."""
+    usual = steady_current_method(case.vessel.model) if case.environment.current_std_mps > 0 else "iv"
+    return stated or usual
 
 
 def _identity(rehearsal: Rehearsal) -> tuple[object, ...]:
