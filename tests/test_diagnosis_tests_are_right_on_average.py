@@ -27,7 +27,7 @@ from expdesign.diagnosis.select.fitted_candidate import fit_candidate
 from expdesign.diagnosis.select.forward_selection import fit_nuisance
 from expdesign.diagnosis.select.score_tests import ScoreTest, _effective_tests, score_tests
 from expdesign.diagnosis.select.selection import Step, redundant_step
-from expdesign.diagnosis.select.selection_round import _candidates
+from expdesign.diagnosis.select.selection_round import open_candidates
 from expdesign.diagnosis.select.starting_point import starting_point
 from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.diagnosis.vessel_file.writing import extend
@@ -367,7 +367,7 @@ def test_uncertain_parameters_beyond_their_bounds_are_still_tested_as_causes():
     extended = extended_model(vessel_of("tug", relative_std=0.1), record)
     windows = cut_windows(extended.model, record)
     base = fit_nuisance(extended, windows, initial_states(windows))
-    own = [item for item in _candidates(base, windows) if item.cause == "thrust_advance_loss"]
+    own = [item for item in open_candidates(base, windows) if item.cause == "thrust_advance_loss"]
     assert [tuple(item.free) for item in own] == [("theta:X_kappa",)]
     assert base.ship.get("theta:X_kappa") < -2 * 0.00025  # beyond two of its standard deviations
     (found,) = score_tests(base, own)

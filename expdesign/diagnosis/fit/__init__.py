@@ -26,7 +26,7 @@ from expdesign.diagnosis.fit.fit import (
     within_stated_std,
 )
 from expdesign.diagnosis.fit.gauss_newton import fit
-from expdesign.diagnosis.fit.gram_matrices import gram_matrices, information
+from expdesign.diagnosis.fit.gram_matrices import gram_matrices, information, marginalised
 from expdesign.diagnosis.fit.linear_model import (
     build_sensitivities,
     difference_step,
@@ -60,6 +60,7 @@ __all__ = [
     "judged",
     "likeliest",
     "log_likelihood_gain",
+    "marginalised",
     "on_common_units",
     "profile_cost",
     "sensitivities_to",

@@ -1,17 +1,24 @@
 """Which causes explain the data: score tests, forward selection, backward elimination, profile likelihood."""
 
 from expdesign.diagnosis.select.backward_elimination import eliminate_backward, only_nuisance
-from expdesign.diagnosis.select.forward_selection import select_forward
+from expdesign.diagnosis.select.candidate_disturbances import candidate_disturbances
+from expdesign.diagnosis.select.forward_selection import fit_nuisance, select_forward
+from expdesign.diagnosis.select.score_tests import ScoreTest, score_tests
 from expdesign.diagnosis.select.selection import Selection, Step
-from expdesign.diagnosis.select.selection_round import leading_candidates
+from expdesign.diagnosis.select.selection_round import leading_candidates, open_candidates
 from expdesign.diagnosis.select.tuning import TUNING as SELECTION_TUNING
 
 __all__ = [
     "SELECTION_TUNING",
+    "ScoreTest",
     "Selection",
     "Step",
+    "candidate_disturbances",
     "eliminate_backward",
+    "fit_nuisance",
     "leading_candidates",
     "only_nuisance",
+    "open_candidates",
+    "score_tests",
     "select_forward",
 ]

@@ -62,7 +62,9 @@ def round_tests(
 ) -> tuple[ScoreTest, ...]:
     """Score tests of a round, with arguments as in `selection_round`."""
     work.tell("testing causes", TUNING.round_work)
-    candidates = [c for c in _candidates(base, windows) if not same_effects_as_any(c, rejected) and len(c.free) <= most]
+    candidates = [
+        c for c in open_candidates(base, windows) if not same_effects_as_any(c, rejected) and len(c.free) <= most
+    ]
     tests = score_tests(base, candidates, rng)
     work.progress.done += TUNING.tests_work
     return tests
@@ -73,7 +75,8 @@ def same_effects_as_any(candidate: Candidate, others: Sequence[Candidate]) -> bo
     return any(candidate.cause == other.cause and set(candidate.free) == set(other.free) for other in others)
 
 
-def _candidates(base: Fit, windows: Windows) -> list[Candidate]:
+def open_candidates(base: Fit, windows: Windows) -> list[Candidate]:
+    """Every candidate of the catalogue that these data can show and the fit does not have."""
     situation = Situation(ship=base.ship, windows=windows)
     return [
         candidate
