@@ -241,7 +241,14 @@ def test_the_mean_current_is_read_out_of_an_augmented_estimate(tmp_path: Path) -
     for item, truth in zip(read, (0.2, -0.2), strict=True):
         assert abs(item["value"] - truth) < 4 * item["std"] < 0.8
     assert found["ls"]["current_to"] is None
-    assert "Mean current, estimated" in (tmp_path / "out" / "estimate.html").read_text(encoding="utf-8")
+    assert found["ls"]["disturbances"] == []
+    told = {item["of"]: item for item in found["iv-augmented"]["disturbances"]}
+    assert set(told) == {"current", "current and wind in du/dt", "current and wind in dv/dt"}
+    assert told["current"]["mean_mps"]["north"] == read[0]
+    for felt in ("current and wind in du/dt", "current and wind in dv/dt"):
+        for part in ("second_moments_m2ps2", "covariance_m2ps2"):
+            assert all(item["std"] > 0 for item in told[felt][part].values())
+    assert "Current and wind" in (tmp_path / "out" / "estimate.html").read_text(encoding="utf-8")
 
 
 def test_blocks_asked_for_are_blocks_used(trial: Path, tmp_path: Path) -> None:

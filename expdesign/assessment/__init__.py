@@ -4,13 +4,13 @@ from expdesign.assessment.assess import NO_TESTS, EstimateOptions, assess, defau
 from expdesign.assessment.limits import Limits, decomposed, sentence
 from expdesign.assessment.residuals import OneStep, one_step
 from expdesign.assessment.runs import RunCheck, check_run
-from expdesign.assessment.values import Assessed, Assessment, Current
+from expdesign.assessment.values import Assessed, Assessment, Disturbances
 
 __all__ = [
     "NO_TESTS",
     "Assessed",
     "Assessment",
-    "Current",
+    "Disturbances",
     "EstimateOptions",
     "Limits",
     "OneStep",

@@ -9,9 +9,9 @@ from expdesign.assessment.limits import Limits, decomposed
 from expdesign.assessment.residuals import one_step
 from expdesign.assessment.runs import ESTIMATION, TEST, check_run
 from expdesign.assessment.tuning import TUNING
-from expdesign.assessment.values import INSTRUMENTAL, Assessed, Assessment, Current
+from expdesign.assessment.values import INSTRUMENTAL, Assessed, Assessment, Disturbances
 from expdesign.errors import Diverged, InputError, NoAnswer, NotInformative, UnknownName
-from expdesign.estimation.disturbance import mean_current, tells_current
+from expdesign.estimation.disturbance import current_moments, felt_moments, measured_wind, tells_current
 from expdesign.estimation.excitation import check_excitation, worst_case
 from expdesign.estimation.methods import STARTS, Method, Settings, estimate, method_named
 from expdesign.estimation.regression import CURRENT, MEANS, PREDICTORS
@@ -195,15 +195,17 @@ def _assessed(
         runs=tuple(runs),
         one_step=one_step(record, vessel.model, found, fixed=options.fixed, quadrature=options.quadrature),
         breaches=breaches,
-        current=_current(found, vessel) if method.predictor in TELL_CURRENT else None,
+        disturbances=_disturbances(found, record, vessel, method),
     )
 
 
-def _current(found: Estimate, vessel: Vessel) -> Current | None:
-    if not tells_current(found):
-        return None
-    to_mps, covariance = mean_current(found, heading_std_rad=vessel.sensors.heading_rad)
-    return Current(to_mps=to_mps, std_mps=covariance.diagonal() ** 0.5)
+def _disturbances(found: Estimate, record: Record, vessel: Vessel, method: Method) -> Disturbances:
+    noise, tells = vessel.sensors.heading_rad, method.predictor in TELL_CURRENT and tells_current(found)
+    return Disturbances(
+        current=current_moments(found, heading_std_rad=noise) if tells else None,
+        felt=felt_moments(found, heading_std_rad=noise),
+        wind=measured_wind(record) if USES_WIND[method.predictor] else None,
+    )
 
 
 def _estimated(

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from expdesign.assessment.limits import Limits
 from expdesign.assessment.residuals import OneStep
 from expdesign.assessment.runs import RunCheck
+from expdesign.estimation.disturbance import MeasuredWind, Moments
 from expdesign.estimation.excitation import Breach
 from expdesign.estimation.methods import Method
 from expdesign.estimation.values import Estimate
 from expdesign.signals import Record
-from expdesign.values import Array, seal
 from expdesign.vessel import VesselModel
 
 INSTRUMENTAL = "iv"
@@ -19,19 +19,18 @@ INSTRUMENTAL = "iv"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Current:
-    """A mean current.
+class Disturbances:
+    """What an estimate and its data tell about current and wind.
 
     Attributes:
-        to_mps: (2,) to north and to east [m/s].
-        std_mps: (2,) standard deviations.
+        current: its moments, or None where the method does not tell them.
+        felt: of current and wind together, for equations that feel both and do not tell them apart.
+        wind: the measured one, or None where none is used.
     """
 
-    to_mps: Array
-    std_mps: Array
-
-    def __post_init__(self) -> None:
-        seal(self, to_mps="2", std_mps="2")
+    current: Moments | None
+    felt: tuple[Moments, ...]
+    wind: MeasuredWind | None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -46,7 +45,7 @@ class Assessed:
         runs: every run simulated with it, first the estimation runs, then the test runs.
         one_step: its residuals.
         breaches: where the data break the excitation condition, for the signals this method uses.
-        current: the mean current from the nuisance parameters, or None without them.
+        disturbances: current and wind, from the nuisance parameters and from the measured wind.
     """
 
     method: Method
@@ -56,7 +55,7 @@ class Assessed:
     runs: tuple[RunCheck, ...]
     one_step: OneStep
     breaches: tuple[Breach, ...]
-    current: Current | None
+    disturbances: Disturbances
 
     @property
     def uses_instruments(self) -> bool:

@@ -1,27 +1,96 @@
-"""Reading the mean current out of the nuisance parameters of surge and sway.
+"""What an estimate tells about current and wind: their means and second moments, from the nuisance parameters.
 
-The linear damping X_u (u - u_c) leaves -X_u times the mean current with cos psi (north) and sin psi (east), and
-Y_v (v - v_c) leaves Y_v times it with sin psi (north) and -cos psi (east). Each ratio is too large by 1 / E cos(heading
-noise), for which there is a correction. Where both equations tell the current, the readings are fused by their
-covariance.
+With a current (N, E) over ground, the term f(u, v) of a parameter theta leaves theta times a first moment E N or E E
+with cos psi and sin psi, and theta times a second moment with cos^2 psi and sin 2psi. The second moments are
+E N^2 - E E^2 and E N E; the sum of the squares is a constant, which zero-mean instruments do not see. So
 
-Source: F. Ljungberg, doctoral thesis, Linköping University, (5.34)-(5.35), (7.61); for sway derived alike.
+- the mean current is read from the linear damping: X_u (u - u_c) leaves -X_u times it with cos psi (north) and sin psi
+  (east), Y_v (v - v_c) leaves Y_v times it with sin psi (north) and -cos psi (east). Where both equations tell it, the
+  readings are fused by their covariance;
+- its second moments are read from all parameters with cos^2 psi and sin 2psi, by least squares whose weights count
+  that terms are uncertain, too. The mean's products taken off, they are its variance to north less that to east, and
+  its covariance;
+- where the wind is not measured, terms of the air fall together with those of the water. Their common nuisance
+  parameters tell, equation by equation, a mean of the current and the wind, each by its share of the two parameters.
+
+First moments are too large by 1 / E cos(heading noise), second ones by 1 / E cos(2 heading noise), which is corrected.
+A measured wind is told by its samples.
+
+Source: F. Ljungberg, doctoral thesis, Linköping University, (5.30)-(5.35), (7.61); for sway and yaw derived alike.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 
 from expdesign.errors import InputError
-from expdesign.estimation.regression import STEADY_CURRENT
+from expdesign.estimation.regression import DIFFERENCE, EAST, NORTH, PRODUCT, STEADY_CURRENT, Share, heading_of
 from expdesign.estimation.values import Estimate
-from expdesign.values import Array
+from expdesign.signals import Record
+from expdesign.values import Array, seal
 
 READINGS = (
     ("X_u", (("u: cos psi", -1.0), ("u: sin psi", -1.0))),
     ("Y_v", (("v: sin psi", 1.0), ("v: cos psi", -1.0))),
 )
 """Damping, then the nuisance parameters that are it times the current to north and to east, with their signs."""
+FIRST, SECOND = (NORTH, EAST), (DIFFERENCE, PRODUCT)
+FELT = ("u", "v")
+"""Equations whose air and water terms of second degree are told together."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Moments:
+    """Mean and second moments of a disturbance (N, E), over ground to north and to east.
+
+    Attributes:
+        of: "current", or the equation "u" or "v" whose quadratic terms felt current and wind together.
+        shares: parameters of the air, and those of the water that hold both, where felt together; () for a current.
+        mean: (2,) E N and E E [m/s].
+        second: (2,) E N^2 - E E^2 and E N E [m^2/s^2]; nan where nothing tells them.
+        central: (2,) the same about the mean: var N - var E and cov(N, E) [m^2/s^2].
+        covariance: (6, 6) of mean, second and central, to first order; intervals of 95 % from it held second moments
+            of a current in 82 to 93 of 100 simulated trials.
+    """
+
+    of: str
+    shares: tuple[tuple[str, str], ...]
+    mean: Array
+    second: Array
+    central: Array
+    covariance: Array
+
+    def __post_init__(self) -> None:
+        seal(self, mean="2", second="2", central="2", covariance="6 6")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MeasuredWind:
+    """Mean and covariance over samples of the measured wind, over ground to north and to east.
+
+    Attributes:
+        mean: (2,) [m/s].
+        covariance: (2, 2) [m^2/s^2], with the noise of the sensors.
+        samples: with wind, velocity and heading.
+    """
+
+    mean: Array
+    covariance: Array
+    samples: int
+
+    def __post_init__(self) -> None:
+        seal(self, mean="2", covariance="2 2")
+
+
+@dataclass(frozen=True, eq=False)
+class _Reading:
+    """Quantities (q,) and their derivatives (q, r) by the parameters and nuisance parameters."""
+
+    values: Array
+    slopes: Array
 
 
 def tells_current(estimate: Estimate) -> bool:
@@ -40,14 +109,66 @@ def mean_current(estimate: Estimate, *, heading_std_rad: float = 0.0) -> tuple[A
     Raises:
         InputError: the estimate has no disturbance parameters.
     """
+    found = _mean_current(estimate, heading_std_rad)
+    return found.values, found.slopes @ estimate.joint_covariance @ found.slopes.T
+
+
+def current_moments(estimate: Estimate, *, heading_std_rad: float = 0.0) -> Moments:
+    """Mean and second moments of the current; arguments and errors as in `mean_current`.
+
+    The second moments of a current that is estimated as steady are those of its mean, and not estimated.
+    """
+    columns = [
+        index for index, own in enumerate(estimate.nuisance_shares) if _of(own, SECOND) and not any(s.air for s in own)
+    ]
+    second = _read(estimate, columns, [estimate.nuisance_shares[index] for index in columns], SECOND)
+    return _moments(estimate, "current", (), _mean_current(estimate, heading_std_rad), second, heading_std_rad)
+
+
+def felt_moments(estimate: Estimate, *, heading_std_rad: float = 0.0) -> tuple[Moments, ...]:
+    """Of current and wind together, for each equation whose terms of the air fall together with those of the water."""
+    factor, found = np.exp(-0.5 * heading_std_rad**2), []
+    for equation in FELT:
+        columns, shares = _felt_columns(estimate, equation)
+        parts = [[n for n, own in enumerate(shares) if _of(own, moments)] for moments in (FIRST, SECOND)]
+        first, second = (
+            _read(estimate, [columns[n] for n in part], [shares[n] for n in part], moments)
+            for part, moments in zip(parts, (FIRST, SECOND), strict=True)
+        )
+        if first is None:
+            continue
+        held = {share.parameter for own in shares for share in own}
+        pairs = [(air, water) for air, water in estimate.partners.items() if water in held]
+        mean = _Reading(factor * first.values, factor * first.slopes)
+        found.append(_moments(estimate, equation, tuple(pairs), mean, second, heading_std_rad))
+    return tuple(found)
+
+
+def measured_wind(record: Record) -> MeasuredWind | None:
+    """The wind over ground, from relative wind, velocity and heading; None where no two samples have all three."""
+    rows = []
+    for batch in record.batches:
+        if batch.wind is None:
+            continue
+        heading, (u, v) = heading_of(batch), (batch.velocity[:, :2] - batch.wind).T
+        c, s = np.cos(heading), np.sin(heading)
+        rows.append(np.stack([u * c - v * s, u * s + v * c], axis=1))
+    wind = np.concatenate(rows) if rows else np.zeros((0, 2))
+    wind = wind[np.isfinite(wind).all(axis=1)]
+    if len(wind) < 2:
+        return None
+    return MeasuredWind(mean=wind.mean(axis=0), covariance=np.cov(wind.T), samples=len(wind))
+
+
+def _mean_current(estimate: Estimate, heading_std_rad: float) -> _Reading:
     names = (*estimate.names, *estimate.nuisance_names)
     if not tells_current(estimate):
         lacking = next(name for name in ("X_u", "u: cos psi", "u: sin psi") if name not in names)
         raise InputError(f"method {estimate.method!r} does not estimate the current: it has no {lacking!r}")
-    joint = np.concatenate([estimate.values, estimate.nuisance_values])
+    joint = _joint(estimate)
     if set(STEADY_CURRENT) <= set(names):
         places = [names.index(name) for name in STEADY_CURRENT]
-        return joint[places], estimate.joint_covariance[np.ix_(places, places)]
+        return _Reading(joint[places], np.eye(len(names))[places])
     factor = float(np.exp(-0.5 * heading_std_rad**2))
     readings, slopes = [], []
     for damping, columns in (reading for reading in READINGS if _needs(reading) <= set(names)):
@@ -59,8 +180,11 @@ def mean_current(estimate: Estimate, *, heading_std_rad: float = 0.0) -> tuple[A
             readings.append(slope[other] * joint[other])
             slope[place] = -readings[-1] / joint[place]
             slopes.append(slope)
-    J = np.array(slopes)
-    return _fused(np.array(readings), J @ estimate.joint_covariance @ J.T)
+    return _fused(np.array(readings), np.array(slopes), estimate.joint_covariance)
+
+
+def _joint(estimate: Estimate) -> Array:
+    return np.concatenate([estimate.values, estimate.nuisance_values])
 
 
 def _needs(reading: tuple[str, tuple[tuple[str, float], ...]]) -> set[str]:
@@ -68,17 +192,95 @@ def _needs(reading: tuple[str, tuple[tuple[str, float], ...]]) -> set[str]:
     return {damping, *(name for name, _ in columns)}
 
 
-def _fused(readings: Array, covariance: Array) -> tuple[Array, Array]:
-    """(2,) and (2, 2) from readings (2 m,) of north and east in turn, by generalised least squares."""
+def _of(shares: Sequence[Share], moments: Sequence[str]) -> bool:
+    return any(share.moment in moments for share in shares)
+
+
+def _felt_columns(estimate: Estimate, equation: str) -> tuple[list[int], list[tuple[Share, ...]]]:
+    """Nuisance parameters of an equation that one term of the air and its partner have to themselves.
+
+    Their shares are those of the air, with the partner's parameter, which holds the sum of both.
+    """
+    columns, shares = [], []
+    for index, (name, own) in enumerate(zip(estimate.nuisance_names, estimate.nuisance_shares, strict=False)):
+        air = {share.parameter for share in own if share.air}
+        if not name.startswith(f"{equation}: ") or len(air) != 1 or not air <= set(estimate.partners):
+            continue
+        partner = estimate.partners[air.pop()]
+        if any(share.parameter != partner for share in own if not share.air):
+            continue
+        columns.append(index)
+        shares.append(tuple(Share(partner, s.moment, s.factor, s.air) for s in own if s.air))
+    return columns, shares
+
+
+def _read(
+    estimate: Estimate, columns: Sequence[int], shares: Sequence[tuple[Share, ...]], moments: Sequence[str]
+) -> _Reading | None:
+    """Moments x from nuisance parameters that are M(theta) x, by generalised least squares; None where M lacks rank."""
+    if not columns:
+        return None
+    names, joint, P = estimate.names, _joint(estimate), estimate.joint_covariance
+    by, M = np.zeros((len(columns), len(moments), len(joint))), np.zeros((len(columns), len(moments)))
+    for row, own in enumerate(shares):
+        for share in own:
+            if share.moment not in moments:
+                continue
+            column = moments.index(share.moment)
+            M[row, column] += share.factor * estimate.value(share.parameter)
+            if share.parameter in names:
+                by[row, column, names.index(share.parameter)] += share.factor
+    places = len(names) + np.array(columns)
+    own_places = np.eye(len(joint))[places]
+    if np.linalg.matrix_rank(M) < len(moments):
+        return None
+    gain = np.linalg.pinv(M)
+    for _ in range(2):
+        slopes = own_places - np.einsum("cqr,q->cr", by, gain @ joint[places])
+        gain = _gain(M, slopes @ P @ slopes.T)
+    return _Reading(gain @ joint[places], gain @ slopes)
+
+
+def _moments(
+    estimate: Estimate,
+    of: str,
+    shares: tuple[tuple[str, str], ...],
+    mean: _Reading,
+    second: _Reading | None,
+    heading_std_rad: float,
+) -> Moments:
+    north, east = mean.values
+    products = np.array([north**2 - east**2, north * east])
+    by_mean = np.array([[2 * north, -2 * east], [east, north]]) @ mean.slopes
+    factor = float(np.exp(-2.0 * heading_std_rad**2))
+    values, slopes = np.full(2, np.nan), np.full_like(mean.slopes, np.nan)
+    if second is not None:
+        values, slopes = factor * second.values, factor * second.slopes
+    J = np.concatenate([mean.slopes, slopes, slopes - by_mean])
+    return Moments(
+        of=of,
+        shares=shares,
+        mean=mean.values,
+        second=values,
+        central=values - products,
+        covariance=J @ estimate.joint_covariance @ J.T,
+    )
+
+
+def _fused(readings: Array, slopes: Array, P: Array) -> _Reading:
+    """(2,) from readings (2 m,) of north and east in turn, by generalised least squares."""
     if len(readings) == 2:
-        return readings, covariance
-    H = np.tile(np.eye(2), (len(readings) // 2, 1))
+        return _Reading(readings, slopes)
+    gain = _gain(np.tile(np.eye(2), (len(readings) // 2, 1)), slopes @ P @ slopes.T)
+    return _Reading(gain @ readings, gain @ slopes)
+
+
+def _gain(H: Array, covariance: Array) -> Array:
+    """(q, c) of the generalised least squares of H (c, q) under noise (c, c); of plain ones without an inverse."""
     size = np.sqrt(np.diag(covariance))
     size = np.where(size > 0, size, size.max() or 1.0)
     weights = np.linalg.pinv(covariance / np.outer(size, size), rcond=1e-10, hermitian=True) / np.outer(size, size)
     information = H.T @ weights @ H
     if not np.linalg.cond(information) < 1e12:
-        return readings[:2], covariance[:2, :2]
-    fused = np.linalg.inv(information)
-    gain = fused @ H.T @ weights
-    return np.asarray(gain @ readings), np.asarray(gain @ covariance @ gain.T)
+        return np.asarray(np.linalg.pinv(H))
+    return np.asarray(np.linalg.solve(information, H.T @ weights))

@@ -336,6 +336,8 @@ def _estimate(
         held={name: full[name] for name in layout.model.names if name not in layout.parameters},
         nuisance_names=rows.regression.parameters[p:],
         nuisance_values=guessed + solution.values[p:],
+        nuisance_shares=tuple(item.shares for item in layout.nuisance),
+        partners=dict(layout.partners),
         joint_covariance=solution.covariance,
         residuals=residuals,
         null_space=solution.null_space,

@@ -9,6 +9,7 @@ import numpy as np
 
 from expdesign.errors import UnknownName
 from expdesign.estimation.feedback import Feedback
+from expdesign.estimation.regression import Share
 from expdesign.estimation.replay import Steered
 from expdesign.estimation.solve import NullSpace
 from expdesign.values import Array, seal
@@ -51,6 +52,8 @@ class Estimate:
         held: parameters not estimated, and the values they were given.
         nuisance_names: nuisance parameters.
         nuisance_values: (q,).
+        nuisance_shares: what each nuisance parameter is the sum of: parameters times moments of disturbances.
+        partners: parameters of the air that are in others' values because no wind was used, and the names of those.
         joint_covariance: (p + q, p + q) of parameters, then nuisance parameters.
         residuals: statistics.
         null_space: what the data cannot see, or see faintly.
@@ -67,6 +70,8 @@ class Estimate:
     held: Mapping[str, float]
     nuisance_names: tuple[str, ...]
     nuisance_values: Array
+    nuisance_shares: tuple[tuple[Share, ...], ...]
+    partners: Mapping[str, str]
     joint_covariance: Array
     residuals: Residuals
     null_space: NullSpace

@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from expdesign.export.files import (
         commands_csv,
         dictionary_json,
+        disturbance_table,
         durations_json,
         estimate_json,
         estimate_warnings,
@@ -46,6 +47,7 @@ __all__ = [
     "build_route",
     "commands_csv",
     "dictionary_json",
+    "disturbance_table",
     "durations_json",
     "estimate_json",
     "estimate_warnings",
@@ -79,6 +81,7 @@ if not TYPE_CHECKING:
                 "estimate_warnings",
                 "estimated_vessel",
                 "fit_entries",
+                "disturbance_table",
                 "fit_table",
                 "limit_entries",
                 "limit_table",

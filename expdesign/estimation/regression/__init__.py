@@ -1,7 +1,7 @@
 """Measured batches as a linear regression."""
 
 from expdesign.estimation.regression.current import STEADY_CURRENT, Guess, slopes
-from expdesign.estimation.regression.nuisance import batch_signs
+from expdesign.estimation.regression.nuisance import DIFFERENCE, EAST, NORTH, PRODUCT, Share, batch_signs
 from expdesign.estimation.regression.polynomial import Polynomial, SignalTable, lift, symbol
 from expdesign.estimation.regression.predictors import (
     CURRENT,
@@ -32,8 +32,12 @@ from expdesign.estimation.regression.zero_mean import MEANS, subtract_mean
 __all__ = [
     "AIR",
     "CURRENT",
+    "DIFFERENCE",
+    "EAST",
     "MEANS",
+    "NORTH",
     "PREDICTORS",
+    "PRODUCT",
     "STEADY_CURRENT",
     "VANE",
     "Guess",
@@ -42,6 +46,7 @@ __all__ = [
     "Polynomial",
     "Regression",
     "Rows",
+    "Share",
     "SignalTable",
     "Table",
     "batch_signs",

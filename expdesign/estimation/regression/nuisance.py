@@ -13,18 +13,46 @@ Source: F. Ljungberg, doctoral thesis, Linköping University, (4.44), (5.22), (5
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from expdesign.errors import InputError
 from expdesign.estimation.regression.polynomial import MOVING, Algebra, Polynomial, SignalTable, lift, symbol
+from expdesign.estimation.regression.tables import AIR
 from expdesign.vessel import VesselModel
 from expdesign.vessel.expressions import Expression
 
 FIRST = ("cos psi", "sin psi")
 SECOND = ("cos^2 psi", "sin 2psi")
+NORTH, EAST, DIFFERENCE, PRODUCT = "north", "east", "difference", "product"
+"""Moments of a disturbance (N, E) over ground: E N and E E [m/s], E N^2 - E E^2 and E N E [m^2/s^2]."""
+SHIFTS = {"u": ((NORTH, -1.0), (EAST, -1.0)), "v": ((EAST, -1.0), (NORTH, 1.0))}
+"""What -(N cos psi + E sin psi) and -(-N sin psi + E cos psi) leave with cos psi and with sin psi."""
+SQUARES = {
+    ("u", "u"): ((DIFFERENCE, 0.5), (PRODUCT, 0.5)),
+    ("u", "v"): ((PRODUCT, 2.0), (DIFFERENCE, -0.5)),
+    ("v", "v"): ((DIFFERENCE, -0.5), (PRODUCT, -0.5)),
+}
+"""What half the squares of the shifts, and their product, leave with cos^2 psi and with sin 2psi, beside constants."""
+
+
+@dataclass(frozen=True)
+class Share:
+    """What one term adds to a nuisance parameter: the term's parameter times a factor times a moment.
+
+    Attributes:
+        parameter: of the term.
+        moment: one of `NORTH`, `EAST`, `DIFFERENCE`, `PRODUCT`.
+        factor: the number.
+        air: whether the moment is the wind's, not the current's.
+    """
+
+    parameter: str
+    moment: str
+    factor: float
+    air: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,12 +64,14 @@ class Nuisance:
         factor: what multiplies the function of heading.
         heading: one of "cos psi", "sin psi", "cos^2 psi", "sin 2psi", or "" for none.
         algebra: gives values to the symbols in the factor.
+        shares: what its parameter is the sum of; () where it has no heading.
     """
 
     equation: str
     factor: Polynomial
     heading: str
     algebra: Algebra
+    shares: tuple[Share, ...] = ()
 
     @property
     def name(self) -> str:
@@ -76,11 +106,18 @@ def nuisance_regressors(
         if term.name not in terms:
             continue
         polynomial = symbolic(expression, algebra, wind_measured=wind_measured)
-        for factor, heading in _expansion(polynomial, term.name):
-            known = factor.substituted(_steady_signs(algebra, batches, signs)).normalised()
+        air = not wind_measured and bool(set(AIR) & set(expression.signals))
+        for factor, heading, moment in _expansion(polynomial, term.name):
+            whole = factor.substituted(_steady_signs(algebra, batches, signs))
+            known = whole.normalised()
             if known.constant and not heading:
                 continue  # a constant: zero-mean instruments do not see it
-            found.setdefault((term.equation, str(known), heading), Nuisance(term.equation, known, heading, algebra))
+            key = (term.equation, str(known), heading)
+            own = found.setdefault(key, Nuisance(term.equation, known, heading, algebra))
+            if moment is not None:
+                name, weight = moment
+                share = Share(term.name, name, weight * whole.leading, air)
+                found[key] = replace(own, shares=(*own.shares, share))
     return tuple(sorted(found.values(), key=lambda item: "uvr".index(item.equation)))
 
 
@@ -98,13 +135,25 @@ def batch_signs(regressors: Sequence[Nuisance], table: SignalTable) -> dict[str,
     return {name: _sign(item.algebra, name, table) for item in regressors for name in names & set(item.algebra.signs)}
 
 
-def _expansion(polynomial: Polynomial, name: str) -> list[tuple[Polynomial, str]]:
+def _expansion(polynomial: Polynomial, name: str) -> list[tuple[Polynomial, str, tuple[str, float] | None]]:
+    """Factor and function of heading of each regressor, and the moment, with its weight, that its parameter has."""
     first = {x: polynomial.derivative(x) for x in MOVING}
-    second = [first[x].derivative(y) for x, y in (("u", "u"), ("u", "v"), ("v", "v"))]
-    if any(item.signals & set(MOVING) for item in second):
+    second = {(x, y): first[x].derivative(y) for x, y in SQUARES}
+    if any(item.signals & set(MOVING) for item in second.values()):
         raise InputError(f"term {name} is of third order in the velocities; augmented predictors end at the second")
-    result = [(item, heading) for item in first.values() for heading in FIRST if item.terms]
-    return result + [(item, heading) for item in second for heading in (*SECOND, "") if item.terms]
+    shifts = [
+        (item, heading, moment)
+        for x, item in first.items()
+        for heading, moment in zip(FIRST, SHIFTS[x], strict=True)
+        if item.terms
+    ]
+    squares = [
+        (item, heading, moment)
+        for pair, item in second.items()
+        for heading, moment in zip((*SECOND, ""), (*SQUARES[pair], None), strict=True)
+        if item.terms
+    ]
+    return [*shifts, *squares]
 
 
 def _steady_signs(algebra: Algebra, batches: Sequence[SignalTable], seen: dict[str, set[float]]) -> Mapping[str, float]:

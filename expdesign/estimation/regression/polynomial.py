@@ -87,10 +87,14 @@ class Polynomial:
             total = total + Polynomial({left: value * factor})
         return total
 
+    @property
+    def leading(self) -> float:
+        """Its first coefficient."""
+        return self.terms[min(self.terms)]
+
     def normalised(self) -> Polynomial:
         """Scaled so that its first coefficient is one."""
-        first = min(self.terms)
-        return self * (1.0 / self.terms[first])
+        return self * (1.0 / self.leading)
 
     def evaluate(self, table: SignalTable, functions: Mapping[str, Callable[[SignalTable], Any]]) -> Any:
         """Its value for a table of signals, with functions for the symbols that are not signals."""

@@ -24,7 +24,7 @@ Source: F. Ljungberg, doctoral thesis, Linköping University, (5.63)-(5.76), (6.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -93,6 +93,7 @@ class Layout:
         parameters: names estimated.
         fixed: names held at the model's values.
         merged: names left out because no wind is used: their effect is in other terms' parameters, or nowhere.
+        partners: those of merged names whose effect is in another term's parameter, and the name of that.
         nuisance: further regressors.
         notes: one sentence for each thing that a reader of the estimate must know.
         quadrature: one of `QUADRATURES`.
@@ -105,6 +106,7 @@ class Layout:
     parameters: tuple[str, ...]
     fixed: tuple[str, ...]
     merged: tuple[str, ...]
+    partners: Mapping[str, str]
     nuisance: tuple[Nuisance, ...]
     notes: tuple[str, ...] = field(default=())
     quadrature: str = "euler"
@@ -211,7 +213,8 @@ def build_layout(
         nuisance = nuisance_regressors(model, disturbed, tables, wind_measured=chosen.wind)
         if not nuisance:
             raise InputError(f"predictor {predictor!r} needs terms of the velocity through the air, the model has none")
-    notes = tuple(_merged_note(model, name) for name in merged)
+    partners = {name: partner for name in merged if (partner := _partner(model, name)) is not None}
+    notes = tuple(_merged_note(name, partners) for name in merged)
     guess = Guess(to_mps=np.zeros(2), parameters=model.parameters) if chosen.steady else None
     return Layout(
         model=model,
@@ -219,6 +222,7 @@ def build_layout(
         parameters=parameters,
         fixed=tuple(fixed),
         merged=merged,
+        partners=partners,
         nuisance=nuisance,
         notes=notes,
         quadrature=quadrature,
@@ -308,13 +312,19 @@ def _checked_table(model: VesselModel, batch: Batch, predictor: Predictor) -> Ta
     return table
 
 
-def _merged_note(model: VesselModel, name: str) -> str:
+def _partner(model: VesselModel, name: str) -> str | None:
+    """The term of the water that a term of the air falls together with where the wind is not measured."""
     algebra, index = Algebra(), model.names.index(name)
     own = symbolic(model.expressions[index], algebra, wind_measured=False)
     for term, expression in zip(model.terms, model.expressions, strict=True):
         same = term.equation == model.terms[index].equation and not set(AIR) & set(expression.signals)
         if same and str(symbolic(expression, algebra, wind_measured=False)) == str(own):
-            return (
-                f"This method uses no wind: {term.name} is the sum of {term.name} and {name}, and {name} is set to 0."
-            )
+            return term.name
+    return None
+
+
+def _merged_note(name: str, partners: Mapping[str, str]) -> str:
+    if name in partners:
+        partner = partners[name]
+        return f"This method uses no wind: {partner} is the sum of {partner} and {name}, and {name} is set to 0."
     return f"This method uses no wind: {name} is set to 0."

@@ -11,7 +11,7 @@ from expdesign.export import words
 from expdesign.export.estimate_page.advice import advice, conditions, summary
 from expdesign.export.estimate_page.content import EstimateContent
 from expdesign.export.estimate_page.figures import autocorrelation_figure, interval_figure, residual_figure, run_figure
-from expdesign.export.files import fit_table, motion_words, plus_minus
+from expdesign.export.files import disturbance_table, fit_table, motion_words, plus_minus
 from expdesign.export.pages import page_templates
 from expdesign.export.pages.figures import report_style
 from expdesign.export.tuning import TUNING
@@ -40,7 +40,6 @@ class MethodNotes:
     title: str
     how: str
     chosen: bool
-    current: str
     explained: str
     correlation: str
     warnings: tuple[str, ...]
@@ -59,6 +58,7 @@ def estimate_html(content: EstimateContent, *, progress: Progress = silent) -> s
         parameters=parameter_rows(content),
         fits=fit_table(found),
         motion=motion_words(found),
+        disturbances=disturbance_table(found),
         limits=limit_rows(found),
         why=[sentence(limits, run) for limits, run in zip(found.limits, found.best.runs, strict=True)],
         ahead_s=ASSESSMENT_TUNING.ahead_s,
@@ -164,21 +164,10 @@ def _notes(content: EstimateContent, item: Assessed) -> MethodNotes:
         title=item.method.title,
         how=how,
         chosen=item is content.found.best,
-        current=_current(item),
         explained=_listed(found.outputs, found.explained.tolist(), 3),
         correlation=_listed(found.outputs, found.autocorrelation[1].tolist(), 2),
         warnings=(*estimate.warnings, *diverged),
     )
-
-
-def _current(item: Assessed) -> str:
-    if item.current is None:
-        return ""
-    north, east = (
-        plus_minus(float(value), float(std)).replace("-", words.MINUS)
-        for value, std in zip(item.current.to_mps, item.current.std_mps, strict=True)
-    )
-    return f"Mean current, estimated from the nuisance parameters: {north} m/s to north, {east} m/s to east."
 
 
 def _listed(outputs: tuple[str, ...], values: list[float], decimals: int) -> str:

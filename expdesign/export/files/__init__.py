@@ -7,6 +7,7 @@ from expdesign.lazy import load_on_use
 if TYPE_CHECKING:
     from expdesign.export.files.design_files import dictionary_json, durations_json
     from expdesign.export.files.dictionary_file import dictionary_files, growth_json
+    from expdesign.export.files.disturbances import disturbance_entries, disturbance_table
     from expdesign.export.files.estimate_tables import (
         breach_sentences,
         estimate_warnings,
@@ -39,6 +40,8 @@ __all__ = [
     "commands_csv",
     "dictionary_files",
     "dictionary_json",
+    "disturbance_entries",
+    "disturbance_table",
     "durations_json",
     "estimate_json",
     "estimate_warnings",
@@ -71,6 +74,7 @@ if not TYPE_CHECKING:
         {
             "design_files": ("dictionary_json", "durations_json"),
             "dictionary_file": ("dictionary_files", "growth_json"),
+            "disturbances": ("disturbance_entries", "disturbance_table"),
             "estimate_tables": (
                 "breach_sentences",
                 "estimate_warnings",

@@ -10,6 +10,7 @@ from expdesign.assessment import Assessed, Assessment, RunCheck, sentence
 from expdesign.assessment.runs import ESTIMATION, TEST
 from expdesign.estimation.excitation import Breach
 from expdesign.estimation.solve import Direction
+from expdesign.export.files.disturbances import disturbance_entries
 from expdesign.export.files.estimate_tables import estimate_warnings, motion_words
 from expdesign.export.files.text import finite, named_finite, strict_json
 from expdesign.export.files.vessel_file import vessel_toml
@@ -35,6 +36,7 @@ def _method_entry(found: Assessment, item: Assessed, vessel: Vessel) -> dict[str
             estimate.joint_covariance.diagonal()[-q:] ** 0.5 if q else estimate.nuisance_values,
         ),
         "current_to": _current(item),
+        "disturbances": disturbance_entries(item),
         "form": model.form,
         "parameters_of": found.motion,
         "sample_time_s": found.record.batches[0].sample_time_s,
@@ -144,9 +146,10 @@ def _instruments(found: Assessment, item: Assessed) -> dict[str, Any] | None:
 
 
 def _current(item: Assessed) -> dict[str, Any] | None:
-    if item.current is None:
+    current = item.disturbances.current
+    if current is None:
         return None
-    return _valued(("north_mps", "east_mps"), item.current.to_mps, item.current.std_mps)
+    return _valued(("north_mps", "east_mps"), current.mean, current.covariance.diagonal()[:2] ** 0.5)
 
 
 def _data(found: Assessment) -> dict[str, Any]:

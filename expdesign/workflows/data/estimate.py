@@ -9,6 +9,7 @@ from expdesign import __version__
 from expdesign.assessment import NO_TESTS, Assessment, EstimateOptions, assess
 from expdesign.errors import InputError
 from expdesign.export import (
+    disturbance_table,
     estimate_json,
     estimate_warnings,
     estimated_vessel,
@@ -142,6 +143,9 @@ def _estimate_tables(found: Assessment) -> tuple[TextTable, ...]:
         ("Fit of the simulated output to the measured one, in per cent", fit_table(found)),
         (f"Causes of misfit of {found.best.method.name}", limit_table(found)),
     ]
+    disturbances = disturbance_table(found)
+    if disturbances[1]:
+        tables.append(("Current and wind, with standard deviations", disturbances))
     if any(batch.steered is not None for batch in found.record.batches):
         tables.append(("Samples used", _used_samples(found)))
     return tuple(TextTable(title=title, header=header, rows=tuple(rows)) for title, (header, rows) in tables)
