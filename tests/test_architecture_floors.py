@@ -25,7 +25,7 @@ FLOORS = {
         ("information", "diagnosis", "assessment"),
         ("durations",),
         ("growing", "rehearsal", "plan"),
-        ("shortest_day",),
+        ("shortest_day", "foresight"),
         ("scenario", "export"),
         ("workflows",),
         ("cli", "__main__"),

@@ -21,6 +21,31 @@ from expdesign.cli.options import (
 )
 
 
+@command("foresee")
+def foresee(
+    scenario: ScenarioFile,
+    plan: Annotated[
+        Path | None,
+        typer.Option(
+            "--plan",
+            metavar="PLAN.json",
+            help="A plan made before, whose whole track is diagnosed. Default: the runs of the design alone.",
+        ),
+    ] = None,
+    out: Out = None,
+    jobs: Jobs = 0,
+    no_cache: NoCache = False,
+    seed: Seed = 0,
+) -> Asked:
+    """Foresee what a diagnosis of the trial would find: the power of its test of every cause, before sailing.
+
+    Writes foresee.json. The causes: expdesign explain causes
+
+    Example: expdesign foresee scenarios/helsinki.toml
+    """
+    return ask("foresee", scenario, out, plan=plan, jobs=jobs, cache=not no_cache, seed=seed)
+
+
 @command("simulate")
 def simulate(
     plan: PlanFile,

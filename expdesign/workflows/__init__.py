@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from expdesign.workflows.steps.measured import measured
     from expdesign.workflows.steps.planned import plan_problem, planned
     from expdesign.workflows.steps.scored import scored
+    from expdesign.workflows.trials.foresee import foresee
     from expdesign.workflows.trials.replan import replan
     from expdesign.workflows.trials.simulate import simulate
     from expdesign.workflows.trials.validate import validate_design
@@ -42,6 +43,7 @@ __all__ = [
     "estimate",
     "explain",
     "export",
+    "foresee",
     "indices",
     "measured",
     "mine",
@@ -78,6 +80,7 @@ if not TYPE_CHECKING:
             "steps.measured": ("measured",),
             "steps.planned": ("plan_problem", "planned"),
             "steps.scored": ("scored",),
+            "trials.foresee": ("foresee",),
             "trials.replan": ("replan",),
             "trials.simulate": ("simulate",),
             "trials.validate": ("validate_design",),

@@ -1,0 +1,128 @@
+"""Power, confusions and added runs as JSON and as rows for people."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from expdesign.export import words
+from expdesign.export.files import finite, strict_json
+from expdesign.foresight import AddedRuns, Foreseen, Foresight
+
+NONE = "\N{EN DASH}"
+HEADER = (
+    "cause",
+    "least visible as",
+    "a size that matters",
+    "because of",
+    "power",
+    "named",
+    "90 % from",
+    "not told from",
+)
+"""Columns of the table for people."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ForesightContent:
+    """The values that page and file show.
+
+    Attributes:
+        scenario: its name.
+        vessel: its name.
+        source: the trial, in words.
+        found: what is foreseen.
+        command, version: to reproduce it.
+    """
+
+    scenario: str
+    vessel: str
+    source: str
+    found: Foresight
+    command: str
+    version: str
+
+
+def foresight_rows(found: Foresight) -> tuple[tuple[str, ...], ...]:
+    """One row for the least visible effect of every cause, in the order of `HEADER`."""
+    return tuple(effect_row(item) for item in found.weakest)
+
+
+def effect_row(item: Foreseen) -> tuple[str, ...]:
+    """One effect, in the order of `HEADER`."""
+    others = ", ".join(other.cause for other in item.mistaken_for[:2])
+    more = len(item.mistaken_for) - 2
+    return (
+        item.cause,
+        item.name,
+        sized(item, item.change),
+        item.rule,
+        words.percent(item.power) if item.sized else NONE,
+        words.percent(item.named) if item.sized else NONE,
+        sized(item, item.least_change),
+        (others + (f" and {more} more" if more > 0 else "")) if item.power >= 0.5 and others else NONE,
+    )
+
+
+def sized(item: Foreseen, change: float) -> str:
+    """A size with its unit; factors as per cent."""
+    if not math.isfinite(change):
+        return NONE
+    if item.unit == "" and ("factor" in item.name or "growth" in item.name):
+        return f"{words.significant(100 * abs(change), 2)} %"
+    if item.unit == "rad":
+        return f"{words.significant(math.degrees(abs(change)), 2)} deg"
+    return f"{words.significant(abs(change), 2)} {item.unit}".rstrip()
+
+
+def foresight_json(content: ForesightContent) -> str:
+    """`foresee.json`."""
+    found = content.found
+    return strict_json(
+        {
+            "scenario": content.scenario,
+            "vessel": content.vessel,
+            "trial": content.source,
+            "duration_s": found.duration_s,
+            "wanted_power": found.wanted_power,
+            "random_current_mps": found.random_current_mps,
+            "effects": [effect_entry(item) for item in found.effects],
+            "missed": list(found.missed),
+            "not_told_apart": [
+                {"cause": item.cause, "effect": item.name, "from": other.cause, "cosine": other.cosine,
+                 "noncentrality_left": other.noncentrality, "told_apart": other.told_apart}
+                for item, other in found.not_told_apart
+            ],
+            "together": _added(found.together),
+            "beyond_the_dictionary": [{"cause": item.cause, "effect": item.name, "best_power": item.best_power}
+                                      for item in found.beyond],
+            "not_seen": [{"cause": cause, "why": why} for cause, why in found.unseen],
+        }
+    )  # fmt: skip
+
+
+def effect_entry(item: Foreseen) -> dict[str, object]:
+    """One effect."""
+    return {
+        "cause": item.cause,
+        "effect": item.name,
+        "size": finite(item.change),
+        "unit": item.unit,
+        "rule": item.rule,
+        "noncentrality": finite(item.noncentrality),
+        "freedom": item.freedom,
+        "level": item.level,
+        "power": finite(item.power),
+        "named": finite(item.named),
+        "size_for_wanted_power": finite(item.least_change),
+        "mistaken_for": [
+            {"cause": other.cause, "cosine": other.cosine, "told_apart": other.told_apart}
+            for other in item.mistaken_for
+        ],
+        "added_runs": _added(item.added),
+        "best_power": finite(item.best_power),
+    }
+
+
+def _added(runs: AddedRuns | None) -> dict[str, object] | None:
+    return None if runs is None else {"runs": dict(runs.runs), "time_s": runs.time_s}

@@ -1,0 +1,64 @@
+"""What a diagnosis of a trial would find, before it is sailed.
+
+    found = foresee(vessel, design_runs(primitives, repeats), weather, seed=0)
+    found.effects[0].power
+
+The trial is simulated with nothing hidden, and a diagnosis of it is begun: its fit, its noise, its candidates and the
+number of its tests. The sensitivity of the simulated outputs to every cause of the catalogue, beside uncertain
+parameters, initial states and a wandering current, gives the noncentrality of the cause's test at a size that matters.
+Power follows from the noncentral chi-squared distribution, at the level that a diagnosis accepts a cause at.
+
+A size matters where it changes the advance, the tactical diameter or a first overshoot of the vessel's own standard
+trials by 5 % (overshoots by half a degree or more), or costs 5 points of fit in simulating them, whichever is less.
+Parameters and effects with a stated standard deviation matter from three of these on. Where standard trials show
+nothing of an effect, a default counts (`sizes.default_sizes`).
+
+Probabilities are to first order in the size, with the nominal model as the true ship.
+
+Sources: A. Wald (1943) for the noncentral distribution; C. R. Rao (1948) for score tests.
+"""
+
+from expdesign.foresight.effects import Direction, HiddenEffect
+from expdesign.foresight.foresee import Background, background, foresee
+from expdesign.foresight.power import level_of, needed_noncentrality, power
+from expdesign.foresight.sizes import (
+    Size,
+    StandardTrials,
+    default_sizes,
+    sizes_that_matter,
+    standard_trials,
+    with_effect,
+)
+from expdesign.foresight.trial import TrialRun, design_runs, run_of, simulated_record, weather_without_causes
+from expdesign.foresight.tuning import TUNING
+from expdesign.foresight.values import AddedRuns, Confusion, Foreseen, Foresight
+
+TOLD_APART = TUNING.told_apart
+"""Probability below which two causes count as not told apart."""
+
+__all__ = [
+    "TOLD_APART",
+    "AddedRuns",
+    "Background",
+    "Confusion",
+    "Direction",
+    "Foreseen",
+    "Foresight",
+    "HiddenEffect",
+    "Size",
+    "StandardTrials",
+    "TrialRun",
+    "background",
+    "default_sizes",
+    "design_runs",
+    "foresee",
+    "level_of",
+    "needed_noncentrality",
+    "power",
+    "run_of",
+    "simulated_record",
+    "sizes_that_matter",
+    "standard_trials",
+    "weather_without_causes",
+    "with_effect",
+]

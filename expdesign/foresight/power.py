@@ -1,0 +1,149 @@
+"""Probabilities that a test of the diagnosis finds an effect, and that it comes before other causes.
+
+A score test and a likelihood ratio test of k numbers are, with an effect of size delta, noncentral chi-squared with
+noncentrality delta' (I_cc - I_cp I_pp^-1 I_pc) delta, where p are the nuisance parameters with their prior.
+
+Source: A. Wald, Transactions of the American Mathematical Society 54 (1943), 426-482.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from expdesign.diagnosis.causes import Candidate
+from expdesign.diagnosis.select import SELECTION_TUNING, ScoreTest
+from expdesign.foresight.tuning import TUNING
+from expdesign.values import Array
+
+SHAPES = ("roll:period", "roll:damping")
+"""Fixed effects of a candidate that its fit estimates too."""
+
+
+def level_of(multiplicity: float) -> float:
+    """Largest p-value of one candidate's test that a diagnosis accepts, its many tests counted."""
+    return SELECTION_TUNING.accepted_p_value / max(multiplicity, 1.0)
+
+
+def power(noncentrality: Array | float, freedom: int, level: float) -> Array:
+    """Probability that a chi-squared test rejects; the level where nothing is hidden.
+
+    Args:
+        noncentrality: of the statistic.
+        freedom: numbers tested at once.
+        level: of the test.
+    """
+    limit = float(scipy.stats.chi2.isf(level, freedom))
+    hidden = np.maximum(np.asarray(noncentrality, dtype=float), 0.0)
+    found = scipy.stats.ncx2.sf(limit, freedom, np.maximum(hidden, 1e-12))
+    return np.where(hidden > 0.0, np.clip(np.nan_to_num(found, nan=1.0), level, 1.0), level)
+
+
+def needed_noncentrality(wanted: float, freedom: int, level: float) -> float:
+    """The least noncentrality of a test with a power."""
+    if wanted <= level:
+        return 0.0
+    limit = float(scipy.stats.chi2.isf(level, freedom))
+    high = 4.0 * limit + 50.0
+    return float(scipy.optimize.brentq(lambda value: float(power(value, freedom, level)) - wanted, 0.0, high))
+
+
+def freedom_of(candidate: Candidate) -> int:
+    """Numbers of the likelihood ratio test that a cause is accepted by."""
+    return max(1, len(_estimated(candidate)))
+
+
+def price_of(candidate: Candidate) -> float:
+    """What the numbers of a candidate cost where causes are ranked."""
+    return SELECTION_TUNING.price * (len(_estimated(candidate)) + (candidate.grid is not None))
+
+
+def _estimated(candidate: Candidate) -> list[str]:
+    searched = None if candidate.grid is None else candidate.grid[0]
+    keys = [*candidate.free, *(key for key in SHAPES if key in candidate.fixed)]
+    return [key for key in keys if key != searched]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Rivals:
+    """All candidates of a catalogue, and how their scores scatter where nothing is hidden.
+
+    Attributes:
+        tests: tested candidates.
+        rows: per candidate, its rows of the information.
+        whitening: (m, w) of scores to independent numbers, those of each candidate side by side; parts: (t,) their
+            beginnings.
+        noise: (n, m) drawn scores; white: (n, w) the same whitened.
+    """
+
+    tests: tuple[ScoreTest, ...]
+    rows: tuple[Array, ...]
+    whitening: Array
+    parts: NDArray[np.int64]
+    noise: Array
+    white: Array
+
+    @property
+    def causes(self) -> tuple[str, ...]:
+        """Of the candidates."""
+        return tuple(test.candidate.cause for test in self.tests)
+
+
+def rivals_of(tests: Sequence[ScoreTest], rows: Sequence[Array], A: Array, rng: np.random.Generator) -> Rivals:
+    """Draw scores of all candidates, and of other effects with them.
+
+    Args:
+        tests: of t candidates.
+        rows: their rows in `A`.
+        A: (m, m) information beside nuisance, of effects that are no candidates too.
+        rng: of the draws.
+    """
+    size = np.sqrt(np.maximum(np.diag(A), 1e-300))
+    blocks, parts, columns = [], [], 0
+    for index in rows:
+        values, vectors = np.linalg.eigh(A[np.ix_(index, index)] / np.outer(size[index], size[index]))
+        root = vectors / np.sqrt(np.maximum(values, 1e-12)) / size[index][:, None]
+        blocks.append((index, root))
+        parts.append(columns)
+        columns += len(index)
+    whitening = np.zeros((len(A), columns))
+    for (index, root), start in zip(blocks, parts, strict=True):
+        whitening[index, start : start + root.shape[1]] = root
+    values, vectors = np.linalg.eigh((A + A.T) / 2.0 / np.outer(size, size))
+    spread = (vectors * np.sqrt(np.maximum(values, 0.0))).T * size
+    drawn = rng.standard_normal((TUNING.draws, len(A))) @ spread
+    return Rivals(
+        tests=tuple(tests),
+        rows=tuple(rows),
+        whitening=whitening,
+        parts=np.array(parts),
+        noise=drawn,
+        white=drawn @ whitening,
+    )
+
+
+def gains(rivals: Rivals, shift: Array) -> Array:
+    """(n, t) likelihood gain of every candidate in every draw, with an effect hidden.
+
+    Args:
+        rivals: all candidates.
+        shift: (m,) expected scores by the hidden effect: its column of the information.
+    """
+    squares = (rivals.white + shift @ rivals.whitening) ** 2
+    return np.asarray(np.add.reduceat(squares, rivals.parts, axis=1))
+
+
+def imitation(rivals: Rivals, shift: Array, own: float) -> Array:
+    """(t,) cosine between the hidden effect and the best of each candidate, beside nuisance.
+
+    Args:
+        rivals: all candidates.
+        shift: (m,) as in `gains`.
+        own: noncentrality of the hidden effect.
+    """
+    explained = np.add.reduceat((shift @ rivals.whitening) ** 2, rivals.parts)
+    return np.asarray(np.sqrt(np.clip(explained / max(own, 1e-300), 0.0, 1.0)))

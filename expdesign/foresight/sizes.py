@@ -1,0 +1,263 @@
+"""Sizes at which effects matter: what they change in the vessel's own standard trials."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from expdesign.conventions import OUTPUTS
+from expdesign.diagnosis.accuracy import squared_sums
+from expdesign.diagnosis.data import cut_windows
+from expdesign.diagnosis.model import ROLL, ExtendedModel
+from expdesign.diagnosis.motion import LinearisedMotion, linearise, responses, simulate_from_measured
+from expdesign.diagnosis.vessel_file import extend, extended_model
+from expdesign.errors import InputError, NoAnswer
+from expdesign.foresight.effects import Direction, disturbance_at
+from expdesign.foresight.trial import exact_record
+from expdesign.foresight.tuning import TUNING
+from expdesign.indices import outcomes
+from expdesign.memory import in_order
+from expdesign.progress import Progress, silent
+from expdesign.simulation import Conduct, Environment, simulate, steady_ahead, stopping, turning_circle, zigzag
+from expdesign.values import Array
+from expdesign.vessel import Vessel
+
+OUTCOMES = ("advance_m", "tactical_diameter_m", "overshoot_10_10_rad", "overshoot_20_20_rad")
+"""Of the standard trials, whose change matters."""
+WORDS = dict(zip(OUTCOMES, ("advance", "tactical diameter", "10/10 overshoot", "20/20 overshoot"), strict=True))
+ZIGZAGS = (math.radians(10.0), math.radians(20.0))
+SENSORS = ("heading_bias", "lever", "gyro", "late")
+"""Kinds of effects that change no motion."""
+WEATHER = ("current", "wind")
+"""Kinds of effects that standard trials, in calm water, do not have."""
+NEGLIGIBLE = 1e-6
+"""Loss of fit [points] that counts as none."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Size:
+    """A size that matters.
+
+    Attributes:
+        value: in the unit of the effect; nan where no size is known.
+        rule: why, in words.
+    """
+
+    value: float
+    rule: str
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StandardTrials:
+    """Turning circle, zig-zags and stop of the vessel in use, without noise.
+
+    Attributes:
+        vessel: the ship.
+        speed_mps: approach speed.
+        ship: its extended model; linear: its motion in them, in the mean wind of the trial.
+        deviation: (n,) sum of squares of each output about its means.
+        outcomes: of `OUTCOMES`.
+    """
+
+    vessel: Vessel
+    speed_mps: float
+    ship: ExtendedModel
+    linear: LinearisedMotion
+    deviation: Array
+    outcomes: Mapping[str, float]
+
+
+def standard_trials(vessel: Vessel, weather: Environment) -> StandardTrials | None:
+    """The standard trials of a vessel; None where it cannot sail them."""
+    try:
+        speed = float(steady_ahead(vessel).velocity[0])
+        conduct = Conduct(speed_mps=speed)
+        orders = {
+            "turning circle": turning_circle(vessel, conduct=conduct),
+            **{
+                f"zig-zag {math.degrees(angle):.0f}": zigzag(vessel, heading_rad=angle, helm_rad=angle, conduct=conduct)
+                for angle in ZIGZAGS
+            },
+            "stop": stopping(vessel, conduct=conduct),
+        }
+        known = outcomes(vessel, speed_mps=speed, names=OUTCOMES)
+        wind = Environment(wind_to=weather.wind_to)
+        runs = [
+            (name, commands, simulate(vessel, commands, velocity=motion.velocity[0], environment=wind))
+            for name, (commands, motion) in orders.items()
+        ]
+    except (InputError, NoAnswer):
+        return None
+    record = exact_record(runs, weather.wind_to)
+    ship = extended_model(vessel, record)
+    windows = cut_windows(ship.model, record)
+    motion = simulate_from_measured(ship, windows)
+    if motion.diverged:
+        return None
+    columns = [OUTPUTS.index(name) for name in ship.model.outputs]
+    measured = windows.measured[..., columns]
+    return StandardTrials(
+        vessel=vessel,
+        speed_mps=speed,
+        ship=ship,
+        linear=linearise(motion),
+        deviation=squared_sums(np.zeros_like(measured), measured)[1].sum(axis=0),
+        outcomes=known,
+    )
+
+
+def sizes_that_matter(
+    directions: Sequence[Direction],
+    trials: StandardTrials | None,
+    stated_std: Mapping[str, float],
+    defaults: Mapping[str, float],
+    progress: Progress = silent,
+) -> tuple[Size, ...]:
+    """The smallest size of each effect that costs points of fit or changes an outcome of the standard trials.
+
+    Args:
+        directions: effects.
+        trials: standard trials; None where there are none, so that defaults count.
+        stated_std: standard deviations of effects in the vessel file; what is within them is no cause.
+        defaults: size by kind of effect, where the rule gives none.
+        progress: of the simulations.
+    """
+    found = [_by_fit(item, trials, _default(item, defaults)) for item in directions]
+    found = [_beyond_std(item, size, stated_std) for item, size in zip(directions, found, strict=True)]
+    if trials is not None:
+        asked = [
+            (item, size.value)
+            for item, size in zip(directions, found, strict=True)
+            if np.isfinite(size.value)
+            and size.value > _least(item, stated_std)
+            and item.key.split(":")[0] not in (*SENSORS, *WEATHER)
+        ]
+        changes = in_order(outcome_changes, (trials.vessel, trials.speed_mps, trials.ship), asked)
+        changed = {}
+        for number, (item, _) in enumerate(asked):
+            progress("sizes that matter", number / len(asked))
+            changed[id(item)] = next(changes)
+        found = [
+            _smaller(size, changed.get(id(item), {}), trials) for item, size in zip(directions, found, strict=True)
+        ]
+    return tuple(_beyond_std(item, size, stated_std) for item, size in zip(directions, found, strict=True))
+
+
+def _default(item: Direction, defaults: Mapping[str, float]) -> float:
+    return defaults.get(item.key, defaults.get(item.key.split(":")[0], math.nan))
+
+
+def _by_fit(item: Direction, trials: StandardTrials | None, default: float) -> Size:
+    """The size that costs `Tuning.fit_points` in the standard trials, else the default."""
+    usual = Size(value=default, rule="default" if math.isfinite(default) else "no size is known")
+    if trials is None:
+        return usual
+    there = _in_standard_trials(item)
+    size = default if math.isfinite(default) else 1.0
+    for _ in range(TUNING.size_rounds if item.finite else 1):
+        lost = fit_loss(trials, there, size)
+        if not lost > NEGLIGIBLE:
+            return usual
+        size *= TUNING.fit_points / lost
+    if math.isfinite(default) and not 1.0 / TUNING.size_reach < size / default < TUNING.size_reach:
+        return usual
+    return Size(value=size, rule=f"{TUNING.fit_points:g} points of fit")
+
+
+def _in_standard_trials(item: Direction) -> Direction:
+    """Changes of the ship act from the beginning there."""
+    fixed = {key: 0.0 if key == "change:time" else value for key, value in item.fixed.items()}
+    return Direction(shares=item.shares, fixed=fixed, finite=item.finite)
+
+
+def fit_loss(trials: StandardTrials, item: Direction, size: float) -> float:
+    """Loss of simulated fit [points], mean over the outputs, by an effect of some size, to first order."""
+    answer = responses(trials.linear, [disturbance_at(trials.linear, item, size)])[0]
+    columns = [OUTPUTS.index(name) for name in trials.ship.model.outputs]
+    lost = (answer[..., columns] ** 2 * np.isfinite(trials.linear.motion.windows.measured[..., columns])).sum(
+        axis=(0, 1)
+    )
+    return float(np.mean(100.0 * np.sqrt(lost / np.maximum(trials.deviation, 1e-300))))
+
+
+def outcome_changes(
+    vessel: Vessel, speed_mps: float, ship: ExtendedModel, item: Direction, size: float
+) -> dict[str, float]:
+    """Outcome -> value with an effect of some size; empty where the ship cannot sail the trials with it."""
+    if any(key in ROLL for key in (*item.shares, *item.fixed)):
+        return {}
+    try:
+        changed = with_effect(vessel, ship, _in_standard_trials(item), size)
+        return outcomes(changed, speed_mps=speed_mps, names=OUTCOMES)
+    except (InputError, NoAnswer):
+        return {}
+
+
+def with_effect(vessel: Vessel, ship: ExtendedModel, item: Direction, size: float) -> Vessel:
+    """The vessel with an effect of some size; one that is changed during a trial as it is after the change.
+
+    Args:
+        vessel: the model in use.
+        ship: its extended model for the records of a trial.
+        item: the effect.
+        size: of it.
+    """
+    present = {key: ship.get(key) + value if key in item.shares else value for key, value in item.at(size).items()}
+    return extend(vessel, ship.with_effects(present), {})[0]
+
+
+def _smaller(size: Size, changed: Mapping[str, float], trials: StandardTrials) -> Size:
+    """The size in proportion at which the outcome that changes most changes by as much as matters, where smaller."""
+    most, which = 1.0, ""
+    for name, value in changed.items():
+        known = trials.outcomes[name]
+        matters = TUNING.outcome_share * abs(known)
+        if name.endswith("_rad"):
+            matters = max(matters, TUNING.least_angle_rad)
+        ratio = abs(value - known) / matters
+        most, which = (ratio, name) if ratio > most else (most, which)
+    if not which:
+        return size
+    return Size(value=size.value / most, rule=f"{100 * TUNING.outcome_share:g} % of the {WORDS[which]}")
+
+
+def _beyond_std(item: Direction, size: Size, stated_std: Mapping[str, float]) -> Size:
+    """No less than what the vessel file expects."""
+    least = _least(item, stated_std)
+    if not least > 0.0 or size.value >= least:
+        return size
+    return Size(value=least, rule=f"{TUNING.beyond_std:g} stated standard deviations")
+
+
+def _least(item: Direction, stated_std: Mapping[str, float]) -> float:
+    return TUNING.beyond_std * max(stated_std.get(key, 0.0) / abs(share) for key, share in item.shares.items())
+
+
+def default_sizes(length_m: float, speed_mps: float) -> dict[str, float]:
+    """Kind of effect -> size where the standard trials give none; times and speeds go with the ship's own.
+
+    Args:
+        length_m: of the ship [m].
+        speed_mps: at which it sails [m/s].
+    """
+    time_s = length_m / max(speed_mps, 1e-6)
+    return {
+        "current": 0.05 * speed_mps,
+        "wind": 3.0,
+        "gain": 0.1,
+        "inertia": 0.1,
+        "asymmetry": 0.02 * length_m,
+        "offset": math.radians(2.0),
+        "scale": 0.1,
+        "lag": 0.1 * time_s,
+        "delay": 0.1 * time_s,
+        "heading_bias": math.radians(2.0),
+        "lever": 0.1 * length_m,
+        "gyro": 0.05,
+        "late": 0.05 * time_s,
+        "shallow": 0.5,
+        "change": 0.2,
+    }

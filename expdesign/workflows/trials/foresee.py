@@ -1,0 +1,103 @@
+"""`expdesign foresee`: what a diagnosis of a planned trial would find, before it is sailed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from expdesign import __version__
+from expdesign.errors import FileError
+from expdesign.export.foresight_page import ForesightContent, foresight_json, foresight_rows
+from expdesign.export.foresight_page.content import HEADER
+from expdesign.export.routes import read_plan
+from expdesign.foresight import Foresight, TrialRun, design_runs
+from expdesign.foresight import foresee as foresee_trial
+from expdesign.memory import remembering, user_memory
+from expdesign.progress import Progress, silent, within
+from expdesign.scenario import Scenario
+from expdesign.simulation import Environment
+from expdesign.workflows.command_text import command_text
+from expdesign.workflows.outcome import Outcome, TextTable
+from expdesign.workflows.steps.case import loaded, written
+from expdesign.workflows.steps.design_problem import designed
+from expdesign.workflows.steps.grown import ready
+from expdesign.workflows.steps.workers import workers
+
+OF_DESIGN = "the runs of the design, without the legs between them"
+OF_PLAN = "the planned trial, its legs counted"
+
+
+def foresee(
+    scenario: Path,
+    out: Path | None,
+    *,
+    plan: Path | None = None,
+    seed: int = 0,
+    jobs: int = 0,
+    cache: bool = True,
+    progress: Progress = silent,
+) -> Outcome:
+    """With which probability a diagnosis of the trial would find each cause, into `out` or runs/<scenario>.
+
+    Args:
+        scenario: the scenario file.
+        out: folder.
+        plan: a plan.json whose track is diagnosed; the runs of the design alone when None.
+        seed: of sensor noise, weather and the tests' null distribution.
+        jobs: processes; 0 for one per core. The results do not depend on it.
+        cache: read what is remembered, and remember what is computed. The results do not depend on it.
+        progress: of the command.
+    """
+    case = loaded(scenario, progress)
+    words = command_text("foresee", [scenario], {"--plan": plan, "--seed": seed})
+    with remembering(user_memory() if cache else None), workers(jobs, load=None):
+        runs, weather = _trial(case, plan, seed, within(progress, 0.02, 0.2))
+        found = foresee_trial(case.vessel, runs, weather, seed=seed, progress=within(progress, 0.2, 0.95))
+    content = ForesightContent(
+        scenario=case.name,
+        vessel=case.vessel.name,
+        source=OF_DESIGN if plan is None else OF_PLAN,
+        found=found,
+        command=words,
+        version=__version__,
+    )
+    files = {"foresee.json": foresight_json(content)}
+    return written(case, out, files, foresight_summary(content), progress, foresight_tables(found))
+
+
+def _trial(case: Scenario, plan: Path | None, seed: int, progress: Progress) -> tuple[Sequence[TrialRun], Environment]:
+    """The runs of the trial and the weather forecast for it."""
+    if plan is None:
+        information, _ = ready(case, seed=seed, progress=within(progress, 0.0, 0.7))
+        design = designed(case, information, seed=seed, progress=within(progress, 0.7, 1.0))
+        return design_runs([item.primitive for item in information], design.repeats), case.environment
+    progress("reading the plan", 0.0)
+    track, inputs = read_plan(plan), case.vessel.model.inputs
+    if (track.commands.names, track.commands.sample_time_s) != (inputs, case.vessel.sample_time_s):
+        raise FileError(
+            plan,
+            "",
+            f"commands {', '.join(track.commands.names)} every {track.commands.sample_time_s:g} s, the scenario's "
+            f"vessel takes {', '.join(inputs)} every {case.vessel.sample_time_s:g} s",
+        )
+    begin = track.trajectory
+    run = TrialRun(name="plan", commands=track.commands, pose=begin.pose[0], velocity=begin.velocity[0])
+    return (run,), track.environment
+
+
+def foresight_summary(content: ForesightContent) -> dict[str, object]:
+    """Key numbers of what is foreseen."""
+    found = content.found
+    return {
+        "trial": content.source,
+        "diagnosed_s": found.duration_s,
+        "causes_tested": len(found.weakest),
+        "causes_missed": list(found.missed),
+        "causes_not_seen": [cause for cause, _ in found.unseen],
+        "not_told_apart": [f"{item.cause} ({item.name}) from {other.cause}" for item, other in found.not_told_apart],
+    }
+
+
+def foresight_tables(found: Foresight) -> tuple[TextTable, ...]:
+    """Power of every cause, at its least visible."""
+    return (TextTable(title="What a diagnosis would find", header=HEADER, rows=foresight_rows(found)),)

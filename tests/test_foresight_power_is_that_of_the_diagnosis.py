@@ -1,0 +1,148 @@
+"""What is foreseen of a diagnosis holds in simulated trials, obeys identities, and agrees with closed forms."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import chi2, ncx2
+
+from expdesign.diagnosis.motion import initial_states, stable_windows
+from expdesign.diagnosis.select import fit_nuisance, score_tests
+from expdesign.diagnosis.vessel_file import extended_model
+from expdesign.dictionary import build_dictionary
+from expdesign.foresight import (
+    background,
+    design_runs,
+    foresee,
+    level_of,
+    needed_noncentrality,
+    power,
+    simulated_record,
+    weather_without_causes,
+    with_effect,
+)
+from expdesign.scenario import load_scenario
+from expdesign.vessel import Vessel
+
+STORY = Path(__file__).parent.parent / "scenarios" / "story.toml"
+RUNS = {"zigzag-speed-1.4": 1, "sway-zigzag-sway-0.6": 1, "telegraph": 1}
+
+
+@pytest.fixture(scope="module")
+def case():
+    """The tender, three runs of two minutes, the bay's weather."""
+    scenario = load_scenario(STORY)
+    primitives = build_dictionary(scenario.vessel, scenario.dictionary)
+    runs = design_runs(primitives, [RUNS.get(item.name, 0) for item in primitives])
+    return scenario.vessel, runs, scenario.environment
+
+
+@pytest.fixture(scope="module")
+def known(case):
+    """The trial with nothing hidden."""
+    return background(*case, seed=0)
+
+
+@pytest.fixture(scope="module")
+def foreseen(case):
+    """Effects by name."""
+    return {item.name: item for item in foresee(*case, seed=0).effects}
+
+
+@pytest.fixture(scope="module")
+def of_known_ship(case):
+    """The same where parameters count as known."""
+    vessel, runs, weather = case
+    return {item.name: item for item in foresee(certain(vessel), runs, weather, seed=0).effects}
+
+
+def certain(vessel: Vessel) -> Vessel:
+    """The vessel with parameters that count as known."""
+    model = vessel.model
+    return replace(vessel, model=replace(model, parameter_std=np.zeros_like(model.parameter_std)))
+
+
+def drawn(vessel: Vessel, rng: np.random.Generator) -> Vessel:
+    """The vessel with parameters as wrong as its file says they may be."""
+    model = vessel.model
+    values = model.parameters + model.parameter_std * rng.standard_normal(len(model.parameters))
+    return replace(vessel, model=model.with_parameters(values))
+
+
+def test_power_of_nothing_is_the_level_and_rises_with_the_size():
+    for freedom in (1, 2, 5):
+        for multiplicity in (1.0, 30.0, 500.0):
+            level = level_of(multiplicity)
+            assert level == pytest.approx(0.025 / multiplicity)
+            curve = power(np.linspace(0.0, 60.0, 200), freedom, level)
+            assert curve[0] == pytest.approx(level)
+            assert (np.diff(curve) > 0).all()
+            for wanted in (0.5, 0.9):
+                assert power(needed_noncentrality(wanted, freedom, level), freedom, level) == pytest.approx(wanted)
+    two_sided = ncx2.sf(chi2.isf(0.025, 1), 1, 9.0)  # a number three standard errors from zero
+    assert float(power(9.0, 1, 0.025)) == pytest.approx(two_sided)
+
+
+def test_a_gyro_is_as_visible_as_its_own_readings_make_it(case, of_known_ship):
+    """With a known ship the noise of the yaw rate alone hides a scale error: size squared times sum r^2 / sigma^2.
+
+    A diagnosis uses a little less: it spends the first samples of a run on noise filters and its initial state, and
+    takes 5 % more white noise than it finds.
+    """
+    vessel, runs, weather = case
+    (found,) = (item for item in of_known_ship.values() if item.cause == "gyro_scale")
+    std = vessel.sensors.yaw_rate_radps
+    still = simulated_record(certain(vessel), runs, weather_without_causes(vessel, weather), np.random.default_rng(1))
+    turned = sum(float((batch.velocity[:, 2] ** 2).sum()) - len(batch) * std**2 for batch in still.batches)
+    expected = found.change**2 * turned / std**2
+    assert 0.7 * expected < found.noncentrality < 1.05 * expected
+
+
+def test_what_uncertain_parameters_imitate_is_harder_to_find(foreseen, of_known_ship):
+    """A heavier ship looks like other damping and thrust; a sensor's place does not."""
+
+    def kept(name: str) -> float:
+        beside, alone = (item[name].noncentrality / item[name].change ** 2 for item in (foreseen, of_known_ship))
+        return beside / alone
+
+    assert kept("inertia_factor_u") < 0.3
+    assert 0.5 < kept("forward_m") < 1.1
+
+
+def test_a_lag_and_a_dead_time_are_not_told_apart_but_a_current_and_a_gyro_are(foreseen):
+    lag = {item.cause: item for item in foreseen["lag_all_s"].confusions}
+    assert lag["actuator_delay"].cosine > 0.95
+    current = {item.cause: item for item in foreseen["north_mps east_mps"].confusions}
+    assert current["gyro_scale"].cosine < 0.5
+    assert current["gyro_scale"].told_apart > 0.9
+    for item in foreseen.values():
+        if item.sized:
+            assert item.named <= item.power + 4 * np.sqrt(item.power * (1 - item.power) / 2000) + 1e-9
+
+
+def share_found(case, known, found, wanted: float, trials: int) -> float:
+    """Share of simulated trials in which the test of an effect rejects, at the size with a power."""
+    vessel, runs, weather = case
+    (direction,) = found.effect.directions
+    least = needed_noncentrality(wanted, found.freedom, found.level)
+    size = found.change * np.sqrt(least / found.noncentrality)  # of these effects the number in results is the effect
+    calm, stated, hits = weather_without_causes(vessel, weather), known.base.ship.without_effects({*known.base.keys}), 0
+    for trial in range(trials):
+        rng = np.random.default_rng([3, trial])
+        record = simulated_record(with_effect(drawn(vessel, rng), stated, direction, size), runs, calm, rng)
+        ship = extended_model(vessel, record)
+        windows = stable_windows(ship, record)
+        (test,) = score_tests(fit_nuisance(ship, windows, initial_states(windows)), [found.effect.candidate])
+        hits += chi2.sf(test.statistic, found.freedom) <= found.level
+    return hits / trials
+
+
+@pytest.mark.parametrize(("name", "trials"), [("inertia_factor_r", 16), ("forward_m", 16), *(
+    pytest.param(name, 100, marks=pytest.mark.slow)
+    for name in ("inertia_factor_r", "forward_m", "thrust_offset_m", "Y_abs_v_v", "heading_bias_rad")
+)])  # fmt: skip
+def test_the_test_finds_as_often_as_foreseen(case, known, foreseen, name, trials):
+    """Within three standard errors of the binomial distribution, and five points for the noise that is estimated."""
+    found = share_found(case, known, foreseen[name], 0.6, trials)
+    assert abs(found - 0.6) < 3 * np.sqrt(0.6 * 0.4 / trials) + 0.05
