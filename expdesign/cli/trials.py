@@ -39,7 +39,8 @@ def foresee(
 ) -> Asked:
     """Foresee what a diagnosis of the trial would find: the power of its test of every cause, before sailing.
 
-    Writes foresee.json. The causes: expdesign explain causes
+    Writes foresee.json and foresee.html: also causes that it would not tell apart, and runs that would help.
+    The causes: expdesign explain causes
 
     Example: expdesign foresee scenarios/helsinki.toml
     """

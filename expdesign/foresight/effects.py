@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import takewhile
 
 import numpy as np
 
@@ -109,6 +110,12 @@ def _is_one_of_a_kind(key: str, ship: ExtendedModel) -> bool:
     return sum(stem(name) == stem(group) for name in ship.model.inputs) > 1
 
 
+def lasting(direction: Direction) -> Direction:
+    """The same effect where a change of the ship has happened from the beginning."""
+    fixed = {key: 0.0 if key == "change:time" else value for key, value in direction.fixed.items()}
+    return replace(direction, fixed=fixed)
+
+
 def disturbance_at(linear: LinearisedMotion, direction: Direction, size: float) -> Disturbance:
     """The change of rates and sensors along a path by an effect of some size."""
     if direction.finite:
@@ -130,7 +137,21 @@ def disturbance_at(linear: LinearisedMotion, direction: Direction, size: float) 
 def described(direction: Direction, ship: ExtendedModel) -> tuple[str, float, str]:
     """(name in results, change of that number per unit of size, its unit)."""
     names = [public_name(key, ship) for key in direction.shares]
-    name, factor, _, unit = names[0]
-    if len(names) > 1:
-        name = " ".join(dict.fromkeys(item[0] for item in names))
-    return name, factor * next(iter(direction.shares.values())), unit
+    _, factor, _, unit = names[0]
+    return joined([item[0] for item in names]), factor * next(iter(direction.shares.values())), unit
+
+
+def joined(names: Sequence[str]) -> str:
+    """Several names as one: inertia_factor_u and inertia_factor_v as inertia_factor_u/v."""
+    parts = [name.split("_") for name in dict.fromkeys(names)]
+    if len(parts) == 1:
+        return names[0]
+    front = _shared(parts)
+    back = _shared([rest[front:][::-1] for rest in parts])
+    middle = "/".join("_".join(rest[front : len(rest) - back]) for rest in parts)
+    return "_".join([*parts[0][:front], middle, *parts[0][len(parts[0]) - back :]])
+
+
+def _shared(parts: Sequence[Sequence[str]]) -> int:
+    """How many words all begin with."""
+    return sum(1 for _ in takewhile(lambda words: len(set(words)) == 1, zip(*parts, strict=False)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,9 @@ from expdesign.diagnosis.select import (
     score_tests,
 )
 from expdesign.diagnosis.vessel_file import extended_model
-from expdesign.foresight.effects import HiddenEffect, described, disturbance_at, hidden_effects
+from expdesign.dictionary import Primitive
+from expdesign.foresight.added import Offers, information_of_runs, of_one_manoeuvre, together
+from expdesign.foresight.effects import Direction, HiddenEffect, described, disturbance_at, hidden_effects, joined
 from expdesign.foresight.information import batch_information, beside_nuisance
 from expdesign.foresight.power import (
     Rivals,
@@ -40,12 +42,14 @@ from expdesign.foresight.power import (
 from expdesign.foresight.sizes import Size, default_sizes, sizes_that_matter, standard_trials
 from expdesign.foresight.trial import TrialRun, simulated_record, weather_without_causes
 from expdesign.foresight.tuning import TUNING
-from expdesign.foresight.values import Confusion, Foreseen, Foresight
+from expdesign.foresight.values import AddedRuns, Confusion, Foreseen, Foresight
 from expdesign.progress import Progress, in_phases, silent
 from expdesign.simulation import Environment
 from expdesign.values import Array
 from expdesign.vessel import Vessel
 
+ENDLESS = 1e5
+"""Runs of every manoeuvre that stand for data without end."""
 UNSEEN = {
     "shallow_water": "no depth is recorded",
     "actuator_deadband": "commands have too few sizes, or a dead band is stated",
@@ -102,6 +106,7 @@ def foresee(
     runs: Sequence[TrialRun],
     weather: Environment,
     *,
+    offers: Sequence[Primitive] = (),
     seed: int = 0,
     progress: Progress = silent,
 ) -> Foresight:
@@ -111,6 +116,7 @@ def foresee(
         vessel: the model in use, with its sensors.
         runs: of the trial.
         weather: the forecast; how it varies is in the trial.
+        offers: manoeuvres whose runs may be added.
         seed: of all chance.
         progress: of the work.
 
@@ -124,17 +130,25 @@ def foresee(
     hidden = tuple(sorted(hidden, key=lambda item: _place(item.cause)))
     sizes = _sizes(vessel, hidden, known, weather, second)
     third("power of the tests", 0.0)
-    found = _foreseen(known, hidden, sizes, np.random.default_rng(seed))
+    joint = _joint(known, hidden, sizes)
+    found = _foreseen(known, hidden, sizes, joint, np.random.default_rng(seed))
+    third("runs that may be added", 0.7)
+    found, more = _with_added_runs(vessel, known, joint, found, offers, weather)
     names = {item.cause.split(":")[0] for item in known.candidates}
     return Foresight(
         effects=found,
-        unseen=tuple((cause.name, UNSEEN.get(cause.name, "it is in the model already"))
-                     for cause in CAUSES if cause.name not in names),
+        unseen=tuple(
+            (cause.name, UNSEEN.get(cause.name, "it is in the model already"))
+            for cause in CAUSES
+            if cause.name not in names
+        ),
         samples=int(np.isfinite(known.windows.measured).any(axis=2).sum()),
         duration_s=known.windows.duration_s,
         wanted_power=TUNING.wanted_power,
         random_current_mps=known.base.noise.current_std_mps,
-    )  # fmt: skip
+        together=more,
+        beyond=tuple(item for item in found if offers and item.needs_runs and item.added is None),
+    )
 
 
 def _place(cause: str) -> int:
@@ -167,28 +181,93 @@ def _defaults(vessel: Vessel, known: Background, speed_mps: float) -> dict[str, 
     return usual | {f"deadband:{group}": 0.05 * float(largest[group_columns(group, inputs)].max()) for group in groups}
 
 
-def _foreseen(
-    known: Background, hidden: Sequence[HiddenEffect], sizes: Sequence[tuple[Size, ...]], rng: np.random.Generator
-) -> tuple[Foreseen, ...]:
-    linear, base = known.base.linear, known.base
-    disturbances = [
-        disturbance_at(linear, direction, size.value if math.isfinite(size.value) else 1.0)
-        for effect, own in zip(hidden, sizes, strict=True)
-        for direction, size in zip(effect.directions, own, strict=True)
-    ]
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Joint:
+    """Information of a trial about hidden effects at their sizes, then about all tested candidates.
+
+    Attributes:
+        whole: (c + m, c + m) nuisance first; beside: (m, m) beside nuisance.
+        directions, sizes: of the effects' own rows.
+        blocks: per effect, its rows among the m; rows: per tested candidate.
+    """
+
+    whole: Array
+    beside: Array
+    directions: tuple[Direction, ...]
+    sizes: tuple[float, ...]
+    blocks: tuple[NDArray[np.int64], ...]
+    rows: tuple[NDArray[np.int64], ...]
+
+
+def _joint(known: Background, hidden: Sequence[HiddenEffect], sizes: Sequence[tuple[Size, ...]]) -> _Joint:
+    base = known.base
+    directions = tuple(item for effect in hidden for item in effect.directions)
+    values = tuple(size.value if math.isfinite(size.value) else 1.0 for own in sizes for size in own)
+    ends = np.cumsum([len(own) for own in sizes])
+    disturbances = [disturbance_at(base.linear, item, size) for item, size in zip(directions, values, strict=True)]
     rows = _candidate_rows(known, disturbances)
-    whole = batch_information(linear, base.keys, disturbances, base.noise).sum(axis=0)
-    A = beside_nuisance(whole, base.precision)
-    rivals = rivals_of(known.tests, rows, A, rng)
-    found, first = [], 0
-    for effect, own in zip(hidden, sizes, strict=True):
-        index = np.arange(first, first + len(own))
-        first += len(own)
-        found.append(_one(effect, own, index, A, rivals, known))
-    return tuple(found)
+    whole = batch_information(base.linear, base.keys, disturbances, base.noise).sum(axis=0)
+    return _Joint(
+        whole=whole,
+        beside=beside_nuisance(whole, base.precision),
+        directions=directions,
+        sizes=values,
+        blocks=tuple(np.arange(end - len(own), end) for end, own in zip(ends.tolist(), sizes, strict=True)),
+        rows=tuple(rows),
+    )
 
 
-def _candidate_rows(known: Background, disturbances: list[Disturbance]) -> list[Array]:
+def _foreseen(
+    known: Background,
+    hidden: Sequence[HiddenEffect],
+    sizes: Sequence[tuple[Size, ...]],
+    joint: _Joint,
+    rng: np.random.Generator,
+) -> tuple[Foreseen, ...]:
+    rivals = rivals_of(known.tests, joint.rows, joint.beside, rng)
+    return tuple(
+        _one(effect, own, index, joint.beside, rivals, known)
+        for effect, own, index in zip(hidden, sizes, joint.blocks, strict=True)
+    )
+
+
+def _with_added_runs(
+    vessel: Vessel,
+    known: Background,
+    joint: _Joint,
+    found: tuple[Foreseen, ...],
+    primitives: Sequence[Primitive],
+    weather: Environment,
+) -> tuple[tuple[Foreseen, ...], AddedRuns | None]:
+    """Effects that lack power with the runs that give it to them, and the runs that do so for all of these."""
+    lacking = [number for number, item in enumerate(found) if item.needs_runs]
+    if not primitives or not lacking:
+        return found, None
+    own = len(joint.directions) + len(known.base.keys)
+    offers = Offers(
+        names=tuple(item.name for item in primitives),
+        run_s=np.array([item.duration_s for item in primitives]),
+        known=joint.whole[:own, :own],
+        each=information_of_runs(vessel, known.base, primitives, weather, joint.directions, joint.sizes),
+        precision=known.base.precision,
+        blocks=tuple(joint.blocks[number] for number in lacking),
+    )
+    items = [found[number] for number in lacking]
+    needed = np.array([needed_noncentrality(TUNING.wanted_power, item.freedom, item.level) for item in items])
+    single = of_one_manoeuvre(offers, needed)
+    best = [float(power(largest, item.freedom, item.level)) for item, (_, largest) in zip(items, single, strict=True)]
+    ever = offers.noncentralities(np.full(len(primitives), ENDLESS))
+    changed = {
+        number: replace(found[number], added=runs, best_power=most, within_std=bool(limit < goal))
+        for number, (runs, _), most, limit, goal in zip(lacking, single, best, ever, needed, strict=True)
+    }
+    kept = [place for place, (runs, _) in enumerate(single) if runs is not None]
+    some = replace(offers, blocks=tuple(offers.blocks[place] for place in kept))
+    more = together(some, needed[kept]) if kept else None
+    return tuple(changed.get(number, item) for number, item in enumerate(found)), more
+
+
+def _candidate_rows(known: Background, disturbances: list[Disturbance]) -> list[NDArray[np.int64]]:
     """Per tested candidate, its rows; appends the disturbances of all of them, shared ones once."""
     shared: dict[object, int] = {}
     rows = []
@@ -252,7 +331,7 @@ def _length(sizes: tuple[Size, ...], mixture: Array) -> float:
 
 
 def _joint_name(effect: HiddenEffect, known: Background) -> str:
-    return " ".join(described(item, known.base.ship)[0] for item in effect.directions)
+    return joined([described(item, known.base.ship)[0] for item in effect.directions])
 
 
 def _against(

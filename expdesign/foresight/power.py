@@ -81,7 +81,7 @@ class Rivals:
     """
 
     tests: tuple[ScoreTest, ...]
-    rows: tuple[Array, ...]
+    rows: tuple[NDArray[np.int64], ...]
     whitening: Array
     parts: NDArray[np.int64]
     noise: Array
@@ -93,7 +93,9 @@ class Rivals:
         return tuple(test.candidate.cause for test in self.tests)
 
 
-def rivals_of(tests: Sequence[ScoreTest], rows: Sequence[Array], A: Array, rng: np.random.Generator) -> Rivals:
+def rivals_of(
+    tests: Sequence[ScoreTest], rows: Sequence[NDArray[np.int64]], A: Array, rng: np.random.Generator
+) -> Rivals:
     """Draw scores of all candidates, and of other effects with them.
 
     Args:

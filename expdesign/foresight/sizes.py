@@ -15,7 +15,7 @@ from expdesign.diagnosis.model import ROLL, ExtendedModel
 from expdesign.diagnosis.motion import LinearisedMotion, linearise, responses, simulate_from_measured
 from expdesign.diagnosis.vessel_file import extend, extended_model
 from expdesign.errors import InputError, NoAnswer
-from expdesign.foresight.effects import Direction, disturbance_at
+from expdesign.foresight.effects import Direction, disturbance_at, lasting
 from expdesign.foresight.trial import exact_record
 from expdesign.foresight.tuning import TUNING
 from expdesign.indices import outcomes
@@ -155,7 +155,7 @@ def _by_fit(item: Direction, trials: StandardTrials | None, default: float) -> S
     usual = Size(value=default, rule="default" if math.isfinite(default) else "no size is known")
     if trials is None:
         return usual
-    there = _in_standard_trials(item)
+    there = lasting(item)
     size = default if math.isfinite(default) else 1.0
     for _ in range(TUNING.size_rounds if item.finite else 1):
         lost = fit_loss(trials, there, size)
@@ -165,12 +165,6 @@ def _by_fit(item: Direction, trials: StandardTrials | None, default: float) -> S
     if math.isfinite(default) and not 1.0 / TUNING.size_reach < size / default < TUNING.size_reach:
         return usual
     return Size(value=size, rule=f"{TUNING.fit_points:g} points of fit")
-
-
-def _in_standard_trials(item: Direction) -> Direction:
-    """Changes of the ship act from the beginning there."""
-    fixed = {key: 0.0 if key == "change:time" else value for key, value in item.fixed.items()}
-    return Direction(shares=item.shares, fixed=fixed, finite=item.finite)
 
 
 def fit_loss(trials: StandardTrials, item: Direction, size: float) -> float:
@@ -190,7 +184,7 @@ def outcome_changes(
     if any(key in ROLL for key in (*item.shares, *item.fixed)):
         return {}
     try:
-        changed = with_effect(vessel, ship, _in_standard_trials(item), size)
+        changed = with_effect(vessel, ship, lasting(item), size)
         return outcomes(changed, speed_mps=speed_mps, names=OUTCOMES)
     except (InputError, NoAnswer):
         return {}

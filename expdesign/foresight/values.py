@@ -59,6 +59,7 @@ class Foreseen:
         added: the manoeuvre whose added runs bring it to the wanted power soonest; None where none does, or none is
             needed.
         best_power: largest power with added runs of one manoeuvre.
+        within_std: no data would do, because the vessel file's standard deviations allow as much.
     """
 
     effect: HiddenEffect
@@ -75,6 +76,7 @@ class Foreseen:
     confusions: tuple[Confusion, ...] = ()
     added: AddedRuns | None = None
     best_power: float = 0.0
+    within_std: bool = False
 
     @property
     def cause(self) -> str:
@@ -85,6 +87,11 @@ class Foreseen:
     def sized(self) -> bool:
         """Whether a size is known that matters."""
         return not math.isnan(self.change)
+
+    @property
+    def needs_runs(self) -> bool:
+        """Whether it lacks the wanted power at the size that matters."""
+        return self.sized and self.power < TUNING.wanted_power
 
     @property
     def mistaken_for(self) -> tuple[Confusion, ...]:

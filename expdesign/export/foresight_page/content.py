@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from expdesign.export import words
 from expdesign.export.files import finite, strict_json
-from expdesign.foresight import AddedRuns, Foreseen, Foresight
+from expdesign.foresight import TOLD_APART, AddedRuns, Foreseen, Foresight
 
 NONE = "\N{EN DASH}"
+MOST_LISTED = 5
+"""Causes in a sentence."""
 HEADER = (
     "cause",
     "least visible as",
     "a size that matters",
-    "because of",
     "power",
     "named",
     "90 % from",
+    "90 % with",
     "not told from",
 )
 """Columns of the table for people."""
@@ -56,12 +59,61 @@ def effect_row(item: Foreseen) -> tuple[str, ...]:
         item.cause,
         item.name,
         sized(item, item.change),
-        item.rule,
         words.percent(item.power) if item.sized else NONE,
         words.percent(item.named) if item.sized else NONE,
         sized(item, item.least_change),
-        (others + (f" and {more} more" if more > 0 else "")) if item.power >= 0.5 and others else NONE,
+        remedy(item),
+        (others + (f" and {more} more" if more > 0 else "")) if item.power >= TOLD_APART and others else NONE,
     )
+
+
+def remedy(item: Foreseen) -> str:
+    """What brings an effect to the wanted power, in words."""
+    if not item.needs_runs:
+        return NONE
+    if item.added is not None:
+        return runs_text(item.added)
+    return "no data: within stated std" if item.within_std else "none of this dictionary"
+
+
+def runs_text(added: AddedRuns) -> str:
+    """Runs and their time."""
+    runs = ", ".join(f"{count} \N{MULTIPLICATION SIGN} {name}" for name, count in added.runs)
+    return f"{runs} ({words.duration(added.time_s)})"
+
+
+def conclusions(found: Foresight) -> tuple[str, ...]:
+    """What follows for the trial, in sentences."""
+    return tuple(_sentences(found))
+
+
+def _sentences(found: Foresight) -> Iterator[str]:
+    least = [item for item in found.weakest if item.sized]
+    seen = [item for item in least if not item.needs_runs]
+    yield (
+        f"A diagnosis of this trial would find {len(seen)} of {len(least)} causes with a probability of at least "
+        f"{100 * found.wanted_power:g} %, wherever they act and at the smallest size that matters."
+    )
+    missed = sorted((item for item in least if item.needs_runs), key=lambda item: item.power)
+    if missed:
+        listed = ", ".join(
+            f"{item.cause} as {item.name} ({words.percent(item.power)})" for item in missed[:MOST_LISTED]
+        )
+        rest = f" and {len(missed) - MOST_LISTED} more" if len(missed) > MOST_LISTED else ""
+        yield f"It would probably miss {listed}{rest}."
+    within = list(dict.fromkeys(item.cause for item in found.effects if item.needs_runs and item.within_std))
+    if within:
+        yield (
+            f"No data would show {', '.join(within)} at that size in every case: the standard deviations in the vessel "
+            "file allow as much."
+        )
+    pairs = list(dict.fromkeys((item.cause, other.cause) for item, other in found.not_told_apart))
+    if pairs:
+        yield "It would find, but not tell apart: " + ", ".join(f"{one} from {other}" for one, other in pairs) + "."
+    if found.together is not None:
+        yield f"With {runs_text(found.together)} more it would also find what runs of this dictionary can show."
+    if found.unseen:
+        yield "Not seen at all: " + ", ".join(f"{cause} ({why})" for cause, why in found.unseen) + "."
 
 
 def sized(item: Foreseen, change: float) -> str:
@@ -88,14 +140,17 @@ def foresight_json(content: ForesightContent) -> str:
             "random_current_mps": found.random_current_mps,
             "effects": [effect_entry(item) for item in found.effects],
             "missed": list(found.missed),
+            "conclusions": list(conclusions(found)),
             "not_told_apart": [
                 {"cause": item.cause, "effect": item.name, "from": other.cause, "cosine": other.cosine,
                  "noncentrality_left": other.noncentrality, "told_apart": other.told_apart}
                 for item, other in found.not_told_apart
             ],
             "together": _added(found.together),
-            "beyond_the_dictionary": [{"cause": item.cause, "effect": item.name, "best_power": item.best_power}
-                                      for item in found.beyond],
+            "beyond_the_dictionary": [
+                {"cause": item.cause, "effect": item.name, "best_power": item.best_power, "within_std": item.within_std}
+                for item in found.beyond
+            ],
             "not_seen": [{"cause": cause, "why": why} for cause, why in found.unseen],
         }
     )  # fmt: skip

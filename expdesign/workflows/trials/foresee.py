@@ -7,11 +7,17 @@ from pathlib import Path
 
 from expdesign import __version__
 from expdesign.errors import FileError
-from expdesign.export.foresight_page import ForesightContent, foresight_json, foresight_rows
-from expdesign.export.foresight_page.content import HEADER
+from expdesign.export.foresight_page import (
+    HEADER,
+    ForesightContent,
+    foresight_html,
+    foresight_json,
+    foresight_rows,
+)
 from expdesign.export.routes import read_plan
 from expdesign.foresight import Foresight, TrialRun, design_runs
 from expdesign.foresight import foresee as foresee_trial
+from expdesign.information import PrimitiveInformation
 from expdesign.memory import remembering, user_memory
 from expdesign.progress import Progress, silent, within
 from expdesign.scenario import Scenario
@@ -51,8 +57,12 @@ def foresee(
     case = loaded(scenario, progress)
     words = command_text("foresee", [scenario], {"--plan": plan, "--seed": seed})
     with remembering(user_memory() if cache else None), workers(jobs, load=None):
-        runs, weather = _trial(case, plan, seed, within(progress, 0.02, 0.2))
-        found = foresee_trial(case.vessel, runs, weather, seed=seed, progress=within(progress, 0.2, 0.95))
+        information, _ = ready(case, seed=seed, progress=within(progress, 0.02, 0.15))
+        offers = [item.primitive for item in information]
+        runs, weather = _trial(case, information, plan, seed, within(progress, 0.15, 0.2))
+        found = foresee_trial(
+            case.vessel, runs, weather, offers=offers, seed=seed, progress=within(progress, 0.2, 0.95)
+        )
     content = ForesightContent(
         scenario=case.name,
         vessel=case.vessel.name,
@@ -61,15 +71,17 @@ def foresee(
         command=words,
         version=__version__,
     )
-    files = {"foresee.json": foresight_json(content)}
+    progress("writing the page", 0.95)
+    files = {"foresee.json": foresight_json(content), "foresee.html": foresight_html(content)}
     return written(case, out, files, foresight_summary(content), progress, foresight_tables(found))
 
 
-def _trial(case: Scenario, plan: Path | None, seed: int, progress: Progress) -> tuple[Sequence[TrialRun], Environment]:
+def _trial(
+    case: Scenario, information: Sequence[PrimitiveInformation], plan: Path | None, seed: int, progress: Progress
+) -> tuple[Sequence[TrialRun], Environment]:
     """The runs of the trial and the weather forecast for it."""
     if plan is None:
-        information, _ = ready(case, seed=seed, progress=within(progress, 0.0, 0.7))
-        design = designed(case, information, seed=seed, progress=within(progress, 0.7, 1.0))
+        design = designed(case, information, seed=seed, progress=progress)
         return design_runs([item.primitive for item in information], design.repeats), case.environment
     progress("reading the plan", 0.0)
     track, inputs = read_plan(plan), case.vessel.model.inputs

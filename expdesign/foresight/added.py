@@ -1,0 +1,152 @@
+"""Whole runs of the dictionary that bring tests to the wanted power, at the least time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from expdesign.diagnosis.fit import Fit
+from expdesign.diagnosis.motion import linearise, simulate_from_measured, stable_windows
+from expdesign.dictionary import Primitive
+from expdesign.foresight.effects import Direction, disturbance_at, lasting
+from expdesign.foresight.information import batch_information, beside_nuisance
+from expdesign.foresight.trial import exact_record, run_of, weather_without_causes
+from expdesign.foresight.tuning import TUNING
+from expdesign.foresight.values import AddedRuns
+from expdesign.simulation import Environment, simulate
+from expdesign.values import Array
+from expdesign.vessel import Vessel
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Offers:
+    """Runs that may be added to a trial, and what they tell.
+
+    Attributes:
+        names: (q,) of the manoeuvres.
+        run_s: (q,) duration of a run [s].
+        known: (c + m, c + m) information of the trial as it is, about nuisance and about effects at their sizes.
+        each: (q, c + m, c + m) information of one run.
+        precision: (c, c) prior precision of the nuisance.
+        blocks: per effect, its rows among the m; of several the worst mixture counts.
+    """
+
+    names: tuple[str, ...]
+    run_s: Array
+    known: Array
+    each: Array
+    precision: Array
+    blocks: tuple[NDArray[np.int64], ...]
+
+    def noncentralities(self, runs: Array) -> Array:
+        """(e,) of every effect once so many runs (q,) are added."""
+        A = beside_nuisance(self.known + np.tensordot(runs, self.each, axes=1), self.precision)
+        return np.array([np.linalg.eigvalsh(A[np.ix_(index, index)])[0] for index in self.blocks])
+
+    @property
+    def most(self) -> NDArray[np.int64]:
+        """(q,) largest number of runs of one manoeuvre."""
+        return np.maximum(np.minimum(TUNING.most_added_s // self.run_s, TUNING.most_added_runs), 1).astype(int)
+
+
+def information_of_runs(
+    vessel: Vessel,
+    base: Fit,
+    primitives: Sequence[Primitive],
+    weather: Environment,
+    directions: Sequence[Direction],
+    sizes: Sequence[float],
+) -> Array:
+    """(q, c + m, c + m) information of one run of each manoeuvre, the mean over `Tuning.headings` first headings.
+
+    Args:
+        vessel: the model in use.
+        base: fit of the trial that the runs are added to: its model, nuisance and noise.
+        primitives: q manoeuvres.
+        weather: forecast.
+        directions: m effects; a change of the ship has happened before the runs.
+        sizes: of the effects.
+    """
+    calm = weather_without_causes(vessel, weather)
+    turns = np.arange(TUNING.headings) * (np.pi / TUNING.headings)
+    sailed = []
+    for primitive in primitives:
+        for turn in turns.tolist():
+            run = run_of(primitive, turn)
+            motion = simulate(
+                vessel,
+                run.commands,
+                pose=run.pose,
+                velocity=run.velocity,
+                environment=calm,
+                standing=run.standing,
+            )
+            sailed.append((primitive.name, run.commands, motion))
+    record = exact_record(sailed, calm.wind_to)
+    windows = stable_windows(base.ship, record)
+    linear = linearise(simulate_from_measured(base.ship, windows))
+    disturbances = [disturbance_at(linear, lasting(item), size) for item, size in zip(directions, sizes, strict=True)]
+    found = batch_information(linear, base.keys, disturbances, base.noise)
+    whole = np.zeros((len(sailed), *found.shape[1:]))
+    whole[np.unique(windows.batch).astype(int)] = found  # a run of a few samples tells nothing
+    return np.asarray(whole.reshape(len(primitives), len(turns), *found.shape[1:]).mean(axis=1))
+
+
+def of_one_manoeuvre(offers: Offers, needed: Array) -> list[tuple[AddedRuns | None, float]]:
+    """Per effect, the runs of one manoeuvre that bring it soonest to a noncentrality, and its largest one.
+
+    Args:
+        offers: runs that may be added.
+        needed: (e,) noncentrality of every effect.
+    """
+    best: list[tuple[AddedRuns | None, float]] = [(None, 0.0)] * len(needed)
+    for q, name in enumerate(offers.names):
+        unit = np.eye(len(offers.names))[q]
+        reached: dict[int, Array] = {}
+
+        def at(count: int, unit: Array = unit, reached: dict[int, Array] = reached) -> Array:
+            if count not in reached:
+                reached[count] = offers.noncentralities(count * unit)
+            return reached[count]
+
+        for effect, goal in enumerate(needed):
+            most = int(offers.most[q])
+            runs, largest = best[effect][0], max(best[effect][1], float(at(most)[effect]))
+            if at(most)[effect] >= goal:
+                low, high = 0, most
+                while high - low > 1:
+                    middle = (low + high) // 2
+                    low, high = (low, middle) if at(middle)[effect] >= goal else (middle, high)
+                time_s = float(high * offers.run_s[q])
+                if runs is None or time_s < runs.time_s:
+                    runs = AddedRuns(runs=((name, high),), time_s=time_s)
+            best[effect] = runs, largest
+    return best
+
+
+def together(offers: Offers, needed: Array) -> AddedRuns | None:
+    """Runs that bring all effects to their noncentralities: the run that does most for its time, again and again.
+
+    Then runs that are not needed any more are left out. None where the time allowed does not suffice.
+    """
+    runs, goal = np.zeros(len(offers.names)), np.maximum(needed, 1e-12)
+
+    def missing(trial: Array) -> float:
+        return float(np.maximum(1.0 - offers.noncentralities(trial) / goal, 0.0).sum())
+
+    left, units = missing(runs), np.eye(len(offers.names))
+    while left > 0.0:
+        after = np.array([missing(runs + unit) for unit in units])
+        q = int(np.argmax((left - after) / offers.run_s))
+        runs = runs + units[q]
+        if runs @ offers.run_s > TUNING.most_added_s or not after[q] < left:
+            return None
+        left = float(after[q])
+    for q in np.argsort(-offers.run_s):
+        while runs[q] and missing(runs - units[q]) == 0.0:
+            runs = runs - units[q]
+    chosen = tuple((name, int(count)) for name, count in zip(offers.names, runs, strict=True) if count)
+    return AddedRuns(runs=chosen, time_s=float(runs @ offers.run_s))
