@@ -38,7 +38,7 @@ FLOORS = {
         ("solve",),
         ("excitation", "output_error", "feedback"),
         ("values",),
-        ("disturbance",),
+        ("disturbance", "equation_wise"),
         ("methods",),
     ),
     "diagnosis": (

@@ -12,6 +12,7 @@ from expdesign.assessment.tuning import TUNING
 from expdesign.assessment.values import INSTRUMENTAL, Assessed, Assessment, Disturbances
 from expdesign.errors import Diverged, InputError, NoAnswer, NotInformative, UnknownName
 from expdesign.estimation.disturbance import current_moments, felt_moments, measured_wind, tells_current
+from expdesign.estimation.equation_wise import ALL, EQUATION_WISE, SAMPLES
 from expdesign.estimation.excitation import check_excitation, worst_case
 from expdesign.estimation.methods import STARTS, Method, Settings, estimate, method_named
 from expdesign.estimation.regression import CURRENT, MEANS, PREDICTORS
@@ -47,6 +48,9 @@ class EstimateOptions:
         horizon_s: simulation horizon of output error [s], None for whole runs.
         constant: whether output error gives every run a constant force of its own.
         steered: what becomes of samples marked as steered, one of `estimation.replay.STEERED`.
+        samples: "all", or "equation-wise": for each equation those that meet the excitation condition.
+        offset_mps: strongest current, and wind where it is not measured, that velocities inside an absolute value must
+            exceed in equation-wise samples, beside the sensors' noise [m/s].
     """
 
     methods: tuple[str, ...] = ()
@@ -58,6 +62,8 @@ class EstimateOptions:
     horizon_s: float | None = None
     constant: bool = False
     steered: str = AUTO
+    samples: str = ALL
+    offset_mps: float = 0.0
 
     def __post_init__(self) -> None:
         for what, value, known in (
@@ -66,9 +72,12 @@ class EstimateOptions:
             ("start", self.start, (AUTO, *STARTS)),
             ("motion", self.motion, MOTIONS),
             ("treatment of steered samples", self.steered, STEERED),
+            ("choice of samples", self.samples, SAMPLES),
         ):
             if value not in known:
                 raise UnknownName(what, value, known=known)
+        if not 0 <= self.offset_mps < float("inf"):
+            raise InputError(f"offset is {self.offset_mps:g} m/s, expected 0 or more")
         if self.horizon_s is not None and not 0 < self.horizon_s < float("inf"):
             raise InputError(f"horizon is {self.horizon_s:g} s, expected more than 0")
 
@@ -187,6 +196,8 @@ def _assessed(
         for batch in part.batches
     ]
     breaches = check_excitation(record, vessel.model, worst=worst_case(vessel.sensors), wind_measured=wind)
+    if options.samples == EQUATION_WISE and method.solver != "oe":
+        breaches = ()  # no equation uses the samples that break it
     return Assessed(
         method=method,
         estimate=found,
@@ -224,6 +235,8 @@ def _estimated(
             horizon_s=options.horizon_s,
             constant=options.constant,
             steered=options.steered,
+            samples=options.samples,
+            worst=worst_case(vessel.sensors, current_mps=options.offset_mps, wind_mps=options.offset_mps),
         )
         return estimate(record, vessel.model, method=method.name, settings=settings, progress=progress)
 

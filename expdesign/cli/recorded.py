@@ -77,6 +77,23 @@ def estimate(
             "inputs; auto: in methods with instruments planned where there are such columns, else leave-out.",
         ),
     ] = "auto",
+    samples: Annotated[
+        str,
+        typer.Option(
+            metavar="HOW",
+            help="Samples of each equation: all; equation-wise, those where what stands inside its absolute values is "
+            "clear of zero in the simulated instruments, so that noise and disturbances leave no bias.",
+        ),
+    ] = "all",
+    offset: Annotated[
+        float,
+        typer.Option(
+            "--offset",
+            metavar="MPS",
+            help="Strongest current, and wind where it is not measured, that velocities must exceed in equation-wise "
+            "samples [m/s], beside three standard deviations of the sensors.",
+        ),
+    ] = 0.0,
     out: OutByData = None,
 ) -> Asked:
     """Estimate the model's parameters from measured data, with standard errors.
@@ -100,6 +117,8 @@ def estimate(
         horizon_s=horizon,
         constant=constant,
         steered=steered,
+        samples=samples,
+        offset_mps=offset,
         tests=tests or (),
     )
 

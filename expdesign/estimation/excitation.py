@@ -25,7 +25,7 @@ from expdesign.estimation.regression import (
 )
 from expdesign.estimation.tuning import TUNING
 from expdesign.signals import Batch, Record
-from expdesign.values import frozen_set
+from expdesign.values import Array, frozen_set
 from expdesign.vessel import Operators, Sensors, VesselModel
 from expdesign.vessel.expressions import Expression
 
@@ -121,6 +121,37 @@ def check_excitation(
     )
 
 
+@dataclass(frozen=True, eq=False)
+class Sides:
+    """On which side of zero what stands in a modulus is.
+
+    Attributes:
+        side: (k,) 1 or -1 where it is farther from zero than its margin, else 0.
+        equations: whose terms hold the modulus.
+    """
+
+    side: Integers
+    equations: tuple[str, ...]
+
+
+def clear_sides(model: VesselModel, table: SignalTable, *, worst: WorstCase, wind_measured: bool) -> dict[str, Sides]:
+    """Every modulus of velocities, by what stands inside, at every sample of a table of signals.
+
+    Args:
+        model: whose terms hold the moduli.
+        table: signals (k,) of one batch.
+        worst, wind_measured: as in `check_excitation`.
+    """
+    count = len(table["psi"])
+    equation = {term.name: term.equation for term in model.terms}
+    found = {}
+    for inside, names, windy in _moduli(model, wind_measured):
+        values, margin = _values_of(inside, table, count), _margin(inside, worst, windy)
+        side = (values > margin).astype(np.int64) - (values < -margin)
+        found[str(inside)] = Sides(side, tuple(dict.fromkeys(equation[name] for name in names)))
+    return found
+
+
 Modulus = tuple[Polynomial, tuple[str, ...], bool]
 """Value inside the modulus, its parameters, and whether the margin includes the wind."""
 
@@ -147,14 +178,9 @@ def _as_polynomial(modulus: Expression, table: SignalTable) -> Polynomial:
 
 
 def _breaches(batch: Batch, table: SignalTable, moduli: list[Modulus], worst: WorstCase) -> list[Breach]:
-    functions = {
-        f"{name}({signal})": lambda t, f=f, signal=signal: f(t[signal])
-        for name, f in (("abs", np.abs), ("sin", np.sin), ("cos", np.cos))
-        for signal in table
-    }
     result = []
     for inside, names, windy in moduli:
-        values = np.broadcast_to(np.asarray(inside.evaluate(table, functions), dtype=float), (len(batch),))
+        values = _values_of(inside, table, len(batch))
         margin = _margin(inside, worst, windy)
         sign = -1.0 if np.nanmean(np.sign(values)) < 0 else 1.0
         samples = np.flatnonzero(sign * values <= margin)
@@ -171,6 +197,15 @@ def _breaches(batch: Batch, table: SignalTable, moduli: list[Modulus], worst: Wo
                 )
             )
     return result
+
+
+def _values_of(inside: Polynomial, table: SignalTable, count: int) -> Array:
+    functions = {
+        f"{name}({signal})": lambda t, f=f, signal=signal: f(t[signal])
+        for name, f in (("abs", np.abs), ("sin", np.sin), ("cos", np.cos))
+        for signal in table
+    }
+    return np.broadcast_to(np.asarray(inside.evaluate(table, functions), dtype=float), (count,))
 
 
 def _margin(inside: Polynomial, worst: WorstCase, windy: bool) -> float:

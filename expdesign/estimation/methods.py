@@ -8,16 +8,22 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from expdesign.errors import Diverged, InputError, UnknownName
+from expdesign.estimation.equation_wise import ALL, EQUATION_WISE, SAMPLES, chosen_rows, sample_notes
+from expdesign.estimation.excitation import WorstCase
 from expdesign.estimation.feedback import Feedback, feedback_in, feedback_notes
 from expdesign.estimation.output_error import Fitting, minimise_output_error
 from expdesign.estimation.regression import (
     PREDICTORS,
     Guess,
+    Integers,
     Layout,
+    Mask,
     Regression,
     Rows,
+    Table,
     build_layout,
     build_regression,
+    measured_table,
     model_for,
     with_wind_as_measured,
 )
@@ -103,6 +109,8 @@ class Settings:
         quadrature: of regressors and instruments over a sample interval, "euler" or "trapezoid".
         steered: what becomes of samples marked as steered: "use", "leave-out", "planned" for instruments from the
             inputs as planned, or "auto", see `replay.treatment_of`.
+        samples: "all", or "equation-wise", see `equation_wise`; output error uses all.
+        worst: what signals inside a modulus must exceed in equation-wise samples.
     """
 
     fixed: tuple[str, ...] = ()
@@ -116,10 +124,14 @@ class Settings:
     constant: bool = False
     quadrature: str = "euler"
     steered: str = "auto"
+    samples: str = ALL
+    worst: WorstCase = field(default_factory=WorstCase)
 
     def __post_init__(self) -> None:
         if self.steered not in STEERED:
             raise UnknownName("treatment of steered samples", self.steered, known=STEERED)
+        if self.samples not in SAMPLES:
+            raise UnknownName("choice of samples", self.samples, known=SAMPLES)
         if self.start not in STARTS:
             raise UnknownName("start of instruments", self.start, known=STARTS)
 
@@ -196,10 +208,16 @@ def estimate(
     driving = as_planned(record) if planned else record
     if chosen.solver == "iv":
         layout, rows, refined = _instrumental(layout, record, driving, choices)
-        feedback = feedback_in(record, rows.regression, refined.solution.residuals, known_steered=planned)
+        whole = _whole(rows.regression)
+        feedback = feedback_in(
+            record, rows.regression.at(whole), refined.solution.residuals[whole], known_steered=planned
+        )
         return _estimate(chosen, layout, rows, refined, steered, feedback)
     rows = build_regression(layout, record)
     if chosen.solver == "ls":
+        if choices.samples == EQUATION_WISE:
+            tables = [measured_table(layout.model, b, wind_measured=layout.predictor.wind) for b in record.batches]
+            rows = _with_rows(rows, _chosen(layout, rows, tables, replace(choices, weighting=Weighting())))
         return _estimate(chosen, layout, rows, _least_squares(rows, choices), steered)
     start, fitting = _start(rows, choices), _fitting(choices)
     solution, regression = minimise_output_error(layout, record, start, fitting, progress=progress)
@@ -261,14 +279,14 @@ def _instrumental(layout: Layout, record: Record, driving: Record, choices: Sett
     windy = layout.predictor.wind and choices.wind != "measured"
     replay = build_replay(layout.model, driving, choices.integration, windy=windy, flowing=layout.predictor.steady)
     rows = apart_from_start(build_regression(layout, record))
-    refined = _with_instruments(layout, driving, rows, replay, choices)
+    rows, refined = _with_instruments(layout, driving, rows, replay, choices)
     for _ in range(TUNING.most_currents if layout.guess else 0):
         assert layout.guess is not None
         moved, parameters = refined.solution.values[-2:], full_parameters(layout, refined.solution.values)
         layout = replace(layout, guess=Guess(to_mps=layout.guess.to_mps + moved, parameters=parameters))
         weighting = replace(choices.weighting, output_weights=_by_residuals(rows, refined))
         rows = apart_from_start(build_regression(layout, record))
-        refined = _with_instruments(layout, driving, rows, replay, replace(choices, weighting=weighting))
+        rows, refined = _with_instruments(layout, driving, rows, replay, replace(choices, weighting=weighting))
         std = np.sqrt(np.diag(refined.solution.covariance)[-2:])
         if (np.abs(refined.solution.values[-2:]) <= TUNING.settled_deviations * std).all():
             break
@@ -282,7 +300,10 @@ def _by_residuals(rows: Rows, refined: Refined) -> tuple[float, ...]:
     return tuple(np.where(variance > 0, variance, variance.max()) ** -1.0) if variance.any() else ()
 
 
-def _with_instruments(layout: Layout, record: Record, rows: Rows, replay: Replay, choices: Settings) -> Refined:
+def _with_instruments(
+    layout: Layout, record: Record, rows: Rows, replay: Replay, choices: Settings
+) -> tuple[Rows, Refined]:
+    """The estimate, and the rows with the samples that each equation used."""
     simulation = InstrumentModel(layout, record, rows, replay, choices.heading, choices.wind)
     start = layout.model.parameters
     if choices.start == "ls":
@@ -291,14 +312,50 @@ def _with_instruments(layout: Layout, record: Record, rows: Rows, replay: Replay
         first = simulation.instruments(start)
     except Diverged as error:
         raise Diverged(f"instruments cannot be simulated from the {choices.start} model: {error}") from None
-    return refine_iv(
-        rows.regression,
-        first,
-        lambda values: simulation.instruments(full_parameters(layout, values)),
-        choices.weighting,
-        prior=_prior(layout, start),
-        most=choices.most_refinements,
-    )
+
+    def refined(some: Rows) -> Refined:
+        return refine_iv(
+            some.regression,
+            first,
+            lambda values: simulation.instruments(full_parameters(layout, values)),
+            choices.weighting,
+            prior=_prior(layout, start),
+            most=choices.most_refinements,
+        )
+
+    if choices.samples == ALL:
+        return rows, refined(rows)
+    own, found = rows, None
+    for _ in range(TUNING.most_choices):
+        parameters = start if found is None else full_parameters(layout, found.solution.values)
+        try:
+            tables = [simulation.table(index, parameters) for index in range(len(record.batches))]
+        except Diverged:
+            break
+        newer = _with_rows(rows, _chosen(layout, rows, tables, choices))
+        if found is not None and np.array_equal(_mask(newer.regression), _mask(own.regression)):
+            break
+        own, found = newer, refined(newer)
+    assert found is not None  # instruments from the start were simulated above
+    return own, found
+
+
+def _chosen(layout: Layout, rows: Rows, tables: Sequence[Table], choices: Settings) -> Mask:
+    apart = choices.weighting.mean == "batch" or choices.weighting.blocks == "batch"
+    return chosen_rows(layout, rows, tables, worst=choices.worst, by_batch=apart)
+
+
+def _with_rows(rows: Rows, chosen: Mask) -> Rows:
+    return replace(rows, regression=replace(rows.regression, chosen=None if chosen.all() else chosen))
+
+
+def _mask(regression: Regression) -> Mask:
+    return np.ones(regression.y.shape, dtype=bool) if regression.chosen is None else regression.chosen
+
+
+def _whole(regression: Regression) -> Integers | slice:
+    """Rows that every equation uses."""
+    return slice(None) if regression.chosen is None else np.flatnonzero(regression.chosen.all(axis=1))
 
 
 def _prior(layout: Layout, start: Array) -> Prior:
@@ -345,6 +402,7 @@ def _estimate(
         warnings=(
             *layout.notes,
             *_row_notes(rows),
+            *sample_notes(residuals),
             *refined.warnings,
             *solution.warnings,
             *faint_notes(solution.null_space),
@@ -358,17 +416,20 @@ def _estimate(
 
 def _statistics(regression: Regression, solution: Solution, left_out: int) -> Residuals:
     used = regression.Phi.any(axis=2) | (solution.residuals != 0)  # output error has zeros where nothing is measured
+    used = used & _mask(regression)
     count = np.maximum(used.sum(axis=0), 1)
     eps = np.where(used, solution.residuals - solution.residuals.sum(axis=0) / count, 0.0)
     joined = (np.diff(regression.step_of) == 1) & (np.diff(regression.batch_of) == 0)
     power = (eps**2).sum(axis=0) / count
-    pairs = (eps[1:] * eps[:-1])[joined]
-    correlation = pairs.mean(axis=0) / np.where(power > 0, power, 1.0) if len(pairs) else np.zeros_like(power)
+    both = joined[:, None] & _mask(regression)[1:] & _mask(regression)[:-1]
+    pairs = np.where(both, eps[1:] * eps[:-1], 0.0).sum(axis=0) / np.maximum(both.sum(axis=0), 1)
+    correlation = pairs / np.where(power > 0, power, 1.0)
     return Residuals(
         outputs=regression.outputs,
         std=np.sqrt(power),
         correlation=correlation,
-        rows=len(regression),
+        rows=int(_mask(regression).any(axis=1).sum()),
+        rows_of=_mask(regression).sum(axis=0),
         left_out=left_out,
         lags=solution.lags,
     )

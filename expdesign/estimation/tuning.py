@@ -17,6 +17,7 @@ class Tuning:
         small_weight: least weight of a parameter that a message names.
         named_parameters: most parameters of a combination that a message names.
         most_refinements: of simulated instruments.
+        most_choices: of equation-wise samples, by the start and by what was estimated.
         most_currents: guesses of an unknown steady current after the first.
         exact_share: of the data's power, which residuals have at least where equations are weighed by them.
         settled_deviations: change of an estimate, in standard deviations, that ends the refinement.
@@ -69,6 +70,7 @@ class Tuning:
     small_weight: float = 0.05
     named_parameters: int = 4
     most_refinements: int = 30
+    most_choices: int = 4
     most_currents: int = 6
     exact_share: float = 1e-12
     settled_deviations: float = 1e-3

@@ -9,10 +9,10 @@ import numpy as np
 
 from expdesign.errors import UnknownName
 from expdesign.estimation.feedback import Feedback
-from expdesign.estimation.regression import Share
+from expdesign.estimation.regression import Integers, Share
 from expdesign.estimation.replay import Steered
 from expdesign.estimation.solve import NullSpace
-from expdesign.values import Array, seal
+from expdesign.values import Array, frozen_set, seal
 from expdesign.vessel import VesselModel
 
 
@@ -24,7 +24,8 @@ class Residuals:
         outputs: names.
         std: (n,) standard deviation, in the unit of a sample-to-sample difference (for "oe": of the output).
         correlation: (n,) with the sample before; -0.5 is measurement noise, +1 is a missing slow effect.
-        rows: samples used.
+        rows: samples used by any equation.
+        rows_of: (n,) samples that each equation uses.
         left_out: samples left out because numbers are missing.
         lags: last lag that the covariance of the estimate counts.
     """
@@ -33,11 +34,15 @@ class Residuals:
     std: Array
     correlation: Array
     rows: int
+    rows_of: Integers
     left_out: int
     lags: int
 
     def __post_init__(self) -> None:
         seal(self, std="n", correlation="n")
+        counts = np.array(self.rows_of, dtype=np.int64)
+        counts.setflags(write=False)
+        frozen_set(self, "rows_of", counts)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -12,7 +12,7 @@ from expdesign.estimation.regression.predictors import (
     build_regression,
     room_for,
 )
-from expdesign.estimation.regression.regression import Integers, Regression, batch_slices, single_output
+from expdesign.estimation.regression.regression import Integers, Mask, Regression, batch_slices, single_output
 from expdesign.estimation.regression.tables import (
     AIR,
     VANE,
@@ -43,6 +43,7 @@ __all__ = [
     "Guess",
     "Integers",
     "Layout",
+    "Mask",
     "Polynomial",
     "Regression",
     "Rows",

@@ -8,16 +8,17 @@ Source: F. Ljungberg, doctoral thesis, Linköping University, (2.14)-(2.21).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from expdesign.errors import InputError
-from expdesign.values import Array, frozen_set, seal
+from expdesign.values import Array, closed, frozen_set, seal
 
 Integers = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -33,6 +34,7 @@ class Regression:
         outputs: names of the n outputs, "y1", "y2" ... when left out.
         heading: (k,) of the ship [rad], by which the covariance knows disturbances that keep their side of the chart
             while the ship turns; None where it is not known.
+        chosen: (k, n) which rows each output uses; None for all.
     """
 
     parameters: tuple[str, ...]
@@ -42,6 +44,7 @@ class Regression:
     step: Integers | None = None
     outputs: tuple[str, ...] = ()
     heading: Array | None = None
+    chosen: Mask | None = None
 
     def __post_init__(self) -> None:
         seal(self, Phi="k n p", y="k n")
@@ -60,6 +63,8 @@ class Regression:
             seal(self, heading="k", Phi="k n p")
             if not np.isfinite(self.heading).all():
                 raise InputError("Regression.heading holds numbers that are not finite; give none")
+        if self.chosen is not None and self.chosen.shape != (k, n):
+            raise InputError(f"Regression.chosen has shape {self.chosen.shape}, expected {(k, n)}")
         frozen_set(self, "batch", batch)
         frozen_set(self, "step", step)
         frozen_set(self, "outputs", self.outputs or tuple(f"y{i + 1}" for i in range(n)))
@@ -78,6 +83,18 @@ class Regression:
         """(k,) sample numbers within the batches."""
         assert self.step is not None  # set at birth
         return self.step
+
+    def at(self, rows: Integers | slice) -> Regression:
+        """Some of its rows."""
+        return replace(
+            self,
+            Phi=closed(self.Phi[rows]),
+            y=self.y[rows],
+            batch=self.batch_of[rows],
+            step=self.step_of[rows],
+            heading=None if self.heading is None else self.heading[rows],
+            chosen=None if self.chosen is None else self.chosen[rows],
+        )
 
     def residuals(self, values: Array) -> Array:
         """(k, n) y - Phi^T theta for parameters (p,)."""

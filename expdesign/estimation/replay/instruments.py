@@ -42,7 +42,7 @@ from expdesign.estimation.regression import (
 from expdesign.estimation.replay.replay import Replay
 from expdesign.signals import Batch, Record
 from expdesign.simulation import to_body
-from expdesign.values import Array, closed, frozen_set
+from expdesign.values import Array, frozen_set
 from expdesign.vessel import NUMPY
 
 HEADINGS = ("measured", "simulated")
@@ -98,6 +98,16 @@ class InstrumentModel:
         return instruments
 
     def _batch(self, index: int, parameters: Array) -> Array:
+        batch, (_, signs) = self.record.batches[index], self.measured[index]
+        ratio = batch.sample_time_s / self.layout.model.time_scale_s
+        return self.layout.rows(self.table(index, parameters), signs, used=_run(self.rows.used[index]), scale=ratio)
+
+    def table(self, index: int, parameters: Array) -> Table:
+        """Signals of a batch that instruments are made from, for a model with all parameters (all,).
+
+        Raises:
+            Diverged: that model is unstable.
+        """
         batch, wind = self.record.batches[index], self.layout.predictor.wind
         blown = wind and self.wind != "measured"
         air_n = instrument_wind(batch, self.wind) if blown else None
@@ -114,10 +124,8 @@ class InstrumentModel:
             u_w, v_w = to_body(instrument_wind(batch, self.wind), psi, NUMPY)
             air = u - u_w, v - v_w
         moved = {"u": u, "v": v, "r": r, "u_q": air[0], "v_q": air[1], "psi": psi}
-        ratio = batch.sample_time_s / self.layout.model.time_scale_s
-        table, signs = self.measured[index]
-        clean = {name: values for name, values in ({**table, **moved}).items() if name != VANE}  # no noise of a vane
-        return self.layout.rows(clean, signs, used=_run(self.rows.used[index]), scale=ratio)
+        table, _ = self.measured[index]
+        return {name: values for name, values in ({**table, **moved}).items() if name != VANE}  # no noise of a vane
 
 
 def apart_from_start(rows: Rows) -> Rows:
@@ -130,16 +138,7 @@ def apart_from_start(rows: Rows) -> Rows:
     later = np.flatnonzero(regression.step_of > 0)
     if not len(later):
         raise NotInformative("instruments need batches of at least three samples")
-    kept = _run(later)
-    shorter = replace(
-        regression,
-        Phi=closed(regression.Phi[kept]),
-        y=regression.y[kept],
-        batch=regression.batch_of[kept],
-        step=regression.step_of[kept],
-        heading=None if regression.heading is None else regression.heading[kept],
-    )
-    return replace(rows, regression=shorter, used=tuple(places[places > 0] for places in rows.used))
+    return replace(rows, regression=regression.at(_run(later)), used=tuple(places[places > 0] for places in rows.used))
 
 
 def _run(places: Integers) -> Integers | slice:

@@ -23,7 +23,7 @@ Source: L. P. Hansen, Econometrica 50 (1982), 1029-1054; H. White, Econometrica 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
@@ -66,6 +66,8 @@ class Uncertainty:
 
 def covariance_of(regression: Regression, weighting: Weighting, parts: Sequence[Part], residuals: Array) -> Uncertainty:
     """The covariance that a weighting asks for, of the estimate from parts with residuals (k, n)."""
+    if regression.chosen is not None:
+        return _by_part(regression, weighting, parts, residuals)
     p, kind = len(regression.parameters), weighting.covariance
     factor = 1.0 if kind == "hc0" else residuals.size / max(1, residuals.size - p)
     if kind == "components":
@@ -73,6 +75,56 @@ def covariance_of(regression: Regression, weighting: Weighting, parts: Sequence[
     terms = _terms(regression, parts, residuals, passes=TUNING.whitening_passes if kind == "hac" else 0)
     P, lags = _summed(terms, weighting, p, len(regression))
     return Uncertainty(factor * P, lags)
+
+
+def _by_part(regression: Regression, weighting: Weighting, parts: Sequence[Part], residuals: Array) -> Uncertainty:
+    """Each part by its own rows; parts are as correlated as their long-run scores on the common timeline are.
+
+    With C the covariance of all scores, and C_o, P_o that of a part by scores and by its own rows, it is D C D^T with
+    the blocks D_o = P_o^(1/2) C_o^(-1/2), which has the blocks P_o and is positive semidefinite.
+    """
+    scores, D = np.zeros((len(regression), len(regression.parameters))), np.zeros((len(regression.parameters),) * 2)
+    found = []
+    for part in parts:
+        rows, columns, outputs = part.system.rows, part.system.columns, part.system.outputs
+        own = regression.at(rows)
+        alone = Regression(
+            parameters=part.system.names,
+            Phi=part.system.Phi,
+            y=part.system.y,
+            batch=own.batch,
+            step=own.step,
+            outputs=tuple(regression.outputs[index] for index in outputs),
+            heading=own.heading,
+        )
+        left = residuals[rows][:, outputs]
+        system = replace(part.system, columns=np.arange(len(columns)), outputs=np.arange(len(outputs)))
+        found.append(covariance_of(alone, weighting, [replace(part, system=system)], left))
+        scores[np.ix_(np.arange(len(scores))[rows], columns)] = by_batch(
+            part.A, np.einsum("knp,kn->kp", part.Z, left), part.system.parts
+        )
+    batch, step = regression.batch_of, regression.step_of
+    lags = automatic_lags(scores, batch, step, kernel=weighting.kernel)
+    C = long_run_covariance(scores, batch, step, lags=lags, kernel=weighting.kernel)
+    for part, own_found in zip(parts, found, strict=True):
+        place = np.ix_(part.system.columns, part.system.columns)
+        D[place] = _root(own_found.covariance) @ _root(C[place], inverse=True)
+    P = D @ C @ D.T
+    for part, own_found in zip(parts, found, strict=True):
+        P[np.ix_(part.system.columns, part.system.columns)] = own_found.covariance
+    warnings = tuple(dict.fromkeys(note for item in found for note in item.warnings))
+    return Uncertainty(P, max((item.lags for item in found), default=0), warnings)
+
+
+def _root(P: Array, *, inverse: bool = False) -> Array:
+    """(p, p) symmetric square root, or its inverse, of a covariance matrix of quantities of any size."""
+    size = np.sqrt(np.diag(P))
+    size = np.where(size > 0, size, 1.0)
+    values, vectors = np.linalg.eigh(P / np.outer(size, size))
+    kept = values > TUNING.unseen * values[-1]
+    roots = np.where(kept, values, 1.0) ** (-0.5 if inverse else 0.5) * kept
+    root = (vectors * roots) @ vectors.T
+    return np.asarray(root / size if inverse else size[:, None] * root)
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,7 +33,7 @@ class Solution:
     Attributes:
         values: (p,) estimate.
         covariance: (p, p) of the estimate.
-        residuals: (k, n) one-step residuals; with zero-mean instruments without their mean.
+        residuals: (k, n) one-step residuals; with zero-mean instruments without their mean. Zero in rows not chosen.
         lags: last lag that a kernel of the covariance counts, 0 where there is none.
         null_space: what the data cannot see.
         warnings: one sentence each.
@@ -101,9 +101,13 @@ def solve(equations: Equations, instruments: Array) -> Solution:
     equations = _fitting(equations, instruments)
     parts = _parts(equations, instruments, exogenous=instruments is regression.Phi)
     values, residuals = np.zeros(len(regression.parameters)), np.array(regression.y)
+    if regression.chosen is not None:
+        residuals[~regression.chosen] = 0.0
     for part in parts:
         theta, left = part.solved(weighting.mean)
-        values[part.system.columns], residuals[:, part.system.outputs] = theta, left
+        values[part.system.columns] = theta
+        rows = np.arange(len(residuals))[part.system.rows]
+        residuals[np.ix_(rows, part.system.outputs)] = left
     found = joined([part.found for part in parts])
     said = covariance_of(regression, weighting, parts, residuals)
     return Solution(
@@ -160,6 +164,8 @@ def _check(regression: Regression, weighting: Weighting) -> None:
     if weighting.blocks == "batch" and weighting.mean == "complete":
         raise InputError("instrument blocks per batch need their mean subtracted per batch, found 'complete'")
     batches = len(np.unique(regression.batch_of))
+    if regression.chosen is not None and weighting.batch_weights:
+        raise InputError("batch_weights need equations that use all samples, found equation-wise ones")
     for what, weights, count in (
         ("batch_weights", weighting.batch_weights, batches),
         ("output_weights", weighting.output_weights, len(regression.outputs)),

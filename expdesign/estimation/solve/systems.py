@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
+from expdesign.errors import NotInformative
 from expdesign.estimation.regression import Integers, Regression, batch_slices, subtract_mean
 from expdesign.estimation.solve.null_space import NullSpace, null_space
 from expdesign.estimation.solve.weighting import Weighting
@@ -24,16 +25,18 @@ class System:
 
     Attributes:
         names: of the parameters.
+        rows: of the regression that its outputs use.
         columns, outputs: places in the regression.
         Phi: (k, n, p) regressors.
         varying: (k, n, p) the same without the mean that is subtracted from instruments.
         size: (p,) norm of that; infinite where it is constant to working precision.
         y: (k, n).
-        batch: (k,) batch numbers.
+        batch: (k,) batch numbers of its rows.
         parts: rows of each batch.
     """
 
     names: tuple[str, ...]
+    rows: Integers | slice
     columns: Integers
     outputs: Integers
     Phi: Array
@@ -44,8 +47,8 @@ class System:
     parts: list[slice]
 
     def cut(self, whole: Array) -> Array:
-        """(k, n, p) of this part from (k, all, all)."""
-        return _cut(whole, self.outputs, self.columns)
+        """(k, n, p) of this part from (all, all, all)."""
+        return _cut(whole[self.rows], self.outputs, self.columns)
 
 
 def occupied(rows: Array) -> Array:
@@ -55,31 +58,41 @@ def occupied(rows: Array) -> Array:
 
 
 def split(regression: Regression, uses: Array, mean: str) -> tuple[System, ...]:
-    """Parts that share neither parameters nor outputs; `uses` (n, p) is nonzero where a parameter acts on an output."""
+    """Parts that share neither parameters nor outputs; `uses` (n, p) is nonzero where a parameter acts on an output.
+
+    Raises:
+        NotInformative: a part uses no rows.
+    """
     held = (uses > 0).astype(int)
     count, labels = scipy.sparse.csgraph.connected_components(held.T @ held, directed=False)
     columns = [np.flatnonzero(labels == label) for label in range(count)]
-    parts = batch_slices(regression.batch_of)
-    return tuple(
-        _system(regression, places, np.flatnonzero(held[:, places].any(axis=1)), mean, parts) for places in columns
-    )
+    return tuple(_system(regression, places, np.flatnonzero(held[:, places].any(axis=1)), mean) for places in columns)
 
 
-def _system(regression: Regression, columns: Integers, outputs: Integers, mean: str, parts: list[slice]) -> System:
-    Phi = _cut(regression.Phi, outputs, columns)
-    varying = subtract_mean(Phi, regression.batch_of, mean)
+def _system(regression: Regression, columns: Integers, outputs: Integers, mean: str) -> System:
+    rows: Integers | slice = slice(None)
+    if regression.chosen is not None:
+        rows = np.flatnonzero(regression.chosen[:, outputs].all(axis=1))
+        if len(outputs) and not len(rows):
+            names = tuple(regression.parameters[index] for index in columns)
+            equations = ", ".join(regression.outputs[index] for index in outputs)
+            raise NotInformative(f"no sample is left for {equations}, which {', '.join(names)} need", parameters=names)
+    batch = regression.batch_of[rows]
+    Phi = _cut(regression.Phi[rows], outputs, columns)
+    varying = subtract_mean(Phi, batch, mean)
     size = _norm(varying)
     size[size <= 1e-11 * _norm(Phi)] = np.inf
     return System(
         names=tuple(regression.parameters[index] for index in columns),
+        rows=rows,
         columns=columns,
         outputs=outputs,
         Phi=Phi,
         varying=varying,
         size=size,
-        y=regression.y[:, outputs],
-        batch=regression.batch_of,
-        parts=parts,
+        y=regression.y[rows][:, outputs],
+        batch=batch,
+        parts=batch_slices(batch),
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from expdesign.assessment import Assessed
+from expdesign.estimation.equation_wise import sample_notes
 from expdesign.export import words
 from expdesign.export.estimate_page.content import EstimateContent
 from expdesign.export.files import breach_sentences, unstable_warning
@@ -47,7 +48,9 @@ def _fit_sentence(best: Assessed) -> str:
 
 def conditions(content: EstimateContent) -> list[str]:
     """Where the data of the chosen estimate break the excitation condition."""
-    return breach_sentences(content.found.best.breaches, len(content.found.record.batches))
+    best = content.found.best
+    chosen = sample_notes(best.estimate.residuals)
+    return [*chosen, *breach_sentences(best.breaches, len(content.found.record.batches))]
 
 
 def advice(content: EstimateContent) -> list[str]:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
         fit_entries,
         limit_entries,
         parameter_entries,
+        rows_entry,
         steered_entry,
     )
     from expdesign.export.files.known import Known, Purchase, replan_json
@@ -60,6 +61,7 @@ __all__ = [
     "record_csv",
     "recorded_dictionary_json",
     "replan_json",
+    "rows_entry",
     "steered_entry",
     "strict_json",
     "subsets_json",
@@ -91,6 +93,7 @@ if not TYPE_CHECKING:
                 "fit_entries",
                 "limit_entries",
                 "parameter_entries",
+                "rows_entry",
                 "steered_entry",
             ),
             "known": ("Known", "Purchase", "replan_json"),

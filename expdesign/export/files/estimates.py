@@ -116,9 +116,16 @@ def _residual_entry(item: Assessed) -> dict[str, Any]:
         "std": named_finite(found.outputs, found.std),
         "correlation_with_sample_before": named_finite(found.outputs, found.correlation),
         "rows": found.rows,
+        "rows_by_equation": rows_entry(item),
         "left_out": found.left_out,
         "lags_in_covariance": found.lags,
     }
+
+
+def rows_entry(item: Assessed) -> dict[str, int]:
+    """Samples that each equation used."""
+    found = item.estimate.residuals
+    return dict(zip(found.outputs, found.rows_of.tolist(), strict=True))
 
 
 def steered_entry(item: Assessed) -> dict[str, Any]:

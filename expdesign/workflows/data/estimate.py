@@ -19,6 +19,7 @@ from expdesign.export import (
     limit_table,
     parameter_entries,
     parameter_table,
+    rows_entry,
     steered_entry,
     write_files,
 )
@@ -48,6 +49,8 @@ def estimate(
     horizon_s: float | None = None,
     constant: bool = False,
     steered: str = "auto",
+    samples: str = "all",
+    offset_mps: float = 0.0,
     tests: Sequence[Path] = (),
     progress: Progress = silent,
 ) -> Outcome:
@@ -69,6 +72,8 @@ def estimate(
         horizon_s=horizon_s,
         constant=constant,
         steered=steered,
+        samples=samples,
+        offset_mps=offset_mps,
     )
     record = reduced_data(data, ship, velocity=velocity)
     apart = reduced_data(tests, ship, velocity=velocity) if tests else NO_TESTS
@@ -91,6 +96,8 @@ def estimate(
             "--horizon": options.horizon_s,
             "--constant": options.constant,
             "--steered": options.steered,
+            "--samples": options.samples,
+            "--offset": options.offset_mps,
         },
         usual={
             "--velocity": "auto",
@@ -99,6 +106,8 @@ def estimate(
             "--start": "auto",
             "--motion": "continuous",
             "--steered": "auto",
+            "--samples": "all",
+            "--offset": 0.0,
         },
     )
     files = {
@@ -129,6 +138,7 @@ def _estimate_summary(found: Assessment) -> dict[str, object]:
                 "parameters": parameter_entries(item),
                 "fit": fit_entries(item),
                 "samples_used": item.estimate.residuals.rows,
+                "samples_used_by_equation": rows_entry(item),
                 "steered": steered_entry(item),
                 "warnings": len(estimate_warnings(found, item)),
             }
@@ -146,16 +156,24 @@ def _estimate_tables(found: Assessment) -> tuple[TextTable, ...]:
     disturbances = disturbance_table(found)
     if disturbances[1]:
         tables.append(("Current and wind, with standard deviations", disturbances))
-    if any(batch.steered is not None for batch in found.record.batches):
+    steered = any(batch.steered is not None for batch in found.record.batches)
+    residuals = [item.estimate.residuals for item in found.methods]
+    if steered or any((own.rows_of < own.rows).any() for own in residuals):
         tables.append(("Samples used", _used_samples(found)))
     return tuple(TextTable(title=title, header=header, rows=tuple(rows)) for title, (header, rows) in tables)
 
 
 def _used_samples(found: Assessment) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Header and rows: samples used by each method, those marked as steered, and what became of these."""
+    """Header and rows: samples used by each method and equation, those marked as steered, what became of these."""
     rows: list[tuple[str, ...]] = [
-        (item.method.name, str(item.estimate.residuals.rows), str(steered.samples), STEERED_WORDS[steered.treatment])
+        (
+            item.method.name,
+            str(item.estimate.residuals.rows),
+            ", ".join(f"d{name}/dt {count}" for name, count in rows_entry(item).items()),
+            str(steered.samples),
+            STEERED_WORDS[steered.treatment] if steered.samples else "",
+        )
         for item in found.methods
         for steered in (item.estimate.steered,)
     ]
-    return ("method", "samples used", "marked as steered", "treatment of these"), rows
+    return ("method", "samples used", "by equation", "marked as steered", "treatment of these"), rows
