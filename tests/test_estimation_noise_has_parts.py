@@ -6,8 +6,9 @@ import scipy
 
 from estimation_case import CALM_CURRENT, NOMINAL, TRUE, commands, measured, record
 from expdesign.estimation.methods import estimate
-from expdesign.estimation.noise.components import Components, Slow, filtered, fit_components, score_covariance
+from expdesign.estimation.noise.components import Components, Fitted, Slow, filtered, fit_components, score_covariance
 from expdesign.estimation.noise.components import _expected as expected_periodogram
+from expdesign.estimation.noise.coupled import Coupled, coupled_covariance, fit_coupled
 from expdesign.estimation.noise.timeline import stretches
 from expdesign.estimation.regression.predictors import build_layout, build_regression
 from expdesign.estimation.regression.regression import single_output
@@ -122,6 +123,62 @@ def test_variances_known_from_few_batches_widen_intervals_as_students_t() -> Non
     scores = score_covariance([W], level[:, None], [fitted], parts)
     factor = widening(np.diag(scores.blocks[0][0]), scores.doubts[0])
     np.testing.assert_allclose(factor, scipy.stats.t.ppf(0.975, n) / scipy.stats.norm.ppf(0.975), rtol=0.01)
+
+
+def coupled_steps(count: int, rng: np.random.Generator) -> np.ndarray:
+    """(count, 2, 2) of a ship whose yaw rate pushes her aside."""
+    A = np.tile([[0.6, -1.5], [0.02, 0.85]], (count, 1, 1))
+    return A * rng.uniform(0.97, 1.03, (count, 1, 1))
+
+
+def carried(A: np.ndarray) -> np.ndarray:
+    """(count + 1, 2, count, 2) errors of simulated states by forces in every step."""
+    result = np.zeros((len(A) + 1, 2, len(A), 2))
+    for k, step in enumerate(A):
+        result[k + 1] = np.tensordot(step, result[k], 1)
+        result[k + 1, :, k] += np.eye(2)
+    return result
+
+
+def test_forces_led_back_by_the_adjoint_give_the_covariance_of_the_simulations_errors() -> None:
+    """Any sum of errors, free of the first state: W^T (R + L D L^T) W, written out."""
+    rng, count = np.random.default_rng(51), 40
+    heading, A = np.cumsum(rng.normal(scale=0.2, size=count)), coupled_steps(40, rng)
+    W = rng.normal(size=(count + 1, 2, 3))
+    adjoint = W.copy()
+    for k in range(count - 1, -1, -1):
+        adjoint[k] += A[k].T @ adjoint[k + 1]
+    W[0] -= adjoint[0]
+    variances, common = rng.uniform(0.5, 2.0, (2, PARTS)), np.array([[1.0, 0.4], [0.4, 1.0]])
+    known = np.zeros((2 * PARTS,) * 2)
+    noise = Coupled(variances=variances, slow=SLOW, common=common, misfit=np.zeros(2), uncertainty=known)
+    parts = stretches(np.zeros(count, dtype=np.int64), np.arange(count), heading)
+    sensed = np.einsum("kna,knb->nab", W, W)
+    P, doubt = coupled_covariance(adjoint[1:], sensed, noise, parts)
+    shape = np.array([explicit(index, heading) for index in range(PARTS)])
+    shape[1] = 0.0
+    roots = np.sqrt(variances)
+    D = np.einsum("oi,qi,oq,ikl->kolq", roots, roots, common, shape).reshape(2 * count, -1)
+    led = np.einsum("koa,komq->mqa", W, carried(A)).reshape(2 * count, -1)
+    np.testing.assert_allclose(P, led.T @ D @ led + np.einsum("n,nab->ab", variances[:, 1], sensed), rtol=1e-9)
+    np.testing.assert_array_equal(doubt, 0.0)
+
+
+def test_small_forces_are_found_beside_the_sensor_noise_of_another_output() -> None:
+    """The noise of a yaw rate is in the next sway, five times as large as the force there."""
+    rng, count = np.random.default_rng(52), 4000
+    A, sensor, force = coupled_steps(count, rng), np.array([0.02, 0.1]), np.array([0.03, 0.01])
+    e, d = sensor * rng.normal(size=(count + 1, 2)), force * rng.normal(size=(count, 2))
+    eps = d + e[1:] - np.einsum("kab,kb->ka", A, e[:-1])
+    parts = stretches(np.zeros(count, dtype=np.int64), np.arange(count))
+    found = fit_coupled(eps, A, parts, [Fitted(*np.zeros((2, count, 0)))] * 2)
+    error = (found.variances[:, :2] - np.stack([force**2, sensor**2], axis=1)).ravel()
+    places = [0, 1, found.variances.shape[1], found.variances.shape[1] + 1]
+    std = np.sqrt(np.diag(found.uncertainty))[places]
+    assert (np.abs(error) < 5 * std).all(), error / std
+    assert std[0] < 0.15 * force[0] ** 2  # by itself, sway knows its force to 60 % only
+    assert found.variances[:, 2:].sum() < 0.05 * force[0] ** 2
+    assert (found.misfit < TUNING.spectrum_misfit).all()
 
 
 def test_noise_of_other_shape_is_noticed_and_noise_of_these_parts_is_not() -> None:

@@ -407,7 +407,6 @@ def _estimate(
             *solution.warnings,
             *faint_notes(solution.null_space),
             *feedback_notes(feedback),
-            *_memory_notes(method, residuals),
         ),
         steered=steered,
         feedback=feedback,
@@ -433,19 +432,6 @@ def _statistics(regression: Regression, solution: Solution, left_out: int) -> Re
         left_out=left_out,
         lags=solution.lags,
     )
-
-
-def _memory_notes(method: Method, residuals: Residuals) -> Sequence[str]:
-    """That intervals of output error are too short where unmeasured forces act on the motion, not only on sensors."""
-    long = np.abs(residuals.correlation) > max(TUNING.remembered, TUNING.clear_deviations / np.sqrt(residuals.rows))
-    if method.solver != "oe" or not long.any():
-        return []
-    outputs = ", ".join(name for name, there in zip(residuals.outputs, long, strict=True) if there)
-    return [
-        f"Errors of the simulated {outputs} last from sample to sample: forces act that nobody measured. Intervals of "
-        "output error are then too short; in simulated trials in wandering currents 95 % intervals held the truth in "
-        "87 to 96 of 100. Those of instrumental variables hold."
-    ]
 
 
 def _row_notes(rows: Rows) -> Sequence[str]:

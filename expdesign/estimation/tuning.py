@@ -35,8 +35,6 @@ class Tuning:
         covariance_steps: how many such steps the covariance takes as long as.
         loading_samples, compiling_samples: how many samples a step could do while libraries are loaded, and while a
             stage is compiled.
-        remembered: correlation of successive residuals of output error from which they have a memory.
-        clear_deviations: standard deviations by which such a correlation is clearly not chance.
         slowest_convergence: least ratio of successive expected decreases that the progress told counts on.
         settled_cost: expected decrease of the cost, in squared standard deviations, that ends the last horizons.
         rough_cost: the same for earlier horizons.
@@ -47,6 +45,7 @@ class Tuning:
         spectrum_iterations: of reweighted non-negative least squares.
         spectrum_misfit: Bartlett's statistic at 1 % (Kolmogorov's distribution).
         least_left: share of a part of the noise that parameters leave in residuals at a frequency, at least.
+        memory_doublings: how far the memory of a slow part may be from the found one, standard deviation of log2.
         least_freedom: degrees of freedom that a variance is taken to have at least.
         rounding: expected periodogram of a part with unit variance below which it is rounding errors.
         long_gap_samples: missing samples in a row after which the noise starts again.
@@ -88,8 +87,6 @@ class Tuning:
     covariance_steps: float = 4.0
     loading_samples: float = 7e4
     compiling_samples: float = 7e3
-    remembered: float = 0.2
-    clear_deviations: float = 4.0
     slowest_convergence: float = 1.5
     settled_cost: float = 1e-4
     rough_cost: float = 0.1
@@ -101,6 +98,7 @@ class Tuning:
     spectrum_iterations: int = 12
     spectrum_misfit: float = 1.628
     least_left: float = 0.05
+    memory_doublings: float = 1.0
     least_freedom: float = 2.0
     rounding: float = 1e-9
     long_gap_samples: int = 500

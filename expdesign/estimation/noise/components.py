@@ -34,14 +34,17 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from expdesign.estimation.noise.timeline import Stretch, Turn
 from expdesign.estimation.regression import Integers
 from expdesign.estimation.tuning import TUNING
 from expdesign.values import Array
 
+WHITE, SENSOR = 0, 1
+"""Places of the quick parts among the variances; slow ones follow."""
 MEMORIES = 2.0 ** np.arange(1, 11)
-"""Of the slow parts [samples]; a quarter of the longest stretch at most, and one that lasts for ever."""
+"""Of the slow parts [samples]; as long as the longest stretch at most, and one that lasts for ever."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +68,7 @@ class Components:
         variances: (2 + m,) white, sensor, slow.
         slow: the m slow parts.
         misfit: Bartlett's statistic.
-        uncertainty: (2 + m, 2 + m) covariance of the variances, zero for parts that are not there.
+        uncertainty: (2 + m, 2 + m) covariance of the variances; see `directions_of`.
     """
 
     variances: Array
@@ -95,15 +98,26 @@ def fit_components(residuals: Array, parts: Sequence[Stretch], by: Sequence[Fitt
         parts: `stretches`; without headings there are no turning parts.
         by: what the estimate took from each output's noise; () for noise of which nothing was taken.
     """
-    slow = _slow_parts(parts)
-    shapes = _shapes(parts, slow)
-    left = [_less(shapes, parts, slow, own) for own in by] or [shapes] * residuals.shape[1]
+    slow = slow_parts(parts)
+    left = left_shapes(parts, slow, by or [nothing_taken(len(residuals))] * residuals.shape[1])
     return [_fitted(column, parts, own, slow) for column, own in zip(residuals.T, left, strict=True)]
 
 
-def _slow_parts(parts: Sequence[Stretch]) -> tuple[Slow, ...]:
+def nothing_taken(rows: int) -> Fitted:
+    """Of the noise in so many rows."""
+    return Fitted(*np.zeros((2, rows, 0)))
+
+
+def left_shapes(parts: Sequence[Stretch], slow: tuple[Slow, ...], by: Sequence[Fitted]) -> list[list[Array]]:
+    """Expected periodograms (2 + m, f) of each output and stretch, for parts of unit variance."""
+    shapes = _shapes(parts, slow)
+    return [_less(shapes, parts, slow, own) for own in by]
+
+
+def slow_parts(parts: Sequence[Stretch]) -> tuple[Slow, ...]:
+    """Slow parts that noise may have in stretches so long; those of the chart only where headings are known."""
     longest = max(part.samples for part in parts)
-    memories = MEMORIES[longest / 4 >= MEMORIES].tolist()
+    memories = MEMORIES[longest >= MEMORIES].tolist()
     turns = any(part.turn is not None and np.ptp(part.turn) > TUNING.rounding for part in parts)
     ship, chart = [Slow(memory) for memory in (*memories, np.inf)], [Slow(memory, turning=True) for memory in memories]
     return (*ship, *chart) if turns else tuple(ship)
@@ -157,19 +171,18 @@ def _fitted(eps: Array, parts: Sequence[Stretch], expected: Sequence[Array], slo
         return Components(variances, slow, 0.0, np.zeros((len(variances),) * 2))
     binned_power, binned_shapes, count = _binned(frequency, ordinates / power, shapes)
     cost = np.inf
-    for places, penalty in _alternatives(slow, len(frequency)):
+    for places, penalty in alternatives(slow, len(frequency)):
         found, own_cost = _most_likely(binned_power, binned_shapes[places], count)
         if own_cost + penalty < cost:
             variances[:], cost = 0.0, own_cost + penalty
             variances[places] = power * found
-    level = variances @ shapes
-    ratio = ordinates / np.maximum(level, 1e-12 * level.max())
-    return Components(
-        variances, slow, _misfit(frequency, ratio), power**2 * _uncertainty(variances / power, binned_shapes, count)
-    )
+    own = binned_shapes / np.maximum((variances / power) @ binned_shapes, 1e-300)
+    uncertainty = covariance_along(directions_of(variances / power, slow), (own * count) @ own.T)
+    misfit = misfit_of(frequency, ordinates, variances @ shapes)
+    return Components(variances, slow, misfit, power**2 * uncertainty)
 
 
-def _alternatives(slow: Sequence[Slow], ordinates: int) -> list[tuple[Integers, float]]:
+def alternatives(slow: Sequence[Slow], ordinates: int) -> list[tuple[Integers, float]]:
     """Parts that noise may consist of, and what they must earn: no slow ones, those of the ship, those of the chart."""
     quick = np.arange(2)
     kinds = [2 + np.flatnonzero([part.turning == kind for part in slow]) for kind in (False, True)]
@@ -177,22 +190,40 @@ def _alternatives(slow: Sequence[Slow], ordinates: int) -> list[tuple[Integers, 
     return [(quick, 0.0), *((np.append(quick, kind), earned) for kind in kinds if len(kind))]
 
 
-def _uncertainty(variances: Array, shapes: Array, count: Array) -> Array:
-    """Covariance of variances (2 + m,), by Fisher's information of Whittle's likelihood; zero for parts not there."""
+def covariance_along(directions: tuple[Array, Array], information: Array) -> Array:
+    """Covariance (q, q) of variances with this information (q, q) that are wrong in these `directions` only."""
+    T, before = directions
+    own = T.T @ information @ T + np.diag(before)
+    size = np.sqrt(np.diag(own))
+    size[size == 0] = 1.0
+    return np.asarray(T @ (np.linalg.pinv(own / np.outer(size, size), hermitian=True) / np.outer(size, size)) @ T.T)
+
+
+def directions_of(variances: Array, slow: Sequence[Slow]) -> tuple[Array, Array]:
+    """How variances (2 + m,) may be wrong: directions (2 + m, d), and what is known about each beforehand (d,).
+
+    The parts that are there may be larger or smaller, and slow ones may have the memory of their neighbours: what lasts
+    long is known much worse than by the size of a part whose memory is given.
+    """
     there = np.flatnonzero(variances)
-    own = shapes[there] / (variances @ shapes)
-    size = np.sqrt((own**2) @ count)
-    result = np.zeros((len(variances),) * 2)
-    information = (own * count) @ own.T / np.outer(size, size)
-    result[np.ix_(there, there)] = np.linalg.pinv(information, hermitian=True) / np.outer(size, size)
-    return result
+    columns, before = list(np.eye(len(variances))[there]), [0.0] * len(there)
+    for place in there[there > SENSOR].tolist():
+        turning = slow[place - 2].turning
+        ends = [other for other in (place - 1, place, place + 1) if 0 <= other - 2 < len(slow)]
+        ends = [other for other in ends if slow[other - 2].turning == turning]
+        if len(ends) > 1:
+            column = np.zeros(len(variances))
+            column[[ends[0], ends[-1]]] = np.array([-1.0, 1.0]) * variances[place] / (ends[-1] - ends[0])
+            columns.append(column)
+            before.append(TUNING.memory_doublings**-2.0)
+    return np.reshape(columns, (-1, len(variances))).T, np.array(before)
 
 
 def filtered(index: int, slow: Sequence[Slow], W: Array, turn: Turn | None = None) -> Array:
     """(t, p) covariance matrix of a part, with unit variance, times W (t, p), under headings exp(i psi) (t,)."""
-    if index == 0:
+    if index == WHITE:
         return W
-    if index == 1:
+    if index == SENSOR:
         result = 2.0 * W
         result[1:] -= W[:-1]
         result[:-1] -= W[1:]
@@ -237,33 +268,58 @@ def score_covariance(
         fitted: the parts of each output.
         parts: `stretches`.
     """
-    common = _correlation(residuals, fitted)
+    variances = np.array([item.variances for item in fitted])
+    doubted = np.array([np.diag(item.uncertainty) > 0 for item in fitted])
+    blocks, units = sums_of_parts(W, variances, fitted[0].slow, _common(residuals, variances), parts, doubted)
+    doubts = [np.einsum("ip,ij,jp->p", own, item.uncertainty, own) for own, item in zip(units, fitted, strict=True)]
+    return Scores(blocks, doubts)
+
+
+def sums_of_parts(
+    W: Sequence[Array],
+    variances: Array,
+    slow: Sequence[Slow],
+    common: Array,
+    parts: Sequence[Stretch],
+    doubted: NDArray[np.bool_],
+) -> tuple[list[list[Array]], list[Array]]:
+    """Covariances (p_o, p_o') of sum W_o eps_o, and what each part adds to variances if its own is one (2 + m, p_o).
+
+    Args:
+        W: (k, p_o) for each output.
+        variances: (n, 2 + m) of each output's parts.
+        slow: the m slow parts.
+        common: (n, n) correlation of the outputs' parts.
+        parts: `stretches`.
+        doubted: (n, 2 + m) parts without variance whose own sums are asked for all the same.
+    """
     blocks = [[np.zeros((a.shape[1], b.shape[1])) for b in W] for a in W]
-    unit = [np.zeros((len(fitted[0].variances), a.shape[1])) for a in W]
+    units = [np.zeros((variances.shape[1], a.shape[1])) for a in W]
     for part in parts:
         wide = [part.spread(item[part.rows]) for item in W]
-        for index in range(len(fitted[0].variances)):
-            scale = np.sqrt([item.variances[index] for item in fitted])
-            for o in np.flatnonzero(scale).tolist():
-                turned = filtered(index, fitted[o].slow, wide[o], part.turn)
-                unit[o][index] += np.einsum("kp,kp->p", wide[o], turned)
+        for index, scale in enumerate(np.sqrt(variances.T)):
+            for o in np.flatnonzero((scale > 0) | doubted[:, index]).tolist():
+                turned = filtered(index, slow, wide[o], part.turn)
+                units[o][index] += np.einsum("kp,kp->p", wide[o], turned)
                 for other in np.flatnonzero(scale[: o + 1] * common[o, : o + 1]).tolist():
                     blocks[other][o] += scale[o] * scale[other] * common[o, other] * (wide[other].T @ turned)
     for o in range(len(W)):
         for other in range(o):
             blocks[o][other] = blocks[other][o].T
-    doubts = [np.einsum("ip,ij,jp->p", own, item.uncertainty, own) for own, item in zip(unit, fitted, strict=True)]
-    return Scores(blocks, doubts)
+    return blocks, units
 
 
-def _correlation(residuals: Array, fitted: Sequence[Components]) -> Array:
-    """(n, n) correlation that all parts share, positive semidefinite."""
-    level = np.ones(len(fitted[0].variances))
-    level[1] = 2.0
-    roots = np.sqrt([item.variances for item in fitted])
-    explained = np.einsum("oi,i,qi->oq", roots, level, roots)
-    moments = residuals.T @ residuals / len(residuals)
-    found = np.clip(np.divide(moments, explained, out=np.zeros_like(moments), where=explained > 0), -1.0, 1.0)
+def _common(residuals: Array, variances: Array) -> Array:
+    """(n, n) correlation that parts with variances (n, 2 + m) share."""
+    level, roots = np.ones(variances.shape[1]), np.sqrt(variances)
+    level[SENSOR] = 2.0
+    moments, explained = residuals.T @ residuals / len(residuals), (roots * level) @ roots.T
+    return as_correlation(np.divide(moments, explained, out=np.zeros_like(moments), where=explained > 0))
+
+
+def as_correlation(found: Array) -> Array:
+    """(n, n) with ones on the diagonal, none above one, positive semidefinite."""
+    found = np.clip(found, -1.0, 1.0)
     np.fill_diagonal(found, 1.0)
     least = float(np.linalg.eigvalsh(found)[0])
     return found if least >= 0 else np.asarray((found - least * np.eye(len(found))) / (1.0 - least))
@@ -310,13 +366,18 @@ def _pairs(weights: Array) -> Array:
 
 def _binned(frequency: Array, ordinates: Array, shapes: Array) -> tuple[Array, Array, Array]:
     """Mean ordinates (b,) and shapes (2 + m, b) of bins, and how many frequencies each holds, half for zero."""
-    least = frequency[frequency > 0].min()
+    means, weight = in_bins(frequency, np.vstack([ordinates, shapes]))
+    return means[0], means[1:], weight
+
+
+def in_bins(frequency: Array, rows: Array) -> tuple[Array, Array]:
+    """Means (q, b) of rows (q, f) in bins of frequency (f,), and how many frequencies each bin holds, half for zero."""
+    least = frequency[frequency > 0].min(initial=np.pi)
     position = np.log(np.maximum(frequency, least) / least) / np.log(1.001 * np.pi / least)
     place = np.where(frequency > 0, 1 + (TUNING.spectrum_bins * position).astype(int), 0)
     _, place, count = np.unique(place, return_inverse=True, return_counts=True)
-    means = [np.bincount(place, row) / count for row in (ordinates, *shapes)]
     weight = np.asarray(np.bincount(place, np.where(frequency > 0, 1.0, 0.5)), dtype=float)
-    return means[0], np.array(means[1:]), weight
+    return np.array([np.bincount(place, row) / count for row in rows]), weight
 
 
 def _most_likely(ordinates: Array, shapes: Array, count: Array) -> tuple[Array, float]:
@@ -329,8 +390,9 @@ def _most_likely(ordinates: Array, shapes: Array, count: Array) -> tuple[Array, 
     return variances, float(count @ (np.log(expected) + ordinates / expected))
 
 
-def _misfit(frequency: Array, ratio: Array) -> float:
+def misfit_of(frequency: Array, ordinates: Array, level: Array) -> float:
     """Bartlett's statistic: how far the cumulated ratio of periodogram to expectation is from a straight line."""
+    ratio = ordinates / np.maximum(level, 1e-12 * level.max())
     order = np.argsort(frequency, kind="stable")
     rising = np.cumsum(ratio[order[frequency[order] > 0]])
     if not rising[-1] > 0:

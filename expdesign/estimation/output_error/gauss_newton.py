@@ -188,16 +188,6 @@ def stretchwise(rows: Array) -> Array:
     return rows.transpose(1, 0, 2, 3).reshape(count, length * n, q)
 
 
-def slopes_of(problem: Problem, values: Array, states: Array) -> tuple[Array, Array]:
-    """Derivatives where data exist, zero elsewhere; zero for constants that are not estimated."""
-    Jv, Js = problem.compiled.sensitivities(problem.local(values), states)
-    unseen = ~np.isfinite(problem.measured)
-    Jv[unseen], Js[unseen] = 0.0, 0.0
-    if not problem.constant:
-        Jv[..., problem.parameters :] = 0.0
-    return Jv, Js
-
-
 def _step(normal: Normal, damping: float) -> Move:
     """Damped step with the starts eliminated; the damping is relative to each diagonal entry."""
     inverse = np.linalg.inv(regular(normal.S) * (1 + damping * np.eye(normal.S.shape[1])))

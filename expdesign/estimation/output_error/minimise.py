@@ -10,8 +10,7 @@ Measured wind acts through the b-frame velocity of the air, ship velocity minus 
 The method is Levenberg and Marquardt with exact derivatives. It starts from least squares with a short horizon, which
 grows by `TUNING.horizon_growth` until it is the requested one: a poor model diverges over a whole run, but not over few
 samples. Of long data only some stretches are compared until then, and of fast ones only some samples. The weight of an
-output is the inverse residual variance of the stage before. The covariance uses the derivatives of the simulation and
-is robust to coloured residuals, as for IV.
+output is the inverse residual variance of the stage before.
 
 Source: L. Ljung, System Identification, 2nd ed. (1999), 4.2 and 9.3; H. G. Bock, in Modelling of Chemical Reaction
 Systems (1981), 102-125, for the stretches.
@@ -19,12 +18,13 @@ Systems (1981), 102-125, for the stretches.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from expdesign.conventions import OUTPUTS
-from expdesign.estimation.output_error.gauss_newton import minimised, regular, slopes_of, stretchwise
+from expdesign.estimation.output_error.covariance import with_covariance
+from expdesign.estimation.output_error.gauss_newton import minimised
 from expdesign.estimation.output_error.problem import (
     Excerpt,
     Fitting,
@@ -35,8 +35,8 @@ from expdesign.estimation.output_error.problem import (
     sample_time,
 )
 from expdesign.estimation.output_error.steps import Steps
-from expdesign.estimation.regression import Integers, Layout, Regression
-from expdesign.estimation.solve import Solution, Weighting, solve_ls
+from expdesign.estimation.regression import Layout, Regression
+from expdesign.estimation.solve import Solution
 from expdesign.estimation.tuning import TUNING
 from expdesign.progress import Progress, silent
 from expdesign.signals import Record
@@ -78,7 +78,7 @@ def minimise_output_error(
         found = dict(zip(problem.places, starts, strict=True))
         weights = 1.0 / _at_least(_variance(problem, values, starts), record, layout)
     steps.end()
-    return _with_covariance(problem, layout, values, starts)
+    return with_covariance(problem, layout, record, values, starts)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,52 +140,3 @@ def _variance(problem: Problem, values: Array, starts: Array) -> Array:
     residuals = problem.residuals(problem.states(values, starts))
     count = np.isfinite(problem.measured).sum(axis=(0, 1)) - len(starts)
     return np.asarray((residuals**2).sum(axis=(0, 1)) / np.maximum(count, 1))
-
-
-def _with_covariance(problem: Problem, layout: Layout, values: Array, starts: Array) -> tuple[Solution, Regression]:
-    """A last Gauss-Newton step as a least-squares problem, for its covariance and null space.
-
-    Its regressors are the derivatives, projected on the complement of the starts (Frisch and Waugh).
-    """
-    states = problem.states(values, starts)
-    Jv, Js = slopes_of(problem, values, states)
-    residuals, root = problem.residuals(states), np.sqrt(problem.weights)[:, None]
-    by_v, by_s = stretchwise(Jv * root), stretchwise(Js * root)
-    near = np.linalg.solve(regular(by_s.swapaxes(1, 2) @ by_s), by_s.swapaxes(1, 2) @ by_v)
-    slopes = Jv - Js @ near
-    batch, step, order = _places(problem)
-    n = Js.shape[3]
-    Phi, names = _columns(slopes, problem, layout)
-    regression = Regression(
-        parameters=names,
-        Phi=Phi.reshape(-1, n, Phi.shape[-1])[order],
-        y=residuals.reshape(-1, n)[order],
-        batch=batch,
-        step=step,
-        outputs=layout.model.outputs,
-    )
-    last = solve_ls(regression, Weighting(output_weights=tuple(problem.weights / problem.weights.max())))
-    return replace(last, values=values[: len(names)] + last.values), regression
-
-
-def _places(problem: Problem) -> tuple[Integers, Integers, Integers]:
-    """Batch, sample and index of every row with a measured output, in the order of time; the others are zero in it."""
-    length, count = problem.measured.shape[:2]
-    whole = np.isfinite(problem.measured).any(axis=2).ravel()
-    batch = np.broadcast_to(problem.batch, (length, count)).ravel()
-    step = (problem.first + np.arange(length)[:, None]).ravel()
-    order = np.lexsort((step, batch))
-    order = order[whole[order]]
-    return batch[order], step[order], order
-
-
-def _columns(slopes: Array, problem: Problem, layout: Layout) -> tuple[Array, tuple[str, ...]]:
-    """Parameters, then the constants of each run."""
-    p, outputs = problem.parameters, layout.model.outputs
-    if not problem.constant:
-        return slopes[..., :p], layout.parameters
-    runs = int(problem.batch.max()) + 1
-    member = (problem.batch[:, None] == np.arange(runs)).astype(float)
-    own = np.einsum("lwns,wb->lwnbs", slopes[..., p:], member).reshape(*slopes.shape[:3], -1)
-    names = [f"constant d{name}/dt of run {number + 1}" for number in range(runs) for name in outputs]
-    return np.concatenate([slopes[..., :p], own], axis=3), (*layout.parameters, *names)

@@ -10,6 +10,7 @@ from expdesign.estimation.regression.predictors import (
     Rows,
     build_layout,
     build_regression,
+    headings_at,
     room_for,
 )
 from expdesign.estimation.regression.regression import Integers, Mask, Regression, batch_slices, single_output
@@ -56,6 +57,7 @@ __all__ = [
     "build_regression",
     "drive_of",
     "heading_of",
+    "headings_at",
     "in_depth",
     "inputs_of",
     "lift",

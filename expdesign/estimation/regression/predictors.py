@@ -282,7 +282,7 @@ def build_regression(layout: Layout, record: Record) -> Rows:
         batch=np.repeat(np.arange(len(used)), [len(rows) for rows in used]),
         step=np.concatenate(used),
         outputs=layout.model.outputs,
-        heading=_headings(record, used),
+        heading=headings_at(record, used),
     )
     return Rows(regression=regression, used=tuple(used), left_out=left_out)
 
@@ -292,8 +292,8 @@ def room_for(rows: int, outputs: int, columns: int) -> Array:
     return np.empty((outputs, columns, rows)).transpose(2, 0, 1)
 
 
-def _headings(record: Record, used: Sequence[Integers]) -> Array | None:
-    """(k,) heading at the rows used; the last one measured where one is missing, None where a batch has none."""
+def headings_at(record: Record, used: Sequence[Integers]) -> Array | None:
+    """(k,) heading at samples used of each batch, the last one measured where one is missing; None where all are."""
     found = []
     for batch, places in zip(record.batches, used, strict=True):
         heading = heading_of(batch)

@@ -60,12 +60,14 @@ class Slopes:
         samples: of the stretches.
         active: (w,) places of those stretches.
         by_values, by_start: (l, w, n, q) by the values, (l, w, n, n) by the start.
+        steps: (l, w, n, n) of these states by the ones a sample before; none of the first sample.
     """
 
     samples: slice
     active: Integers
     by_values: Array
     by_start: Array
+    steps: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +121,11 @@ class Compiled:
         (length, count, n), counts = states.shape, self.stretches.counts
         carried = np.zeros((count, n, values.shape[1])), np.tile(np.eye(n), (count, 1, 1))
         yield Slopes(
-            samples=slice(0, 1), active=np.arange(count), by_values=carried[0][None], by_start=carried[1][None]
+            samples=slice(0, 1),
+            active=np.arange(count),
+            by_values=carried[0][None],
+            by_start=carried[1][None],
+            steps=np.zeros((1, count, n, n)),
         )
         first = 1
         while first < length:
@@ -127,15 +133,14 @@ class Compiled:
             samples = slice(first, min(first + max(1, self.block[2] // len(active)), length))
             before = slice(first - 1, samples.stop - 1)
             A, B = self._steps(values[active], states[before, active], self.stretches.drive[before, active])
-            by_values, by_start = B, A  # both become sums in place
+            by_values, by_start = B, A.copy()  # both become sums in place
             was = carried[0][active], carried[1][active]
             for index in range(len(A)):
-                step = A[index].copy()
-                by_values[index] += step @ was[0]
-                by_start[index] = step @ was[1]
+                by_values[index] += A[index] @ was[0]
+                by_start[index] = A[index] @ was[1]
                 was = by_values[index], by_start[index]
             carried[0][active], carried[1][active] = was
-            yield Slopes(samples=samples, active=active, by_values=by_values, by_start=by_start)
+            yield Slopes(samples=samples, active=active, by_values=by_values, by_start=by_start, steps=A)
             first = samples.stop
 
     def _steps(self, values: Array, states: Array, drive: Array) -> tuple[Array, Array]:

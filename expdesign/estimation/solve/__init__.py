@@ -2,6 +2,7 @@
 
 from expdesign.estimation.solve.null_space import Direction, NullSpace
 from expdesign.estimation.solve.refine import Prior, Refined, refine_iv
+from expdesign.estimation.solve.sandwich import changing_variance, misfit_note, widening
 from expdesign.estimation.solve.solution import Solution, Weighting, solve_iv, solve_ls
 from expdesign.estimation.solve.weighting import BLOCKS
 
@@ -13,7 +14,10 @@ __all__ = [
     "Refined",
     "Solution",
     "Weighting",
+    "changing_variance",
+    "misfit_note",
     "refine_iv",
     "solve_iv",
     "solve_ls",
+    "widening",
 ]

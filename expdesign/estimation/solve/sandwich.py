@@ -73,7 +73,7 @@ def covariance_of(regression: Regression, weighting: Weighting, parts: Sequence[
     if kind == "components":
         return _by_components(regression, weighting, parts, residuals, factor)
     terms = _terms(regression, parts, residuals, passes=TUNING.whitening_passes if kind == "hac" else 0)
-    P, lags = _summed(terms, weighting, p, len(regression))
+    P, lags = _summed(terms, parts, weighting, p, len(regression))
     return Uncertainty(factor * P, lags)
 
 
@@ -132,12 +132,12 @@ class _Terms:
     """Terms whose sum is the error of a part's estimate.
 
     Attributes:
-        part: the part.
-        when: where its rows stand.
+        A: (p, p) of each batch, see `Part`.
+        when: where the rows stand.
         zeta, n: (t, n, p) and (t, n) instruments and residuals, perhaps whitened.
     """
 
-    part: Part
+    A: Sequence[Array]
     when: Timeline
     zeta: Array
     n: Array
@@ -160,25 +160,41 @@ class _Terms:
         return np.where(clear, np.divide(changing, even, out=np.ones_like(even), where=even > 0), 1.0)
 
     def _led(self, scores: Array) -> Array:
-        return by_batch([self.part.A[owner] for owner in self.when.owner], scores, batch_slices(self.when.batch))
+        return by_batch([self.A[owner] for owner in self.when.owner], scores, batch_slices(self.when.batch))
 
 
 def _terms(regression: Regression, parts: Sequence[Part], residuals: Array, *, passes: int) -> list[_Terms]:
     when = timeline(regression.batch_of, regression.step_of)
     return [
-        _Terms(part, when, *white_parts(part.Z, residuals[:, part.system.outputs], when, passes=passes))
+        _Terms(part.A, when, *white_parts(part.Z, residuals[:, part.system.outputs], when, passes=passes))
         for part in parts
     ]
 
 
-def _summed(terms: Sequence[_Terms], weighting: Weighting, p: int, rows: int) -> tuple[Array, int]:
-    """(p, p) long-run covariance of the terms, and the last lag counted."""
+def changing_variance(Z: Array, A: Array, residuals: Array, batch: Integers, step: Integers) -> Array:
+    """Factors (p,) of the standard deviations of A sum Z eps for variances that change with Z; 1 unless clear.
+
+    Args:
+        Z: (k, n, p).
+        A: (p, p).
+        residuals: (k, n) eps.
+        batch, step: (k,) batch number and sample number within the batch.
+    """
+    when = timeline(batch, step)
+    zeta, n = white_parts(Z, residuals, when, passes=1)
+    return np.sqrt(_Terms([A] * len(np.unique(batch)), when, zeta, n).white_factor())
+
+
+def _summed(
+    terms: Sequence[_Terms], parts: Sequence[Part], weighting: Weighting, p: int, rows: int
+) -> tuple[Array, int]:
+    """(p, p) long-run covariance of the terms of each part, and the last lag counted."""
     when, kind = terms[0].when, weighting.covariance
     scores = np.zeros((len(when.batch), p))
     lags = 0 if weighting.lags is None or kind in ("hc0", "hc1") else weighting.lags
-    for item in terms:
+    for item, part in zip(terms, parts, strict=True):
         own = item.influences()
-        scores[:, item.part.system.columns] = own
+        scores[:, part.system.columns] = own
         if weighting.lags is None and kind not in ("hc0", "hc1"):
             lags = max(lags, automatic_lags(own, when.batch, when.step, kernel=weighting.kernel))
     P = long_run_covariance(scores, when.batch, when.step, lags=lags, kernel=weighting.kernel)
@@ -195,8 +211,8 @@ def _by_components(
     fitted = fit_components(residuals, places, by)
     P, widened = _exact(by, columns, residuals, fitted, places, len(regression.parameters))
     scale, odd = np.ones((2, len(P)))
-    for item in _terms(regression, parts, residuals, passes=1):
-        system = item.part.system
+    for part, item in zip(parts, _terms(regression, parts, residuals, passes=1), strict=True):
+        system = part.system
         scale[system.columns] = np.sqrt(item.white_factor())
         odd[system.columns] = max(fitted[output].misfit for output in system.outputs)
     scale *= widened
@@ -204,21 +220,21 @@ def _by_components(
     doubtful = odd > TUNING.spectrum_misfit
     if not doubtful.any():
         return Uncertainty(P, 0)
-    robust, lags = _summed(
-        _terms(regression, parts, residuals, passes=TUNING.whitening_passes), weighting, len(P), len(regression)
-    )
+    terms = _terms(regression, parts, residuals, passes=TUNING.whitening_passes)
+    robust, lags = _summed(terms, parts, weighting, len(P), len(regression))
     own, other = np.diag(P), factor * np.diag(robust)
     larger = doubtful & (other > own) & (own > 0)
     scale = np.sqrt(np.divide(other, own, out=np.ones_like(own), where=larger))
-    names = [
-        name for name, item in zip(regression.outputs, fitted, strict=True) if item.misfit > TUNING.spectrum_misfit
-    ]
-    return Uncertainty(P * np.outer(scale, scale), lags, (_misfit_note(names),) if names else ())
+    misfit = np.array([item.misfit for item in fitted])
+    notes = (misfit_note(regression.outputs, misfit),) if (misfit > TUNING.spectrum_misfit).any() else ()
+    return Uncertainty(P * np.outer(scale, scale), lags, notes)
 
 
-def _misfit_note(outputs: Sequence[str]) -> str:
+def misfit_note(outputs: Sequence[str], misfit: Array) -> str:
+    """A warning that names the outputs with a large misfit (n,)."""
+    names = [name for name, own in zip(outputs, misfit, strict=True) if own > TUNING.spectrum_misfit]
     return (
-        f"Sensor noise and slow disturbances do not explain the colour of the residuals of {', '.join(outputs)}. The "
+        f"Sensor noise and slow disturbances do not explain the colour of the residuals of {', '.join(names)}. The "
         "standard deviations are the larger of two estimates, and less reliable than usual."
     )
 

@@ -1,0 +1,201 @@
+"""The covariance of output error: from the noise that one step of the linearised ship leaves.
+
+Errors r of the simulation last, as forces that nobody measured are integrated by the ship. Their one-step residuals
+
+    eps(k) = r(k + 1) - A(k) r(k)
+
+are the noise of `noise.coupled`, whose colour does not depend on the ship's. The estimate errs by sum W(k) r(k) with
+W = G^-1 J^T Q, the derivatives J of the simulation, their weights Q and G = J^T Q J. Written with the adjoint,
+
+    sum W(k) r(k) = sum lambda(k + 1) eps(k),    lambda(k) = W(k) + lambda(k + 1) A(k)
+
+without any share of the first error, as the first velocities are estimated: lambda(0) = 0. Output error is therefore an
+estimate by instruments lambda, and its covariance that of such an estimate: exact for noise of sensors and for forces,
+white or slow, with the variances that explain eps best. Standard deviations grow where the variance changes, and by
+Student's t, as in `solve.sandwich`. Where the parts do not explain eps, they are those that a kernel finds in r where
+these are larger.
+
+Source: the adjoint after A. E. Bryson and Y.-C. Ho, Applied Optimal Control (1975), 2.2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from expdesign.estimation.noise import Fitted, Stretch, coupled_covariance, fit_coupled, stretches
+from expdesign.estimation.output_error.gauss_newton import regular
+from expdesign.estimation.output_error.problem import Problem
+from expdesign.estimation.regression import Integers, Layout, Regression, headings_at
+from expdesign.estimation.solve import Solution, Weighting, changing_variance, misfit_note, solve_ls, widening
+from expdesign.estimation.tuning import TUNING
+from expdesign.signals import Record
+from expdesign.values import Array
+
+
+def with_covariance(
+    problem: Problem, layout: Layout, record: Record, values: Array, starts: Array
+) -> tuple[Solution, Regression]:
+    """A last Gauss-Newton step as a least-squares problem, with its covariance and null space.
+
+    Its regressors are the derivatives, projected on the complement of the starts (Frisch and Waugh).
+    """
+    simulated, seen = _linearised(problem, values, starts), np.isfinite(problem.measured)
+    batch, step, order = _places(problem)
+    slopes, names = _columns(simulated.slopes, problem, layout)
+    n = len(layout.model.outputs)
+    regression = Regression(
+        parameters=names,
+        Phi=(slopes * seen[..., None]).reshape(-1, n, len(names))[order],
+        y=np.where(seen, simulated.errors, 0.0).reshape(-1, n)[order],
+        batch=batch,
+        step=step,
+        outputs=layout.model.outputs,
+    )
+    weighting = Weighting(output_weights=tuple(problem.weights / problem.weights.max()), covariance="hc0")
+    last = solve_ls(regression, weighting)
+    P, misfit = _propagated(problem, layout, record, simulated)
+    if (misfit > TUNING.spectrum_misfit).any():
+        robust = solve_ls(regression, replace(weighting, covariance="hac"))
+        own, other = np.diag(P), np.diag(robust.covariance)
+        scale = np.sqrt(np.divide(np.maximum(own, other), own, out=np.ones_like(own), where=own > 0))
+        P = P * np.outer(scale, scale)
+        note = misfit_note(regression.outputs, misfit)
+        last = replace(last, lags=robust.lags, warnings=(*last.warnings, note))
+    return replace(last, values=values[: len(names)] + last.values, covariance=P), regression
+
+
+@dataclass(frozen=True, eq=False)
+class _Linearised:
+    """A simulation around the estimate.
+
+    Attributes:
+        errors: (L, W, n) measured minus simulated; where nothing was measured, on the line between neighbours.
+        slopes: (L, W, n, q) its derivatives, without what the starts make up for.
+        steps: (L - 1, W, n, n) A, of each next state by the state.
+    """
+
+    errors: Array
+    slopes: Array
+    steps: Array
+
+
+def _linearised(problem: Problem, values: Array, starts: Array) -> _Linearised:
+    states = problem.states(values, starts)
+    length, count, n = states.shape
+    local = problem.local(values)
+    slopes, by_start = np.zeros((length, count, n, local.shape[1])), np.zeros((length, count, n, n))
+    steps = np.zeros((length, count, n, n))
+    for part in problem.compiled.slope_blocks(local, states):
+        at = (part.samples, part.active)
+        slopes[at], by_start[at], steps[at] = part.by_values, part.by_start, part.steps
+    if not problem.constant:
+        slopes = slopes[..., : problem.parameters]
+    weights = np.where(np.isfinite(problem.measured), problem.weights, 0.0)
+    weighted = by_start * weights[..., None]
+    S, C = (np.einsum("lwna,lwnb->wab", weighted, rows, optimize=True) for rows in (by_start, slopes))
+    near = np.linalg.solve(regular(S), C)
+    for sample in range(length):  # in place: these are the largest arrays
+        slopes[sample] -= by_start[sample] @ near
+    return _Linearised(_between_readings(problem, states), slopes, steps[1:])
+
+
+def _between_readings(problem: Problem, states: Array) -> Array:
+    """(L, W, n) errors; where nothing was measured they are free, as nothing is compared there."""
+    errors = problem.measured - states
+    for stretch, output in np.argwhere(~np.isfinite(errors).all(axis=0)):
+        column = errors[:, stretch, output]
+        seen = np.flatnonzero(np.isfinite(column))
+        column[:] = np.interp(np.arange(len(column)), seen, column[seen]) if len(seen) else 0.0
+    return errors
+
+
+def _propagated(problem: Problem, layout: Layout, record: Record, simulated: _Linearised) -> tuple[Array, Array]:
+    """(p, p) covariance by the noise of one step, and (n,) how little that explains each output's."""
+    A, slopes = simulated.steps, _columns(simulated.slopes, problem, layout)[0]
+    lead = slopes * np.where(np.isfinite(problem.measured), problem.weights, 0.0)[..., None]
+    sensed = np.einsum("lwna,lwnb->nab", lead, lead, optimize=True)
+    G = _inverse(np.tensordot(1.0 / problem.weights, sensed, 1))
+    for sample in range(len(lead) - 2, -1, -1):  # summed backwards to lambda, in place
+        lead[sample] += A[sample].swapaxes(1, 2) @ lead[sample + 1]
+    rows = _steps_of(problem, record)
+    Z, errors, owner = rows.of(lead[1:]), simulated.errors, _owners(problem, layout)
+    eps = rows.of(errors[1:] - np.einsum("lwab,lwb->lwa", A, errors[:-1]))
+    by = []
+    for output in range(len(layout.model.outputs)):
+        own = np.flatnonzero(owner == output)
+        Phi = slopes[1:, :, output, own] - np.einsum("lwb,lwbp->lwp", A[:, :, output], slopes[:-1, :, :, own])
+        by.append(Fitted(rows.of(Phi), Z[:, output] @ G[:, own]))
+    found = fit_coupled(eps, rows.of(A), rows.parts, by)
+    P, doubt = coupled_covariance(Z @ G, G @ sensed @ G, found, rows.parts)
+    changing = changing_variance(Z, G, eps, rows.batch, rows.step)
+    scale = changing * widening(np.diag(P), doubt)
+    return P * np.outer(scale, scale), found.misfit
+
+
+def _inverse(information: Array) -> Array:
+    size = np.sqrt(np.diag(information))
+    return np.asarray(np.linalg.inv(information / np.outer(size, size)) / np.outer(size, size))
+
+
+def _owners(problem: Problem, layout: Layout) -> Integers:
+    """(p,) the output in whose equation each parameter stands, and each constant."""
+    model = layout.model
+    equations = [model.terms[model.names.index(name)].equation for name in layout.parameters]
+    found = [model.outputs.index(name) for name in equations]
+    runs = int(problem.batch.max()) + 1 if problem.constant else 0
+    return np.array([*found, *(list(range(len(model.outputs))) * runs)])
+
+
+@dataclass(frozen=True, eq=False)
+class _Steps:
+    """From every sample to the next of the same stretch, one stretch after the other.
+
+    Attributes:
+        there: (W, L - 1) whether a stretch lasts so long.
+        batch, step: (k,) of each row.
+        parts: where rows stand in time.
+    """
+
+    there: NDArray[np.bool_]
+    batch: Integers
+    step: Integers
+    parts: list[Stretch]
+
+    def of(self, values: Array) -> Array:
+        """(k, ...) from (L - 1, W, ...)."""
+        return np.asarray(values.swapaxes(0, 1)[self.there])
+
+
+def _steps_of(problem: Problem, record: Record) -> _Steps:
+    counts = problem.compiled.stretches.counts
+    there = np.arange(len(problem.measured) - 1) < counts[:, None] - 1
+    stretch, sample = np.nonzero(there)
+    batch, step = problem.batch[stretch], problem.first[stretch] + sample
+    heading = headings_at(record, [step[batch == number] for number in range(len(record.batches))])
+    return _Steps(there, batch, step, stretches(batch, step, heading))
+
+
+def _places(problem: Problem) -> tuple[Integers, Integers, Integers]:
+    """Batch, sample and index of every row with a measured output, in the order of time; the others are zero in it."""
+    length, count = problem.measured.shape[:2]
+    whole = np.isfinite(problem.measured).any(axis=2).ravel()
+    batch = np.broadcast_to(problem.batch, (length, count)).ravel()
+    step = (problem.first + np.arange(length)[:, None]).ravel()
+    order = np.lexsort((step, batch))
+    order = order[whole[order]]
+    return batch[order], step[order], order
+
+
+def _columns(slopes: Array, problem: Problem, layout: Layout) -> tuple[Array, tuple[str, ...]]:
+    """Parameters, then the constants of each run."""
+    p, outputs = problem.parameters, layout.model.outputs
+    if not problem.constant:
+        return slopes, layout.parameters
+    runs = int(problem.batch.max()) + 1
+    member = (problem.batch[:, None] == np.arange(runs)).astype(float)
+    own = np.einsum("lwns,wb->lwnbs", slopes[..., p:], member).reshape(*slopes.shape[:3], -1)
+    names = [f"constant d{name}/dt of run {number + 1}" for number in range(runs) for name in outputs]
+    return np.concatenate([slopes[..., :p], own], axis=3), (*layout.parameters, *names)
