@@ -259,3 +259,63 @@ def mine(
         draws=draws,
         seed=seed,
     )
+
+
+@command("monitor")
+def monitor(
+    data: Annotated[
+        list[Path],
+        typer.Argument(metavar="DATA.csv ...", help="Records of operation in the order of time; - reads a stream."),
+    ],
+    vessel: Annotated[Path, typer.Option("--vessel", metavar="VESSEL.toml", help="The model of the ship.")],
+    reference: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--reference",
+            metavar="FILE ...",
+            help="Records of a time in which the ship was as known, in weather as usual.",
+        ),
+    ] = None,
+    learn: Annotated[
+        float,
+        typer.Option("--learn-h", metavar="H", help="Hours of the data that are the reference, where none is given."),
+    ] = 24.0,
+    false_alarms: Annotated[
+        float, typer.Option("--false-alarm-days", metavar="D", help="Days between false alarms, on average.")
+    ] = 30.0,
+    size: Annotated[
+        float,
+        typer.Option(
+            "--size",
+            metavar="S",
+            help="Relative change of parameters, thrust and inertia that matters; alarms are tuned to it.",
+        ),
+    ] = 0.1,
+    every: Annotated[
+        float, typer.Option("--every-s", metavar="T", help="Seconds of a stream between looks at it.")
+    ] = 3600.0,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on from the state that an earlier watch left in the same folder.")
+    ] = False,
+    velocity: Velocity = "auto",
+    out: OutByData = None,
+) -> Asked:
+    """Watch a ship in operation: whether it still is the ship of its model, what changed, since when, by how much.
+
+    Writes monitor.json, monitor.html, monitor-state.json and, after an alarm, since-change.csv for diagnose.
+
+    Example: expdesign monitor voyage.csv --vessel ship.toml --learn-h 6
+    """
+    return ask(
+        "monitor",
+        data,
+        out,
+        vessel=vessel,
+        reference=reference or (),
+        learn_h=learn,
+        false_alarm_days=false_alarms,
+        size=size,
+        every_s=every,
+        velocity=velocity,
+        resume=resume,
+    )

@@ -18,16 +18,20 @@ are ignored and noted. Every error is a `FileError` with the rows concerned.
 from expdesign.records.file import COLUMNS
 from expdesign.records.labels import LABEL_SOURCES, row_labels
 from expdesign.records.load import load_records
+from expdesign.records.pieces import STREAM, Piece, pieces
 from expdesign.records.pose import VELOCITY_METHODS, Fix, central_difference, last_fix, smoothed_velocity
 
 __all__ = [
     "COLUMNS",
     "LABEL_SOURCES",
+    "STREAM",
     "VELOCITY_METHODS",
     "Fix",
+    "Piece",
     "central_difference",
     "last_fix",
     "load_records",
+    "pieces",
     "row_labels",
     "smoothed_velocity",
 ]

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from expdesign.workflows.data.estimate import estimate
     from expdesign.workflows.data.indices import indices
     from expdesign.workflows.data.mine import mine
+    from expdesign.workflows.data.monitor import monitor
     from expdesign.workflows.explanations.explain import explain
     from expdesign.workflows.outcome import Outcome, TextTable
     from expdesign.workflows.planning.check_routes import check_routes
@@ -47,6 +48,7 @@ __all__ = [
     "indices",
     "measured",
     "mine",
+    "monitor",
     "plan",
     "plan_problem",
     "planned",
@@ -67,6 +69,7 @@ if not TYPE_CHECKING:
             "data.estimate": ("estimate",),
             "data.indices": ("indices",),
             "data.mine": ("mine",),
+            "data.monitor": ("monitor",),
             "explanations.explain": ("explain",),
             "outcome": ("Outcome", "TextTable"),
             "planning.check_routes": ("check_routes",),

@@ -1,24 +1,27 @@
 """One file of measured data: header, cells, columns, clock, ranges."""
 
 from expdesign.records.file.cells import FIRST_ROW, read_cells
-from expdesign.records.file.choice import Inputs, mistyped
+from expdesign.records.file.choice import Inputs, Sources, choose_columns, mistyped
 from expdesign.records.file.clock import Clock, read_clock
 from expdesign.records.file.names import COLUMNS, LABEL, PLANNED, STEERED, is_input
 from expdesign.records.file.ranges import check_ranges
-from expdesign.records.file.table import Table, read_table
+from expdesign.records.file.table import MISSING, Table, read_table
 from expdesign.records.file.wind import check_wind, relative_wind
 
 __all__ = [
     "COLUMNS",
     "FIRST_ROW",
     "LABEL",
+    "MISSING",
     "PLANNED",
     "STEERED",
     "Clock",
     "Inputs",
+    "Sources",
     "Table",
     "check_ranges",
     "check_wind",
+    "choose_columns",
     "is_input",
     "mistyped",
     "read_cells",

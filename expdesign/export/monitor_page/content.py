@@ -1,0 +1,232 @@
+"""A watch over a ship in operation as JSON, tables and sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from expdesign.export.files import finite, strict_json
+from expdesign.monitoring import TUNING, Alarm, Calibration, Change, State
+from expdesign.values import Array
+
+ALIKE = 0.95
+"""Correlation of scores from which two changes count as not distinguishable."""
+CLEAR, LARGE = 4.0, 0.5
+"""Standard errors and sizes by which the ship of the reference differs from its file, that are told."""
+MUCH_LEFT_OUT = 0.05
+HOUR = 3600.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Moment:
+    """Of the watch, after a piece of the data.
+
+    Attributes:
+        time_s: end of the piece [s].
+        statistic: the largest sum in the piece.
+        value, std: (m,) size of each change, had it alone happened when the watch began, and its standard error.
+    """
+
+    time_s: float
+    statistic: float
+    value: Array
+    std: Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MonitorContent:
+    """The values that page and file show.
+
+    Attributes:
+        vessel: its name.
+        changes: watched for.
+        calibration: of the reference, which ended at `reference_s` [s].
+        state: at the end.
+        limit: threshold of the statistic.
+        false_alarm_days: average time between false alarms that it is for [d].
+        alarms: as raised, in order; each again when settled.
+        moments: of the watch.
+        left_out_rows: of the data, which lacked a number.
+        notes: on the data.
+        command, version: to reproduce it.
+    """
+
+    vessel: str
+    changes: tuple[Change, ...]
+    calibration: Calibration
+    reference_s: float
+    state: State
+    limit: float
+    false_alarm_days: float
+    alarms: tuple[Alarm, ...]
+    moments: tuple[Moment, ...]
+    left_out_rows: int
+    notes: tuple[str, ...]
+    command: str
+    version: str
+
+    @property
+    def found(self) -> tuple[Alarm, ...]:
+        """One for each change that was noticed, as it is known at the end."""
+        latest = {alarm.time_s: alarm for alarm in self.alarms}
+        if self.state.alarm is not None:
+            latest[self.state.alarm.time_s] = self.state.alarm
+        return tuple(latest.values())
+
+
+def hours(time_s: float) -> str:
+    """A time in words."""
+    return f"{time_s / HOUR:.2f} h" if time_s < 100 * HOUR else f"{time_s / HOUR / 24:.1f} d"
+
+
+def told(content: MonitorContent, alarm: Alarm, number: int | None = None) -> str:
+    """The size of a change in words."""
+    change = content.changes[alarm.change if number is None else number]
+    return change.told(alarm.value * change.size, alarm.std * change.size)
+
+
+def sentences(content: MonitorContent) -> tuple[str, ...]:
+    """The verdict."""
+    return tuple(_sentences(content))
+
+
+def _sentences(content: MonitorContent) -> Iterator[str]:
+    state, found = content.state, content.found
+    judged_h = state.judged * TUNING.stretch_s / HOUR
+    rate = f"with at most one false alarm in {content.false_alarm_days:g} days on average"
+    if not found:
+        largest = max((moment.statistic for moment in content.moments), default=0.0)
+        yield (
+            f"No alarm in {judged_h:.1f} h: the ship is the one of the reference, {rate}. The largest statistic is "
+            f"{largest:.1f}, the threshold {content.limit:.1f}."
+        )
+    for alarm in found:
+        yield _alarm(content, alarm)
+    if found:
+        yield f"Alarms are raised {rate}. For the cause, give the rows since the change to expdesign diagnose."
+    total = state.judged + state.left_out
+    if total and state.left_out > MUCH_LEFT_OUT * total:
+        yield (
+            f"{100 * state.left_out / total:.0f} % of the data were not judged: their error is beyond what the "
+            "reference shows and looks like no change that is watched for. Weather, waves or a sensor may be others."
+        )
+    yield from _baseline(content)
+
+
+def _alarm(content: MonitorContent, alarm: Alarm) -> str:
+    change = content.changes[alarm.change]
+    text = (
+        f"Since {hours(alarm.since_s)} the ship is another: {change.words} by {told(content, alarm)}. The alarm came "
+        f"at {hours(alarm.time_s)}, with the statistic {alarm.statistic:.1f}."
+    )
+    if alarm.as_likely:
+        others = ", ".join(content.changes[number].words for number in alarm.as_likely)
+        text += f" The data are explained as well by: {others}."
+    if alarm.unexplained > content.limit:
+        text += " More than this one change is needed to explain them."
+    if not alarm.settled:
+        text += " The size is not yet settled."
+    return text
+
+
+def _baseline(content: MonitorContent) -> Iterator[str]:
+    c = content.calibration
+    clear = (np.abs(c.baseline) > CLEAR * c.baseline_std) & (np.abs(c.baseline) > LARGE)
+    off = [(i, content.changes[i]) for i in np.flatnonzero(clear).tolist()]
+    if off:
+        sizes = [(change, c.baseline[i] * change.size, c.baseline_std[i] * change.size) for i, change in off]
+        parts = ", ".join(f"{change.words} {change.told(value, std)}" for change, value, std in sizes)
+        yield f"Already in the reference the ship differs from its file: {parts}. Changes are counted from there."
+
+
+def alike(content: MonitorContent, number: int) -> list[str]:
+    """Changes that this one cannot be told apart from."""
+    row = np.abs(content.calibration.alike[number])
+    watched = content.calibration.watched
+    return [
+        change.words
+        for other, change in enumerate(content.changes)
+        if other != number and watched[other] and row[other] > ALIKE
+    ]
+
+
+def delay_s(content: MonitorContent, number: int) -> float:
+    """Expected time to the alarm after a change of its size [s], in data like the reference."""
+    rate = float(content.calibration.rate[number])
+    return float(np.ceil(2.0 * content.limit / rate)) * TUNING.stretch_s if rate > 0 else float("inf")
+
+
+HEADER = ("change", "size watched for", "alarm after", "since the watch began", "not distinguishable from")
+
+
+def monitor_tables(content: MonitorContent) -> list[tuple[str, ...]]:
+    """A row for each change, under `HEADER`."""
+    last = content.moments[-1] if content.moments else None
+    rows: list[tuple[str, ...]] = []
+    for number, change in enumerate(content.changes):
+        watched = bool(content.calibration.watched[number])
+        since = "\N{EN DASH}"
+        if last is not None and np.isfinite(last.std[number]) and last.std[number] < 1e3:
+            since = change.told(last.value[number] * change.size, last.std[number] * change.size)
+        rows.append(
+            (
+                change.words,
+                change.told(change.size).lstrip("+-"),
+                hours(delay_s(content, number)) if watched else "not watched: the reference tells too little",
+                since,
+                ", ".join(alike(content, number)) if watched else "",
+            )
+        )
+    return rows
+
+
+def monitor_json(content: MonitorContent) -> str:
+    """Everything, with units in the names."""
+    c, state = content.calibration, content.state
+    return strict_json(
+        {
+            "verdict": sentences(content),
+            "vessel": content.vessel,
+            "judged_h": state.judged * TUNING.stretch_s / HOUR,
+            "not_judged_h": state.left_out * TUNING.stretch_s / HOUR,
+            "rows_without_numbers": content.left_out_rows,
+            "threshold": content.limit,
+            "false_alarm_days": content.false_alarm_days,
+            "reference": {
+                "until_s": content.reference_s,
+                "stretches": c.stretches,
+                "noise_std": [finite(value) for value in c.std.tolist()],
+            },
+            "alarms": [_alarm_entry(content, alarm) for alarm in content.found],
+            "changes": [
+                {
+                    "effect": change.effect,
+                    "watched": bool(c.watched[number]),
+                    "size": change.size,
+                    "expected_delay_s": finite(delay_s(content, number)),
+                    "in_reference": float(c.baseline[number] * change.size),
+                    "not_distinguishable_from": alike(content, number),
+                }
+                for number, change in enumerate(content.changes)
+            ],
+            "history": [{"time_s": m.time_s, "statistic": m.statistic} for m in content.moments],
+            "notes": content.notes,
+        }
+    )
+
+
+def _alarm_entry(content: MonitorContent, alarm: Alarm) -> dict[str, object]:
+    change = content.changes[alarm.change]
+    return {
+        "time_s": alarm.time_s,
+        "since_s": alarm.since_s,
+        "statistic": alarm.statistic,
+        "effect": change.effect,
+        "value": alarm.value * change.size,
+        "std": alarm.std * change.size,
+        "in_words": f"{change.words} by {told(content, alarm)}",
+        "as_likely": [content.changes[number].effect for number in alarm.as_likely],
+        "settled": alarm.settled,
+    }

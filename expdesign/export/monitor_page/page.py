@@ -1,0 +1,27 @@
+"""The page of a watch over a ship in operation."""
+
+from __future__ import annotations
+
+from expdesign.export.monitor_page.content import HEADER, MonitorContent, monitor_tables, sentences
+from expdesign.export.monitor_page.figures import estimate_figure, statistic_figure
+from expdesign.export.pages import page_templates
+from expdesign.export.pages.figures import report_style
+from expdesign.monitoring import TUNING
+
+
+def monitor_html(content: MonitorContent) -> str:
+    """One HTML page without any outside reference."""
+    with report_style():
+        figures = {"statistic": statistic_figure(content), "estimate": estimate_figure(content)}
+    return (
+        page_templates("expdesign.export.monitor_page")
+        .get_template("monitor.html")
+        .render(
+            content=content,
+            sentences=sentences(content),
+            header=tuple(name.capitalize() for name in HEADER),
+            rows=monitor_tables(content),
+            figures=figures,
+            stretch_s=TUNING.stretch_s,
+        )
+    )

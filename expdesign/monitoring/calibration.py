@@ -1,0 +1,226 @@
+"""Calibration on a reference: a period in which the ship was as known, in the weather and with the sensors at hand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from expdesign.errors import NotInformative
+from expdesign.monitoring.evidence import STARTS, Grams, Stretches, stretches_of
+from expdesign.monitoring.force import Force, Known, after_gap, after_stretch, judged, likelihood
+from expdesign.monitoring.tuning import TUNING
+from expdesign.values import Array, seal
+
+LEAST_VARIANCE = 1e-14
+"""Of a force that is none."""
+STEPS = np.array([-4.0, -2.0, -1.0, 1.0, 2.0])
+"""By which logarithms of variances and times are changed in a round of the search, to base two."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Calibration:
+    """What a reference tells of noise, of the unmeasured force and of the ship.
+
+    Attributes:
+        std: (4,) standard deviations of the noise of u, v, r and the rate of the heading; infinite where not measured.
+        force: the unmeasured force.
+        baseline: (m,) differences of the ship from its model in the reference, in sizes of the changes.
+        baseline_std: (m,) their standard errors, all free at once, with a prior of one size.
+        inflation: (m,) variance of sums of scores over that of independent stretches, at least one.
+        rate: (m,) information of a stretch, on average, in inverse squared sizes and after inflation.
+        alike: (m, m) correlation of scores: one where two changes cannot be told apart.
+        stretches: number of stretches of the reference.
+        misfit_limit: misfit per measured number beyond which a stretch is not judged.
+    """
+
+    std: Array
+    force: Force
+    baseline: Array
+    baseline_std: Array
+    inflation: Array
+    rate: Array
+    alike: Array
+    stretches: int
+    misfit_limit: float
+
+    def __post_init__(self) -> None:
+        seal(self, std="4", baseline="m", baseline_std="m", inflation="m", rate="m", alike="m m")
+
+    @property
+    def watched(self) -> NDArray[np.bool_]:
+        """(m,) changes that can be told from the uncertainty of the reference itself."""
+        return np.asarray(self.rate * self.stretches >= TUNING.known_within**2)
+
+    @property
+    def common(self) -> float:
+        """The largest inflation of changes that are watched, for comparing them."""
+        return float(self.inflation[self.watched].max())
+
+
+def calibrate(grams: Grams) -> Calibration:
+    """Noise, force and baseline of a reference.
+
+    Noise and the variances of a force that is independent from stretch to stretch have the largest likelihood, by
+    expectation-maximisation. How the force varies from stretch to stretch follows from a search of the likelihood of
+    the filter. Changes have a standard normal prior in units of their sizes.
+
+    Raises:
+        NotInformative: too few stretches.
+
+    Source: N. M. Laird and J. H. Ware, Biometrics 38 (1982), 963-974.
+    """
+    if len(grams) < TUNING.fewest_stretches:
+        raise NotInformative(
+            f"the reference has {len(grams)} stretches of {TUNING.stretch_s:g} s with a usable simulation, expected at "
+            f"least {TUNING.fewest_stretches}"
+        )
+    m = grams.changes
+    std, variance, change = _independent(grams)
+    stretches = stretches_of(grams, std)
+    force = _varying(stretches.less(change), variance)
+    score, information = _filtered(stretches, force)
+    whole = information.sum(axis=0)
+    baseline = np.linalg.solve(whole + np.eye(m), score.sum(axis=0))
+    after = stretches.less(baseline)
+    inflation = _inflation(*_filtered(after, force))
+    own = np.sqrt(np.maximum(np.diag(whole), 1e-300))
+    misfit = _misfits(after, force)
+    middle = float(np.median(misfit))
+    spread = 1.4826 * float(np.median(np.abs(misfit - middle)))
+    return Calibration(
+        std=std,
+        force=force,
+        baseline=baseline,
+        baseline_std=np.sqrt(np.diag(np.linalg.inv(whole + np.eye(m)))),
+        inflation=inflation,
+        rate=np.diag(whole) / inflation / len(grams),
+        alike=whole / np.outer(own, own),
+        stretches=len(grams),
+        misfit_limit=middle + TUNING.misfit_deviations * spread,
+    )
+
+
+def misfit_of(quadratic: float, score: Array, information: Array, count: float) -> float:
+    """Squared error per measured number, in standard deviations, that no change of a common size explains."""
+    explained = np.linalg.solve(information + np.eye(len(score)), score)
+    return float((quadratic - score @ explained) / max(count, 1.0))
+
+
+def _independent(grams: Grams) -> tuple[Array, Array, Array]:
+    """(4,) noise, (q,) variances of the force and (m,) changes, with a force of its own in every stretch."""
+    total = grams.counts.sum(axis=1)
+    error = grams.products[:, :, -1, -1].sum(axis=1)
+    std = np.where(total > 0, np.sqrt(np.maximum(error, 1e-24) / np.maximum(total, 1)), np.inf)
+    m, q = grams.changes, grams.forces
+    own = np.einsum("c,cwii->i", 1.0 / std**2, grams.products)[m + STARTS : m + STARTS + q]
+    variance = np.maximum(grams.counts.sum() / np.maximum(own, 1e-300), LEAST_VARIANCE)
+    change = np.zeros(m)
+    for _ in range(TUNING.iterations):
+        std, variance, change = _improved(grams, total, std, variance)
+    return std, variance, change
+
+
+def _improved(grams: Grams, total: Array, std: Array, variance: Array) -> tuple[Array, Array, Array]:
+    """The same after one step of expectation-maximisation."""
+    m, c = grams.changes, grams.products.shape[-1]
+    whole = np.einsum("c,cwij->wij", 1.0 / std**2, grams.products)
+    nuisance, others = slice(m, c - 1), np.r_[:m, c - 1]
+    inner = whole[:, nuisance, nuisance] + np.diag(np.concatenate([np.full(STARTS, 1e-9), 1.0 / variance]))
+    across = whole[:, nuisance][:, :, others]
+    left = (whole[:, others][:, :, others] - np.swapaxes(across, 1, 2) @ np.linalg.solve(inner, across)).sum(axis=0)
+    change = np.linalg.solve(left[:m, :m] + np.eye(m), left[:m, m])
+    after = np.eye(c)[:, m:]
+    after[:m, -1] = -change
+    own = after.T @ grams.products @ after
+    spread = np.linalg.inv(inner)
+    mean = np.einsum("wij,c,cwj->wi", spread, 1.0 / std**2, own[:, :, :-1, -1])
+    second = spread + mean[:, :, None] * mean[:, None, :]
+    remaining = (
+        own[:, :, -1, -1]
+        - 2.0 * np.einsum("cwi,wi->cw", own[:, :, :-1, -1], mean)
+        + np.einsum("cwij,wij->cw", own[:, :, :-1, :-1], second)
+    )
+    noise = np.where(total > 0, np.sqrt(remaining.sum(axis=1) / np.maximum(total, 1)), np.inf)
+    return noise, np.maximum(np.einsum("wii->i", second)[STARTS:] / len(grams), LEAST_VARIANCE), change
+
+
+def _varying(stretches: Stretches, variance: Array) -> Force:
+    """The force as it varies from stretch to stretch: variances of its quick and slow parts, and the quick time."""
+    part = replace(
+        stretches,
+        time_s=stretches.time_s[: TUNING.searched_stretches],
+        products=stretches.products[: TUNING.searched_stretches],
+        counts=stretches.counts[: TUNING.searched_stretches],
+    )
+    q = len(variance)
+    best = np.log2(np.concatenate([variance / 2, variance / 2, [TUNING.quick_s]]))
+    cost = float(likelihood(part, _force(best, q)))
+    for _ in range(TUNING.search_rounds):
+        tried = best + np.concatenate([step * np.eye(2 * q + 1) for step in STEPS])
+        costs = likelihood(part, _force(tried, q))
+        gains = cost - costs
+        better = [_best_step(gains.reshape(len(STEPS), -1)[:, place]) for place in range(2 * q + 1)]
+        together = best + np.array(better)
+        whole = float(likelihood(part, _force(together, q)))
+        single = int(np.argmin(costs))
+        new, value = (together, whole) if whole <= costs[single] else (tried[single], float(costs[single]))
+        if cost - value < TUNING.search_gain:
+            break
+        best, cost = new, value
+    return _force(best, q)
+
+
+def _best_step(gains: Array) -> float:
+    """The step of one number that gains most, or none."""
+    place = int(np.argmax(gains))
+    return float(STEPS[place]) if gains[place] > 0 else 0.0
+
+
+def _force(logarithms: Array, q: int) -> Force:
+    """Of (..., 2 q + 1) logarithms."""
+    values = np.exp2(logarithms)
+    variance = np.maximum(values[..., : 2 * q], LEAST_VARIANCE)
+    quick = np.broadcast_to(np.clip(values[..., -1:], TUNING.stretch_s / 2, TUNING.slow_s / 4), variance[..., :q].shape)
+    return Force(variance=variance, time_s=np.concatenate([quick, np.full_like(quick, TUNING.slow_s)], axis=-1))
+
+
+def _filtered(stretches: Stretches, force: Force) -> tuple[Array, Array]:
+    """(w, m) scores and (w, m, m) information of changes that were there from the first stretch on."""
+    m = stretches.changes
+    known, taken = Known.nothing(force), np.zeros((force.variance.shape[-1], m))
+    scores, known_of = np.empty((len(stretches), m)), np.empty((len(stretches), m, m))
+    for index, products in enumerate(stretches.products):
+        if index:
+            gap_s = float(stretches.time_s[index] - stretches.time_s[index - 1])
+            known, taken = after_gap(known, force, gap_s), force.memory(gap_s)[:, None] * taken
+        one = judged(products, m, known)
+        scores[index] = one.score - taken.T @ one.force_score
+        cross = one.by_force @ taken
+        known_of[index] = one.information - cross - cross.T + taken.T @ one.force_information @ taken
+        known, taken = after_stretch(known, one), taken + one.gain @ (one.seen[0] - one.seen[1] @ taken)
+    return scores, known_of
+
+
+def _misfits(stretches: Stretches, force: Force) -> Array:
+    """(w,) `misfit_of` every stretch of a reference."""
+    known, found = Known.nothing(force), np.empty(len(stretches))
+    for index, products in enumerate(stretches.products):
+        if index:
+            known = after_gap(known, force, float(stretches.time_s[index] - stretches.time_s[index - 1]))
+        one = judged(products, stretches.changes, known)
+        found[index] = misfit_of(float(one.quadratic), one.score, one.information, float(stretches.counts[index]))
+        known = after_stretch(known, one)
+    return found
+
+
+def _inflation(score: Array, information: Array) -> Array:
+    """(m,) the largest ratio of the variance of sums over blocks to the sum of information, at least one."""
+    known = np.einsum("wii->wi", information)
+    largest = np.ones(score.shape[1])
+    for count in TUNING.block_counts:
+        edges = np.linspace(0, len(score), min(count, len(score)), endpoint=False).astype(int)
+        sums, sizes = np.add.reduceat(score, edges), np.add.reduceat(known, edges)
+        largest = np.maximum(largest, (sums**2).sum(axis=0) / np.maximum(sizes.sum(axis=0), 1e-300))
+    return largest

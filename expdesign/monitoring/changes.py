@@ -1,0 +1,64 @@
+"""Changes of a ship or its sensors that are watched for, with the sizes that matter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from expdesign.diagnosis.model import ExtendedModel
+from expdesign.monitoring.tuning import TUNING
+from expdesign.vessel import stem
+
+EQUATIONS = {"u": "surge", "v": "sway", "r": "yaw"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Change:
+    """One way in which the ship may differ from its model.
+
+    Attributes:
+        effect: key of an effect of the extended model, e.g. "theta:N_r".
+        size: change that matters, in the effect's unit; CUSUM is tuned to it in both directions.
+        unit: of sizes in words: a divisor and what it gives, e.g. (0.01, "%").
+        words: e.g. "parameter N_r".
+    """
+
+    effect: str
+    size: float
+    unit: tuple[float, str]
+    words: str
+
+    def told(self, value: float, std: float | None = None) -> str:
+        """A value in words, e.g. "+12 +- 3 %"."""
+        divisor, name = self.unit
+        spread = "" if std is None else f" ± {abs(std / divisor):.2g}"
+        return f"{value / divisor:+.3g}{spread} {name}"
+
+
+def watched_changes(ship: ExtendedModel, *, size: float = TUNING.relative_size) -> tuple[Change, ...]:
+    """Parameters of the model, inertia by equation, thrust, angles of rudders and azimuths, and the yaw-rate sensor.
+
+    Args:
+        ship: the model with what its file states.
+        size: relative change of parameters, thrust and inertia that matters.
+    """
+    model = ship.model
+    values = dict(zip(model.names, model.parameters.tolist(), strict=True))
+    changes = [
+        Change(effect=f"theta:{name}", size=size * abs(value), unit=(0.01 * value, "%"), words=f"parameter {name}")
+        for name, value in values.items()
+        if value
+    ]
+    changes += [
+        Change(effect=f"inertia:{name}", size=size, unit=(0.01, "%"), words=f"inertia in {EQUATIONS[name]}")
+        for name in model.outputs
+    ]
+    changes.append(Change(effect="gain", size=size, unit=(0.01, "%"), words="thrust, or force of all actuators"))
+    stems = dict.fromkeys(stem(name) for name in model.inputs)
+    changes += [
+        Change(effect=f"offset:{name}", size=TUNING.angle_rad, unit=(1.0, "rad"), words=f"offset of {what} angles")
+        for name, what in (("a", "azimuth"), ("rudder", "rudder"))
+        if name in stems
+    ]
+    if "r" not in ship.derived and "r" in model.outputs:
+        changes.append(Change(effect="gyro", size=TUNING.gyro_share, unit=(0.01, "%"), words="scale of yaw rate"))
+    return tuple(changes)

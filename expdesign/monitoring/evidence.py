@@ -1,0 +1,178 @@
+"""What stretches of data hold: inner products of the sensitivities and the error of their simulations.
+
+A stretch has the error e = X d + S a + F f + noise: of the measured velocities from a simulation of the model, with the
+changes d, the error a of the initial velocities, of which nothing is known, and the unmeasured force f: a steady
+current and steady accelerations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from expdesign.diagnosis.data import cut_windows
+from expdesign.diagnosis.fit import effect_disturbances
+from expdesign.diagnosis.model import ExtendedModel
+from expdesign.diagnosis.motion import (
+    Disturbance,
+    LinearisedMotion,
+    disturbance_of,
+    linearise,
+    responses,
+    simulate_from_measured,
+    start_responses,
+)
+from expdesign.monitoring.changes import Change
+from expdesign.monitoring.tuning import TUNING
+from expdesign.signals import Record
+from expdesign.values import Array, seal
+
+STARTS = 3
+CURRENT = ("current:north", "current:east")
+PER_CURRENT = 1e-3
+"""Difference of a current for its sensitivity [m/s]."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Grams:
+    """Inner products of the sensitivities and the error of w stretches, by channel.
+
+    Attributes:
+        time_s: (w,) beginning of each stretch, since the data began [s].
+        products: (4, w, c, c) of the columns X (m), S (3), F and e, for u, v, r and the rate of the heading.
+        counts: (4, w) measured samples.
+        changes: m.
+    """
+
+    time_s: Array
+    products: Array
+    counts: Array
+    changes: int
+
+    def __post_init__(self) -> None:
+        seal(self, time_s="w", products="4 w c c", counts="4 w")
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    def part(self, stretches: slice) -> Grams:
+        """Some of the stretches."""
+        return replace(
+            self,
+            time_s=self.time_s[stretches],
+            products=self.products[:, stretches],
+            counts=self.counts[:, stretches],
+        )
+
+    @property
+    def forces(self) -> int:
+        """Number of components of the unmeasured force."""
+        return int(self.products.shape[-1] - self.changes - STARTS - 1)
+
+
+def grams_of(ship: ExtendedModel, record: Record, changes: Sequence[Change], *, begins_s: Sequence[float]) -> Grams:
+    """Inner products of all stretches of a record; those whose simulation diverges or with few samples are left out.
+
+    Args:
+        ship: the model with what its file states.
+        record: measured data.
+        changes: watched for.
+        begins_s: time of the first sample of each batch [s].
+
+    Raises:
+        InputError: batches of different sample times.
+    """
+    windows = cut_windows(ship.model, record, longest_s=TUNING.stretch_s)
+    linear = linearise(simulate_from_measured(ship, windows))
+    known = effect_disturbances(linear, [change.effect for change in changes])
+    scale = np.array([change.size for change in changes])
+    moved = responses(linear, [*known, *_forces(linear)])
+    moved[: len(changes)] *= scale[:, None, None, None]
+    columns = np.concatenate([moved[: len(changes)], start_responses(linear), moved[len(changes) :]])
+    error = linear.motion.error
+    seen = np.isfinite(error)
+    columns = np.where(seen, np.concatenate([columns, np.where(seen, error, 0.0)[None]]), 0.0)
+    table = np.moveaxis(columns, (3, 1, 0, 2), (0, 1, 2, 3))  # (4, w, c, s)
+    calm = np.abs(linear.motion.states).max(axis=(1, 2)) < TUNING.largest_speed
+    keep = calm & (seen[..., :STARTS].any(axis=2).sum(axis=1) >= TUNING.fewest_samples)
+    begin_s = np.asarray(begins_s)[windows.batch.astype(int)] + windows.first * windows.step_s
+    products = table[:, keep] @ np.swapaxes(table[:, keep], 2, 3)
+    return Grams(
+        time_s=begin_s[keep],
+        products=products,
+        counts=seen.sum(axis=1).T[:, keep],
+        changes=len(changes),
+    )
+
+
+def joined(parts: Sequence[Grams]) -> Grams:
+    """Stretches of several records as one."""
+    return Grams(
+        time_s=np.concatenate([part.time_s for part in parts]),
+        products=np.concatenate([part.products for part in parts], axis=1),
+        counts=np.concatenate([part.counts for part in parts], axis=1),
+        changes=parts[0].changes,
+    )
+
+
+def _forces(linear: LinearisedMotion) -> list[Disturbance]:
+    """A steady current where a heading is measured, and steady accelerations of the modelled velocities."""
+    motion = linear.motion
+    flows = [
+        disturbance_of(linear, motion.ship.with_effects({key: motion.ship.get(key) + PER_CURRENT}), PER_CURRENT)
+        for key in CURRENT * motion.windows.has_heading
+    ]
+    w, k, n = motion.states.shape
+    pushes = []
+    for axis, name in enumerate("uvr"):
+        if name in motion.ship.model.outputs:
+            force = np.zeros((w, k - 1, n))
+            force[..., axis] = 1.0
+            pushes.append(Disturbance(force=force, sensor=None))
+    return [*flows, *pushes]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Stretches:
+    """What w stretches hold, for a known noise and whatever their initial velocities are.
+
+    Attributes:
+        time_s: (w,) beginning of each stretch [s].
+        products: (w, c, c) inner products of the columns X (m), F (q) and e, in standard deviations of the noise.
+        counts: (w,) measured numbers.
+        changes: m.
+    """
+
+    time_s: Array
+    products: Array
+    counts: Array
+    changes: int
+
+    def __post_init__(self) -> None:
+        seal(self, time_s="w", products="w c c", counts="w")
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    def less(self, change: Array) -> Stretches:
+        """The same with the error of a ship that differs by a change (m,), in sizes."""
+        after = np.eye(self.products.shape[-1])
+        after[: self.changes, -1] = -change
+        return replace(self, products=after.T @ self.products @ after)
+
+
+def stretches_of(grams: Grams, std: Array) -> Stretches:
+    """The stretches for noise with standard deviations (4,) of the channels, infinite where there is none.
+
+    Source: C. R. Rao, Linear Statistical Inference (1973), section 4a, for mixed linear models.
+    """
+    m = grams.changes
+    whole = np.einsum("c,cwij->wij", 1.0 / std**2, grams.products)
+    starts = slice(m, m + STARTS)
+    kept = np.r_[:m, m + STARTS : whole.shape[1]]
+    inner = whole[:, starts, starts] + 1e-9 * np.eye(STARTS)
+    across = whole[:, starts][:, :, kept]
+    left = whole[:, kept][:, :, kept] - np.swapaxes(across, 1, 2) @ np.linalg.solve(inner, across)
+    return Stretches(time_s=grams.time_s, products=left, counts=grams.counts.sum(axis=0), changes=m)

@@ -1,0 +1,67 @@
+"""Calibration and state as plain values for a file, and back, to the last bit."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+
+from expdesign.monitoring.calibration import Calibration
+from expdesign.monitoring.changes import Change
+from expdesign.monitoring.cusum import Alarm, State, Sums
+from expdesign.monitoring.force import Force, Known
+
+
+def saved(value: Any) -> Any:
+    """Numbers, texts, lists and tables of a value of this room; infinite numbers as texts."""
+    if isinstance(value, np.ndarray):
+        return saved(value.tolist())
+    if isinstance(value, list | tuple):
+        return [saved(item) for item in value]
+    if hasattr(value, "__dataclass_fields__"):
+        return {field.name: saved(getattr(value, field.name)) for field in fields(value)}
+    return str(value) if isinstance(value, float) and not np.isfinite(value) else value
+
+
+def restored_calibration(table: dict[str, Any]) -> Calibration:
+    """From `saved`."""
+    arrays = {name: _array(values) for name, values in table.items() if isinstance(values, list)}
+    rest = {name: table[name] for name in ("stretches", "misfit_limit")}
+    return Calibration(force=Force(**_arrays(table["force"])), **arrays, **rest)
+
+
+def restored_state(table: dict[str, Any]) -> State:
+    """From `saved`."""
+    alarm, pending = table["alarm"], table["pending"]
+    return State(
+        judged_s=table["judged_s"],
+        known=Known(**_arrays(table["known"])),
+        ratios=_array(table["ratios"]),
+        sums=Sums(**_arrays(table["sums"])),
+        shift=_array(table["shift"]),
+        before=_array(table["before"]),
+        whole=Sums(**_arrays(table["whole"])),
+        alarm=None if alarm is None else restored_alarm(alarm),
+        pending=None if pending is None else Sums(**_arrays(pending)),
+        judged=table["judged"],
+        left_out=table["left_out"],
+    )
+
+
+def restored_alarm(table: dict[str, Any]) -> Alarm:
+    """From `saved`."""
+    return Alarm(**{**table, "as_likely": tuple(table["as_likely"])})
+
+
+def restored_changes(tables: list[dict[str, Any]]) -> tuple[Change, ...]:
+    """From `saved`."""
+    return tuple(Change(**{**table, "unit": tuple(table["unit"])}) for table in tables)
+
+
+def _arrays(table: dict[str, Any]) -> dict[str, Any]:
+    return {name: _array(values) for name, values in table.items()}
+
+
+def _array(values: Any) -> Any:
+    return np.array(values, dtype=float)

@@ -1,0 +1,58 @@
+"""The tuning constants of monitoring, in one place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tuning:
+    """Sizes, lengths and limits.
+
+    Attributes:
+        stretch_s: length of the stretches that are simulated [s].
+        fewest_samples: measured samples of a stretch that is judged.
+        iterations: of the expectation-maximisation of noise and force.
+        fewest_stretches: of a reference.
+        block_counts: blocks into which the reference is cut to measure how scores of neighbouring stretches hang
+            together; the largest inflation counts.
+        misfit_deviations: standard deviations of the reference's misfit beyond which a stretch is not judged.
+        settling_stretches: fewest from which the size of a change is told.
+        refined: change of the size, in sizes that matter, below which it is refined no further.
+        as_likely: difference of log-likelihood up to which another change explains the data as well.
+        settled: information, in inverse squared sizes, from which a change is settled; patience: factor of it where
+            other changes explain the data as well.
+        known_within: a change is watched for where the reference tells its size so many times better than the size.
+        quick_s, slow_s: correlation times of the unmeasured force: first guess of the quick one, and the slow one [s].
+        searched_stretches: of a reference, from which the variation of the force is learnt.
+        search_rounds, search_gain: rounds of that search, and the least gain of twice the log-likelihood in one.
+        relative_size: change of a parameter, a gain or an inertia that matters, as a share.
+        angle_rad: misalignment that matters [rad].
+        gyro_share: change of the gyro's scale that matters.
+        largest_speed: speed beyond which a simulation has diverged [m/s, rad/s].
+    """
+
+    stretch_s: float = 60.0
+    fewest_samples: int = 15
+    iterations: int = 60
+    fewest_stretches: int = 60
+    block_counts: tuple[int, ...] = (160, 80, 40, 20)
+    misfit_deviations: float = 6.0
+    as_likely: float = 3.0
+    settling_stretches: int = 20
+    refined: float = 0.2
+    settled: float = 60.0
+    patience: float = 10.0
+    known_within: float = 6.0
+    quick_s: float = 300.0
+    slow_s: float = 43200.0
+    searched_stretches: int = 600
+    search_rounds: int = 12
+    search_gain: float = 0.5
+    relative_size: float = 0.1
+    angle_rad: float = 0.03
+    gyro_share: float = 0.05
+    largest_speed: float = 100.0
+
+
+TUNING = Tuning()

@@ -1,0 +1,101 @@
+"""Stretches with known statistics, and a tender in operation, for the tests of monitoring."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from expdesign.monitoring import Grams
+from expdesign.scenario import load_vessel
+from expdesign.signals import Commands
+from expdesign.simulation import Environment, Variation, draw_weather, measure, simulate
+from expdesign.vessel import Vessel
+
+ROOT = Path(__file__).parents[1]
+TENDER = ROOT / "scenarios" / "vessels" / "tender-20m.toml"
+CHANGES, STARTS, FORCES = 4, 3, 2
+STRETCH_S = 60.0
+
+
+def drawn_grams(
+    count: int, *, seed: int, change: np.ndarray | None = None, since: int = 0, quick: float = 0.3, slow: float = 0.3
+) -> Grams:
+    """Stretches of 20 samples of one channel with random sensitivities, a varying force, and perhaps a change."""
+    return grams_from(drawn_columns(count, seed=seed, change=change, since=since, quick=quick, slow=slow))
+
+
+def drawn_columns(
+    count: int, *, seed: int, change: np.ndarray | None = None, since: int = 0, quick: float = 0.3, slow: float = 0.3
+) -> np.ndarray:
+    """(count, samples, columns) X, S, F and e."""
+    rng = np.random.default_rng(seed)
+    columns = rng.standard_normal((count, 20, CHANGES + STARTS + FORCES + 1))
+    columns[:, :, 1] = 0.9 * columns[:, :, 0] + 0.3 * columns[:, :, 1]  # two changes that are alike
+    force = np.zeros((count, FORCES))
+    for std, time_s in ((quick, 300.0), (slow, 43200.0)):
+        keep = np.exp(-STRETCH_S / time_s)
+        part = std * rng.standard_normal(FORCES)
+        for index in range(count):
+            force[index] += part
+            part = keep * part + std * np.sqrt(1.0 - keep**2) * rng.standard_normal(FORCES)
+    starts = columns[:, :, CHANGES : CHANGES + STARTS] @ rng.standard_normal((count, STARTS, 1))
+    pushed = columns[:, :, CHANGES + STARTS : -1] @ force[:, :, None]
+    error = (starts + pushed)[:, :, 0] + rng.standard_normal((count, 20))
+    if change is not None:
+        error[since:] += columns[since:, :, :CHANGES] @ change
+    columns[:, :, -1] = error
+    return columns
+
+
+def grams_from(columns: np.ndarray) -> Grams:
+    """Inner products of columns, all of the first channel."""
+    count, samples, width = columns.shape
+    products = np.zeros((4, count, width, width))
+    products[0] = np.swapaxes(columns, 1, 2) @ columns
+    counts = np.zeros((4, count))
+    counts[0] = samples
+    return Grams(time_s=STRETCH_S * np.arange(count), products=products, counts=counts, changes=CHANGES)
+
+
+def tender(**factors: float) -> Vessel:
+    """The tender with some parameters times a factor."""
+    vessel = load_vessel(TENDER)
+    known = dict(zip(vessel.model.names, vessel.model.parameters.tolist(), strict=True))
+    changed = {name: factor * known[name] for name, factor in factors.items()}
+    return replace(vessel, model=vessel.model.with_parameters(changed))
+
+
+def orders(samples: int, rng: np.random.Generator) -> np.ndarray:
+    """(k, 4) of a voyage: speeds held for minutes, turns now and then."""
+    table, row = np.zeros((samples, 4)), 0
+    while row < samples:
+        held, speed = int(rng.uniform(60, 400)), rng.uniform(4, 10)
+        angle = rng.choice([-1, 0, 1]) * rng.uniform(0.05, 0.5)
+        table[row : row + held] = speed, angle, speed, -angle
+        row += held
+    return table
+
+
+def voyage_csv(path: Path, vessel: Vessel, samples: int, *, seed: int, begin_s: float = 0.0) -> Path:
+    """Measured data of a voyage in a current that wanders."""
+    rng = np.random.default_rng(seed)
+    weather = Environment(
+        current_to=0.1 * rng.standard_normal(2), current_variation=Variation(std_mps=0.03, correlation_s=300.0)
+    )
+    commands = Commands(sample_time_s=1.0, names=vessel.model.inputs, values=orders(samples, rng))
+    series = draw_weather(weather, samples, sample_time_s=1.0, rng=rng)
+    track = simulate(vessel, commands, velocity=(3.0, 0.0, 0.0), environment=series)
+    told = dict(measure(vessel, commands, track, environment=series, rng=rng))
+    told["time_s"] = told["time_s"] + begin_s
+    kept = [name for name in told if not name.startswith("wind")]
+    np.savetxt(
+        path,
+        np.column_stack([told[name] for name in kept]),
+        delimiter=",",
+        header=",".join(kept),
+        comments="",
+        fmt="%.9g",
+    )
+    return path

@@ -1,0 +1,175 @@
+"""The watch over a ship: its filter is exact, its alarms are as rare as stated, and changes are named and dated."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from expdesign.monitoring import (
+    TUNING,
+    Alarm,
+    Calibration,
+    Grams,
+    State,
+    Step,
+    calibrate,
+    restored_calibration,
+    restored_state,
+    saved,
+    threshold,
+    watch,
+)
+from expdesign.monitoring.evidence import stretches_of
+from expdesign.monitoring.force import Force, Known, after_gap, after_stretch, judged, likelihood
+from monitoring_case import CHANGES, FORCES, STARTS, STRETCH_S, drawn_columns, drawn_grams, grams_from
+
+NOISE = np.array([1.0, np.inf, np.inf, np.inf])
+FORCE = Force(variance=np.array([0.09, 0.09, 0.04, 0.04]), time_s=np.array([300.0, 300.0, 43200.0, 43200.0]))
+
+
+@pytest.fixture(scope="module")
+def calibration() -> Calibration:
+    return calibrate(drawn_grams(600, seed=0))
+
+
+def watched(
+    calibration: Calibration, grams: Grams, limit: float, state: State | None = None
+) -> tuple[State, tuple[Alarm, ...], tuple[Step, ...]]:
+    """All stretches, the error of the changed ship being linear in its changes."""
+    state = State.begun(calibration, time_s=0.0) if state is None else state
+    alarms, steps, first = list[Alarm](), list[Step](), 0
+    while first < len(grams):
+        rest = grams.part(slice(first, None))
+        after = np.eye(rest.products.shape[-1])
+        after[:CHANGES, -1] = -state.shift
+        linearised = replace(rest, products=after.T @ rest.products @ after)
+        state, more, sums, used = watch(calibration, state, linearised, limit=limit)
+        alarms, steps, first = [*alarms, *more], [*steps, *sums], first + used
+    return state, tuple(alarms), tuple(steps)
+
+
+def dense_covariance(columns: np.ndarray) -> np.ndarray:
+    """Of the errors of all stretches together: noise, force over time, and initial velocities nobody knows."""
+    count, samples, _ = columns.shape
+    time_s = STRETCH_S * np.arange(count)
+    blocks = np.zeros((count, samples, count, FORCES))
+    pushed = columns[:, :, CHANGES + STARTS : -1]
+    blocks[np.arange(count), :, np.arange(count)] = pushed
+    F = blocks.reshape(count * samples, count * FORCES)
+    apart = np.abs(np.subtract.outer(time_s, time_s))
+    over_time = sum(np.kron(np.exp(-apart / t), v * np.eye(FORCES)) for v, t in ((0.09, 300.0), (0.04, 43200.0)))
+    S = np.zeros((count, samples, count, STARTS))
+    S[np.arange(count), :, np.arange(count)] = columns[:, :, CHANGES : CHANGES + STARTS]
+    S = S.reshape(count * samples, count * STARTS)
+    return np.eye(count * samples) + F @ over_time @ F.T + 1e6 * S @ S.T
+
+
+def test_the_likelihood_and_the_scores_are_those_of_all_stretches_together() -> None:
+    columns = drawn_columns(6, seed=1, change=np.array([0.5, 0.0, -0.3, 0.0]))
+    R = dense_covariance(columns)
+    e, X = columns[:, :, -1].ravel(), columns[:, :, :CHANGES].reshape(-1, CHANGES)
+    stretches = stretches_of(grams_from(columns), NOISE)
+    known, taken = Known.nothing(FORCE), np.zeros((2 * FORCES, CHANGES))
+    score, information, quadratic = np.zeros(CHANGES), np.zeros((CHANGES, CHANGES)), 0.0
+    for index, products in enumerate(stretches.products):
+        if index:
+            known, taken = after_gap(known, FORCE, STRETCH_S), FORCE.memory(STRETCH_S)[:, None] * taken
+        one = judged(products, CHANGES, known)
+        cross = one.by_force @ taken
+        score += one.score - taken.T @ one.force_score
+        information += one.information - cross - cross.T + taken.T @ one.force_information @ taken
+        quadratic += float(one.quadratic)
+        known, taken = after_stretch(known, one), taken + one.gain @ (one.seen[0] - one.seen[1] @ taken)
+    assert quadratic == pytest.approx(e @ np.linalg.solve(R, e), rel=1e-4)
+    assert score == pytest.approx(X.T @ np.linalg.solve(R, e), rel=1e-3, abs=1e-3)
+    assert information == pytest.approx(X.T @ np.linalg.solve(R, X), rel=1e-3, abs=1e-3)
+
+
+def test_of_two_forces_the_likelihood_prefers_as_the_dense_one_does() -> None:
+    columns = drawn_columns(6, seed=2)
+    stretches = stretches_of(grams_from(columns), NOISE)
+    other = Force(variance=4.0 * FORCE.variance, time_s=FORCE.time_s)
+    both = Force(variance=np.stack([FORCE.variance, other.variance]), time_s=FORCE.time_s)
+    one, two = likelihood(stretches, FORCE), likelihood(stretches, other)
+    assert likelihood(stretches, both) == pytest.approx([float(one), float(two)])
+    e = columns[:, :, -1].ravel()
+    dense = dense_covariance(columns)
+    starts = columns[:, :, CHANGES : CHANGES + STARTS]
+    S = np.zeros((6, 20, 6, STARTS))
+    S[np.arange(6), :, np.arange(6)] = starts
+    S = S.reshape(120, 18)
+    plain = np.eye(120) + 1e6 * S @ S.T
+    wider = plain + 4.0 * (dense - plain)
+    costs = [e @ np.linalg.solve(R, e) + np.linalg.slogdet(R)[1] for R in (dense, wider)]
+    assert float(two - one) == pytest.approx(costs[1] - costs[0], abs=1e-2)
+
+
+def test_the_calibration_finds_noise_and_force(calibration: Calibration) -> None:
+    assert calibration.std[0] == pytest.approx(1.0, abs=0.03)
+    total = calibration.force.variance.reshape(2, FORCES).sum(axis=0)
+    assert np.all((total > 0.05) & (total < 0.5))  # 0.18 was drawn, the slow half of it once
+    assert np.all(np.abs(calibration.baseline) < 5 * calibration.baseline_std)
+    assert calibration.watched.all()
+
+
+def test_where_nothing_changes_the_likelihood_ratio_has_mean_one_and_alarms_are_rare(calibration: Calibration) -> None:
+    between, count = 150.0, 3000
+    limit = threshold(CHANGES, between)
+    _, alarms, steps = watched(calibration, drawn_grams(count, seed=3), limit)
+    raised = [alarm for alarm in alarms if not alarm.settled]
+    allowed = count / between
+    assert len(raised) <= allowed + 3.0 * np.sqrt(allowed)
+    assert len(steps) > 0.5 * count
+    assert not watched(calibration, drawn_grams(600, seed=4), threshold(CHANGES, 1e6))[1]
+
+
+@pytest.mark.parametrize(("number", "size"), [(0, 1.0), (2, -1.0), (3, 0.6)])
+def test_a_change_is_named_dated_and_measured(calibration: Calibration, number: int, size: float) -> None:
+    change = np.zeros(CHANGES)
+    change[number] = size
+    since = 200
+    columns = drawn_columns(320, seed=5, change=change, since=since)
+    state, alarms, _ = watched(calibration, grams_from(columns), threshold(CHANGES, 1e4))
+    first, settled = alarms[0], alarms[1]
+    assert settled.settled
+    assert settled.change == number
+    assert abs(settled.value - size) < 4.0 * settled.std
+    assert since - 3 <= first.since_s / STRETCH_S <= since + 3
+    assert first.time_s > first.since_s
+    assert state.alarm is None
+    assert state.shift[number] == pytest.approx(size, abs=5.0 * settled.std + 0.2)
+    assert len(alarms) == 2  # the watch goes on from the changed ship
+
+
+def test_a_watch_in_parts_and_out_of_a_file_is_the_same_to_the_last_bit(calibration: Calibration) -> None:
+    change = np.array([0.0, 0.0, 1.0, 0.0])
+    grams = drawn_grams(120, seed=6, change=change, since=60)
+    limit = threshold(CHANGES, 1e4)
+    whole = watched(calibration, grams, limit)
+    state = State.begun(calibration, time_s=0.0)
+    alarms: list[Alarm] = []
+    again = restored_calibration(json.loads(json.dumps(saved(calibration))))
+    for first in range(0, 120, 7):
+        state, more, _ = watched(again, grams.part(slice(first, first + 7)), limit, state)
+        state = restored_state(json.loads(json.dumps(saved(state))))
+        alarms += more
+    assert saved(state) == saved(whole[0])
+    assert tuple(alarms) == whole[1]
+
+
+def test_stretches_unlike_the_reference_are_not_judged(calibration: Calibration) -> None:
+    columns = drawn_columns(100, seed=7)
+    columns[40:70, :, -1] += 8.0 * np.random.default_rng(0).standard_normal((30, 20))
+    limit = threshold(CHANGES, 1e5)
+    state, alarms, _ = watched(calibration, grams_from(columns), limit)
+    assert state.left_out == 30
+    assert not alarms
+
+
+def test_the_threshold_grows_with_the_time_between_false_alarms() -> None:
+    assert threshold(10, 1e4) == pytest.approx(np.log(2e5))
+    assert threshold(10, 1e6) > threshold(10, 1e4) > threshold(1, 1e4)
+    assert TUNING.fewest_stretches > 0

@@ -1,0 +1,146 @@
+"""`expdesign monitor`: voyages of a simulated tender, with and without a change, whole, in parts and as a stream."""
+
+from __future__ import annotations
+
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from expdesign.cli import main
+from monitoring_case import TENDER, tender, voyage_csv
+
+HOUR = 3600
+
+
+@pytest.fixture(scope="module")
+def voyages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    folder = tmp_path_factory.mktemp("voyages")
+    return {
+        "reference": voyage_csv(folder / "reference.csv", tender(), 3 * HOUR, seed=1),
+        "same": voyage_csv(folder / "same.csv", tender(), 2 * HOUR, seed=2),
+        "changed": voyage_csv(folder / "changed.csv", tender(N_r=1.2), HOUR, seed=3, begin_s=2.0 * HOUR),
+    }
+
+
+def monitored(folder: Path, *words: object) -> dict[str, object]:
+    assert main(["monitor", *map(str, words), "--vessel", str(TENDER), "--out", str(folder), "--quiet"]) == 0
+    content: dict[str, object] = json.loads((folder / "monitor.json").read_text())
+    return content
+
+
+def test_a_change_of_the_ship_is_told_and_nothing_else(voyages: dict[str, Path], tmp_path: Path) -> None:
+    told = monitored(tmp_path, voyages["same"], voyages["changed"], "--reference", voyages["reference"])
+    assert told["judged_h"] == pytest.approx(3.0, abs=0.05)
+    (alarm,) = told["alarms"]
+    assert alarm["effect"] == "theta:N_r"
+    assert 2 * HOUR - 300 <= alarm["since_s"] <= alarm["time_s"] <= 2 * HOUR + 1800
+    size = 0.2 * -0.15
+    assert alarm["value"] == pytest.approx(size, abs=5 * alarm["std"])
+    rows = (tmp_path / "since-change.csv").read_text().splitlines()
+    assert float(rows[1].split(",")[0]) >= alarm["since_s"]
+    page = (tmp_path / "monitor.html").read_text()
+    assert "parameter N_r" in page
+    assert "http" not in page.replace("http://www.w3.org", "")
+
+
+def test_a_ship_as_in_the_reference_raises_no_alarm(voyages: dict[str, Path], tmp_path: Path) -> None:
+    told = monitored(tmp_path, voyages["same"], "--reference", voyages["reference"])
+    assert told["alarms"] == []
+    assert "No alarm" in told["verdict"][0]
+    assert not (tmp_path / "since-change.csv").exists()
+
+
+def test_a_watch_that_is_resumed_loses_nothing_and_counts_nothing_twice(
+    voyages: dict[str, Path], tmp_path: Path
+) -> None:
+    header, *rows = voyages["same"].read_text().splitlines(keepends=True)
+    first, second = tmp_path / "first.csv", tmp_path / "second.csv"
+    first.write_text(header + "".join(rows[:3333]))  # ends within a stretch
+    second.write_text(header + "".join(rows[3333:]))
+    whole = monitored(tmp_path / "whole", voyages["same"], "--reference", voyages["reference"])
+    monitored(tmp_path / "parts", first, "--reference", voyages["reference"])
+    parts = monitored(tmp_path / "parts", second, "--resume")
+    for key in ("judged_h", "not_judged_h", "alarms", "threshold"):
+        assert parts[key] == whole[key]
+    states = [json.loads((tmp_path / name / "monitor-state.json").read_text()) for name in ("whole", "parts")]
+    scores, known = (
+        [np.array(state["state"]["whole"][key][0]) for state in states] for key in ("score", "information")
+    )
+    chance = np.sqrt(np.diag(known[0]))  # rates of headings lack a sample where pieces meet
+    assert np.all(np.abs(scores[0] - scores[1]) <= 0.1 * chance + 1e-9)
+    assert states[0]["pending"] == states[1]["pending"]
+
+
+def test_a_stream_is_watched_as_its_file_is(
+    voyages: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = monitored(tmp_path / "file", voyages["changed"], "--reference", voyages["reference"])
+    monkeypatch.setattr("sys.stdin", io.StringIO(voyages["changed"].read_text()))
+    stream = monitored(tmp_path / "stream", "-", "--reference", voyages["reference"], "--every-s", 600)
+    assert [alarm["effect"] for alarm in stream["alarms"]] == [alarm["effect"] for alarm in whole["alarms"]]
+    assert stream["judged_h"] == whole["judged_h"]
+
+
+def test_gaps_and_rows_without_numbers_are_left_out(voyages: dict[str, Path], tmp_path: Path) -> None:
+    header, *rows = voyages["same"].read_text().splitlines(keepends=True)
+    names = header.strip().split(",")
+    for index in (100, 101, 2000):
+        cells = rows[index].strip().split(",")
+        cells[names.index("u_mps")] = "" if index == 100 else "NaN"
+        rows[index] = ",".join(cells) + "\n"
+    path = tmp_path / "gaps.csv"
+    path.write_text(header + "".join(rows[:3000] + rows[3600:]))
+    told = monitored(tmp_path / "out", path, "--reference", voyages["reference"])
+    assert told["rows_without_numbers"] == 3
+    assert told["judged_h"] == pytest.approx(2.0 - 603 / HOUR, abs=0.06)
+    assert told["alarms"] == []
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "what"),
+    [
+        (["{same}", "--learn-h", "0"], 2, "--learn-h is 0"),
+        (["{same}", "--size", "2"], 2, "--size is 2"),
+        (["{same}", "-", "--reference", "{reference}"], 2, "- stands beside other data files"),
+        (["{same}", "--resume"], 2, "monitor-state.json: does not exist"),
+        (["{same}", "--resume", "--reference", "{reference}"], 2, "expected one"),
+        (["{same}"], 3, "give files of a reference"),
+        (["{same}", "--learn-h", "0.2"], 3, "expected at least"),
+        (["{same}", "{same}", "--reference", "{reference}"], 2, "expected times after"),
+        (["nothing.csv", "--reference", "{reference}"], 2, "cannot be read"),
+    ],
+)
+def test_what_cannot_be_watched_is_refused_in_one_line(
+    voyages: dict[str, Path],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    words: list[str],
+    status: int,
+    what: str,
+) -> None:
+    spelled = [word.format(**voyages) for word in words]
+    assert main(["monitor", *spelled, "--vessel", str(TENDER), "--out", str(tmp_path / "out"), "--quiet"]) == status
+    told = capsys.readouterr().err.strip().splitlines()
+    assert len(told) == 1
+    assert what in told[0]
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_state_of_another_program_is_refused(voyages: dict[str, Path], tmp_path: Path) -> None:
+    (tmp_path / "monitor-state.json").write_text("{}")
+    assert (
+        main(["monitor", str(voyages["same"]), "--vessel", str(TENDER), "--out", str(tmp_path), "--resume", "-q"]) == 2
+    )
+
+
+def test_the_reference_may_be_the_beginning_of_the_data(voyages: dict[str, Path], tmp_path: Path) -> None:
+    header, *rows = voyages["reference"].read_text().splitlines(keepends=True)
+    path = tmp_path / "all.csv"
+    shifted = np.array([float(row.split(",")[0]) for row in rows])
+    assert shifted[-1] == 3 * HOUR - 1
+    path.write_text(header + "".join(rows))
+    told = monitored(tmp_path / "out", path, "--learn-h", 1.5)
+    assert told["reference"]["until_s"] >= 1.5 * HOUR
