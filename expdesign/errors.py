@@ -87,6 +87,19 @@ class NotInformative(NoAnswer):
         super().__init__(message)
 
 
+class FloorOutOfReach(NoAnswer):
+    """A least information that no durations reach; the message names it.
+
+    Attributes:
+        name: of the floor.
+        reached, least: the most information that durations reach, and the least that is asked for.
+    """
+
+    def __init__(self, name: str, *, reached: float, least: float) -> None:
+        self.name, self.reached, self.least = name, reached, least
+        super().__init__(f"{name}: no durations within the other limits reach {least:.4g}; at most {reached:.4g}")
+
+
 class NoPlan(NoAnswer):
     """No trajectory satisfies the limits; the message names the place or the primitive, and what helps.
 

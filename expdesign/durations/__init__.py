@@ -10,6 +10,7 @@ from expdesign.durations.mining import Subset, best_subset, build_recorded
 from expdesign.durations.problem import (
     ROBUST,
     DurationProblem,
+    InformationFloor,
     bordered,
     bordered_moments,
     build_durations,
@@ -33,6 +34,7 @@ __all__ = [
     "DurationDesign",
     "DurationProblem",
     "Efficiencies",
+    "InformationFloor",
     "Kept",
     "LargeDesign",
     "Subset",

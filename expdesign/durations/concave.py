@@ -11,12 +11,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from expdesign.durations.criteria import LogDet, Measure, criterion
+from expdesign.durations.criteria import LogDet, LogTrace, Measure, criterion
 from expdesign.durations.criteria.measures import SmoothMeasure
 from expdesign.durations.criteria.models import Objective, Piece, congruent, pieces_of, stacked_values
 from expdesign.durations.limits import Polytope, feasible_set
-from expdesign.durations.problem import DurationProblem
+from expdesign.durations.problem import DurationProblem, InformationFloor
 from expdesign.durations.tuning import TUNING
+from expdesign.errors import FloorOutOfReach, NotInformative
 from expdesign.values import Array
 
 IDLE = "(unused time)"
@@ -86,6 +87,19 @@ def floor_of(problem: DurationProblem, equation: str) -> Objective:
     return Objective(pieces_of([symmetric_part(problem.matrices)], symmetric_part(problem.prior), measure), np.zeros(1))
 
 
+def information_floor(floor: InformationFloor) -> Objective:
+    """A least information as a concave function that must not be negative.
+
+    Raises:
+        FloorOutOfReach: equal shares tell nothing of it, so that no shares do.
+    """
+    try:
+        pieces = pieces_of([symmetric_part(floor.matrices)], symmetric_part(floor.prior), LogTrace(floor.L))
+    except NotInformative:
+        raise FloorOutOfReach(floor.name, reached=0.0, least=floor.least) from None
+    return Objective(pieces, np.array([np.log(floor.least)]))
+
+
 def polytope_of(problem: DurationProblem) -> Polytope:
     """The linear limits.
 
@@ -117,6 +131,10 @@ def with_idle(problem: DurationProblem) -> DurationProblem:
         matrices=np.concatenate([problem.matrices, idle]),
         run_s=np.r_[problem.run_s, problem.total_s],
         sampled=sampled,
+        floors=tuple(
+            replace(item, matrices=np.concatenate([item.matrices, np.zeros((1, *item.prior.shape))]))
+            for item in problem.floors
+        ),
     )
 
 

@@ -71,11 +71,11 @@ def efficiencies(design: DurationDesign) -> tuple[Efficiencies, ...]:
 
 @dataclass(frozen=True, kw_only=True)
 class Kept:
-    """How far a budget is used, or a balance is reached.
+    """How far a budget is used, or a balance or a least information is reached.
 
     Attributes:
-        name: of the budget or the balance.
-        limit: of the budget; for a balance the least share.
+        name: of the limit.
+        limit: of the budget; for a balance the least share; the least information.
         continuous: used or reached by the optimal fractions.
         repeats: used or reached by the whole runs, which may fall short of a balance.
         price: Lagrange multiplier in the certificate; zero when the limit is not active.
@@ -89,7 +89,7 @@ class Kept:
 
 
 def limits_kept(design: DurationDesign) -> tuple[Kept, ...]:
-    """Every budget and every balance, by the optimal fractions and by the whole runs."""
+    """Every budget, balance and least information, by the optimal fractions and by the whole runs."""
     problem = design.problem
     runs = np.array(design.repeats) * problem.run_s / problem.total_s
     found = []
@@ -97,10 +97,11 @@ def limits_kept(design: DurationDesign) -> tuple[Kept, ...]:
         cost = np.array([budget.cost_per_s.get(name, 0.0) for name in problem.names]) * problem.total_s
         found.append((budget.name, budget.limit, float(cost @ design.fractions), float(cost @ runs)))
     idle = bool(problem.constraints.budgets)
-    for equation, floor in floors_of(with_idle(problem) if idle else problem).items():
-        piece = floor.pieces[0]
+    asked = {item.name: item.least for item in problem.floors}
+    for name, floor in floors_of(with_idle(problem) if idle else problem).items():
+        piece, least = floor.pieces[0], asked.get(name, problem.constraints.balance)
         value, at_runs = (
-            problem.constraints.balance
+            least
             * float(
                 np.exp(
                     (stacked_values(piece.measure, piece.matrix(w)[None])[0] - floor.levels[0]) / piece.measure.degree
@@ -108,7 +109,7 @@ def limits_kept(design: DurationDesign) -> tuple[Kept, ...]:
             )
             for w in (np.r_[design.fractions, [0.0] * idle], np.r_[runs, [0.0] * idle])
         )
-        found.append((f"balance of equation {equation}", problem.constraints.balance, value, at_runs))
+        found.append((name, least, value, at_runs))
     prices = design.certificate.multipliers
     return tuple(
         Kept(name=name, limit=limit, continuous=continuous, repeats=repeats, price=prices.get(name, 0.0))

@@ -29,6 +29,33 @@ ROBUST = ("nominal", "average", "worst")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class InformationFloor:
+    """A least information about combinations of other parameters, such as a cause that a diagnosis is to reveal.
+
+    With M = prior + sum_q w_q matrices_q, information 1 / trace(L^T M^-1 L) must be at least `least`. Of one
+    combination that is its Schur complement; of several it is no more than the smallest eigenvalue of theirs.
+
+    Attributes:
+        name: for reports.
+        matrices: (q, d, d) information if all of the time is spent on one primitive.
+        prior: (d, d).
+        L: (d, k) combinations in its columns.
+        least: what is asked for.
+    """
+
+    name: str
+    matrices: Array
+    prior: Array
+    L: Array
+    least: float
+
+    def __post_init__(self) -> None:
+        seal(self, matrices="q d d", prior="d d", L="d k")
+        if not 0 < self.least < np.inf:
+            raise InputError(f"{self.name}: the least information is {self.least:g}, expected more than 0")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class DurationProblem:
     """Maximise a criterion of B(w) = B_prior + sum_q w_q B_q over time fractions w.
 
@@ -50,6 +77,7 @@ class DurationProblem:
         equations: (p) equation, "u", "v" or "r", of each parameter; only `constraints.balance` needs it.
         nuisance: parameters of disturbances in the augmented predictor; where runs make two of their regressors
             coincide, the estimator merges them, see `estimation.nuisance`.
+        floors: least information about other parameters.
 
     Source: F. Ljungberg, doctoral thesis, Linköping University, (7.50)-(7.58); Schur complement form derived here.
     """
@@ -67,6 +95,7 @@ class DurationProblem:
     sampled: Array = field(default_factory=lambda: np.zeros((0, 0, 0, 0)))
     equations: tuple[str, ...] = ()
     nuisance: tuple[str, ...] = ()
+    floors: tuple[InformationFloor, ...] = ()
 
     def __post_init__(self) -> None:
         if np.size(self.prior) == 0:
@@ -120,6 +149,7 @@ def build_durations(
     robust: str = "nominal",
     equations: Sequence[str] = (),
     nuisance: Sequence[str] = (),
+    floors: Sequence[InformationFloor] = (),
 ) -> DurationProblem:
     """The duration problem of a scored dictionary.
 
@@ -134,7 +164,7 @@ def build_durations(
         sampled: the information by each model drawn from the prior of the nominal parameters.
         robust: one of `ROBUST`.
         equations: of each parameter; only needed for `constraints.balance`.
-        nuisance: as in `DurationProblem`.
+        nuisance, floors: as in `DurationProblem`.
 
     Raises:
         UnknownName: no such mean subtraction.
@@ -159,6 +189,7 @@ def build_durations(
         sampled=np.array([_stack(items, mean_subtraction) for items in sampled]),
         equations=tuple(equations),
         nuisance=tuple(nuisance),
+        floors=tuple(floors),
     )
 
 

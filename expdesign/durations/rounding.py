@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +52,64 @@ def whole_runs(problem: DurationProblem, fractions: Array) -> tuple[int, ...]:
             "primitives" + (" (least and most times and budgets counted)" if not search.polytope.plain else "")
         )
     return tuple(int(n) for n in runs)
+
+
+def runs_above_floors(
+    problem: DurationProblem, starts: Iterable[Array], shortfall: Callable[[Array], float]
+) -> tuple[int, ...]:
+    """As `whole_runs`, of which shares of the time (q,) must keep every least information.
+
+    Rounded fractions are changed run by run until nothing is missing, and then exchanged for a better criterion among
+    runs that keep it.
+
+    Args:
+        problem: as there.
+        starts: fractions (q,); the first that leads to such runs is where the search begins.
+        shortfall: of shares of the time, 0 where everything is kept.
+
+    Raises:
+        NoAnswer: no fractions lead to runs that keep it and inform about every parameter.
+    """
+    for fractions in starts:
+        search = _Search.of(problem, fractions)
+        runs = _completed(search, search.rounded(fractions), shortfall)
+        if search.informative(runs) and shortfall(runs * search.shares) == 0.0:
+            found = _searched(search, runs, accepted=partial(_informative_and_kept, search, shortfall))
+            return tuple(int(n) for n in found)
+    names = ", ".join(item.name for item in problem.floors)
+    raise NoAnswer(
+        f"design.total_s is {problem.total_s:g}: shares of that time keep {names}, but no whole runs were found that "
+        "do; with a little more design.total_s they may"
+    )
+
+
+def _completed(search: _Search, runs: Array, shortfall: Callable[[Array], float]) -> Array:
+    """Runs (q,) after the insertions of a run for others that leave least missing, while they help."""
+    missing = shortfall(runs * search.shares)
+    while missing > 0.0:
+        tried = [_inserted(search, runs, int(index), shortfall) for index in np.flatnonzero(runs < search.most_runs)]
+        left = [shortfall(item * search.shares) for item in tried]
+        if not left or not min(left) < missing:
+            break
+        runs, missing = tried[int(np.argmin(left))], min(left)
+    return runs
+
+
+def _inserted(search: _Search, runs: Array, index: int, shortfall: Callable[[Array], float]) -> Array:
+    """Runs with one more of a primitive, and without those others that are missed least until the limits hold."""
+    changed = runs + _unit(index, runs)
+    while not search.allowed(changed):
+        spare = np.setdiff1d(np.flatnonzero(changed > search.fewest), index)
+        if not len(spare):
+            return runs
+        without = [changed - _unit(int(other), runs) for other in spare]
+        losses = [(shortfall(item * search.shares), -search.value_of(item)) for item in without]
+        changed = without[min(range(len(losses)), key=losses.__getitem__)]
+    return changed
+
+
+def _informative_and_kept(search: _Search, shortfall: Callable[[Array], float], runs: Array) -> bool:
+    return search.informative(runs) and shortfall(runs * search.shares) == 0.0
 
 
 def _any_runs(runs: Array) -> bool:

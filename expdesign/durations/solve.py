@@ -7,7 +7,7 @@ from the problem alone; a design without one is not returned.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +19,7 @@ from expdesign.durations.concave import (
     ConcaveProblem,
     collected_measure,
     floor_of,
+    information_floor,
     informs_about_all,
     objective_of,
     polytope_of,
@@ -29,9 +30,9 @@ from expdesign.durations.criteria import criterion
 from expdesign.durations.criteria.models import Indices, Objective
 from expdesign.durations.large_scale import d_optimal, rows_of
 from expdesign.durations.problem import DurationProblem
-from expdesign.durations.rounding import efficiency_of_shares, note_on_runs, whole_runs
+from expdesign.durations.rounding import efficiency_of_shares, note_on_runs, runs_above_floors, whole_runs
 from expdesign.durations.tuning import TUNING
-from expdesign.errors import InputError, NoAnswer, NotInformative
+from expdesign.errors import FloorOutOfReach, InputError, NoAnswer, NotInformative
 from expdesign.values import Array
 
 THEOREMS = {
@@ -62,7 +63,31 @@ def solve_durations(problem: DurationProblem) -> DurationDesign:
             not fit.
     """
     design = optimal_shares(problem)
-    return _with_runs(design, whole_runs(problem, design.fractions))
+    if not problem.floors:
+        return _with_runs(design, whole_runs(problem, design.fractions))
+    return _with_runs(design, runs_above_floors(problem, _tightened(problem, design.fractions), _shortfall(problem)))
+
+
+def _shortfall(problem: DurationProblem) -> Callable[[Array], float]:
+    """How far shares of the time (q,) fall short of every least information, as a sum of logarithms."""
+    floors = [information_floor(item) for item in problem.floors]
+
+    def missing(shares: Array) -> float:
+        short = np.array([floor.value(shares) for floor in floors])
+        return float(-short[short < -TUNING.floor_rounding].sum())
+
+    return missing
+
+
+def _tightened(problem: DurationProblem, fractions: Array) -> Iterator[Array]:
+    """Optimal fractions (q,), then those that keep more than the least information, of which rounding takes some."""
+    yield fractions
+    for factor in TUNING.tightened:
+        floors = tuple(replace(item, least=factor * item.least) for item in problem.floors)
+        try:
+            yield optimal_shares(replace(problem, floors=floors)).fractions
+        except NoAnswer:
+            return
 
 
 def optimal_shares(problem: DurationProblem) -> DurationDesign:
@@ -116,12 +141,20 @@ def concave_problem(problem: DurationProblem, *, within: Array | None = None) ->
         objective=objective_of(problem, measure, within=within),
         polytope=polytope_of(problem),
         floors=tuple(floors.values()),
-        floor_names=tuple(f"balance of equation {equation}" for equation in floors),
+        floor_names=tuple(floors),
     )
 
 
 def floors_of(problem: DurationProblem) -> dict[str, Objective]:
-    """One concave function per equation: its log det above the balanced share of the best for it alone."""
+    """Concave functions that must not be negative, by name.
+
+    One per equation with a balance: its log det above the balanced share of the best for it alone; one for every least
+    information about other parameters.
+    """
+    return {**_balances(problem), **{item.name: information_floor(item) for item in problem.floors}}
+
+
+def _balances(problem: DurationProblem) -> dict[str, Objective]:
     balance = problem.constraints.balance
     if not balance > 0:
         return {}
@@ -131,7 +164,9 @@ def floors_of(problem: DurationProblem) -> dict[str, Objective]:
     for equation in dict.fromkeys(problem.equations):
         alone = floor_of(problem, equation)
         best = _maximised(ConcaveProblem(objective=alone, polytope=polytope)).certificate.value
-        floors[equation] = replace(alone, levels=np.array([best + alone.degree * np.log(balance)]))
+        floors[f"balance of equation {equation}"] = replace(
+            alone, levels=np.array([best + alone.degree * np.log(balance)])
+        )
     return floors
 
 
@@ -250,11 +285,28 @@ def _check_floors(task: ConcaveProblem, w: Array | None) -> None:
     )
     best = _maximised(ConcaveProblem(objective=together, polytope=task.polytope)).fractions
     kept = min(float(np.exp(floor.value(best) / floor.degree)) for floor in task.floors)
+    balances = tuple(name for name in task.floor_names if name.startswith("balance"))
+    if kept < 1.0 and len(balances) < len(task.floors):
+        _check_each(task)
+        raise NoAnswer(
+            f"no durations within the other limits keep {', '.join(task.floor_names)} together, though each alone; at "
+            f"most {kept:.3g} times what is asked of each is possible"
+        )
     if kept < 1.0:
         raise NoAnswer(
             "design.balance cannot be met: no durations within the other limits are this informative about every "
             f"equation; at most {kept:.3g} times the required share is possible"
         )
+
+
+def _check_each(task: ConcaveProblem) -> None:
+    """Raises FloorOutOfReach for the first floor that cannot be kept even alone."""
+    for name, floor in zip(task.floor_names, task.floors, strict=True):
+        alone = replace(floor, levels=np.zeros(1))
+        most = _maximised(ConcaveProblem(objective=alone, polytope=task.polytope)).certificate.value
+        if most < floor.levels[0]:
+            reached, least = (float(np.exp(value / floor.degree)) for value in (most, floor.levels[0]))
+            raise FloorOutOfReach(name, reached=reached, least=least)
 
 
 def _certified_shares(problem: DurationProblem, within: Array | None) -> DurationDesign:
@@ -299,6 +351,8 @@ def _improved_shares(problem: DurationProblem) -> DurationDesign:
             "recorded primitives (regressors measured, instruments simulated) need criterion D and the nominal model; "
             "simulate their commands for other criteria"
         )
+    if problem.floors:
+        raise InputError("design.reveal needs primitives that are simulated, not recorded ones")
     if problem.constraints.balance:
         raise InputError("design.balance needs primitives that are simulated, not recorded ones")
     polytope = polytope_of(problem)

@@ -46,6 +46,7 @@ class Tuning:
         least_gain_nearly_singular: `least_gain` there.
         named_pairs: pairs of merged regressors that a note names.
         insertions: primitives, best gain per second first, tried in an exchange of one run for several.
+        tightened: factors on least information with which shares are sought whose whole runs keep it.
         all_subsets: up to this number, every subset of batches is evaluated.
     """
 
@@ -84,6 +85,7 @@ class Tuning:
     least_gain_nearly_singular: float = 1e-6
     named_pairs: int = 3
     insertions: int = 200
+    tightened: tuple[float, ...] = (1.05, 1.15, 1.3, 1.6)
     all_subsets: int = 20_000
 
 

@@ -21,6 +21,7 @@ Sources: A. Wald (1943) for the noncentral distribution; C. R. Rao (1948) for sc
 from expdesign.foresight.effects import Direction, HiddenEffect
 from expdesign.foresight.foresee import Background, background, foresee
 from expdesign.foresight.power import level_of, needed_noncentrality, power
+from expdesign.foresight.reveal import Wanted, causes_by_runs, told_apart_from, told_apart_with, wanted
 from expdesign.foresight.sizes import (
     Size,
     StandardTrials,
@@ -48,7 +49,9 @@ __all__ = [
     "Size",
     "StandardTrials",
     "TrialRun",
+    "Wanted",
     "background",
+    "causes_by_runs",
     "default_sizes",
     "design_runs",
     "foresee",
@@ -59,6 +62,9 @@ __all__ = [
     "simulated_record",
     "sizes_that_matter",
     "standard_trials",
+    "told_apart_from",
+    "told_apart_with",
+    "wanted",
     "weather_without_causes",
     "with_effect",
 ]

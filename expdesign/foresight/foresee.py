@@ -128,7 +128,7 @@ def foresee(
     known = background(vessel, runs, weather, seed=seed)
     hidden = hidden_effects([test.candidate for test in known.tests], known.base, known.windows)
     hidden = tuple(sorted(hidden, key=lambda item: _place(item.cause)))
-    sizes = _sizes(vessel, hidden, known, weather, second)
+    sizes = sizes_of(vessel, hidden, known, weather, second)
     third("power of the tests", 0.0)
     joint = _joint(known, hidden, sizes)
     found = _foreseen(known, hidden, sizes, joint, np.random.default_rng(seed))
@@ -155,7 +155,7 @@ def _place(cause: str) -> int:
     return [item.name for item in CAUSES].index(cause.split(":")[0])
 
 
-def _sizes(
+def sizes_of(
     vessel: Vessel, hidden: Sequence[HiddenEffect], known: Background, weather: Environment, progress: Progress
 ) -> tuple[tuple[Size, ...], ...]:
     """Per effect, the size of each of its directions."""
@@ -312,7 +312,7 @@ def _one(
     named, confusions = _against(effect, rivals, shift, exact, (noncentrality, freedom, level))
     return Foreseen(
         effect=effect,
-        name=name if len(sizes) == 1 else _joint_name(effect, known),
+        name=name if len(sizes) == 1 else effect_name(effect, known),
         change=change if known_size else math.nan,
         unit=unit,
         rule=sizes[place].rule,
@@ -330,7 +330,8 @@ def _length(sizes: tuple[Size, ...], mixture: Array) -> float:
     return float(np.linalg.norm([size.value * share for size, share in zip(sizes, mixture, strict=True)]))
 
 
-def _joint_name(effect: HiddenEffect, known: Background) -> str:
+def effect_name(effect: HiddenEffect, known: Background) -> str:
+    """In results."""
     return joined([described(item, known.base.ship)[0] for item in effect.directions])
 
 

@@ -133,6 +133,22 @@ class DesignTable(Table):
         default=0.0,
         description="the least D-efficiency for each of surge, sway and yaw, relative to the optimum for it alone",
     )
+    reveal: list[Text] = Field(
+        default=[],
+        description="the causes that a diagnosis of the trial must reveal with a probability of 90 % each, at sizes "
+        "that matter, however they act, e.g. ['wind', 'gyro_scale']; see expdesign explain causes and expdesign "
+        "foresee",
+    )
+    tell_apart: list[list[Text]] = Field(
+        default=[],
+        description="the pairs of causes that it must tell apart with that probability, e.g. [['actuator_lag', "
+        "'actuator_delay']]",
+    )
+    reveal_sizes: dict[str, Positive] = Field(
+        default={},
+        description="the size of a cause in reveal or tell_apart, in the unit of its effects in foresee.json, instead "
+        "of one that matters, e.g. {actuator_lag = 0.5}",
+    )
     grow: GrowTable | None = Field(
         default=None, description="a table [design.grow]: search for manoeuvres to add to the dictionary"
     )
@@ -178,6 +194,7 @@ def design_settings(table: DesignTable, vessel: Vessel, primitives: tuple[str, .
     for key in ("required", "excluded"):
         _check_list(getattr(table, key), primitives, entry.at(key))
     _check_together(table, vessel, entry)
+    _check_causes(table, vessel, entry)
     return DesignSettings(
         total_s=table.total_s,
         criterion=table.criterion,
@@ -200,6 +217,9 @@ def design_settings(table: DesignTable, vessel: Vessel, primitives: tuple[str, .
         excluded=tuple(table.excluded),
         budgets=_budgets(table.budgets, primitives, entry.at("budgets")),
         balance=table.balance,
+        reveal=tuple(table.reveal),
+        tell_apart=tuple((one, other) for one, other in table.tell_apart),
+        reveal_sizes=dict(table.reveal_sizes),
         grow=None if table.grow is None else build_grow(table.grow, entry.at("grow")),
         accuracy=_asked(table, vessel, estimated, entry),
     )
@@ -258,6 +278,22 @@ def _check_list(given: list[str], known: Iterable[str], entry: Entry) -> None:
             raise place.unknown(name, allowed)
         if name in given[: index - 1]:
             raise place.error(f"is {name!r} again, expected every name once")
+
+
+def _check_causes(table: DesignTable, vessel: Vessel, entry: Entry) -> None:
+    if not (table.reveal or table.tell_apart or table.reveal_sizes):
+        return
+    from expdesign.foresight import causes_by_runs  # what asks for no cause does not wait for the diagnosis
+
+    known = causes_by_runs(vessel.model)
+    _check_list(table.reveal, known, entry.at("reveal"))
+    for index, pair in enumerate(table.tell_apart, start=1):
+        place = entry.at("tell_apart").item(index)
+        if len(pair) != 2:
+            raise place.error(f"has {len(pair)} names, expected two causes")
+        _check_list(pair, known, place)
+    _check_keys(table.reveal_sizes, [*table.reveal, *(name for pair in table.tell_apart for name in pair)],
+                entry.at("reveal_sizes"))  # fmt: skip
 
 
 def _check_keys(given: Mapping[str, float], known: Iterable[str], entry: Entry) -> None:

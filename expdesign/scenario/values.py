@@ -57,6 +57,8 @@ class DesignSettings:
         prior: prior information, "none" or "parameter_std".
         prior_data: files of earlier trials, whose information is added to the prior.
         least_s, most_s, required, excluded, budgets, balance: see `durations.Constraints`.
+        reveal: causes that a diagnosis of the trial must reveal; tell_apart: pairs that it must tell apart.
+        reveal_sizes: of causes, in the unit of their effects, instead of those that matter.
         grow: settings of the dictionary growth, or None for no growth.
         accuracy: what the shortest day must reach, or None for the most information in total_s of runs.
     """
@@ -82,6 +84,9 @@ class DesignSettings:
     excluded: tuple[str, ...] = ()
     budgets: tuple[BudgetSettings, ...] = ()
     balance: float = 0.0
+    reveal: tuple[str, ...] = ()
+    tell_apart: tuple[tuple[str, str], ...] = ()
+    reveal_sizes: Mapping[str, float] = field(default_factory=dict)
     grow: GrowSettings | None = None
     accuracy: AccuracySettings | None = None
 

@@ -192,6 +192,7 @@ def _check_adds_up(design: DurationDesign) -> None:
         (not problem.symmetric, "the dictionary", "with recorded primitives"),
         (bool(problem.constraints.budgets), "budgets", "set"),
         (bool(problem.constraints.balance), "balance", f"{problem.constraints.balance:g}"),
+        (bool(problem.floors), "reveal", "set"),
     ):
         if is_set:
             raise InputError(

@@ -58,10 +58,10 @@ def effect_row(item: Foreseen) -> tuple[str, ...]:
     return (
         item.cause,
         item.name,
-        sized(item, item.change),
+        size_text(item.name, item.change, item.unit),
         words.percent(item.power) if item.sized else NONE,
         words.percent(item.named) if item.sized else NONE,
-        sized(item, item.least_change),
+        size_text(item.name, item.least_change, item.unit),
         remedy(item),
         (others + (f" and {more} more" if more > 0 else "")) if item.power >= TOLD_APART and others else NONE,
     )
@@ -116,15 +116,15 @@ def _sentences(found: Foresight) -> Iterator[str]:
         yield "Not seen at all: " + ", ".join(f"{cause} ({why})" for cause, why in found.unseen) + "."
 
 
-def sized(item: Foreseen, change: float) -> str:
-    """A size with its unit; factors as per cent."""
+def size_text(name: str, change: float, unit: str) -> str:
+    """A size with its unit; factors as per cent, angles in degrees."""
     if not math.isfinite(change):
         return NONE
-    if item.unit == "" and ("factor" in item.name or "growth" in item.name):
+    if unit == "" and ("factor" in name or "growth" in name):
         return f"{words.significant(100 * abs(change), 2)} %"
-    if item.unit == "rad":
+    if unit == "rad":
         return f"{words.significant(math.degrees(abs(change)), 2)} deg"
-    return f"{words.significant(abs(change), 2)} {item.unit}".rstrip()
+    return f"{words.significant(abs(change), 2)} {unit}".rstrip()
 
 
 def foresight_json(content: ForesightContent) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,10 +14,11 @@ from expdesign.durations import (
     Constraints,
     DurationDesign,
     DurationProblem,
+    InformationFloor,
     build_durations,
     solve_durations,
 )
-from expdesign.errors import InputError
+from expdesign.errors import FloorOutOfReach, InputError, NoAnswer
 from expdesign.information import MEAN_SUBTRACTIONS, PrimitiveInformation, estimated_parameters
 from expdesign.information.augmented import score_augmented
 from expdesign.information.outcome_gradients import outcome_gradients
@@ -27,9 +29,13 @@ from expdesign.progress import Progress, silent, within
 from expdesign.reduction import at_reference_point
 from expdesign.scenario import Scenario
 from expdesign.scenario.values import BudgetSettings
+from expdesign.simulation import Environment
 from expdesign.values import Array
-from expdesign.vessel import VesselModel
+from expdesign.vessel import Vessel, VesselModel
 from expdesign.workflows.steps.measured import measured
+
+if TYPE_CHECKING:
+    from expdesign.foresight import Wanted
 
 
 def designed(
@@ -43,7 +49,10 @@ def designed(
     """The certified durations of a scored scenario; arguments as of `duration_problem`."""
     problem = duration_problem(case, information, stated=stated, seed=seed, progress=within(progress, 0.0, 0.8))
     progress("sharing out time", 0.8)
-    return recalled(solve_durations, problem)
+    try:
+        return recalled(solve_durations, problem)
+    except FloorOutOfReach as error:
+        raise _not_revealed(case, error, [item.primitive for item in information], seed=seed) from None
 
 
 def duration_problem(
@@ -111,6 +120,7 @@ def duration_problem(
         robust=settings.robust,
         equations=equations,
         nuisance=nuisance,
+        floors=_least_information(case, primitives, seed=seed, progress=within(progress, 0.9, 1.0)),
     )
 
 
@@ -223,3 +233,78 @@ def _prior(case: Scenario, parameters: tuple[str, ...], stated: VesselModel) -> 
         matrix, rows = pooled(batches, settings.mean_subtraction)
         prior += matrix * rows * record.batches[0].sample_time_s / case.vessel.sample_time_s / samples
     return prior if prior.any() else None
+
+
+def _least_information(
+    case: Scenario, primitives: Sequence[Primitive], *, seed: int = 0, progress: Progress = silent
+) -> tuple[InformationFloor, ...]:
+    """What design.reveal and design.tell_apart ask of the durations.
+
+    Raises:
+        NoAnswer: records of a trial cannot show a cause.
+    """
+    run_s = np.array([item.duration_s for item in primitives])
+    return tuple(
+        InformationFloor(
+            name=item.name,
+            matrices=item.each * (case.design.total_s / run_s)[:, None, None],
+            prior=item.prior,
+            L=np.eye(len(item.prior))[:, len(item.prior) - item.columns :],
+            least=item.least,
+        )
+        for item in _wanted(case, primitives, seed, progress)
+    )
+
+
+def _wanted(case: Scenario, primitives: Sequence[Primitive], seed: int, progress: Progress) -> tuple[Wanted, ...]:
+    settings = case.design
+    if not (settings.reveal or settings.tell_apart):
+        return ()
+    return recalled(
+        _foreseen,
+        case.vessel,
+        tuple(primitives),
+        case.environment,
+        settings.reveal,
+        settings.tell_apart,
+        tuple(settings.reveal_sizes.items()),
+        seed,
+        progress=progress,
+    )
+
+
+def _foreseen(
+    vessel: Vessel,
+    primitives: tuple[Primitive, ...],
+    weather: Environment,
+    reveal: tuple[str, ...],
+    apart: tuple[tuple[str, str], ...],
+    sizes: tuple[tuple[str, float], ...],
+    seed: int,
+    progress: Progress = silent,
+) -> tuple[Wanted, ...]:
+    from expdesign.foresight import wanted  # what asks for no cause does not wait for the diagnosis
+
+    return wanted(
+        vessel, primitives, weather, reveal=reveal, apart=apart, sizes=dict(sizes), seed=seed, progress=progress
+    )
+
+
+def _not_revealed(case: Scenario, error: FloorOutOfReach, primitives: Sequence[Primitive], *, seed: int) -> NoAnswer:
+    """The refusal with the best probability instead of the information."""
+    from expdesign.export.foresight_page import size_text
+    from expdesign.foresight import power, told_apart_with
+
+    (item,) = [one for one in _wanted(case, primitives, seed, silent) if one.name == error.name]
+    if item.apart_from:
+        key, what = "tell_apart", f"tell {item.cause} ({item.effect}) from {item.apart_from}"
+        best = told_apart_with(error.reached)
+    else:
+        key, what = "reveal", f"reveal {item.cause} ({item.effect})"
+        best = float(power(error.reached, item.freedom, item.level))
+    never = "; no time would do, as the standard deviations in the vessel file allow as much" if item.within_std else ""
+    size = size_text(item.effect, item.size, item.unit)
+    return NoAnswer(
+        f"design.{key}: {case.design.total_s:g} s of this dictionary cannot {what} at {size} with a probability of "
+        f"90 %; the best is {100.0 * best:.2g} %{never}"
+    )

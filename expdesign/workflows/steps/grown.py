@@ -76,6 +76,7 @@ def growth_note(case: Scenario) -> dict[str, object]:
         "times": bool(settings.least_s or settings.most_s or settings.required or settings.excluded),
         "budgets": bool(settings.budgets),
         "balance": bool(settings.balance),
+        "reveal": bool(settings.reveal or settings.tell_apart),
     }
     asked = [name for name, is_asked in limits.items() if is_asked]
     if not asked:

@@ -1,0 +1,240 @@
+"""What durations must tell a diagnosis: least information about causes, linear in the time of every manoeuvre.
+
+The noncentrality of a cause's test is a Schur complement of an information matrix that is linear in the durations, so
+that a least noncentrality is a convex constraint. To tell one cause from another, the noncentrality that is left where
+the other one is free too must be large enough: locally T-optimality, as a constraint.
+
+Sources: F. Pukelsheim, Optimal Design of Experiments (2006), 3.2; A. C. Atkinson and V. V. Fedorov, Biometrika 62
+(1975), 57-70, for T-optimality; R. D. Cook and W. K. Wong, J. Amer. Statist. Assoc. 89 (1994), 687-692: a constrained
+design is a compound one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import norm
+
+from expdesign.diagnosis.causes import CAUSES
+from expdesign.diagnosis.model import ExtendedModel, term_library
+from expdesign.diagnosis.select import SELECTION_TUNING
+from expdesign.dictionary import Primitive
+from expdesign.errors import NoAnswer
+from expdesign.foresight.added import information_of_runs
+from expdesign.foresight.effects import HiddenEffect, described, hidden_effects
+from expdesign.foresight.foresee import ENDLESS, UNSEEN, Background, background, effect_name, sizes_of
+from expdesign.foresight.information import beside_nuisance
+from expdesign.foresight.power import freedom_of, level_of, needed_noncentrality
+from expdesign.foresight.sizes import Size
+from expdesign.foresight.trial import design_runs
+from expdesign.foresight.tuning import TUNING
+from expdesign.progress import Progress, silent, within
+from expdesign.simulation import Environment
+from expdesign.values import Array, seal
+from expdesign.vessel import Vessel, VesselModel
+
+NOT_BY_RUNS = ("change_point",)
+"""Causes that are shown by when runs are sailed, not by which."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Wanted:
+    """One effect that a trial must reveal, or tell from another.
+
+    Attributes:
+        cause, effect: names.
+        size: of the effect, in its unit; of several numbers the first.
+        unit: of it.
+        apart_from: the other cause, or "".
+        each: (q, d, d) information of one run of every manoeuvre: nuisance, the other effect if any, then the effect.
+        prior: (d, d).
+        columns: number of the effect's own rows, the last ones.
+        least: noncentrality that is needed.
+        freedom, level: of its test; where it is told from another cause, of a gain that decides.
+    """
+
+    cause: str
+    effect: str
+    size: float
+    unit: str
+    apart_from: str
+    each: Array
+    prior: Array
+    columns: int
+    least: float
+    freedom: int
+    level: float
+
+    def __post_init__(self) -> None:
+        seal(self, each="q d d", prior="d d")
+
+    @property
+    def within_std(self) -> bool:
+        """No data would do, because the vessel file's standard deviations allow as much."""
+        c = len(self.prior) - self.columns
+        whole = self.prior + ENDLESS * self.each.sum(axis=0)
+        return bool(np.linalg.eigvalsh(beside_nuisance(whole, np.zeros((c, c))))[0] < self.least)
+
+    @property
+    def name(self) -> str:
+        """In words."""
+        shown = self.cause if self.cause.endswith(f":{self.effect}") else f"{self.cause} as {self.effect}"
+        return f"{shown} told from {self.apart_from}" if self.apart_from else f"power to reveal {shown}"
+
+
+def causes_by_runs(model: VesselModel) -> tuple[str, ...]:
+    """Names of all causes that runs can show: of missing terms, those of the library that a model lacks."""
+    names: list[str] = []
+    for cause in CAUSES:
+        terms = [f"missing_term:{name}" for name in term_library(model)] if cause.name == "missing_term" else []
+        names += terms or ([cause.name] if cause.name not in ("missing_term", *NOT_BY_RUNS) else [])
+    return tuple(names)
+
+
+def told_apart_from(probability: float) -> float:
+    """Noncentrality left with which the right cause leads by as much as a diagnosis asks for, with a probability.
+
+    The lead of one cause over another nearly collinear one is Gaussian, with the noncentrality as mean and four times
+    it as variance.
+    """
+    quantile = float(norm.ppf(probability))
+    return (quantile + math.sqrt(quantile**2 + SELECTION_TUNING.equivalent_within)) ** 2
+
+
+def told_apart_with(noncentrality: float) -> float:
+    """The probability of `told_apart_from` at a noncentrality that is left."""
+    lead = noncentrality - SELECTION_TUNING.equivalent_within
+    return float(norm.cdf(lead / (2.0 * math.sqrt(noncentrality)))) if noncentrality > 0 else 0.0
+
+
+def wanted(
+    vessel: Vessel,
+    primitives: Sequence[Primitive],
+    weather: Environment,
+    *,
+    reveal: Sequence[str] = (),
+    apart: Sequence[tuple[str, str]] = (),
+    sizes: Mapping[str, float] | None = None,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> tuple[Wanted, ...]:
+    """Every effect of the causes to reveal, and of both causes of every pair, with the information of every manoeuvre.
+
+    Noise and the number of tests are those of a trial with one run of every manoeuvre.
+
+    Args:
+        vessel: the model in use, with its sensors.
+        primitives: q manoeuvres.
+        weather: forecast.
+        reveal: causes.
+        apart: pairs of causes to tell apart.
+        sizes: of causes, in the unit of their effects, instead of those that matter.
+        seed: of all chance.
+        progress: of the work.
+
+    Raises:
+        NoAnswer: records of the trial cannot show a cause.
+    """
+    progress("simulating a diagnosis of the dictionary", 0.0)
+    known = background(vessel, design_runs(primitives, [1] * len(primitives)), weather, seed=seed)
+    causes = list(dict.fromkeys([*reveal, *(name for pair in apart for name in pair)]))
+    tests = [test for test in known.tests if test.candidate.cause in causes]
+    hidden = hidden_effects([test.candidate for test in tests], known.base, known.windows)
+    for cause in causes:
+        if not any(item.cause == cause for item in hidden):
+            why = UNSEEN.get(cause, "nothing that differs from the model and its uncertain parameters shows it")
+            raise NoAnswer(f"design.reveal: no trial of this ship reveals {cause}: {why}")
+    found = sizes_of(vessel, hidden, known, weather, within(progress, 0.4, 0.9))
+    chosen = [
+        _stated(item, own, known.base.ship, (sizes or {}).get(item.cause))
+        for item, own in zip(hidden, found, strict=True)
+    ]
+    for item, own in zip(hidden, chosen, strict=True):
+        if not all(math.isfinite(value) for value in own):
+            raise NoAnswer(
+                f"design.reveal: no size of {item.cause} as {effect_name(item, known)} is known that matters; "
+                "design.reveal_sizes can state one"
+            )
+    progress("information of every manoeuvre about causes", 0.9)
+    directions = [direction for item in hidden for direction in item.directions]
+    values = [value for own in chosen for value in own]
+    each = information_of_runs(vessel, known.base, primitives, weather, directions, values)
+    ends = np.cumsum([len(item.directions) for item in hidden]) + len(known.base.keys)
+    rows = [np.arange(end - len(item.directions), end) for end, item in zip(ends.tolist(), hidden, strict=True)]
+    several = _Several(known=known, hidden=hidden, sizes=tuple(map(tuple, chosen)), rows=tuple(rows), each=each)
+    return (
+        *(several.revealed(place) for place, item in enumerate(hidden) if item.cause in reveal),
+        *(several.told(place, other) for pair in apart for one, other in (pair, pair[::-1])
+          for place, item in enumerate(hidden) if item.cause == one),
+    )  # fmt: skip
+
+
+def _stated(item: HiddenEffect, own: Sequence[Size], ship: ExtendedModel, size: float | None) -> list[float]:
+    """Sizes of an effect's directions: those that matter, or the stated one."""
+    if size is None:
+        return [one.value for one in own]
+    return [size / described(direction, ship)[1] for direction in item.directions]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Several:
+    """Hidden effects with the information of every manoeuvre about all of them.
+
+    Attributes:
+        known: the trial that gave noise and tests.
+        hidden: the effects; sizes: of their directions; rows: of each in the information.
+        each: (q, c + m, c + m).
+    """
+
+    known: Background
+    hidden: tuple[HiddenEffect, ...]
+    sizes: tuple[tuple[float, ...], ...]
+    rows: tuple[Array, ...]
+    each: Array
+
+    def revealed(self, place: int) -> Wanted:
+        """An effect with the wanted power."""
+        item = self.hidden[place]
+        test = next(test for test in self.known.tests if test.candidate is item.candidate)
+        freedom, level = freedom_of(item.candidate), level_of(test.multiplicity)
+        least = needed_noncentrality(TUNING.wanted_power, freedom, level)
+        return self._wanted(place, (), "", (least, freedom, level))
+
+    def told(self, place: int, other: str) -> Wanted:
+        """An effect told from the most similar one of another cause."""
+        precision = self.known.base.precision
+        A = beside_nuisance(self.each.sum(axis=0), precision)
+        own = self.rows[place] - len(precision)
+        likeness = []
+        for number, item in enumerate(self.hidden):
+            if item.cause == other:
+                index = self.rows[number] - len(precision)
+                cross = A[np.ix_(own, index)]
+                explained = cross @ np.linalg.pinv(A[np.ix_(index, index)], hermitian=True) @ cross.T
+                likeness.append((float(np.trace(explained)), number))
+        beside = self.rows[max(likeness)[1]]
+        return self._wanted(place, tuple(beside.tolist()), other, (told_apart_from(TUNING.wanted_power), 1, 0.0))
+
+    def _wanted(self, place: int, beside: tuple[int, ...], other: str, test: tuple[float, int, float]) -> Wanted:
+        precision, own = self.known.base.precision, self.rows[place]
+        index = np.array([*range(len(precision)), *beside, *own.tolist()], dtype=int)
+        prior = np.zeros((len(index), len(index)))
+        prior[: len(precision), : len(precision)] = precision
+        least, freedom, level = test
+        _, factor, unit = described(self.hidden[place].directions[0], self.known.base.ship)
+        return Wanted(
+            cause=self.hidden[place].cause,
+            effect=effect_name(self.hidden[place], self.known),
+            size=factor * self.sizes[place][0],
+            unit=unit,
+            apart_from=other,
+            each=self.each[:, index[:, None], index],
+            prior=prior,
+            columns=len(own),
+            least=least,
+            freedom=freedom,
+            level=level,
+        )
