@@ -166,6 +166,7 @@ def cut_windows(model: VesselModel, record: Record, *, longest_s: float | None =
     pieces = [(b, low, high) for b, part in enumerate(parts) for low, high in _cut(part.samples, limit)]
     size = max(high - low for _, low, high in pieces)
     derived = derived_outputs(record)
+    measured = [part.measured(derived) for part in parts]
     starts = np.concatenate([[0.0], np.cumsum([len(batch) * sample_s for batch in record.batches])])
     rows: dict[str, list[Array]] = {name: [] for name in ROWS}
     for b, low, high in pieces:
@@ -173,7 +174,7 @@ def cut_windows(model: VesselModel, record: Record, *, longest_s: float | None =
         index = np.minimum(np.arange(low * between, (low + size) * between), high * between - 1)
         rows["batch"].append(np.array(float(b)))
         rows["first"].append(np.array(float(low * between)))
-        rows["measured"].append(_filled(part.measured(derived)[low:high], size))
+        rows["measured"].append(_filled(measured[b][low:high], size))
         rows["heading"].append(part.heading[index])
         rows["wind"].append(part.wind[index])
         rows["depth_m"].append(part.depth[index])
