@@ -9,9 +9,9 @@ import numpy as np
 
 from expdesign.monitoring import Grams
 from expdesign.scenario import load_vessel
-from expdesign.signals import Commands
+from expdesign.signals import Batch, Commands, Record
 from expdesign.simulation import Environment, Variation, draw_weather, measure, simulate
-from expdesign.vessel import Vessel
+from expdesign.vessel import Vessel, column_name
 
 ROOT = Path(__file__).parents[1]
 TENDER = ROOT / "scenarios" / "vessels" / "tender-20m.toml"
@@ -78,8 +78,8 @@ def orders(samples: int, rng: np.random.Generator) -> np.ndarray:
     return table
 
 
-def voyage_csv(path: Path, vessel: Vessel, samples: int, *, seed: int, begin_s: float = 0.0) -> Path:
-    """Measured data of a voyage in a current that wanders."""
+def voyage(vessel: Vessel, samples: int, *, seed: int) -> dict[str, np.ndarray]:
+    """Measured columns of a voyage in a current that wanders about a mean of its own."""
     rng = np.random.default_rng(seed)
     weather = Environment(
         current_to=0.1 * rng.standard_normal(2), current_variation=Variation(std_mps=0.03, correlation_s=300.0)
@@ -87,15 +87,28 @@ def voyage_csv(path: Path, vessel: Vessel, samples: int, *, seed: int, begin_s: 
     commands = Commands(sample_time_s=1.0, names=vessel.model.inputs, values=orders(samples, rng))
     series = draw_weather(weather, samples, sample_time_s=1.0, rng=rng)
     track = simulate(vessel, commands, velocity=(3.0, 0.0, 0.0), environment=series)
-    told = dict(measure(vessel, commands, track, environment=series, rng=rng))
+    return dict(measure(vessel, commands, track, environment=series, rng=rng))
+
+
+def voyage_csv(path: Path, vessel: Vessel, samples: int, *, seed: int, begin_s: float = 0.0) -> Path:
+    """The same as a file, without wind."""
+    told = voyage(vessel, samples, seed=seed)
     told["time_s"] = told["time_s"] + begin_s
     kept = [name for name in told if not name.startswith("wind")]
-    np.savetxt(
-        path,
-        np.column_stack([told[name] for name in kept]),
-        delimiter=",",
-        header=",".join(kept),
-        comments="",
-        fmt="%.9g",
-    )
+    table = np.column_stack([told[name] for name in kept])
+    np.savetxt(path, table, delimiter=",", header=",".join(kept), comments="", fmt="%.9g")
     return path
+
+
+def voyage_record(vessel: Vessel, samples: int, *, seed: int) -> Record:
+    """The same as a record of one batch."""
+    told = voyage(vessel, samples, seed=seed)
+    batch = Batch(
+        name="voyage",
+        sample_time_s=1.0,
+        input_names=vessel.model.inputs,
+        inputs=np.column_stack([told[column_name(name)] for name in vessel.model.inputs]),
+        velocity=np.column_stack([told["u_mps"], told["v_mps"], told["r_radps"]]),
+        pose=np.column_stack([told["north_m"], told["east_m"], np.unwrap(told["heading_rad"])]),
+    )
+    return Record(batches=(batch,), notes=())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -40,6 +41,8 @@ from expdesign.workflows.outcome import Outcome, TextTable
 STATE = "monitor-state.json"
 MOST_ROWS = 20_000
 """Of a piece of a file."""
+WRITTEN_EVERY_S = 10.0
+"""Of a stream that comes faster than it was measured, time between writing its files [s]."""
 USUAL = {"--learn-h": 24.0, "--false-alarm-days": 30.0, "--size": TUNING.relative_size, "--velocity": "auto"}
 
 
@@ -85,6 +88,7 @@ def monitor(
     }  # fmt: skip
     command = command_text("monitor", data, options, usual=USUAL)
     now = _resumed(folder / STATE) if resume else _with_reference(Watch(), reference, asked, progress)
+    due = (0, 0.0)  # files of a stream are written at once when there are more alarms
     for number, source in enumerate(data):
         rows = max(1, round(every_s / asked.vessel.sample_time_s)) if source == STREAM else MOST_ROWS
         size_bytes = source.stat().st_size if source != STREAM and source.is_file() else 0
@@ -96,8 +100,9 @@ def monitor(
             read += sum(map(len, piece.lines))
             share = (number + (read / size_bytes if size_bytes else 0.0)) / len(data)
             progress(f"watching {source.name}, {len(now.alarms)} alarms", min(share, 0.99))
-            if source == STREAM and now.state is not None:
+            if source == STREAM and now.state is not None and (len(now.alarms), time.monotonic()) >= due:
                 write_files(folder, _files(_content(now, asked, command), now))
+                due = (len(now.alarms), time.monotonic() + WRITTEN_EVERY_S)
     if now.calibration is None or now.state is None:
         raise NotInformative(
             f"the data end before the reference does, which takes {learn_h:g} h: give files of a reference "

@@ -1,0 +1,206 @@
+"""A ship in operation: how often alarms are false, how soon changes are found, and how they are named.
+
+``python tests/benchmarks/monitoring.py [--trials N] [--days D]``: the tender sails ordinary voyages in a current that
+wanders, with a mean of its own in each. The watch is calibrated on 12 hours. False alarms are counted over D days of
+voyages of 12 hours each, at thresholds for one in 6 hours, one in a day and one in 30 days. Each change is then made in
+N voyages of 3 hours, of which the first hour is without it. ``--year`` instead sends a year at 1 Hz through the command,
+as a stream, and prints its time and its peak memory.
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from expdesign.diagnosis.vessel_file import extended_model
+from expdesign.monitoring import (
+    TUNING,
+    Alarm,
+    Calibration,
+    Change,
+    State,
+    calibrate,
+    grams_of,
+    threshold,
+    watch,
+    watched_changes,
+)
+from expdesign.signals import Record
+from expdesign.vessel import Vessel
+from monitoring_case import TENDER, tender, voyage_csv, voyage_record
+
+HOUR, DAY = 3600, 86400
+
+
+def heavier(vessel: Vessel, equation: str, factor: float) -> Vessel:
+    """More inertia in one equation: all its terms act less."""
+    model = vessel.model
+    values = {
+        term.name: value / factor
+        for term, value in zip(model.terms, model.parameters.tolist(), strict=True)
+        if term.equation == equation
+    }
+    return replace(vessel, model=model.with_parameters(values))
+
+
+def weaker(vessel: Vessel, factor: float) -> Vessel:
+    """Less thrust."""
+    values = {name: factor * v for name, v in zip(vessel.model.names, vessel.model.parameters.tolist(), strict=True)}
+    return replace(
+        vessel, model=vessel.model.with_parameters({name: values[name] for name in values if name.endswith("_mu")})
+    )
+
+
+def gyro(vessel: Vessel, scale: float) -> Vessel:
+    """A wrong scale of the yaw rate."""
+    return replace(vessel, sensors=replace(vessel.sensors, yaw_rate_scale=scale))
+
+
+CASES: tuple[tuple[str, str, float, Callable[[Vessel], Vessel]], ...] = (
+    ("damping in yaw + 10 %", "theta:N_r", 0.1, lambda v: tender(N_r=1.1)),
+    ("damping in yaw + 3 %", "theta:N_r", 0.03, lambda v: tender(N_r=1.03)),
+    ("drag + 10 %", "theta:X_abs_u_u", 0.1, lambda v: tender(X_abs_u_u=1.1)),
+    ("damping in sway + 10 %", "theta:Y_v", 0.1, lambda v: tender(Y_v=1.1)),
+    ("yaw by drift + 20 %", "theta:N_uv", 0.2, lambda v: tender(N_uv=1.2)),
+    ("thrust - 5 %", "gain", -0.05, lambda v: weaker(v, 0.95)),
+    ("inertia in yaw + 10 %", "inertia:r", 0.1, lambda v: heavier(v, "r", 1.1)),
+    ("inertia in surge + 20 %", "inertia:u", 0.2, lambda v: heavier(v, "u", 1.2)),
+    ("scale of yaw rate 0.97", "gyro", -0.03, lambda v: gyro(v, 0.97)),
+)
+"""Name, effect, its size in the effect's unit (of parameters as a share), and the changed ship."""
+
+
+def watched(
+    vessel: Vessel, record: Record, changes: tuple[Change, ...], calibration: Calibration, limit: float
+) -> tuple[State, list[Alarm]]:
+    """A record watched from its beginning, linearised anew after each change."""
+    ship = extended_model(vessel, record)
+    state, alarms, first = State.begun(calibration, time_s=0.0), list[Alarm](), 0
+    grams = grams_of(ship, record, changes, begins_s=[0.0])
+    while first < len(grams):
+        state, more, _, used = watch(calibration, state, grams.part(slice(first, None)), limit=limit)
+        alarms, first = [*alarms, *more], first + used
+        if first < len(grams):
+            effects = {c.effect: c.size * x for c, x in zip(changes, state.shift.tolist(), strict=True) if x}
+            grams = grams_of(ship.with_effects(effects), record, changes, begins_s=[0.0])
+    return state, alarms if state.alarm is None else [*alarms, state.alarm]
+
+
+def study(trials: int, days: float) -> None:
+    """False alarms, then changes."""
+    vessel = tender()
+    reference = voyage_record(vessel, 12 * HOUR, seed=0)
+    changes = watched_changes(extended_model(vessel, reference))
+    calibration = calibrate(grams_of(extended_model(vessel, reference), reference, changes, begins_s=[0.0]))
+    number = int(calibration.watched.sum())
+    voyages = max(1, round(days * 2))
+    limits = {between: threshold(number, between * DAY / TUNING.stretch_s) for between in (0.25, 1.0, 30.0)}
+    false = dict.fromkeys(limits, 0)
+    for seed in range(voyages):
+        record = voyage_record(vessel, 12 * HOUR, seed=1000 + seed)
+        for between, limit in limits.items():
+            found = watched(vessel, record, changes, calibration, limit)[1]
+            false[between] += len({alarm.time_s for alarm in found})
+    print(f"{number} changes are watched for.\n")
+    print("| at most one false alarm in | days | alarms | allowed |")
+    print("|---|---|---|---|")
+    for between, count in false.items():
+        print(f"| {between:g} d | {voyages / 2:g} | {count} | {voyages / 2 / between:.1f} |")
+    print("\n| change | found | median delay | named first | or as likely | size within 2 std | false before |")
+    print("|---|---|---|---|---|---|---|")
+    effects = [change.effect for change in changes]
+    for name, effect, share, changed in CASES:
+        change = changes[effects.index(effect)]
+        true = share * change.unit[0] / 0.01 if effect.startswith("theta:") else share
+        rows = [
+            trial(vessel, changed(vessel), seed, changes, calibration, limits[30.0], effects.index(effect), true)
+            for seed in range(trials)
+        ]
+        hits = [row for row in rows if row[0] is not None]
+        delay = float(np.median([row[0] for row in hits])) / 60.0 if hits else float("nan")
+        first, likely, close = (sum(row[place] for row in hits) for place in (1, 2, 3))
+        print(
+            f"| {name} | {len(hits)} of {trials} | {delay:.0f} min | {first} | {likely} | {close} "
+            f"| {sum(row[4] for row in rows)} |",
+            flush=True,
+        )
+
+
+def trial(
+    vessel: Vessel,
+    true: Vessel,
+    seed: int,
+    changes: tuple[Change, ...],
+    calibration: Calibration,
+    limit: float,
+    number: int,
+    size: float,
+) -> tuple[float | None, bool, bool, bool, bool]:
+    """Delay [s], named first, named or as likely, size right, and whether there was an alarm before the change."""
+    before = voyage_record(vessel, HOUR, seed=2 * seed)
+    after = voyage_record(true, 2 * HOUR, seed=2 * seed + 1)
+    _, early = watched(vessel, before, changes, calibration, limit)
+    _, alarms = watched(vessel, after, changes, calibration, limit)
+    if not alarms:
+        return None, False, False, False, bool(early)
+    first = alarms[0].time_s
+    alarm = [item for item in alarms if item.time_s == first][-1]
+    named = alarm.change == number
+    close = named and abs(alarm.value * changes[number].size - size) < 2.0 * alarm.std * changes[number].size
+    return first, named, named or number in alarm.as_likely, close, bool(early)
+
+
+def year(days: int) -> None:
+    """A year at 1 Hz as a stream: a day's voyage again and again, with times that go on."""
+    with tempfile.TemporaryDirectory() as folder:
+        reference = voyage_csv(Path(folder) / "reference.csv", tender(), 12 * HOUR, seed=0)
+        day = voyage_csv(Path(folder) / "day.csv", tender(), DAY, seed=1)
+        header, *rows = day.read_text().splitlines(keepends=True)
+        ends = [row[row.index(",") :] for row in rows]
+        words = ["monitor", "-", "--vessel", str(TENDER), "--reference", str(reference), "--out", f"{folder}/out"]
+        began = time.perf_counter()
+        with subprocess.Popen(
+            [sys.executable, "-m", "expdesign", *words, "--every-s", "21600", "--quiet"],
+            stdin=subprocess.PIPE,
+            text=True,
+        ) as process:
+            assert process.stdin is not None
+            process.stdin.write(header)
+            for block in blocks(ends, days):
+                process.stdin.write(block)
+            process.stdin.close()
+            process.wait()
+        usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+        print(
+            f"{days} days, {days * DAY} rows: {time.perf_counter() - began:.0f} s, "
+            f"{usage.ru_utime + usage.ru_stime:.0f} s of processor time, {usage.ru_maxrss / 1024:.0f} MiB, status {process.returncode}"
+        )
+
+
+def blocks(ends: list[str], days: int) -> Iterator[str]:
+    """The text of each day."""
+    for number in range(days):
+        begin = number * len(ends)
+        yield "".join(f"{begin + index}{end}" for index, end in enumerate(ends))
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--trials", type=int, default=20)
+    parser.add_argument("--days", type=float, default=30.0)
+    parser.add_argument("--year", type=int, nargs="?", const=365, help="days of it")
+    asked = parser.parse_args()
+    if asked.year:
+        year(asked.year)
+    else:
+        study(asked.trials, asked.days)
