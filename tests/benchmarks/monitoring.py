@@ -3,8 +3,8 @@
 ``python tests/benchmarks/monitoring.py [--trials N] [--days D]``: the tender sails ordinary voyages in a current that
 wanders, with a mean of its own in each. The watch is calibrated on 12 hours. False alarms are counted over D days of
 voyages of 12 hours each, at thresholds for one in 6 hours, one in a day and one in 30 days. Each change is then made in
-N voyages of 3 hours, of which the first hour is without it. ``--year`` instead sends a year at 1 Hz through the command,
-as a stream, and prints its time and its peak memory.
+N voyages of 3 hours, of which the first hour is without it. ``--year`` instead sends a year at 1 Hz through the
+command, as a stream, and prints its time and its peak memory.
 """
 
 from __future__ import annotations
@@ -181,9 +181,10 @@ def year(days: int) -> None:
             process.stdin.close()
             process.wait()
         usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+        seconds, processor = time.perf_counter() - began, usage.ru_utime + usage.ru_stime
         print(
-            f"{days} days, {days * DAY} rows: {time.perf_counter() - began:.0f} s, "
-            f"{usage.ru_utime + usage.ru_stime:.0f} s of processor time, {usage.ru_maxrss / 1024:.0f} MiB, status {process.returncode}"
+            f"{days} days, {days * DAY} rows: {seconds:.0f} s, {processor:.0f} s of processor time, "
+            f"{usage.ru_maxrss / 1024:.0f} MiB, status {process.returncode}"
         )
 
 
