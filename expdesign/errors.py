@@ -128,7 +128,13 @@ class NoPlan(NoAnswer):
 
 
 class NoRoom(NoPlan):
-    """The water looked at has no path, or no place for a run; more of the chart may have one."""
+    """The water looked at has no path, or no place for a run; more of the chart may have one.
+
+    Attributes:
+        lacking: runs that have no place, where each was looked at by itself.
+    """
+
+    lacking: tuple[str, ...] = ()
 
 
 def _remade(kind: type[ExpdesignError], arguments: tuple[object, ...]) -> ExpdesignError:

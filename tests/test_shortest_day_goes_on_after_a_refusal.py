@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from expdesign.errors import NoAnswer, NoPlan
+from expdesign.errors import NoAnswer, NoPlan, NoRoom
 from expdesign.scenario import load_scenario
 from expdesign.shortest_day import AccuracySettings, alternate, shortest_day, stated_accuracy
 from expdesign.workflows.steps.design_problem import designed
@@ -31,7 +31,7 @@ def asked():
 def test_other_runs_are_tried_each_once(asked, monkeypatch):
     tried = []
 
-    def refuse(problem, progress):
+    def refuse(problem, *, like, progress):
         tried.append(problem.design.repeats)
         if len(tried) == 3:
             raise Found
@@ -44,7 +44,7 @@ def test_other_runs_are_tried_each_once(asked, monkeypatch):
 
 
 def test_where_no_day_has_a_plan_the_last_refusal_is_told(asked, monkeypatch):
-    def refuse(problem, progress):
+    def refuse(problem, *, like, progress):
         raise NoPlan("no place for a run")
 
     monkeypatch.setattr(alternate, "draft_trial", refuse)
@@ -62,10 +62,31 @@ def test_limits_that_allow_no_more_end_the_search_with_what_was_tried(asked, mon
             return once(*arguments, **options)
         raise NoAnswer("no more runs are allowed")
 
-    def refuse(problem, progress):
+    def refuse(problem, *, like, progress):
         raise NoPlan("no place for a run")
 
     monkeypatch.setattr(alternate, "cheapest_runs", choose)
     monkeypatch.setattr(alternate, "draft_trial", refuse)
     with pytest.raises(NoPlan, match="no place for a run"):
         shortest_day(problem, accuracy)
+
+
+def test_a_run_without_any_place_is_not_chosen_again_and_costs_no_day(asked, monkeypatch):
+    problem, accuracy = asked
+    names, tried, rounds = problem.design.problem.names, [], 2
+
+    def refuse(problem, *, like, progress):
+        tried.append({name for name, count in zip(names, problem.design.repeats, strict=True) if count})
+        if len(tried) > 2:
+            raise NoPlan("no place for a run")
+        error = NoRoom("no room for a run", what="room")
+        error.lacking = (min(tried[-1]),)
+        raise error
+
+    monkeypatch.setattr(alternate, "draft_trial", refuse)
+    monkeypatch.setattr(alternate, "TUNING", replace(alternate.TUNING, rounds=rounds))
+    with pytest.raises(NoPlan, match="no place for a run"):
+        shortest_day(problem, accuracy)
+    assert len(tried) == 2 + rounds
+    assert min(tried[0]) not in set().union(*tried[1:])
+    assert min(tried[1]) not in set().union(*tried[2:])

@@ -83,6 +83,7 @@ class Measure:
     Attributes:
         vessel, names, environment, mean_subtraction: as in `information.many.bordered_runs`.
         limits: (3, 2) low and high of u, v, r.
+        courses: (c,) that runs make good; None where nobody knows them.
     """
 
     vessel: Vessel
@@ -90,6 +91,7 @@ class Measure:
     environment: Environment
     mean_subtraction: str
     limits: Array
+    courses: Array | None = None
 
     def __call__(self, specs: Sequence[PrimitiveSpec]) -> Runs:
         """The runs of specifications; those of one duration are simulated together."""
@@ -114,6 +116,7 @@ class Measure:
             environment=self.environment,
             mean_subtraction=self.mean_subtraction,
             standing=runs.entry_inputs,
+            courses=self.courses,
         )
         over = violation(motion, self.limits)
         sound = (runs.possible > 0) & np.isfinite(matrices).all(axis=(1, 2)) & np.isfinite(over)

@@ -10,7 +10,7 @@ Source: F. Pukelsheim, Optimal Design of Experiments (2006), 3.10 for the inform
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -31,8 +31,12 @@ def current_rows(vessel: Vessel, trajectory: Trajectory, commands: Commands, env
     k = len(commands)
     pose, velocity = trajectory.pose[:k], trajectory.velocity[:k]
     table = signals_of(vessel.model, (*pose.T, *velocity.T), commands.values.T, environment)
-    signals = {name: np.broadcast_to(values, k) for name, values in table.items()}
-    moved = slopes(vessel.model, vessel.model.parameters, {**signals, "psi": pose[:, 2]})
+    return current_slopes(vessel, {name: np.broadcast_to(values, k) for name, values in table.items()}, pose[:, 2])
+
+
+def current_slopes(vessel: Vessel, signals: Mapping[str, Array], heading_rad: Array) -> Array:
+    """(k, n, 2) J, as of `current_rows`, for signals (k,) of terms at headings (k,)."""
+    moved = slopes(vessel.model, vessel.model.parameters, {**signals, "psi": heading_rad})
     return np.asarray(moved.transpose(1, 2, 0) / _noise(vessel)[:, None])
 
 
@@ -74,6 +78,15 @@ def beside_current(whole: Array, parameters: int) -> Array:
     left[p:, p:] = whole[p:d, p:d]
     left[:p, :p] = whole[:p, :p] - whole[:p, p:] @ _pseudo_inverse(whole[p:, p:]) @ whole[p:, :p]
     return left
+
+
+def slope_of_whole(whole: Array, parameters: int, slope: Array) -> Array:
+    """(d + 2, d + 2) derivative by the whole information of what has derivative `slope` (d, d) by `beside_current`."""
+    p, d = parameters, len(slope)
+    left = np.concatenate([np.eye(p), -whole[:p, p:] @ _pseudo_inverse(whole[p:, p:])], axis=1)
+    found = left.T @ slope[:p, :p] @ left
+    found[p:d, p:d] += slope[p:, p:]
+    return np.asarray(found)
 
 
 def _pseudo_inverse(M: Array) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -26,9 +26,11 @@ from expdesign.plan.legs import LegWater
 from expdesign.plan.local_planner import (
     GoAroundTime,
     LocalPlanner,
+    Pair,
     RunSpace,
     SearchSpace,
     TransitionTrials,
+    TriedTransition,
     local_planner,
     pairs_of,
 )
@@ -41,6 +43,10 @@ from expdesign.progress import Progress, in_phases
 from expdesign.sea_area import SeaArea
 from expdesign.values import Array
 from expdesign.vessel.hull import covering_discs
+
+Tried = Mapping[Pair, TriedTransition | None]
+"""Transitions by the runs before and after."""
+NOTHING_TRIED: Tried = {}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -72,10 +78,13 @@ def phases_of(problem: PlanProblem, planner: LocalPlanner, progress: Progress) -
     return Phases(*in_phases(progress, water, transitions * (_most_trials(problem, planner) > 0), *others))
 
 
-def plan_room(problem: PlanProblem, water: LegWater, progress: Progress, *, strict: bool = False) -> PlanRoom:
+def plan_room(
+    problem: PlanProblem, water: LegWater, progress: Progress, known: Tried = NOTHING_TRIED, *, strict: bool = False
+) -> PlanRoom:
     """Water and search space of the first plan, with the transitions optimised that the search uses.
 
-    With `strict`, runs that may have a place are refused, too, where none was found.
+    Transitions known already are not optimised again. With `strict`, runs that may have a place are refused, too, where
+    none was found.
 
     Raises:
         NoPlan: no path leads from start to goal, or the ship cannot leave its start or reach its goal.
@@ -84,11 +93,14 @@ def plan_room(problem: PlanProblem, water: LegWater, progress: Progress, *, stri
     planner.check_ends(problem.start, problem.goal, water)
     space = search_space(problem, water, planner, strict=strict)
     if _most_trials(problem, planner):
+        space = replace(space, tried=known)
         space = _with_transitions(problem, water, space, phases_of(problem, planner, progress).transitions)
     return PlanRoom(water=water, space=space)
 
 
-def roomy_water(problem: PlanProblem, ship: Capability, progress: Progress) -> tuple[LegWater, PlanRoom]:
+def roomy_water(
+    problem: PlanProblem, ship: Capability, progress: Progress, known: Tried = NOTHING_TRIED
+) -> tuple[LegWater, PlanRoom]:
     """The water, and what the first plan is made in; on a finer grid and with more corners of the shore where need be.
 
     Raises:
@@ -96,14 +108,14 @@ def roomy_water(problem: PlanProblem, ship: Capability, progress: Progress) -> t
     """
     water = leg_water(problem, ship)
     try:
-        return water, plan_room(problem, water, progress, strict=True)
+        return water, plan_room(problem, water, progress, known, strict=True)
     except NoRoom:
         finer = leg_water(problem, ship, finer=PLAN.finer_grid)
     if finer.field.cell_m >= 0.75 * water.field.cell_m:  # the area is too large for it
         finer = replace(finer, field=water.field)
     if finer.field is not water.field or shapely.get_num_coordinates(problem.area.water) > CHART.corners[1][1]:
         water = finer
-    return water, plan_room(problem, water, progress)
+    return water, plan_room(problem, water, progress, known)
 
 
 def waters(problem: PlanProblem, ship: Capability) -> Iterator[SeaArea]:

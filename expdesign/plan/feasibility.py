@@ -115,13 +115,15 @@ def without_room(space: RunSpace, *, strict: bool = False) -> NoRoom | None:
     widest = space.field.origin + space.field.cell_m * np.array([row, column])
     lat, lon = space.frame.to_degrees(widest)
     others = f", nor do {', '.join(map(repr, sorted(set(names) - {run.name})))}" if len(names) > 1 else ""
-    return NoRoom(
+    error = NoRoom(
         f"no room for {run.name!r}: {run.needs}; it fits nowhere in the water that can be reached, at any "
         f"heading{others}; the shore is farthest near {lat:.5f}, {lon:.5f}, {space.field.clearance_m.max():.4g} m",
         what="room",
         which=run.name,
         place=widest,
     )
+    error.lacking = names
+    return error
 
 
 def _size_m(discs: Array) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
@@ -50,18 +51,24 @@ from expdesign.values import Array, seal
 Planned = TypeVar("Planned")
 
 
-def plan_trial(problem: PlanProblem, *, progress: Progress = silent) -> Plan:
+def plan_trial(problem: PlanProblem, *, drafted: Draft | None = None, progress: Progress = silent) -> Plan:
     """One continuous, verified trial from start to goal with every run the design asks for.
+
+    Args:
+        problem: the trial.
+        drafted: its draft, where there is one already.
+        progress: of the planning.
 
     Raises:
         NoPlan: no path, no room, or no dynamically feasible leg; the message names what, where, and which change of
             one key helps, if one of those tried does.
     """
+    told = never_falling(progress)
     try:
-        return _in_water(problem, never_falling(progress), _planned)
+        return _in_water(problem, told, _planned) if drafted is None else _checked(problem, drafted, told)
     except NoPlan as error:
         progress("looking for what would help", 0.95)
-        raise advised(replace(problem, area=error.within or problem.area), error) from None
+        raise advised(replace(problem, area=error.within or (drafted or problem).area), error) from None
 
 
 def _in_water(
@@ -86,18 +93,23 @@ def _in_water(
 
 def _planned(whole: PlanProblem, area: SeaArea, ship: Capability, progress: Progress) -> Plan:
     """The trial planned in a part of the water, checked with all of it."""
-    progress("measuring the water", 0.0)
-    problem = replace(whole, area=area)
-    water, room = roomy_water(problem, ship, progress)
+    return _checked(whole, _drafted(whole, area, ship, progress), progress)
+
+
+def _checked(whole: PlanProblem, draft: Draft, progress: Progress) -> Plan:
+    """A draft's plan, verified with all of the water; made anew with more room where drawn trials leave it."""
+    problem, water, room = replace(whole, area=draft.area), draft.water, draft.room
     confidence = problem.settings.confidence
-    budget = WorkBudget(most_s=PLAN.replan_budgets * problem.settings.time_budget_s)
-    first, made = room, list[Refused]()
+    budget = _budget(problem)
+    sailed, before_s, budget.spent_s = draft.sailed, 0.0, draft.spent_s
+    made = list[Refused]()
     for attempt in range(PLAN.replans + 1):
-        before_s = budget.spent_s
-        try:
-            sailed = sail_all(problem, room, progress, stated=water, budget=budget)
-        except NoPlan as error:
-            raise _not_again(error, made) from None
+        if attempt:
+            before_s, progress = budget.spent_s, _replanning(progress)
+            try:
+                sailed = sail_all(problem, room, progress, stated=water, budget=budget)
+            except NoPlan as error:
+                raise _not_again(error, made) from None
         checking = phases_of(problem, room.space.planner, progress).trials
         checking("verifying", 0.0)
         checks = in_order(_check, (whole, water, sailed), ((verified,), (_bound_s,)))
@@ -113,9 +125,12 @@ def _planned(whole: PlanProblem, area: SeaArea, ship: Capability, progress: Prog
         try:
             room = _wider(problem, room, trials, sailed.legs)
         except NoPlan as error:
-            raise _too_risky(problem, first, made, f"; {error.obstacle}") from None
-        progress = _replanning(progress)
-    raise _too_risky(problem, first, made)
+            raise _too_risky(problem, draft.room, made, f"; {error.obstacle}") from None
+    raise _too_risky(problem, draft.room, made)
+
+
+def _budget(problem: PlanProblem) -> WorkBudget:
+    return WorkBudget(most_s=PLAN.replan_budgets * problem.settings.time_budget_s)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -123,6 +138,9 @@ class Draft:
     """A trial as sailed by the planner, before verification, risk and bound.
 
     Attributes:
+        area: part of the chart that it is planned in.
+        water, room: what legs and runs keep to, as stated and as planned with.
+        spent_s: counted work.
         sailed: commands, motion and legs.
         direct_s: time of the shortest path from start to goal at transit speed [s].
         transit_mps: that speed [m/s].
@@ -130,6 +148,10 @@ class Draft:
         made_good_m: (legs,) by how much each run or leg shortens the way to the goal.
     """
 
+    area: SeaArea
+    water: LegWater
+    room: PlanRoom
+    spent_s: float
     sailed: SailedTrial
     direct_s: float
     transit_mps: float
@@ -145,20 +167,28 @@ class Draft:
         return self.sailed.seconds(kind) - float(self.made_good_m[of_kind].sum()) / self.transit_mps
 
 
-def draft_trial(problem: PlanProblem, *, progress: Progress = silent) -> Draft:
+def draft_trial(problem: PlanProblem, *, like: Draft | None = None, progress: Progress = silent) -> Draft:
     """The trial of `plan_trial` without the checks, for comparing trials.
+
+    Args:
+        problem: the trial.
+        like: another trial between the same places; transitions that were tried for it are not tried again.
+        progress: of the planning.
 
     Raises:
         NoPlan: no path, no room, or no dynamically feasible leg.
     """
-    return _in_water(problem, never_falling(progress), _drafted)
+    return _in_water(problem, never_falling(progress), partial(_drafted, like=like))
 
 
-def _drafted(whole: PlanProblem, area: SeaArea, ship: Capability, progress: Progress) -> Draft:
+def _drafted(
+    whole: PlanProblem, area: SeaArea, ship: Capability, progress: Progress, like: Draft | None = None
+) -> Draft:
     progress("measuring the water", 0.0)
     problem = replace(whole, area=area)
-    water, room = roomy_water(problem, ship, progress)
-    budget = WorkBudget(most_s=PLAN.replan_budgets * problem.settings.time_budget_s)
+    known = like.room.space.tried if like is not None and like.water.ship == ship else {}
+    water, room = roomy_water(problem, ship, progress, known)
+    budget = _budget(problem)
     sailed = sail_all(problem, room, progress, stated=water, budget=budget)
     ends = [0, *(leg.last for leg in sailed.legs)]
     left_m = room.space.goal_distance.to_goal(sailed.trajectory.pose[ends, :2])
@@ -168,6 +198,10 @@ def _drafted(whole: PlanProblem, area: SeaArea, ship: Capability, progress: Prog
     leg_s = sample_s * np.array([leg.last - leg.first for leg in legs])
     rounds_s = 0.0 if go_around is None else float(go_around.seconds(leg_s).sum())
     return Draft(
+        area=area,
+        water=water,
+        room=room,
+        spent_s=budget.spent_s,
         sailed=sailed,
         direct_s=float(left_m[0]) / speed,
         transit_mps=speed,

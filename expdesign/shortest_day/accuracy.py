@@ -21,6 +21,7 @@ from expdesign.durations.criteria.models import congruent
 from expdesign.errors import InputError
 from expdesign.information.outcome_gradients import outcome_gradients
 from expdesign.information.prior import equation_noise
+from expdesign.information.unknown_current import beside_current, slope_of_whole
 from expdesign.shortest_day.values import AccuracySettings
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
@@ -32,6 +33,9 @@ NORMAL_95 = 1.959963984540054
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Accuracy:
     """An accuracy to be reached; information matrices (d, d) are sums over samples.
+
+    They may also be (d + 2, d + 2), about a steady current that is unknown too: what they tell of the ship counts, see
+    `information.unknown_current`, which is concave as well.
 
     Attributes:
         collected: the criterion, of information per sample of `samples`; None where it is not asked for.
@@ -60,10 +64,24 @@ class Accuracy:
 
     def margin(self, information: Array) -> float:
         """f of information (d, d) besides the prior; -inf where it is singular."""
+        information = self.about_ship(information)
         return min(self._criterion_margin(information), float(self._margins(information).min()))
 
+    def about_ship(self, information: Array) -> Array:
+        """(d, d) of what information tells of the ship."""
+        if len(information) == len(self.prior):
+            return information
+        return beside_current(information, len(self.parameters))
+
     def supergradient(self, information: Array) -> Array:
-        """(d, d) G with f(N) <= f(M) + <G, N - M> for every N, at a regular M."""
+        """G, shaped as M, with f(N) <= f(M) + <G, N - M> for every N, at a regular M."""
+        slope = self._slope(self.about_ship(information))
+        if len(information) == len(self.prior):
+            return slope
+        return slope_of_whole(information, len(self.parameters), slope)
+
+    def _slope(self, information: Array) -> Array:
+        """(d, d) the same by information (d, d)."""
         if self._criterion_margin(information) <= self._margins(information).min():
             assert self.collected is not None
             piece, degree = self.collected.pieces[0], self.collected.degree
@@ -77,6 +95,7 @@ class Accuracy:
 
     def scarcest(self, information: Array) -> str:
         """The parameter or outcome whose standard deviation is furthest from its limit; "" where the criterion is."""
+        information = self.about_ship(information)
         margins = self._margins(information)
         if self._criterion_margin(information) <= margins.min():
             return ""

@@ -7,24 +7,24 @@ prices says so. The prices decide only what is tried next.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
 
 from expdesign.durations import DurationDesign, with_repeats
-from expdesign.errors import NoAnswer, NoPlan, NotInformative
-from expdesign.memory import recalled
+from expdesign.errors import NoAnswer, NoPlan, NoRoom, NotInformative
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import Draft, draft_trial, plan_trial
 from expdesign.plan.values import Plan, SailedTrial
-from expdesign.plan.verify import about_ship, track_information
+from expdesign.plan.verify import track_information
 from expdesign.progress import Progress, in_phases, silent
 from expdesign.shortest_day.accuracy import Accuracy
 from expdesign.shortest_day.bounds import fastest_mps, way_bound_s
-from expdesign.shortest_day.cheapest import Choice, cheapest_runs, fullest_level, shares_cost_s
+from expdesign.shortest_day.cheapest import Choice, cheapest_runs, fullest_level, shares_costs_s
 from expdesign.shortest_day.offer import Offer
-from expdesign.shortest_day.prices import DraftedDay, Prices, first_prices, learnt_prices, offered
+from expdesign.shortest_day.prices import DraftedDay, Prices, first_prices, learnt_prices, near_day, offered
 from expdesign.shortest_day.tuning import TUNING
 from expdesign.shortest_day.values import DayParts, DayTried, ShortestDay
 from expdesign.values import Array
@@ -60,7 +60,8 @@ def shortest_day(
     found = search.planned(allowed, days, last, planning, good=lambda _, margin: margin >= 0, most=TUNING.compared)
     if not found:
         raise NoPlan(search.falls_short(days))
-    return min(found, key=lambda day: day.plan.day.median_s)
+    best = min(found, key=lambda day: day.plan.day.median_s)
+    return replace(best, curve=search.curve(days))
 
 
 def fullest_day(
@@ -98,7 +99,7 @@ def fullest_day(
     )
     if not found:
         raise NoPlan(f"no day within design.day_s = {day_s:g} was planned as it was drafted; a larger day_s would do")
-    return replace(found[0], most_s=day_s)
+    return replace(found[0], most_s=day_s, curve=search.curve(days))
 
 
 def check_way_fits(problem: PlanProblem, day_s: float) -> None:
@@ -117,11 +118,13 @@ class _Search:
 
     Attributes:
         problem, accuracy, added: as of `shortest_day`.
+        placeless: runs found to have no place in the water; grows.
     """
 
     problem: PlanProblem
     accuracy: Accuracy
     added: tuple[str, ...]
+    placeless: set[str] = field(default_factory=set)
 
     def rounds(
         self, choose: Callable[[Prices, Sequence[DraftedDay], Sequence[Choice]], Choice | None], progress: Progress
@@ -137,18 +140,22 @@ class _Search:
         """
         prices, days, choices = first_prices(self.problem), list[DraftedDay](), list[Choice]()
         *rounds, last = in_phases(progress, *np.ones(TUNING.rounds + 1))
-        refused = NoPlan("no day was planned")
-        for told in rounds:
+        refused, left = NoPlan("no day was planned"), iter(rounds)
+        told: Progress | None = next(left)
+        while told is not None:
             choice = choose(prices, days, choices)
             if choice is None:
                 break
             choices.append(choice)
             try:
-                days.append(self.drafted(choice, told))
+                days.append(self.drafted(choice, days, told))
+                prices = self.prices(days)
             except NoPlan as error:  # other runs may find their places
                 refused = error
-                continue
-            prices = self.prices(days)
+                if isinstance(error, NoRoom) and not self.placeless.issuperset(error.lacking):
+                    self.placeless.update(error.lacking)
+                    continue  # soon found, and no reason to try fewer days
+            told = next(left, None)
         if not days:
             raise refused
         return days, choices[-1], last
@@ -169,58 +176,69 @@ class _Search:
         return spare[-1] if spare else None
 
     def untried(self, prices: Prices, days: Sequence[DraftedDay], tried: Sequence[Choice]) -> Choice | None:
-        """The cheapest runs not tried yet that should reach the accuracy with their legs, by some margin.
+        """The cheapest runs not tried yet that should reach the accuracy, by some margin.
 
-        Where all days so far reach it, runs that promise less are tried first: prices learnt from longer days say less
-        of shorter ones.
+        None where no day is expected to be about as short as the shortest that reaches it, go-arounds included.
 
         Raises:
             NoAnswer: by the first prices, no runs within the limits reach it.
         """
-        steps = np.arange(TUNING.level_steps)
-        if days and all(day.margin >= 0 for day in days):
-            steps = np.r_[-steps, steps[1:]]
-        for step in steps.tolist():
+        reached = min((day.expected_s for day in days if day.margin >= 0), default=np.inf)
+        for step in range(TUNING.level_steps):
+            margin = step * TUNING.level_step
             try:
-                choice = self.chosen(prices, level=prices.level + step * TUNING.level_step)
+                choice, expected_s = self.chosen(prices, days, tried, margin=margin)
             except NoAnswer:
                 if not tried:
                     raise
                 return None  # the limits allow no more than what was tried
             if all(choice.repeats != earlier.repeats for earlier in tried):
-                return choice
+                return choice if expected_s < TUNING.worth_trying * reached else None
         return None
 
-    def chosen(self, prices: Prices, *, level: float) -> Choice:
-        """The cheapest runs that with their legs reach this margin by the prices."""
-        return cheapest_runs(self.accuracy, self.offer(prices), level=level)
+    def chosen(
+        self, prices: Prices, days: Sequence[DraftedDay], tried: Sequence[Choice], *, margin: float
+    ) -> tuple[Choice, float]:
+        """The cheapest runs that reach a margin by the prices, and the day expected with them [s].
+
+        Once days have been drafted, runs differ by few from one of these, and what tells and what it takes is counted
+        from there: of the days nearest to the accuracy the one from which the shortest is expected.
+
+        Raises:
+            NoAnswer: none within the limits do.
+        """
+        offer, tangents, found = self.offer(prices), tried[-1].tangents if tried else (), list[tuple[Choice, float]]()
+        for day in sorted(days, key=lambda day: abs(day.margin))[: TUNING.nearest]:
+            near = near_day(offer, prices.runs, day, self.problem.design.problem.names)
+            with suppress(NoAnswer):
+                choice = cheapest_runs(self.accuracy, near, level=margin, tangents=tangents)
+                saved_s = offer.total_s(np.array(day.repeats, dtype=float)) - choice.cost_s
+                found.append((choice, day.expected_s - saved_s))
+        if not found:
+            choice = cheapest_runs(self.accuracy, offer, level=prices.level + margin, tangents=tangents)
+            return choice, -np.inf  # nothing to compare with
+        return min(found, key=lambda one: one[1])
 
     def offer(self, prices: Prices) -> Offer:
         """What runs cost and tell with their legs, by the prices."""
-        return offered(self.problem, prices, free=self.added)
+        return offered(self.problem, prices, free=self.added, placeless=self.placeless)
 
-    def drafted(self, choice: Choice, progress: Progress) -> DraftedDay:
-        """The day with these runs."""
+    def drafted(self, choice: Choice, days: Sequence[DraftedDay], progress: Progress) -> DraftedDay:
+        """The day with these runs; transitions that the day before tried are not tried again."""
         problem = replace(self.problem, design=self.design(choice.repeats))
-        draft = recalled(draft_trial, problem, progress=progress)
-        information, whole = self._information(draft.sailed)
-        return DraftedDay(
-            repeats=choice.repeats,
-            draft=draft,
-            information=information,
-            whole=whole,
-            margin=self.accuracy.margin(whole),
-        )
+        draft = draft_trial(problem, like=days[-1].draft if days else None, progress=progress)
+        information = self._information(draft.sailed)
+        margin = self.accuracy.margin(information.sum(axis=0))
+        return DraftedDay(repeats=choice.repeats, draft=draft, information=information, margin=margin)
 
-    def _information(self, sailed: SailedTrial) -> tuple[Array, Array]:
-        """Of each leg (legs, d, d) if the current is known, and of the track (d, d) beside an unknown one."""
-        durations, weather = self.problem.design.problem, self.problem.environment
-        legs, d = track_information(self.problem.vessel, durations, weather, sailed), durations.dimension
-        return legs[:, :d, :d], about_ship(durations, legs.sum(axis=0))
+    def _information(self, sailed: SailedTrial) -> Array:
+        """(legs, d, d) of each leg, or (legs, d + 2, d + 2)."""
+        problem = self.problem
+        return track_information(problem.vessel, problem.design.problem, problem.environment, sailed)
 
     def prices(self, days: Sequence[DraftedDay]) -> Prices:
         """Prices by the days so far; the level is what they promise where the accuracy is just reached."""
-        prices = learnt_prices(self.problem.primitives, days)
+        prices = learnt_prices(self.problem, days)
         promised = [
             self.accuracy.margin(self.offer(prices).information(np.array(day.repeats, dtype=float))) for day in days
         ]
@@ -243,7 +261,7 @@ class _Search:
         good: Callable[[Plan, float], bool],
         most: int,
     ) -> list[ShortestDay]:
-        """The first good ones of the best days, planned with their verification and their drawn trials.
+        """The first good ones of the best days, with their verification and their drawn trials.
 
         Args:
             best: to be planned, the best first.
@@ -262,11 +280,11 @@ class _Search:
                 break
             design = self.design(day.repeats)
             try:
-                plan = recalled(plan_trial, replace(self.problem, design=design), progress=progress)
+                plan = plan_trial(replace(self.problem, design=design), drafted=day.draft, progress=progress)
             except NoPlan as error:  # a longer day may be less risky
                 refused = error
                 continue
-            if good(plan, margin := self.accuracy.margin(self._information(plan.sailed)[1])):
+            if good(plan, margin := self.accuracy.margin(self._information(plan.sailed).sum(axis=0))):
                 found.append(
                     ShortestDay(
                         plan=plan,
@@ -276,7 +294,6 @@ class _Search:
                         cost_bound_s=last.bound_s,
                         information=float(np.exp(margin)),
                         parts=_parts(day.draft, plan),
-                        curve=self._curve(days),
                     )
                 )
         if refused is not None and not found:
@@ -293,14 +310,13 @@ class _Search:
             f"is needed{about}; less accuracy, or manoeuvres that need less room, would do"
         )
 
-    def _curve(self, days: Sequence[DraftedDay]) -> Array:
+    def curve(self, days: Sequence[DraftedDay]) -> Array:
         """(k, 2) day [s] and information of the cheapest choices by the prices learnt; days drafted were so late."""
         prices = self.prices(days)
         offer = self.offer(prices)
         late_s = self.late_s(days, prices)
-        margins = np.log(TUNING.curve_shares)
-        costs_s = [shares_cost_s(self.accuracy, offer, prices.level + margin) for margin in margins]
-        points = np.column_stack([prices.way_s + late_s + np.array(costs_s), TUNING.curve_shares])
+        costs_s = shares_costs_s(self.accuracy, offer, (prices.level + np.log(TUNING.curve_shares)).tolist())
+        points = np.column_stack([prices.way_s + late_s + costs_s, TUNING.curve_shares])
         return np.asarray(points[np.isfinite(points[:, 0])])
 
     def late_s(self, days: Sequence[DraftedDay], prices: Prices) -> float:

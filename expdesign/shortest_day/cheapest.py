@@ -14,7 +14,8 @@ Source: J. E. Kelley 1960; A. F. Veinott 1967 for cuts where the way to inner po
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.optimize import linprog
@@ -24,7 +25,7 @@ from expdesign.shortest_day.accuracy import Accuracy
 from expdesign.shortest_day.offer import Offer
 from expdesign.shortest_day.tuning import TUNING
 from expdesign.shortest_day.whole_runs import exchanged
-from expdesign.values import Array
+from expdesign.values import Array, seal
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,11 +36,29 @@ class Choice:
         repeats: (q,) whole runs, one at least.
         cost_s: of them, less what they save.
         bound_s: no runs, whole or not, reach the accuracy for less.
+        tangents: on the margin, see `Relaxed`.
     """
 
     repeats: tuple[int, ...]
     cost_s: float
     bound_s: float
+    tangents: tuple[Tangent, ...] = field(default=(), repr=False, compare=False)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Tangent:
+    """A linear bound on the margin of an accuracy: f(M) <= <slope, M> + offset, for all runs, costs and levels.
+
+    Attributes:
+        slope: (d, d).
+        offset: of the margin.
+    """
+
+    slope: Array
+    offset: float
+
+    def __post_init__(self) -> None:
+        seal(self, slope="d d")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -51,40 +70,50 @@ class Relaxed:
         bound_s: no runs, whole or not, cost less.
         worth: (d, d) what information is worth at the margin: trace(G M) seconds.
         worth_of_saved: of a second of transit saved, from 0 to 1.
+        tangents: on the margin, with which a like problem is soon solved.
     """
 
     runs: Array
     bound_s: float
     worth: Array
     worth_of_saved: float
+    tangents: tuple[Tangent, ...] = ()
 
 
-def cheapest_runs(accuracy: Accuracy, offer: Offer, *, level: float = 0.0) -> Choice:
+def cheapest_runs(accuracy: Accuracy, offer: Offer, *, level: float = 0.0, tangents: Sequence[Tangent] = ()) -> Choice:
     """Whole runs that reach an accuracy at little cost.
 
     Args:
         accuracy: gives the margin f.
         offer: runs and their costs.
         level: of f that is to be reached; 0 reaches the accuracy.
+        tangents: of earlier choices for the same accuracy.
 
     Raises:
         NoAnswer: no runs within the limits reach it.
     """
-    relaxed = cheapest_shares(accuracy, offer, level=level)
+    relaxed = cheapest_shares(accuracy, offer, level=level, tangents=tangents)
     runs = np.clip(np.ceil(relaxed.runs - TUNING.choice_gap), offer.fewest, offer.most)
     if not runs.any() or accuracy.margin(offer.information(runs)) < level:
         runs = np.minimum(runs + 1.0, offer.most)
     runs = exchanged(accuracy, offer, runs, level)
-    return Choice(repeats=tuple(int(n) for n in runs), cost_s=offer.total_s(runs), bound_s=relaxed.bound_s)
+    return Choice(
+        repeats=tuple(int(n) for n in runs),
+        cost_s=offer.total_s(runs),
+        bound_s=relaxed.bound_s,
+        tangents=relaxed.tangents,
+    )
 
 
-def cheapest_shares(accuracy: Accuracy, offer: Offer, *, level: float = 0.0) -> Relaxed:
-    """The cheapest runs, whole or not, and what information and way are worth at the margin.
+def cheapest_shares(
+    accuracy: Accuracy, offer: Offer, *, level: float = 0.0, tangents: Sequence[Tangent] = ()
+) -> Relaxed:
+    """The cheapest runs, whole or not, and what information and way are worth at the margin; see `cheapest_runs`.
 
     Raises:
         NoAnswer: no runs within the limits reach it.
     """
-    return _relaxed(_Cuts(accuracy=accuracy, offer=offer, level=level))
+    return _relaxed(_Cuts(accuracy=accuracy, offer=offer, level=level, tangents=tangents))
 
 
 def fullest_level(accuracy: Accuracy, offer: Offer, most_s: float) -> float:
@@ -93,18 +122,29 @@ def fullest_level(accuracy: Accuracy, offer: Offer, most_s: float) -> float:
     Levels are searched from `Tuning.least_level` to that of the most runs; the least where even it costs more.
     """
     low, high = TUNING.least_level, accuracy.margin(offer.information(offer.most))
+    tangents: tuple[Tangent, ...] = ()
     for _ in range(TUNING.level_halvings):
         middle = (low + high) / 2
-        low, high = (middle, high) if shares_cost_s(accuracy, offer, middle) <= most_s else (low, middle)
+        try:
+            found = cheapest_shares(accuracy, offer, level=middle, tangents=tangents)
+        except NoAnswer:
+            high = middle
+            continue
+        tangents = found.tangents
+        low, high = (middle, high) if found.bound_s <= most_s else (low, middle)
     return low
 
 
-def shares_cost_s(accuracy: Accuracy, offer: Offer, level: float) -> float:
-    """Least cost of runs, whole or not, that reach a level; inf where none do [s]."""
-    try:
-        return cheapest_shares(accuracy, offer, level=level).bound_s
-    except NoAnswer:
-        return np.inf
+def shares_costs_s(accuracy: Accuracy, offer: Offer, levels: Sequence[float]) -> Array:
+    """(n,) least cost of runs, whole or not, that reach levels; inf where none do [s]."""
+    costs_s, tangents = np.full(len(levels), np.inf), tuple[Tangent, ...]()
+    for place, level in enumerate(levels):
+        try:
+            found = cheapest_shares(accuracy, offer, level=level, tangents=tangents)
+        except NoAnswer:
+            continue
+        costs_s[place], tangents = found.bound_s, found.tangents
+    return costs_s
 
 
 def _refuse(accuracy: Accuracy, information: Array) -> None:
@@ -125,8 +165,8 @@ def _refuse(accuracy: Accuracy, information: Array) -> None:
 class _Cuts:
     """Linear inequalities A x >= b that all x = (runs n, time saved s) with margin above the level satisfy."""
 
-    def __init__(self, *, accuracy: Accuracy, offer: Offer, level: float) -> None:
-        """The inequality of the time saved, and a first tangent.
+    def __init__(self, *, accuracy: Accuracy, offer: Offer, level: float, tangents: Sequence[Tangent] = ()) -> None:
+        """The inequality of the time saved, tangents known already, and a first one.
 
         Raises:
             NoAnswer: the most runs do not reach the level.
@@ -141,14 +181,22 @@ class _Cuts:
         self.inner = self._moved(offer.fewest, offer.most, min(level + 1.0, accuracy.margin(most)))
         self._A, self._b = [np.r_[offer.saved_s, -1.0], np.r_[np.ones(count), 0.0]], [0.0, 1.0]  # a trial has a run
         self._gradients = [np.zeros_like(most)] * 2
+        self.tangents = list[Tangent]()
+        for tangent in tangents:
+            self._keep(tangent)
         self.add(offer.fewest)
 
     def add(self, runs: Array) -> None:
         """The inequality that is tangent where the way from runs (q,) that fall short to inner ones meets the level."""
-        M, matrices = self.offer.information(self._reaching(runs)), self.offer.matrices
+        M = self.offer.information(self._reaching(runs))
         G = self.accuracy.supergradient(M)
+        self._keep(Tangent(slope=G, offset=self.accuracy.margin(M) - float(np.sum(G * M))))
+
+    def _keep(self, tangent: Tangent) -> None:
+        matrices, G = self.offer.matrices, tangent.slope
         slope = matrices.reshape(len(matrices), -1) @ G.ravel()
-        short = self.level - self.accuracy.margin(M) + float(np.sum(G * (M - self.offer.known)))
+        short = self.level - tangent.offset - float(np.sum(G * self.offer.known))
+        self.tangents.append(tangent)
         size = max(float(np.abs(slope).max()), np.finfo(float).tiny)
         self._A.append(np.r_[slope / size, 0.0])
         self._b.append(short / size)
@@ -196,7 +244,11 @@ def _relaxed(cuts: _Cuts) -> Relaxed:
         multipliers, runs = np.maximum(-found.ineqlin.marginals, 0.0), found.x[:-1]
         bound_s = max(best.bound_s, _dual_bound(A, b, cuts, multipliers))
         best = Relaxed(
-            runs=runs, bound_s=bound_s, worth=cuts.worth(multipliers), worth_of_saved=min(float(multipliers[0]), 1.0)
+            runs=runs,
+            bound_s=bound_s,
+            worth=cuts.worth(multipliers),
+            worth_of_saved=min(float(multipliers[0]), 1.0),
+            tangents=tuple(cuts.tangents[-TUNING.tangents :]),
         )
         if cuts.accuracy.margin(offer.information(runs)) >= cuts.level - TUNING.choice_gap / 10:
             break

@@ -32,6 +32,7 @@ from expdesign.plan.assembly import ship_on_legs
 from expdesign.plan.problem import PlanProblem
 from expdesign.progress import Progress, silent
 from expdesign.shortest_day.accuracy import Accuracy
+from expdesign.shortest_day.along_way import straight_courses
 from expdesign.shortest_day.cheapest import Relaxed, cheapest_shares, fullest_level
 from expdesign.shortest_day.offer import Offer
 from expdesign.shortest_day.prices import first_prices, offered
@@ -74,8 +75,9 @@ def manoeuvres_worth_adding(
     level = float(np.log(TUNING.first_share))
     if day_s is not None:
         level = fullest_level(accuracy, offer, day_s - offer.way_s)
+    shares = cheapest_shares(accuracy, offer, level=level)
     for number in range(TUNING.growth_rounds):
-        worth = _worth(cheapest_shares(accuracy, offer, level=level), problem, transit_mps)
+        worth, before_s = _worth(shares, problem, transit_mps), shares.bound_s
         progress("searching for manoeuvres that shorten the day", (number + 0.5) / (TUNING.growth_rounds + 1))
         archives = _refined(archives, worth, measure, rng)
         found = _better(archives, worth, settings)
@@ -83,7 +85,10 @@ def manoeuvres_worth_adding(
             break
         specs += [candidate.spec for candidate in found]
         offer = _with(offer, found, problem, transit_mps)
-    runs = cheapest_shares(accuracy, offer, level=level).runs[given:]
+        shares = cheapest_shares(accuracy, offer, level=level, tangents=shares.tangents)
+        if shares.bound_s > (1 - TUNING.growth_gain) * before_s:
+            break
+    runs = shares.runs[given:]
     most = np.argsort(-runs, kind="stable")[: settings.rounds]
     chosen = [specs[index] for index in np.sort(most[runs[most] > TUNING.used])]
     taken = {item.name for item in problem.primitives}
@@ -120,6 +125,7 @@ def _measure(problem: PlanProblem, limits: Array) -> Measure:
         environment=problem.environment,
         mean_subtraction=durations.mean_subtraction,
         limits=limits,
+        courses=straight_courses(problem),
     )
 
 

@@ -1,7 +1,8 @@
 """What one more run costs and tells, its leg included, learnt from the days that were planned.
 
 A run takes its own time, and a share of the repositioning that plans have beyond the direct way. Its way made good
-saves time of that way. The legs that lead to runs tell, too. Each is taken to tell what legs did on average: how long
+saves time of that way. It tells what it does along the way to the goal: its heading decides what wind and an unknown
+current leave to be told. The legs that lead to runs tell, too. Each is taken to tell what legs did on average: how long
 a leg is, and so what it tells, depends on its place in the day more than on the run that it leads to. These are
 estimates for the next plan; the next plan itself says what is true.
 """
@@ -9,7 +10,7 @@ estimates for the next plan; the next plan itself says what is true.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from expdesign.dictionary import Primitive
 from expdesign.plan.assembly import ship_on_legs
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import Draft
+from expdesign.shortest_day.along_way import courses_of, runs_along, straight_courses
 from expdesign.shortest_day.offer import Offer
 from expdesign.shortest_day.tuning import TUNING
 from expdesign.values import Array, seal
@@ -30,7 +32,8 @@ class Prices:
         cost_s: (q,) of one more whole run, its leg included.
         saved_s: (q,) time at transit speed of its way made good.
         way_s: time at transit speed of the way from start to goal.
-        legs: (q, d, d) information of the leg that leads to each.
+        runs: (q, d, d) information of one more whole run.
+        leg: (d, d) information of the leg that leads to it.
         goal: (d, d) information of the leg to the goal.
         level: margin of the accuracy that runs and legs must reach by these estimates.
     """
@@ -38,12 +41,13 @@ class Prices:
     cost_s: Array
     saved_s: Array
     way_s: float
-    legs: Array
+    runs: Array
+    leg: Array
     goal: Array
     level: float = 0.0
 
     def __post_init__(self) -> None:
-        seal(self, cost_s="q", saved_s="q", legs="q d d", goal="d d")
+        seal(self, cost_s="q", saved_s="q", runs="q d d", leg="d d", goal="d d")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -53,16 +57,20 @@ class DraftedDay:
     Attributes:
         repeats: (q,) runs.
         draft: the day.
-        information: (legs, d, d) of each leg of its track, were the current known.
-        whole: (d, d) of the whole track, beside a steady current that the forecast leaves unknown.
+        information: (legs, d, d) of each leg of its track, or (legs, d + 2, d + 2) where the forecast leaves a steady
+            current unknown.
         margin: of the accuracy, by the whole track.
     """
 
     repeats: tuple[int, ...]
     draft: Draft
     information: Array
-    whole: Array
     margin: float
+
+    @property
+    def whole(self) -> Array:
+        """(d, d) or (d + 2, d + 2) information of the whole track."""
+        return np.asarray(self.information.sum(axis=0))
 
     @property
     def day_s(self) -> float:
@@ -77,25 +85,27 @@ class DraftedDay:
 
 def first_prices(problem: PlanProblem) -> Prices:
     """Prices before any day was planned: the way is at least the straight line to the goal."""
-    count, dimension = len(problem.primitives), problem.design.problem.dimension
     transit_mps = ship_on_legs(problem).transit_speed_mps
+    runs = runs_along(problem, straight_courses(problem))
     return Prices(
         cost_s=problem.design.problem.run_s + TUNING.first_leg_s,
         saved_s=_made_good_s(problem.primitives, transit_mps),
         way_s=float(np.hypot(*(problem.goal - problem.start)[:2])) / transit_mps,
-        legs=np.zeros((count, dimension, dimension)),
-        goal=np.zeros((dimension, dimension)),
+        runs=runs,
+        leg=np.zeros_like(runs[0]),
+        goal=np.zeros_like(runs[0]),
         level=float(np.log(TUNING.first_share)),
     )
 
 
-def offered(problem: PlanProblem, prices: Prices, free: Collection[str] = ()) -> Offer:
+def offered(problem: PlanProblem, prices: Prices, free: Collection[str] = (), placeless: Collection[str] = ()) -> Offer:
     """What runs cost and tell with their legs.
 
     Args:
         problem: gives the runs and the limits on them.
         prices: of runs.
         free: of the limits.
+        placeless: not offered, as they have no place in the water, unless the limits require them.
     """
     durations, limits = problem.design.problem, problem.design.problem.constraints
     names, run_s = durations.names, durations.run_s
@@ -103,24 +113,43 @@ def offered(problem: PlanProblem, prices: Prices, free: Collection[str] = ()) ->
     least_s = np.array([limits.least_s.get(name, 0.0) for name in names])
     most_s = np.array([0.0 if name in barred else limits.most_s.get(name, np.inf) for name in names])
     required = np.array([float(name in limits.required) for name in names])
-    samples = run_s / problem.vessel.sample_time_s
+    fewest = np.maximum(np.ceil(least_s / run_s), required)
+    most = np.minimum(np.floor(most_s / run_s), TUNING.most_runs)
     return Offer(
-        matrices=durations.matrices * samples[:, None, None] + prices.legs,
+        matrices=prices.runs + prices.leg,
         cost_s=prices.cost_s,
         saved_s=prices.saved_s,
         way_s=prices.way_s,
         known=prices.goal,
-        fewest=np.maximum(np.ceil(least_s / run_s), required),
-        most=np.minimum(np.floor(most_s / run_s), TUNING.most_runs),
+        fewest=fewest,
+        most=np.where([name in placeless for name in names], fewest, most),
     )
 
 
-def learnt_prices(primitives: Sequence[Primitive], days: Sequence[DraftedDay]) -> Prices:
+def near_day(offer: Offer, runs: Array, day: DraftedDay, names: Sequence[str]) -> Offer:
+    """The offer round a day: a few runs more or fewer of each, by what the day's own runs and legs tell.
+
+    Other runs tell what they are taken to, (q, d, d), and legs the same whatever runs they join.
+    """
+    had, matrices, legs = np.array(day.repeats, dtype=float), runs.copy(), day.draft.sailed.legs
+    for index in np.flatnonzero(had).tolist():
+        own = [leg.kind == "primitive" and leg.name == names[index] for leg in legs]
+        matrices[index] = day.information[own].mean(axis=0)
+    return replace(
+        offer,
+        matrices=matrices,
+        known=day.information[[leg.kind != "primitive" for leg in legs]].sum(axis=0),
+        fewest=np.clip(had - TUNING.other_runs, offer.fewest, offer.most),
+        most=np.clip(had + TUNING.other_runs, offer.fewest, offer.most),
+    )
+
+
+def learnt_prices(problem: PlanProblem, days: Sequence[DraftedDay]) -> Prices:
     """Prices by all days so far; `level` is left at 0.
 
     Args:
-        primitives: of the dictionary.
-        days: one at least.
+        problem: gives the dictionary.
+        days: one at least; runs are taken to lie along the track of the last.
     """
     told = np.array(
         [
@@ -131,25 +160,40 @@ def learnt_prices(primitives: Sequence[Primitive], days: Sequence[DraftedDay]) -
         ]
     )
     goal, draft = np.mean([day.information[-1] for day in days], axis=0), days[0].draft
-    saved_s = _made_good_s(primitives, draft.transit_mps)
+    names = problem.design.problem.names
+    saved_s = _made_good_s(problem.primitives, draft.transit_mps)
     return Prices(
-        cost_s=np.array([item.duration_s for item in primitives]) + _leg_s(days, saved_s),
+        cost_s=np.array([item.duration_s for item in problem.primitives]) + _legs_s(names, days, saved_s),
         saved_s=saved_s,
         way_s=draft.direct_s,
-        legs=np.broadcast_to(told.mean(axis=0), (len(primitives), *told.shape[1:])),
+        runs=runs_along(problem, courses_of(days[-1].draft.sailed.trajectory)),
+        leg=told.mean(axis=0),
         goal=goal,
     )
 
 
-def _leg_s(days: Sequence[DraftedDay], saved_s: Array) -> float:
-    """Repositioning for each run, beyond the way to the goal that runs leave [s]."""
-    beyond_s = sum(
-        day.draft.sailed.seconds("reposition")
-        + day.draft.going_round_s
-        - max(day.draft.direct_s - float(np.dot(day.repeats, saved_s)), 0.0)
-        for day in days
-    )
-    return max(float(beyond_s) / sum(sum(day.repeats) for day in days), TUNING.least_leg_s)
+def _legs_s(names: Sequence[str], days: Sequence[DraftedDay], saved_s: Array) -> Array:
+    """(q,) repositioning for each run, beyond the way that it and its leg make good [s].
+
+    By the legs that led to it so far, and the average leg, which counts as `Tuning.average_legs` of them.
+    """
+    beyond_s, into = list[float](), list[int]()
+    for day in days:
+        draft, sailed = day.draft, day.draft.sailed
+        second, runs = sailed.commands.sample_time_s, [leg.kind == "primitive" for leg in sailed.legs]
+        lost_s = (
+            second * np.array([leg.last - leg.first for leg in sailed.legs]) - draft.made_good_m / draft.transit_mps
+        )
+        for place in np.flatnonzero(runs).tolist():
+            run = names.index(sailed.legs[place].name)
+            first = place - 1 if place and not runs[place - 1] else place
+            own_s = second * (sailed.legs[place].last - sailed.legs[place].first) - saved_s[run]
+            into.append(run)
+            beyond_s.append(float(lost_s[first : place + 1].sum()) - own_s + draft.going_round_s / sum(runs))
+    average_s, count = np.mean(beyond_s), np.bincount(into, minlength=len(names))
+    sums_s = np.bincount(into, weights=beyond_s, minlength=len(names))
+    learnt_s: Array = (TUNING.average_legs * average_s + sums_s) / (TUNING.average_legs + count)
+    return np.asarray(np.maximum(learnt_s, TUNING.least_leg_s))
 
 
 def _made_good_s(primitives: Sequence[Primitive], transit_mps: float) -> Array:

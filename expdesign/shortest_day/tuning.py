@@ -12,21 +12,29 @@ class Tuning:
     Attributes:
         rounds: most days that are planned in search of the shortest.
         first_share: information from runs in the first day, as a share of what is needed; legs tell the rest.
+        courses: on which runs are taken to be sailed.
+        course_spread_rad: of these to both sides of the straight line, before a day has been planned.
         first_leg_s: time of repositioning for each run, before a day has been planned [s].
+        nearest: days to the accuracy, from which the next is sought.
+        other_runs: of each manoeuvre that it has more or fewer, at most.
+        worth_trying: longest day expected for which one is drafted, in the shortest that reaches the accuracy.
         level_step, level_steps: margin that is asked for besides where the cheapest runs were tried already, at most so
             many times.
         compared: days that reach the accuracy and are planned, of which that with the least median of drawn trials is
             taken: they know slow ships and go-arounds, which the expected time of a draft hardly does.
         least_level, level_halvings: least margin of a day of a given length, and steps in search of the largest.
+        average_legs: legs to one manoeuvre that the average of all legs counts as, once days have been planned.
         least_leg_s: least of it once days have been planned [s].
         added_durations: durations of manoeuvres that are searched for, in that of the longest run of the dictionary.
         growth_rounds: searches for manoeuvres that are worth more than they cost.
+        growth_gain: share of the cheapest runs' cost that a search must save for another to follow.
         growth_families: searched in each of them, the most promising; the best of each may be added.
         added_speed: largest surge speed of a manoeuvre that is added, in transit speeds, which leaves some thrust for
             sway.
         used: least runs of a manoeuvre found, in the cheapest runs not made whole, for it to be added.
         curve_shares: information, in shares of what is needed, for which the day is estimated.
         cuts: most linear bounds on the accuracy in the choice of runs, not whole.
+        tangents: most of them carried over to a like choice.
         halvings: of the way to inner runs, in search of the boundary.
         reached: shortfall of the accuracy's margin that counts as reached.
         choice_gap: relative gap at which the choice of runs ends.
@@ -35,21 +43,29 @@ class Tuning:
     """
 
     rounds: int = 6
-    first_share: float = 0.6
-    first_leg_s: float = 30.0
+    first_share: float = 0.4
+    courses: int = 4
+    course_spread_rad: float = 0.5
+    first_leg_s: float = 15.0
+    nearest: int = 3
+    other_runs: int = 2
+    worth_trying: float = 1.01
     level_step: float = 0.05
     level_steps: int = 10
     compared: int = 2
     least_level: float = -4.0
     level_halvings: int = 12
+    average_legs: float = 2.0
     least_leg_s: float = 5.0
     added_durations: tuple[float, ...] = (0.25, 0.5, 1.0)
     growth_rounds: int = 8
+    growth_gain: float = 0.02
     growth_families: int = 6
     added_speed: float = 0.95
     used: float = 0.1
     curve_shares: tuple[float, ...] = (0.4, 0.5, 0.65, 0.8, 1.0, 1.25, 1.6, 2.0)
     cuts: int = 200
+    tangents: int = 60
     halvings: int = 20
     reached: float = 1e-9
     choice_gap: float = 1e-3

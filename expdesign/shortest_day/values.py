@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from expdesign.durations import DurationDesign
 from expdesign.plan.values import Plan
 from expdesign.values import Array, seal
@@ -122,7 +124,7 @@ class ShortestDay:
     cost_bound_s: float
     information: float
     parts: DayParts
-    curve: Array
+    curve: Array = field(default_factory=lambda: np.zeros((0, 2)))
     bound: DayBound | None = None
     most_s: float | None = None
 

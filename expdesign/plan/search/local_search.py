@@ -126,12 +126,27 @@ class _Legs:
         before, after = [*froms[i : i + 1, :2], *chain.bends[i]][-1], [*chain.bends[j + 1], *tos[j + 1 : j + 2, :2]][0]
         gain_s[(legs_m[0] < self._least_m(chain.runs, i)) | (legs_m[1] < self._least_m(chain.runs, j + 1))] = -np.inf
         order = np.argsort(-gain_s, kind="stable")
-        for row in order[gain_s[order] > SEARCH.least_gain_s]:
-            if self._clear(chain.runs[i : j + 1], blocks[row], before, after):
-                poses, legs_s = chain.poses.copy(), chain.legs_s.copy()
-                poses[i : j + 1], legs_s[i], legs_s[j + 1] = blocks[row], arrive_s[row], leave_s[row]
-                return replace(chain, poses=poses, legs_s=legs_s)
-        return chain
+        row = self._first_clear(
+            chain.runs[i : j + 1], blocks, order[gain_s[order] > SEARCH.least_gain_s], before, after
+        )
+        if row is None:
+            return chain
+        poses, legs_s = chain.poses.copy(), chain.legs_s.copy()
+        poses[i : j + 1], legs_s[i], legs_s[j + 1] = blocks[row], arrive_s[row], leave_s[row]
+        return replace(chain, poses=poses, legs_s=legs_s)
+
+    def _first_clear(
+        self, runs: np.ndarray, blocks: Array, rows: np.ndarray, before: Array, after: Array
+    ) -> int | None:
+        """The first of the rows of blocks (n, m, 3) that is clear, or None; more and more are looked at together."""
+        first, count = 0, SEARCH.blocks_at_once
+        while first < len(rows):
+            some = rows[first : first + count]
+            clear = self._clear(runs, blocks[some], before, after)
+            if clear.any():
+                return int(some[clear.argmax()])
+            first, count = first + count, 4 * count
+        return None
 
     def _least_m(self, runs: np.ndarray, k: int) -> float:
         """Length from which on leg k takes as long as the rule says."""
@@ -160,13 +175,20 @@ class _Legs:
         chain = [self.ends.last, *runs.tolist(), -1]
         return self.space.pair(chain[k], chain[k + 1])
 
-    def _clear(self, runs: np.ndarray, poses: Array, before: Array, after: Array) -> bool:
-        """Whether runs have room, and straight lines between them and two places (2,) lead through water."""
+    def _clear(self, runs: np.ndarray, blocks: Array, before: Array, after: Array) -> np.ndarray:
+        """(n,) whether runs (m,) at blocks (n, m, 3) have room, and water is between them and two places (2,)."""
+        primitive, poses = np.tile(runs, len(blocks)), blocks.reshape(-1, 3)
+        clear = np.asarray(runs_clear(self.space, primitive, poses).reshape(len(blocks), -1).all(axis=1))
+        some = blocks[clear]
+        ends = run_ends(self.space, primitive[: some[..., 0].size], some.reshape(-1, 3)).reshape(some.shape)
+        starts, stops = (np.broadcast_to(place, (len(some), 1, 2)) for place in (before, after))
         lines = sight_lines(
-            np.vstack([before, run_ends(self.space, runs, poses)[:, :2]]), np.vstack([poses[:, :2], after])
+            np.concatenate([starts, ends[..., :2]], axis=1).reshape(-1, 2),
+            np.concatenate([some[..., :2], stops], axis=1).reshape(-1, 2),
         )
-        seen = shapely.covers(self.space.goal_distance.graph.water, lines).all()
-        return bool(seen and runs_clear(self.space, runs, poses).all())
+        seen = shapely.covers(self.space.goal_distance.graph.water, lines)
+        clear[clear] = seen.reshape(len(some), len(runs) + 1).all(axis=1)
+        return clear
 
     def _blocks(self, chain: Chain, i: int, j: int) -> Array:
         """(moves, j - i + 1, 3) poses of a block moved and turned about its first pose, drifting as before."""

@@ -15,6 +15,7 @@ class Tuning:
         checked_at_once, sorted_at_once: successors checked for clearance at a time, and sorted.
         cell_hulls, heading_rad: places of which one successor is kept: their size in hull lengths, and in heading.
         shift_hulls, turn_deg: steps of the local search, and with each a turn.
+        blocks_at_once: moves of a block looked at together at first, four times as many then.
         sweeps: over all blocks of runs at most.
         same: hull lengths and radians by which a leg may differ from a transition that was tried.
         least_gain_s: for which a block is moved.
@@ -37,6 +38,7 @@ class Tuning:
     heading_rad: float = 0.4
     shift_hulls: tuple[float, ...] = (8.0, 4.0, 2.0, 1.0, 0.5, 0.25, 0.125, 0.0625)
     turn_deg: tuple[float, ...] = (90.0, 60.0, 40.0, 25.0, 15.0, 8.0, 4.0, 2.0)
+    blocks_at_once: int = 4
     sweeps: int = 20
     same: float = 1e-3
     least_gain_s: float = 0.05

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 
 from expdesign.dictionary import PrimitiveSpec
 from expdesign.durations import DurationDesign
@@ -89,11 +90,12 @@ def planned_day(
         design = designed(case, information, seed=seed)
     problem = replace(plan_problem(case, information, design, seed=seed), expected=True)
     names = tuple(spec.name for spec in added)
-    found = (
-        shortest_day(problem, accuracy, added=names, most_s=asked.most_s, progress=planning)
+    search = (
+        partial(shortest_day, added=names, most_s=asked.most_s)
         if asked.day_s is None
-        else fullest_day(problem, accuracy, asked.day_s, added=names, progress=planning)
+        else partial(fullest_day, day_s=asked.day_s, added=names)
     )
+    found = recalled(search, problem, accuracy, progress=planning)
     found = replace(found, bound=recalled(day_bound, problem, accuracy, found.plan))
     return Day(information=information, design=found.design, plan=found.plan, shortest=found, added=added)
 
