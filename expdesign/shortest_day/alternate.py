@@ -276,8 +276,8 @@ class _Search:
         """
         refused, found = None, list[ShortestDay]()
         for day in best:
-            if len(found) == most:
-                break
+            if len(found) == most or any(day.day_s >= other.plan.day.median_s for other in found):
+                break  # drawn trials take no less than planned
             design = self.design(day.repeats)
             try:
                 plan = plan_trial(replace(self.problem, design=design), drafted=day.draft, progress=progress)
