@@ -33,7 +33,7 @@ def foresee(
         ),
     ] = None,
     out: Out = None,
-    jobs: Jobs = 0,
+    jobs: Jobs = 1,
     no_cache: NoCache = False,
     seed: Seed = 0,
 ) -> Asked:

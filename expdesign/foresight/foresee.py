@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,7 +27,7 @@ from expdesign.diagnosis.vessel_file import extended_model
 from expdesign.dictionary import Primitive
 from expdesign.foresight.added import Offers, information_of_runs, of_one_manoeuvre, together
 from expdesign.foresight.effects import Direction, HiddenEffect, described, disturbance_at, hidden_effects, joined
-from expdesign.foresight.information import batch_information, beside_nuisance
+from expdesign.foresight.information import allowed_by_prior, batch_information, beside_nuisance
 from expdesign.foresight.power import (
     Rivals,
     freedom_of,
@@ -107,6 +107,7 @@ def foresee(
     weather: Environment,
     *,
     offers: Sequence[Primitive] = (),
+    sizes: Mapping[str, float] | None = None,
     seed: int = 0,
     progress: Progress = silent,
 ) -> Foresight:
@@ -117,6 +118,7 @@ def foresee(
         runs: of the trial.
         weather: the forecast; how it varies is in the trial.
         offers: manoeuvres whose runs may be added.
+        sizes: of causes, in the unit of their effects in results, instead of those that matter.
         seed: of all chance.
         progress: of the work.
 
@@ -128,10 +130,10 @@ def foresee(
     known = background(vessel, runs, weather, seed=seed)
     hidden = hidden_effects([test.candidate for test in known.tests], known.base, known.windows)
     hidden = tuple(sorted(hidden, key=lambda item: _place(item.cause)))
-    sizes = sizes_of(vessel, hidden, known, weather, second)
+    own_sizes = sizes_of(vessel, hidden, known, weather, stated=sizes, progress=second)
     third("power of the tests", 0.0)
-    joint = _joint(known, hidden, sizes)
-    found = _foreseen(known, hidden, sizes, joint, np.random.default_rng(seed))
+    joint = _joint(known, hidden, own_sizes)
+    found = _foreseen(known, hidden, own_sizes, joint, np.random.default_rng(seed))
     third("runs that may be added", 0.7)
     found, more = _with_added_runs(vessel, known, joint, found, offers, weather)
     names = {item.cause.split(":")[0] for item in known.candidates}
@@ -156,19 +158,42 @@ def _place(cause: str) -> int:
 
 
 def sizes_of(
-    vessel: Vessel, hidden: Sequence[HiddenEffect], known: Background, weather: Environment, progress: Progress
+    vessel: Vessel,
+    hidden: Sequence[HiddenEffect],
+    known: Background,
+    weather: Environment,
+    *,
+    stated: Mapping[str, float] | None = None,
+    progress: Progress = silent,
 ) -> tuple[tuple[Size, ...], ...]:
-    """Per effect, the size of each of its directions."""
-    ship = known.base.ship
+    """Per effect, the size of each of its directions: that matters, or is stated for its cause.
+
+    Args:
+        vessel: the model in use.
+        hidden: the effects.
+        known: the trial that they are hidden in.
+        weather: forecast.
+        stated: size by cause, in the unit of its effects in results.
+        progress: of the simulations.
+    """
+    ship, stated = known.base.ship, stated or {}
     std = {f"theta:{n}": s for n, s in zip(ship.model.names, ship.model.parameter_std.tolist(), strict=True)}
     progress("sizes that matter", 0.0)
-    trials = standard_trials(vessel, weather)
+    asked = [item for effect in hidden if effect.cause not in stated for item in effect.directions]
+    trials = standard_trials(vessel, weather) if asked else None
     speed = float(np.nanmean(np.abs(known.windows.measured[..., 0]))) if trials is None else trials.speed_mps
-    directions = [item for effect in hidden for item in effect.directions]
     found = iter(
-        sizes_that_matter(directions, trials, {**std, **ship.stated_std}, _defaults(vessel, known, speed), progress)
+        sizes_that_matter(asked, trials, {**std, **ship.stated_std}, _defaults(vessel, known, speed), progress)
     )
-    return tuple(tuple(next(found) for _ in effect.directions) for effect in hidden)
+    return tuple(
+        tuple(
+            Size(value=stated[effect.cause] / described(item, ship)[1], rule="stated")
+            if effect.cause in stated
+            else next(found)
+            for item in effect.directions
+        )
+        for effect in hidden
+    )
 
 
 def _defaults(vessel: Vessel, known: Background, speed_mps: float) -> dict[str, float]:
@@ -256,10 +281,15 @@ def _with_added_runs(
     needed = np.array([needed_noncentrality(TUNING.wanted_power, item.freedom, item.level) for item in items])
     single = of_one_manoeuvre(offers, needed)
     best = [float(power(largest, item.freedom, item.level)) for item, (_, largest) in zip(items, single, strict=True)]
-    ever = offers.noncentralities(np.full(len(primitives), ENDLESS))
+    c, ever = len(known.base.keys), offers.known + ENDLESS * offers.each.sum(axis=0)
+    places = [np.r_[np.arange(c), c + index] for index in offers.blocks]
+    within = [
+        allowed_by_prior(ever[np.ix_(place, place)], offers.precision, goal)
+        for place, goal in zip(places, needed.tolist(), strict=True)
+    ]
     changed = {
-        number: replace(found[number], added=runs, best_power=most, within_std=bool(limit < goal))
-        for number, (runs, _), most, limit, goal in zip(lacking, single, best, ever, needed, strict=True)
+        number: replace(found[number], added=runs, best_power=most, within_std=is_within)
+        for number, (runs, _), most, is_within in zip(lacking, single, best, within, strict=True)
     }
     kept = [place for place, (runs, _) in enumerate(single) if runs is not None]
     some = replace(offers, blocks=tuple(offers.blocks[place] for place in kept))

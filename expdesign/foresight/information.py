@@ -45,6 +45,19 @@ def batch_information(
     return np.stack(rows)
 
 
+def allowed_by_prior(whole: Array, precision: Array, least: float) -> bool:
+    """Whether data without end reach a noncentrality if nuisance is known, and never if it has its prior.
+
+    Args:
+        whole: (c + m, c + m) information of a large multiple of the data, about nuisance and m effects.
+        precision: (c, c) prior precision of the nuisance.
+        least: noncentrality that is needed.
+    """
+    c = len(precision)
+    alone, beside = (np.linalg.eigvalsh(item)[0] for item in (whole[c:, c:], beside_nuisance(whole, precision)))
+    return bool(beside < least <= alone)
+
+
 def beside_nuisance(whole: Array, precision: Array) -> Array:
     """(..., m, m) what is left of the information about m effects once c others are estimated too.
 

@@ -19,16 +19,15 @@ import numpy as np
 from scipy.stats import norm
 
 from expdesign.diagnosis.causes import CAUSES
-from expdesign.diagnosis.model import ExtendedModel, term_library
+from expdesign.diagnosis.model import term_library
 from expdesign.diagnosis.select import SELECTION_TUNING
 from expdesign.dictionary import Primitive
 from expdesign.errors import NoAnswer
 from expdesign.foresight.added import information_of_runs
 from expdesign.foresight.effects import HiddenEffect, described, hidden_effects
 from expdesign.foresight.foresee import ENDLESS, UNSEEN, Background, background, effect_name, sizes_of
-from expdesign.foresight.information import beside_nuisance
+from expdesign.foresight.information import allowed_by_prior, beside_nuisance
 from expdesign.foresight.power import freedom_of, level_of, needed_noncentrality
-from expdesign.foresight.sizes import Size
 from expdesign.foresight.trial import design_runs
 from expdesign.foresight.tuning import TUNING
 from expdesign.progress import Progress, silent, within
@@ -75,8 +74,7 @@ class Wanted:
     def within_std(self) -> bool:
         """No data would do, because the vessel file's standard deviations allow as much."""
         c = len(self.prior) - self.columns
-        whole = self.prior + ENDLESS * self.each.sum(axis=0)
-        return bool(np.linalg.eigvalsh(beside_nuisance(whole, np.zeros((c, c))))[0] < self.least)
+        return allowed_by_prior(ENDLESS * self.each.sum(axis=0), self.prior[:c, :c], self.least)
 
     @property
     def name(self) -> str:
@@ -147,36 +145,31 @@ def wanted(
         if not any(item.cause == cause for item in hidden):
             why = UNSEEN.get(cause, "nothing that differs from the model and its uncertain parameters shows it")
             raise NoAnswer(f"design.reveal: no trial of this ship reveals {cause}: {why}")
-    found = sizes_of(vessel, hidden, known, weather, within(progress, 0.4, 0.9))
-    chosen = [
-        _stated(item, own, known.base.ship, (sizes or {}).get(item.cause))
-        for item, own in zip(hidden, found, strict=True)
-    ]
+    chosen = sizes_of(vessel, hidden, known, weather, stated=sizes, progress=within(progress, 0.4, 0.9))
     for item, own in zip(hidden, chosen, strict=True):
-        if not all(math.isfinite(value) for value in own):
+        if not all(math.isfinite(size.value) for size in own):
             raise NoAnswer(
                 f"design.reveal: no size of {item.cause} as {effect_name(item, known)} is known that matters; "
                 "design.reveal_sizes can state one"
             )
     progress("information of every manoeuvre about causes", 0.9)
     directions = [direction for item in hidden for direction in item.directions]
-    values = [value for own in chosen for value in own]
+    values = [size.value for own in chosen for size in own]
     each = information_of_runs(vessel, known.base, primitives, weather, directions, values)
     ends = np.cumsum([len(item.directions) for item in hidden]) + len(known.base.keys)
     rows = [np.arange(end - len(item.directions), end) for end, item in zip(ends.tolist(), hidden, strict=True)]
-    several = _Several(known=known, hidden=hidden, sizes=tuple(map(tuple, chosen)), rows=tuple(rows), each=each)
+    several = _Several(
+        known=known,
+        hidden=hidden,
+        sizes=tuple(tuple(size.value for size in own) for own in chosen),
+        rows=tuple(rows),
+        each=each,
+    )
     return (
         *(several.revealed(place) for place, item in enumerate(hidden) if item.cause in reveal),
         *(several.told(place, other) for pair in apart for one, other in (pair, pair[::-1])
           for place, item in enumerate(hidden) if item.cause == one),
     )  # fmt: skip
-
-
-def _stated(item: HiddenEffect, own: Sequence[Size], ship: ExtendedModel, size: float | None) -> list[float]:
-    """Sizes of an effect's directions: those that matter, or the stated one."""
-    if size is None:
-        return [one.value for one in own]
-    return [size / described(direction, ship)[1] for direction in item.directions]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

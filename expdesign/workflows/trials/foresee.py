@@ -39,7 +39,7 @@ def foresee(
     *,
     plan: Path | None = None,
     seed: int = 0,
-    jobs: int = 0,
+    jobs: int = 1,
     cache: bool = True,
     progress: Progress = silent,
 ) -> Outcome:
@@ -61,7 +61,13 @@ def foresee(
         offers = [item.primitive for item in information]
         runs, weather = _trial(case, information, plan, seed, within(progress, 0.15, 0.2))
         found = foresee_trial(
-            case.vessel, runs, weather, offers=offers, seed=seed, progress=within(progress, 0.2, 0.95)
+            case.vessel,
+            runs,
+            weather,
+            offers=offers,
+            sizes=case.design.reveal_sizes,
+            seed=seed,
+            progress=within(progress, 0.2, 0.95),
         )
     content = ForesightContent(
         scenario=case.name,
