@@ -72,7 +72,7 @@ def manoeuvres_worth_adding(
     spaces = _spaces(problem, settings, limits)
     archives, rng = pool_of(spaces, measure, pool=settings.pool, seed=seed), np.random.default_rng(seed)
     given, specs = len(offer.cost_s), list[PrimitiveSpec]()
-    level = float(np.log(TUNING.first_share))
+    level = float(np.log(TUNING.growth_share))
     if day_s is not None:
         level = fullest_level(accuracy, offer, day_s - offer.way_s)
     shares = cheapest_shares(accuracy, offer, level=level)

@@ -26,6 +26,7 @@ class Tuning:
         average_legs: legs to one manoeuvre that the average of all legs counts as, once days have been planned.
         least_leg_s: least of it once days have been planned [s].
         added_durations: durations of manoeuvres that are searched for, in that of the longest run of the dictionary.
+        growth_share: information from runs, as a share of what is needed, for which manoeuvres are searched for.
         growth_rounds: searches for manoeuvres that are worth more than they cost.
         growth_gain: share of the cheapest runs' cost that a search must save for another to follow.
         growth_families: searched in each of them, the most promising; the best of each may be added.
@@ -58,6 +59,7 @@ class Tuning:
     average_legs: float = 2.0
     least_leg_s: float = 5.0
     added_durations: tuple[float, ...] = (0.25, 0.5, 1.0)
+    growth_share: float = 0.6
     growth_rounds: int = 8
     growth_gain: float = 0.02
     growth_families: int = 6
