@@ -1,0 +1,30 @@
+"""What each term of a yaw model contributes in a voyage, and which parameters a voyage can tell apart."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from expdesign.monitoring.yaw.estimate import simulate_yaw
+from expdesign.monitoring.yaw.model import YawData, YawModel
+from expdesign.values import Array
+
+RANK_TOLERANCE = 1e-6
+
+
+def term_budget(model: YawModel, data: YawData, parameters: Mapping[str, float]) -> dict[str, Array]:
+    """Parameter -> (n, k) moment of its term [Nm] along the measured motion; the largest name what a voyage tells."""
+    constant, linear, even, odd = np.moveaxis(model.shapes(data), (1, 2), (2, 1))
+    r = data.r[..., None]
+    values = constant + linear * r + (even + odd * r) * np.abs(r)
+    return {name: parameters[name] * values[..., place] for place, name in enumerate(model.parameters[1:])}
+
+
+def excitation_rank(model: YawModel, data: YawData, parameters: Mapping[str, float]) -> int:
+    """Number of parameters that one voyage tells apart: rank of the sensitivities of the simulated yaw rate."""
+    scale = np.array([abs(parameters[name]) for name in model.parameters])
+    values = np.array([parameters[name] for name in model.parameters])
+    columns = simulate_yaw(model, data, values)[1][0] * scale
+    size = np.linalg.norm(columns, axis=0)
+    return int(np.linalg.matrix_rank(columns / np.where(size > 0, size, 1.0), tol=RANK_TOLERANCE))

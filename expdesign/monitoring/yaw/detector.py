@@ -1,0 +1,66 @@
+"""A one-sided cumulative sum on the size of a residual, as in the thesis, and its calibration.
+
+s = |e| - d where |e| >= d, else -l;    g = max(0, g + s);    alarm where g > h
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+
+from expdesign.values import Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class Detector:
+    """Constants of the sum, in the unit of the residual.
+
+    Attributes:
+        d: size of a residual that counts.
+        l: by which the sum falls at every smaller one.
+        h: threshold.
+    """
+
+    d: float
+    l: float  # noqa: E741  as the thesis names it
+    h: float
+
+    def sums(self, residual: Array) -> Array:
+        """(n, k) sums of residuals (n, k)."""
+        size = np.abs(residual)
+        steps = np.where(size >= self.d, size - self.d, -self.l)
+        found, total = np.empty_like(steps), np.zeros(len(steps))
+        for index in range(steps.shape[1]):
+            total = np.maximum(0.0, total + steps[:, index])
+            found[:, index] = total
+        return found
+
+    def drift(self, std: float) -> float:
+        """Expected step for white normal residuals of a standard deviation."""
+        k = self.d / std
+        tail = float(scipy.stats.norm.sf(k))
+        return 2.0 * std * (float(scipy.stats.norm.pdf(k)) - k * tail) - self.l * (1.0 - 2.0 * tail)
+
+    @classmethod
+    def calibrated(cls, residuals: Array, *, false_share: float, deviations: float = 2.0) -> Detector:
+        """From residuals of the nominal ship (n, k): the sum hardly grows, and a share of the voyages raises an alarm.
+
+        Args:
+            residuals: of voyages as long as those that are watched.
+            false_share: of the voyages.
+            deviations: of the residual from which it counts.
+        """
+        size = np.abs(residuals)
+        d = deviations * float(np.sqrt((residuals**2).mean()))
+        over = size >= d
+        l = 1.2 * float((size - d)[over].sum()) / max(float((~over).sum()), 1.0)  # noqa: E741
+        largest = cls(d=d, l=l, h=np.inf).sums(residuals).max(axis=1)
+        return cls(d=d, l=l, h=float(np.quantile(largest, 1.0 - false_share)))
+
+
+def alarm_samples(detector: Detector, residual: Array) -> Array:
+    """(n,) first sample with an alarm; nan without one."""
+    over = detector.sums(residual) > detector.h
+    return np.where(over.any(axis=1), over.argmax(axis=1), np.nan)

@@ -1,0 +1,18 @@
+"""A multipurpose naval vessel with two podded drives in four degrees of freedom: surge, sway, roll, yaw.
+
+It is a truth to simulate, with coupled inertia and roll, for trials of models that are simpler. Vessel files cannot
+name it: their equations are linear in the parameters and have no coupled inertia.
+
+Frames: b-frame x forward, y to starboard, z down; roll positive to starboard, yaw clockwise. A positive pod angle
+pushes the stern to starboard, so that the ship turns to port.
+
+Sources: M. Blanke and A. Christensen (1993) and T. Perez, Ship Motion Control (2005), for hull and coefficients;
+W. Gierusz (2015), simplified, for the pods; both as listed in a master's thesis on the estimation of a ship's yaw
+dynamics in operation. Where its text and tables disagree, the sign that obeys Newton's law was taken: -C(nu) nu.
+"""
+
+from expdesign.simulation.naval.hull import NOMINAL, Hull
+from expdesign.simulation.naval.motion import STATES, Voyage, sail
+from expdesign.simulation.naval.pods import Pods, pod_force
+
+__all__ = ["NOMINAL", "STATES", "Hull", "Pods", "Voyage", "pod_force", "sail"]

@@ -1,0 +1,75 @@
+"""Voyages of the naval vessel and noisy measurements of them, for tests and benchmarks."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import scipy
+
+from expdesign.monitoring.yaw import YawData
+from expdesign.simulation.naval import NOMINAL, Hull, Voyage, sail
+
+NOISE = {"r": 0.0025, "sway_acceleration": 0.015, "u": 0.15, "v": 0.15, "phi": 0.025, "moment": 5e4}
+STEP_S = 0.1
+
+
+def low_passed(values: np.ndarray, time_s: float) -> np.ndarray:
+    """A first-order lag of orders."""
+    keep = float(np.exp(-STEP_S / time_s))
+    return np.asarray(scipy.signal.lfilter([1.0 - keep], [1.0, -keep], values))
+
+
+def turn(hull: Hull = NOMINAL) -> Voyage:
+    """Full ahead from rest, then pods at -10 degrees for 50 s."""
+    time_s = STEP_S * np.arange(1501)
+    angle = np.where((time_s >= 50.0) & (time_s < 100.0), -np.deg2rad(10.0), 0.0)
+    return sail(hull, low_passed(angle, 2.0), np.full(len(time_s), 80.0), sample_time_s=STEP_S)
+
+
+def rotation(hull: Hull = NOMINAL, *, ahead: float = 0.0) -> Voyage:
+    """On the spot: pods across, thrust from 10 to 50 s; perhaps with some speed ahead at first [m/s]."""
+    time_s = STEP_S * np.arange(1001)
+    speed = np.where((time_s >= 10.0) & (time_s < 50.0), 80.0, 0.0)
+    start = np.array([ahead, 0.0, 0.0, 0.0, 0.0, 0.0])
+    return sail(hull, np.full(len(time_s), np.deg2rad(90.0)), speed, sample_time_s=STEP_S, start=start)
+
+
+def harbour(hull: Hull = NOMINAL, *, seconds: float = 600.0, seed: int = 0) -> Voyage:
+    """Pod angles within 35 degrees and 30 to 80 revolutions a second, held for 12 to 40 s, with a lag of 3 s."""
+    rng = np.random.default_rng(seed)
+    count = round(seconds / STEP_S)
+    angle, speed, row = np.zeros(count), np.zeros(count), 0
+    while row < count:
+        held = round(rng.uniform(12.0, 40.0) / STEP_S)
+        angle[row : row + held] = np.deg2rad(rng.uniform(-35.0, 35.0))
+        speed[row : row + held] = rng.uniform(30.0, 80.0)
+        row += held
+    return sail(hull, low_passed(angle, 3.0), low_passed(speed, 3.0), sample_time_s=STEP_S)
+
+
+def heavier(*, inertia: float = 1.0, mass: float = 1.0) -> Hull:
+    """More moment of inertia or mass."""
+    return replace(NOMINAL, yaw_inertia_kgm2=inertia * NOMINAL.yaw_inertia_kgm2, mass_kg=mass * NOMINAL.mass_kg)
+
+
+def exact(voyage: Voyage) -> YawData:
+    """Measured without noise."""
+    return measured(voyage, count=1, seed=0, noise=0.0)
+
+
+def measured(
+    voyage: Voyage, *, count: int, seed: int, noise: float = 1.0, averaged: int = 5, every: int = 1
+) -> YawData:
+    """The same voyage measured so often, with the noise of the thesis averaged over some samples, every so manieth."""
+    rng = np.random.default_rng(seed)
+    true = {
+        "r": voyage.column("r"), "sway_acceleration": voyage.sway_acceleration, "u": voyage.column("u"),
+        "v": voyage.column("v"), "phi": voyage.column("phi"), "moment": voyage.moment,
+    }  # fmt: skip
+    told = {}
+    for name, values in true.items():
+        drawn = NOISE[name] * rng.standard_normal((count, len(values) + averaged - 1))
+        mean = np.lib.stride_tricks.sliding_window_view(drawn, averaged, axis=1).mean(axis=2)
+        told[name] = (values + noise * mean)[:, ::every]
+    return YawData(sample_time_s=every * voyage.sample_time_s, **told)
