@@ -92,12 +92,12 @@ class FloorOutOfReach(NoAnswer):
 
     Attributes:
         name: of the floor.
-        reached, least: the most information that durations reach, and the least that is asked for.
+        share: of the information that is asked for, the most that durations reach.
     """
 
-    def __init__(self, name: str, *, reached: float, least: float) -> None:
-        self.name, self.reached, self.least = name, reached, least
-        super().__init__(f"{name}: no durations within the other limits reach {least:.4g}; at most {reached:.4g}")
+    def __init__(self, name: str, *, share: float) -> None:
+        self.name, self.share = name, share
+        super().__init__(f"{name}: durations within the other limits reach at most {share:.4g} of what is asked for")
 
 
 class NoPlan(NoAnswer):

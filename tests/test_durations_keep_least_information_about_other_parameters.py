@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from expdesign.durations import DurationProblem, InformationFloor, limits_kept, optimal_shares, solve_durations
+from expdesign.durations import Aim, DurationProblem, InformationFloor, limits_kept, optimal_shares, solve_durations
 from expdesign.durations.certificate import certify
 from expdesign.durations.solve import concave_problem
 from expdesign.errors import FloorOutOfReach, NoAnswer
@@ -85,12 +85,11 @@ def test_the_optimum_is_the_best_of_a_grid_and_certified_from_the_problem_alone(
 def test_what_cannot_be_reached_is_named_with_the_most_that_can():
     with pytest.raises(FloorOutOfReach, match="power of lag") as refused:
         optimal_shares(problem(floor(1.5)))
-    assert refused.value.reached == pytest.approx(1.0, rel=1e-5)
-    assert refused.value.least == 1.5
+    assert refused.value.share == pytest.approx(1.0 / 1.5, rel=1e-5)
     dark = floor(1.0, matrices=np.zeros((3, 1, 1)))
     with pytest.raises(FloorOutOfReach) as refused:
         optimal_shares(problem(dark))
-    assert refused.value.reached == 0.0
+    assert refused.value.share == 0.0
     other = floor(0.8, matrices=np.array([[[1.0]], [[0.0]], [[0.0]]]), name="power of wind")
     with pytest.raises(NoAnswer, match="together, though each alone"):
         optimal_shares(problem(floor(0.8), other))
@@ -106,3 +105,30 @@ def test_whole_runs_keep_it_too():
     assert (kept.name, kept.limit) == ("power of lag", 0.333)
     assert kept.continuous == pytest.approx(0.333, rel=1e-5)
     assert kept.repeats == pytest.approx(information(asked, shares))
+
+
+def test_criterion_t_shares_time_by_what_each_cause_needs():
+    """Each of two primitives alone tells of one effect: their times are as what is asked for."""
+    other = floor(0.6, matrices=np.array([[[1.0]], [[0.0]], [[0.0]]]), name="power of wind")
+    found = solve_durations(replace(problem(floor(0.3), other), aim=Aim(criterion="T")))
+    assert found.fractions == pytest.approx([2 / 3, 1 / 3, 0.0], abs=1e-6)
+    assert found.gap < 1e-6
+    assert np.array(found.repeats) * 10.0 == pytest.approx([670.0, 330.0, 0.0], abs=11.0)
+    assert [item.continuous / item.limit for item in limits_kept(found)] == pytest.approx([10 / 9, 10 / 9], rel=1e-5)
+
+
+def test_criterion_t_is_the_best_of_a_grid_within_its_certificate():
+    rng, step = np.random.default_rng(8), 1.0 / 60
+    grid = [np.array([i, j, 60 - i - j]) * step for i in range(61) for j in range(61 - i)]
+    for _ in range(3):
+        floors = [replace(random_floor(rng, 1.0), name=name) for name in ("one", "two")]
+        found = optimal_shares(replace(problem(*floors), aim=Aim(criterion="T")))
+
+        def worst(w: np.ndarray, floors: list[InformationFloor] = floors) -> float:
+            return float(np.log(min(information(item, w) for item in floors)))
+
+        best = max(worst(w) for w in grid)
+        assert found.certificate.value == pytest.approx(worst(found.fractions), abs=1e-6)
+        assert best <= found.certificate.bound + 1e-9
+        assert best <= found.certificate.value + 1e-5
+        assert found.certificate.value <= best + 0.05  # the grid is coarse

@@ -17,10 +17,12 @@ from expdesign.durations.criteria.models import Objective, Piece, congruent, pie
 from expdesign.durations.limits import Polytope, feasible_set
 from expdesign.durations.problem import DurationProblem, InformationFloor
 from expdesign.durations.tuning import TUNING
-from expdesign.errors import FloorOutOfReach, NotInformative
+from expdesign.errors import FloorOutOfReach, InputError, NotInformative
 from expdesign.values import Array
 
 IDLE = "(unused time)"
+T = "T"
+"""Criterion that is about other parameters."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -88,16 +90,29 @@ def floor_of(problem: DurationProblem, equation: str) -> Objective:
 
 
 def information_floor(floor: InformationFloor) -> Objective:
-    """A least information as a concave function that must not be negative.
+    """A least information as a concave function that must not be negative: the log of its share of what is asked for.
 
     Raises:
         FloorOutOfReach: equal shares tell nothing of it, so that no shares do.
     """
     try:
-        pieces = pieces_of([symmetric_part(floor.matrices)], symmetric_part(floor.prior), LogTrace(floor.L))
+        asked = LogTrace(floor.L * np.sqrt(floor.least))
+        pieces = pieces_of([symmetric_part(floor.matrices)], symmetric_part(floor.prior), asked)
     except NotInformative:
-        raise FloorOutOfReach(floor.name, reached=0.0, least=floor.least) from None
-    return Objective(pieces, np.array([np.log(floor.least)]))
+        raise FloorOutOfReach(floor.name, share=0.0) from None
+    return Objective(pieces, np.zeros(1))
+
+
+def least_of_floors(problem: DurationProblem) -> Objective:
+    """The objective of criterion T: the least of what is told of other parameters, as a share of what is asked for.
+
+    Raises:
+        InputError: nothing is asked for.
+    """
+    if not problem.floors:
+        raise InputError("criterion T needs causes in design.reveal or design.tell_apart")
+    pieces = tuple(information_floor(item).pieces[0] for item in problem.floors)
+    return Objective(pieces, np.zeros(len(pieces)), worst=True)
 
 
 def polytope_of(problem: DurationProblem) -> Polytope:
@@ -167,7 +182,10 @@ class Collected:
             UnknownName, InputError: no such criterion, or the aim lacks settings for it.
             NotInformative: equal shares do not inform about every parameter.
         """
-        measure = collected_measure(problem, name or problem.aim.criterion)
+        name = name or problem.aim.criterion
+        if name == T:
+            return Collected(pieces=least_of_floors(problem).pieces, worst=True)
+        measure = collected_measure(problem, name)
         if not problem.symmetric:
             return Collected(pieces=(_unsymmetric(problem, measure),), worst=False, symmetric=False)
         objective = objective_of(problem, measure)

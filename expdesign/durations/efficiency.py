@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from expdesign.durations.certificate import DurationDesign
-from expdesign.durations.concave import Collected, with_idle
+from expdesign.durations.concave import Collected, T, with_idle
 from expdesign.durations.criteria import CRITERIA
 from expdesign.durations.criteria.models import stacked_values
 from expdesign.durations.problem import DurationProblem
@@ -50,9 +50,10 @@ def efficiencies(design: DurationDesign) -> tuple[Efficiencies, ...]:
     if any(design.repeats):
         named["repeats"] = np.array(design.repeats) * problem.run_s / problem.total_s
     named["uniform"] = np.full(len(problem.names), 1.0 / len(problem.names))
+    compared = [item for item in CRITERIA if problem.floors or item.name != T]
     found: dict[str, Array] = {}
     missing: dict[str, str] = {}
-    for item in CRITERIA:
+    for item in compared:
         try:
             found[item.name] = _optimum(design, problem, item.name)
         except (InputError, NoAnswer) as error:
@@ -65,7 +66,7 @@ def efficiencies(design: DurationDesign) -> tuple[Efficiencies, ...]:
             of=_of(problem, item.name, named, found[item.name]) if item.name in found else {},
             missing=missing.get(item.name, ""),
         )
-        for item in CRITERIA
+        for item in compared
     )
 
 
@@ -124,7 +125,8 @@ def _optimum(design: DurationDesign, problem: DurationProblem, name: str) -> Arr
         raise InputError(f"criterion {name} needs primitives that are simulated, not recorded ones")
     if name == "D_s" and not problem.aim.interest:
         raise InputError("criterion D_s needs parameters of interest; without, it is D")
-    return optimal_shares(replace(problem, aim=replace(problem.aim, criterion=name))).fractions
+    floors = () if problem.aim.criterion == T else problem.floors  # which T maximises and does not demand
+    return optimal_shares(replace(problem, aim=replace(problem.aim, criterion=name), floors=floors)).fractions
 
 
 def _of(problem: DurationProblem, name: str, designs: Mapping[str, Array], best: Array) -> dict[str, float]:

@@ -185,7 +185,7 @@ class _Search:
             added=tuple(
                 piece.prior
                 + TUNING.added_share * np.tensordot(fractions, piece.matrices, axes=1)
-                + small * np.eye(problem.dimension)  # equal shares, in whitened coordinates
+                + small * np.eye(len(piece.prior))  # equal shares, in whitened coordinates
                 for piece in collected.pieces
             ),
             gain=TUNING.least_gain_nearly_singular if small else TUNING.least_gain,

@@ -17,10 +17,12 @@ from expdesign.durations.certificate import Certificate, DurationDesign, certify
 from expdesign.durations.concave import (
     Collected,
     ConcaveProblem,
+    T,
     collected_measure,
     floor_of,
     information_floor,
     informs_about_all,
+    least_of_floors,
     objective_of,
     polytope_of,
     unidentifiable,
@@ -41,6 +43,7 @@ THEOREMS = {
     "A": "Pukelsheim 2006, general equivalence theorem",
     "E": "Pukelsheim 2006, general equivalence theorem with a mixture of eigenvectors",
     "V": "Pukelsheim 2006, general equivalence theorem",
+    "T": "Pukelsheim 2006, general equivalence theorem with a mixture of causes",
 }
 
 NO_THEOREM = (
@@ -63,7 +66,7 @@ def solve_durations(problem: DurationProblem) -> DurationDesign:
             not fit.
     """
     design = optimal_shares(problem)
-    if not problem.floors:
+    if not problem.floors or problem.aim.criterion == T:
         return _with_runs(design, whole_runs(problem, design.fractions))
     return _with_runs(design, runs_above_floors(problem, _tightened(problem, design.fractions), _shortfall(problem)))
 
@@ -133,6 +136,8 @@ def concave_problem(problem: DurationProblem, *, within: Array | None = None) ->
         NotInformative: equal shares do not inform about every parameter.
         NoAnswer: no fractions satisfy the limits.
     """
+    if problem.aim.criterion == T:
+        return _about_other_parameters(problem)
     measure = criterion(problem.aim.criterion).measure(problem.picked)
     if problem.constraints.budgets:
         problem, measure = with_idle(problem), collected_measure(problem, problem.aim.criterion)
@@ -142,6 +147,18 @@ def concave_problem(problem: DurationProblem, *, within: Array | None = None) ->
         polytope=polytope_of(problem),
         floors=tuple(floors.values()),
         floor_names=tuple(floors),
+    )
+
+
+def _about_other_parameters(problem: DurationProblem) -> ConcaveProblem:
+    """The concave problem of criterion T; a balance between equations is kept."""
+    problem = with_idle(problem) if problem.constraints.budgets else problem
+    balances = _balances(problem)
+    return ConcaveProblem(
+        objective=least_of_floors(problem),
+        polytope=polytope_of(problem),
+        floors=tuple(balances.values()),
+        floor_names=tuple(balances),
     )
 
 
@@ -305,8 +322,7 @@ def _check_each(task: ConcaveProblem) -> None:
         alone = replace(floor, levels=np.zeros(1))
         most = _maximised(ConcaveProblem(objective=alone, polytope=task.polytope)).certificate.value
         if most < floor.levels[0]:
-            reached, least = (float(np.exp(value / floor.degree)) for value in (most, floor.levels[0]))
-            raise FloorOutOfReach(name, reached=reached, least=least)
+            raise FloorOutOfReach(name, share=float(np.exp((most - floor.levels[0]) / floor.degree)))
 
 
 def _certified_shares(problem: DurationProblem, within: Array | None) -> DurationDesign:

@@ -65,7 +65,7 @@ class DesignTable(Table):
     """`[design]`."""
 
     total_s: Positive = Field(description="the total informative time of all primitives [s]")
-    criterion: Literal["D", "D_s", "A", "E", "V"] = Field(
+    criterion: Literal["D", "D_s", "A", "E", "V", "T"] = Field(
         default="D", description="the design criterion, see expdesign explain criteria"
     )
     mean_subtraction: Literal["none", "batch", "complete"] = Field(
@@ -309,6 +309,8 @@ def _check_together(table: DesignTable, vessel: Vessel, entry: Entry) -> None:
         raise entry.at("interest").error("is missing, criterion D_s needs the parameters of interest")
     if table.criterion == "V" and not table.outcomes:
         raise entry.at("outcomes").error(f"is missing, criterion V needs one or more of {', '.join(OUTCOMES)}")
+    if table.criterion == "T" and not (table.reveal or table.tell_apart):
+        raise entry.at("criterion").error("is 'T', which needs causes in design.reveal or design.tell_apart")
     if table.prior_samples is not None and table.robust == "nominal":
         raise entry.at("prior_samples").error("has no effect while design.robust is 'nominal'")
     uses_std = {"robust": table.robust != "nominal", "prior": table.prior != "none",

@@ -40,7 +40,7 @@ class DesignSettings:
 
     Attributes:
         total_s: total informative time of all primitives [s].
-        criterion: name of a design criterion: "D", "D_s", "A", "E" or "V".
+        criterion: name of a design criterion: "D", "D_s", "A", "E", "V" or "T".
         mean_subtraction: "none", "batch" or "complete".
         fixed_parameters: parameters held at the vessel file's values and not estimated.
         interest: parameters of interest in D_s, A and E; empty for all.

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from expdesign.durations.criteria.aim import Aim, Criterion, Picked, prediction_columns
+from expdesign.durations.criteria.aim import Aim, Criterion, Picked, of_other_parameters, prediction_columns
 from expdesign.durations.criteria.measures import LogDet, LogSmallest, LogTrace, Measure
 from expdesign.errors import UnknownName
 
@@ -38,6 +38,11 @@ CRITERIA = (
         name="V",
         title="mean square error of the predicted outcomes",
         measure=lambda picked: LogTrace(prediction_columns(picked)),
+    ),
+    Criterion(
+        name="T",
+        title="worst shortfall of what reveals, or tells apart, the causes asked for",
+        measure=of_other_parameters,
     ),
 )
 

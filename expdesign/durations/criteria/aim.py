@@ -112,6 +112,15 @@ class Criterion:
     measure: Callable[[Picked], Measure]
 
 
+def of_other_parameters(picked: Picked) -> Measure:
+    """Criterion T has no measure of the model's parameters: see `concave.least_of_floors`.
+
+    Raises:
+        InputError: always.
+    """
+    raise InputError("criterion T needs causes in design.reveal or design.tell_apart")
+
+
 def prediction_columns(picked: Picked) -> Array:
     """(d, o) derivatives of the outcomes by the parameters, times the residual noise of their equations.
 

@@ -66,7 +66,8 @@ def criteria_topic() -> Topic:
 
     entries = tuple(Explained(name=item.name, meaning=f"minimises the {item.title}") for item in CRITERIA)
     text = (
-        "D_s, A and E are about the parameters in design.interest; V is about design.outcomes. A, E and V weigh "
+        "D_s, A and E are about the parameters in design.interest; V is about design.outcomes, "
+        "T about design.reveal and design.tell_apart. A, E and V weigh "
         "equations against each other and need the sensors' noise in the vessel file."
     )
     return _list("criteria", "Design criteria, design.criterion", entries, text)

@@ -298,10 +298,10 @@ def _not_revealed(case: Scenario, error: FloorOutOfReach, primitives: Sequence[P
     (item,) = [one for one in _wanted(case, primitives, seed, silent) if one.name == error.name]
     if item.apart_from:
         key, what = "tell_apart", f"tell {item.cause} ({item.effect}) from {item.apart_from}"
-        best = told_apart_with(error.reached)
+        best = told_apart_with(error.share * item.least)
     else:
         key, what = "reveal", f"reveal {item.cause} ({item.effect})"
-        best = float(power(error.reached, item.freedom, item.level))
+        best = float(power(error.share * item.least, item.freedom, item.level))
     never = "; no time would do, as the standard deviations in the vessel file allow as much" if item.within_std else ""
     size = size_text(item.effect, item.size, item.unit)
     return NoAnswer(
