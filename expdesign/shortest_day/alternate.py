@@ -57,11 +57,13 @@ def shortest_day(
     allowed = [day for day in reached if most_s is None or day.day_s <= most_s]
     if reached and not allowed and most_s is not None:
         raise NoAnswer(search.too_long(min(reached, key=lambda day: day.day_s), most_s))
+    with suppress(NoAnswer):  # limits on runs may allow no more than days near those drafted have
+        last = search.cheapest(days)
     found = search.planned(allowed, days, last, planning, good=lambda _, margin: margin >= 0, most=TUNING.compared)
     if not found:
         raise NoPlan(search.falls_short(days))
     best = min(found, key=lambda day: day.plan.day.median_s)
-    return replace(best, curve=search.curve(days))
+    return replace(best, curve=search.curve(days, best.design.repeats))
 
 
 def fullest_day(
@@ -99,7 +101,7 @@ def fullest_day(
     )
     if not found:
         raise NoPlan(f"no day within design.day_s = {day_s:g} was planned as it was drafted; a larger day_s would do")
-    return replace(found[0], most_s=day_s, curve=search.curve(days))
+    return replace(found[0], most_s=day_s, curve=search.curve(days, found[0].design.repeats))
 
 
 def check_way_fits(problem: PlanProblem, day_s: float) -> None:
@@ -219,6 +221,11 @@ class _Search:
             return choice, -np.inf  # nothing to compare with
         return min(found, key=lambda one: one[1])
 
+    def cheapest(self, days: Sequence[DraftedDay]) -> Choice:
+        """The cheapest runs of the whole dictionary by the prices learnt."""
+        prices = self.prices(days)
+        return cheapest_runs(self.accuracy, self.offer(prices), level=prices.level)
+
     def offer(self, prices: Prices) -> Offer:
         """What runs cost and tell with their legs, by the prices."""
         return offered(self.problem, prices, free=self.added, placeless=self.placeless)
@@ -310,13 +317,16 @@ class _Search:
             f"is needed{about}; less accuracy, or manoeuvres that need less room, would do"
         )
 
-    def curve(self, days: Sequence[DraftedDay]) -> Array:
-        """(k, 2) day [s] and information of the cheapest choices by the prices learnt; days drafted were so late."""
-        prices = self.prices(days)
-        offer = self.offer(prices)
-        late_s = self.late_s(days, prices)
-        costs_s = shares_costs_s(self.accuracy, offer, (prices.level + np.log(TUNING.curve_shares)).tolist())
-        points = np.column_stack([prices.way_s + late_s + costs_s, TUNING.curve_shares])
+    def curve(self, days: Sequence[DraftedDay], repeats: Sequence[int]) -> Array:
+        """(k, 2) day [s] and information of the cheapest choices by the prices learnt, as the day with these runs is.
+
+        What that day takes and tells beside its prices, all are taken to.
+        """
+        prices, day = self.prices(days), next(day for day in days if day.repeats == tuple(repeats))
+        offer, runs = self.offer(prices), np.array(repeats, dtype=float)
+        level = self.accuracy.margin(offer.information(runs)) - day.margin
+        costs_s = shares_costs_s(self.accuracy, offer, (level + np.log(TUNING.curve_shares)).tolist())
+        points = np.column_stack([day.day_s - offer.total_s(runs) + costs_s, TUNING.curve_shares])
         return np.asarray(points[np.isfinite(points[:, 0])])
 
     def late_s(self, days: Sequence[DraftedDay], prices: Prices) -> float:

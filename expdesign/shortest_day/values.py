@@ -107,12 +107,12 @@ class ShortestDay:
         plan: the day.
         design: its runs; fractions and certificate are those of the accuracy's reference.
         tried: days planned, in order.
-        cost_s, cost_bound_s: cost of the runs chosen last, at the prices of the day planned before, and what no choice
-            of the same dictionary costs less than at these prices and with this information of legs [s].
+        cost_s, cost_bound_s: cost of the cheapest runs found at the prices learnt, and what no choice of the same
+            dictionary costs less than at these prices and with this information of legs [s].
         information: of the plan's track, as a share of what is needed.
         parts: where its time goes.
         curve: (k, 2) day [s] and information, as a share of what is needed, of the cheapest choices of runs, whole or
-            not, by the prices learnt: an estimate of what other accuracies would take.
+            not, by the prices learnt and beside them as the plan: an estimate of what other accuracies would take.
         bound: on every day of a class that holds this one; None where it was not computed.
         most_s: length of the day asked for, which tells most in it; None where an accuracy was asked for.
     """

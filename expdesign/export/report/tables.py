@@ -242,8 +242,9 @@ def found_sentence(day: ShortestDay) -> str:
 def day_sentences(day: ShortestDay) -> list[str]:
     """How far the choice of runs is proven, and what no day can fall below."""
     return [
-        f"The runs tried last cost {words.duration(day.cost_s)} with their share of the repositioning. At these prices "
-        f"no choice of runs from the dictionary costs less than {words.duration(day.cost_bound_s)}.",
+        f"At the prices learnt from the days planned, the cheapest runs found cost {words.duration(day.cost_s)} with "
+        "their share of the repositioning. No choice of runs from the dictionary costs less than "
+        f"{words.duration(day.cost_bound_s)} then.",
         *_bound_sentences(day),
     ]
 
