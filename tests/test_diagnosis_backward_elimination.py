@@ -294,7 +294,9 @@ def test_gains_are_those_of_stretches_where_a_whole_run_leads_astray():
     ahead = [errors(value) for value in (70.0, 75.0, 80.0)]
 
     def of(*whole: float) -> list[float]:
-        held = [replace(errors(value), ahead=short) for value, short in zip(whole, ahead, strict=True)]
+        held = [
+            replace(errors(value), ahead=lambda short=short: short) for value, short in zip(whole, ahead, strict=True)
+        ]
         return [item.fit[0] for item in judged(held)]
 
     assert of(-50.0, 20.0, 30.0) == pytest.approx([-50.0, 20.0, 30.0])

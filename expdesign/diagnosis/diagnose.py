@@ -36,10 +36,10 @@ from expdesign.diagnosis.discriminating_manoeuvre import Proposal, most_discrimi
 from expdesign.diagnosis.fit import (
     CrossValidation,
     HeldOut,
-    cross_validate,
     held_out_gain,
     judged,
     unmeasured_force_share,
+    with_longer_windows,
     within_stated_std,
 )
 from expdesign.diagnosis.model import ExtendedModel
@@ -102,11 +102,12 @@ def diagnose(
     ship = extended_model(vessel, record)
     windows = stable_windows(ship, record)
     check_excitation(ship, windows)
-    motion = simulate_from_measured(ship, windows)
-    if motion.diverged:
+    if simulate_from_measured(ship, windows).diverged:
         raise Diverged(f"vessel {vessel.name!r}: its simulation of the data diverges; the model is unstable")
+    begun, windows = with_longer_windows(ship, record, windows)
+    motion = simulate_from_measured(ship, windows)
     told.done = SIMULATED
-    chosen = _select(ship, windows, seed, told)
+    chosen = _select(ship, begun, (windows, record), seed, told)
     concluding = told.part(CONCLUDED, 0.0)
     concluding("looking for manoeuvres that distinguish causes", 0.0)
     proposals = proposals or standard_proposals(windows, ship.model.inputs, windows.sample_s)
@@ -159,31 +160,40 @@ class _Selected:
     Attributes:
         as_stated: errors of the model in use as its file states it.
         held: of the model before any cause, then after every one that was kept.
+        validation: of other fits.
     """
 
     found: Selection
     kept: Selection
     as_stated: HeldOut
     held: list[HeldOut]
+    validation: CrossValidation
 
     @property
     def before(self) -> HeldOut:
         """`as_stated` as `held` was measured: of whole units or of short stretches."""
-        stretches = self.as_stated.ahead
-        return stretches if self.held[0].in_stretches and stretches is not None else self.as_stated
+        return _like(self.held[0], self.as_stated)
 
 
-def _select(ship: ExtendedModel, windows: Windows, seed: int, told: Estimated) -> _Selected:
-    rng = np.random.default_rng(seed)
-    validation = CrossValidation(windows)
-    found = select_forward(ship, windows, initial_states(windows), rng, told, validation)
-    as_stated = cross_validate(None, ship, windows, silent)
+def _like(other: HeldOut, held: HeldOut) -> HeldOut:
+    """Errors measured as others were: of whole units or of short stretches."""
+    return held.ahead() if other.in_stretches and held.ahead is not None else held
+
+
+def _select(
+    ship: ExtendedModel, begun: ExtendedModel, data: tuple[Windows, Record], seed: int, told: Estimated
+) -> _Selected:
+    """Causes beside the model in use; the search begins at `begun`, the same re-estimated where it diverges."""
+    rng, (windows, _) = np.random.default_rng(seed), data
+    validation = CrossValidation(*data)
+    found = select_forward(begun, windows, initial_states(windows), rng, told, validation)
+    as_stated = validation.without(None, ship)
 
     def cross_validated(found: Selection) -> list[HeldOut]:
         return _cross_validated(found, as_stated, validation, told.part(VALIDATED * (1 + len(found.steps)), CONCLUDED))
 
     kept, held = eliminate_backward(found, windows, cross_validated, seed)
-    return _Selected(found=found, kept=kept, as_stated=as_stated, held=held)
+    return _Selected(found=found, kept=kept, as_stated=as_stated, held=held, validation=validation)
 
 
 def _cross_validated(
@@ -228,8 +238,7 @@ def _unexplained(chosen: _Selected, after: Accuracy, windows: Windows, seed: int
         return None
     base, leads = chosen.held[len(chosen.kept.steps)], []
     for item in leading_candidates(chosen.kept.last, windows, chosen.kept.last_tests):
-        held = cross_validate(item.fit, item.fit.ship, windows, silent)
-        held = held.ahead if base.in_stretches and held.ahead is not None else held
+        held = _like(base, chosen.validation.without(item.fit, item.fit.ship))
         leads.append(Lead(item.candidate.cause, *held_out_gain(base, held, seed)))
     return Unexplained(
         outputs=after.outputs,

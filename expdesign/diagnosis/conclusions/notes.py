@@ -124,8 +124,8 @@ def note_on_stretches(held: Sequence[HeldOut]) -> tuple[str, ...]:
     if not held[0].in_stretches:
         return ()
     return (
-        "Fitted to the other runs, a model leads away from the ship in a whole run. So gains are measured in stretches "
-        f"of {AHEAD_S:g} s, each simulated from its first measured state.",
+        "Fitted to the other runs, a model leads away from the ship in a whole run. So models are fitted, and gains "
+        f"are measured, in stretches of {AHEAD_S:g} s, each simulated from its first measured state.",
     )
 
 

@@ -12,6 +12,7 @@ from expdesign.diagnosis.fit.cross_validation import (
     cross_validate,
     held_out_gain,
     judged,
+    leads_away,
     on_common_units,
     validation_units,
 )
@@ -33,6 +34,7 @@ from expdesign.diagnosis.fit.linear_model import (
     effect_disturbances,
     sensitivities_to,
 )
+from expdesign.diagnosis.fit.output_error import with_longer_windows
 from expdesign.diagnosis.fit.tuning import TUNING
 from expdesign.diagnosis.fit.unmeasured_force import unmeasured_force_share
 
@@ -58,6 +60,7 @@ __all__ = [
     "held_out_gain",
     "information",
     "judged",
+    "leads_away",
     "likeliest",
     "log_likelihood_gain",
     "marginalised",
@@ -66,5 +69,6 @@ __all__ = [
     "sensitivities_to",
     "unmeasured_force_share",
     "validation_units",
+    "with_longer_windows",
     "within_stated_std",
 ]

@@ -5,28 +5,33 @@ units that they are evaluated on. Where such a fit does not improve on the fit t
 are kept; `unconverged` counts these folds. The selection of causes and the grid searches (width of a dead band, time of
 a change, direction of the wind) used all units.
 
-Every unit is simulated as a whole, and besides in short stretches, each from its first measured state. A fit of many
-parameters to few units may lead away from the ship in a whole unit; then only the stretches tell what it is worth.
+Every unit is simulated as a whole. A fit of many parameters to few units may lead away from the ship in a whole unit.
+Then models are judged by what they predict a short time ahead: in stretches, each simulated from its first measured
+state. What is judged so is also fitted so, by output error in the stretches of the other units. The likelihood whitens
+slow errors away, and these are most of the error of such a prediction.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.accuracy import squared_sums
-from expdesign.diagnosis.data import Windows
+from expdesign.diagnosis.data import Windows, cut_windows
 from expdesign.diagnosis.fit.fit import Fit, FitOptions
 from expdesign.diagnosis.fit.gauss_newton import fit
+from expdesign.diagnosis.fit.output_error import fit_output_error
 from expdesign.diagnosis.fit.tuning import TUNING
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import simulate_from_measured
 from expdesign.processes import in_order
 from expdesign.progress import Progress, silent
+from expdesign.signals import Record
 from expdesign.values import Array
 
 
@@ -38,14 +43,14 @@ class HeldOut:
         squared_error: (b, n) sum per unit and output; nan for units whose fold could not be fitted.
         squared_deviation: (b, n) of the measurements from their mean, likewise.
         unconverged: folds that kept the effects fitted to all units.
-        ahead: of the same units in stretches of `Tuning.ahead_s`, where they were simulated so besides.
+        ahead: of the same units in stretches of `Tuning.ahead_s`, fitted and simulated when it is called.
         in_stretches: whether these are such errors.
     """
 
     squared_error: Array
     squared_deviation: Array
     unconverged: int = 0
-    ahead: HeldOut | None = None
+    ahead: Callable[[], HeldOut] | None = None
     in_stretches: bool = False
 
     @property
@@ -68,19 +73,25 @@ def validation_units(windows: Windows) -> Array:
 class CrossValidation:
     """Errors of fits on held-out units, each measured once."""
 
-    def __init__(self, windows: Windows) -> None:
-        """Of all data."""
-        self._windows = windows
+    def __init__(self, windows: Windows, record: Record | None = None) -> None:
+        """Of all data; without a record, stretches are no longer than windows."""
+        self._windows, self._record = windows, record
         self._known: dict[int, tuple[Fit, HeldOut]] = {}
 
     def of(self, found: Fit, progress: Progress = silent) -> HeldOut:
         """Of a model whose effects are fitted."""
         if id(found) not in self._known:
-            self._known[id(found)] = found, cross_validate(found, found.ship, self._windows, progress)
+            self._known[id(found)] = found, self.without(found, found.ship, progress)
         return self._known[id(found)][1]
 
+    def without(self, found: Fit | None, ship: ExtendedModel, progress: Progress = silent) -> HeldOut:
+        """The same, not kept; None for a model that is not fitted."""
+        return cross_validate(found, ship, self._windows, progress, self._record)
 
-def cross_validate(found: Fit | None, ship: ExtendedModel, windows: Windows, progress: Progress) -> HeldOut:
+
+def cross_validate(
+    found: Fit | None, ship: ExtendedModel, windows: Windows, progress: Progress, record: Record | None = None
+) -> HeldOut:
     """Errors of a model whose effects are fitted to the other units.
 
     Args:
@@ -88,35 +99,59 @@ def cross_validate(found: Fit | None, ship: ExtendedModel, windows: Windows, pro
         ship: the model.
         windows: all data.
         progress: of this cross-validation.
+        record: the same data, which stretches are cut from where units are batches; else they are parts of windows.
     """
     unit = validation_units(windows)
-    names = np.unique(unit)
+    whole = _of_folds(_Folds(found=found, ship=ship, windows=windows, unit=unit, fitted=_fitted), progress)
+    short, of_short = _stretches(windows, unit, ship, record)
+    fitted = partial(_fitted_ahead, unit, of_short)
+    ahead = _Folds(found=found, ship=ship, windows=short, unit=of_short, fitted=fitted)
+    return replace(whole, ahead=cache(lambda: replace(_of_folds(ahead, silent), in_stretches=True)))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Folds:
+    """What is cross-validated.
+
+    Attributes:
+        found: its fit to all units; None for a model that is not fitted.
+        ship: the model.
+        windows: that it is simulated in.
+        unit: (w,) of each of them.
+        fitted: the model fitted to some of the windows, by a mask (w,).
+    """
+
+    found: Fit | None
+    ship: ExtendedModel
+    windows: Windows
+    unit: Array
+    fitted: Callable[[Fit, Windows, NDArray[np.bool_]], ExtendedModel | None]
+
+
+def _of_folds(given: _Folds, progress: Progress) -> HeldOut:
+    found, windows = given.found, given.windows
+    names = np.unique(given.unit)
     folds = [names[index :: TUNING.folds] for index in range(min(TUNING.folds, len(names)))]
-    columns = [OUTPUTS.index(name) for name in ship.model.outputs]
+    columns = [OUTPUTS.index(name) for name in given.ship.model.outputs]
     error = np.zeros((len(names), len(columns)))
-    ahead, deviation, unconverged = np.zeros_like(error), np.zeros_like(error), 0
-    kept_out = [np.isin(unit, fold) for fold in folds]
+    deviation, unconverged = np.zeros_like(error), 0
+    kept_out = [np.isin(given.unit, fold) for fold in folds]
     refitted = [test for test in kept_out if found is not None and not test.all()]
-    models = in_order(_fitted, (found, windows), [(~test,) for test in refitted])
+    models = in_order(given.fitted, (found, windows), [(~test,) for test in refitted])
     for number, (fold, test) in enumerate(zip(folds, kept_out, strict=True)):
         progress("measuring the gain on held-out runs", number / len(folds))
-        model = ship if found is None or test.all() else next(models)
+        model = given.ship if found is None or test.all() else next(models)
         if model is None:
-            for total in (error, ahead, deviation):
+            for total in (error, deviation):
                 total[np.isin(names, fold)] = np.nan
             continue
         unconverged += found is not None and model.effects == found.ship.effects
         part = windows.selected(test)
-        motion = simulate_from_measured(model, part, None if found is None else found.linear.selected(test))
-        sums = squared_sums(motion.error[..., columns], part.measured[..., columns])
-        short, parent = _stretches(part)
-        begun_anew = simulate_from_measured(model, short).error[..., columns]
-        place = np.searchsorted(names, unit[test])
-        np.add.at(error, place, sums[0])
-        np.add.at(deviation, place, sums[1])
-        np.add.at(ahead, place[parent], squared_sums(begun_anew, short.measured[..., columns])[0])
-    stretches = HeldOut(squared_error=ahead, squared_deviation=deviation, unconverged=unconverged, in_stretches=True)
-    return HeldOut(squared_error=error, squared_deviation=deviation, unconverged=unconverged, ahead=stretches)
+        near = found.linear.selected(test) if found is not None and windows is found.linear.motion.windows else None
+        sums = squared_sums(simulate_from_measured(model, part, near).error[..., columns], part.measured[..., columns])
+        for total, more in zip((error, deviation), sums, strict=True):
+            np.add.at(total, np.searchsorted(names, given.unit[test]), more)
+    return HeldOut(squared_error=error, squared_deviation=deviation, unconverged=unconverged)
 
 
 def judged(held: Sequence[HeldOut], *, first: int = 1) -> list[HeldOut]:
@@ -129,26 +164,31 @@ def judged(held: Sequence[HeldOut], *, first: int = 1) -> list[HeldOut]:
         first: the first whose simulation decides so; the model before any cause may be as bad as it is.
     """
     stretches = [item.ahead for item in held if item.ahead is not None]
-    astray = any(not (item.fit >= TUNING.least_fit).all() for item in held[first:])
-    return stretches if astray and len(stretches) == len(held) else [*held]
+    astray = any(leads_away(item) for item in held[first:])
+    return [ahead() for ahead in stretches] if astray and len(stretches) == len(held) else [*held]
 
 
-def _stretches(windows: Windows) -> tuple[Windows, NDArray[np.int64]]:
-    """The data in short stretches, and the number of the window that each is a part of."""
+def leads_away(held: HeldOut) -> bool:
+    """Whether a model simulates some output of whole units worse than a constant."""
+    return not (held.fit >= TUNING.least_fit).all()
+
+
+def _stretches(windows: Windows, unit: Array, ship: ExtendedModel, record: Record | None) -> tuple[Windows, Array]:
+    """The data in short stretches, and the unit that each is a part of."""
+    if record is not None and unit is windows.batch:
+        short = cut_windows(ship.model, record, longest_s=TUNING.ahead_s)
+        return short, short.batch
     short = windows.cut_shorter(max(2, round(TUNING.ahead_s / windows.sample_s)))
     within = (windows.batch == short.batch[:, None]) & (windows.first <= short.first[:, None])
-    return short, np.asarray(np.where(within, windows.first, -1.0).argmax(axis=1))
+    return short, unit[np.where(within, windows.first, -1.0).argmax(axis=1)]
 
 
 def _fitted(found: Fit, windows: Windows, train: NDArray[np.bool_]) -> ExtendedModel | None:
     """The model with its effects fitted to some windows, or None where that is impossible.
 
-    The effects stay if no step from the fit to all windows reduces the cost on these. Those that do nothing in these
-    windows, such as a change of the ship that comes later, are left out: nothing is known of them.
+    The effects stay if no step from the fit to all windows reduces the cost on these.
     """
-    seen = np.abs(found.sensitivities.values[: found.free_count, train]).max(axis=(1, 2, 3), initial=0.0)
-    unseen = {key for key, size in zip(found.free_keys, seen.tolist(), strict=True) if not size > 0.0}
-    ship, free = found.ship.without_effects(unseen), tuple(key for key in found.free_keys if key not in unseen)
+    ship, free = _seen(found, train)
     options = FitOptions(
         noise=found.noise,
         ar_order=found.noise.order,
@@ -156,11 +196,31 @@ def _fitted(found: Fit, windows: Windows, train: NDArray[np.bool_]) -> ExtendedM
         warm_start=found.linear.selected(train),
         fixed_weights=True,
     )
-    part = windows.selected(train)
     try:
-        return fit(ship, part, free, starts=found.starts[train], options=options).ship
+        return fit(ship, windows.selected(train), free, starts=found.starts[train], options=options).ship
     except (FloatingPointError, np.linalg.LinAlgError):
         return None
+
+
+def _fitted_ahead(
+    unit: Array, of_short: Array, found: Fit, short: Windows, train: NDArray[np.bool_]
+) -> ExtendedModel | None:
+    """The same by output error in short stretches, with the units of the windows of the fit and of the stretches."""
+    ship, free = _seen(found, np.isin(unit, of_short[train]))
+    try:
+        return fit_output_error(ship, short.selected(train), free).ship
+    except (FloatingPointError, np.linalg.LinAlgError):
+        return None
+
+
+def _seen(found: Fit, train: NDArray[np.bool_]) -> tuple[ExtendedModel, tuple[str, ...]]:
+    """The model without effects that do nothing in these windows, and the free ones that are left.
+
+    Nothing is known there of a change of the ship that comes later, for example.
+    """
+    seen = np.abs(found.sensitivities.values[: found.free_count, train]).max(axis=(1, 2, 3), initial=0.0)
+    unseen = {key for key, size in zip(found.free_keys, seen.tolist(), strict=True) if not size > 0.0}
+    return found.ship.without_effects(unseen), tuple(key for key in found.free_keys if key not in unseen)
 
 
 def on_common_units(before: HeldOut, after: HeldOut) -> tuple[HeldOut, HeldOut]:

@@ -20,7 +20,7 @@ class Tuning:
         knot_spacing_s: of the random current, at least [s].
         most_knots: of the random current in a window.
         tile: edge of blocks of matrix products; for up to 64 x 64 x 64 multiplications OpenBLAS uses one thread.
-    largest_sensitivity: beyond it the model counts as unstable.
+        largest_sensitivity: beyond it the model counts as unstable.
         smallest_factor_change: factors of inertia, thrust and gyro stay above one plus this.
         largest_ratio: times and widths change by this factor in a step, at most.
         beyond_std_level: of the test whether parameters are within their stated standard deviations.
@@ -29,6 +29,7 @@ class Tuning:
         folds: of the cross-validation.
         fold_steps: Gauss-Newton steps from the fit to all units to the fit without a fold.
         ahead_s: length of the stretches that held-out data are also simulated in [s].
+        longer_by: factor of the length of windows from one fit of a diverging model to the next.
         least_fit: of simulations of whole held-out units [%]; where one is worse, the stretches count.
         force_spacing_s: between the knots of a force that nobody measured [s].
         force_penalties: sizes of such a force that are tried, as ridge penalties.
@@ -54,6 +55,7 @@ class Tuning:
     folds: int = 3
     fold_steps: int = 6
     ahead_s: float = 30.0
+    longer_by: float = 1.4
     least_fit: float = 0.0
     force_spacing_s: float = 60.0
     force_penalties: tuple[float, ...] = (1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0, 1e3, 1e4)

@@ -84,7 +84,8 @@ def improves_held_out(found: Selection, held: Sequence[HeldOut], seed: int) -> l
     the intervals of few runs wide.) Later causes need a gain, because no model of a real ship is exact: once a large
     error is explained, small differences between model and ship become significant. A small gain counts if its
     interval excludes zero. Uncertain parameters are estimated in any case, so as a cause they need no gain. A cause
-    that imitates others may make no output worse by more than it gains on average. What takes less than
+    that imitates others may make no output worse by more than it gains on average. Where whole
+    simulations lead away, the interval of a later cause must exclude zero. What takes less than
     `Tuning.least_reduction` off every error is a remark, whatever its p-value.
     """
     gains = [held_out_gain(one, other, seed) for one, other in pairwise(held)]
@@ -94,6 +95,7 @@ def improves_held_out(found: Selection, held: Sequence[HeldOut], seed: int) -> l
         and _improves(
             index == 0 or only_nuisance(step, found), _least_change(*held[index : index + 2]) >= 0.0, gain, interval
         )
+        and (index == 0 or not held[0].in_stretches or interval[0] > 0.0)
         for index, (step, (gain, interval)) in enumerate(zip(found.steps, gains, strict=True))
     ]
 

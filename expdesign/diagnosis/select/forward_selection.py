@@ -90,11 +90,17 @@ def select_forward(
 
 
 def _gains(fits: Sequence[Fit], validation: CrossValidation) -> list[bool]:
-    """Which fits improve on the one before them in simulations of held-out data; of one cause alone it is not asked."""
+    """Which fits improve on the one before them in simulations of held-out data; of one cause alone it is not asked.
+
+    Where these simulations are short stretches, because whole ones lead away, a gain counts if its interval excludes
+    zero.
+    """
     if len(fits) < 3:
         return [True] * (len(fits) - 1)
     held = judged([validation.of(item) for item in fits])
-    return [not held_out_gain(*pair, 0)[0] <= TUNING.least_gain_points for pair in pairwise(held)]
+    gains = [held_out_gain(*pair, 0) for pair in pairwise(held)]
+    least = TUNING.least_gain_points
+    return [not (gain <= least or (held[0].in_stretches and low <= 0.0)) for gain, (low, _) in gains]
 
 
 def to_take_out(steps: Sequence[Step], redundant: int) -> int:

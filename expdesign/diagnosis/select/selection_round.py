@@ -9,7 +9,7 @@ import numpy as np
 
 from expdesign.diagnosis.causes import CAUSES, Candidate, Situation
 from expdesign.diagnosis.data import Windows
-from expdesign.diagnosis.fit import CrossValidation, Fit, judged
+from expdesign.diagnosis.fit import CrossValidation, Fit, judged, leads_away
 from expdesign.diagnosis.select.fitted_candidate import (
     FittedCandidate,
     fit_candidate,
@@ -127,9 +127,12 @@ def _best_on_held_out(
 ) -> FittedCandidate:
     """The best candidate, or one with fewer numbers that simulates data held out of the fit better.
 
-    Many numbers explain errors of the model's structure in the data that they are fitted to, and in no others.
+    Many numbers explain errors of the model's structure in the data that they are fitted to, and in no others. Where
+    the simulation of whole units leads away from the ship, likelihoods tell little, and the best candidates of all
+    other causes are compared.
     """
-    rivals = _rivals(first, accepted)
+    astray = leads_away(validation.of(first.fit))
+    rivals = _rivals(first, accepted, most_numbers=99 if astray else first.numbers - 1)
     if not rivals:
         return first
     held = judged([validation.of(item.fit) for item in (first, *rivals)], first=0)
@@ -138,11 +141,11 @@ def _best_on_held_out(
     return rivals[best - 1] if best and means[best] > means[0] + TUNING.clear_gain_points else first
 
 
-def _rivals(first: FittedCandidate, accepted: Sequence[FittedCandidate]) -> list[FittedCandidate]:
-    """The best candidate of each other cause that has fewer numbers."""
+def _rivals(first: FittedCandidate, accepted: Sequence[FittedCandidate], *, most_numbers: int) -> list[FittedCandidate]:
+    """The best candidate of each other cause that has so many numbers at most."""
     found: dict[str, FittedCandidate] = {}
     for item in accepted:
-        if item.numbers < first.numbers and item.candidate.cause != first.candidate.cause:
+        if item.numbers <= most_numbers and item.candidate.cause != first.candidate.cause:
             found.setdefault(item.candidate.cause, item)
     return [*found.values()][: TUNING.rivals]
 
