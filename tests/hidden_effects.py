@@ -34,7 +34,8 @@ INPUTS = {"tug": ("n1", "a1", "n2", "a2"), "barge": ("tau_x", "tau_y", "tau_psi"
 TERMS = {
     "X_vr": lambda u, v, r: v * r, "X_abs_u_u": lambda u, v, r: abs(u) * u, "Y_abs_v_v": lambda u, v, r: abs(v) * v,
     "Y_abs_v_r": lambda u, v, r: abs(v) * r, "N_uv": lambda u, v, r: u * v, "N_abs_v_v": lambda u, v, r: abs(v) * v,
-    "N_abs_v_r": lambda u, v, r: abs(v) * r, "Y_ur": lambda u, v, r: u * r,
+    "N_abs_v_r": lambda u, v, r: abs(v) * r, "Y_ur": lambda u, v, r: u * r, "Y_vvv": lambda u, v, r: v * v * v,
+    "N_rrr": lambda u, v, r: r * r * r, "N_ur_abs_r": lambda u, v, r: u * r * abs(r),
 }  # fmt: skip
 """Terms that may be hidden: regressors by name; the first letter tells the equation."""
 SUBSTEPS = 5
@@ -126,7 +127,8 @@ def sail(trials: list[Trial], orders: np.ndarray, step_s: float, weather: Weathe
 
     Effects: gain, kappa, asymmetry (yaw moment per ahead force), angle_offset (all azimuths or the rudder),
     rudder_scale, lag_s, delay_s, deadband, load_u load_v load_r, shallow_damping shallow_inertia
-    (times draught/depth, draught 2.5 m), roll_period_s roll_damping roll_sway roll_yaw, change_s (batches laid end to
+    (times draught/depth, draught 2.5 m), bank_sway bank_yaw (accelerations at a bank 100 m to the east, half as much
+    every 70 m before it), roll_period_s roll_damping roll_sway roll_yaw, change_s (batches laid end to
     end) with change_gain change_damping, and any name of TERMS. lag and delay act on the inputs named by `acts_on`,
     the dead band on those named by `dead_on` (bit masks).
     """
@@ -189,7 +191,8 @@ def sail(trials: list[Trial], orders: np.ndarray, step_s: float, weather: Weathe
 
 EFFECTS = (
     "gain", "kappa", "asymmetry", "angle_offset", "rudder_scale", "lag_s", "delay_s", "deadband", "acts_on", "dead_on",
-    "load_u", "load_v", "load_r", "shallow_damping", "shallow_inertia", "roll_period_s", "roll_damping", "roll_sway",
+    "load_u", "load_v", "load_r", "shallow_damping", "shallow_inertia", "bank_sway",
+    "bank_yaw", "roll_period_s", "roll_damping", "roll_sway",
     "roll_yaw", "change_s", "change_gain", "change_damping", *(name for name in TERMS),
 )  # fmt: skip
 
@@ -257,6 +260,9 @@ def _rates(ship, x, acting, th, e, present, shoal, after, current, wind):
     for name, term in TERMS.items():
         if name in present:
             extra[name[0]] = extra[name[0]] + e[name] * term(ur, vr, r)
+    if present & {"bank_sway", "bank_yaw"}:
+        near = ca.exp(-ca.fmax(100.0 - x[1], 0.0) / 100.0)
+        extra["Y"], extra["N"] = extra["Y"] + e["bank_sway"] * near, extra["N"] + e["bank_yaw"] * near
     du = th["X_vr"] * vr * r + (damp * dx + gain * (fx + kx) + extra["X"]) / (1 + e["load_u"]) / heavy
     dv = th["Y_ur"] * ur * r + (damp * dy + gain * fy + extra["Y"]) / (1 + e["load_v"]) / heavy
     dr = (damp * dn + gain * fn + extra["N"]) / (1 + e["load_r"]) / heavy

@@ -48,6 +48,7 @@ FLOORS = {
         ("accuracy", "discriminating_manoeuvre"),
         ("fit",),
         ("select",),
+        ("remainder",),
         ("values",),
         ("conclusions",),
         ("diagnose",),

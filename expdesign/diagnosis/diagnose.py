@@ -17,6 +17,7 @@ from expdesign.diagnosis.accuracy import (
     one_step_residuals,
     white_noise_std,
 )
+from expdesign.diagnosis.causes import rounded
 from expdesign.diagnosis.conclusions import (
     error_reductions_of,
     finding_of,
@@ -44,6 +45,7 @@ from expdesign.diagnosis.fit import (
 )
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import initial_states, simulate_from_measured, stable_windows
+from expdesign.diagnosis.remainder import Missing, Remainder, with_unlisted_terms
 from expdesign.diagnosis.select import (
     SELECTION_TUNING,
     Selection,
@@ -137,7 +139,16 @@ def diagnose(
         before=before,
         after=after,
         findings=ranked,
-        verdict=verdict(ranked, before, unit, unexplained, within, _signs(chosen, after, windows)),
+        verdict=verdict(
+            ranked,
+            before,
+            unit,
+            unexplained,
+            within,
+            _signs(chosen, after, windows),
+            _in_words(chosen.rest.kinds),
+            _in_words(chosen.rest.instead),
+        ),
         unexplained=unexplained,
         simulated_before=motion.predicted,
         simulated_after=simulate_from_measured(final, windows).predicted,
@@ -161,6 +172,7 @@ class _Selected:
         as_stated: errors of the model in use as its file states it.
         held: of the model before any cause, then after every one that was kept.
         validation: of other fits.
+        rest: what is missing beside all causes, or instead of them.
     """
 
     found: Selection
@@ -168,6 +180,7 @@ class _Selected:
     as_stated: HeldOut
     held: list[HeldOut]
     validation: CrossValidation
+    rest: Remainder
 
     @property
     def before(self) -> HeldOut:
@@ -193,7 +206,8 @@ def _select(
         return _cross_validated(found, as_stated, validation, told.part(VALIDATED * (1 + len(found.steps)), CONCLUDED))
 
     kept, held = eliminate_backward(found, windows, cross_validated, seed)
-    return _Selected(found=found, kept=kept, as_stated=as_stated, held=held, validation=validation)
+    rest = with_unlisted_terms(kept, held, windows, validation, seed)
+    return _Selected(found=found, kept=rest.kept, as_stated=as_stated, held=rest.held, validation=validation, rest=rest)
 
 
 def _cross_validated(
@@ -261,6 +275,11 @@ def _signs(chosen: _Selected, after: Accuracy, windows: Windows) -> tuple[str, .
     if not _more_than_noise(after, windows).any():
         return ()
     return tuple(dict.fromkeys(item.cause for item in rejected))
+
+
+def _in_words(found: Sequence[Missing]) -> tuple[str, ...]:
+    """What no cause is and no model can get, with its size."""
+    return tuple(f"{item.words} ({rounded(item.value, item.std)} {item.unit}".rstrip() + ")" for item in found)
 
 
 def _findings(chosen: _Selected, windows: Windows, proposals: Sequence[Proposal], seed: int) -> tuple[Finding, ...]:

@@ -11,7 +11,14 @@ from expdesign.diagnosis.causes.actuators import (
 )
 from expdesign.diagnosis.causes.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.environment import CURRENT, SHALLOW_WATER, WIND
-from expdesign.diagnosis.causes.hull import CHANGE_POINT, LOAD_CHANGE, MISSING_TERM, PARAMETERS, ROLL_COUPLING
+from expdesign.diagnosis.causes.hull import (
+    CHANGE_POINT,
+    LOAD_CHANGE,
+    MISSING_TERM,
+    PARAMETERS,
+    ROLL_COUPLING,
+    UNLISTED_TERM,
+)
 from expdesign.diagnosis.causes.sensors import GYRO_SCALE, HEADING_BIAS, LEVER_ARM, SENSOR_DELAY
 from expdesign.diagnosis.causes.words import rounded
 
@@ -37,4 +44,4 @@ CAUSES: tuple[Cause, ...] = (
     CHANGE_POINT,
 )
 
-__all__ = ["CAUSES", "Candidate", "Cause", "Situation", "Values", "rounded"]
+__all__ = ["CAUSES", "UNLISTED_TERM", "Candidate", "Cause", "Situation", "Values", "rounded"]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from expdesign.diagnosis.causes import CAUSES, Cause, Values
+from expdesign.diagnosis.causes import CAUSES, UNLISTED_TERM, Cause, Values
 from expdesign.diagnosis.fit import Fit, HeldOut, bootstrap_sums, held_out_gain, on_common_units
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.select import Step
@@ -49,7 +49,7 @@ def finding_of(
 
 def cause_of(name: str) -> Cause:
     """The entry of the catalogue that a name belongs to."""
-    return next(cause for cause in CAUSES if cause.name == name.split(":")[0])
+    return next(cause for cause in (*CAUSES, UNLISTED_TERM) if cause.name == name.split(":")[0])
 
 
 def _values(step: Step, last: Fit) -> dict[str, tuple[float, float]]:

@@ -54,6 +54,8 @@ MANOEUVRES = {
 def missing_effect(cause: str) -> str:
     """Missing effect of a cause, e.g. of "missing_term:Y_r"."""
     kind, _, term = cause.partition(":")
+    if kind == "unlisted_term":
+        return term
     return f"the term {term}" if kind == "missing_term" else MISSING_EFFECTS[kind]
 
 
@@ -99,6 +101,8 @@ def verdict(
     unexplained: Unexplained | None = None,
     within_std: Sequence[ErrorReduction] = (),
     signs: Sequence[str] = (),
+    kinds: Sequence[str] = (),
+    instead: Sequence[str] = (),
 ) -> str:
     """The whole diagnosis in one sentence.
 
@@ -109,7 +113,12 @@ def verdict(
         unexplained: what remains, if that is much.
         within_std: what uncertain parameters gain within their standard deviations, if that is clear.
         signs: causes that are significant in a test and no findings, where the error is more than noise.
+        kinds: what else the error looks like, which no cause of the catalogue is and no model can get.
+        instead: the same of what explains about as much as the findings do.
     """
+    rest = f"no known cause matches what remains: it looks like {listed(kinds)}" if kinds else ""
+    if not findings and kinds:
+        return f"{rest[0].upper()}{rest[1:]}; {accuracy_in_words(before)}."
     if not findings and within_std:
         return _within_std(within_std, unexplained, unit)
     if not findings and unexplained is not None:
@@ -125,6 +134,10 @@ def verdict(
     parts += [_benefits(findings, unit), *_invisible(findings)]
     parts += [_open_question(item) for item in findings if item.not_distinguishable_from]
     parts += [] if unexplained is None else [f"much remains unexplained: {_remainder(unexplained, unit)}"]
+    parts += (
+        [f"no cause of the catalogue, {listed(instead, 'or')} explains these data about as well"] if instead else []
+    )
+    parts += [rest] if kinds else []
     return "; ".join(parts) + "."
 
 

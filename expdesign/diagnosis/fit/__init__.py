@@ -27,7 +27,7 @@ from expdesign.diagnosis.fit.fit import (
     within_stated_std,
 )
 from expdesign.diagnosis.fit.gauss_newton import fit
-from expdesign.diagnosis.fit.gram_matrices import gram_matrices, information, marginalised
+from expdesign.diagnosis.fit.gram_matrices import gram_matrices, information, marginalised, window_information
 from expdesign.diagnosis.fit.linear_model import (
     build_sensitivities,
     difference_step,
@@ -69,6 +69,7 @@ __all__ = [
     "sensitivities_to",
     "unmeasured_force_share",
     "validation_units",
+    "window_information",
     "with_longer_windows",
     "within_stated_std",
 ]

@@ -103,6 +103,18 @@ class MarginalInformation:
     log_det: float
 
 
+def window_information(grams: GramMatrices, found: Sensitivities, noise: Noise) -> tuple[Array, Array]:
+    """(w, c, c) and (w, c) information and scores of every window once the random current is integrated out."""
+    c = found.numbers
+    A, s = grams.XX[:, :c, :c], grams.Xe[:, :c]
+    if noise.current_std_mps == 0.0 or found.knot_count == 0:
+        return A, s
+    ZZ = grams.XX[:, c:, c:] + np.linalg.inv(current_prior(found, noise))
+    solved = np.linalg.solve(ZZ, np.concatenate([grams.XX[:, c:, :c], grams.Xe[:, c:, None]], axis=2))
+    ZX = np.swapaxes(grams.XX[:, c:, :c], 1, 2)
+    return A - ZX @ solved[..., :-1], s - (ZX @ solved[..., -1:])[..., 0]
+
+
 def marginalised(grams: GramMatrices, found: Sensitivities, noise: Noise) -> MarginalInformation:
     """Integrate the random current out."""
     c = found.numbers

@@ -1,5 +1,7 @@
 """Simulation of the extended model over all windows, and its linearisation."""
 
+from expdesign.diagnosis.motion.exogenous_inputs import exogenous_inputs
+from expdesign.diagnosis.motion.integration import stacked_rates
 from expdesign.diagnosis.motion.linearisation import (
     Disturbance,
     disturbance_of,
@@ -22,6 +24,7 @@ __all__ = [
     "LinearisedMotion",
     "Motion",
     "disturbance_of",
+    "exogenous_inputs",
     "initial_states",
     "linearise",
     "responses",
@@ -29,6 +32,7 @@ __all__ = [
     "simulate_nearby",
     "simulate_windows",
     "stable_windows",
+    "stacked_rates",
     "start_responses",
     "term_disturbances",
 ]

@@ -2,14 +2,16 @@
 
 from expdesign.diagnosis.select.backward_elimination import eliminate_backward, only_nuisance
 from expdesign.diagnosis.select.candidate_disturbances import candidate_disturbances
+from expdesign.diagnosis.select.fitted_candidate import FittedCandidate
 from expdesign.diagnosis.select.forward_selection import fit_nuisance, select_forward
 from expdesign.diagnosis.select.score_tests import ScoreTest, score_tests
-from expdesign.diagnosis.select.selection import Selection, Step
+from expdesign.diagnosis.select.selection import Selection, Step, redundant_step, without_step
 from expdesign.diagnosis.select.selection_round import leading_candidates, open_candidates
 from expdesign.diagnosis.select.tuning import TUNING as SELECTION_TUNING
 
 __all__ = [
     "SELECTION_TUNING",
+    "FittedCandidate",
     "ScoreTest",
     "Selection",
     "Step",
@@ -19,6 +21,8 @@ __all__ = [
     "leading_candidates",
     "only_nuisance",
     "open_candidates",
+    "redundant_step",
     "score_tests",
     "select_forward",
+    "without_step",
 ]

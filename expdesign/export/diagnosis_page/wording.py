@@ -61,12 +61,16 @@ PATTERNS = (
 def cause_title(cause: str) -> str:
     """Title of a cause, e.g. of "missing_term:Y_r"."""
     kind, _, term = cause.partition(":")
+    if kind == "unlisted_term":
+        return f"No known cause: {term}"
     return f"Missing term {term}" if kind == "missing_term" else TITLES.get(cause, cause.replace("_", " "))
 
 
 def estimate_words(name: str, cause: str) -> str:
     """The name of an estimate in words; parameters and terms of the model keep theirs."""
-    if cause.partition(":")[0] in ("parameters", "missing_term") or (cause == "wind" and name not in NAMES):
+    if cause.partition(":")[0] in ("parameters", "missing_term", "unlisted_term") or (
+        cause == "wind" and name not in NAMES
+    ):
         return name
     for pattern, text in PATTERNS:
         match = pattern.fullmatch(name)

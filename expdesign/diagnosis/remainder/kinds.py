@@ -1,0 +1,180 @@
+"""Kinds of missing effects that no term of motion describes: places, times, single inputs and clocks.
+
+Each is a disturbance along the simulated path. A vessel file cannot hold them, so they are named and not added.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from expdesign.conventions import OUTPUTS
+from expdesign.diagnosis.model import ANGLE_STEMS, group_columns
+from expdesign.diagnosis.motion import Disturbance, LinearisedMotion, disturbance_of, exogenous_inputs, stacked_rates
+from expdesign.values import Array
+from expdesign.vessel import stem
+
+WORDS = {"u": "surge", "v": "sway", "r": "yaw"}
+LAG_S = 4.0
+TIMES = 9
+"""Times at which something may begin, evenly over the data."""
+SATURATED = (0.5, 0.75)
+"""Shares of an input's samples below the values from which on it may saturate."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Kind:
+    """A kind of missing effect.
+
+    Attributes:
+        words: what is missing, to follow "looks like".
+        unit: of its size, or empty.
+        disturbance: per unit of its size.
+        whole: its size is one where it is what is missing.
+    """
+
+    words: str
+    unit: str
+    disturbance: Callable[[], Disturbance]
+    whole: bool = False
+
+
+def kinds(linear: LinearisedMotion) -> tuple[Kind, ...]:
+    """All kinds that the data can show."""
+    return (*_steady(linear), *_by_heading(linear), *_inputs(linear), *_slow_answers(linear), _clock(linear))
+
+
+def _force(linear: LinearisedMotion, axis: int, values: Array) -> Callable[[], Disturbance]:
+    def pushing() -> Disturbance:
+        states = linear.motion.states
+        force = np.zeros((states.shape[0], states.shape[1] - 1, states.shape[2]))
+        force[..., axis] = values
+        return Disturbance(force=force, sensor=None)
+
+    return pushing
+
+
+def _steady(linear: LinearisedMotion) -> Iterator[Kind]:
+    time = linear.motion.windows.time_s[:, :-1]
+    grown = time / max(float(time.max()), 1.0)
+    for name in linear.motion.ship.model.outputs:
+        axis, unit = OUTPUTS.index(name), "rad/s\N{SUPERSCRIPT TWO}" if name == "r" else "m/s\N{SUPERSCRIPT TWO}"
+        words = f"a steady {'moment' if name == 'r' else 'force'} in {WORDS[name]}"
+        yield Kind(words=words, unit=unit, disturbance=_force(linear, axis, np.ones_like(grown)))
+        yield Kind(words=f"{words} that grows with time", unit=f"{unit} at the end",
+                   disturbance=_force(linear, axis, grown))  # fmt: skip
+
+
+def _by_heading(linear: LinearisedMotion) -> Iterator[Kind]:
+    windows = linear.motion.windows
+    if not windows.has_heading:
+        return
+    heading = windows.heading[:, :-1]
+    for name in linear.motion.ship.model.outputs:
+        for times in (1, 2):
+            for shape in (np.sin, np.cos):
+                text = f"{shape.__name__}({'' if times == 1 else '2 '}heading)"
+                words = f"a force in {WORDS[name]} that goes with {text}"
+                values = shape(times * heading)
+                yield Kind(words=words, unit="", disturbance=_force(linear, OUTPUTS.index(name), values))
+
+
+def _inputs(linear: LinearisedMotion) -> Iterator[Kind]:
+    """Inputs that from some time on stay where they were or do nothing, saturated inputs, and inputs with play."""
+    inputs, windows = linear.motion.ship.model.inputs, linear.motion.windows
+    times = np.linspace(0.0, float(windows.time_s.max()), TIMES + 2)[1:-1].tolist()
+    for column, name in enumerate(inputs):
+        for time in times:
+            for held, what in ((True, "stuck"), (False, "without effect")):
+                words = f"{name} {what} from about {time:.0f} s on"
+                changed = _with_inputs(linear, [column], partial(_stopped, held), time)
+                yield Kind(words=words, unit="of it", disturbance=changed, whole=True)
+    for name in dict.fromkeys(map(stem, inputs)):
+        columns = group_columns(name, inputs)
+        unit = " rad" if name in ANGLE_STEMS else ""
+        sizes = np.abs(np.concatenate([rows[:, columns].ravel() for rows in windows.batch_inputs]))
+        for size in np.unique(np.quantile(sizes, SATURATED)).tolist():
+            words = f"less effect of {name} above {size:.2g}{unit}, as by saturation or ventilation"
+            yield Kind(words=words, unit="of it lost", disturbance=_with_inputs(linear, columns, partial(_cut, size)))
+        words = f"play (hysteresis) of {name}"
+        yield Kind(words=words, unit=unit.strip(), disturbance=_with_inputs(linear, columns, _play))
+
+
+def _with_inputs(
+    linear: LinearisedMotion,
+    columns: list[int],
+    change: Callable[[Array, NDArray[np.bool_]], Array],
+    begin_s: float = 0.0,
+) -> Callable[[], Disturbance]:
+    """The disturbance by another course of some inputs: `change` of their values (k,) from a time on, by mask (k,)."""
+
+    def disturbance() -> Disturbance:
+        motion = linear.motion
+        windows = motion.windows
+        rows = np.concatenate(windows.batch_inputs)  # laid end to end, as the times are
+        since = np.arange(len(rows)) * windows.step_s / windows.rows_per_step >= begin_s
+        for column in columns:
+            rows[:, column] = change(rows[:, column], since)
+        ends_of_runs = np.cumsum([len(part) for part in windows.batch_inputs])[:-1]
+        changed = np.split(rows, ends_of_runs)
+        exogenous = exogenous_inputs(motion.ship, replace(windows, batch_inputs=tuple(changed))).without_last_step()
+        ends = (motion.states[:, :-1], motion.states[:, 1:])
+        force = np.mean([stacked_rates(motion.ship, one, exogenous) for one in ends], axis=0)
+        return Disturbance(force=force - linear.path_rates.mean(axis=0), sensor=None)
+
+    return disturbance
+
+
+def _cut(size: float, values: Array, _since: NDArray[np.bool_]) -> Array:
+    """Values no larger than a size."""
+    return np.clip(values, -size, size)
+
+
+def _stopped(held: bool, values: Array, since: NDArray[np.bool_]) -> Array:
+    """Values that stay as they are at the time, or vanish."""
+    if not since.any():
+        return values
+    last = values[max(int(np.argmax(since)) - 1, 0)] if held else 0.0
+    return np.where(since, last, values)
+
+
+def _play(values: Array, _since: NDArray[np.bool_]) -> Array:
+    """What follows its order only once that has turned round by more than the play: here of size one."""
+    direction = np.sign(np.diff(values, prepend=values[:1]))
+    index = np.maximum.accumulate(np.where(direction != 0, np.arange(len(values)), 0))
+    return np.asarray(values - 0.5 * direction[index])
+
+
+def _slow_answers(linear: LinearisedMotion) -> Iterator[Kind]:
+    """Lags that are longer at speed, or in slow motion."""
+    motion = linear.motion
+    speed = motion.states[:, :-1, 0]
+    share = (speed - speed.mean()) / max(float(speed.std()), 1e-9)
+    for name in dict.fromkeys(map(stem, motion.ship.model.inputs)):
+        key = f"lag:{name}"
+        if motion.ship.get(key):
+            continue
+
+        def lagging(key: str = key) -> Disturbance:
+            force = disturbance_of(linear, motion.ship.with_effects({key: LAG_S}), LAG_S).force
+            return Disturbance(force=None if force is None else force * share[..., None], sensor=None)
+
+        yield Kind(words=f"a lag of {name} that changes with speed", unit="s per standard deviation of speed",
+                   disturbance=lagging)  # fmt: skip
+
+
+def _clock(linear: LinearisedMotion) -> Kind:
+    """Measurements later and later: their time stamps run at another rate than those of the inputs."""
+
+    def drifting() -> Disturbance:
+        motion = linear.motion
+        windows = motion.windows
+        time = windows.time_s[:, :: windows.steps_per_sample][:, : motion.predicted.shape[1], None]
+        return Disturbance(force=None, sensor=-time * np.gradient(motion.predicted, windows.sample_s, axis=1))
+
+    return Kind(words="time stamps of the sensors that drift against those of the inputs", unit="s per second",
+                disturbance=drifting)  # fmt: skip

@@ -1,0 +1,168 @@
+"""What remains beside all causes: terms to add to the model, or the kind of what is missing."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from expdesign.diagnosis.data import Windows
+from expdesign.diagnosis.fit import (
+    Fit,
+    FitOptions,
+    build_sensitivities,
+    continuing,
+    deviations_of,
+    effect_disturbances,
+    fit,
+    gram_matrices,
+    log_likelihood_gain,
+    window_information,
+)
+from expdesign.diagnosis.motion import initial_states, term_disturbances
+from expdesign.diagnosis.remainder.kinds import WORDS, Kind, kinds
+from expdesign.diagnosis.remainder.stability_selection import Chosen, UnitInformation, stable_selection
+from expdesign.diagnosis.remainder.term_dictionary import term_dictionary
+from expdesign.diagnosis.remainder.tuning import TUNING
+from expdesign.vessel import Term
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Missing:
+    """Something that no cause explains and the data surely show.
+
+    Attributes:
+        words: what it looks like.
+        unit: of its size.
+        value, std: its size by the linear model of the fit.
+        chosen: how sure it is.
+        share: of the whitened squared error of held-out units that it takes away.
+        term: to add to the model; None where a vessel file cannot hold it.
+    """
+
+    words: str
+    unit: str
+    value: float
+    std: float
+    chosen: Chosen
+    share: float
+    term: Term | None
+
+
+def missing_effects(base: Fit, windows: Windows, rng: np.random.Generator) -> tuple[Missing, ...]:
+    """A sparse sum of terms and of kinds of effects that explains what a fit leaves, best first; empty for noise."""
+    base = _begun_anew(base, windows)
+    windows, ship = base.linear.motion.windows, base.ship
+    terms = term_dictionary(ship.model, ship.library)
+    wider = replace(ship, library={**ship.library, **terms})
+    linear = replace(base.linear, motion=replace(base.linear.motion, ship=wider))
+    steady = term_disturbances(linear, [f"term:{name}" for name in (*ship.library, *terms)])
+    names = [key.removeprefix("term:") for key in steady if key not in base.keys]
+    others = kinds(base.linear)
+    disturbances = [
+        *effect_disturbances(base.linear, base.keys),
+        *(steady[f"term:{name}"] for name in names),
+        *(kind.disturbance() for kind in others),
+    ]
+    found = build_sensitivities(base.linear, disturbances, random_current=base.noise.current_std_mps > 0)
+    grams = gram_matrices(found, base.noise)
+    A, s = window_information(grams, found, base.noise)
+    given = UnitInformation(A=A, s=s, precision=base.precision, offset=deviations_of(ship, base.keys))
+    chosen = stable_selection(_without(_by_unit(given, windows), _impossible(given, len(names), others)), rng)
+    sizes = _sizes(given, [item.index for item in chosen])
+    listed = [wider.library[name] for name in names]
+    size = float(grams.ee.sum())
+    return tuple(_missing(listed, others, item, *pair, size) for item, pair in zip(chosen, sizes, strict=True))
+
+
+def _begun_anew(base: Fit, windows: Windows) -> Fit:
+    """The fit in windows of `Tuning.window_s`: simulated from what is measured, the path stays near the ship's own."""
+    short = windows.cut_shorter(max(TUNING.fewest_samples, round(TUNING.window_s / windows.sample_s)))
+    starts = initial_states(short, base.ship.states)
+    try:
+        return fit(base.ship, short, base.free_keys, starts=starts, options=FitOptions(steps=TUNING.steps))
+    except (FloatingPointError, np.linalg.LinAlgError):
+        return base
+
+
+def as_good_as_causes(first: Fit, last: Fit, windows: Windows, rng: np.random.Generator) -> tuple[Missing, ...]:
+    """The kind of effect that explains about as much as all causes between two fits, if there is one.
+
+    Whatever is not in the catalogue may be imitated by causes that are.
+    """
+    found = missing_effects(first, windows, rng)
+    if not found or found[0].term is not None:
+        return ()
+    gain = log_likelihood_gain(_begun_anew(first, windows), _begun_anew(last, windows))
+    return found[:1] if found[0].chosen.statistic > TUNING.as_good * gain else ()
+
+
+def _impossible(given: UnitInformation, terms: int, others: tuple[Kind, ...]) -> list[int]:
+    """Places of kinds that act as a whole or not at all, and whose size is far from one."""
+    A, s = given.beside_nuisance(np.ones(len(given.A), dtype=bool))
+    sizes = s / np.maximum(np.diag(A), 1e-300)
+    low, high = TUNING.whole
+    return [terms + at for at, kind in enumerate(others) if kind.whole and not low < sizes[terms + at] < high]
+
+
+def _without(given: UnitInformation, places: list[int]) -> UnitInformation:
+    """The same without information about some regressors, so that they are never chosen."""
+    A, s = given.A.copy(), given.s.copy()
+    rows = [len(given.precision) + place for place in places]
+    A[:, rows], A[:, :, rows], s[:, rows] = 0.0, 0.0, 0.0
+    return replace(given, A=A, s=s)
+
+
+def _by_unit(given: UnitInformation, windows: Windows) -> UnitInformation:
+    """Windows of one run belong together, where there are enough runs."""
+    runs = np.unique(windows.batch)
+    if len(runs) < 3:
+        return given
+    member = (windows.batch == runs[:, None]).astype(float)
+    return replace(given, A=np.einsum("bw,wij->bij", member, given.A), s=member @ given.s)
+
+
+def _sizes(given: UnitInformation, chosen: list[int]) -> list[tuple[float, float]]:
+    """Values and standard errors of a sum of regressors."""
+    A, s = given.beside_nuisance(np.ones(len(given.A), dtype=bool))
+    block = A[np.ix_(chosen, chosen)]
+    values = np.linalg.lstsq(block, s[chosen], rcond=None)[0] if chosen else np.zeros(0)
+    std = np.sqrt(np.diag(np.linalg.pinv(block, hermitian=True))) if chosen else np.zeros(0)
+    return list(zip(values.tolist(), std.tolist(), strict=True))
+
+
+def _missing(
+    terms: list[Term], others: tuple[Kind, ...], chosen: Chosen, value: float, std: float, whole: float
+) -> Missing:
+    if chosen.index < len(terms):
+        term = terms[chosen.index]
+        words, unit = f"a term like {term.expression} in {WORDS[term.equation]}", ""
+    else:
+        kind, term = others[chosen.index - len(terms)], None
+        words, unit = kind.words, kind.unit
+    share = chosen.held_out / whole
+    return Missing(words=words, unit=unit, value=value, std=std, chosen=chosen, share=share, term=term)
+
+
+def with_term(base: Fit, windows: Windows, missing: Missing) -> tuple[Fit, str, float] | None:
+    """The fit with a term added, its effect and its likelihood ratio; None where it is no term or cannot be fitted."""
+    if missing.term is None:
+        return None
+    term = replace(missing.term, name=_name(missing.term, {*base.ship.model.names, *base.ship.library}))
+    key = f"term:{term.name}"
+    ship = replace(base.ship, library={**base.ship.library, term.name: term}).with_effects({key: 0.0})
+    try:
+        found = fit(ship, windows, (*base.free_keys, key), starts=base.starts, options=continuing(base))
+    except (FloatingPointError, np.linalg.LinAlgError):
+        return None
+    return found, key, log_likelihood_gain(base, found)
+
+
+def _name(term: Term, taken: set[str]) -> str:
+    """X, Y or N and what the term reads; a library term keeps its name."""
+    if term.name in taken and "_more_" not in term.name:
+        return term.name
+    text = re.sub(r"[^A-Za-z0-9]+", "_", term.expression).strip("_")
+    name = f"{term.name[0]}_{text}"
+    return name if name not in taken else f"{name}_found"
