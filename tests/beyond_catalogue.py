@@ -97,3 +97,14 @@ CASES: dict[str, Callable[[int], tuple[Vessel, Record]]] = {
     "nothing": lambda seed: trial("barge", seed),
 }
 """Name -> model in use and data, by seed."""
+SAYS: dict[str, tuple[str, ...]] = {
+    "cubic damping": ("v*v*v", "r*r*r"),
+    "governor hysteresis": ("play (hysteresis) of n",),
+    "propeller ventilation": ("less effect of n above",),
+    "stuck thruster": ("a1 stuck",),
+    "speed-dependent lag": ("lag of rudder that changes with speed",),
+    "bank": ("a steady force in sway", "a steady moment in yaw"),
+    "drifting time stamps": ("time stamps of the sensors that drift",),
+    "nothing": ("no error of the model",),
+}
+"""Words of a verdict that say what is hidden; any of them is right."""

@@ -13,7 +13,7 @@ from expdesign.diagnosis.conclusions.notes import note_on_random_current
 from expdesign.diagnosis.conclusions.verdict import MISSING_EFFECTS, verdict
 from expdesign.diagnosis.data.noise import Noise, white_noise
 from expdesign.diagnosis.fit.cross_validation import HeldOut
-from expdesign.diagnosis.values import ErrorReduction, Finding
+from expdesign.diagnosis.values import ErrorReduction, Finding, Lead
 from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.diagnosis.vessel_file.writing import extend
 from expdesign.progress import never_falling
@@ -73,12 +73,12 @@ def test_an_invisible_improvement_is_given_no_number(share):
 
 def test_a_verdict_without_findings_states_the_accuracy():
     assert verdict([], BEFORE).startswith("These data show no error of the model: the fit is 60 % in surge")
-    assert verdict([], BEFORE, signs=("actuator_delay", "wind")).endswith(
-        "; signs of the dead time of the actuators and wind improve nothing for certain on runs held out."
+    delay, wind = Lead("actuator_delay", 0.5, (-0.6, 1.2)), Lead("wind", -2.0, (-3.0, 0.0))
+    assert verdict([], BEFORE, signs=(delay, wind)).endswith(
+        "; signs of the dead time of the actuators (+0.5 points of fit, -0.6 to 1.2) and wind (-2.0 points of fit, "
+        "-3.0 to 0.0) improve nothing for certain on runs held out."
     )
-    assert verdict([], BEFORE, signs=("wind",)).startswith(
-        "No cause of the remaining error is certain: the fit is 60 %"
-    )
+    assert verdict([], BEFORE, signs=(wind,)).startswith("No cause of the remaining error is certain: the fit is 60 %")
     lost = Accuracy(**{**vars(BEFORE), "fit": np.array([-66608676.0, 50.0, 10.0])})
     assert "diverges from the ship" in verdict([], lost)
     assert "66608676" not in verdict([], lost)

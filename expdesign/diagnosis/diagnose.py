@@ -145,7 +145,7 @@ def diagnose(
             unit,
             unexplained,
             within,
-            _signs(chosen, after, windows),
+            _signs(chosen, after, windows, seed),
             _in_words(chosen.rest.kinds),
             _in_words(chosen.rest.instead),
         ),
@@ -268,13 +268,21 @@ def _more_than_noise(after: Accuracy, windows: Windows) -> NDArray[np.bool_]:
     return np.asarray(after.rmse > MORE_THAN_NOISE * white_noise_std(windows.measured[..., columns]))
 
 
-def _signs(chosen: _Selected, after: Accuracy, windows: Windows) -> tuple[str, ...]:
-    """Causes that are significant in a test and no findings; none where little but noise is left."""
+def _signs(chosen: _Selected, after: Accuracy, windows: Windows, seed: int) -> tuple[Lead, ...]:
+    """Causes that are significant in a test and no findings, surest first; none where little but noise is left.
+
+    Their gain is against the same model without them, fitted as they are.
+    """
     kept = {id(step.chosen.candidate) for step in chosen.kept.steps}
-    rejected = [step.chosen.candidate for step in chosen.found.steps if id(step.chosen.candidate) not in kept]
+    rejected = [step for step in chosen.found.steps if id(step.chosen.candidate) not in kept]
     if not _more_than_noise(after, windows).any():
         return ()
-    return tuple(dict.fromkeys(item.cause for item in rejected))
+    found: dict[str, Lead] = {}
+    for step in rejected:
+        pair = judged([chosen.validation.of(one) for one in (step.before, step.chosen.fit)])
+        cause = step.chosen.candidate.cause
+        found.setdefault(cause, Lead(cause, *held_out_gain(pair[0], pair[1], seed)))
+    return tuple(found.values())
 
 
 def _in_words(found: Sequence[Missing]) -> tuple[str, ...]:

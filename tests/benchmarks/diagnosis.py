@@ -13,7 +13,8 @@ the model with the generator's own parameters 5 points of simulated fit or more 
 - varied: one effect, parameters known, recorded otherwise: velocities derived from the pose or measured, wind not
   measured, one run or many, 1 to 10 Hz, all drawn;
 - power: effects of 3, 10, 30 and 100 % of the size that just costs 5 points, found against an oracle, the score test of
-  the one true cause at 5 %, without any correction.
+  the one true cause at 5 %, without any correction;
+- beyond: effects that no cause of the catalogue is, parameters known; is the verdict's name right?
 
 Columns: trials; the true cause first among the findings; the same or listed as not distinguishable from the first;
 among the findings at all; nothing found; estimate within three standard errors, of those named; other findings beside
@@ -128,6 +129,12 @@ def report(part: str, rows: list[dict]) -> None:
             some = [row for row in rows if row["std"] == std]
             print(f"alarms, parameters {'uncertain' if std else 'known'}: "
                   f"{share(sum(bool(row['findings']) for row in some), len(some))}")  # fmt: skip
+        return
+    if part == "beyond":
+        for row in sorted(rows, key=lambda row: row["number"]):
+            fits = " ".join(f"{value:.0f}" for value in row["fit"])
+            print(f"{row['cause']:24}{'right' if row['right'] else 'wrong':7}fit {fits}: {row['verdict']}")
+        print(f"right: {share(sum(row['right'] for row in rows), len(rows))}")
         return
     if part == "pairs":
         names = [([f["cause"] for f in row["findings"]], row["cause"].split("+")) for row in rows]

@@ -14,6 +14,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 import hidden_effects as sea
+from beyond_catalogue import CASES, SAYS
 from diagnosis_case import Told, drawn_parameters, from_pose, hidden_records, vessel_of
 from expdesign.diagnosis import CAUSES, diagnose
 from expdesign.diagnosis.accuracy.simulated_fit import WHOLE_S, pooled_fit
@@ -32,7 +33,7 @@ LEVELS = (0.03, 0.1, 0.3, 1.0)
 UNSEEN = {"gyro_scale": ("measured",), "sensor_delay": ("measured",)}
 """Faults of sensors that other ways of recording do without."""
 AIR = ("W_abs_u_u", "W_abs_v_v", "W_uv")
-PARTS = ("known", "uncertain", "clean", "pairs", "power", "varied")
+PARTS = ("known", "uncertain", "clean", "pairs", "power", "varied", "beyond")
 ALL = {"tug": 0b1111, "barge": 0b111, "coaster": 0b11}
 
 
@@ -293,8 +294,21 @@ def another(case: Case, hidden: Hidden, rng: np.random.Generator) -> Hidden:
     return large_enough(case, other)[0]
 
 
+def tried_beyond(number: int, seed: int) -> dict[str, object]:
+    """One trial with an effect that no cause of the catalogue is."""
+    name = list(CASES)[number % len(CASES)]
+    found = diagnose(*CASES[name](seed + number // len(CASES)), seed=number)
+    return {
+        "part": "beyond", "number": number, "seed": seed, "cause": name, "fit": found.before.fit.tolist(),
+        "findings": [{"cause": item.cause, "gain": item.gain} for item in found.findings], "verdict": found.verdict,
+        "right": any(words in found.verdict for words in SAYS[name]),
+    }  # fmt: skip
+
+
 def tried(part: str, number: int, seed: int, only: str | None = None) -> dict[str, object]:
     """One trial."""
+    if part == "beyond":
+        return tried_beyond(number, seed)
     whole = np.random.SeedSequence([seed, PARTS.index(part), number])
     rng = np.random.default_rng(whole)
     name = NAMES[number % len(NAMES)]

@@ -9,7 +9,7 @@ import numpy as np
 from expdesign.diagnosis.accuracy import Accuracy
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.fit import AHEAD_S, validation_units
-from expdesign.diagnosis.values import ErrorReduction, Finding, Unexplained
+from expdesign.diagnosis.values import ErrorReduction, Finding, Lead, Unexplained
 
 DIVERGED_FIT = -300.0
 """Fit [%] below which the simulation has diverged from the ship; the number then has no meaning."""
@@ -100,7 +100,7 @@ def verdict(
     unit: str = "runs",
     unexplained: Unexplained | None = None,
     within_std: Sequence[ErrorReduction] = (),
-    signs: Sequence[str] = (),
+    signs: Sequence[Lead] = (),
     kinds: Sequence[str] = (),
     instead: Sequence[str] = (),
 ) -> str:
@@ -126,7 +126,7 @@ def verdict(
     if not findings and signs:
         return (
             f"No cause of the remaining error is certain: {accuracy_in_words(before)}; signs of "
-            f"{listed([missing_effect(name) for name in signs])} improve nothing for certain on {unit} held out."
+            f"{listed([_lead(item) for item in signs])} improve nothing for certain on {unit} held out."
         )
     if not findings:
         return f"These data show no error of the model: {accuracy_in_words(before)}."
@@ -159,14 +159,16 @@ def _remainder(unexplained: Unexplained, unit: str) -> str:
         shares.append(f"{_percent(share)} % off the {WORDS[name]} error")
     parts = [listed(fits), f"a slowly varying force that nobody measured would take {listed(shares)}"]
     if unexplained.leads:
-        leads = [
-            f"{missing_effect(lead.cause)} ({lead.gain:+.1f} points of fit on {unit} held out, "
-            f"{lead.gain_interval[0]:.1f} to {lead.gain_interval[1]:.1f})"
-            for lead in unexplained.leads
-        ]
+        leads = [_lead(lead, f" on {unit} held out") for lead in unexplained.leads]
         verb = "candidate is" if len(leads) == 1 else "candidates are"
         parts.append(f"the best uncertain {verb} {listed(leads)}")
     return "; ".join(parts)
+
+
+def _lead(lead: Lead, where: str = "") -> str:
+    """An uncertain candidate with its gain."""
+    low, high = lead.gain_interval
+    return f"{missing_effect(lead.cause)} ({lead.gain:+.1f} points of fit{where}, {low:.1f} to {high:.1f})"
 
 
 def _benefits(findings: Sequence[Finding], unit: str) -> str:

@@ -111,7 +111,8 @@ def _step(
     first = simplest(accepted)
     chosen = _best_on_held_out(first, accepted, validation)
     outranked = () if chosen is first else (first.candidate,)
-    others = [item for item in fitted if item.candidate.cause not in {one.cause for one in outranked}]
+    worse = set() if first.candidate.imitates else {one.cause for one in outranked}
+    others = [item for item in fitted if item.candidate.cause not in worse]
     return Step(
         chosen=with_profile_estimate(chosen, base),
         p_value=chosen.p_value,
@@ -127,7 +128,8 @@ def _best_on_held_out(
 ) -> FittedCandidate:
     """The best candidate, or one with fewer numbers that simulates data held out of the fit better.
 
-    Many numbers explain errors of the model's structure in the data that they are fitted to, and in no others. Where
+    One that imitates many causes has to be clearly better itself; else it remains among the alternatives. Many numbers
+    explain errors of the model's structure in the data that they are fitted to, and in no others. Where
     the simulation of whole units leads away from the ship, likelihoods tell little, and the best candidates of all
     other causes are compared.
     """
@@ -137,8 +139,9 @@ def _best_on_held_out(
         return first
     held = judged([validation.of(item.fit) for item in (first, *rivals)], first=0)
     means = [float(np.nan_to_num(item.fit, nan=-np.inf).mean()) for item in held]
-    best = int(np.argmax(means))
-    return rivals[best - 1] if best and means[best] > means[0] + TUNING.clear_gain_points else first
+    best = 1 + int(np.argmax(means[1:]))
+    least = means[0] + (-1.0 if first.candidate.imitates and not astray else 1.0) * TUNING.clear_gain_points
+    return rivals[best - 1] if means[best] > least else first
 
 
 def _rivals(first: FittedCandidate, accepted: Sequence[FittedCandidate], *, most_numbers: int) -> list[FittedCandidate]:
