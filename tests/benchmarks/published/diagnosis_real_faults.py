@@ -115,7 +115,7 @@ def _turned_round(
 def _taken_out(
     vessel: Vessel, record: Record, _rng: np.random.Generator
 ) -> tuple[Vessel, Record, Callable[[Finding], bool]] | None:
-    """A term of the library likewise."""
+    """A term of the library likewise; terms of the air are named as wind."""
     changed = {name: _without(vessel.model, name) for name in _certain(vessel.model)}
     known = {
         name: model
@@ -126,7 +126,7 @@ def _taken_out(
     if name is None:
         return None
     found = next(other for other in term_library(known[name]) if _same_term(vessel.model, name, other))
-    return replace(vessel, model=known[name]), record, lambda item: item.cause == f"missing_term:{found}"
+    return replace(vessel, model=known[name]), record, lambda item: f"term:{found}" in item.keys
 
 
 def _same_term(model: VesselModel, name: str, other: str) -> bool:
