@@ -102,10 +102,10 @@ def cross_validate(
         record: the same data, which stretches are cut from where units are batches; else they are parts of windows.
     """
     unit = validation_units(windows)
-    whole = _of_folds(_Folds(found=found, ship=ship, windows=windows, unit=unit, fitted=_fitted), progress)
+    whole = _of_folds(_Folds(found=found, ship=ship, windows=windows, unit=unit, fitted=_fitted, near=True), progress)
     short, of_short = _stretches(windows, unit, ship, record)
     fitted = partial(_fitted_ahead, unit, of_short)
-    ahead = _Folds(found=found, ship=ship, windows=short, unit=of_short, fitted=fitted)
+    ahead = _Folds(found=found, ship=ship, windows=short, unit=of_short, fitted=fitted, near=False)
     return replace(whole, ahead=cache(lambda: replace(_of_folds(ahead, silent), in_stretches=True)))
 
 
@@ -119,6 +119,7 @@ class _Folds:
         windows: that it is simulated in.
         unit: (w,) of each of them.
         fitted: the model fitted to some of the windows, by a mask (w,).
+        near: the windows are those of the fit, so that its motion speeds up the simulation.
     """
 
     found: Fit | None
@@ -126,6 +127,7 @@ class _Folds:
     windows: Windows
     unit: Array
     fitted: Callable[[Fit, Windows, NDArray[np.bool_]], ExtendedModel | None]
+    near: bool
 
 
 def _of_folds(given: _Folds, progress: Progress) -> HeldOut:
@@ -147,7 +149,7 @@ def _of_folds(given: _Folds, progress: Progress) -> HeldOut:
             continue
         unconverged += found is not None and model.effects == found.ship.effects
         part = windows.selected(test)
-        near = found.linear.selected(test) if found is not None and windows is found.linear.motion.windows else None
+        near = found.linear.selected(test) if found is not None and given.near else None
         sums = squared_sums(simulate_from_measured(model, part, near).error[..., columns], part.measured[..., columns])
         for total, more in zip((error, deviation), sums, strict=True):
             np.add.at(total, np.searchsorted(names, given.unit[test]), more)

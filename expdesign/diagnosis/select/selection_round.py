@@ -236,10 +236,15 @@ def _explained_share(tests: tuple[ScoreTest, ...], base: Fit) -> float:
 
 
 def _hidden_by_random_current(base: Fit, tests: tuple[ScoreTest, ...]) -> list[ScoreTest]:
-    """A steady current that a large random current may have absorbed; few runs cannot distinguish the two."""
-    if base.noise.current_std_mps < TUNING.large_current_mps:
+    """A steady current that a large random current may have absorbed; few runs cannot distinguish the two.
+
+    A wind that nobody measured needs more numbers for what such a current does, so a current is always tried beside it.
+    """
+    shortlist = _shortlist(tests)
+    windy = any(item.candidate.imitates for item in shortlist)
+    if base.noise.current_std_mps < TUNING.large_current_mps and not windy:
         return []
-    listed = {id(item.candidate) for item in _shortlist(tests)}
+    listed = {id(item.candidate) for item in shortlist}
     return [item for item in tests if item.candidate.cause == "current" and id(item.candidate) not in listed]
 
 
