@@ -13,7 +13,7 @@ Source: F. Ljungberg, doctoral thesis, Linköping University, (7.50)-(7.63).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -26,6 +26,10 @@ from expdesign.values import Array, frozen_set, seal
 
 ROBUST = ("nominal", "average", "worst")
 """The nominal model only, the average over sampled models, or the worst of them."""
+
+
+UNUSED = 1e-9
+"""Share in place of zero for strata that a run has no samples of, so that designs without them stay regular."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -60,7 +64,9 @@ class DurationProblem:
     """Maximise a criterion of B(w) = B_prior + sum_q w_q B_q over time fractions w.
 
     With complete mean subtraction B_q = [[X_q, Y_q], [Z_q^T, I]], of dimension p + n: its Schur complement is the
-    information matrix after subtraction, because sum w = 1. Otherwise B_q has dimension p.
+    information matrix after subtraction, because sum w = 1. Otherwise B_q has dimension p. Where equations have samples
+    of their own, I is a diagonal of their shares, with a column for each stratum of samples; D is then D_s of all
+    parameters.
 
     Attributes:
         names: of the primitives.
@@ -78,6 +84,8 @@ class DurationProblem:
         nuisance: parameters of disturbances in the augmented predictor; where runs make two of their regressors
             coincide, the estimator merges them, see `estimation.nuisance`.
         floors: least information about other parameters.
+        excitation: which samples count in each equation, see `information.excitation`.
+        excites: primitive -> equation -> whether the excitation condition holds; () where it was not looked at.
 
     Source: F. Ljungberg, doctoral thesis, Linköping University, (7.50)-(7.58); Schur complement form derived here.
     """
@@ -96,6 +104,8 @@ class DurationProblem:
     equations: tuple[str, ...] = ()
     nuisance: tuple[str, ...] = ()
     floors: tuple[InformationFloor, ...] = ()
+    excitation: str = "free"
+    excites: tuple[Mapping[str, bool], ...] = ()
 
     def __post_init__(self) -> None:
         if np.size(self.prior) == 0:
@@ -150,6 +160,7 @@ def build_durations(
     equations: Sequence[str] = (),
     nuisance: Sequence[str] = (),
     floors: Sequence[InformationFloor] = (),
+    excitation: str = "free",
 ) -> DurationProblem:
     """The duration problem of a scored dictionary.
 
@@ -164,7 +175,7 @@ def build_durations(
         sampled: the information by each model drawn from the prior of the nominal parameters.
         robust: one of `ROBUST`.
         equations: of each parameter; only needed for `constraints.balance`.
-        nuisance, floors: as in `DurationProblem`.
+        nuisance, floors, excitation: as in `DurationProblem`.
 
     Raises:
         UnknownName: no such mean subtraction.
@@ -190,6 +201,8 @@ def build_durations(
         equations=tuple(equations),
         nuisance=tuple(nuisance),
         floors=tuple(floors),
+        excitation=excitation,
+        excites=tuple(dict(item.excites) for item in information),
     )
 
 
@@ -199,16 +212,18 @@ def _stack(information: Sequence[PrimitiveInformation], mean_subtraction: str) -
 
 def bordered(item: PrimitiveInformation, mean_subtraction: str) -> Array:
     """(d, d) B_q of one primitive, see `DurationProblem`."""
-    return bordered_moments(item.X, item.Y, item.Z, item.YZ, mean_subtraction)
+    return bordered_moments(item.X, item.Y, item.Z, item.YZ, mean_subtraction, item.used)
 
 
-def bordered_moments(X: Array, Y: Array, Z: Array, YZ: Array, mean_subtraction: str) -> Array:
-    """B_q from moments X (p, p), means Y and Z (p, outputs) and the means' products YZ (p, p)."""
+def bordered_moments(
+    X: Array, Y: Array, Z: Array, YZ: Array, mean_subtraction: str, used: Array | None = None
+) -> Array:
+    """B_q from moments X (p, p), means Y and Z (p, n), the means' products YZ (p, p) and shares of samples (n,)."""
     if mean_subtraction == "none":
         return X
     if mean_subtraction == "batch":
         return X - YZ
-    return np.block([[X, Y], [Z.T, np.eye(Y.shape[1])]])
+    return np.block([[X, Y], [Z.T, np.eye(Y.shape[1]) if used is None else np.diag(np.maximum(used, UNUSED))]])
 
 
 def monte_carlo_covariance(estimates: Array, nominal: Array) -> Array:

@@ -6,8 +6,11 @@ samples, its own mean of instruments over them, and its own equations to solve.
 
 Samples are chosen by the signals that instruments are simulated from, which owe nothing to the noise of the sample.
 (Chosen by measured velocities, those whose noise is large would be chosen more often near the margin.) Least squares,
-which has no instruments, goes by measured ones. A modulus has one sign over all samples whose instruments share a mean:
-the mean of a square's noise changes its sign with the modulus, and only then is one constant.
+which has no instruments, goes by measured ones.
+
+The mean of a square's noise changes its sign with the modulus. Samples on either side of zero therefore have a mean of
+instruments of their own, or, which is the same, a constant of their own (Lemma 7.1). Nuisance regressors change their
+signs with the modulus, too; they have one sign in a batch, and only samples on that side are used.
 
 Source: F. Ljungberg, doctoral thesis, Linköping University, 5.6, (5.72), (5.77).
 """
@@ -20,22 +23,21 @@ import numpy as np
 
 from expdesign.errors import InputError, NotInformative
 from expdesign.estimation.excitation import WorstCase, clear_sides
-from expdesign.estimation.regression import Layout, Mask, Rows, Table
+from expdesign.estimation.regression import Integers, Layout, Rows, Table
 from expdesign.estimation.values import Residuals
 
 ALL, EQUATION_WISE = "all", "equation-wise"
 SAMPLES = (ALL, EQUATION_WISE)
 
 
-def chosen_rows(layout: Layout, rows: Rows, tables: Sequence[Table], *, worst: WorstCase, by_batch: bool) -> Mask:
-    """(k, n) which rows of the regression each equation uses.
+def strata_of(layout: Layout, rows: Rows, tables: Sequence[Table], *, worst: WorstCase) -> Integers:
+    """(k, n) of each row and equation: 0 where it is not used, else a number for the sides that its moduli are on.
 
     Args:
         layout: columns; equations are its model's outputs.
         rows: of the regression.
         tables: signals of each batch, simulated or measured.
         worst: noise, current and wind that signals inside a modulus must exceed.
-        by_batch: whether a modulus may have another sign in another batch.
 
     Raises:
         InputError: a steady current is estimated, which the equations share and which needs no such samples.
@@ -44,23 +46,27 @@ def chosen_rows(layout: Layout, rows: Rows, tables: Sequence[Table], *, worst: W
     if layout.guess is not None:
         raise InputError("equation-wise samples are for methods without a steady current; those need no such samples")
     model, wind = layout.model, layout.predictor.wind
-    sides = [clear_sides(model, table, worst=worst, wind_measured=wind) for table in tables]
-    found = []
-    for number, places in enumerate(rows.used):
-        own = np.ones((len(places), len(model.outputs)), dtype=bool)
-        for inside, modulus in sides[number].items():
-            others = [sides[number]] if by_batch else sides
-            side = 1 if sum(int(item[inside].side.sum()) for item in others) >= 0 else -1
-            clear = modulus.side == side
+    found, insides = [], dict[str, list[str]]()
+    for table, places in zip(tables, rows.used, strict=True):
+        own = np.ones((len(places), len(model.outputs)), dtype=np.int64)
+        for inside, modulus in clear_sides(model, table, worst=worst, wind_measured=wind).items():
+            side = modulus.side
+            if layout.nuisance:
+                side = np.where(side == (1 if side.sum() >= 0 else -1), side, 0)
             if layout.quadrature != "euler":
-                clear = clear & np.append(clear[1:], clear[-1:])
-            own &= clear[places][:, None] | ~np.isin(model.outputs, modulus.equations)
+                side = np.where(side == np.append(side[1:], side[-1:]), side, 0)
+            label = np.where(side == 0, 0, (side + 3) // 2)[places]  # 0, 1 below zero, 2 above
+            for equation in modulus.equations:
+                column = model.outputs.index(equation)
+                own[:, column] = np.where(label == 0, 0, own[:, column] * 2 + label - 2)
+                insides.setdefault(equation, []).append(inside)
+            own = np.maximum(own, 0)
         found.append(own)
-    chosen = np.concatenate(found)
-    for output, column in zip(model.outputs, chosen.T, strict=True):
-        if not column.any():
-            raise NotInformative(_nothing_left(output, [str(i) for i, m in sides[0].items() if output in m.equations]))
-    return chosen
+    strata = np.concatenate(found)
+    for output, column_of in zip(model.outputs, strata.T, strict=True):
+        if not column_of.any():
+            raise NotInformative(_nothing_left(output, tuple(dict.fromkeys(insides[output]))))
+    return strata
 
 
 def _nothing_left(output: str, insides: Sequence[str]) -> str:

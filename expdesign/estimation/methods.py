@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from expdesign.errors import Diverged, InputError, UnknownName
-from expdesign.estimation.equation_wise import ALL, EQUATION_WISE, SAMPLES, chosen_rows, sample_notes
+from expdesign.estimation.equation_wise import ALL, EQUATION_WISE, SAMPLES, sample_notes, strata_of
 from expdesign.estimation.excitation import WorstCase
 from expdesign.estimation.feedback import Feedback, feedback_in, feedback_notes
 from expdesign.estimation.output_error import Fitting, minimise_output_error
@@ -20,7 +20,6 @@ from expdesign.estimation.regression import (
     Mask,
     Regression,
     Rows,
-    Table,
     build_layout,
     build_regression,
     measured_table,
@@ -217,7 +216,7 @@ def estimate(
     if chosen.solver == "ls":
         if choices.samples == EQUATION_WISE:
             tables = [measured_table(layout.model, b, wind_measured=layout.predictor.wind) for b in record.batches]
-            rows = _with_rows(rows, _chosen(layout, rows, tables, replace(choices, weighting=Weighting())))
+            rows = _with_rows(rows, strata_of(layout, rows, tables, worst=choices.worst))
         return _estimate(chosen, layout, rows, _least_squares(rows, choices), steered)
     start, fitting = _start(rows, choices), _fitting(choices)
     solution, regression = minimise_output_error(layout, record, start, fitting, progress=progress)
@@ -332,25 +331,25 @@ def _with_instruments(
             tables = [simulation.table(index, parameters) for index in range(len(record.batches))]
         except Diverged:
             break
-        newer = _with_rows(rows, _chosen(layout, rows, tables, choices))
-        if found is not None and np.array_equal(_mask(newer.regression), _mask(own.regression)):
+        newer = _with_rows(rows, strata_of(layout, rows, tables, worst=choices.worst))
+        if found is not None and np.array_equal(_strata(newer.regression), _strata(own.regression)):
             break
         own, found = newer, refined(newer)
     assert found is not None  # instruments from the start were simulated above
     return own, found
 
 
-def _chosen(layout: Layout, rows: Rows, tables: Sequence[Table], choices: Settings) -> Mask:
-    apart = choices.weighting.mean == "batch" or choices.weighting.blocks == "batch"
-    return chosen_rows(layout, rows, tables, worst=choices.worst, by_batch=apart)
+def _with_rows(rows: Rows, strata: Integers) -> Rows:
+    whole = bool((strata == strata[0]).all() and strata.all())
+    return replace(rows, regression=replace(rows.regression, strata=None if whole else strata))
 
 
-def _with_rows(rows: Rows, chosen: Mask) -> Rows:
-    return replace(rows, regression=replace(rows.regression, chosen=None if chosen.all() else chosen))
+def _strata(regression: Regression) -> Integers:
+    return np.ones(regression.y.shape, dtype=np.int64) if regression.strata is None else regression.strata
 
 
 def _mask(regression: Regression) -> Mask:
-    return np.ones(regression.y.shape, dtype=bool) if regression.chosen is None else regression.chosen
+    return np.asarray(_strata(regression) != 0)
 
 
 def _whole(regression: Regression) -> Integers | slice:

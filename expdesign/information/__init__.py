@@ -1,10 +1,10 @@
 """Information: moments of regressors and instruments, identifiability."""
 
+from expdesign.information.excitation import EXCITATIONS, excitation_condition, excitation_refusal
 from expdesign.information.moments import (
     MEAN_SUBTRACTIONS,
     check_informative,
     estimated_parameters,
-    excitation_condition,
     log_det_or_none,
     moments,
     regressor_rows,
@@ -13,11 +13,13 @@ from expdesign.information.primitive_information import PrimitiveInformation
 from expdesign.information.scoring import score_models, score_primitives
 
 __all__ = [
+    "EXCITATIONS",
     "MEAN_SUBTRACTIONS",
     "PrimitiveInformation",
     "check_informative",
     "estimated_parameters",
     "excitation_condition",
+    "excitation_refusal",
     "log_det_or_none",
     "moments",
     "regressor_rows",

@@ -20,13 +20,15 @@ derived here.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from expdesign.errors import NotInformative
 from expdesign.estimation.regression import STEADY_CURRENT
+from expdesign.information.excitation import FREE, REQUIRED, kept_runs, strata_of_run
 from expdesign.information.moments import regressor_rows
 from expdesign.information.tuning import TUNING
 from expdesign.signals import Commands, Trajectory
@@ -68,6 +70,7 @@ def expected_covariance(
     instruments: VesselModel | None = None,
     integrator: str = "rk4",
     unknown_current: bool = False,
+    excitation: str = FREE,
 ) -> Array:
     """(p, p) covariance of the estimates of the named parameters from a trial.
 
@@ -81,29 +84,58 @@ def expected_covariance(
         integrator: "rk4" for the motion of a ship and its parameters, "euler" for the map that defines discrete ones.
         unknown_current: whether a steady current is estimated with the parameters, as by methods iv-current and
             iv-air-current.
+        excitation: which samples the estimator uses in each equation, see `information.excitation`.
 
     Raises:
         NotInformative: the trial contains no information about some parameters.
     """
     rows = [
-        _rows(vessel, part, parameters, environment, instruments or vessel.model, integrator, unknown_current)
+        _rows(
+            vessel,
+            part,
+            parameters,
+            environment,
+            instruments or vessel.model,
+            integrator,
+            unknown_current,
+            excitation,
+        )
         for part in parts
     ]
     weights = np.array([part.repeats for part in parts], dtype=float)
-    means = [item.instruments.mean(axis=0) for item in rows]
-    counts = np.array([len(item.instruments) for item in rows]) * weights
-    if mean_subtraction == "complete":
-        means = [np.average(means, axis=0, weights=counts)] * len(rows)
-    elif mean_subtraction == "none":
-        means = [np.zeros_like(means[0])] * len(rows)
     size = rows[0].regressors.shape[1]
     G, Omega = np.zeros((size, size)), np.zeros((size, size))
-    for item, mean, weight in zip(rows, means, weights, strict=True):
-        Z = item.instruments - mean
+    for item, Z, weight in zip(rows, _without_means(rows, weights, mean_subtraction), weights, strict=True):
         G += weight * np.einsum("kpo,kqo->pq", Z, item.regressors)
         Omega += weight * _score_covariance(Z, item)
     names = (*parameters, *(STEADY_CURRENT if unknown_current else ()))
     return _sandwich(G, Omega, names)[: len(parameters), : len(parameters)]
+
+
+def _without_means(rows: Sequence[_Rows], weights: Array, mean_subtraction: str) -> Iterator[Array]:
+    """Instruments (k, p, n) of each part without the mean of their stratum, zero in samples that are not used."""
+    if mean_subtraction == "complete":
+        totals = _sums([(item, weight) for item, weight in zip(rows, weights, strict=True)])
+    for item in rows:
+        if mean_subtraction != "complete":
+            totals = _sums([(item, 1.0)])
+        Z = np.array(item.instruments)
+        for (output, label), (total, count) in totals.items():
+            own = item.strata[:, output] == label
+            Z[own, :, output] -= 0.0 if mean_subtraction == "none" else total / count
+        yield Z * (item.strata > 0)[:, None]
+
+
+def _sums(rows: Sequence[tuple[_Rows, float]]) -> dict[tuple[int, int], tuple[Array, float]]:
+    """Weighted sum (p,) of instruments, and count, for each output and stratum of it."""
+    found: dict[tuple[int, int], tuple[Array, float]] = {}
+    for item, weight in rows:
+        for output in range(item.strata.shape[1]):
+            for label in np.unique(item.strata[:, output]).tolist():
+                own = item.instruments[item.strata[:, output] == label, :, output]
+                total, count = found.get((output, label), (np.zeros(own.shape[1]), 0.0))
+                found[output, label] = total + weight * own.sum(axis=0), count + weight * len(own)
+    return found
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -111,7 +143,7 @@ class _Rows:
     """Regressors and instruments (k, p, n), and the derivatives and variances of the residual's disturbances.
 
     Derivatives by velocity (2, k, n, n) and air (2, k, n, 2) are those at the begin and at the end of samples, times
-    the share that each end has in the regressors.
+    the share that each end has in the regressors. Strata (k, n) are 0 for samples that an output does not use.
     """
 
     regressors: Array
@@ -122,6 +154,7 @@ class _Rows:
     sensor: Array
     air: float
     current: float
+    strata: NDArray[np.int8]
 
 
 def _rows(
@@ -132,6 +165,7 @@ def _rows(
     instruments: VesselModel,
     integrator: str,
     unknown_current: bool,
+    excitation: str,
 ) -> _Rows:
     model, outputs = vessel.model, vessel.model.outputs
 
@@ -180,7 +214,30 @@ def _rows(
         sensor=sensor,
         air=noise.wind_mps**2,
         current=environment.current_variation.std_mps**2,
+        strata=_strata(vessel, own, given, environment, excitation, begins=[begin for _, begin in ends]),
     )
+
+
+def _strata(
+    vessel: Vessel,
+    motion: Trajectory,
+    inputs: Commands,
+    environment: Environment,
+    excitation: str,
+    *,
+    begins: Sequence[int],
+) -> NDArray[np.int8]:
+    """(k, n) of the samples of a part; those of an interval whose ends differ are not used."""
+    if excitation == FREE:
+        return np.ones((len(inputs), len(vessel.model.outputs)), dtype=np.int8)
+    first, *others = [
+        strata_of_run(vessel, _from(motion, begin), inputs, environment, air_measured=True) for begin in begins
+    ]
+    for other in others:
+        first = np.where(first == other, first, 0).astype(np.int8)
+    if excitation == REQUIRED:
+        first = np.where(kept_runs(first)[:, None], first, 0).astype(np.int8)
+    return first.T
 
 
 def _from(motion: Trajectory, sample: int) -> Trajectory:

@@ -8,21 +8,19 @@ Source: F. Ljungberg, doctoral thesis, Linköping University, (7.50)-(7.57).
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from expdesign.errors import InputError, NotInformative, UnknownName
-from expdesign.information.primitive_information import PrimitiveInformation
+from expdesign.information.primitive_information import PrimitiveInformation, over_shares
 from expdesign.information.tuning import TUNING
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import Environment, relative_velocity
 from expdesign.simulation.motion import State
 from expdesign.values import Array
-from expdesign.vessel import NUMPY, Operators, Vessel, VesselModel
-from expdesign.vessel.expressions import Expression, Signals
+from expdesign.vessel import NUMPY, Operators, VesselModel
+from expdesign.vessel.expressions import Signals
 from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS
 
 MEAN_SUBTRACTIONS = ("none", "batch", "complete")
@@ -99,52 +97,6 @@ def moments(model: VesselModel, rows: Array, parameters: Sequence[str]) -> tuple
     return np.where(same, kept.T @ kept / len(kept), 0.0), np.where(member, kept.mean(axis=0)[:, None], 0.0)
 
 
-def excitation_condition(
-    vessel: Vessel, trajectory: Trajectory, commands: Commands, environment: Environment, *, sigmas: float = 3.0
-) -> bool:
-    """Whether the argument of every modulus keeps its sign and is at least `sigmas` standard deviations from zero.
-
-    The standard deviation includes the sensors' noise and the stated spread of current and wind. Arguments that depend
-    on commands only have to keep their sign.
-
-    Source: F. Ljungberg, doctoral thesis, Linköping University, assumptions A5 and A7, (5.8).
-    """
-    table = _signals(vessel.model, trajectory, commands, environment)
-    return bool(clear_of_zero(vessel, table, environment, shape=(len(commands),), sigmas=sigmas))
-
-
-def clear_of_zero(
-    vessel: Vessel, table: Signals, environment: Environment, *, shape: tuple[int, ...], sigmas: float = 3.0
-) -> NDArray[np.bool_]:
-    """(...) whether the excitation condition holds, for signals that broadcast to (k, ...)."""
-    noise = _signal_noise(vessel, environment)
-    clear: NDArray[np.bool_] = np.ones(shape[1:], dtype=bool)
-    moduli = {modulus.text: modulus for expression in vessel.model.expressions for modulus in expression.moduli}
-    for modulus in moduli.values():
-        clear = clear & _keeps_clear(modulus, table, noise, sigmas, shape)
-    return clear
-
-
-def _signal_noise(vessel: Vessel, environment: Environment) -> dict[str, float]:
-    """Standard deviation of each motion signal, from its sensor and from current or wind."""
-    sensors = vessel.sensors
-    water = math.hypot(sensors.velocity_mps, environment.current_std_mps)
-    air = math.hypot(sensors.velocity_mps, sensors.wind_mps, environment.wind_std_mps)
-    return {"u": water, "v": water, "r": sensors.yaw_rate_radps, "u_q": air, "v_q": air}
-
-
-def _keeps_clear(
-    modulus: Expression, table: Signals, noise: Mapping[str, float], sigmas: float, shape: tuple[int, ...]
-) -> NDArray[np.bool_]:
-    inside = np.broadcast_to(np.asarray(modulus.evaluate(table, NUMPY)), shape)
-    shifted = (
-        modulus.evaluate({**table, name: table[name] + noise[name]}, NUMPY) for name in modulus.signals if name in noise
-    )
-    margin = sigmas * np.sqrt(sum(((other - inside) ** 2 for other in shifted), np.zeros_like(inside)))
-    above, below = np.min(inside - margin, axis=0) > 0, np.max(inside + margin, axis=0) < 0
-    return np.asarray(above | below, dtype=bool)
-
-
 def log_det_or_none(information: Array, squares: Array) -> float | None:
     """log det of an information matrix, or None when it is singular to working precision in any scaling.
 
@@ -167,7 +119,8 @@ def check_informative(information: Sequence[PrimitiveInformation], names: Sequen
     X = np.mean([item.X for item in information], axis=0)
     S = np.mean([item.Y for item in information], axis=0)
     YZ = np.mean([item.YZ for item in information], axis=0)
-    taken = {"none": np.zeros_like(X), "batch": YZ, "complete": S @ S.T}[mean_subtraction]
+    used = np.mean([item.used for item in information], axis=0)
+    taken = {"none": np.zeros_like(X), "batch": YZ, "complete": over_shares(S, used) @ S.T}[mean_subtraction]
     unidentifiable = _unidentifiable(X - taken, np.diag(X))
     if not unidentifiable.any():
         return

@@ -6,7 +6,7 @@ Source: F. Ljungberg, doctoral thesis, Linköping University, (7.50)-(7.57).
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,15 +14,24 @@ from numpy.typing import NDArray
 from expdesign.dictionary import Primitive
 from expdesign.errors import Diverged, UnknownName
 from expdesign.estimation.regression import AIR
+from expdesign.information.excitation import (
+    EXCITATIONS,
+    FREE,
+    REQUIRED,
+    Strata,
+    kept_runs,
+    most_strata,
+    strata,
+    whole_runs,
+)
 from expdesign.information.moments import (
     MEAN_SUBTRACTIONS,
-    clear_of_zero,
     estimated_parameters,
     log_det_or_none,
     rows_of,
     signals_of,
 )
-from expdesign.information.primitive_information import PrimitiveInformation
+from expdesign.information.primitive_information import PrimitiveInformation, over_shares
 from expdesign.information.tuning import TUNING
 from expdesign.simulation import CALM, Environment, deliver, rk4_step, simulate, to_body
 from expdesign.simulation.motion import begun
@@ -39,14 +48,23 @@ def score_primitives(
     environment: Environment = CALM,
     fixed_parameters: Sequence[str] = (),
     mean_subtraction: str = "complete",
+    excitation: str = FREE,
 ) -> tuple[PrimitiveInformation, ...]:
     """Information of every primitive about the parameters to estimate.
 
     In a mean current or wind, each primitive is simulated on `Tuning.headings` evenly spread headings and its moments
     are averaged, because its heading is not known before the plan.
 
+    Args:
+        vessel: nominal.
+        primitives: the dictionary.
+        environment: mean current and wind, and their spread.
+        fixed_parameters: held at the nominal values.
+        mean_subtraction: "none", "batch" or "complete".
+        excitation: which samples count in each equation, see `information.excitation`.
+
     Raises:
-        UnknownName: no such parameter or mean subtraction.
+        UnknownName: no such parameter, mean subtraction or choice of samples.
         InputError: every parameter is fixed.
         Diverged: the nominal model is unstable.
     """
@@ -57,6 +75,7 @@ def score_primitives(
         environment=environment,
         fixed_parameters=fixed_parameters,
         mean_subtraction=mean_subtraction,
+        excitation=excitation,
     )
     return scored
 
@@ -69,12 +88,13 @@ def score_models(
     environment: Environment = CALM,
     fixed_parameters: Sequence[str] = (),
     mean_subtraction: str = "complete",
+    excitation: str = FREE,
     unstable: str = "raise",
 ) -> tuple[tuple[tuple[PrimitiveInformation, ...], bool], ...]:
     """As `score_primitives`, for several parameter vectors (m, all) of the same structure under the same commands.
 
     Args:
-        vessel, primitives, environment, fixed_parameters, mean_subtraction: as in `score_primitives`.
+        vessel, primitives, environment, fixed_parameters, mean_subtraction, excitation: as in `score_primitives`.
         parameters: (m, all) in the model's own form.
         unstable: "raise" when a model diverges, or "mark".
 
@@ -87,25 +107,33 @@ def score_models(
     names = estimated_parameters(vessel.model, fixed_parameters)
     if mean_subtraction not in MEAN_SUBTRACTIONS:
         raise UnknownName("mean subtraction", mean_subtraction, known=MEAN_SUBTRACTIONS)
-    p, n, m = len(names), len(vessel.model.outputs), len(parameters)
-    count = len(primitives)
+    if excitation not in EXCITATIONS:
+        raise UnknownName("choice of samples", excitation, known=EXCITATIONS)
+    p, m, count = len(names), len(parameters), len(primitives)
+    n = len(vessel.model.outputs) if excitation == FREE else sum(most_strata(vessel.model))
     found = _Moments(
         X=np.zeros((m, count, p, p)),
         Y=np.zeros((m, count, p, n)),
         YZ=np.zeros((m, count, p, p)),
-        clear=np.zeros((m, count), dtype=bool),
+        shares=np.zeros((m, count, len(vessel.model.outputs))),
+        used=np.full((m, count, n), float(excitation == FREE)),
+        clear=np.zeros((m, count, len(vessel.model.outputs)), dtype=bool),
     )
     for members in _groups(primitives, len(parameters) * len(_headings(environment))):
         stack = _Runs.of(vessel, [primitives[index] for index in members], parameters, environment)
-        part = stack.moments(names)
+        part = stack.moments(names, excitation)
         if unstable == "raise" and not np.isfinite(part.X).all():
             _raise_diverged(vessel, [primitives[index] for index in members], environment)
-        for name in ("X", "Y", "YZ", "clear"):
+        for name in vars(found):
             getattr(found, name)[:, members] = getattr(part, name)
+    found, outputs = found if excitation == FREE else found.with_used_columns(), vessel.model.outputs
     stable = np.asarray(np.isfinite(found.X).all(axis=(1, 2, 3)))
     return tuple(
         (
-            tuple(found.item(model, index, primitive, mean_subtraction) for index, primitive in enumerate(primitives)),
+            tuple(
+                found.item(model, index, primitive, mean_subtraction, outputs)
+                for index, primitive in enumerate(primitives)
+            ),
             bool(stable[model]),
         )
         for model in range(m)
@@ -114,16 +142,31 @@ def score_models(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Moments:
-    """X, Y, YZ (m, n, ...) and the excitation condition (m, n) of runs under every model, averaged over headings."""
+    """X, Y, YZ and shares of samples (m, n, ...) of runs under every model, averaged over headings.
+
+    Shares (m, n, outputs) are of the samples that meet the excitation condition, heading by heading; it is clear where
+    it holds throughout on all headings.
+    """
 
     X: Array
     Y: Array
     YZ: Array
+    used: Array
+    shares: Array
     clear: NDArray[np.bool_]
 
-    def item(self, model: int, index: int, primitive: Primitive, mean_subtraction: str) -> PrimitiveInformation:
-        X, Y, YZ = self.X[model, index], self.Y[model, index], self.YZ[model, index]
-        taken = {"none": np.zeros_like(X), "batch": YZ, "complete": Y @ Y.T}[mean_subtraction]
+    def with_used_columns(self) -> _Moments:
+        """Without strata that no run has."""
+        columns = np.flatnonzero(self.used.any(axis=(0, 1)))
+        return replace(self, Y=self.Y[..., columns], used=self.used[..., columns])
+
+    def item(
+        self, model: int, index: int, primitive: Primitive, mean_subtraction: str, outputs: Sequence[str]
+    ) -> PrimitiveInformation:
+        X, Y, YZ, used = (getattr(self, name)[model, index] for name in ("X", "Y", "YZ", "used"))
+        complete = over_shares(Y, used) @ Y.T
+        taken = {"none": np.zeros_like(X), "batch": YZ, "complete": complete}[mean_subtraction]
+        clear = self.clear[model, index]
         return PrimitiveInformation(
             primitive=primitive,
             X=X,
@@ -131,7 +174,10 @@ class _Moments:
             Z=Y,
             YZ=YZ,
             log_det_alone=log_det_or_none(X - taken, np.diag(X)) if np.isfinite(X).all() else None,
-            excitation_condition=bool(self.clear[model, index]),
+            excitation_condition=bool(clear.all()),
+            excites=dict(zip(outputs, clear.tolist(), strict=True)),
+            clear_share=dict(zip(outputs, self.shares[model, index].tolist(), strict=True)),
+            used=used,
         )
 
 
@@ -178,37 +224,66 @@ class _Runs:
         inputs = given[:, 0] if given.shape[1] == 1 else given.mean(axis=1)
         return _Runs(vessel=vessel, environment=environment, inputs=inputs, states=states)
 
-    def moments(self, names: Sequence[str]) -> _Moments:
+    def moments(self, names: Sequence[str], excitation: str) -> _Moments:
         """Averages over headings, some primitives at a time."""
         samples, _, models, headings, count = self.states.shape
         size = max(1, TUNING.evaluated_samples // (samples * models * headings))
-        parts = [self._some(slice(first, first + size), names) for first in range(0, count, size)]
+        parts = [self._some(slice(first, first + size), names, excitation) for first in range(0, count, size)]
         columns = {name: np.concatenate([getattr(part, name) for part in parts], axis=1) for name in vars(parts[0])}
         return _Moments(**columns)
 
-    def _some(self, chosen: slice, names: Sequence[str]) -> _Moments:
+    def _some(self, chosen: slice, names: Sequence[str], excitation: str) -> _Moments:
         model, p = self.vessel.model, len(names)
         states = np.moveaxis(self.states[..., chosen], 1, 0)  # (6, k, m, h, n)
         inputs = self.inputs[:, :, None, None, chosen].swapaxes(0, 1)  # (inputs, k, 1, 1, n)
         with np.errstate(invalid="ignore", over="ignore"):
             table = signals_of(model, tuple(states), inputs, self.environment)
             rows = rows_of(model, table, states.shape[1:])[[model.names.index(name) for name in names]]
-            clear = clear_of_zero(self.vessel, table, self.environment, shape=states.shape[1:])
+            groups = strata(
+                self.vessel,
+                table,
+                self.environment,
+                shape=states.shape[1:],
+                air_measured=excitation != FREE,
+            )
+        whole = whole_runs(groups)  # (outputs, m, h, n)
+        if excitation == REQUIRED:
+            groups = np.where(kept_runs(groups)[:, None], groups, 0).astype(np.int8)
+        shares = (groups > 0).mean(axis=(1, 3))
+        most = most_strata(model)
+        if excitation == FREE:
+            groups, most = np.ones((len(model.outputs), 1, 1, 1, 1), dtype=np.int8), [1] * len(model.outputs)
         models, count = rows.shape[2], rows.shape[4]
         X, YZ = np.zeros((models, count, p, p)), np.zeros((models, count, p, p))
-        Y = np.zeros((models, count, p, len(model.outputs)))
+        Y = np.zeros((models, count, p, sum(most)))
+        used = np.full((models, count, sum(most)), float(excitation == FREE))
         equations = [model.terms[model.names.index(name)].equation for name in names]
-        for column, output in enumerate(model.outputs):
+        for number, output in enumerate(model.outputs):
             index = np.flatnonzero([equation == output for equation in equations])
             if not len(index):
                 continue
             own = np.ascontiguousarray(rows[index].transpose(2, 3, 4, 0, 1))  # (m, h, n, own, k)
-            mean = own.mean(axis=-1)
             place = np.ix_(np.arange(models), np.arange(count), index, index)
-            X[place] = (own @ own.swapaxes(-1, -2)).mean(axis=1) / own.shape[-1]
-            YZ[place] = (mean[..., :, None] * mean[..., None, :]).mean(axis=1)
-            Y[:, :, index, column] = mean.mean(axis=1)
-        return _Moments(X=X, Y=Y, YZ=YZ, clear=np.atleast_2d(clear.all(axis=1)))
+            for label in range(1, most[number] + 1):
+                column = sum(most[:number]) + label - 1
+                kept, share = _kept(own, groups[number], label)
+                mean = kept.mean(axis=-1)
+                X[place] += (kept @ own.swapaxes(-1, -2)).mean(axis=1) / own.shape[-1]
+                YZ[place] += (
+                    mean[..., :, None] * over_shares(mean[..., None], share[..., None])[..., None, :, 0]
+                ).mean(axis=1)
+                Y[:, :, index, column] = mean.mean(axis=1)
+                used[:, :, column] = np.broadcast_to(share, mean.shape[:3]).mean(axis=1)
+        clear = np.asarray(whole.all(axis=2)).transpose(1, 2, 0)
+        return _Moments(X=X, Y=Y, YZ=YZ, used=used, shares=shares.transpose(1, 2, 0), clear=clear)
+
+
+def _kept(own: Array, group: Strata, label: int) -> tuple[Array, Array]:
+    """Rows (m, h, n, own, k) with zeros where another stratum (k, m, h, n) is, and the shares (m, h, n) of this one."""
+    if group.size == 1:
+        return own, np.ones((1, 1, 1))
+    chosen = np.moveaxis(group == label, 0, -1)  # (m, h, n, k)
+    return own * chosen[..., None, :], np.asarray(chosen.mean(axis=-1))
 
 
 def _sailed(

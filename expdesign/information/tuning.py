@@ -21,6 +21,7 @@ class Tuning:
         velocity_step: step of central differences, relative to the larger of 1 and the signal [m/s, rad/s].
         parameter_step: relative step of central differences in a parameter.
         gradient_agreement: change of a gradient when the step is halved, relative to the outcome's largest gradient.
+        least_clear: share of a run that meets the excitation condition, at least, where designs require it.
         singular: condition number above which a trial counts as uninformative.
     """
 
@@ -35,6 +36,7 @@ class Tuning:
     velocity_step: float = 1e-6
     parameter_step: float = 1e-3
     gradient_agreement: float = 0.05
+    least_clear: float = 0.5
     singular: float = 1e12
 
 

@@ -22,9 +22,12 @@ import numpy as np
 
 from expdesign.dictionary import Primitive
 from expdesign.errors import InputError, NoAnswer
+from expdesign.estimation.equation_wise import EQUATION_WISE
+from expdesign.estimation.excitation import worst_case
 from expdesign.estimation.methods import Settings, estimate, method_named
 from expdesign.estimation.replay import Integration
 from expdesign.estimation.solve import Weighting
+from expdesign.information.excitation import FREE, SIGMAS
 from expdesign.information.expected import TrialPart, expected_covariance
 from expdesign.information.tuning import TUNING as INFORMATION_TUNING
 from expdesign.processes import as_finished
@@ -55,6 +58,7 @@ class Rehearsal:
         environment: weather; its mean is drawn for each trial with its standard deviation.
         parameters: names of the estimated parameters; the others are fixed at the nominal model's values.
         method, mean_subtraction: of the estimator.
+        excitation: of the design; unless "free", estimates are from equation-wise samples.
         integrator: of the true ship: "rk4", and parameters of the continuous motion are estimated, as by `expdesign
             estimate`; or "euler", the map that defines discrete parameters, and those of the map are.
         trials: number for each design.
@@ -70,6 +74,7 @@ class Rehearsal:
     parameters: tuple[str, ...]
     method: str = "iv"
     mean_subtraction: str = "complete"
+    excitation: str = FREE
     integrator: str = "rk4"
     trials: int = 100
     seed: int = 0
@@ -124,6 +129,11 @@ class Validated:
     def bias(self) -> Array:
         """(p,) mean estimate less the true value."""
         return np.asarray(self.estimates.mean(axis=0) - self.truth)
+
+    @property
+    def bias_deviations(self) -> Array:
+        """(p,) bias in standard errors of a mean over these trials."""
+        return np.asarray(np.abs(self.bias) / self.found * np.sqrt(len(self.estimates)))
 
     @property
     def coverage(self) -> Array:
@@ -267,6 +277,14 @@ def _estimated(rehearsal: Rehearsal, record: Record) -> Array:
     model = rehearsal.nominal.model
     fixed = tuple(name for name in model.names if name not in rehearsal.parameters)
     settings = Settings(fixed=fixed, weighting=Weighting(mean=rehearsal.mean_subtraction))
+    if rehearsal.excitation != FREE:
+        weather, sigmas = rehearsal.environment, SIGMAS
+        worst = worst_case(
+            rehearsal.nominal.sensors,
+            current_mps=float(np.hypot(*weather.current_to)) + sigmas * weather.current_std_mps,
+            wind_mps=float(np.hypot(*weather.wind_to)) + sigmas * weather.wind_std_mps,
+        )
+        settings = replace(settings, samples=EQUATION_WISE, worst=worst)
     if rehearsal.integrator == "rk4":
         settings = replace(settings, integration=Integration("rk4", SUBSTEPS), quadrature="trapezoid")
     try:
@@ -309,6 +327,7 @@ def _predicted(rehearsal: Rehearsal, design: str, vessel: Vessel) -> Array:
         mean_subtraction=rehearsal.mean_subtraction,
         integrator=rehearsal.integrator,
         unknown_current=method_named(rehearsal.method).estimates_steady_current,
+        excitation=rehearsal.excitation,
     )
     return np.asarray(np.sqrt(np.diag(covariance)))
 

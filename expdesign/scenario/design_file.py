@@ -104,6 +104,14 @@ class DesignTable(Table):
         "'no-current' with those of the wind alone, 'no-wind' with those of the current alone; 'wind' with measured "
         "wind and those of an unknown current; use all but the first with criterion D_s",
     )
+    excitation: Literal["free", "rewarded", "required"] = Field(
+        default="free",
+        description="the samples whose information counts: 'free', all; 'rewarded', for each equation those at which "
+        "what stands inside its absolute values is farther from zero than three standard deviations of the sensors, "
+        "and the current, as in expdesign estimate --samples equation-wise; 'required', the same of manoeuvres only "
+        "that, once clear, stay so, for at least half of their time. Where velocities are noisy, only such samples "
+        "leave no bias; expdesign validate estimates from them, too",
+    )
     robust: Literal["nominal", "average", "worst"] = Field(
         default="nominal",
         description="the models in the criterion: the nominal one, or the average or the worst over models drawn from "
@@ -207,6 +215,7 @@ def design_settings(table: DesignTable, vessel: Vessel, primitives: tuple[str, .
         outcome_units=dict(table.outcome_units),
         outcome_speed_mps=table.outcome_speed_mps,
         predictor=table.predictor,
+        excitation=table.excitation,
         robust=table.robust,
         prior_samples=(table.prior_samples or 20) if table.robust != "nominal" else 0,
         prior=table.prior,
@@ -320,6 +329,18 @@ def _check_together(table: DesignTable, vessel: Vessel, entry: Entry) -> None:
         raise entry.at(key).error("needs standard deviations in the vessel's [model.parameter_std], found none")
     if table.predictor != "model" and (table.robust != "nominal" or table.prior_data):
         raise entry.at("predictor").error("with nuisance regressors excludes design.robust and prior_data")
+    if table.excitation != "free":
+        others = {
+            "predictor": table.predictor != "model",
+            "robust": table.robust != "nominal",
+            "prior_data": bool(table.prior_data),
+            "grow": table.grow is not None,
+            "accuracy": table.accuracy is not None,
+            "day_s": table.day_s is not None,
+        }
+        if any(others.values()):
+            key = next(key for key, used in others.items() if used)
+            raise entry.at("excitation").error(f"is {table.excitation!r}, which excludes design.{key}")
     for name in table.required:
         if name in table.excluded:
             raise entry.at("excluded").error(f"names {name!r}, which design.required names too")

@@ -52,6 +52,7 @@ class DesignSettings:
         outcome_speed_mps: approach speed of the predicted trials, or None for the nominal one.
         predictor: "model" for the model's terms; with nuisance regressors, too, "augmented", "wind", "no-current" or
             "no-wind".
+        excitation: which samples count in each equation: "free", "rewarded" or "required".
         robust: "nominal", "average" or "worst".
         prior_samples: models drawn from the prior.
         prior: prior information, "none" or "parameter_std".
@@ -74,6 +75,7 @@ class DesignSettings:
     outcome_units: Mapping[str, float] = field(default_factory=dict)
     outcome_speed_mps: float | None = None
     predictor: str = "model"
+    excitation: str = "free"
     robust: str = "nominal"
     prior_samples: int = 0
     prior: str = "none"

@@ -34,7 +34,8 @@ class Regression:
         outputs: names of the n outputs, "y1", "y2" ... when left out.
         heading: (k,) of the ship [rad], by which the covariance knows disturbances that keep their side of the chart
             while the ship turns; None where it is not known.
-        chosen: (k, n) which rows each output uses; None for all.
+        strata: (k, n) groups of rows for each output, from whose instruments the mean is subtracted separately, counted
+            from 1; 0 for rows that it does not use. None for one group of all.
     """
 
     parameters: tuple[str, ...]
@@ -44,7 +45,7 @@ class Regression:
     step: Integers | None = None
     outputs: tuple[str, ...] = ()
     heading: Array | None = None
-    chosen: Mask | None = None
+    strata: Integers | None = None
 
     def __post_init__(self) -> None:
         seal(self, Phi="k n p", y="k n")
@@ -63,8 +64,8 @@ class Regression:
             seal(self, heading="k", Phi="k n p")
             if not np.isfinite(self.heading).all():
                 raise InputError("Regression.heading holds numbers that are not finite; give none")
-        if self.chosen is not None and self.chosen.shape != (k, n):
-            raise InputError(f"Regression.chosen has shape {self.chosen.shape}, expected {(k, n)}")
+        if self.strata is not None and self.strata.shape != (k, n):
+            raise InputError(f"Regression.strata has shape {self.strata.shape}, expected {(k, n)}")
         frozen_set(self, "batch", batch)
         frozen_set(self, "step", step)
         frozen_set(self, "outputs", self.outputs or tuple(f"y{i + 1}" for i in range(n)))
@@ -77,6 +78,11 @@ class Regression:
         """(k,) batch numbers."""
         assert self.batch is not None  # set at birth
         return self.batch
+
+    @property
+    def chosen(self) -> Mask | None:
+        """(k, n) which rows each output uses; None for all."""
+        return None if self.strata is None else self.strata != 0
 
     @property
     def step_of(self) -> Integers:
@@ -93,7 +99,7 @@ class Regression:
             batch=self.batch_of[rows],
             step=self.step_of[rows],
             heading=None if self.heading is None else self.heading[rows],
-            chosen=None if self.chosen is None else self.chosen[rows],
+            strata=None if self.strata is None else self.strata[rows],
         )
 
     def residuals(self, values: Array) -> Array:

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from expdesign.errors import NotInformative
-from expdesign.estimation.regression import Integers, Regression, batch_slices, subtract_mean
+from expdesign.errors import NotInformative, UnknownName
+from expdesign.estimation.regression import MEANS, Integers, Regression, batch_slices, subtract_mean
 from expdesign.estimation.solve.null_space import NullSpace, null_space
 from expdesign.estimation.solve.weighting import Weighting
 from expdesign.values import Array
@@ -32,6 +32,7 @@ class System:
         size: (p,) norm of that; infinite where it is constant to working precision.
         y: (k, n).
         batch: (k,) batch numbers of its rows.
+        group: (k,) numbers of the rows that share a mean.
         parts: rows of each batch.
     """
 
@@ -44,11 +45,16 @@ class System:
     size: Array
     y: Array
     batch: Integers
+    group: Integers
     parts: list[slice]
 
     def cut(self, whole: Array) -> Array:
         """(k, n, p) of this part from (all, all, all)."""
         return _cut(whole[self.rows], self.outputs, self.columns)
+
+    def without_mean(self, rows: Array, mean: str) -> Array:
+        """Rows (k, ...) of this part without the mean of their group, unless the mean is "none"."""
+        return subtract_mean(rows, self.group, "none" if mean == "none" else "batch")
 
 
 def occupied(rows: Array) -> Array:
@@ -79,7 +85,8 @@ def _system(regression: Regression, columns: Integers, outputs: Integers, mean: 
             raise NotInformative(f"no sample is left for {equations}, which {', '.join(names)} need", parameters=names)
     batch = regression.batch_of[rows]
     Phi = _cut(regression.Phi[rows], outputs, columns)
-    varying = subtract_mean(Phi, batch, mean)
+    group = _groups(regression, rows, outputs, mean)
+    varying = subtract_mean(Phi, group, "none" if mean == "none" else "batch")
     size = _norm(varying)
     size[size <= 1e-11 * _norm(Phi)] = np.inf
     return System(
@@ -92,8 +99,25 @@ def _system(regression: Regression, columns: Integers, outputs: Integers, mean: 
         size=size,
         y=regression.y[rows][:, outputs],
         batch=batch,
+        group=group,
         parts=batch_slices(batch),
     )
+
+
+def _groups(regression: Regression, rows: Integers | slice, outputs: Integers, mean: str) -> Integers:
+    """(k,) numbers of the rows that share a mean: those of a batch, of a stratum, or both.
+
+    Raises:
+        UnknownName: `mean` is not one of `MEANS`.
+    """
+    if mean not in MEANS:
+        raise UnknownName("instrument mean", mean, known=MEANS)
+    group = regression.batch_of[rows] if mean == "batch" else np.zeros_like(regression.batch_of[rows])
+    if regression.strata is None or not len(outputs):
+        return group
+    strata = regression.strata[rows][:, outputs]
+    _, own = np.unique(np.column_stack([group, strata]), axis=0, return_inverse=True)
+    return np.asarray(own, dtype=np.int64).reshape(-1)
 
 
 def _cut(whole: Array, outputs: Integers, columns: Integers) -> Array:
@@ -123,12 +147,12 @@ class Part:
         theta = np.zeros(p)
         for rows, A in zip(system.parts, self.A, strict=True):
             theta += A @ (self.Z[rows].reshape(-1, p).T @ system.y[rows].ravel())
-        return theta, subtract_mean(system.y - system.Phi @ theta, system.batch, mean)
+        return theta, system.without_mean(system.y - system.Phi @ theta, mean)
 
 
 def instruments_of(system: System, instruments: Array, weighting: Weighting) -> Array:
     """(k, n, p) instruments of a part, without mean and weighted."""
-    Z = subtract_mean(system.cut(instruments), system.batch, weighting.mean)
+    Z = system.without_mean(system.cut(instruments), weighting.mean)
     return Z * np.array(weighting.output_weights)[system.outputs, None] if weighting.output_weights else Z
 
 

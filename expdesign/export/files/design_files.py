@@ -59,6 +59,8 @@ def _primitive_entry(item: PrimitiveInformation, vessel: Vessel) -> dict[str, An
         "displacement": {"forward_m": forward, "starboard_m": starboard, "turn_rad": turn},
         "footprint_radius_m": footprint_radius(primitive, vessel),
         "excitation_condition": bool(item.excitation_condition),
+        "excitation_condition_by_equation": dict(item.excites),
+        "excitation_share_by_equation": dict(item.clear_share),
         "X": item.X.tolist(),
         "Y": item.Y.tolist(),
         "Z": item.Z.tolist(),
@@ -92,6 +94,7 @@ def durations_json(design: DurationDesign, *, compared: Sequence[Efficiencies] =
         strict=True,
     )
     keys = ("name", "fraction", "duration_s", "repeats", "sensitivity", "price")
+    held = [{"excitation_condition_by_equation": dict(own)} for own in problem.excites] or [{}] * len(problem.names)
     return strict_json(
         {
             "criterion": problem.aim.criterion,
@@ -103,7 +106,10 @@ def durations_json(design: DurationDesign, *, compared: Sequence[Efficiencies] =
             "gap_relative": finite(design.gap_relative),
             "dimension": problem.dimension,
             "parameters": list(problem.parameters),
-            "primitives": [dict(zip(keys, row, strict=True)) for row in columns],
+            "primitives": [
+                {**dict(zip(keys, row, strict=True)), **own} for row, own in zip(columns, held, strict=True)
+            ],
+            "excitation": problem.excitation,
             "efficiency": {
                 "continuous": 1.0,
                 "repeats": design.efficiency_repeats,

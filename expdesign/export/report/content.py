@@ -10,7 +10,7 @@ from expdesign.durations import DurationDesign, Efficiencies
 from expdesign.export.files import Known
 from expdesign.export.routes import Route
 from expdesign.growing import Growth
-from expdesign.information.primitive_information import PrimitiveInformation
+from expdesign.information.primitive_information import PrimitiveInformation, over_shares
 from expdesign.plan.values import Plan
 from expdesign.shortest_day import ShortestDay
 from expdesign.simulation.environment import Environment
@@ -104,9 +104,8 @@ def information_rate(content: ReportContent) -> Array:
     With complete mean subtraction the design's means are taken off, so that the rows weighted by the time fractions
     add up to the diagonal of the design's information matrix; with batchwise subtraction each run's own means.
     """
-    X = np.array([item.X for item in content.information])
-    Y = np.array([item.Y for item in content.information])
-    Z = np.array([item.Z for item in content.information])
+    names = ("X", "Y", "Z", "used")
+    X, Y, Z, used = (np.array([getattr(item, name) for item in content.information]) for name in names)
     subtraction = content.design.problem.mean_subtraction
     if subtraction == "none":
         matrices = X
@@ -114,8 +113,10 @@ def information_rate(content: ReportContent) -> Array:
         matrices = X - np.array([item.YZ for item in content.information])
     else:
         weights = content.design.fractions
-        mean_y, mean_z = np.tensordot(weights, Y, axes=1), np.tensordot(weights, Z, axes=1)
-        matrices = X - Y @ mean_z.T - mean_y @ Z.transpose(0, 2, 1) + mean_y @ mean_z.T
+        share = weights @ used
+        mean_y, mean_z = (over_shares(np.tensordot(weights, part, axes=1), share) for part in (Y, Z))
+        taken = (mean_y * used[:, None, :]) @ mean_z.T
+        matrices = X - Y @ mean_z.T - mean_y @ Z.transpose(0, 2, 1) + taken
     return readonly(np.diagonal(matrices, axis1=1, axis2=2))
 
 

@@ -75,7 +75,7 @@ class PrimitiveRow:
     lasts: str
     entry: str
     log_det: str
-    excites: bool
+    excites: str
     share: str
     optimal: str
     runs: int
@@ -101,7 +101,7 @@ def primitive_rows(content: ReportContent) -> list[PrimitiveRow]:
             lasts=words.duration(item.primitive.duration_s),
             entry=_entry(item),
             log_det="singular" if item.log_det_alone is None else words.number(item.log_det_alone, 1),
-            excites=item.excitation_condition,
+            excites=excitation_words(item),
             share=words.percent(float(fraction)),
             optimal=words.duration(float(seconds)),
             runs=runs,
@@ -177,12 +177,33 @@ def _entry(item: PrimitiveInformation) -> str:
     return ", ".join(parts)
 
 
+def excitation_words(item: PrimitiveInformation) -> str:
+    """Where the excitation condition holds: in all, or by equation the share of the samples that meet it."""
+    if item.excitation_condition:
+        return "holds"
+    if not item.excites:
+        return "does not hold"
+    parts = [
+        f"{output}: holds" if held else f"{output}: {words.percent(item.clear_share.get(output, 0.0))}"
+        for output, held in item.excites.items()
+    ]
+    return ", ".join(parts)
+
+
 def excitation_sentence(content: ReportContent) -> str:
     """Consequences of the excitation condition for the estimation."""
     held = [item.primitive.name for item in content.information if item.excitation_condition]
     if len(held) == len(content.information):
         return (
             "The excitation condition holds in all manoeuvres: instrumental variables are unbiased with noisy sensors."
+        )
+    problem = content.design.problem
+    if problem.excitation != "free":
+        whole = "" if problem.excitation == "rewarded" else " of manoeuvres that keep it, once clear,"
+        return (
+            "In each equation only samples count at which what stands inside its absolute values is clear of zero,"
+            f"{whole} so that noisy velocities leave no bias; estimate with --samples equation-wise. The table says "
+            "which share of a run that is."
         )
     where = f"only in {words.counted(len(held), 'manoeuvre')}" if held else "in no manoeuvre"
     return (

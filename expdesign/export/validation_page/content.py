@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from expdesign.estimation.methods import method_named
@@ -13,6 +14,8 @@ from expdesign.export.files import finite, strict_json
 from expdesign.export.tuning import TUNING
 from expdesign.rehearsal import Rehearsal, Validated
 
+CHANCE = 0.01
+"""By which a bias may be found where there is none."""
 ERROR_LIMIT = 1.5
 """Normalised error below which the thesis calls a trial good."""
 
@@ -55,6 +58,13 @@ def biased(result: Validated) -> list[str]:
     return _named(result, np.abs(result.bias) > allowed * result.found)
 
 
+def surely_biased(result: Validated) -> list[str]:
+    """Parameters whose bias is more than chance: 1 % for all parameters of a design together, by Bonferroni."""
+    known = np.isfinite(result.truth)
+    limit = -float(scipy.special.ndtri(CHANCE / (2 * max(1, int(known.sum())))))
+    return _named(result, known & (result.bias_deviations > limit))
+
+
 def _named(result: Validated, chosen: NDArray[np.bool_]) -> list[str]:
     return [name for name, is_so in zip(result.parameters, chosen, strict=True) if is_so]
 
@@ -90,6 +100,14 @@ def _judged(result: Validated) -> Iterator[str]:
         )
     if off:
         yield f"{result.design.capitalize()}: predicted and observed standard deviations differ for {', '.join(off)}."
+    if surely := surely_biased(result):
+        worst = float(np.nanmax(result.bias_deviations))
+        yield (
+            f"{result.design.capitalize()}: the bias is more than chance for {', '.join(surely)}, up to {worst:.1f} "
+            "standard errors of its mean over the trials."
+        )
+    else:
+        yield f"{result.design.capitalize()}: no bias is more than chance (1 % for all parameters together)."
     if shifted:
         yield f"{result.design.capitalize()}: the bias exceeds half a standard deviation for {', '.join(shifted)}."
 
@@ -163,6 +181,7 @@ def validation_json(content: ValidationContent) -> str:
         "truth": rehearsal.truth.name,
         "method": rehearsal.method,
         "mean_subtraction": rehearsal.mean_subtraction,
+        "excitation": rehearsal.excitation,
         "integrator": rehearsal.integrator,
         "trials": rehearsal.trials,
         "seed": rehearsal.seed,
@@ -187,6 +206,7 @@ def _entry(rehearsal: Rehearsal, result: Validated) -> dict[str, object]:
             name: {
                 "truth": finite(result.truth[index]),
                 "bias": finite(result.bias[index]),
+                "bias_in_standard_errors": finite(result.bias_deviations[index]),
                 "std_found": finite(result.found[index]),
                 "std_predicted_at_truth": finite(result.theory[index]),
                 "std_forecast_by_nominal": finite(result.forecast[index]),

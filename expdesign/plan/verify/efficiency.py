@@ -28,11 +28,12 @@ def realised_efficiencies(
     against the design's whole runs is due to their places: headings in wind, and entries that a leg reached within its
     tolerance. What the whole trial has more is due to its legs; above 1 where they add more than rounding and places
     take. A steady current that the forecast leaves unknown is estimated along; the optimum is for runs of any heading,
-    which tell the same then. None where the design has nuisance regressors or recorded primitives: of these the track
-    says nothing.
+    which tell the same then. None where the design has nuisance regressors, recorded primitives, or samples of each
+    equation's own: of these the track says nothing.
     """
     problem = replace(design.problem, robust="nominal", sampled=np.zeros((0, 0, 0, 0)))
-    if not set(problem.parameters) <= set(vessel.model.names) or not problem.symmetric:
+    known = set(problem.parameters) <= set(vessel.model.names) and problem.excitation == "free"
+    if not known or not problem.symmetric:
         return None, None
     collected, share = Collected.of(problem), sailed.commands.sample_time_s / problem.total_s
     legs = track_information(vessel, problem, environment, sailed)
@@ -76,11 +77,12 @@ def track_covariance(
 ) -> Array | None:
     """(p, p) inverse information of a whole trial about the parameters, means left out, in units of the noise.
 
-    None where the design has nuisance regressors, or the track does not determine every parameter.
+    None where the design has nuisance regressors or samples of each equation's own, or the track does not determine
+    every parameter.
     """
     problem = design.problem
     p = len(problem.parameters)
-    if not set(problem.parameters) <= set(vessel.model.names):
+    if not set(problem.parameters) <= set(vessel.model.names) or problem.excitation != "free":
         return None
     M = about_ship(problem, track_information(vessel, problem, environment, sailed).sum(axis=0))
     scale = np.sqrt(np.maximum(np.diag(M), 0.0))

@@ -18,8 +18,14 @@ from expdesign.durations import (
     build_durations,
     solve_durations,
 )
-from expdesign.errors import FloorOutOfReach, InputError, NoAnswer
-from expdesign.information import MEAN_SUBTRACTIONS, PrimitiveInformation, estimated_parameters
+from expdesign.errors import FloorOutOfReach, InputError, NoAnswer, NotInformative
+from expdesign.information import (
+    MEAN_SUBTRACTIONS,
+    PrimitiveInformation,
+    check_informative,
+    estimated_parameters,
+    excitation_refusal,
+)
 from expdesign.information.augmented import score_augmented
 from expdesign.information.outcome_gradients import outcome_gradients
 from expdesign.information.prior import equation_noise, score_prior, stated_information
@@ -96,6 +102,9 @@ def duration_problem(
         information, parameters, equations = wide.information, wide.parameters, wide.equations
         nuisance = tuple(name for name in wide.parameters if name not in wide.interest)
         interest = _still_estimated(interest or wide.interest, wide.interest, settings.predictor)
+    if settings.excitation != "free":
+        _check_excitation(case, information, parameters)
+        interest = interest or parameters
     sampled: Sequence[Sequence[PrimitiveInformation]] = ()
     if settings.robust != "nominal":
         progress(f"simulating the dictionary with {settings.prior_samples} models of the prior", 0.1)
@@ -115,13 +124,30 @@ def duration_problem(
         mean_subtraction=settings.mean_subtraction,
         aim=aim_of(case, parameters, interest, progress=within(progress, 0.4, 0.9)),
         constraints=constraints_of(case, primitives),
-        prior=_prior(case, parameters, stated or case.vessel.model),
+        prior=_prior(case, parameters, stated or case.vessel.model, means=information[0].Y.shape[1]),
         sampled=sampled,
         robust=settings.robust,
         equations=equations,
         nuisance=nuisance,
         floors=_least_information(case, primitives, seed=seed, progress=within(progress, 0.9, 1.0)),
+        excitation=settings.excitation,
     )
+
+
+def _check_excitation(case: Scenario, information: Sequence[PrimitiveInformation], parameters: tuple[str, ...]) -> None:
+    """Refuse samples that do not inform about every parameter, by the manoeuvres that lack the condition.
+
+    Raises:
+        NotInformative: they do not.
+    """
+    settings = case.design
+    allowed = [item for item in information if item.primitive.name not in settings.excluded]
+    try:
+        check_informative(allowed or information, parameters, settings.mean_subtraction)
+    except NotInformative as error:
+        why = excitation_refusal(case.vessel.model, allowed or information, settings.excitation)
+        blind = f"no information is left about {', '.join(error.parameters)}"
+        raise NotInformative(f"{blind}: {why}", parameters=error.parameters) from None
 
 
 def _still_estimated(interest: tuple[str, ...], estimated: tuple[str, ...], predictor: str) -> tuple[str, ...]:
@@ -165,8 +191,9 @@ def aim_of(
         names = found.names
         gradients = np.zeros((len(names), len(parameters)))
         gradients[:, [parameters.index(name) for name in own]] = found.gradients / units[:, None]
+    own_samples = settings.criterion == "D" and settings.excitation != "free"  # shares of samples are no parameters
     return Aim(
-        criterion=settings.criterion,
+        criterion="D_s" if own_samples else settings.criterion,
         interest=interest,
         unit=np.array([settings.parameter_units.get(name, nominal.get(name, 0.0)) for name in parameters]),
         noise=np.array([noise.get(name, 0.0) for name in parameters]),
@@ -208,11 +235,11 @@ def cubed_propeller_speed(primitive: Primitive) -> float:
     return float(sum(np.mean(np.abs(primitive.commands.column(name)) ** 3) for name in names))
 
 
-def _prior(case: Scenario, parameters: tuple[str, ...], stated: VesselModel) -> Array | None:
+def _prior(case: Scenario, parameters: tuple[str, ...], stated: VesselModel, *, means: int) -> Array | None:
     """Prior information per sample of the informative time; None without any."""
     settings, model = case.design, case.vessel.model
-    means = len(model.outputs) if settings.mean_subtraction == MEAN_SUBTRACTIONS[-1] else 0
-    dimension, samples = len(parameters) + means, settings.total_s / case.vessel.sample_time_s
+    complete = settings.mean_subtraction == MEAN_SUBTRACTIONS[-1]
+    dimension, samples = len(parameters) + (means if complete else 0), settings.total_s / case.vessel.sample_time_s
     prior = np.zeros((dimension, dimension))
     if settings.prior == "parameter_std":
         own = [name for name in parameters if name in stated.names]

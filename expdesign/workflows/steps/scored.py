@@ -28,6 +28,7 @@ def scored(case: Scenario, *, progress: Progress = silent) -> tuple[PrimitiveInf
         case.environment,
         case.design.fixed_parameters,
         case.design.mean_subtraction,
+        case.design.excitation,
         progress=progress,
     )
 
@@ -38,6 +39,7 @@ def _scored(
     environment: Environment,
     fixed_parameters: tuple[str, ...],
     mean_subtraction: str,
+    excitation: str,
     *,
     progress: Progress,
 ) -> tuple[PrimitiveInformation, ...]:
@@ -50,6 +52,7 @@ def _scored(
         environment=environment,
         fixed_parameters=fixed_parameters,
         mean_subtraction=mean_subtraction,
+        excitation=excitation,
     )
 
 

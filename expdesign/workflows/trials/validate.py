@@ -70,6 +70,7 @@ def validate_design(
         parameters=estimated_parameters(case.vessel.model, case.design.fixed_parameters),
         method=method,
         mean_subtraction=case.design.mean_subtraction,
+        excitation=case.design.excitation,
         integrator=integrator,
         trials=trials,
         seed=seed,
@@ -104,7 +105,10 @@ def validate_design(
 
 def _method(case: Scenario, stated: str | None) -> str:
     """The estimator that is stated, or the one whose accuracy designs count."""
-    usual = steady_current_method(case.vessel.model) if case.environment.current_std_mps > 0 else "iv"
+    if case.design.excitation != "free":
+        usual = "iv-air" if case.vessel.model.reads_air else "iv"
+    else:
+        usual = steady_current_method(case.vessel.model) if case.environment.current_std_mps > 0 else "iv"
     return stated or usual
 
 
@@ -120,7 +124,7 @@ def _identity(rehearsal: Rehearsal) -> tuple[object, ...]:
         (weather.current_to, weather.current_std_mps, weather.wind_to, weather.wind_std_mps),
         (weather.current_variation, weather.wind_variation),
         (dict(rehearsal.designs), rehearsal.total_s, rehearsal.parameters, rehearsal.method),
-        (rehearsal.mean_subtraction, rehearsal.integrator, rehearsal.trials, rehearsal.seed),
+        (rehearsal.mean_subtraction, rehearsal.excitation, rehearsal.integrator, rehearsal.trials, rehearsal.seed),
     )
 
 
