@@ -109,7 +109,6 @@ def test_gaps_and_rows_without_numbers_are_left_out(voyages: dict[str, Path], tm
         (["{same}", "--resume", "--reference", "{reference}"], 2, "expected one"),
         (["{same}"], 3, "give files of a reference"),
         (["{same}", "--learn-h", "0.2"], 3, "expected at least"),
-        (["{same}", "{same}", "--reference", "{reference}"], 2, "expected times after"),
         (["nothing.csv", "--reference", "{reference}"], 2, "cannot be read"),
     ],
 )
@@ -140,3 +139,10 @@ def test_the_reference_may_be_the_beginning_of_the_data(voyages: dict[str, Path]
     told = monitored(tmp_path / "out", voyages["reference"], "--learn-h", 1.1)
     assert 1.1 * HOUR <= told["reference"]["until_s"] <= 1.1 * HOUR + 60
     assert told["judged_h"] == pytest.approx(0.4, abs=0.05)
+
+
+def test_files_whose_times_begin_again_follow_each_other(voyages: dict[str, Path], tmp_path: Path) -> None:
+    told = monitored(tmp_path, voyages["same"], voyages["reference"], "--reference", voyages["reference"])
+    assert told["judged_h"] == pytest.approx(2.5, abs=0.05)
+    assert told["alarms"] == []
+    assert told["history"][-1]["time_s"] > 3.4 * HOUR

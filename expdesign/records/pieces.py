@@ -74,6 +74,7 @@ def pieces(
     most_rows: int,
     unread: Sequence[str] = OPTIONAL,
     before: Sequence[str] = (),
+    more_follow: bool = False,
 ) -> Iterator[Piece]:
     """Pieces of a CSV file, or of the standard input for `STREAM`, with whole stretches but at gaps.
 
@@ -84,6 +85,7 @@ def pieces(
         most_rows: of a piece; one that is shorter than a stretch has the rows of one.
         unread: columns that rows may lack.
         before: header and `pending` lines of earlier data, which come first where the header is the same.
+        more_follow: the source goes on later: rows at its end that do not fill a stretch are `pending`.
 
     Raises:
         FileError: unreadable, without header, or without columns that are needed.
@@ -104,7 +106,9 @@ def pieces(
         stretch = max(1, round(stretch_s / step_s))
         lines = itertools.chain(first, iter(file.readline, ""))
         rows = stretch * max(1, most_rows // stretch)
-        yield from _cut(lines, _Cut(source, header, columns, rows, stretch, Path(folder) / "piece.csv"), -len(left))
+        yield from _cut(
+            lines, _Cut(source, header, columns, rows, stretch, Path(folder) / "piece.csv", more_follow), -len(left)
+        )
 
 
 @dataclass(frozen=True)
@@ -115,9 +119,10 @@ class _Cut:
     rows: int
     stretch: int
     path: Path
+    more_follow: bool
 
     def piece(self, lines: list[str], first_row: int, left_out: int, *, last: bool) -> Piece:
-        whole = len(lines) // self.stretch * self.stretch
+        whole = len(lines) // self.stretch * self.stretch if self.more_follow else len(lines)
         kept = lines[:whole]
         written = self.columns.without_optional(kept) if self.columns.gaps else kept
         self.path.write_text(self.header + "".join(written), encoding="utf-8", errors="surrogateescape")

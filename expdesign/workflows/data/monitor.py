@@ -89,13 +89,15 @@ def monitor(
     command = command_text("monitor", data, options, usual=USUAL)
     now = _resumed(folder / STATE) if resume else _with_reference(Watch(), reference, asked, progress)
     due = (0, 0.0)  # files of a stream are written at once when there are more alarms
+    left = now.pending
     for number, source in enumerate(data):
         rows = max(1, round(every_s / asked.vessel.sample_time_s)) if source == STREAM else MOST_ROWS
         size_bytes = source.stat().st_size if source != STREAM and source.is_file() else 0
         read = 0
         for piece in pieces(
-            source, inputs=asked.vessel.model.inputs, stretch_s=TUNING.stretch_s, most_rows=rows, before=now.pending
-        ):
+            source, inputs=asked.vessel.model.inputs, stretch_s=TUNING.stretch_s, most_rows=rows,
+            before=() if number else left, more_follow=number + 1 == len(data),
+        ):  # fmt: skip
             now = with_piece(now, piece, asked)
             read += sum(map(len, piece.lines))
             share = (number + (read / size_bytes if size_bytes else 0.0)) / len(data)

@@ -10,7 +10,7 @@ import numpy as np
 
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.vessel_file import extended_model
-from expdesign.errors import FileError, NotInformative
+from expdesign.errors import NotInformative
 from expdesign.export.monitor_page import Moment
 from expdesign.monitoring import (
     TUNING,
@@ -33,6 +33,8 @@ from expdesign.signals import Record
 from expdesign.vessel import Vessel
 from expdesign.workflows.steps.measured import measured
 
+BETWEEN_FILES_S = 3600.0
+"""From the end of a file to the beginning of the next, where that has times that begin again."""
 MOST_SAVED_ROWS = 7200
 """Since a change, for a diagnosis."""
 MOST_MOMENTS = 1000
@@ -53,6 +55,7 @@ class Watch:
         alarms, moments: of the watch.
         left_out_rows: that lacked a number.
         notes: on the data.
+        offset_s: added to the times of the file, where they begin again in each file.
         changed: header and lines since the last alarm's change.
         pending: header, and lines that do not fill a stretch.
     """
@@ -63,6 +66,7 @@ class Watch:
     state: State | None = None
     reference_s: float = 0.0
     now_s: float = -np.inf
+    offset_s: float = 0.0
     alarms: tuple[Alarm, ...] = ()
     moments: tuple[Moment, ...] = ()
     left_out_rows: int = 0
@@ -95,17 +99,17 @@ def read_piece(now: Watch, piece: Piece, asked: Asked) -> tuple[Watch, tuple[Rea
     now = replace(now, left_out_rows=now.left_out_rows + piece.left_out, pending=(piece.header, *piece.pending))
     if not piece.lines:
         return now, ()
-    if not piece.time_s[0] > now.now_s:
-        problem = f"begins at {piece.time_s[0]:.10g}, expected times after {now.now_s:.10g}, the end of the data before"
-        raise FileError(piece.source, "time_s", problem)
+    if not piece.time_s[0] + now.offset_s > now.now_s:
+        now = replace(now, offset_s=now.now_s + BETWEEN_FILES_S - float(piece.time_s[0]))
+    times = piece.time_s + now.offset_s
     with piece.named():
         record = measured([piece.path], asked.vessel, velocity=asked.velocity)
     ship = extended_model(asked.vessel, record)
     changes = now.changes or watched_changes(ship, size=asked.size)
-    begins = [float(piece.time_s[batch.first_row - FIRST_ROW]) for batch in record.batches]
+    begins = [float(times[batch.first_row - FIRST_ROW]) for batch in record.batches]
     told = [note.replace(piece.path.name, piece.source.name) for note in record.notes]
     notes = tuple({re.sub(r"\d+", "", note): note for note in (*told, *now.notes)}.values())
-    now = replace(now, changes=changes, now_s=float(piece.time_s[-1]), notes=notes)
+    now = replace(now, changes=changes, now_s=float(times[-1]), notes=notes)
     return now, (Reading(piece=piece, ship=ship, record=record, begins_s=tuple(begins)),)
 
 
@@ -193,7 +197,7 @@ def _watched(now: Watch, read: Reading, asked: Asked, *, first_s: float = -np.in
 def _changed(now: Watch, piece: Piece, raised: Sequence[Alarm]) -> tuple[str, ...]:
     """Header and lines since the last alarm's change."""
     if raised:
-        since = piece.time_s >= raised[-1].since_s
+        since = piece.time_s + now.offset_s >= raised[-1].since_s
         return (piece.header, *(line for line, late in zip(piece.lines, since, strict=True) if late))
     return (*now.changed, *piece.lines) if now.changed else ()
 
