@@ -56,7 +56,9 @@ def grams_from(columns: np.ndarray) -> Grams:
     products[0] = np.swapaxes(columns, 1, 2) @ columns
     counts = np.zeros((4, count))
     counts[0] = samples
-    return Grams(time_s=STRETCH_S * np.arange(count), products=products, counts=counts, changes=CHANGES)
+    return Grams(
+        time_s=STRETCH_S * np.arange(count), products=products, counts=counts, changes=CHANGES, stretch_s=STRETCH_S
+    )
 
 
 def tender(**factors: float) -> Vessel:

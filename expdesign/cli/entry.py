@@ -19,9 +19,9 @@ from expdesign.cli.commands import app
 from expdesign.errors import InputError, NoAnswer
 from expdesign.interruptions import interruptions_wait
 
-LISTS = ("--format", "--method", "--fixed", "--test", "--data", "--interest")
+LISTS = ("--format", "--method", "--fixed", "--test", "--data", "--interest", "--reference")
 """Options that take several values."""
-FILE_LISTS = ("--test", "--data")
+FILE_LISTS = ("--test", "--data", "--reference")
 """Those of them whose values are files."""
 DONE, BUG, WRONG_INPUT, NO_ANSWER, INTERRUPTED = 0, 1, 2, 3, 130
 

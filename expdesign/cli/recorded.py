@@ -288,7 +288,7 @@ def monitor(
         typer.Option(
             "--size",
             metavar="S",
-            help="Relative change of parameters, thrust and inertia that matters; alarms are tuned to it.",
+            help="Relative change of parameters, thrust and inertia that matters; of angles and gyro in proportion.",
         ),
     ] = 0.1,
     every: Annotated[

@@ -16,7 +16,7 @@ M. Basseville and I. V. Nikiforov, Detection of Abrupt Changes (1993), chapters 
 from expdesign.monitoring.calibration import Calibration, calibrate
 from expdesign.monitoring.changes import Change, watched_changes
 from expdesign.monitoring.cusum import Alarm, State, Step, estimates, threshold, watch
-from expdesign.monitoring.evidence import Grams, grams_of, joined
+from expdesign.monitoring.evidence import Grams, grams_of, joined, stretch_length
 from expdesign.monitoring.saved import restored_alarm, restored_calibration, restored_changes, restored_state, saved
 from expdesign.monitoring.tuning import TUNING
 
@@ -37,6 +37,7 @@ __all__ = [
     "restored_changes",
     "restored_state",
     "saved",
+    "stretch_length",
     "threshold",
     "watch",
     "watched_changes",

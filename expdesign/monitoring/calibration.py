@@ -32,6 +32,7 @@ class Calibration:
         rate: (m,) information of a stretch, on average, in inverse squared sizes and after inflation.
         alike: (m, m) correlation of scores: one where two changes cannot be told apart.
         stretches: number of stretches of the reference.
+        stretch_s: their length [s].
         misfit_limit: misfit per measured number beyond which a stretch is not judged.
     """
 
@@ -43,6 +44,7 @@ class Calibration:
     rate: Array
     alike: Array
     stretches: int
+    stretch_s: float
     misfit_limit: float
 
     def __post_init__(self) -> None:
@@ -73,13 +75,13 @@ def calibrate(grams: Grams) -> Calibration:
     """
     if len(grams) < TUNING.fewest_stretches:
         raise NotInformative(
-            f"the reference has {len(grams)} stretches of {TUNING.stretch_s:g} s with a usable simulation, expected at "
+            f"the reference has {len(grams)} stretches of {grams.stretch_s:g} s with a usable simulation, expected at "
             f"least {TUNING.fewest_stretches}"
         )
     m = grams.changes
     std, variance, change = _independent(grams)
     stretches = stretches_of(grams, std)
-    force = _varying(stretches.less(change), variance)
+    force = _varying(stretches.less(change), variance, grams.stretch_s)
     score, information = _filtered(stretches, force)
     whole = information.sum(axis=0)
     baseline = np.linalg.solve(whole + np.eye(m), score.sum(axis=0))
@@ -98,6 +100,7 @@ def calibrate(grams: Grams) -> Calibration:
         rate=np.diag(whole) / inflation / len(grams),
         alike=whole / np.outer(own, own),
         stretches=len(grams),
+        stretch_s=grams.stretch_s,
         misfit_limit=middle + TUNING.misfit_deviations * spread,
     )
 
@@ -146,7 +149,7 @@ def _improved(grams: Grams, total: Array, std: Array, variance: Array) -> tuple[
     return noise, np.maximum(np.einsum("wii->i", second)[STARTS:] / len(grams), LEAST_VARIANCE), change
 
 
-def _varying(stretches: Stretches, variance: Array) -> Force:
+def _varying(stretches: Stretches, variance: Array, stretch_s: float) -> Force:
     """The force as it varies from stretch to stretch: variances of its quick and slow parts, and the quick time."""
     part = replace(
         stretches,
@@ -156,20 +159,20 @@ def _varying(stretches: Stretches, variance: Array) -> Force:
     )
     q = len(variance)
     best = np.log2(np.concatenate([variance / 2, variance / 2, [TUNING.quick_s]]))
-    cost = float(likelihood(part, _force(best, q)))
+    cost = float(likelihood(part, _force(best, q, stretch_s)))
     for _ in range(TUNING.search_rounds):
         tried = best + np.concatenate([step * np.eye(2 * q + 1) for step in STEPS])
-        costs = likelihood(part, _force(tried, q))
+        costs = likelihood(part, _force(tried, q, stretch_s))
         gains = cost - costs
         better = [_best_step(gains.reshape(len(STEPS), -1)[:, place]) for place in range(2 * q + 1)]
         together = best + np.array(better)
-        whole = float(likelihood(part, _force(together, q)))
+        whole = float(likelihood(part, _force(together, q, stretch_s)))
         single = int(np.argmin(costs))
         new, value = (together, whole) if whole <= costs[single] else (tried[single], float(costs[single]))
         if cost - value < TUNING.search_gain:
             break
         best, cost = new, value
-    return _force(best, q)
+    return _force(best, q, stretch_s)
 
 
 def _best_step(gains: Array) -> float:
@@ -178,11 +181,11 @@ def _best_step(gains: Array) -> float:
     return float(STEPS[place]) if gains[place] > 0 else 0.0
 
 
-def _force(logarithms: Array, q: int) -> Force:
+def _force(logarithms: Array, q: int, stretch_s: float) -> Force:
     """Of (..., 2 q + 1) logarithms."""
     values = np.exp2(logarithms)
     variance = np.maximum(values[..., : 2 * q], LEAST_VARIANCE)
-    quick = np.broadcast_to(np.clip(values[..., -1:], TUNING.stretch_s / 2, TUNING.slow_s / 4), variance[..., :q].shape)
+    quick = np.broadcast_to(np.clip(values[..., -1:], stretch_s / 2, TUNING.slow_s / 4), variance[..., :q].shape)
     return Force(variance=variance, time_s=np.concatenate([quick, np.full_like(quick, TUNING.slow_s)], axis=-1))
 
 

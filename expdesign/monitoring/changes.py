@@ -39,8 +39,10 @@ def watched_changes(ship: ExtendedModel, *, size: float = TUNING.relative_size) 
 
     Args:
         ship: the model with what its file states.
-        size: relative change of parameters, thrust and inertia that matters.
+        size: relative change of parameters, thrust and inertia that matters; of angles and the yaw-rate sensor in
+            proportion.
     """
+    share = size / TUNING.relative_size
     model = ship.model
     values = dict(zip(model.names, model.parameters.tolist(), strict=True))
     changes = [
@@ -55,10 +57,14 @@ def watched_changes(ship: ExtendedModel, *, size: float = TUNING.relative_size) 
     changes.append(Change(effect="gain", size=size, unit=(0.01, "%"), words="thrust, or force of all actuators"))
     stems = dict.fromkeys(stem(name) for name in model.inputs)
     changes += [
-        Change(effect=f"offset:{name}", size=TUNING.angle_rad, unit=(1.0, "rad"), words=f"offset of {what} angles")
+        Change(
+            effect=f"offset:{name}", size=share * TUNING.angle_rad, unit=(1.0, "rad"), words=f"offset of {what} angles"
+        )
         for name, what in (("a", "azimuth"), ("rudder", "rudder"))
         if name in stems
     ]
     if "r" not in ship.derived and "r" in model.outputs:
-        changes.append(Change(effect="gyro", size=TUNING.gyro_share, unit=(0.01, "%"), words="scale of yaw rate"))
+        changes.append(
+            Change(effect="gyro", size=share * TUNING.gyro_share, unit=(0.01, "%"), words="scale of yaw rate")
+        )
     return tuple(changes)

@@ -210,7 +210,7 @@ def watch(
     stretches = stretches_of(grams, calibration.std)
     for index, products in enumerate(stretches.products):
         begin_s, count = float(stretches.time_s[index]), float(stretches.counts[index])
-        state = _waited(state, calibration, begin_s + TUNING.stretch_s)
+        state = _waited(state, calibration, begin_s + calibration.stretch_s)
         one = judged(_less(products, calibration.baseline), stretches.changes, state.known)
         if misfit_of(float(one.quadratic), one.score, one.information, count) > calibration.misfit_limit:
             state = replace(state, left_out=state.left_out + 1)

@@ -44,12 +44,14 @@ class Grams:
         products: (4, w, c, c) of the columns X (m), S (3), F and e, for u, v, r and the rate of the heading.
         counts: (4, w) measured samples.
         changes: m.
+        stretch_s: their length [s].
     """
 
     time_s: Array
     products: Array
     counts: Array
     changes: int
+    stretch_s: float
 
     def __post_init__(self) -> None:
         seal(self, time_s="w", products="4 w c c", counts="4 w")
@@ -72,7 +74,9 @@ class Grams:
         return int(self.products.shape[-1] - self.changes - STARTS - 1)
 
 
-def grams_of(ship: ExtendedModel, record: Record, changes: Sequence[Change], *, begins_s: Sequence[float]) -> Grams:
+def grams_of(
+    ship: ExtendedModel, record: Record, changes: Sequence[Change], *, begins_s: Sequence[float], stretch_s: float
+) -> Grams:
     """Inner products of all stretches of a record; those whose simulation diverges or with few samples are left out.
 
     Args:
@@ -80,11 +84,12 @@ def grams_of(ship: ExtendedModel, record: Record, changes: Sequence[Change], *, 
         record: measured data.
         changes: watched for.
         begins_s: time of the first sample of each batch [s].
+        stretch_s: length of a stretch [s].
 
     Raises:
         InputError: batches of different sample times.
     """
-    windows = cut_windows(ship.model, record, longest_s=TUNING.stretch_s)
+    windows = cut_windows(ship.model, record, longest_s=stretch_s)
     linear = linearise(simulate_from_measured(ship, windows))
     known = effect_disturbances(linear, [change.effect for change in changes])
     scale = np.array([change.size for change in changes])
@@ -104,6 +109,7 @@ def grams_of(ship: ExtendedModel, record: Record, changes: Sequence[Change], *, 
         products=products,
         counts=seen.sum(axis=1).T[:, keep],
         changes=len(changes),
+        stretch_s=stretch_s,
     )
 
 
@@ -114,7 +120,13 @@ def joined(parts: Sequence[Grams]) -> Grams:
         products=np.concatenate([part.products for part in parts], axis=1),
         counts=np.concatenate([part.counts for part in parts], axis=1),
         changes=parts[0].changes,
+        stretch_s=parts[0].stretch_s,
     )
+
+
+def stretch_length(length_m: float) -> float:
+    """Length of the stretches [s] for a ship of a length [m]: its motion scales as Froude's law has it."""
+    return max(5.0, 5.0 * float(round(TUNING.stretch_s * (length_m / TUNING.length_m) ** 0.5 / 5.0)))
 
 
 def _forces(linear: LinearisedMotion) -> list[Disturbance]:

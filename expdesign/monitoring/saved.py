@@ -27,7 +27,7 @@ def saved(value: Any) -> Any:
 def restored_calibration(table: dict[str, Any]) -> Calibration:
     """From `saved`."""
     arrays = {name: _array(values) for name, values in table.items() if isinstance(values, list)}
-    rest = {name: table[name] for name in ("stretches", "misfit_limit")}
+    rest = {name: table[name] for name in ("stretches", "stretch_s", "misfit_limit")}
     return Calibration(force=Force(**_arrays(table["force"])), **arrays, **rest)
 
 

@@ -10,7 +10,8 @@ class Tuning:
     """Sizes, lengths and limits.
 
     Attributes:
-        stretch_s: length of the stretches that are simulated [s].
+        stretch_s: length of the stretches that are simulated [s], for a ship of `length_m`.
+        length_m: see there [m].
         fewest_samples: measured samples of a stretch that is judged.
         iterations: of the expectation-maximisation of noise and force.
         fewest_stretches: of a reference.
@@ -33,9 +34,10 @@ class Tuning:
     """
 
     stretch_s: float = 60.0
+    length_m: float = 20.0
     fewest_samples: int = 15
     iterations: int = 60
-    fewest_stretches: int = 60
+    fewest_stretches: int = 40
     block_counts: tuple[int, ...] = (160, 80, 40, 20)
     misfit_deviations: float = 6.0
     as_likely: float = 3.0

@@ -86,13 +86,13 @@ def watched(
     """A record watched from its beginning, linearised anew after each change."""
     ship = extended_model(vessel, record)
     state, alarms, first = State.begun(calibration, time_s=0.0), list[Alarm](), 0
-    grams = grams_of(ship, record, changes, begins_s=[0.0])
+    grams = grams_of(ship, record, changes, begins_s=[0.0], stretch_s=TUNING.stretch_s)
     while first < len(grams):
         state, more, _, used = watch(calibration, state, grams.part(slice(first, None)), limit=limit)
         alarms, first = [*alarms, *more], first + used
         if first < len(grams):
             effects = {c.effect: c.size * x for c, x in zip(changes, state.shift.tolist(), strict=True) if x}
-            grams = grams_of(ship.with_effects(effects), record, changes, begins_s=[0.0])
+            grams = grams_of(ship.with_effects(effects), record, changes, begins_s=[0.0], stretch_s=TUNING.stretch_s)
     return state, alarms if state.alarm is None else [*alarms, state.alarm]
 
 
@@ -101,7 +101,9 @@ def study(trials: int, days: float) -> None:
     vessel = tender()
     reference = voyage_record(vessel, 12 * HOUR, seed=0)
     changes = watched_changes(extended_model(vessel, reference))
-    calibration = calibrate(grams_of(extended_model(vessel, reference), reference, changes, begins_s=[0.0]))
+    calibration = calibrate(
+        grams_of(extended_model(vessel, reference), reference, changes, begins_s=[0.0], stretch_s=TUNING.stretch_s)
+    )
     number = int(calibration.watched.sum())
     voyages = max(1, round(days * 2))
     limits = {between: threshold(number, between * DAY / TUNING.stretch_s) for between in (0.25, 1.0, 30.0)}

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.export.files import finite, strict_json
-from expdesign.monitoring import TUNING, Alarm, Calibration, Change, State
+from expdesign.monitoring import Alarm, Calibration, Change, State
 from expdesign.values import Array
 
 ALIKE = 0.95
@@ -94,7 +94,7 @@ def sentences(content: MonitorContent) -> tuple[str, ...]:
 
 def _sentences(content: MonitorContent) -> Iterator[str]:
     state, found = content.state, content.found
-    judged_h = state.judged * TUNING.stretch_s / HOUR
+    judged_h = state.judged * content.calibration.stretch_s / HOUR
     rate = f"with at most one false alarm in {content.false_alarm_days:g} days on average"
     if not found:
         largest = max((moment.statistic for moment in content.moments), default=0.0)
@@ -155,7 +155,7 @@ def alike(content: MonitorContent, number: int) -> list[str]:
 def delay_s(content: MonitorContent, number: int) -> float:
     """Expected time to the alarm after a change of its size [s], in data like the reference."""
     rate = float(content.calibration.rate[number])
-    return float(np.ceil(2.0 * content.limit / rate)) * TUNING.stretch_s if rate > 0 else float("inf")
+    return float(np.ceil(2.0 * content.limit / rate)) * content.calibration.stretch_s if rate > 0 else float("inf")
 
 
 HEADER = ("change", "size watched for", "alarm after", "since the watch began", "not distinguishable from")
@@ -189,8 +189,8 @@ def monitor_json(content: MonitorContent) -> str:
         {
             "verdict": sentences(content),
             "vessel": content.vessel,
-            "judged_h": state.judged * TUNING.stretch_s / HOUR,
-            "not_judged_h": state.left_out * TUNING.stretch_s / HOUR,
+            "judged_h": state.judged * content.calibration.stretch_s / HOUR,
+            "not_judged_h": state.left_out * content.calibration.stretch_s / HOUR,
             "rows_without_numbers": content.left_out_rows,
             "threshold": content.limit,
             "false_alarm_days": content.false_alarm_days,

@@ -6,7 +6,6 @@ from expdesign.export.monitor_page.content import HEADER, MonitorContent, monito
 from expdesign.export.monitor_page.figures import estimate_figure, statistic_figure
 from expdesign.export.pages import page_templates
 from expdesign.export.pages.figures import report_style
-from expdesign.monitoring import TUNING
 
 
 def monitor_html(content: MonitorContent) -> str:
@@ -22,6 +21,5 @@ def monitor_html(content: MonitorContent) -> str:
             header=tuple(name.capitalize() for name in HEADER),
             rows=monitor_tables(content),
             figures=figures,
-            stretch_s=TUNING.stretch_s,
         )
     )

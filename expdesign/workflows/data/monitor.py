@@ -95,7 +95,7 @@ def monitor(
         size_bytes = source.stat().st_size if source != STREAM and source.is_file() else 0
         read = 0
         for piece in pieces(
-            source, inputs=asked.vessel.model.inputs, stretch_s=TUNING.stretch_s, most_rows=rows,
+            source, inputs=asked.vessel.model.inputs, stretch_s=asked.stretch_s, most_rows=rows,
             before=() if number else left, more_follow=number + 1 == len(data),
         ):  # fmt: skip
             now = with_piece(now, piece, asked)
@@ -135,7 +135,7 @@ def _check(
 def _with_reference(now: Watch, reference: Sequence[Path], asked: Asked, progress: Progress) -> Watch:
     """Calibrated on files of a reference, if there are some; the times of the data begin anew."""
     for source in reference:
-        for piece in pieces(source, inputs=asked.vessel.model.inputs, stretch_s=TUNING.stretch_s, most_rows=MOST_ROWS):
+        for piece in pieces(source, inputs=asked.vessel.model.inputs, stretch_s=asked.stretch_s, most_rows=MOST_ROWS):
             progress(f"reading the reference, {source.name}", 0.0)
             now, parts = read_piece(now, piece, asked)
             now = replace(now, learnt=(*now.learnt, *(part.grams(now) for part in parts)))
@@ -208,7 +208,7 @@ def _resumed(path: Path) -> Watch:
 
 def _summary(content: MonitorContent) -> dict[str, object]:
     return {
-        "judged_h": content.state.judged * TUNING.stretch_s / HOUR,
+        "judged_h": content.state.judged * content.calibration.stretch_s / HOUR,
         "alarms": len(content.found),
         "remarks": list(sentences(content)),
     }

@@ -23,6 +23,7 @@ from expdesign.monitoring import (
     estimates,
     grams_of,
     joined,
+    stretch_length,
     threshold,
     watch,
     watched_changes,
@@ -93,6 +94,11 @@ class Asked:
     false_alarm_days: float
     velocity: str
 
+    @property
+    def stretch_s(self) -> float:
+        """Length of a stretch [s]."""
+        return stretch_length(self.vessel.length_m)
+
 
 def read_piece(now: Watch, piece: Piece, asked: Asked) -> tuple[Watch, tuple[Reading, ...]]:
     """A piece with its inner products, none where it has no rows, and the watch at its end."""
@@ -110,7 +116,7 @@ def read_piece(now: Watch, piece: Piece, asked: Asked) -> tuple[Watch, tuple[Rea
     told = [note.replace(piece.path.name, piece.source.name) for note in record.notes]
     notes = tuple({re.sub(r"\d+", "", note): note for note in (*told, *now.notes)}.values())
     now = replace(now, changes=changes, now_s=float(times[-1]), notes=notes)
-    return now, (Reading(piece=piece, ship=ship, record=record, begins_s=tuple(begins)),)
+    return now, (Reading(piece=piece, ship=ship, record=record, begins_s=tuple(begins), stretch_s=asked.stretch_s),)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -121,6 +127,7 @@ class Reading:
     ship: ExtendedModel
     record: Record
     begins_s: tuple[float, ...]
+    stretch_s: float
 
     def grams(self, now: Watch) -> Grams:
         """Inner products, linearised at the ship as it is known to have changed."""
@@ -130,7 +137,9 @@ class Reading:
             for change, value in zip(now.changes, shift.tolist(), strict=True)
             if value
         }
-        return grams_of(self.ship.with_effects(effects), self.record, now.changes, begins_s=self.begins_s)
+        return grams_of(
+            self.ship.with_effects(effects), self.record, now.changes, begins_s=self.begins_s, stretch_s=self.stretch_s
+        )
 
 
 def with_piece(now: Watch, piece: Piece, asked: Asked) -> Watch:
@@ -158,24 +167,27 @@ def calibrated(now: Watch) -> Watch:
         raise NotInformative("the reference has no rows")
     calibration = calibrate(joined(now.learnt))
     if not calibration.watched.any():
+        best = int(np.argmax(calibration.rate))
+        larger = TUNING.known_within / np.sqrt(max(float(calibration.rate[best]) * calibration.stretches, 1e-12))
         raise NotInformative(
-            f"the reference of {calibration.stretches} stretches tells no change well enough to watch for it, expected "
-            "a longer one, or one with more manoeuvres"
+            f"the reference of {calibration.stretches} stretches of {calibration.stretch_s:g} s tells no change well "
+            f"enough to watch for it: take a longer one, or one with more manoeuvres, or watch for larger changes, "
+            f"{larger:.2g} times as large at least (--size), for {now.changes[best].words}"
         )
-    end_s = float(now.learnt[-1].time_s[-1]) + TUNING.stretch_s
+    end_s = float(now.learnt[-1].time_s[-1]) + calibration.stretch_s
     return replace(now, calibration=calibration, learnt=(), reference_s=end_s)
 
 
 def limit_of(now: Watch, days: float) -> float:
     """The threshold for so many days between false alarms."""
     assert now.calibration is not None
-    return threshold(int(now.calibration.watched.sum()), days * DAY / TUNING.stretch_s)
+    return threshold(int(now.calibration.watched.sum()), days * DAY / now.calibration.stretch_s)
 
 
 def _watched(now: Watch, read: Reading, asked: Asked, *, first_s: float = -np.inf) -> Watch:
     """After the stretches of a piece that begin at a time or later were watched."""
     assert now.calibration is not None
-    limit, hour = limit_of(now, asked.false_alarm_days), round(HOUR / TUNING.stretch_s)
+    limit, hour = limit_of(now, asked.false_alarm_days), round(HOUR / now.calibration.stretch_s)
     moments, raised = list(now.moments), list[Alarm]()
     grams = read.grams(now)
     first = int(np.searchsorted(grams.time_s, first_s))
