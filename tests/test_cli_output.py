@@ -127,6 +127,18 @@ def workflows(monkeypatch: pytest.MonkeyPatch) -> Workflows:
             },
         ),
         (
+            "foresee s.toml",
+            "foresee",
+            (Path("s.toml"), None),
+            {"plan": None, "jobs": 1, "cache": True, "seed": 0},
+        ),
+        (
+            "foresee s.toml --plan p.json --out o --jobs 2 --no-cache --seed 3",
+            "foresee",
+            (Path("s.toml"), Path("o")),
+            {"plan": Path("p.json"), "jobs": 2, "cache": False, "seed": 3},
+        ),
+        (
             "simulate p.json --truth v.toml",
             "simulate",
             (Path("p.json"), None),

@@ -24,6 +24,7 @@ from expdesign.foresight import (
     weather_without_causes,
     with_effect,
 )
+from expdesign.foresight.effects import disturbance_at
 from expdesign.scenario import load_scenario
 from expdesign.vessel import Vessel
 
@@ -112,6 +113,15 @@ def test_what_uncertain_parameters_imitate_is_harder_to_find(foreseen, of_known_
     assert 0.5 < kept("forward_m") < 1.1
 
 
+def test_a_heavier_ship_is_not_heavier_in_proportion(known, foreseen):
+    """Twice the inertia halves the accelerations: by less than twice what a little more inertia takes, per unit."""
+    item = foreseen["inertia_factor_u"]
+    (direction,) = item.effect.directions
+    linear = known.base.linear
+    little, much = (disturbance_at(linear, direction, size).force[..., 0] / size for size in (1e-4, 1.0))
+    assert np.abs(much).max() == pytest.approx(0.5 * np.abs(little).max(), rel=1e-3)
+
+
 def test_a_lag_and_a_dead_time_are_not_told_apart_but_a_current_and_a_gyro_are(foreseen):
     lag = {item.cause: item for item in foreseen["lag_all_s"].confusions}
     assert lag["actuator_delay"].cosine > 0.95
@@ -123,12 +133,14 @@ def test_a_lag_and_a_dead_time_are_not_told_apart_but_a_current_and_a_gyro_are(f
             assert item.named <= item.power + 4 * np.sqrt(item.power * (1 - item.power) / 2000) + 1e-9
 
 
-def share_found(case, known, found, wanted: float, trials: int) -> float:
-    """Share of simulated trials in which the likelihood ratio test accepts an effect, at the size with a power."""
+def shares_found(case, known, found, wanted: float, trials: int) -> tuple[float, float]:
+    """Foreseen and simulated share of trials in which the likelihood ratio test accepts an effect, at about a power."""
     vessel, runs, weather = case
     (direction,) = found.effect.directions
     least = needed_noncentrality(wanted, found.freedom, found.level)
     size = found.change * np.sqrt(least / found.noncentrality)  # of these effects the number in results is the effect
+    effects = foresee(vessel, runs, weather, sizes={found.cause: size}).effects
+    (there,) = [item for item in effects if (item.cause, item.name) == (found.cause, found.name)]
     calm, stated, hits = weather_without_causes(vessel, weather), known.base.ship.without_effects({*known.base.keys}), 0
     for trial in range(trials):
         rng = np.random.default_rng([3, trial])
@@ -139,7 +151,7 @@ def share_found(case, known, found, wanted: float, trials: int) -> float:
         (test,) = score_tests(base, [found.effect.candidate])
         fitted = fit_candidate(base, windows, starting_point(base, test))
         hits += fitted is not None and chi2.sf(fitted.likelihood_gain, found.freedom) <= found.level
-    return hits / trials
+    return there.power, hits / trials
 
 
 EFFECTS = ("inertia_factor_r", "heading_bias_rad", "forward_m", "thrust_offset_m", "Y_abs_v_v", "lag_all_s")
@@ -154,5 +166,6 @@ EFFECTS = ("inertia_factor_r", "heading_bias_rad", "forward_m", "thrust_offset_m
 )
 def test_the_test_finds_as_often_as_foreseen(case, known, foreseen, name, trials):
     """Within three standard errors of the binomial distribution, and eight points for the noise that is estimated."""
-    found = share_found(case, known, foreseen[name], 0.6, trials)
-    assert abs(found - 0.6) < 3 * np.sqrt(0.6 * 0.4 / trials) + 0.08
+    predicted, found = shares_found(case, known, foreseen[name], 0.6, trials)
+    assert abs(predicted - 0.6) < 0.15  # sizes are scaled in proportion
+    assert abs(found - predicted) < 3 * np.sqrt(predicted * (1 - predicted) / trials) + 0.08

@@ -12,8 +12,8 @@ import numpy as np
 from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.fit import Fit
-from expdesign.diagnosis.model import ExtendedModel
-from expdesign.diagnosis.motion import Disturbance, LinearisedMotion
+from expdesign.diagnosis.model import ROLL, ExtendedModel
+from expdesign.diagnosis.motion import Disturbance, LinearisedMotion, disturbance_of
 from expdesign.diagnosis.select import candidate_disturbances
 from expdesign.diagnosis.vessel_file import public_name
 from expdesign.vessel import stem
@@ -26,12 +26,10 @@ class Direction:
     Attributes:
         shares: effect of the extended model -> its share of the size.
         fixed: effects that say which candidate it is.
-        finite: the effect is not proportional to its size.
     """
 
     shares: Mapping[str, float]
     fixed: Mapping[str, float] = field(default_factory=dict)
-    finite: bool = False
 
     def at(self, size: float) -> dict[str, float]:
         """Effects of the extended model at a size."""
@@ -78,7 +76,7 @@ def hidden_effects(candidates: Sequence[Candidate], base: Fit, windows: Windows)
         if not (len(keys) == 1 or together or heavier) or _is_one_of_a_kind(keys[0], base.ship):
             continue
         parts = [dict.fromkeys(keys, 1.0)] if heavier else [{key: 1.0} for key in keys]
-        directions = tuple(Direction(shares=part, fixed=item.fixed, finite=item.finite) for part in parts)
+        directions = tuple(Direction(shares=part, fixed=item.fixed) for part in parts)
         found.setdefault((item.cause, keys), HiddenEffect(candidate=item, directions=directions))
     order = {id(item): number for number, item in enumerate(candidates)}
     return tuple(sorted(found.values(), key=lambda effect: order[id(effect.candidate)]))
@@ -117,21 +115,23 @@ def lasting(direction: Direction) -> Direction:
 
 
 def disturbance_at(linear: LinearisedMotion, direction: Direction, size: float) -> Disturbance:
-    """The change of rates and sensors along a path by an effect of some size."""
-    if direction.finite:
-        ship = linear.motion.ship
-        free = {key: ship.get(key) + size * share for key, share in direction.shares.items()}
-        whole = Candidate(cause="", free=free, fixed=direction.fixed, finite=True)
-        ((_, disturbance),) = candidate_disturbances(linear, whole)
-        return disturbance()
-    item = Candidate(cause="", free=dict.fromkeys(direction.shares, 0.0), fixed=direction.fixed)
-    parts = [disturbance() for _, disturbance in candidate_disturbances(linear, item)]
-    weights = [size * share for share in direction.shares.values()]
-    forces = [weight * part.force for weight, part in zip(weights, parts, strict=True) if part.force is not None]
-    sensors = [weight * part.sensor for weight, part in zip(weights, parts, strict=True) if part.sensor is not None]
-    return Disturbance(
-        force=np.sum(forces, axis=0) if forces else None, sensor=np.sum(sensors, axis=0) if sensors else None
-    )
+    """The change of rates and sensors along a path by an effect of some size, as a whole.
+
+    A ship that is heavier by a tenth accelerates by an eleventh less: sizes that matter are not always small. A roll
+    mode that the path lacks acts in proportion to its size.
+    """
+    if any(key in ROLL for key in direction.fixed):
+        item = Candidate(cause="", free=dict.fromkeys(direction.shares, 0.0), fixed=direction.fixed)
+        parts = [disturbance() for _, disturbance in candidate_disturbances(linear, item)]
+        forces = [
+            part.force * size * share
+            for part, share in zip(parts, direction.shares.values(), strict=True)
+            if part.force is not None
+        ]
+        return Disturbance(force=np.sum(forces, axis=0) if forces else None, sensor=None)
+    ship = linear.motion.ship
+    free = {key: ship.get(key) + size * share for key, share in direction.shares.items()}
+    return disturbance_of(linear, ship.with_effects({**direction.fixed, **free}), 1.0)
 
 
 def described(direction: Direction, ship: ExtendedModel) -> tuple[str, float, str]:

@@ -33,6 +33,8 @@ SENSORS = ("heading_bias", "lever", "gyro", "late")
 """Kinds of effects that change no motion."""
 WEATHER = ("current", "wind")
 """Kinds of effects that standard trials, in calm water, do not have."""
+PROPORTIONAL = ("theta:", "term:")
+"""Effects in proportion to their size."""
 NEGLIGIBLE = 1e-6
 """Loss of fit [points] that counts as none."""
 
@@ -157,7 +159,7 @@ def _by_fit(item: Direction, trials: StandardTrials | None, default: float) -> S
         return usual
     there = lasting(item)
     size = default if math.isfinite(default) else 1.0
-    for _ in range(TUNING.size_rounds if item.finite else 1):
+    for _ in range(1 if item.key.startswith(PROPORTIONAL) else TUNING.size_rounds):
         lost = fit_loss(trials, there, size)
         if not lost > NEGLIGIBLE:
             return usual
@@ -168,7 +170,10 @@ def _by_fit(item: Direction, trials: StandardTrials | None, default: float) -> S
 
 
 def fit_loss(trials: StandardTrials, item: Direction, size: float) -> float:
-    """Loss of simulated fit [points], mean over the outputs, by an effect of some size, to first order."""
+    """Loss of simulated fit [points], mean over the outputs, by an effect of some size.
+
+    The effect is whole, the motion is linear in the forces that it changes.
+    """
     answer = responses(trials.linear, [disturbance_at(trials.linear, item, size)])[0]
     columns = [OUTPUTS.index(name) for name in trials.ship.model.outputs]
     lost = (answer[..., columns] ** 2 * np.isfinite(trials.linear.motion.windows.measured[..., columns])).sum(
