@@ -180,7 +180,7 @@ class _Search:
     def untried(self, prices: Prices, days: Sequence[DraftedDay], tried: Sequence[Choice]) -> Choice | None:
         """The cheapest runs not tried yet that should reach the accuracy, by some margin.
 
-        None where no day is expected to be about as short as the shortest that reaches it, go-arounds included.
+        None where no day is expected to be shorter than the shortest that reaches it, go-arounds included.
 
         Raises:
             NoAnswer: by the first prices, no runs within the limits reach it.
@@ -195,7 +195,7 @@ class _Search:
                     raise
                 return None  # the limits allow no more than what was tried
             if all(choice.repeats != earlier.repeats for earlier in tried):
-                return choice if expected_s < TUNING.worth_trying * reached else None
+                return choice if expected_s < reached else None
         return None
 
     def chosen(

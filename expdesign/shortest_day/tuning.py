@@ -17,7 +17,6 @@ class Tuning:
         first_leg_s: time of repositioning for each run, before a day has been planned [s].
         nearest: days to the accuracy, from which the next is sought.
         other_runs: of each manoeuvre that it has more or fewer, at most.
-        worth_trying: longest day expected for which one is drafted, in the shortest that reaches the accuracy.
         level_step, level_steps: margin that is asked for besides where the cheapest runs were tried already, at most so
             many times.
         compared: days that reach the accuracy and are planned, of which that with the least median of drawn trials is
@@ -50,7 +49,6 @@ class Tuning:
     first_leg_s: float = 15.0
     nearest: int = 3
     other_runs: int = 2
-    worth_trying: float = 1.01
     level_step: float = 0.05
     level_steps: int = 10
     compared: int = 2
