@@ -185,26 +185,28 @@ class _Search:
         Raises:
             NoAnswer: by the first prices, no runs within the limits reach it.
         """
-        reached = min((day.expected_s for day in days if day.margin >= 0), default=np.inf)
+        reached_s = min((day.expected_s for day in days if day.margin >= 0), default=np.inf)
         for step in range(TUNING.level_steps):
             margin = step * TUNING.level_step
             try:
-                choice, expected_s = self.chosen(prices, days, tried, margin=margin)
+                found = self.choices(prices, days, tried, margin=margin)
             except NoAnswer:
                 if not tried:
                     raise
                 return None  # the limits allow no more than what was tried
-            if all(choice.repeats != earlier.repeats for earlier in tried):
-                return choice if expected_s < reached else None
+            fresh = [one for one in found if all(one[0].repeats != earlier.repeats for earlier in tried)]
+            if fresh:
+                choice, expected_s = min(fresh, key=lambda one: one[1])
+                return choice if expected_s < reached_s else None
         return None
 
-    def chosen(
+    def choices(
         self, prices: Prices, days: Sequence[DraftedDay], tried: Sequence[Choice], *, margin: float
-    ) -> tuple[Choice, float]:
+    ) -> list[tuple[Choice, float]]:
         """The cheapest runs that reach a margin by the prices, and the day expected with them [s].
 
-        Once days have been drafted, runs differ by few from one of these, and what tells and what it takes is counted
-        from there: of the days nearest to the accuracy the one from which the shortest is expected.
+        Once days have been drafted, runs differ by few from one of those nearest to the accuracy, and what tells and
+        what it takes is counted from there.
 
         Raises:
             NoAnswer: none within the limits do.
@@ -218,8 +220,8 @@ class _Search:
                 found.append((choice, day.expected_s - saved_s))
         if not found:
             choice = cheapest_runs(self.accuracy, offer, level=prices.level + margin, tangents=tangents)
-            return choice, -np.inf  # nothing to compare with
-        return min(found, key=lambda one: one[1])
+            found.append((choice, -np.inf))  # nothing to compare with
+        return found
 
     def cheapest(self, days: Sequence[DraftedDay]) -> Choice:
         """The cheapest runs of the whole dictionary by the prices learnt."""
