@@ -8,6 +8,7 @@ import pytest
 
 from expdesign import workflows
 from expdesign.cli import main
+from expdesign.durations import InformationFloor
 from expdesign.errors import NoAnswer
 from expdesign.foresight import design_runs, foresee, told_apart_from, told_apart_with
 from expdesign.scenario import load_scenario
@@ -45,13 +46,22 @@ def test_a_design_reveals_what_it_is_asked_to(tmp_path):
     assert design.gap < 1e-5
     assert design.certificate.multipliers["power to reveal lever_arm as forward_m"] > 0
     free = workflows.designed(load_scenario(SCENARIOS / "story.toml"), information)
-    primitives = [item.primitive for item in information]
-    least = []
-    for runs in (free.repeats, design.repeats):
-        found = foresee(case.vessel, design_runs(primitives, runs), case.environment)
-        least.append(max(item.least_change for item in found.effects if item.cause == "lever_arm"))
-    assert least[0] > 1.1 * 0.16
-    assert least[1] < 1.1 * 0.16
+    shares = {
+        name: np.array(item.repeats) * item.problem.run_s / 720.0 for name, item in (("free", free), ("own", design))
+    }
+    told = {name: min(told_of(item, share) for item in design.problem.floors) for name, share in shares.items()}
+    assert told["free"] < 0.9
+    assert told["own"] >= 1.0 - 1e-5
+    found = foresee(
+        case.vessel, design_runs([item.primitive for item in information], design.repeats), case.environment
+    )
+    assert max(item.least_change for item in found.effects if item.cause == "lever_arm") < 1.1 * 0.16
+
+
+def told_of(floor: InformationFloor, shares: np.ndarray) -> float:
+    """Information of shares of the time over what is asked for."""
+    M = floor.prior + np.tensordot(shares, floor.matrices, axes=1)
+    return float(1.0 / np.trace(floor.L.T @ np.linalg.inv(M) @ floor.L) / floor.least)
 
 
 def test_a_cause_that_cannot_be_revealed_is_refused_with_the_best_probability(tmp_path):
