@@ -51,8 +51,16 @@ class Missing:
 
 
 def missing_effects(base: Fit, windows: Windows, rng: np.random.Generator) -> tuple[Missing, ...]:
-    """A sparse sum of terms and of kinds of effects that explains what a fit leaves, best first; empty for noise."""
-    base = _begun_anew(base, windows)
+    """A sparse sum of terms and of kinds of effects that explains what a fit leaves, best first; empty for noise.
+
+    Long windows show small effects, short ones large effects, which would lead a long simulation away from the ship.
+    """
+    tried = [_missing_from(item, rng) for item in (base, _begun_anew(base, windows))]
+    return max(tried, key=lambda found: found[0].chosen.statistic if found else 0.0)
+
+
+def _missing_from(base: Fit, rng: np.random.Generator) -> tuple[Missing, ...]:
+    """The same in the windows of a fit."""
     windows, ship = base.linear.motion.windows, base.ship
     terms = term_dictionary(ship.model, ship.library)
     wider = replace(ship, library={**ship.library, **terms})

@@ -218,7 +218,7 @@ def _starting_points(base: Fit, windows: Windows, tests: tuple[ScoreTest, ...]) 
     short_tests = None if short_fit is None else score_tests(short_fit, [item.candidate for item in tests])
     if short_fit is None or short_tests is None or _explained_share(short_tests, short_fit) < TUNING.large_share:
         return [starting_point(base, test) for test in shortlist], False
-    certain = shortlist[: TUNING.certain]
+    certain = [*shortlist[: TUNING.certain], *_hidden_by_random_current(base, tests)]
     listed = {id(item.candidate) for item in certain}
     multiplicity = {id(item.candidate): item.multiplicity for item in tests}
     others = [
