@@ -20,7 +20,7 @@ from expdesign.simulation import Environment, Variation, simulate_ensemble
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.vessel import Sensors, Vessel
 
-METHODS = ("ls", "iv", "iv-augmented", "iv-air", "iv-wind", "oe", "oe-air")
+METHODS = ("ls", "iv", "iv-augmented", "iv-air", "iv-wind", "oe", "oe-air", "iv-current", "iv-air-current")
 FROM_POSE = Sensors(position_m=0.02, heading_rad=0.005, wind_mps=0.0316)
 AT_ONCE = 20
 
@@ -54,10 +54,10 @@ class Case:
         """A mean current only for methods that estimate it, wind only for those that read it."""
         memory_s = 100.0 if self.wandering else 0.0
         calm = Environment(
-            current_to=CURRENT if self.method in ("iv-augmented", "iv-wind") else np.zeros(2),
+            current_to=CURRENT if self.method.endswith(("augmented", "wind", "current")) else np.zeros(2),
             current_variation=Variation(std_mps=0.03, correlation_s=memory_s),
         )
-        if not self.method.endswith(("air", "wind")):
+        if not {"air", "wind"} & {*self.method.split("-")}:
             return calm
         return replace(calm, wind_to=np.array([4.0, -3.0]), wind_variation=Variation(std_mps=0.5, correlation_s=30.0))
 
