@@ -307,10 +307,12 @@ def _with_instruments(
     start = layout.model.parameters
     if choices.start == "ls":
         start = full_parameters(layout, _start(rows, choices).values)
-    try:
-        first = simulation.instruments(start)
-    except Diverged as error:
-        raise Diverged(f"instruments cannot be simulated from the {choices.start} model: {error}") from None
+
+    def first() -> Array:
+        try:
+            return simulation.instruments(start)
+        except Diverged as error:
+            raise Diverged(f"instruments cannot be simulated from the {choices.start} model: {error}") from None
 
     def refined(some: Rows) -> Refined:
         return refine_iv(

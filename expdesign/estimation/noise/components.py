@@ -29,7 +29,7 @@ Introduction to Stochastic Processes (1955), for the test.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -108,10 +108,10 @@ def nothing_taken(rows: int) -> Fitted:
     return Fitted(*np.zeros((2, rows, 0)))
 
 
-def left_shapes(parts: Sequence[Stretch], slow: tuple[Slow, ...], by: Sequence[Fitted]) -> list[list[Array]]:
-    """Expected periodograms (2 + m, f) of each output and stretch, for parts of unit variance."""
+def left_shapes(parts: Sequence[Stretch], slow: tuple[Slow, ...], by: Sequence[Fitted]) -> Iterator[list[Array]]:
+    """Expected periodograms (2 + m, f) of the stretches for parts of unit variance, output by output."""
     shapes = _shapes(parts, slow)
-    return [_less(shapes, parts, slow, own) for own in by]
+    return (_less(shapes, parts, slow, own) for own in by)
 
 
 def slow_parts(parts: Sequence[Stretch]) -> tuple[Slow, ...]:

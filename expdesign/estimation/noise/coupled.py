@@ -18,7 +18,7 @@ Source: P. Whittle, Journal of the Royal Statistical Society B 15 (1953), 125-13
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -194,7 +194,7 @@ class _Spectra:
         return np.array([misfit_of(self.frequency, *pair) for pair in zip(self.ordinates, level, strict=True)])
 
 
-def _spectra(eps: Array, A: Array, parts: Sequence[Stretch], left: Sequence[Sequence[Array]]) -> _Spectra:
+def _spectra(eps: Array, A: Array, parts: Sequence[Stretch], left: Iterable[Sequence[Array]]) -> _Spectra:
     count, n = eps.shape
     frequency = np.concatenate([2 * np.pi * np.arange(part.samples // 2 + 1) / part.samples for part in parts])
     cross = np.concatenate([_cross_periodograms(eps, part) for part in parts], axis=2)

@@ -120,17 +120,18 @@ def _propagated(problem: Problem, layout: Layout, record: Record, simulated: _Li
     G = _inverse(np.tensordot(1.0 / problem.weights, sensed, 1))
     for sample in range(len(lead) - 2, -1, -1):  # summed backwards to lambda, in place
         lead[sample] += A[sample].swapaxes(1, 2) @ lead[sample + 1]
-    rows = _steps_of(problem, record)
-    Z, errors, owner = rows.of(lead[1:]), simulated.errors, _owners(problem, layout)
+    rows, errors, owner = _steps_of(problem, record), simulated.errors, _owners(problem, layout)
+    W = (G.T @ rows.of(lead[1:]).transpose(1, 2, 0)).transpose(2, 0, 1)  # columns in one piece
+    del lead  # as large as the derivatives
     eps = rows.of(errors[1:] - np.einsum("lwab,lwb->lwa", A, errors[:-1]))
     by = []
     for output in range(len(layout.model.outputs)):
         own = np.flatnonzero(owner == output)
         Phi = slopes[1:, :, output, own] - np.einsum("lwb,lwbp->lwp", A[:, :, output], slopes[:-1, :, :, own])
-        by.append(Fitted(rows.of(Phi), Z[:, output] @ G[:, own]))
+        by.append(Fitted(rows.of(Phi), W[:, output, own]))
     found = fit_coupled(eps, rows.of(A), rows.parts, by)
-    P, doubt = coupled_covariance(Z @ G, G @ sensed @ G, found, rows.parts)
-    changing = changing_variance(Z, G, eps, rows.batch, rows.step)
+    P, doubt = coupled_covariance(W, G @ sensed @ G, found, rows.parts)
+    changing = changing_variance(W, eps, rows.batch, rows.step)
     scale = changing * widening(np.diag(P), doubt)
     return P * np.outer(scale, scale), found.misfit
 

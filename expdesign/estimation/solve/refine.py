@@ -26,10 +26,12 @@ import numpy as np
 
 from expdesign.errors import Diverged, NotInformative
 from expdesign.estimation.regression import Regression
-from expdesign.estimation.solve.solution import Solution, Weighting, build_equations, solve, solve_quick
+from expdesign.estimation.solve.solution import Solution, Weighting, build_equations, build_parts, solve_quick, solved
 from expdesign.estimation.tuning import TUNING
 from expdesign.values import Array
 
+First = Callable[[], Array]
+"""The first instruments (k, n, p), each time anew: not kept, as they are among the largest of arrays."""
 Simulate = Callable[[Array], Array]
 """Parameter values (p,) of the regression -> instruments (k, n, p); raises Diverged."""
 
@@ -74,7 +76,7 @@ class Refined:
 
 def refine_iv(
     regression: Regression,
-    first: Array,
+    first: First,
     simulate: Simulate,
     weighting: Weighting,
     *,
@@ -82,7 +84,7 @@ def refine_iv(
     most: int = TUNING.most_refinements,
     settled: float = TUNING.settled_deviations,
 ) -> Refined:
-    """Refine from first instruments (k, n, p).
+    """Refine from first instruments.
 
     A model that loses sight of parameters during refinement ends it with a warning, and so does one that diverges where
     there is no prior; the estimate is then the last one whose instruments could be simulated.
@@ -90,34 +92,42 @@ def refine_iv(
     Raises:
         NotInformative: the first instruments already fail.
     """
-    equations = build_equations(regression, first, weighting)
-    instruments, (values, covariance) = first, solve_quick(equations, first)
+    instruments = first()
+    equations = build_equations(regression, instruments, weighting)
+    values, covariance = solve_quick(equations, instruments)
+    origin: tuple[Array, Array] | None = None  # of the instruments that the values are from
     moved, count, weight, warnings = np.zeros(len(values)), 0, 0.0, []
     while count < most:
+        del instruments
+        before = values, covariance
         try:
-            newer_instruments, weight = _bounded(simulate, values, covariance, prior)
-            newer, covariance = solve_quick(equations, newer_instruments)
+            instruments, weight = _bounded(simulate, values, covariance, prior)
+            newer, covariance = solve_quick(equations, instruments)
         except Diverged as error:
             warnings.append(f"Refinement stopped: the estimated model is unstable ({error}).")
+            instruments = _made_again(first, simulate, origin, prior)
             break
         except NotInformative as error:
             warnings.append(f"Refinement stopped: {error}.")
+            instruments = _made_again(first, simulate, origin, prior)
             break
         deviations = np.sqrt(np.diag(covariance))
         moved = np.abs(newer - values) / np.maximum(deviations, 1e-150)
-        instruments, values, count = newer_instruments, newer, count + 1
+        origin, values, count = before, newer, count + 1
         if moved.max() < settled:
             break
-    newest = instruments
+    restless = np.zeros(len(equations.uses), dtype=bool)
     if count == most and moved.max() >= settled:
         warnings.append(
             f"The estimate still changes by {moved.max():.2g} standard deviations after {most} refinements; equations "
             "that do not settle keep their first instruments."
         )
-        restless = (equations.uses[:, moved >= settled] > 0).any(axis=1, keepdims=True)  # (n, 1)
-        instruments = np.where(restless, first, instruments)
-    solution = solve(equations, instruments)
-    if instruments is not newest:
+        restless = np.asarray((equations.uses[:, moved >= settled] > 0).any(axis=1))
+        instruments = np.where(restless[:, None], first(), instruments)
+    parts = build_parts(equations, instruments)
+    del instruments
+    solution = solved(equations, parts)
+    if restless.any():
         try:
             _, weight = _bounded(simulate, solution.values, solution.covariance, prior)
         except Diverged as error:
@@ -131,6 +141,11 @@ def refine_iv(
         f"{shift:.2g} standard deviations."
     )
     return Refined(replace(solution, values=drawn, residuals=regression.residuals(drawn)), count, tuple(warnings))
+
+
+def _made_again(first: First, simulate: Simulate, origin: tuple[Array, Array] | None, prior: Prior | None) -> Array:
+    """Instruments from values and their covariance that gave some before; the first ones without."""
+    return first() if origin is None else _bounded(simulate, *origin, prior)[0]
 
 
 def _bounded(simulate: Simulate, values: Array, covariance: Array, prior: Prior | None) -> tuple[Array, float]:

@@ -42,7 +42,7 @@ from expdesign.estimation.noise import (
     timeline,
     white_parts,
 )
-from expdesign.estimation.regression import Integers, Regression, batch_slices
+from expdesign.estimation.regression import Integers, Regression
 from expdesign.estimation.solve.systems import Part
 from expdesign.estimation.solve.weighting import Weighting
 from expdesign.estimation.tuning import TUNING
@@ -72,8 +72,7 @@ def covariance_of(regression: Regression, weighting: Weighting, parts: Sequence[
     factor = 1.0 if kind == "hc0" else residuals.size / max(1, residuals.size - p)
     if kind == "components":
         return _by_components(regression, weighting, parts, residuals, factor)
-    terms = _terms(regression, parts, residuals, passes=TUNING.whitening_passes if kind == "hac" else 0)
-    P, lags = _summed(terms, parts, weighting, p, len(regression))
+    P, lags = _summed(regression, weighting, parts, residuals, passes=TUNING.whitening_passes if kind == "hac" else 0)
     return Uncertainty(factor * P, lags)
 
 
@@ -90,7 +89,7 @@ def _by_part(regression: Regression, weighting: Weighting, parts: Sequence[Part]
         own = regression.at(rows)
         alone = Regression(
             parameters=part.system.names,
-            Phi=part.system.Phi,
+            Phi=part.system.varying,
             y=part.system.y,
             batch=own.batch,
             step=own.step,
@@ -100,9 +99,7 @@ def _by_part(regression: Regression, weighting: Weighting, parts: Sequence[Part]
         left = residuals[rows][:, outputs]
         system = replace(part.system, columns=np.arange(len(columns)), outputs=np.arange(len(outputs)))
         found.append(covariance_of(alone, weighting, [replace(part, system=system)], left))
-        scores[np.ix_(np.arange(len(scores))[rows], columns)] = by_batch(
-            part.A, np.einsum("knp,kn->kp", part.Z, left), part.system.parts
-        )
+        scores[np.ix_(np.arange(len(scores))[rows], columns)] = np.einsum("knp,kn->kp", part.W, left)
     batch, step = regression.batch_of, regression.step_of
     lags = automatic_lags(scores, batch, step, kernel=weighting.kernel)
     C = long_run_covariance(scores, batch, step, lags=lags, kernel=weighting.kernel)
@@ -132,19 +129,17 @@ class _Terms:
     """Terms whose sum is the error of a part's estimate.
 
     Attributes:
-        A: (p, p) of each batch, see `Part`.
         when: where the rows stand.
-        zeta, n: (t, n, p) and (t, n) instruments and residuals, perhaps whitened.
+        zeta, n: (t, n, p) and (t, n) weights and residuals, perhaps whitened.
     """
 
-    A: Sequence[Array]
     when: Timeline
     zeta: Array
     n: Array
 
     def influences(self) -> Array:
         """(t, p) contribution of each term."""
-        return self._led(np.einsum("knp,kn->kp", self.zeta, self.n))
+        return np.asarray(np.einsum("knp,kn->kp", self.zeta, self.n))
 
     def white_factor(self) -> Array:
         """(p,) by how much changing variance adds to the variance of parameters, where it clearly does; else 1."""
@@ -152,54 +147,45 @@ class _Terms:
         for output in range(self.n.shape[1]):
             squares = self.n[self.when.place, output] ** 2
             level = float(squares.mean())
-            shares = self._led(self.zeta[:, output])[self.when.place] ** 2
+            shares = self.zeta[self.when.place, output] ** 2
             even += level * shares.sum(axis=0)
             changing += squares @ shares
             chance += ((squares - level) ** 2).mean() * ((shares - shares.mean(axis=0)) ** 2).sum(axis=0)
         clear = changing - even > -scipy.special.ndtri(TUNING.white_test_level / len(even)) * np.sqrt(chance)
         return np.where(clear, np.divide(changing, even, out=np.ones_like(even), where=even > 0), 1.0)
 
-    def _led(self, scores: Array) -> Array:
-        return by_batch([self.A[owner] for owner in self.when.owner], scores, batch_slices(self.when.batch))
+
+def _terms(part: Part, when: Timeline, residuals: Array, *, passes: int) -> _Terms:
+    return _Terms(when, *white_parts(part.W, residuals[:, part.system.outputs], when, passes=passes))
 
 
-def _terms(regression: Regression, parts: Sequence[Part], residuals: Array, *, passes: int) -> list[_Terms]:
-    when = timeline(regression.batch_of, regression.step_of)
-    return [
-        _Terms(part.A, when, *white_parts(part.Z, residuals[:, part.system.outputs], when, passes=passes))
-        for part in parts
-    ]
-
-
-def changing_variance(Z: Array, A: Array, residuals: Array, batch: Integers, step: Integers) -> Array:
-    """Factors (p,) of the standard deviations of A sum Z eps for variances that change with Z; 1 unless clear.
+def changing_variance(W: Array, residuals: Array, batch: Integers, step: Integers) -> Array:
+    """Factors (p,) of the standard deviations of sum W eps for variances that change with W; 1 unless clear.
 
     Args:
-        Z: (k, n, p).
-        A: (p, p).
+        W: (k, n, p).
         residuals: (k, n) eps.
         batch, step: (k,) batch number and sample number within the batch.
     """
     when = timeline(batch, step)
-    zeta, n = white_parts(Z, residuals, when, passes=1)
-    return np.sqrt(_Terms([A] * len(np.unique(batch)), when, zeta, n).white_factor())
+    return np.sqrt(_Terms(when, *white_parts(W, residuals, when, passes=1)).white_factor())
 
 
 def _summed(
-    terms: Sequence[_Terms], parts: Sequence[Part], weighting: Weighting, p: int, rows: int
+    regression: Regression, weighting: Weighting, parts: Sequence[Part], residuals: Array, *, passes: int
 ) -> tuple[Array, int]:
-    """(p, p) long-run covariance of the terms of each part, and the last lag counted."""
-    when, kind = terms[0].when, weighting.covariance
-    scores = np.zeros((len(when.batch), p))
+    """(p, p) long-run covariance of the terms of all parts, and the last lag counted."""
+    when, kind = timeline(regression.batch_of, regression.step_of), weighting.covariance
+    scores = np.zeros((len(when.batch), len(regression.parameters)))
     lags = 0 if weighting.lags is None or kind in ("hc0", "hc1") else weighting.lags
-    for item, part in zip(terms, parts, strict=True):
-        own = item.influences()
+    for part in parts:
+        own = _terms(part, when, residuals, passes=passes).influences()
         scores[:, part.system.columns] = own
         if weighting.lags is None and kind not in ("hc0", "hc1"):
             lags = max(lags, automatic_lags(own, when.batch, when.step, kernel=weighting.kernel))
     P = long_run_covariance(scores, when.batch, when.step, lags=lags, kernel=weighting.kernel)
     if kind in ("hac", "components"):
-        P = P / (1.0 - lost_share(rows, lags=lags, kernel=weighting.kernel))
+        P = P / (1.0 - lost_share(len(regression), lags=lags, kernel=weighting.kernel))
     return P, lags
 
 
@@ -211,17 +197,17 @@ def _by_components(
     fitted = fit_components(residuals, places, by)
     P, widened = _exact(by, columns, residuals, fitted, places, len(regression.parameters))
     scale, odd = np.ones((2, len(P)))
-    for part, item in zip(parts, _terms(regression, parts, residuals, passes=1), strict=True):
+    when = timeline(regression.batch_of, regression.step_of)
+    for part in parts:
         system = part.system
-        scale[system.columns] = np.sqrt(item.white_factor())
+        scale[system.columns] = np.sqrt(_terms(part, when, residuals, passes=1).white_factor())
         odd[system.columns] = max(fitted[output].misfit for output in system.outputs)
     scale *= widened
     P *= np.outer(scale, scale)
     doubtful = odd > TUNING.spectrum_misfit
     if not doubtful.any():
         return Uncertainty(P, 0)
-    terms = _terms(regression, parts, residuals, passes=TUNING.whitening_passes)
-    robust, lags = _summed(terms, parts, weighting, len(P), len(regression))
+    robust, lags = _summed(regression, weighting, parts, residuals, passes=TUNING.whitening_passes)
     own, other = np.diag(P), factor * np.diag(robust)
     larger = doubtful & (other > own) & (own > 0)
     scale = np.sqrt(np.divide(other, own, out=np.ones_like(own), where=larger))
@@ -249,8 +235,7 @@ def _taken(regression: Regression, parts: Sequence[Part]) -> tuple[list[Fitted],
             columns.append(np.zeros(0, dtype=np.int64))
             continue
         place = int(np.flatnonzero(own.system.outputs == output)[0])
-        W = by_batch(own.A, own.Z[:, place], own.system.parts)
-        by.append(Fitted(own.system.varying[:, place], W))
+        by.append(Fitted(own.system.varying[:, place], own.W[:, place]))
         columns.append(own.system.columns)
     return by, columns
 
@@ -288,8 +273,3 @@ def widening(variance: Array, doubt: Array) -> Array:
     return np.asarray(
         scipy.special.stdtrit(np.maximum(freedom, TUNING.least_freedom), 0.975) / scipy.special.ndtri(0.975)
     )
-
-
-def by_batch(A: Sequence[Array], scores: Array, batches: Sequence[slice]) -> Array:
-    """Scores (k, p) as contributions to the estimate, with each batch's own A (p, p)."""
-    return np.concatenate([scores[rows] @ own.T for rows, own in zip(batches, A, strict=True)])

@@ -13,6 +13,7 @@ Source: F. Ljungberg, doctoral thesis, Linköping University, (2.17), (2.21), (4
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -20,8 +21,8 @@ import numpy as np
 from expdesign.errors import InputError, ShapeError
 from expdesign.estimation.regression import Regression
 from expdesign.estimation.solve.null_space import NullSpace, joined, require_informative
-from expdesign.estimation.solve.sandwich import by_batch, covariance_of
-from expdesign.estimation.solve.systems import Part, System, instruments_of, occupied, solvers, split
+from expdesign.estimation.solve.sandwich import covariance_of
+from expdesign.estimation.solve.systems import Part, System, build_part, occupied, split
 from expdesign.estimation.solve.weighting import Weighting as Weighting
 from expdesign.values import Array, seal
 
@@ -97,9 +98,18 @@ def build_equations(regression: Regression, instruments: Array, weighting: Weigh
 
 def solve(equations: Equations, instruments: Array) -> Solution:
     """The estimate with instruments (k, n, p); errors as in `solve_iv`."""
+    return solved(equations, build_parts(equations, instruments))
+
+
+def build_parts(equations: Equations, instruments: Array) -> list[Part]:
+    """Parts with instruments (k, n, p), which are not needed afterwards; errors as in `solve_iv`."""
+    exogenous = instruments is equations.regression.Phi
+    return _parts(_fitting(equations, instruments), instruments, exogenous=exogenous)
+
+
+def solved(equations: Equations, parts: Sequence[Part]) -> Solution:
+    """The estimate from parts."""
     regression, weighting = equations.regression, equations.weighting
-    equations = _fitting(equations, instruments)
-    parts = _parts(equations, instruments, exogenous=instruments is regression.Phi)
     values, residuals = np.zeros(len(regression.parameters)), np.array(regression.y)
     if regression.chosen is not None:
         residuals[~regression.chosen] = 0.0
@@ -127,7 +137,7 @@ def solve_quick(equations: Equations, instruments: Array) -> tuple[Array, Array]
     values, covariance = np.zeros(count), np.zeros((count, count))
     for part in _parts(equations, instruments, exogenous=True):  # spares the search for weak instruments
         theta, left = part.solved(equations.weighting.mean)
-        influences = by_batch(part.A, np.einsum("knp,kn->kp", part.Z, left), part.system.parts)
+        influences = np.einsum("knp,kn->kp", part.W, left)
         values[part.system.columns] = theta
         covariance[np.ix_(part.system.columns, part.system.columns)] = influences.T @ influences
     return values, covariance
@@ -142,10 +152,7 @@ def _fitting(equations: Equations, instruments: Array) -> Equations:
 
 
 def _parts(equations: Equations, instruments: Array, *, exogenous: bool) -> list[Part]:
-    parts = []
-    for system in equations.systems:
-        Z = instruments_of(system, instruments, equations.weighting)
-        parts.append(Part(system, Z, *solvers(system, Z, equations.weighting, exogenous=exogenous)))
+    parts = [build_part(item, instruments, equations.weighting, exogenous=exogenous) for item in equations.systems]
     require_informative(joined([part.found for part in parts]))
     return parts
 

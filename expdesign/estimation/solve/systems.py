@@ -27,8 +27,7 @@ class System:
         names: of the parameters.
         rows: of the regression that its outputs use.
         columns, outputs: places in the regression.
-        Phi: (k, n, p) regressors.
-        varying: (k, n, p) the same without the mean that is subtracted from instruments.
+        varying: (k, n, p) regressors without the mean that is subtracted from instruments.
         size: (p,) norm of that; infinite where it is constant to working precision.
         y: (k, n).
         batch: (k,) batch numbers of its rows.
@@ -40,7 +39,6 @@ class System:
     rows: Integers | slice
     columns: Integers
     outputs: Integers
-    Phi: Array
     varying: Array
     size: Array
     y: Array
@@ -54,7 +52,7 @@ class System:
 
     def without_mean(self, rows: Array, mean: str) -> Array:
         """Rows (k, ...) of this part without the mean of their group, unless the mean is "none"."""
-        return subtract_mean(rows, self.group, "none" if mean == "none" else "batch")
+        return _without_mean(rows, self.group, mean)
 
 
 def occupied(rows: Array) -> Array:
@@ -86,7 +84,7 @@ def _system(regression: Regression, columns: Integers, outputs: Integers, mean: 
     batch = regression.batch_of[rows]
     Phi = _cut(regression.Phi[rows], outputs, columns)
     group = _groups(regression, rows, outputs, mean)
-    varying = subtract_mean(Phi, group, "none" if mean == "none" else "batch")
+    varying = _without_mean(Phi, group, mean)
     size = _norm(varying)
     size[size <= 1e-11 * _norm(Phi)] = np.inf
     return System(
@@ -94,7 +92,6 @@ def _system(regression: Regression, columns: Integers, outputs: Integers, mean: 
         rows=rows,
         columns=columns,
         outputs=outputs,
-        Phi=Phi,
         varying=varying,
         size=size,
         y=regression.y[rows][:, outputs],
@@ -102,6 +99,12 @@ def _system(regression: Regression, columns: Integers, outputs: Integers, mean: 
         group=group,
         parts=batch_slices(batch),
     )
+
+
+def _without_mean(rows: Array, group: Integers, mean: str) -> Array:
+    if mean == "none":
+        return rows
+    return subtract_mean(rows, group, "batch" if group.any() else "complete")  # of one group without copies of it
 
 
 def _groups(regression: Regression, rows: Integers | slice, outputs: Integers, mean: str) -> Integers:
@@ -131,29 +134,37 @@ class Part:
 
     Attributes:
         system: the part of the regression.
-        Z: (k, n, p) instruments, without mean and weighted.
-        A: (p, p) per batch, with theta = sum over batches of A sum Z y.
+        W: (k, n, p) with theta = sum W y; nothing that can be used where its data do not see all parameters.
         found: what its data cannot see.
     """
 
     system: System
-    Z: Array
-    A: list[Array]
+    W: Array
     found: NullSpace
 
     def solved(self, mean: str) -> tuple[Array, Array]:
         """Parameters (p,) and residuals (k, n) without the mean that instruments are without."""
-        system, p = self.system, len(self.system.names)
-        theta = np.zeros(p)
-        for rows, A in zip(system.parts, self.A, strict=True):
-            theta += A @ (self.Z[rows].reshape(-1, p).T @ system.y[rows].ravel())
-        return theta, system.without_mean(system.y - system.Phi @ theta, mean)
+        system = self.system
+        theta = sum((rows.T @ y for rows, y in zip(self.W.swapaxes(0, 1), system.y.T, strict=True)), start=np.zeros(1))
+        return theta, system.without_mean(system.y, mean) - system.varying @ theta
+
+
+def build_part(system: System, instruments: Array, weighting: Weighting, *, exogenous: bool) -> Part:
+    """A system with instruments (k, all, all); `exogenous`: they are the regressors themselves."""
+    Z = instruments_of(system, instruments, weighting)
+    A, found = solvers(system, Z, weighting, exogenous=exogenous)
+    for rows, own in zip(system.parts, A, strict=False):
+        for output in range(Z.shape[1]):
+            Z[rows, output] = (own @ Z[rows, output].T).T
+    return Part(system, Z, found)
 
 
 def instruments_of(system: System, instruments: Array, weighting: Weighting) -> Array:
-    """(k, n, p) instruments of a part, without mean and weighted."""
+    """(k, n, p) instruments of a part, without mean and weighted, in memory of their own."""
     Z = system.without_mean(system.cut(instruments), weighting.mean)
-    return Z * np.array(weighting.output_weights)[system.outputs, None] if weighting.output_weights else Z
+    if weighting.output_weights:
+        Z *= np.array(weighting.output_weights)[system.outputs, None]
+    return Z
 
 
 def solvers(system: System, Z: Array, weighting: Weighting, *, exogenous: bool) -> tuple[list[Array], NullSpace]:
