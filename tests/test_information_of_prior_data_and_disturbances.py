@@ -9,6 +9,8 @@ from design_case import CALM, Environment, example_dictionary, vessel
 from expdesign.dictionary import Primitive
 from expdesign.durations import DurationProblem, bordered, build_durations, optimal_shares
 from expdesign.errors import InputError
+from expdesign.estimation.methods import method_named
+from expdesign.estimation.regression import build_layout, model_for
 from expdesign.indices import outcomes
 from expdesign.information import score_primitives
 from expdesign.information.augmented import score_augmented
@@ -156,3 +158,26 @@ def test_slopes_of_outcomes_are_those_of_a_straight_line_through_other_steps():
         slopes = np.polyfit(steps, np.array(table), 3)[-2]
         size = np.abs(found.gradients).max(axis=1) * 1e-2
         assert (np.abs(found.gradients[:, column] - slopes) <= 1e-3 * np.abs(slopes) + 1e-2 * size).all()
+
+
+@pytest.mark.parametrize("predictor", ["augmented", "wind", "no-current", "no-wind"])
+def test_designs_and_estimates_have_the_same_columns(predictor: str):
+    """Reduced sets, (6.5) to (6.7), too: what a design counts is what the method of that name estimates."""
+    ship = vessel("azimuth-30m")
+    wide = score_augmented(ship, FEW, predictor=predictor, environment=BREEZE)
+    primitive = FEW[0]
+    run = simulate(ship, primitive.commands, velocity=primitive.entry_velocity, standing=primitive.entry_inputs)
+    batch = Batch(
+        name="run",
+        sample_time_s=ship.sample_time_s,
+        input_names=primitive.commands.names,
+        inputs=primitive.commands.values,
+        velocity=run.velocity[:-1],
+        pose=run.pose[:-1],
+        wind=run.velocity[:-1, :2] - np.array([3.0, 2.0]),
+    )
+    record = Record(batches=(batch,))
+    layout = build_layout(model_for(ship.model, record), record, predictor=predictor)
+    assert method_named(f"iv-{predictor}").predictor == predictor
+    assert set(wide.parameters) == set(layout.names)
+    assert wide.interest == layout.parameters

@@ -110,7 +110,7 @@ class DesignTable(Table):
         "what stands inside its absolute values is farther from zero than three standard deviations of the sensors, "
         "and the current, as in expdesign estimate --samples equation-wise; 'required', the same of manoeuvres only "
         "that, once clear, stay so, for at least half of their time. Where velocities are noisy, only such samples "
-        "leave no bias; expdesign validate estimates from them, too",
+        "leave no bias, given a mean_subtraction; expdesign validate estimates from them, too",
     )
     robust: Literal["nominal", "average", "worst"] = Field(
         default="nominal",

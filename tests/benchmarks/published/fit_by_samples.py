@@ -1,11 +1,11 @@
 """How well estimated models simulate, by the samples that they were estimated from, and how often they are unstable.
 
-`python tests/benchmarks/published/fit_by_samples.py [--runs N] [--sets N]`: the six estimators of the study with
-current and wind, from the first 1000 to 5000 samples of each run, simulate a zig-zag without disturbances or noise. The
-mean fit of surge, sway and yaw rate stands beside its standard deviation, over the runs whose model stays bounded. The
-source leaves out a size at which a model is unstable in some run: 3 of 100 for IV2 and IV3 from 1000 samples. Here an
-unstable estimate is drawn to the first model and says so; `drawn` counts these, `unstable` the models whose zig-zag
-diverges all the same, and estimates that fail.
+`python tests/benchmarks/published/fit_by_samples.py [--runs N] [--sets N] [--case NAME ...]`: the six estimators of the
+study with current and wind, from the first 1000 to 5000 samples of each run, simulate a zig-zag without disturbances or
+noise. The mean fit of surge, sway and yaw rate stands beside its standard deviation, over the runs whose model stays
+bounded. The source leaves out a size at which a model is unstable in some run: 3 of 100 for IV2 and IV3 from 1000
+samples. Here an unstable estimate is drawn to the first model and says so; `drawn` counts these, `unstable` the models
+whose zig-zag diverges all the same, and estimates that fail.
 
 Source: F. Ljungberg, doctoral thesis, Linköping University, 6.1, figures 6.2 and 6.3.
 """
@@ -110,10 +110,13 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=10)
     parser.add_argument("--sets", type=int, default=10)
     parser.add_argument("--sizes", type=int, nargs="*", default=SIZES)
+    parser.add_argument("--case", nargs="*", default=[case.name for case in CASES], help="of the study, all by default")
     add_sharing(parser)
     chosen = parser.parse_args()
     with shared_work(chosen):
         for case in CASES:
+            if case.name not in chosen.case:
+                continue
             print(f"\n{case.name}, {chosen.sets} inputs of {chosen.runs} runs:\n", flush=True)
             print("| estimator | samples | surge [%] | sway [%] | yaw rate [%] | unstable | drawn |")
             print("|---|---|---|---|---|---|---|")
