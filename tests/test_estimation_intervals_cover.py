@@ -60,9 +60,11 @@ def test_intervals_cover_small(case: str, trials: int, samples: int) -> None:
 TABLE = [
     Case(method=method, wandering=wandering, samples=1000, batches=batches)
     for method in METHODS
+    if not method.endswith("current")
     for wandering in ((False,) if method == "ls" else (False, True))
     for batches in (1, 5)
 ]
+"""Not of methods that estimate a steady current, whose intervals are not promised: see `benchmarks/README.md`."""
 
 
 @pytest.mark.parametrize("case", TABLE[::5], ids=str)
