@@ -34,7 +34,19 @@ ESTIMATE = {
     "horizon_s": None,
     "constant": False,
     "steered": "auto",
+    "samples": "all",
+    "offset_mps": 0.0,
     "tests": (),
+}
+MONITOR = {
+    "vessel": Path("v.toml"),
+    "reference": (),
+    "learn_h": 24.0,
+    "false_alarm_days": 30.0,
+    "size": 0.1,
+    "every_s": 3600.0,
+    "velocity": "auto",
+    "resume": False,
 }
 PLAIN = {"departure": None, "tolerance_m": None, "fine": False, "name": None}
 SHARED = {"jobs": 0, "scheduler": None, "cache": True}
@@ -177,6 +189,13 @@ def workflows(monkeypatch: pytest.MonkeyPatch) -> Workflows:
             ((Path("a.csv"),), None),
             ESTIMATE | {"methods": ("iv",), "velocity": "smoothed", "mean": "none", "start": "ls"},
         ),
+        (
+            "monitor a.csv b.csv --vessel v.toml --reference c.csv d.csv --size 0.2",
+            "monitor",
+            ((Path("a.csv"), Path("b.csv")), None),
+            MONITOR | {"reference": (Path("c.csv"), Path("d.csv")), "size": 0.2},
+        ),
+        ("monitor - --vessel v.toml --resume", "monitor", ((Path("-"),), None), MONITOR | {"resume": True}),
     ],
 )
 def test_what_was_typed_reaches_the_workflow(
