@@ -2,9 +2,9 @@
 
 ``python tests/benchmarks/monitoring.py [--trials N] [--days D]``: the tender sails ordinary voyages in a current that
 wanders, with a mean of its own in each. The watch is calibrated on eight voyages of 2 hours. False alarms are counted
-over D days of voyages of 12 hours each, at thresholds for one in 6 hours, one in a day and one in 30 days. Each change is
-then made in N voyages of 3 hours, of which the first hour is without it. ``--year`` instead sends a year at 1 Hz through
-the command, as a stream, and prints its time and its peak memory.
+over D days of voyages of 12 hours each, at thresholds for one in 6 hours, one in a day and one in 30 days. Each change
+is then made in N voyages of 3 hours, of which the first hour is without it. ``--year`` instead sends a year at 1 Hz
+through the command, as a stream, and prints its time and its peak memory.
 """
 
 from __future__ import annotations
