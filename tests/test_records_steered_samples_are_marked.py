@@ -83,4 +83,5 @@ def test_estimates_say_which_samples_they_used(tmp_path: Path) -> None:
         encoding="utf-8"
     )
     (table,) = (item for item in outcome.tables if item.title == "Samples used")
-    assert ("iv", "1498", "500", "left out") in table.rows
+    by_equation = "du/dt 1498, dv/dt 1498, dr/dt 1498"
+    assert ("iv", "1498", by_equation, "500", "left out") in table.rows

@@ -26,7 +26,7 @@ SCENARIO_CASES = [
     ("total_s = 600", "", "design.total_s", "is missing, expected the total informative time"),
     ("total_s = 600", "total = 600", "design.total", "did you mean 'total_s'?"),
     ("[design]", "[desing]", "desing", "did you mean 'design'?"),
-    ('criterion = "D"', 'criterion = "C"', "design.criterion", "is 'C', expected 'D', 'D_s', 'A', 'E' or 'V'"),
+    ('criterion = "D"', 'criterion = "C"', "design.criterion", "is 'C', expected 'D', 'D_s', 'A', 'E', 'V' or 'T'"),
     ("fixed_parameters = []", 'fixed_parameters = ["X_w"]', "design.fixed_parameters[1]", "is 'X_w', did you mean"),
     ("fixed_parameters = []", 'fixed_parameters = ["X_u", "X_u"]', "design.fixed_parameters[2]", "'X_u' again"),
     ("fixed_parameters = []", "fixed_parameters = [1]", "design.fixed_parameters[1]", "is 1, expected text"),
