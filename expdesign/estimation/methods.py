@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from expdesign.errors import Diverged, InputError, UnknownName
+from expdesign.errors import Diverged, InputError, NoAnswer, UnknownName
 from expdesign.estimation.equation_wise import ALL, EQUATION_WISE, SAMPLES, sample_notes, strata_of
 from expdesign.estimation.excitation import WorstCase
 from expdesign.estimation.feedback import Feedback, feedback_in, feedback_notes
@@ -279,17 +279,50 @@ def _instrumental(layout: Layout, record: Record, driving: Record, choices: Sett
     replay = build_replay(layout.model, driving, choices.integration, windy=windy, flowing=layout.predictor.steady)
     rows = apart_from_start(build_regression(layout, record))
     rows, refined = _with_instruments(layout, driving, rows, replay, choices)
-    for _ in range(TUNING.most_currents if layout.guess else 0):
-        assert layout.guess is not None
-        moved, parameters = refined.solution.values[-2:], full_parameters(layout, refined.solution.values)
-        layout = replace(layout, guess=Guess(to_mps=layout.guess.to_mps + moved, parameters=parameters))
-        weighting = replace(choices.weighting, output_weights=_by_residuals(rows, refined))
-        rows = apart_from_start(build_regression(layout, record))
-        rows, refined = _with_instruments(layout, driving, rows, replay, replace(choices, weighting=weighting))
-        std = np.sqrt(np.diag(refined.solution.covariance)[-2:])
-        if (np.abs(refined.solution.values[-2:]) <= TUNING.settled_deviations * std).all():
+    if layout.guess is None:
+        return layout, rows, refined
+    weighting = replace(choices.weighting, output_weights=_by_residuals(rows, refined))
+    weighted = replace(choices, weighting=weighting)
+
+    def around(guess: Guess) -> tuple[Layout, Rows, Refined]:
+        there = replace(layout, guess=guess)
+        own = apart_from_start(build_regression(there, record))
+        return there, *_with_instruments(there, driving, own, replay, weighted)
+
+    parameters = full_parameters(layout, refined.solution.values)
+    return _settled_current(around, around(replace(layout.guess, parameters=parameters)))
+
+
+def _settled_current(
+    around: Callable[[Guess], tuple[Layout, Rows, Refined]], found: tuple[Layout, Rows, Refined]
+) -> tuple[Layout, Rows, Refined]:
+    """The estimate around the current that it finds: Newton's method, with steps halved where the next one grows.
+
+    Args:
+        around: the estimate around a guess.
+        found: the first one.
+    """
+    share = 1.0
+    for _ in range(TUNING.most_currents):
+        layout, _, refined = found
+        moved, old = refined.solution.values[-2:], layout.guess
+        assert old is not None
+        if (np.abs(moved) <= TUNING.settled_deviations * np.sqrt(np.diag(refined.solution.covariance)[-2:])).all():
             break
-    return layout, rows, refined
+        parameters = full_parameters(layout, refined.solution.values)
+        guess = Guess(
+            to_mps=old.to_mps + share * moved, parameters=old.parameters + share * (parameters - old.parameters)
+        )
+        try:
+            there = around(guess)
+        except NoAnswer:  # a poor guess may make the instruments' model unstable
+            share /= 2.0
+            continue
+        if np.hypot(*there[2].solution.values[-2:]) < np.hypot(*moved):
+            found, share = there, min(1.0, 2.0 * share)
+        else:
+            share /= 2.0
+    return found
 
 
 def _by_residuals(rows: Rows, refined: Refined) -> tuple[float, ...]:

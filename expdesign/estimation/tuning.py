@@ -70,7 +70,7 @@ class Tuning:
     named_parameters: int = 4
     most_refinements: int = 30
     most_choices: int = 4
-    most_currents: int = 6
+    most_currents: int = 8
     exact_share: float = 1e-12
     settled_deviations: float = 1e-3
     stabilising_weights: tuple[float, ...] = (0.01, 0.1, 1.0, 10.0, 100.0, 1e4)
