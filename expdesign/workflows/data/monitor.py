@@ -215,4 +215,8 @@ def _summary(content: MonitorContent) -> dict[str, object]:
 
 
 def _tables(content: MonitorContent) -> tuple[TextTable, ...]:
-    return (TextTable(title="Changes that are watched for", header=HEADER, rows=tuple(monitor_tables(content))),)
+    told = tuple((sentence,) for sentence in sentences(content))
+    return (
+        TextTable(title="Is it still the ship of the reference?", header=("verdict",), rows=told),
+        TextTable(title="Changes that are watched for", header=HEADER, rows=tuple(monitor_tables(content))),
+    )
