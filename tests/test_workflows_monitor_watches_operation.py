@@ -146,3 +146,29 @@ def test_files_whose_times_begin_again_follow_each_other(voyages: dict[str, Path
     assert told["judged_h"] == pytest.approx(2.5, abs=0.05)
     assert told["alarms"] == []
     assert told["history"][-1]["time_s"] > 3.4 * HOUR
+
+
+def test_a_loss_of_half_the_thrust_is_a_change_and_not_left_out(voyages: dict[str, Path], tmp_path: Path) -> None:
+    path = voyage_csv(tmp_path / "half.csv", tender(X_mu=0.5, Y_mu=0.5, N_mu=0.5), HOUR // 2, seed=9)
+    told = monitored(tmp_path / "out", path, "--reference", voyages["reference"])
+    alarm = told["alarms"][0]
+    assert alarm["effect"] == "gain"
+    assert alarm["value"] == pytest.approx(-0.5, abs=max(5 * alarm["std"], 0.02))
+
+
+def test_data_unlike_the_reference_are_not_called_the_same_ship(voyages: dict[str, Path], tmp_path: Path) -> None:
+    header, *rows = voyages["same"].read_text().splitlines(keepends=True)
+    column = header.strip().split(",").index("v_mps")
+    rng = np.random.default_rng(1)
+    noisy = []
+    for row in rows:
+        cells = row.strip().split(",")
+        cells[column] = f"{float(cells[column]) + 0.2 * rng.standard_normal():.6g}"
+        noisy.append(",".join(cells) + "\n")
+    path = tmp_path / "noisy.csv"
+    path.write_text(header + "".join(noisy))
+    told = monitored(tmp_path / "out", path, "--reference", voyages["reference"])
+    assert told["not_judged_h"] > 0.9
+    assert told["alarms"] == []
+    assert "is not known" in told["verdict"][0]
+    assert not any("No alarm" in sentence for sentence in told["verdict"])

@@ -322,6 +322,14 @@ def _settled_current(
             found, share = there, min(1.0, 2.0 * share)
         else:
             share /= 2.0
+    else:
+        layout, rows, refined = found
+        left = " and ".join(f"{value:.2g}" for value in refined.solution.values[-2:])
+        note = (
+            f"the steady current did not settle in {TUNING.most_currents} steps: from the guess that the estimate is "
+            f"around, it would go on by {left} m/s to north and east; intervals may be too short"
+        )
+        found = layout, rows, replace(refined, warnings=(*refined.warnings, note))
     return found
 
 

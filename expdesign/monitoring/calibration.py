@@ -106,8 +106,8 @@ def calibrate(grams: Grams) -> Calibration:
 
 
 def misfit_of(quadratic: float, score: Array, information: Array, count: float) -> float:
-    """Squared error per measured number, in standard deviations, that no change of a common size explains."""
-    explained = np.linalg.solve(information + np.eye(len(score)), score)
+    """Squared error per measured number, in standard deviations, that no change explains, large ones included."""
+    explained = np.linalg.solve(information + np.eye(len(score)) / TUNING.largest_size**2, score)
     return float((quadratic - score @ explained) / max(count, 1.0))
 
 

@@ -20,6 +20,7 @@ class Tuning:
         misfit_deviations: standard deviations of the reference's misfit beyond which a stretch is not judged.
         settling_stretches: fewest from which the size of a change is told.
         refined: change of the size, in sizes that matter, below which it is refined no further.
+        largest_size: of changes that are told from errors unlike the reference's, in sizes that matter.
         as_likely: difference of log-likelihood up to which another change explains the data as well.
         settled: information, in inverse squared sizes, from which a change is settled; patience: factor of it where
             other changes explain the data as well.
@@ -40,6 +41,7 @@ class Tuning:
     fewest_stretches: int = 40
     block_counts: tuple[int, ...] = (160, 80, 40, 20)
     misfit_deviations: float = 6.0
+    largest_size: float = 10.0
     as_likely: float = 3.0
     settling_stretches: int = 20
     refined: float = 0.2

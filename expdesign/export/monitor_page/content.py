@@ -96,7 +96,13 @@ def _sentences(content: MonitorContent) -> Iterator[str]:
     state, found = content.state, content.found
     judged_h = state.judged * content.calibration.stretch_s / HOUR
     rate = f"with at most one false alarm in {content.false_alarm_days:g} days on average"
-    if not found:
+    total = state.judged + state.left_out
+    if 2 * state.left_out > total:
+        yield (
+            f"Most of the data, {100 * state.left_out / total:.0f} %, differ from the reference in a way that no change "
+            "explains that is watched for. Whether the ship is the same is not known: give them to expdesign diagnose."
+        )
+    elif not found:
         largest = max((moment.statistic for moment in content.moments), default=0.0)
         yield (
             f"No alarm in {judged_h:.1f} h: the ship is the one of the reference, {rate}. The largest statistic is "
@@ -106,8 +112,7 @@ def _sentences(content: MonitorContent) -> Iterator[str]:
         yield _alarm(content, alarm)
     if found:
         yield f"Alarms are raised {rate}. For the cause, give the rows since the change to expdesign diagnose."
-    total = state.judged + state.left_out
-    if total and state.left_out > MUCH_LEFT_OUT * total:
+    if MUCH_LEFT_OUT * total < state.left_out <= total / 2:
         yield (
             f"{100 * state.left_out / total:.0f} % of the data were not judged: their error is beyond what the "
             "reference shows and looks like no change that is watched for. Weather, waves or a sensor may be others."
