@@ -99,8 +99,8 @@ def _sentences(content: MonitorContent) -> Iterator[str]:
     total = state.judged + state.left_out
     if 2 * state.left_out > total:
         yield (
-            f"Most of the data, {100 * state.left_out / total:.0f} %, differ from the reference in a way that no change "
-            "explains that is watched for. Whether the ship is the same is not known: give them to expdesign diagnose."
+            f"Most of the data, {100 * state.left_out / total:.0f} %, differ from the reference in a way that no "
+            "change explains that is watched for. Whether it is the same ship is not known: try expdesign diagnose."
         )
     elif not found:
         largest = max((moment.statistic for moment in content.moments), default=0.0)

@@ -43,7 +43,10 @@ MOST_ROWS = 20_000
 """Of a piece of a file."""
 WRITTEN_EVERY_S = 10.0
 """Of a stream that comes faster than it was measured, time between writing its files [s]."""
-USUAL = {"--learn-h": 24.0, "--false-alarm-days": 30.0, "--size": TUNING.relative_size, "--velocity": "auto"}
+USUAL = {
+    "--learn-h": 24.0, "--false-alarm-days": 30.0, "--size": TUNING.relative_size, "--every-s": 3600.0,
+    "--velocity": "auto",
+}  # fmt: skip
 
 
 def monitor(
@@ -84,7 +87,7 @@ def monitor(
     )  # fmt: skip
     options = {
         "--vessel": vessel, "--reference": tuple(reference), "--learn-h": learn_h, "--velocity": velocity,
-        "--false-alarm-days": false_alarm_days, "--size": size, "--out": out, "--resume": resume,
+        "--false-alarm-days": false_alarm_days, "--size": size, "--every-s": every_s, "--out": out, "--resume": resume,
     }  # fmt: skip
     command = command_text("monitor", data, options, usual=USUAL)
     now = _resumed(folder / STATE) if resume else _with_reference(Watch(), reference, asked, progress)

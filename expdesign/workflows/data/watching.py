@@ -106,15 +106,17 @@ def read_piece(now: Watch, piece: Piece, asked: Asked) -> tuple[Watch, tuple[Rea
     if not piece.lines:
         return now, ()
     if not piece.time_s[0] + now.offset_s > now.now_s:
-        now = replace(now, offset_s=now.now_s + BETWEEN_FILES_S - float(piece.time_s[0]))
+        note = f"{piece.source.name}: its times begin again; it is taken as an hour after the data before"
+        offset_s = now.now_s + BETWEEN_FILES_S - float(piece.time_s[0])
+        now = replace(now, offset_s=offset_s, notes=(note, *now.notes))
     times = piece.time_s + now.offset_s
     with piece.named():
         record = measured([piece.path], asked.vessel, velocity=asked.velocity)
     ship = extended_model(asked.vessel, record)
     changes = now.changes or watched_changes(ship, size=asked.size)
     begins = [float(times[batch.first_row - FIRST_ROW]) for batch in record.batches]
-    told = [note.replace(piece.path.name, piece.source.name) for note in record.notes]
-    notes = tuple({re.sub(r"\d+", "", note): note for note in (*told, *now.notes)}.values())
+    told = [text.replace(piece.path.name, piece.source.name) for text in record.notes]
+    notes = tuple({re.sub(r"\d+", "", text): text for text in (*told, *now.notes)}.values())
     now = replace(now, changes=changes, now_s=float(times[-1]), notes=notes)
     return now, (Reading(piece=piece, ship=ship, record=record, begins_s=tuple(begins), stretch_s=asked.stretch_s),)
 
