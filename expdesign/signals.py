@@ -45,6 +45,14 @@ class Commands:
         return self.values[:, self.names.index(name)]
 
 
+AUXILIARY = (
+    "roll_rad", "roll_rate_radps", "sway_acceleration_mps2", "lateral_acceleration_mps2", "actuator_x_n",
+    "actuator_y_n", "actuator_psi_nm",
+)  # fmt: skip
+"""Measured beside what every model needs: roll, positive to starboard, its rate, dv/dt, the acceleration to starboard
+of the origin without gravity, dv/dt + u r, and the force and moment of all actuators on the hull."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Trajectory:
     """Motion sampled at the ends of every command: one sample more than there are commands.
@@ -53,14 +61,16 @@ class Trajectory:
         sample_time_s: time between samples [s].
         pose: (k, 3) n-frame [north m, east m, heading rad]; heading is continuous, not wrapped.
         velocity: (k, 3) b-frame [u m/s, v m/s, r rad/s], over ground.
+        auxiliary: (k, 4) the first four of `AUXILIARY`; None where the simulation does not give them.
     """
 
     sample_time_s: float
     pose: Array
     velocity: Array
+    auxiliary: Array | None = None
 
     def __post_init__(self) -> None:
-        seal(self, pose="k 3", velocity="k 3")
+        seal(self, pose="k 3", velocity="k 3", **({} if self.auxiliary is None else {"auxiliary": "k 4"}))
 
     def __len__(self) -> int:
         return len(self.pose)
@@ -103,6 +113,7 @@ class Batch:
         steered: (k,) 1 where the inputs follow the ship's motion, 0 where they were set beforehand; None where the
             data do not say.
         planned: (k, p) what the first p inputs were planned to be, whatever the ship did; None where unknown.
+        auxiliary: (k, 7) of `AUXILIARY`, as measured, nan where a column is not; None where none is.
     """
 
     name: str
@@ -121,11 +132,12 @@ class Batch:
     delivered: Array | None = None
     steered: Array | None = None
     planned: Array | None = None
+    auxiliary: Array | None = None
 
     def __post_init__(self) -> None:
         shapes = {
             "inputs": "k m", "velocity": "k 3", "pose": "k 3", "wind": "k 2", "depth_m": "k", "interpolated": "k 3",
-            "delivered": "k s m", "steered": "k", "planned": "k p",
+            "delivered": "k s m", "steered": "k", "planned": "k p", "auxiliary": "k 7",
         }  # fmt: skip
         seal(self, **{name: shape for name, shape in shapes.items() if getattr(self, name) is not None})
         if self.inputs.shape[1] != len(self.input_names):
@@ -139,10 +151,15 @@ class Batch:
         """(k,) from zero [s]."""
         return np.asarray(np.arange(len(self)) * self.sample_time_s, dtype=float)
 
+    def measures(self, name: str) -> bool:
+        """Whether one of `AUXILIARY` is measured."""
+        return self.auxiliary is not None and bool(np.isfinite(self.auxiliary[:, AUXILIARY.index(name)]).any())
+
     def cut(self, part: slice) -> Batch:
         """Consecutive samples of the batch."""
         series = (
-            "inputs", "velocity", "pose", "wind", "depth_m", "interpolated", "delivered", "steered", "planned"
+            "inputs", "velocity", "pose", "wind", "depth_m", "interpolated", "delivered", "steered", "planned",
+            "auxiliary",
         )  # fmt: skip
         rows: dict[str, Any] = {name: values[part] for name in series if (values := getattr(self, name)) is not None}
         return replace(self, first_row=self.first_row and self.first_row + part.start, **rows)

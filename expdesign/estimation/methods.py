@@ -46,7 +46,7 @@ from expdesign.estimation.values import Estimate, Residuals
 from expdesign.progress import Progress, silent
 from expdesign.signals import Record
 from expdesign.values import Array
-from expdesign.vessel import VesselModel
+from expdesign.vessel import NOT_SUPPORTED, VesselModel
 
 
 @dataclass(frozen=True)
@@ -191,6 +191,8 @@ def estimate(
     chosen, choices = method_named(method), settings or Settings()
     if model.roll is not None:
         raise InputError(ROLLS)
+    if model.inertia is not None:
+        raise InputError(NOT_SUPPORTED.format(what="estimate"))
     steered = treatment_of(record, choices.steered, instruments=chosen.solver == "iv")
     record = open_loop(record) if steered.treatment == LEAVE_OUT else record
     measured, record = record, as_read(record, chosen)

@@ -19,7 +19,7 @@ from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import Environment, relative_velocity
 from expdesign.simulation.motion import State
 from expdesign.values import Array
-from expdesign.vessel import NUMPY, Operators, VesselModel
+from expdesign.vessel import NOT_SUPPORTED, NUMPY, Operators, VesselModel
 from expdesign.vessel.expressions import Signals
 from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS
 
@@ -31,8 +31,10 @@ def estimated_parameters(model: VesselModel, fixed: Sequence[str]) -> tuple[str,
 
     Raises:
         UnknownName: a fixed name is not a parameter.
-        InputError: every parameter is fixed.
+        InputError: every parameter is fixed, or inertia is coupled.
     """
+    if model.inertia is not None:
+        raise InputError(NOT_SUPPORTED.format(what="information"))
     for name in fixed:
         if name not in model.names:
             raise UnknownName("parameter", name, known=model.names)

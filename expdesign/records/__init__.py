@@ -9,6 +9,8 @@ One file has one header row (row 1 in every message) and one row per sample. Col
 - relative wind `wind_u_mps wind_v_mps` (ship's velocity through the air), or of a vane `wind_speed_mps wind_angle_rad`,
   the direction it comes from, clockwise from the bow: u_q = V cos, v_q = V sin;
 - `depth_m`, water depth;
+- `roll_rad roll_rate_radps sway_acceleration_mps2 lateral_acceleration_mps2`, and the force of all actuators
+  `actuator_x_n actuator_y_n actuator_psi_nm`;
 - `manoeuvre`, a text that labels the row, which only `row_labels` reads.
 
 Known quantities in other units (`u_knots`, `n1_rpm`, `wind_angle_deg`) are converted and noted; unknown columns

@@ -40,7 +40,7 @@ from expdesign.records.pose import (
     with_metres,
 )
 from expdesign.records.remarks import motion_remarks, table_remarks
-from expdesign.signals import Batch, Record
+from expdesign.signals import AUXILIARY, Batch, Record
 from expdesign.vessel import column_name
 
 
@@ -191,4 +191,5 @@ def _batch(file: _File, part: slice, name: str) -> Batch:
         first_row=table.first_row + kept.start,
         steered=steered[kept] if steered is not None else None,
         planned=table.stack(*planned)[kept] if planned else None,
+        auxiliary=table.stack(*AUXILIARY)[kept] if set(AUXILIARY) & set(table.columns) else None,
     )

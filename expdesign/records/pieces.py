@@ -20,6 +20,7 @@ import numpy as np
 from expdesign.errors import FileError
 from expdesign.input_files import check_ends
 from expdesign.records.file import FIRST_ROW, MISSING, Inputs, Sources, choose_columns
+from expdesign.signals import AUXILIARY
 from expdesign.values import Array
 from expdesign.vessel import column_name
 
@@ -27,7 +28,7 @@ STREAM = Path("-")
 """Stands for the standard input."""
 CLOCKED_ROWS = 50
 """From which the time between samples is learnt."""
-OPTIONAL = ("wind_u_mps", "wind_v_mps", "wind_speed_mps", "wind_angle_rad", "depth_m", "steered", "batch")
+OPTIONAL = ("wind_u_mps", "wind_v_mps", "wind_speed_mps", "wind_angle_rad", "depth_m", "steered", "batch", *AUXILIARY)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

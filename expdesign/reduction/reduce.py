@@ -19,6 +19,7 @@ from expdesign.simulation import deliver
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array
 from expdesign.vessel import IDEAL, Response, Sensors, Vessel, VesselModel
+from expdesign.vessel.sensors import NOISE
 
 
 def reduced(record: Record, vessel: Vessel, *, smoothed: bool = False) -> Record:
@@ -164,12 +165,8 @@ def _with_wind(batch: Batch, sensors: Sensors) -> Batch:
     return replace(batch, wind=batch.velocity[:, :2] - (there.velocity[:, :2] - there.wind))
 
 
-NOISE = ("position_m", "heading_rad", "velocity_mps", "yaw_rate_radps", "wind_mps", "wind_angle_rad", "wind_sensor")
-"""What leaves expectations as they are, but for a vane's shrinkage."""
-
-
 def _faulty(sensors: Sensors) -> bool:
-    noise: dict[str, Any] = {name: getattr(sensors, name) for name in NOISE}
+    noise: dict[str, Any] = {name: getattr(sensors, name) for name in (*NOISE, "wind_sensor")}
     return shrinkage(sensors) < 1.0 or sensors != Sensors(**noise)
 
 

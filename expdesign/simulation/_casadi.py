@@ -16,7 +16,7 @@ import numpy as np
 
 from expdesign.simulation.motion import State, integrator_step, motion_rates
 from expdesign.values import Array
-from expdesign.vessel import Actuator, Operators, Roll, Term, VesselModel
+from expdesign.vessel import Actuator, Inertia, Operators, Roll, Term, VesselModel
 
 SHIPS = tuple(1 << power for power in reversed(range(8)))
 """Ships in one function."""
@@ -36,7 +36,7 @@ class CompiledIntegrator:
             InputError: Euler's map for a model that rolls.
         """
         integrator_step(integrator, model)
-        structure = model.terms, model.form, model.sample_time_s, model.actuators, model.roll
+        structure = model.terms, model.form, model.sample_time_s, model.actuators, model.roll, model.inertia
         self._functions = compiled_steps(structure, integrator)
         self._states, self._parameters = model.states, np.array(model.parameters)
 
@@ -95,7 +95,7 @@ class CompiledSample:
 
     def __init__(self, model: VesselModel, *, rows: int, substeps: int) -> None:
         """Of `substeps` Runge-Kutta steps, with as many `rows` of inputs, or one where they are held."""
-        structure = model.terms, model.form, model.sample_time_s, model.actuators, model.roll
+        structure = model.terms, model.form, model.sample_time_s, model.actuators, model.roll, model.inertia
         self._functions, self._substeps = compiled_samples(structure, rows, substeps), substeps
 
     def states(self, start: Array, delivered: Array, *, sea: Array, parameters: Array, sample_time_s: float) -> Array:
@@ -137,8 +137,8 @@ def compiled_integrator(model: VesselModel, integrator: str) -> CompiledIntegrat
     return CompiledIntegrator(model, integrator)
 
 
-Structure = tuple[tuple[Term, ...], str, float, tuple[Actuator, ...], Roll | None]
-"""Terms, form, sample time, actuators and roll of a model: everything but the values of its parameters."""
+Structure = tuple[tuple[Term, ...], str, float, tuple[Actuator, ...], Roll | None, Inertia | None]
+"""Terms, form, sample time, actuators, roll and inertia of a model: everything but the values of its parameters."""
 
 
 @lru_cache(maxsize=16)
@@ -174,7 +174,7 @@ def _chained(step: ca.Function, length: int) -> ca.Function:
 
 def _step(structure: Structure, integrator: str) -> ca.Function:
     """`motion_rates` stepped once; what depends on the inputs alone is worked out once."""
-    terms, form, sample_time_s, actuators, roll = structure
+    terms, form, sample_time_s, actuators, roll, inertia = structure
     zeros = np.zeros(len(terms))
     model = VesselModel(
         terms=terms,
@@ -184,6 +184,7 @@ def _step(structure: Structure, integrator: str) -> ca.Function:
         sample_time_s=sample_time_s,
         actuators=actuators,
         roll=roll,
+        inertia=inertia,
     )
     m = len(model.inputs)
     x, drive = ca.SX.sym("x", model.states), ca.SX.sym("drive", m + 4)

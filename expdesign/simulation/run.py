@@ -10,7 +10,7 @@ from expdesign.errors import Diverged, InputError
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation.actuation import deliver
 from expdesign.simulation.environment import CALM, Environment, WeatherSeries, weather_rows
-from expdesign.simulation.motion import begun, rk4_step
+from expdesign.simulation.motion import begun, motion_rates, rk4_step
 from expdesign.simulation.program import STATES, RatesProgram, march
 from expdesign.values import Array
 from expdesign.vessel import Vessel, VesselModel
@@ -58,16 +58,36 @@ def simulate(
         substeps=substeps,
         standing=standing,
     )
-    states = integrate_motion(
+    sea = np.concatenate(weather_rows(environment, len(commands)), axis=1)
+    states = _integrated(
         vessel,
         given,
         np.array([*pose, *velocity]),
-        sea=np.concatenate(weather_rows(environment, len(commands)), axis=1),
+        sea=sea,
         sample_time_s=commands.sample_time_s,
         substeps=substeps,
         integrator=integrator,
     )
-    return Trajectory(sample_time_s=commands.sample_time_s, pose=states[:, :3], velocity=states[:, 3:])
+    return Trajectory(
+        sample_time_s=commands.sample_time_s,
+        pose=states[:, :3],
+        velocity=states[:, 3:STATES],
+        auxiliary=_auxiliary(vessel.model, states, given[:, 0], sea),
+    )
+
+
+def _auxiliary(model: VesselModel, states: Array, inputs: Array, sea: Array) -> Array | None:
+    """(k + 1, 4) roll, its rate, and accelerations in sway and to starboard; None without a roll mode in radians.
+
+    The accelerations are those just after the inputs of a sample, of the last one's at the end.
+    """
+    if model.roll is None or not model.roll.heel_rad_per_mps2:
+        return None
+    held, flow = (np.concatenate([x, x[-1:]]) for x in (inputs, np.broadcast_to(sea, (len(inputs), 4))))
+    state, drive, weather = (tuple(np.moveaxis(x, -1, 0)) for x in (states, held, flow))
+    rates = motion_rates(model, state, drive, current_to=weather[:2], wind_to=weather[2:])
+    heel = model.roll.heel_rad_per_mps2 * states[:, STATES:]
+    return np.column_stack([heel, rates[4], rates[4] + state[3] * state[5]])
 
 
 def integrate_motion(
@@ -93,6 +113,23 @@ def integrate_motion(
     Raises:
         Diverged: a speed passed `LARGEST_SPEED`.
     """
+    states = _integrated(
+        vessel, delivered, start, sea=sea, sample_time_s=sample_time_s, substeps=substeps, integrator=integrator
+    )
+    return states[:, :STATES]
+
+
+def _integrated(
+    vessel: Vessel,
+    delivered: Array,
+    start: Array,
+    *,
+    sea: Array,
+    sample_time_s: float,
+    substeps: int,
+    integrator: str,
+) -> Array:
+    """`integrate_motion` with roll: (k + 1, 6 or 8)."""
     from expdesign.simulation._casadi import compiled_integrator  # CasADi is loaded when a motion is integrated
 
     states = compiled_integrator(vessel.model, integrator).states(
@@ -105,7 +142,7 @@ def integrate_motion(
             f"vessel {vessel.name!r}: the simulation diverges after {time_s:.1f} s: "
             f"a speed passes {LARGEST_SPEED:g} m/s or rad/s; the model is unstable under these commands"
         )
-    return states[:, :STATES]
+    return states
 
 
 def simulate_many(

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from expdesign.conventions import wrap_angle
-from expdesign.signals import Commands, Trajectory
+from expdesign.signals import AUXILIARY, Commands, Trajectory
 from expdesign.simulation.environment import Environment, WeatherSeries, weather_rows
 from expdesign.simulation.motion import to_body
 from expdesign.values import Array
@@ -158,7 +158,7 @@ def measure(
 
     Returns:
         Column name -> (k,). Wind is the relative wind in the b-frame, the air's velocity past the ship taken as
-        (u_q, v_q) = velocity - wind.
+        (u_q, v_q) = velocity - wind. Ships with a roll mode in radians have columns of roll and acceleration, too.
     """
     count = len(commands)
     states = np.concatenate([trajectory.pose[:count], trajectory.velocity[:count]], axis=1)
@@ -179,4 +179,13 @@ def measure(
         "wind_v_mps": readings[7],
     }
     inputs = {column_name(name): commands.column(name) for name in commands.names}
-    return {**columns, **inputs}
+    return {**columns, **_auxiliary(vessel.sensors, trajectory, count, rng), **inputs}
+
+
+def _auxiliary(sensors: Sensors, trajectory: Trajectory, count: int, rng: np.random.Generator) -> dict[str, Array]:
+    """Roll and accelerations, where the simulation gives them; drawn last, so that other noise is as without them."""
+    if trajectory.auxiliary is None:
+        return {}
+    std = np.array([sensors.roll_rad, sensors.roll_rate_radps, sensors.acceleration_mps2, sensors.acceleration_mps2])
+    told = trajectory.auxiliary[:count] + std * rng.standard_normal((count, len(std)))
+    return dict(zip(AUXILIARY, told.T, strict=False))

@@ -14,6 +14,7 @@ from expdesign.vessel.actuators import (
 )
 from expdesign.vessel.environment import CALM, STEADY, Environment, Variation
 from expdesign.vessel.expressions import NUMPY, SCALAR, Operators
+from expdesign.vessel.inertia import NOT_SUPPORTED, Inertia
 from expdesign.vessel.inverse import (
     Allocator,
     allocate,
@@ -33,6 +34,7 @@ __all__ = [
     "CENTRAL",
     "IDEAL",
     "KINDS",
+    "NOT_SUPPORTED",
     "NUMPY",
     "SCALAR",
     "SENSORS",
@@ -42,6 +44,7 @@ __all__ = [
     "Actuator",
     "Allocator",
     "Environment",
+    "Inertia",
     "Limit",
     "Mounting",
     "Operators",

@@ -32,6 +32,9 @@ def required_force(model: VesselModel, velocity: Array, acceleration: Array) -> 
             f"term {direct[0]}: desired velocities need a model whose inputs are "
             f"{', '.join(FORCE_SIGNALS)}; use families with commands"
         )
+    if model.inertia is not None:
+        sway, yaw = model.inertia.uncoupled(acceleration[..., 1], acceleration[..., 2])
+        acceleration = np.stack(np.broadcast_arrays(acceleration[..., 0], sway, yaw), axis=-1)
     motion = {name: velocity[..., column] for column, name in enumerate(OUTPUTS)}
     signals = motion | {"u_q": motion["u"], "v_q": motion["v"], SHOAL: 0.0}
 

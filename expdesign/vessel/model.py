@@ -21,6 +21,7 @@ from expdesign.errors import InputError, UnknownName
 from expdesign.values import Array, readonly
 from expdesign.vessel.actuators import Actuator, generalised_force
 from expdesign.vessel.expressions import NUMPY, Expression, Operators, Signals, parse_expression
+from expdesign.vessel.inertia import Inertia
 from expdesign.vessel.roll import Roll
 from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS, SHOAL, Term
 
@@ -39,6 +40,7 @@ class VesselModel:
         sample_time_s: of the discrete form [s].
         actuators: they turn commands into generalised forces.
         roll: a mode that oscillates beside what the terms say, or None.
+        inertia: coupled inertia of sway and yaw; None where neither accelerates the other.
     """
 
     terms: tuple[Term, ...]
@@ -48,6 +50,7 @@ class VesselModel:
     sample_time_s: float
     actuators: tuple[Actuator, ...]
     roll: Roll | None = None
+    inertia: Inertia | None = None
     parameter_correlation: Mapping[tuple[str, str], float] = field(default_factory=dict)
     expressions: tuple[Expression, ...] = field(init=False, repr=False)
 
@@ -183,7 +186,8 @@ class VesselModel:
         for index, (term, value) in enumerate(zip(self.terms, values, strict=True)):
             totals[term.equation] = totals[term.equation] + theta[index] * value
         scale = 1.0 / self.time_scale_s
-        return totals["u"] * scale, totals["v"] * scale, totals["r"] * scale
+        sway, yaw = totals["v"] * scale, totals["r"] * scale
+        return totals["u"] * scale, *(self.inertia.coupled(sway, yaw) if self.inertia else (sway, yaw))
 
     def signals(self, velocity_r: Any, velocity_q: Any, inputs: Any, ops: Operators) -> Signals:
         """The table of everything an expression may read; the water is deep unless depth is among the inputs."""

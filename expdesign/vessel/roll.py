@@ -30,18 +30,23 @@ class Roll:
         damping_ratio: zeta, not negative.
         Y_phi: sway acceleration per unit of roll, a pure number.
         N_phi: yaw acceleration per unit of roll [rad/m].
+        heel_rad_per_mps2: roll angle that 1 m/s2 of side acceleration to starboard by the terms holds for long, positive
+            to starboard, negative for a ship that heels outwards; 0 where unknown, so that roll is not measured.
     """
 
     period_s: float
     damping_ratio: float
     Y_phi: float
     N_phi: float
+    heel_rad_per_mps2: float = 0.0
 
     def __post_init__(self) -> None:
         if not 0 < self.period_s < math.inf:
             raise InputError(f"roll.period_s is {self.period_s:g}, expected more than 0")
         if not 0 <= self.damping_ratio < math.inf:
             raise InputError(f"roll.damping_ratio is {self.damping_ratio:g}, expected 0 or more")
+        if not math.isfinite(self.heel_rad_per_mps2):
+            raise InputError(f"roll.heel_rad_per_mps2 is {self.heel_rad_per_mps2:g}, expected a finite number")
 
     def rates(self, plain: tuple[Any, ...], turning: Any, roll: tuple[Any, ...]) -> tuple[Any, ...]:
         """d/dt of (u, v, r, roll, roll rate).

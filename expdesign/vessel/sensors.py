@@ -42,6 +42,11 @@ FAULTS = (
     *(f"{name}_delay_s" for name in SENSORS),
 )
 """Errors of sensors that a diagnosis estimates, as vessel files call them."""
+NOISE = (
+    "position_m", "heading_rad", "velocity_mps", "yaw_rate_radps", "wind_mps", "wind_angle_rad", "roll_rad",
+    "roll_rate_radps", "acceleration_mps2",
+)  # fmt: skip
+"""Standard deviations, as vessel files call them."""
 CENTRAL = Mounting()
 """At the origin of the b-frame, at once, every sample."""
 
@@ -54,6 +59,7 @@ class Sensors:
         position_m, heading_rad, velocity_mps, yaw_rate_radps: standard deviations of white noise, not negative.
         wind_mps: of each component of a cartesian wind sensor, or of a vane's speed.
         wind_angle_rad: of a vane's angle.
+        roll_rad, roll_rate_radps, acceleration_mps2: of roll, its rate, and of sway and lateral acceleration.
         heading_bias_rad: measured heading less true heading.
         velocity_angle_rad: from the bow to the velocity sensor's own forward axis, clockwise; it measures along that.
         yaw_rate_scale: measured yaw rate over true yaw rate.
@@ -67,6 +73,9 @@ class Sensors:
     yaw_rate_radps: float = 0.0
     wind_mps: float = 0.0
     wind_angle_rad: float = 0.0
+    roll_rad: float = 0.0
+    roll_rate_radps: float = 0.0
+    acceleration_mps2: float = 0.0
     heading_bias_rad: float = 0.0
     velocity_angle_rad: float = 0.0
     yaw_rate_scale: float = 1.0
@@ -78,7 +87,7 @@ class Sensors:
     wind: Mounting = CENTRAL
 
     def __post_init__(self) -> None:
-        for name in ("position_m", "heading_rad", "velocity_mps", "yaw_rate_radps", "wind_mps", "wind_angle_rad"):
+        for name in NOISE:
             value = getattr(self, name)
             if not 0 <= value < math.inf:
                 raise InputError(f"sensors.{name} is {value:g}, expected a standard deviation of 0 or more")

@@ -20,8 +20,8 @@ def state_rates(ship: ExtendedModel, state: tuple[Array, ...], exogenous: Exogen
     u, v, r = state[:3]
     totals = _accelerations(ship, u, v, r, exogenous)
     if ship.roll is None:
-        return tuple(totals)
-    return ship.roll.rates(tuple(totals), u * r, state[3:])
+        return totals
+    return ship.roll.rates(totals, u * r, state[3:])
 
 
 def rates_by_term(
@@ -36,12 +36,12 @@ def rates_by_term(
     for part, regressor in zip(parts, regressors, strict=True):
         value = _value(ship, part, regressor, exogenous)
         value = value if part.coriolis else value / _heavier(ship, part.equation, exogenous)
-        plain = tuple(value if name == part.equation else still for name in OUTPUTS)
+        plain = _coupled(ship, [value if name == part.equation else still for name in OUTPUTS])
         result.append(plain if ship.roll is None else ship.roll.rates(plain, still, (still, still)))
     return result
 
 
-def _accelerations(ship: ExtendedModel, u: Array, v: Array, r: Array, exogenous: ExogenousInputs) -> list[Array]:
+def _accelerations(ship: ExtendedModel, u: Array, v: Array, r: Array, exogenous: ExogenousInputs) -> tuple[Array, ...]:
     """d/dt (u, v, r) without roll."""
     signals = _signals(ship, u, v, r, exogenous)
     totals = dict.fromkeys(OUTPUTS, np.zeros_like(u))
@@ -52,7 +52,13 @@ def _accelerations(ship: ExtendedModel, u: Array, v: Array, r: Array, exogenous:
     lean = ship.get("asymmetry")
     if lean and not any(part.reads_turn for part in ship.scaled_terms):
         totals["r"] = totals["r"] + lean * ahead_force(signals, ship.model)
-    return [totals[n] / _heavier(ship, n, exogenous) + steady[n] for n in OUTPUTS]
+    return _coupled(ship, [totals[n] / _heavier(ship, n, exogenous) + steady[n] for n in OUTPUTS])
+
+
+def _coupled(ship: ExtendedModel, rates: Sequence[Array]) -> tuple[Array, ...]:
+    """d/dt (u, v, r) of the terms with coupled inertia."""
+    surge, sway, yaw = rates
+    return (surge, sway, yaw) if ship.model.inertia is None else (surge, *ship.model.inertia.coupled(sway, yaw))
 
 
 def _signals(ship: ExtendedModel, u: Array, v: Array, r: Array, exogenous: ExogenousInputs) -> dict[str, Array]:

@@ -23,7 +23,7 @@ from expdesign.diagnosis.model import (
     reads_rudder,
 )
 from expdesign.diagnosis.vessel_file.shallow_water import in_shallow_water
-from expdesign.vessel import Term, VesselModel
+from expdesign.vessel import Roll, Term, VesselModel
 from expdesign.vessel.expressions import Expression
 
 TURN = re.compile(r"\btau_psi\b")
@@ -68,10 +68,17 @@ def found_model(
         terms=tuple(row.term for row in rows),
         parameters=np.array([row.value for row in rows]),
         parameter_std=np.array([row.std for row in rows]),
-        roll=ship.roll,
+        roll=_roll(model, ship),
     )
     found, depths = _in_depth(found, model, ship)
     return found, (*notes, *depths)
+
+
+def _roll(model: VesselModel, ship: ExtendedModel) -> Roll | None:
+    """The mode; what an angle of it means is as the file states it."""
+    if ship.roll is None or model.roll is None:
+        return ship.roll
+    return replace(ship.roll, heel_rad_per_mps2=model.roll.heel_rad_per_mps2)
 
 
 def _own(model: VesselModel, ship: ExtendedModel, std: Mapping[str, float]) -> list[Row]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from expdesign.conventions import wrap_angle
-from expdesign.signals import Batch
+from expdesign.signals import AUXILIARY, Batch
 from expdesign.values import Array
 from expdesign.vessel import column_name
 
@@ -36,6 +36,7 @@ def _columns(batch: Batch) -> dict[str, Array]:
         (("wind_u_mps", "wind_v_mps"), batch.wind),
         (("steered",), None if batch.steered is None else batch.steered[:, None]),
         (tuple(f"planned_{column_name(name)}" for name in batch.input_names), batch.planned),
+        (AUXILIARY, batch.auxiliary),
         (("depth_m",), None if batch.depth_m is None else batch.depth_m[:, None]),
     ]
     columns = {

@@ -121,7 +121,11 @@ def _model(model: VesselModel) -> Iterator[str]:
         yield from ("", *_table("[model.parameter_std]", known))
     yield from _correlation(model)
     if model.roll is not None:
-        yield from ("", *_table("[model.roll]", vars(model.roll)))
+        known = {key: value for key, value in vars(model.roll).items() if key != "heel_rad_per_mps2" or value}
+        yield from ("", *_table("[model.roll]", known))
+    if model.inertia is not None:
+        stated = {key: value for key, value in vars(model.inertia).items() if value is not None}
+        yield from ("", *_table("[model.inertia]", stated))
 
 
 def _correlation(model: VesselModel) -> Iterator[str]:

@@ -7,6 +7,7 @@ import re
 from dataclasses import dataclass, replace
 
 from expdesign.conventions import KNOTS_PER_MPS, METRES_PER_NAUTICAL_MILE
+from expdesign.signals import AUXILIARY
 
 FORCES = ("tau_x", "tau_y", "tau_psi")
 STEERED, PLANNED = "steered", "planned_"
@@ -33,6 +34,9 @@ YAW_RATE = {
 }
 PLACE = {"deg": 1.0, "degrees": 1.0, "rad": 1.0 / DEGREE}
 CLOCK = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0}
+ACCELERATION = {"mps2": 1.0, **dict.fromkeys(("m/s2", "m/s^2"), 1.0), "g": 9.80665}
+FORCE = {"n": 1.0, "kn": 1e3, "mn": 1e6}
+MOMENT = {"nm": 1.0, "knm": 1e3, "mnm": 1e6}
 REVOLUTIONS = {"rps": 1.0, "hz": 1.0, **dict.fromkeys(("rpm", "1/min"), 1.0 / 60.0)}
 
 
@@ -70,6 +74,27 @@ QUANTITIES = (
         "wind_angle", ANGLE, "wind_angle_rad", "direction that the wind comes from at a vane, clockwise from the bow"
     ),
     Quantity("depth", LENGTH, "depth_m", "depth of the water"),
+    Quantity("roll", ANGLE, "roll_rad", "roll angle, positive with the starboard side down"),
+    Quantity("roll_rate", YAW_RATE, "roll_rate_radps", "rate of the roll angle"),
+    Quantity(
+        "sway_acceleration|lateral_acceleration",
+        ACCELERATION,
+        "sway_acceleration_mps2, lateral_acceleration_mps2",
+        "time derivative of v, and the acceleration to starboard of midships with gravity taken off, which is that "
+        "derivative plus u r; yaw models of expdesign monitor read one of them",
+    ),
+    Quantity(
+        "actuator_x|actuator_y",
+        FORCE,
+        "actuator_x_n, actuator_y_n",
+        "force of all actuators on the hull, forward and to starboard, as measured or from a table",
+    ),
+    Quantity(
+        "actuator_psi",
+        MOMENT,
+        "actuator_psi_nm",
+        "yaw moment of all actuators about midships; yaw models of expdesign monitor read it",
+    ),
     Quantity(r"n\d+", REVOLUTIONS, "n1_rps, n2_rps", "commanded speed of propellers and thrusters"),
     Quantity(r"(?:a|rudder)\d+", ANGLE, "a1_rad, rudder1_rad", "commanded angle of thrusters and rudders"),
 )
@@ -155,6 +180,8 @@ def meaning(header: str, column: int) -> Source | Unitless | None:
             continue
         stem, unit = SYNONYMS.get(found[1], found[1]), found[2]
         own = next(iter(units))
+        if unit is None and f"{stem}_{own}" in AUXILIARY:
+            return None
         if unit is None:
             return Unitless(header, _offered(stem, units)) if len(found[1]) > 1 or found[1] == stem else None
         if unit in units:

@@ -43,6 +43,9 @@ RANGES = (
     Range(
         pattern=r"(?:planned_)?rudder\d+_rad", low=-TURN / 4, high=TURN / 4, expected="-1.57 to 1.57 rad", degrees=True
     ),
+    Range(pattern="roll_rad", low=-TURN / 4, high=TURN / 4, expected="-1.57 to 1.57 rad", degrees=True),
+    Range(pattern="roll_rate_radps", low=-TURN, high=TURN, expected="-6.28 to 6.28 rad/s", degrees=True),
+    Range(pattern="(?:sway|lateral)_acceleration_mps2", low=-50, high=50, expected="-50 to 50 m/s2"),
     Range(pattern="depth_m", low=1e-9, high=12000, expected="more than 0, counted downwards, at most 12000 m"),
     Range(pattern="lat_deg", low=-90, high=90, expected="-90 to 90 degrees"),
     Range(pattern="lon_deg", low=-180, high=180, expected="-180 to 180 degrees"),

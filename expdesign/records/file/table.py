@@ -15,10 +15,14 @@ from expdesign.records.file.cells import FIRST_ROW, Cells, read_cells, shown
 from expdesign.records.file.choice import Inputs, Sources, choose_columns
 from expdesign.records.file.names import Source, is_input
 from expdesign.records.tuning import TUNING
+from expdesign.signals import AUXILIARY
 from expdesign.values import Array
 
 MISSING = ("", "na", "n/a", "nan", "-nan", "null", "none")
-OPTIONAL = (("wind_u_mps", "wind_v_mps"), ("wind_speed_mps", "wind_angle_rad"), ("depth_m",), ("steered",))
+OPTIONAL = (
+    ("wind_u_mps", "wind_v_mps"), ("wind_speed_mps", "wind_angle_rad"), ("depth_m",), ("steered",),
+    *((name,) for name in AUXILIARY),
+)  # fmt: skip
 
 Mask = NDArray[np.bool_]
 

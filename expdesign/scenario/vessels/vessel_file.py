@@ -29,6 +29,7 @@ from expdesign.vessel import (
     SENSORS,
     STRUCTURES,
     Actuator,
+    Inertia,
     Limit,
     Mounting,
     Response,
@@ -168,6 +169,8 @@ def _model(table: ModelTable, actuators: tuple[Actuator, ...], sample_time_s: fl
         raise entry.at("parameters").error(f"{found}, expected every parameter of structure {table.structure!r}")
     if table.roll is not None and not {"v", "r"} <= {term.equation for term in terms}:
         raise entry.at("roll").error("needs terms of v and r, which roll acts on")
+    if table.inertia is not None and not {"v", "r"} <= {term.equation for term in terms}:
+        raise entry.at("inertia").error("needs terms of v and r, which it couples")
     model = VesselModel(
         terms=terms,
         parameters=np.array([table.parameters[name] for name in names]),
@@ -176,11 +179,19 @@ def _model(table: ModelTable, actuators: tuple[Actuator, ...], sample_time_s: fl
         sample_time_s=sample_time_s,
         actuators=actuators,
         roll=None if table.roll is None else Roll(**table.roll.model_dump()),
+        inertia=_inertia(table, entry.at("inertia")),
         parameter_correlation=_correlation(table, names, entry.at("parameter_correlation")),
     )
     if np.linalg.eigvalsh(model.parameter_correlation_matrix)[0] < -CORRELATION_ROUNDING:
         raise entry.at("parameter_correlation").error("contradicts itself: no parameters have such correlations")
     return model
+
+
+def _inertia(table: ModelTable, entry: Entry) -> Inertia | None:
+    try:
+        return None if table.inertia is None else Inertia(**table.inertia.model_dump())
+    except InputError as error:
+        raise entry.error(f"has no inverse: {error}") from None
 
 
 def _correlation(table: ModelTable, names: list[str], entry: Entry) -> dict[tuple[str, str], float]:

@@ -148,6 +148,25 @@ class RollTable(Table):
     damping_ratio: NonNegative = Field(description="the damping ratio of roll")
     Y_phi: Number = Field(description="the sway acceleration per unit of roll")
     N_phi: Number = Field(description="the yaw acceleration per unit of roll")
+    heel_rad_per_mps2: Number = Field(
+        default=0.0,
+        description="the roll angle that a lasting side acceleration of 1 m/s2 to starboard holds [rad], positive to "
+        "starboard, negative for a ship that heels outwards; with it, simulate measures roll",
+    )
+
+
+class InertiaTable(Table):
+    """`[model.inertia]`: sway and yaw that accelerate each other, as where the centre of gravity is not amidships."""
+
+    sway_kg: Positive = Field(description="the mass with added mass in sway [kg]")
+    yaw_kgm2: Positive = Field(description="the moment of inertia with added inertia in yaw, about midships [kg m2]")
+    sway_yaw_kgm: Number = Field(
+        description="the sway force per yaw acceleration [kg m]: the mass times the distance of the centre of gravity "
+        "ahead of midships, with added mass"
+    )
+    yaw_sway_kgm: Number | None = Field(
+        default=None, description="the yaw moment per sway acceleration [kg m]; the same when not given"
+    )
 
 
 class ModelTable(Table):
@@ -171,6 +190,11 @@ class ModelTable(Table):
     roll: RollTable | None = Field(
         default=None, description="a table [model.roll]; simulations follow it, estimates and plans do not"
     )
+    inertia: InertiaTable | None = Field(
+        default=None,
+        description="a table [model.inertia]; the terms then give accelerations before coupling. Simulations, "
+        "diagnoses and watches follow it, scores, estimates and plans do not",
+    )
 
 
 class SensorsTable(Table):
@@ -184,6 +208,11 @@ class SensorsTable(Table):
         default=0.0, description="the standard deviation of wind speed, or of each component [m/s]"
     )
     wind_angle_rad: NonNegative = Field(default=0.0, description="the standard deviation of a vane's angle [rad]")
+    roll_rad: NonNegative = Field(default=0.0, description="the standard deviation of roll angles [rad]")
+    roll_rate_radps: NonNegative = Field(default=0.0, description="the standard deviation of roll rates [rad/s]")
+    acceleration_mps2: NonNegative = Field(
+        default=0.0, description="the standard deviation of sway and lateral accelerations [m/s2]"
+    )
     heading_bias_rad: HalfTurn = Field(default=0.0, description="the measured heading less the true one [rad]")
     velocity_angle_rad: HalfTurn = Field(
         default=0.0, description="the angle from the bow to the velocity sensor's forward axis [rad], clockwise"

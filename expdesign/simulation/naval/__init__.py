@@ -1,7 +1,9 @@
 """A multipurpose naval vessel with two podded drives in four degrees of freedom: surge, sway, roll, yaw.
 
-It is a truth to simulate, with coupled inertia and roll, for trials of models that are simpler. Vessel files cannot
-name it: their equations are linear in the parameters and have no coupled inertia.
+It is a truth to simulate, for trials of models that are simpler; vessel files cannot name it, as roll and pods in
+oblique flow are not linear in parameters. What becomes of it in vessel files: the coupling of sway and yaw is
+`[model.inertia]`, roll is the linear mode of `[model.roll]`, and everything in u, v, r is `[[model.terms]]`. Its yaw
+equation is the yaw model of `expdesign monitor`, which reads roll and the drives' moment from the data.
 
 Frames: b-frame x forward, y to starboard, z down; roll positive to starboard, yaw clockwise. A positive pod angle
 pushes the stern to starboard, so that the ship turns to port.

@@ -19,6 +19,7 @@ from expdesign.plan.tuning import PLAN
 from expdesign.plan.values import LatticeProof, Plan, RiskEstimate
 from expdesign.progress import Progress, silent
 from expdesign.scenario import Scenario
+from expdesign.vessel import NOT_SUPPORTED
 
 
 def planned(
@@ -68,6 +69,8 @@ def check_plannable(case: Scenario) -> None:
             f"vessel {case.vessel.name!r} has a roll mode, [model.roll], which plans do not follow; expected a vessel "
             "file without that table for planning, and the one with it as the truth of a simulation"
         )
+    if case.vessel.model.inertia is not None:
+        raise InputError(NOT_SUPPORTED.format(what="a plan"))
 
 
 def plan_files(case: Scenario, plan: Plan) -> dict[str, str | bytes]:
