@@ -30,8 +30,8 @@ class Roll:
         damping_ratio: zeta, not negative.
         Y_phi: sway acceleration per unit of roll, a pure number.
         N_phi: yaw acceleration per unit of roll [rad/m].
-        heel_rad_per_mps2: roll angle that 1 m/s2 of side acceleration to starboard by the terms lastingly holds, positive
-            to starboard, negative for a ship that heels outwards; 0 where unknown, so that roll is not measured.
+        heel_rad_per_mps2: roll angle that a side acceleration of 1 m/s2 to starboard holds for long, positive to
+            starboard, negative for a ship that heels outwards; 0 where unknown, so that roll is not measured.
     """
 
     period_s: float
