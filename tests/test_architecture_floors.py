@@ -36,9 +36,11 @@ FLOORS = {
         ("regression",),
         ("noise", "replay"),
         ("solve",),
-        ("excitation", "output_error", "feedback"),
+        ("excitation", "output_error", "feedback", "least_squares"),
         ("values",),
         ("disturbance", "equation_wise"),
+        ("settings",),
+        ("instrumental",),
         ("methods",),
     ),
     "diagnosis": (

@@ -19,9 +19,10 @@ from expdesign.diagnosis.vessel_file.writing import extend
 from expdesign.dictionary import PrimitiveSpec, build_dictionary
 from expdesign.dictionary.build import family
 from expdesign.dictionary.spec import complete_settings
-from expdesign.estimation.methods import Settings, estimate
+from expdesign.estimation.methods import estimate
 from expdesign.estimation.regression.tables import model_for, with_depth
 from expdesign.estimation.replay.replay import Integration, simulate_batch
+from expdesign.estimation.settings import Settings
 from expdesign.export import vessel_toml
 from expdesign.export.diagnosis_page import diagnosis_html, extended_vessel
 from expdesign.information import score_primitives

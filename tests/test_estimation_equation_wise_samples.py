@@ -9,8 +9,9 @@ from estimation_case import NOMINAL, QUIET, TRUE, commands, measured, record, tr
 from expdesign.errors import InputError, NotInformative
 from expdesign.estimation.equation_wise import EQUATION_WISE
 from expdesign.estimation.excitation import WorstCase, worst_case
-from expdesign.estimation.methods import Settings, estimate
+from expdesign.estimation.methods import estimate
 from expdesign.estimation.regression import Regression
+from expdesign.estimation.settings import Settings
 from expdesign.estimation.solve import Weighting, solve_iv
 from expdesign.vessel import Sensors
 

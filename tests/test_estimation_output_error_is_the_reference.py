@@ -9,10 +9,11 @@ from scipy.optimize import least_squares
 from estimation_case import NOMINAL, QUIET, TRUE, commands, measured, record
 from expdesign.errors import InputError
 from expdesign.estimation.fit import fit_percent
-from expdesign.estimation.methods import Settings, estimate
+from expdesign.estimation.methods import estimate
 from expdesign.estimation.output_error import gauss_newton, minimise
 from expdesign.estimation.replay import Stretches, compiled
 from expdesign.estimation.replay.replay import Integration, build_replay, simulate_batch, start_state
+from expdesign.estimation.settings import Settings
 from expdesign.signals import Batch, Record
 from expdesign.simulation import Environment, Variation, motion_rates, simulate
 from measured_trials import MODEL_SHIP_TRUE, model_ship_commands

@@ -9,8 +9,9 @@ from estimation_case import CURRENT, NOMINAL, QUIET, TRUE, commands, measured, r
 from expdesign.errors import Diverged
 from expdesign.estimation.excitation import WorstCase, check_excitation, worst_case
 from expdesign.estimation.fit import fit_percent
-from expdesign.estimation.methods import Settings, estimate
+from expdesign.estimation.methods import estimate
 from expdesign.estimation.replay.replay import Integration, simulate_batch
+from expdesign.estimation.settings import Settings
 from expdesign.signals import Commands
 from expdesign.simulation import CALM, Environment, Variation, simulate, simulate_ensemble
 

@@ -9,8 +9,9 @@ import pytest
 
 from expdesign.errors import InputError, NotInformative
 from expdesign.estimation.feedback import feedback_in
-from expdesign.estimation.methods import Settings, estimate
+from expdesign.estimation.methods import estimate
 from expdesign.estimation.regression import Regression
+from expdesign.estimation.settings import Settings
 from expdesign.estimation.values import Estimate
 from expdesign.signals import Record
 from expdesign.vessel import Term

@@ -7,9 +7,10 @@ import pytest
 
 from estimation_case import MERGED, NOMINAL, TRUE
 from expdesign.errors import InputError
-from expdesign.estimation.methods import Settings, estimate
+from expdesign.estimation.methods import estimate
 from expdesign.estimation.regression.vane import unbiased_value
 from expdesign.estimation.replay import Integration
+from expdesign.estimation.settings import Settings
 from expdesign.reduction import at_reference_point, reduced, with_reduced_wind
 from expdesign.reduction.readings import readings
 from expdesign.signals import Batch, Commands, Record

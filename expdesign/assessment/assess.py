@@ -14,9 +14,10 @@ from expdesign.errors import Diverged, InputError, NoAnswer, NotInformative, Unk
 from expdesign.estimation.disturbance import current_moments, felt_moments, measured_wind, tells_current
 from expdesign.estimation.equation_wise import ALL, EQUATION_WISE, SAMPLES
 from expdesign.estimation.excitation import check_excitation, worst_case
-from expdesign.estimation.methods import STARTS, Method, Settings, estimate, method_named
+from expdesign.estimation.methods import Method, estimate, method_named
 from expdesign.estimation.regression import CURRENT, MEANS, PREDICTORS
 from expdesign.estimation.replay import STEERED, Integration
+from expdesign.estimation.settings import STARTS, Settings
 from expdesign.estimation.solve import BLOCKS, Weighting
 from expdesign.estimation.values import Estimate
 from expdesign.progress import Progress, in_phases, silent

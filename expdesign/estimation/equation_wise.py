@@ -18,6 +18,7 @@ Source: F. Ljungberg, doctoral thesis, Linköping University, 5.6, (5.72), (5.77
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -30,8 +31,8 @@ ALL, EQUATION_WISE = "all", "equation-wise"
 SAMPLES = (ALL, EQUATION_WISE)
 
 
-def strata_of(layout: Layout, rows: Rows, tables: Sequence[Table], *, worst: WorstCase) -> Integers:
-    """(k, n) of each row and equation: 0 where it is not used, else a number for the sides that its moduli are on.
+def with_strata(layout: Layout, rows: Rows, tables: Sequence[Table], *, worst: WorstCase) -> Rows:
+    """The rows, of which each equation uses its own samples, in groups by the sides that its moduli are on.
 
     Args:
         layout: columns; equations are its model's outputs.
@@ -43,6 +44,13 @@ def strata_of(layout: Layout, rows: Rows, tables: Sequence[Table], *, worst: Wor
         InputError: a steady current is estimated, which the equations share and which needs no such samples.
         NotInformative: an equation has no samples.
     """
+    strata = _strata(layout, rows, tables, worst=worst)
+    whole = bool((strata == strata[0]).all() and strata.all())
+    return replace(rows, regression=replace(rows.regression, strata=None if whole else strata))
+
+
+def _strata(layout: Layout, rows: Rows, tables: Sequence[Table], *, worst: WorstCase) -> Integers:
+    """(k, n) of each row and equation: 0 where it is not used, else a number for the sides that its moduli are on."""
     if layout.guess is not None:
         raise InputError("equation-wise samples are for methods without a steady current; those need no such samples")
     model, wind = layout.model, layout.predictor.wind

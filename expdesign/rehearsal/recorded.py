@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 
 from expdesign.conventions import OUTPUTS
 from expdesign.errors import Diverged, InputError
-from expdesign.estimation.methods import full_parameters
 from expdesign.estimation.regression import build_layout, build_regression, model_for
 from expdesign.estimation.replay import (
     InstrumentModel,
@@ -140,7 +139,7 @@ def recorded_pieces(
     winds = [instrument_wind(batch, "lagged").T if layout.predictor.wind else None for batch in record.batches]
 
     def simulate(values: Array) -> Array:
-        full = full_parameters(layout, values)
+        full = layout.full_parameters(values)
         errors = []
         for batch, wind in zip(record.batches, winds, strict=True):
             velocity = replay.states(batch, full, wind)[:, 3:]

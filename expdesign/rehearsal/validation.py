@@ -24,8 +24,9 @@ from expdesign.dictionary import Primitive
 from expdesign.errors import InputError, NoAnswer
 from expdesign.estimation.equation_wise import EQUATION_WISE
 from expdesign.estimation.excitation import worst_case
-from expdesign.estimation.methods import Settings, estimate, method_named
+from expdesign.estimation.methods import estimate, method_named
 from expdesign.estimation.replay import Integration
+from expdesign.estimation.settings import Settings
 from expdesign.estimation.solve import Weighting
 from expdesign.information.excitation import FREE, SIGMAS
 from expdesign.information.expected import TrialPart, expected_covariance

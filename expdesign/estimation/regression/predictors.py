@@ -117,6 +117,15 @@ class Layout:
         """Parameters, then nuisance parameters."""
         return self.parameters + tuple(item.name for item in self.nuisance) + (STEADY_CURRENT if self.guess else ())
 
+    def full_parameters(self, values: Array) -> Array:
+        """All parameters (all,) of the model from those estimated: others are held, or zero where merged."""
+        full = np.array(self.model.parameters)
+        for name, value in zip(self.parameters, values, strict=False):
+            full[self.model.names.index(name)] = value
+        for name in self.merged:
+            full[self.model.names.index(name)] = 0.0
+        return full
+
     def rows(self, table: Table, signs: dict[str, float], *, used: Integers | slice, scale: float) -> Array:
         """(k, n, p) regressors of a table of signals, times a scale, at the samples used."""
         table = self._in_water(table)

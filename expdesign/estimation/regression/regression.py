@@ -85,6 +85,16 @@ class Regression:
         return None if self.strata is None else self.strata != 0
 
     @property
+    def groups(self) -> Integers:
+        """(k, n) `strata`, of which there is one where there are none."""
+        return np.ones(self.y.shape, dtype=np.int64) if self.strata is None else self.strata
+
+    @property
+    def used(self) -> Mask:
+        """(k, n) which rows each output uses."""
+        return np.asarray(self.groups != 0)
+
+    @property
     def step_of(self) -> Integers:
         """(k,) sample numbers within the batches."""
         assert self.step is not None  # set at birth

@@ -23,7 +23,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from expdesign.assessment.runs import TEST, check_run
 from expdesign.errors import NoAnswer
-from expdesign.estimation.methods import Settings, estimate
+from expdesign.estimation.methods import estimate
+from expdesign.estimation.settings import Settings
 from expdesign.processes import in_order
 from expdesign.signals import Batch, Record
 from expdesign.simulation import Ensemble, Environment, simulate_ensemble

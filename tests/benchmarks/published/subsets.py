@@ -27,9 +27,10 @@ from scipy.stats import binomtest
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from expdesign.assessment.runs import TEST, check_run
 from expdesign.errors import NoAnswer
-from expdesign.estimation.methods import Settings, estimate, method_named
+from expdesign.estimation.methods import estimate, method_named
 from expdesign.estimation.regression import PREDICTORS
 from expdesign.estimation.replay import Integration
+from expdesign.estimation.settings import Settings
 from expdesign.estimation.solve import Weighting
 from expdesign.processes import in_order
 from expdesign.records import load_records

@@ -1,0 +1,147 @@
+"""Estimates by instrumental variables, around a steady current that is sought where a method asks for one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from expdesign.errors import Diverged, NoAnswer
+from expdesign.estimation.equation_wise import ALL, with_strata
+from expdesign.estimation.least_squares import quick_least_squares
+from expdesign.estimation.regression import Guess, Layout, Rows, build_regression
+from expdesign.estimation.replay import InstrumentModel, Replay, apart_from_start, build_replay
+from expdesign.estimation.settings import Settings
+from expdesign.estimation.solve import Prior, Refined, refine_iv
+from expdesign.estimation.tuning import TUNING
+from expdesign.signals import Record
+from expdesign.values import Array
+
+
+def instrumental_estimate(
+    layout: Layout, record: Record, driving: Record, choices: Settings
+) -> tuple[Layout, Rows, Refined]:
+    """The estimate, with the layout and the rows that it is from; where a current is sought, those around the last.
+
+    Args:
+        layout: columns, linearised around the first guess of a current.
+        record: the data.
+        driving: whose inputs the instruments are simulated with.
+        choices: settings.
+    """
+    windy = layout.predictor.wind and choices.wind != "measured"
+    replay = build_replay(layout.model, driving, choices.integration, windy=windy, flowing=layout.predictor.steady)
+    rows = apart_from_start(build_regression(layout, record))
+    rows, refined = _with_instruments(layout, driving, rows, replay, choices)
+    if layout.guess is None:
+        return layout, rows, refined
+    weighting = replace(choices.weighting, output_weights=_by_residuals(rows, refined))
+    weighted = replace(choices, weighting=weighting)
+
+    def around(guess: Guess) -> tuple[Layout, Rows, Refined]:
+        there = replace(layout, guess=guess)
+        own = apart_from_start(build_regression(there, record))
+        return there, *_with_instruments(there, driving, own, replay, weighted)
+
+    parameters = layout.full_parameters(refined.solution.values)
+    return _settled_current(around, around(replace(layout.guess, parameters=parameters)))
+
+
+def _settled_current(
+    around: Callable[[Guess], tuple[Layout, Rows, Refined]], found: tuple[Layout, Rows, Refined]
+) -> tuple[Layout, Rows, Refined]:
+    """The estimate around the current that it finds: Newton's method, with steps halved where the next one grows.
+
+    Args:
+        around: the estimate around a guess.
+        found: the first one.
+    """
+    share = 1.0
+    for _ in range(TUNING.most_currents):
+        layout, _, refined = found
+        moved, old = refined.solution.values[-2:], layout.guess
+        assert old is not None
+        if (np.abs(moved) <= TUNING.settled_deviations * np.sqrt(np.diag(refined.solution.covariance)[-2:])).all():
+            break
+        parameters = layout.full_parameters(refined.solution.values)
+        guess = Guess(
+            to_mps=old.to_mps + share * moved, parameters=old.parameters + share * (parameters - old.parameters)
+        )
+        try:
+            there = around(guess)
+        except NoAnswer:  # a poor guess may make the instruments' model unstable
+            share /= 2.0
+            continue
+        if np.hypot(*there[2].solution.values[-2:]) < np.hypot(*moved):
+            found, share = there, min(1.0, 2.0 * share)
+        else:
+            share /= 2.0
+    else:
+        layout, rows, refined = found
+        left = " and ".join(f"{value:.2g}" for value in refined.solution.values[-2:])
+        note = (
+            f"the steady current did not settle in {TUNING.most_currents} steps: from the guess that the estimate is "
+            f"around, it would go on by {left} m/s to north and east; intervals may be too short"
+        )
+        found = layout, rows, replace(refined, warnings=(*refined.warnings, note))
+    return found
+
+
+def _by_residuals(rows: Rows, refined: Refined) -> tuple[float, ...]:
+    """Weights of the outputs, which the current couples: one over the variance of their residuals."""
+    left, data = (np.mean(values**2, axis=0) for values in (refined.solution.residuals, rows.regression.y))
+    variance = np.maximum(left, TUNING.exact_share * data)
+    return tuple(np.where(variance > 0, variance, variance.max()) ** -1.0) if variance.any() else ()
+
+
+def _with_instruments(
+    layout: Layout, record: Record, rows: Rows, replay: Replay, choices: Settings
+) -> tuple[Rows, Refined]:
+    """The estimate, and the rows with the samples that each equation used."""
+    simulation = InstrumentModel(layout, record, rows, replay, choices.heading, choices.wind)
+    start = layout.model.parameters
+    if choices.start == "ls":
+        start = layout.full_parameters(quick_least_squares(rows, choices.weighting).values)
+
+    def first() -> Array:
+        try:
+            return simulation.instruments(start)
+        except Diverged as error:
+            raise Diverged(f"instruments cannot be simulated from the {choices.start} model: {error}") from None
+
+    def refined(some: Rows) -> Refined:
+        return refine_iv(
+            some.regression,
+            first,
+            lambda values: simulation.instruments(layout.full_parameters(values)),
+            choices.weighting,
+            prior=_prior(layout, start),
+            most=choices.most_refinements,
+        )
+
+    if choices.samples == ALL:
+        return rows, refined(rows)
+    own, found = rows, None
+    for _ in range(TUNING.most_choices):
+        parameters = start if found is None else layout.full_parameters(found.solution.values)
+        try:
+            tables = [simulation.table(index, parameters) for index in range(len(record.batches))]
+        except Diverged:
+            break
+        newer = with_strata(layout, rows, tables, worst=choices.worst)
+        if found is not None and np.array_equal(newer.regression.groups, own.regression.groups):
+            break
+        own, found = newer, refined(newer)
+    assert found is not None  # instruments from the start were simulated above
+    return own, found
+
+
+def _prior(layout: Layout, start: Array) -> Prior:
+    """The first model, around which parameters spread as far as the vessel file states, or by their own size."""
+    model = layout.model
+    places = [model.names.index(name) for name in layout.parameters]
+    stated, sizes = model.parameter_std[places], TUNING.prior_share * np.abs(start[places])
+    spread = np.where(stated > 0, stated, np.where(sizes > 0, sizes, np.inf))
+    others = len(layout.names) - len(layout.parameters)
+    return Prior(values=np.append(start[places], np.zeros(others)), spread=np.append(spread, np.full(others, np.inf)))
