@@ -89,7 +89,7 @@ MOST_MODULES = 12
 EXCEPTIONS = {("__main__", "cli")}  # `python -m` is nothing but the command line under another name
 
 IMPORTERS = {
-    "cvxpy": ("durations/_cvxpy.py",),
+    "cvxpy": ("durations/maximise/_cvxpy.py",),
     "ompl": ("plan/legs/_ompl.py",),
     "distributed": ("processes/_dask.py",),
     "casadi": (

@@ -23,7 +23,7 @@ from expdesign.values import Array
 
 def definite_start(problem: DurationProblem, polytope: Polytope) -> Array | None:
     """Fractions (q,) that make sym B positive definite, or None where there are none."""
-    from expdesign.durations._cvxpy import largest_least_eigenvalue
+    from expdesign.durations.maximise._cvxpy import largest_least_eigenvalue
 
     matrices, prior = (symmetric_part(item) for item in _unit_scaled(problem))
     w = largest_least_eigenvalue(matrices, prior, polytope)
