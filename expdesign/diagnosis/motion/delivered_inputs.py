@@ -30,6 +30,12 @@ def delivered_inputs(ship: ExtendedModel, windows: Windows) -> tuple[tuple[Array
     return tuple((rows * _scales(ship), finer) for rows in delivered)
 
 
+def actuator_effects(ship: ExtendedModel) -> dict[str, float]:
+    """Effects that change what actuators deliver."""
+    kinds = {*RESPONSES, "scale"}
+    return {key: value for key, value in ship.effects.items() if value and key.split(":", 1)[0] in kinds}
+
+
 def _scales(ship: ExtendedModel) -> Array:
     """(m,) factors of the inputs."""
     factors = np.ones(len(ship.model.inputs))

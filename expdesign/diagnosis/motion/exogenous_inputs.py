@@ -9,7 +9,7 @@ import scipy
 
 from expdesign.diagnosis.data import Windows, averaging_half_width
 from expdesign.diagnosis.model import ExtendedModel, mean_wind
-from expdesign.diagnosis.motion.delivered_inputs import delivered_inputs
+from expdesign.diagnosis.motion.delivered_inputs import actuator_effects, delivered_inputs
 from expdesign.simulation.motion import to_body
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, VesselModel, generalised_force
@@ -52,15 +52,18 @@ class ExogenousInputs(dict[str, Array]):
         return ExogenousInputs({name: values[:, :-1] for name, values in self.items()})
 
 
-def exogenous_inputs(ship: ExtendedModel, windows: Windows) -> ExogenousInputs:
-    """The exogenous signals, with the inputs as delivered by the actuators."""
-    model, shape = ship.model, windows.heading.shape
-    names = (*dict.fromkeys((*model.inputs, *FORCE_SIGNALS)),)
-    followed = delivered_inputs(ship, windows)
-    moving = any(finer > 1 for _, finer in followed)
-    signals = windows.gather(tuple(_acting(model, *rows, windows.rows_per_step) for rows in followed))
-    names = (*names, *(f"{RISE}{name}" for name in names)) if moving else names
-    table = ExogenousInputs({n: np.broadcast_to(signals[..., i], shape) for i, n in enumerate(names)})
+def exogenous_inputs(
+    ship: ExtendedModel, windows: Windows, *, known: tuple[ExtendedModel, ExogenousInputs] | None = None
+) -> ExogenousInputs:
+    """The exogenous signals, with the inputs as delivered by the actuators.
+
+    Args:
+        ship: model and effects.
+        windows: w windows.
+        known: another ship and its signals over the same windows; actuators without a difference are not followed again.
+    """
+    model = ship.model
+    table = _forces(ship, windows) if known is None else _forces_like(ship, windows, *known)
     north, east = ship.get("current:north"), ship.get("current:east")
     if north or east:
         table["u_c"], table["v_c"] = to_body((north, east), true_heading(ship, windows), NUMPY)
@@ -72,6 +75,33 @@ def exogenous_inputs(ship: ExtendedModel, windows: Windows) -> ExogenousInputs:
         since = windows.time_s + windows.step_s - ship.effects["change:time"]
         table["after"] = np.clip(since / windows.step_s, 0.0, 1.0)  # share of the step
     return table
+
+
+def _forces(ship: ExtendedModel, windows: Windows) -> ExogenousInputs:
+    """Delivered inputs and their forces."""
+    model, shape = ship.model, windows.heading.shape
+    names = _force_names(model)
+    followed = delivered_inputs(ship, windows)
+    moving = any(finer > 1 for _, finer in followed)
+    signals = windows.gather(tuple(_acting(model, *rows, windows.rows_per_step) for rows in followed))
+    names = (*names, *(f"{RISE}{name}" for name in names)) if moving else names
+    return ExogenousInputs({n: np.broadcast_to(signals[..., i], shape) for i, n in enumerate(names)})
+
+
+def _forces_like(
+    ship: ExtendedModel, windows: Windows, other: ExtendedModel, known: ExogenousInputs
+) -> ExogenousInputs:
+    """The same, from the signals of another ship where its actuators deliver the same."""
+    names = _force_names(ship.model)
+    shape = known[names[0]].shape if names[0] in known else None
+    if actuator_effects(ship) != actuator_effects(other) or shape != windows.heading.shape:
+        return _forces(ship, windows)
+    rises = [f"{RISE}{name}" for name in names]
+    return ExogenousInputs({name: known[name] for name in (*names, *rises) if name in known})
+
+
+def _force_names(model: VesselModel) -> tuple[str, ...]:
+    return (*dict.fromkeys((*model.inputs, *FORCE_SIGNALS)),)
 
 
 def _acting(model: VesselModel, rows: Array, finer: int, rows_per_step: int) -> Array:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.linalg.lapack import dtbtrs
 
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion.equations_of_motion import state_rates
@@ -65,6 +66,21 @@ def transition_matrices(jacobian: Array, h: float) -> tuple[Array, Array]:
     A2 = A @ A
     A3 = A2 @ A
     return eye + A + A2 / 2 + A3 / 6 + A3 @ A / 24, h * (eye + A / 2 + A2 / 6 + A3 / 24)
+
+
+def propagated(transition: Array, first: Array, missed: Array) -> Array:
+    """(w, k, n) changes of the states by gaps at the start (w, n) and between steps (w, k - 1, n).
+
+    All steps of all windows are one lower triangular band matrix. Where a motion overflows, so may those of other
+    windows.
+    """
+    w, n = first.shape
+    band = np.zeros((w, missed.shape[1] + 1, n, 2 * n))  # (column, diagonal) of the matrix, from the main one down
+    for column in range(n):
+        band[:, :-1, column, n - column : 2 * n - column] = -transition[..., column]
+    gaps = np.concatenate([first[:, None], missed], axis=1)
+    found, _ = dtbtrs(band.reshape(-1, 2 * n).T, gaps.reshape(-1, 1), uplo="L", diag="U")
+    return np.asarray(found.reshape(gaps.shape))
 
 
 def stacked_rates(ship: ExtendedModel, states: Array, exogenous: ExogenousInputs) -> Array:

@@ -13,13 +13,13 @@ import numpy as np
 
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion.equations_of_motion import rates_by_term
-from expdesign.diagnosis.motion.exogenous_inputs import exogenous_inputs
-from expdesign.diagnosis.motion.integration import stacked_rates, state_jacobian, transition_matrices
+from expdesign.diagnosis.motion.exogenous_inputs import ExogenousInputs, exogenous_inputs
+from expdesign.diagnosis.motion.integration import propagated, stacked_rates, state_jacobian, transition_matrices
 from expdesign.diagnosis.motion.motion import LinearisedMotion, Motion
 from expdesign.diagnosis.motion.sensors import sensor_outputs, simpson_mean
 from expdesign.values import Array
 
-INNER, OUTER = {"theta", "term", "gain", "inertia", "asymmetry"}, {"lever", "gyro"}
+INNER, OUTER = {"theta", "term", "gain", "inertia", "asymmetry"}, {"lever", "gyro", "late"}
 """Kinds of effects that change neither exogenous signals nor sensors, and those that change sensors alone."""
 
 
@@ -57,7 +57,8 @@ def disturbance_of(linear: LinearisedMotion, changed: ExtendedModel, per: float)
         known = not kinds - INNER and (
             "u_w" in motion.exogenous or not any(part.reads_air for part in changed.scaled_terms)
         )
-        exogenous = (motion.exogenous if known else exogenous_inputs(changed, motion.windows)).without_last_step()
+        exogenous = motion.exogenous if known else _exogenous_after(motion, changed)
+        exogenous = exogenous.without_last_step()
         ends = (motion.states[:, :-1], motion.states[:, 1:])
         force = np.mean([stacked_rates(changed, end, exogenous) for end in ends], axis=0) - linear.path_rates.mean(
             axis=0
@@ -66,6 +67,10 @@ def disturbance_of(linear: LinearisedMotion, changed: ExtendedModel, per: float)
         force=force / per if np.any(force) else None,
         sensor=sensor / per if np.any(sensor) else None,
     )
+
+
+def _exogenous_after(motion: Motion, changed: ExtendedModel) -> ExogenousInputs:
+    return exogenous_inputs(changed, motion.windows, known=(motion.ship, motion.exogenous))
 
 
 def term_disturbances(linear: LinearisedMotion, keys: Sequence[str]) -> dict[str, Disturbance]:
@@ -103,59 +108,66 @@ def _differing(one: ExtendedModel, other: ExtendedModel) -> set[str]:
 def responses(linear: LinearisedMotion, disturbances: Sequence[Disturbance]) -> Array:
     """(c, w, s, 4) responses of the channels to each disturbance, from undisturbed initial states.
 
-    Responses of an unstable motion may overflow.
+    Responses of an unstable motion may overflow. Channels lie apart in memory.
     """
-    motion = linear.motion
-    n = motion.ship.states
-    w, k = motion.states.shape[:2]
-    moved = np.zeros((len(disturbances), w, k, n))
-    forces = {
-        index: disturbance.force for index, disturbance in enumerate(disturbances) if disturbance.force is not None
-    }
-    forcing = list(forces)
-    if forcing:
-        kicks = np.stack([np.einsum("wkij,wkj->wki", linear.forcing, force) for force in forces.values()], axis=-1)
-        x = np.zeros((w, n, len(forcing)))
-        path = np.zeros((k, w, n, len(forcing)))
+    forces = {index: item.force for index, item in enumerate(disturbances) if item.force is not None}
+    result = _empty_channels(linear, len(disturbances))
+    if len(forces) < len(disturbances):
+        result[:] = 0.0
+    if forces:
         with np.errstate(over="ignore", invalid="ignore"):
-            for step in range(k - 1):
-                x = linear.transition[:, step] @ x + kicks[:, step]
-                path[step + 1] = x
-        moved[forcing] = np.moveaxis(path, (3, 1, 0, 2), (0, 1, 2, 3))
-    with np.errstate(over="ignore", invalid="ignore"):
-        result = _shown(linear, moved)
+            result[list(forces)] = _shown(linear, _driven(linear, list(forces.values())))
     for index, disturbance in enumerate(disturbances):
         if disturbance.sensor is not None:
             result[index] += disturbance.sensor
-    return np.nan_to_num(result, nan=0.0, posinf=0.0, neginf=0.0)
+    return np.nan_to_num(result, copy=False, nan=0.0, posinf=0.0, neginf=0.0)
+
+
+def _driven(linear: LinearisedMotion, forces: Sequence[Array]) -> Array:
+    """(w, k, n, c) states from rest under each force (w, k - 1, n)."""
+    w, k, n = linear.motion.states.shape
+    path = np.empty((w, k, n, len(forces)))
+    path[:, 0] = 0.0
+    np.matmul(linear.forcing, np.stack(forces, axis=-1), out=path[:, 1:])
+    for step in range(1, k - 1):
+        path[:, step + 1] += linear.transition[:, step] @ path[:, step]
+    return path
 
 
 def start_responses(linear: LinearisedMotion) -> Array:
     """(3, w, s, 4) responses to unit initial velocities of every window; roll begins at rest."""
-    motion = linear.motion
-    w, k, n = motion.states.shape
-    x = np.broadcast_to(np.eye(n)[:, :3], (w, n, 3)).copy()
-    path = np.empty((k, w, n, 3))
-    path[0] = x
+    w, k, n = linear.motion.states.shape
+    still = np.zeros((w, k - 1, n))
     with np.errstate(over="ignore", invalid="ignore"):
-        for step in range(k - 1):
-            x = linear.transition[:, step] @ x
-            path[step + 1] = x
-        return _shown(linear, np.moveaxis(path, (3, 1, 0, 2), (0, 1, 2, 3)))
+        paths = [propagated(linear.transition, np.tile(unit, (w, 1)), still) for unit in np.eye(n)[:3]]
+        return _shown(linear, np.stack(paths, axis=-1))
+
+
+def _empty_channels(linear: LinearisedMotion, count: int) -> Array:
+    """(count, w, s, 4) of which channels lie apart in memory."""
+    w, s, _ = linear.motion.predicted.shape
+    return np.moveaxis(np.empty((4, count, w, s)), 0, -1)
 
 
 def _shown(linear: LinearisedMotion, moved: Array) -> Array:
-    """Changes of the channels for changes of the states (c, w, k, n); sensors are nearly linear in the states."""
+    """(c, w, s, 4) changes of the channels for changes of the states (w, k, n, c).
+
+    Sensors are nearly linear in the states.
+    """
     motion = linear.motion
-    if not any(key.startswith(("heading", "lever", "gyro", "late")) for key in motion.ship.effects):
-        windows = motion.windows
-        values = moved[:, :, :: windows.steps_per_sample, :3]
-        means = simpson_mean(np.moveaxis(values, -1, 0), windows.rows_per_step)
-        seen = [means[i] if n in windows.derived else values[..., i] for i, n in enumerate("uvr")]
-        return np.stack([*seen, means[2]], axis=-1)
-    size = 1e-4
-    still = sensor_outputs(motion.ship, motion.states, motion.windows)
-    changes = [
-        (sensor_outputs(motion.ship, motion.states + size * part, motion.windows) - still) / size for part in moved
-    ]
-    return np.array(changes).reshape(len(moved), *still.shape)
+    windows, count = motion.windows, moved.shape[-1]
+    result = _empty_channels(linear, count)
+    if any(key.startswith(("heading", "lever", "gyro", "late")) for key in motion.ship.effects):
+        size = 1e-4
+        still = sensor_outputs(motion.ship, motion.states, windows)
+        for index in range(count):
+            states = motion.states + size * moved[..., index]
+            result[index] = (sensor_outputs(motion.ship, states, windows) - still) / size
+        return result
+    for channel, name in enumerate("uvr"):
+        result[..., channel] = np.moveaxis(moved[:, :: windows.steps_per_sample, channel], -1, 0)
+        if name in windows.derived:
+            result[..., channel] = simpson_mean(result[..., channel], windows.rows_per_step)
+    rate = result[..., 2]
+    result[..., 3] = rate if "r" in windows.derived else simpson_mean(rate, windows.rows_per_step)
+    return result

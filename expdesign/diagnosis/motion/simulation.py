@@ -8,7 +8,7 @@ from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion.exogenous_inputs import ExogenousInputs, exogenous_inputs
-from expdesign.diagnosis.motion.integration import runge_kutta_step, state_jacobian, transition_matrices
+from expdesign.diagnosis.motion.integration import propagated, runge_kutta_step, state_jacobian, transition_matrices
 from expdesign.diagnosis.motion.motion import LinearisedMotion, Motion
 from expdesign.diagnosis.motion.sensors import sensor_outputs, ship_velocities
 from expdesign.diagnosis.motion.tuning import TUNING
@@ -26,7 +26,7 @@ def simulate_windows(
         start: (w, n) initial states.
         near: linearised motion of a similar ship; it speeds up the simulation and does not change it.
     """
-    exogenous = exogenous_inputs(ship, windows)
+    exogenous = _exogenous_near(ship, windows, warm_start)
     with np.errstate(over="ignore", invalid="ignore"):
         states = None if warm_start is None else _newton_from(ship, windows, exogenous, start, warm_start)
         states = _newton_from_measured(ship, windows, exogenous, start) if states is None else states
@@ -41,10 +41,15 @@ def simulate_nearby(ship: ExtendedModel, windows: Windows, start: Array, near: L
     """
     if near.motion.states.shape != (len(start), windows.steps, ship.states):
         return simulate_windows(ship, windows, start)
-    exogenous = exogenous_inputs(ship, windows)
+    exogenous = _exogenous_near(ship, windows, near)
     with np.errstate(over="ignore", invalid="ignore"):
         states = _newton_from(ship, windows, exogenous, start, near)
     return None if states is None else _motion(ship, windows, exogenous, states)
+
+
+def _exogenous_near(ship: ExtendedModel, windows: Windows, near: LinearisedMotion | None) -> ExogenousInputs:
+    known = None if near is None else (near.motion.ship, near.motion.exogenous)
+    return exogenous_inputs(ship, windows, known=known)
 
 
 def _motion(ship: ExtendedModel, windows: Windows, exogenous: ExogenousInputs, states: Array) -> Motion:
@@ -124,7 +129,7 @@ def _newton_over_all_steps(
         made = np.stack(
             runge_kutta_step(ship, tuple(np.moveaxis(states[:, :-1], -1, 0)), middle, windows.step_s)[0], axis=-1
         )
-        change = _propagated(transition, start - states[:, 0], made - states[:, 1:])
+        change = propagated(transition, start - states[:, 0], made - states[:, 1:])
         size = float(np.abs(change).max())
         if not size < min(TUNING.newton_divergence * last, TUNING.largest_speed):
             return None
@@ -136,16 +141,6 @@ def _newton_over_all_steps(
                 state_jacobian(ship, (states[:, :-1] + states[:, 1:]) / 2, middle), windows.step_s
             )
     return None
-
-
-def _propagated(transition: Array, first: Array, missed: Array) -> Array:
-    """(w, k, n) changes of the states by gaps (w, k - 1, n) between steps and at the start."""
-    change = np.empty((missed.shape[1] + 1, *first.shape, 1))
-    change[0, ..., 0] = first
-    gaps, matrices = np.moveaxis(missed, 1, 0)[..., None], np.ascontiguousarray(np.moveaxis(transition, 1, 0))
-    for step, (matrix, gap) in enumerate(zip(matrices, gaps, strict=True)):
-        np.add(matrix @ change[step], gap, out=change[step + 1])
-    return np.moveaxis(change[..., 0], 0, 1)
 
 
 def initial_states(windows: Windows, states: int = 3) -> Array:
