@@ -195,7 +195,7 @@ def _fitted(found: Fit, windows: Windows, train: NDArray[np.bool_]) -> ExtendedM
         noise=found.noise,
         ar_order=found.noise.order,
         steps=TUNING.fold_steps,
-        warm_start=found.linear.selected(train),
+        warm_start=found.selected(train),
         fixed_weights=True,
     )
     try:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from expdesign.diagnosis.data import Noise
 from expdesign.diagnosis.fit.gram_matrices import GramMatrices, gram_matrices, marginalised
@@ -58,6 +59,19 @@ class Fit:
     converged: bool
     simulations: int = 1
 
+    def selected(self, keep: NDArray[np.bool_]) -> Fit:
+        """The same effects beside only some of the windows, by a mask (w,): where a fit to these begins.
+
+        Cost, covariance and step remain those of all windows.
+        """
+        return replace(
+            self,
+            starts=self.starts[keep],
+            linear=self.linear.selected(keep),
+            sensitivities=self.sensitivities.selected(keep),
+            grams=self.grams.selected(keep),
+        )
+
     @property
     def free_keys(self) -> tuple[str, ...]:
         """Estimated effects without a prior."""
@@ -81,7 +95,7 @@ class FitOptions:
         noise: first guess; white noise by default.
         ar_order: of the noise's autoregressions, or None to choose it.
         steps: Gauss-Newton steps, at most.
-        warm_start: linearised motion of a similar ship over the same windows; faster, with the same result.
+        warm_start: a fit of a similar ship over the same windows; faster, with the same result.
         fixed_weights: evaluate a step with the weights of initial states and random current at its start. The weights
             depend on the effects, which a step of weighted least squares ignores, so a step may raise the cost with
             updated weights. Fits that are compared with each other need updated weights.
@@ -90,13 +104,13 @@ class FitOptions:
     noise: Noise | None = None
     ar_order: int | None = None
     steps: int = TUNING.steps
-    warm_start: LinearisedMotion | None = None
+    warm_start: Fit | None = None
     fixed_weights: bool = False
 
 
 def continuing(found: Fit, *, steps: int = TUNING.steps) -> FitOptions:
     """Options of a fit that starts from another one: its noise, its order, its motion."""
-    return FitOptions(noise=found.noise, ar_order=found.noise.order, warm_start=found.linear, steps=steps)
+    return FitOptions(noise=found.noise, ar_order=found.noise.order, warm_start=found, steps=steps)
 
 
 def uncertain_keys(ship: ExtendedModel) -> tuple[str, ...]:

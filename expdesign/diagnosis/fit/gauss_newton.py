@@ -16,13 +16,20 @@ from expdesign.diagnosis.fit.fit import (
     prior_precision,
     uncertain_keys,
 )
-from expdesign.diagnosis.fit.gram_matrices import gram_matrices, information, marginalised
-from expdesign.diagnosis.fit.linear_model import Sensitivities, sensitivities_to
+from expdesign.diagnosis.fit.gram_matrices import GramMatrices, gram_matrices, information, marginalised
+from expdesign.diagnosis.fit.linear_model import Sensitivities, sensitivities_beside, sensitivities_to
 from expdesign.diagnosis.fit.noise_estimation import Prior, estimate_noise
 from expdesign.diagnosis.fit.step_limits import after_step
 from expdesign.diagnosis.fit.tuning import TUNING
 from expdesign.diagnosis.model import ExtendedModel
-from expdesign.diagnosis.motion import LinearisedMotion, Motion, linearise, simulate_nearby, simulate_windows
+from expdesign.diagnosis.motion import (
+    LinearisedMotion,
+    Motion,
+    linearise,
+    linearised_like,
+    simulate_nearby,
+    simulate_windows,
+)
 from expdesign.values import Array
 
 
@@ -39,12 +46,17 @@ class _Problem:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Point:
-    """A model simulated and linearised, before its errors are weighted."""
+    """A model simulated and linearised, before its errors are weighted.
+
+    Attributes:
+        grams: under the noise of the fit that it comes from, where they are known.
+    """
 
     ship: ExtendedModel
     starts: Array
     linear: LinearisedMotion
     sensitivities: Sensitivities
+    grams: GramMatrices | None = None
 
 
 def fit(
@@ -67,7 +79,7 @@ def fit(
     precision = prior_precision(ship, keys, free=len(free))
     problem = _Problem(windows=windows, keys=keys, free_count=len(free), precision=precision, options=options)
     starts = _resized(starts, ship.states)
-    point = _linearised(problem, ship, starts, simulate_windows(ship, windows, starts, warm_start=options.warm_start))
+    point = _first_point(problem, ship, starts)
     if point is None:
         raise FloatingPointError
     best, noise_is_fitted = _weighted(problem, point, _noise(problem, point, options.noise)), True
@@ -83,6 +95,26 @@ def fit(
         if step == 0:
             best, noise_is_fitted = _with_noise_refitted(problem, best), True
     return replace(best if noise_is_fitted else _with_noise_refitted(problem, best), simulations=simulations)
+
+
+def _first_point(problem: _Problem, ship: ExtendedModel, starts: Array) -> _Point | None:
+    """The point where a fit begins: what is known of it from the fit that it continues is not computed again."""
+    known = problem.options.warm_start
+    near = None if known is None else known.linear
+    motion = simulate_windows(ship, problem.windows, starts, warm_start=near)
+    linear = None if motion.diverged else linearised_like(motion, near)
+    if known is None or linear is None:
+        return _linearised(problem, ship, starts, motion)
+    grams = None
+    if problem.keys == known.keys and motion.ship.effects == known.ship.effects:
+        sensitivities = known.sensitivities
+        grams = known.grams if problem.options.noise is known.noise else None
+    else:
+        of_effects = dict(zip(known.keys, known.sensitivities.values, strict=False))
+        sensitivities = sensitivities_beside(linear, problem.keys, of_effects, known.sensitivities)
+    if sensitivities.unbounded:
+        return None
+    return _Point(ship=ship, starts=starts, linear=linear, sensitivities=sensitivities, grams=grams)
 
 
 def _linearised(problem: _Problem, ship: ExtendedModel, starts: Array, motion: Motion) -> _Point | None:
@@ -136,8 +168,7 @@ def _noise(problem: _Problem, point: _Point | Fit, guess: Noise | None) -> Noise
         now=deviations_of(point.ship, problem.keys),
         lowest=lowest_steps(point.ship, problem.keys),
     )
-    grams = point.grams if isinstance(point, Fit) else None
-    return estimate_noise(point.sensitivities, prior, guess, grams, ar_order=problem.options.ar_order)
+    return estimate_noise(point.sensitivities, prior, guess, point.grams, ar_order=problem.options.ar_order)
 
 
 def _with_noise_refitted(problem: _Problem, found: Fit) -> Fit:

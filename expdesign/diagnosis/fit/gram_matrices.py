@@ -6,7 +6,7 @@ These small matrices suffice for steps, covariances, score tests and likelihoods
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,10 @@ class GramMatrices:
     ee: Array
     effect_starts: Array
     error_starts: Array
+
+    def selected(self, keep: NDArray[np.bool_]) -> GramMatrices:
+        """Only some of the windows, by a mask (w,)."""
+        return GramMatrices(**{item.name: getattr(self, item.name)[keep] for item in fields(self)})
 
     def initial_state_steps(self, effects: Array) -> Array:
         """(w, 3) change of the initial velocities that explains most of the error left by steps (w, z) of effects."""

@@ -6,10 +6,11 @@ and the random current is a random effect with piecewise linear basis functions 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from expdesign.diagnosis.data import linear_basis
 from expdesign.diagnosis.fit.tuning import TUNING
@@ -17,6 +18,7 @@ from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import (
     Disturbance,
     LinearisedMotion,
+    channels_apart,
     disturbance_of,
     responses,
     start_responses,
@@ -47,6 +49,10 @@ class Sensitivities:
     def knot_count(self) -> int:
         """Knots of the random current in a window; 0 without one."""
         return (len(self.values) - self.numbers) // 2
+
+    def selected(self, keep: NDArray[np.bool_]) -> Sensitivities:
+        """Only some of the windows, by a mask (w,)."""
+        return replace(self, values=self.values[:, keep], starts=self.starts[:, keep], error=self.error[keep])
 
     @property
     def unbounded(self) -> bool:
@@ -92,6 +98,27 @@ def sensitivities_to(linear: LinearisedMotion, keys: Sequence[str]) -> Sensitivi
     """Sensitivities to effects, with a random current where a heading is measured."""
     disturbances = effect_disturbances(linear, keys)
     return build_sensitivities(linear, disturbances, random_current=linear.motion.windows.has_heading)
+
+
+def sensitivities_beside(
+    linear: LinearisedMotion, keys: Sequence[str], known: Mapping[str, Array], same: Sensitivities
+) -> Sensitivities:
+    """The same, of which some are known along this motion.
+
+    Args:
+        linear: the motion.
+        keys: effects.
+        known: effect -> (w, s, 4) response.
+        same: sensitivities along the same motion: of the random current and of initial states.
+    """
+    new = [key for key in keys if key not in known]
+    more = build_sensitivities(linear, effect_disturbances(linear, new), random_current=False)
+    of_effects = {**known, **dict(zip(new, more.values, strict=True))}
+    rows = [of_effects[key] for key in keys]
+    values = channels_apart(len(rows) + 2 * same.knot_count, more.error.shape[:2])
+    for place, row in enumerate((*rows, *same.values[same.numbers :])):
+        values[place] = row
+    return replace(same, values=values, error=more.error, numbers=len(keys))
 
 
 def difference_step(ship: ExtendedModel, key: str) -> float:

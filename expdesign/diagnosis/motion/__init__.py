@@ -4,8 +4,10 @@ from expdesign.diagnosis.motion.exogenous_inputs import exogenous_inputs
 from expdesign.diagnosis.motion.integration import stacked_rates
 from expdesign.diagnosis.motion.linearisation import (
     Disturbance,
+    channels_apart,
     disturbance_of,
     linearise,
+    linearised_like,
     responses,
     start_responses,
     term_disturbances,
@@ -23,10 +25,12 @@ __all__ = [
     "Disturbance",
     "LinearisedMotion",
     "Motion",
+    "channels_apart",
     "disturbance_of",
     "exogenous_inputs",
     "initial_states",
     "linearise",
+    "linearised_like",
     "responses",
     "simulate_from_measured",
     "simulate_nearby",

@@ -60,7 +60,7 @@ def exogenous_inputs(
     Args:
         ship: model and effects.
         windows: w windows.
-        known: another ship and its signals over the same windows; actuators without a difference are not followed again.
+        known: another ship and its signals over the same windows; the same actuators are not followed again.
     """
     model = ship.model
     table = _forces(ship, windows) if known is None else _forces_like(ship, windows, *known)

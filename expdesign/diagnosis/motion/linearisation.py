@@ -7,7 +7,7 @@ All disturbances share one linearisation, so hundreds of them cost little more t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from expdesign.diagnosis.motion.exogenous_inputs import ExogenousInputs, exogeno
 from expdesign.diagnosis.motion.integration import propagated, stacked_rates, state_jacobian, transition_matrices
 from expdesign.diagnosis.motion.motion import LinearisedMotion, Motion
 from expdesign.diagnosis.motion.sensors import sensor_outputs, simpson_mean
+from expdesign.diagnosis.motion.tuning import TUNING
 from expdesign.values import Array
 
 INNER, OUTER = {"theta", "term", "gain", "inertia", "asymmetry"}, {"lever", "gyro", "late"}
@@ -31,6 +32,18 @@ def linearise(motion: Motion) -> LinearisedMotion:
     jacobian = (state_jacobian(motion.ship, ends[0], exogenous) + state_jacobian(motion.ship, ends[1], exogenous)) / 2
     transition, forcing = transition_matrices(jacobian, motion.windows.step_s)
     return LinearisedMotion(motion=motion, transition=transition, forcing=forcing, path_rates=path_rates)
+
+
+def linearised_like(motion: Motion, near: LinearisedMotion | None) -> LinearisedMotion | None:
+    """The linearisation of a motion along the path of another one, with the same; None where path or ship differ.
+
+    Ships are the same here if all effects in which they differ are zero, so that the other has none of them.
+    """
+    if near is None or near.motion.states.shape != motion.states.shape:
+        return None
+    differ = any(motion.ship.get(key) != near.motion.ship.get(key) for key in _differing(motion.ship, near.motion.ship))
+    apart = np.abs(motion.states - near.motion.states).max()
+    return None if differ or not apart < TUNING.newton_tolerance else replace(near, motion=motion)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -111,7 +124,7 @@ def responses(linear: LinearisedMotion, disturbances: Sequence[Disturbance]) -> 
     Responses of an unstable motion may overflow. Channels lie apart in memory.
     """
     forces = {index: item.force for index, item in enumerate(disturbances) if item.force is not None}
-    result = _empty_channels(linear, len(disturbances))
+    result = channels_apart(len(disturbances), linear.motion.predicted.shape[:2])
     if len(forces) < len(disturbances):
         result[:] = 0.0
     if forces:
@@ -143,10 +156,9 @@ def start_responses(linear: LinearisedMotion) -> Array:
         return _shown(linear, np.stack(paths, axis=-1))
 
 
-def _empty_channels(linear: LinearisedMotion, count: int) -> Array:
-    """(count, w, s, 4) of which channels lie apart in memory."""
-    w, s, _ = linear.motion.predicted.shape
-    return np.moveaxis(np.empty((4, count, w, s)), 0, -1)
+def channels_apart(count: int, shape: tuple[int, ...]) -> Array:
+    """(count, w, s, 4), not filled, for windows of shape (w, s): the channels lie apart in memory."""
+    return np.moveaxis(np.empty((4, count, *shape)), 0, -1)
 
 
 def _shown(linear: LinearisedMotion, moved: Array) -> Array:
@@ -156,7 +168,7 @@ def _shown(linear: LinearisedMotion, moved: Array) -> Array:
     """
     motion = linear.motion
     windows, count = motion.windows, moved.shape[-1]
-    result = _empty_channels(linear, count)
+    result = channels_apart(count, motion.predicted.shape[:2])
     if any(key.startswith(("heading", "lever", "gyro", "late")) for key in motion.ship.effects):
         size = 1e-4
         still = sensor_outputs(motion.ship, motion.states, windows)

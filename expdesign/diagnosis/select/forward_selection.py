@@ -145,7 +145,7 @@ def fit_nuisance(ship: ExtendedModel, windows: Windows, starts: Array) -> Fit:
     found = fit(ship, windows, (), starts=starts, options=FitOptions(steps=TUNING.nuisance_steps))
     if not found.keys:
         return found
-    options = FitOptions(noise=found.noise, steps=TUNING.nuisance_steps, warm_start=found.linear)
+    options = FitOptions(noise=found.noise, steps=TUNING.nuisance_steps, warm_start=found)
     return fit(found.ship, windows, (), starts=found.starts, options=options)
 
 

@@ -60,7 +60,7 @@ def start_in_short_windows(short_fit: Fit, shortlist: Sequence[ScoreTest], certa
 
 def _fit_in_short_windows(short_fit: Fit, point: StartingPoint) -> Fit | None:
     """None where the candidate cannot be fitted."""
-    options = replace(FROM_NOTHING, noise=short_fit.noise, warm_start=short_fit.linear)
+    options = replace(FROM_NOTHING, noise=short_fit.noise, warm_start=short_fit)
     ship, windows = short_fit.ship.with_effects(point.effects), short_fit.linear.motion.windows
     try:
         return fit(ship, windows, joint_keys(short_fit, point.keys), starts=short_fit.starts, options=options)
