@@ -54,7 +54,8 @@ def test_commands_are_followed_as_recorded_not_as_averaged():
     place = ship.model.inputs.index("tau_psi")
     orders = np.concatenate([batch.inputs[:, place] for batch in record.batches])
     width = 0.99 * np.abs(orders).min()
-    (acting, _), *_ = delivered_inputs(ship.with_effects({"deadband:tau_psi": width}), windows)
+    rows = windows.batch_inputs[0][..., None]
+    acting = delivered_inputs(ship.with_effects({"deadband:tau_psi": width}), rows, windows)[0][..., 0]
     assert np.abs(acting[:, place]).min() > width
 
 

@@ -38,13 +38,18 @@ def white_noise(std: Array) -> Noise:
     return Noise(filters=np.ones((4, 1)), std=std)
 
 
-def whitened(values: Array, noise: Noise) -> Array:
+def whitened(values: Array, noise: Noise, *, out: Array | None = None) -> Array:
     """(..., w, s - p, 4) filtered and in units of the remainder's standard deviation; nan where a tap is nan.
 
     Channels that are not measured are zero, or nan where they are nan. Channels lie apart in memory.
+
+    Args:
+        values: (..., w, s, 4).
+        noise: of order p.
+        out: (4, ..., w, s - p) to hold the result.
     """
     p = noise.order
-    result = np.empty((4, *values.shape[:-2], values.shape[-2] - p))
+    result = np.empty((4, *values.shape[:-2], values.shape[-2] - p)) if out is None else out
     for channel, (taps, std) in enumerate(zip(noise.filters, noise.std, strict=True)):
         if np.isfinite(std):
             result[channel] = _filtered(values[..., channel], taps / std)[..., p:]

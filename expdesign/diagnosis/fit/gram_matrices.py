@@ -46,9 +46,14 @@ class GramMatrices:
 def gram_matrices(found: Sensitivities, noise: Noise) -> GramMatrices:
     """Whiten, leave out samples that are not measured, project the initial states out."""
     e, seen = _whitened_error(found.error, noise)
-    parts = [whitened(values, noise) * seen for values in (found.starts, found.values)]
-    G = _gram(np.concatenate([np.moveaxis(rows, -1, 0) for rows in (*parts, e[None])], axis=1))
-    n = len(found.starts)
+    n, c = len(found.starts), len(found.values)
+    rows = np.empty((4, n + c + 1, *e.shape[:2]))
+    whitened(found.starts, noise, out=rows[:, :n])
+    whitened(found.values, noise, out=rows[:, n:-1])
+    rows[:, -1] = np.moveaxis(e, -1, 0)
+    if not seen.all():
+        rows *= np.moveaxis(seen, -1, 0)[:, None]
+    G = _gram(rows)
     SS = G[:, :n, :n]
     scale = np.trace(SS, axis1=1, axis2=2)[:, None, None] / n
     half = np.linalg.solve(SS + (1e-9 * scale + 1e-12) * np.eye(n), G[:, :n, n:])

@@ -15,19 +15,27 @@ from expdesign.values import Array
 from expdesign.vessel import Response
 
 
-def delivered_inputs(ship: ExtendedModel, windows: Windows) -> tuple[tuple[Array, int], ...]:
-    """Per batch, the delivered inputs (k, m) and how many of their rows an integrator step has."""
+def delivered_inputs(ship: ExtendedModel, rows: Array, windows: Windows) -> tuple[Array, int]:
+    """Delivered inputs (k, m, b) of batches of equal length, and how many of their rows an integrator step has.
+
+    Args:
+        ship: its actuators.
+        rows: (k_b, m, b) held inputs.
+        windows: that they belong to.
+    """
     inputs = ship.model.inputs
     moving = any(key.startswith(("delay:", "lag:")) and value for key, value in ship.effects.items())
     parts = -(-TUNING.actuator_substeps // windows.rows_per_step) if moving else 1
-    delivered = tuple(np.repeat(rows, parts, axis=0) for rows in windows.batch_inputs)
+    delivered = np.repeat(rows, parts, axis=0)
     finer = parts * windows.rows_per_step
     for kind, field in RESPONSES.items():
         for key, value in ship.effects.items():
             if key.startswith(kind + ":") and value != 0.0:
                 columns, response = group_columns(key.split(":", 1)[1], inputs), _response(field, value)
-                delivered = tuple(_through(rows, columns, response, windows.step_s / finer) for rows in delivered)
-    return tuple((rows * _scales(ship), finer) for rows in delivered)
+                responses = (response,) * len(columns)
+                through = deliver(responses, delivered[:, columns], sample_time_s=windows.step_s / finer)
+                delivered[:, columns] = through[:, 0]
+    return delivered * _scales(ship)[:, None], finer
 
 
 def actuator_effects(ship: ExtendedModel) -> dict[str, float]:
@@ -48,11 +56,3 @@ def _scales(ship: ExtendedModel) -> Array:
 def _response(field: str, value: float) -> Response:
     """A response with one effect; fits may try times and dead bands below zero, which count as zero."""
     return Response(**{field: value if field == "offset" else max(value, 0.0)})
-
-
-def _through(rows: Array, columns: list[int], response: Response, step_s: float) -> Array:
-    """Inputs (k, m) of which some columns go through actuators with this response."""
-    result = np.array(rows)
-    responses = (response,) * len(columns)
-    result[:, columns] = deliver(responses, result[:, columns], sample_time_s=step_s)[:, 0]
-    return result

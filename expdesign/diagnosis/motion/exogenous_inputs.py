@@ -78,14 +78,17 @@ def exogenous_inputs(
 
 
 def _forces(ship: ExtendedModel, windows: Windows) -> ExogenousInputs:
-    """Delivered inputs and their forces."""
-    model, shape = ship.model, windows.heading.shape
-    names = _force_names(model)
-    followed = delivered_inputs(ship, windows)
-    moving = any(finer > 1 for _, finer in followed)
-    signals = windows.gather(tuple(_acting(model, *rows, windows.rows_per_step) for rows in followed))
-    names = (*names, *(f"{RISE}{name}" for name in names)) if moving else names
-    return ExogenousInputs({n: np.broadcast_to(signals[..., i], shape) for i, n in enumerate(names)})
+    """Delivered inputs and their forces; batches of equal length are followed at once."""
+    batches, found = windows.batch_inputs, dict[int, Array]()
+    for length in dict.fromkeys(map(len, batches)):
+        places = [place for place, rows in enumerate(batches) if len(rows) == length]
+        rows, finer = delivered_inputs(ship, np.stack([batches[place] for place in places], axis=-1), windows)
+        acting = _acting(ship.model, rows, finer, windows.rows_per_step)
+        found |= {place: acting[..., at] for at, place in enumerate(places)}
+    signals = windows.gather(tuple(found[place] for place in range(len(batches))))
+    names = _force_names(ship.model)
+    names = (*names, *(f"{RISE}{name}" for name in names)) if finer > 1 else names
+    return ExogenousInputs({name: signals[..., i] for i, name in enumerate(names)})
 
 
 def _forces_like(
@@ -105,19 +108,23 @@ def _force_names(model: VesselModel) -> tuple[str, ...]:
 
 
 def _acting(model: VesselModel, rows: Array, finer: int, rows_per_step: int) -> Array:
-    """(k, m) inputs and forces, as means over integrator steps, and (k, m) their rises.
+    """(k, m, b) inputs and forces, as means over integrator steps, and (k, m, b) their rises where steps have parts.
 
     A straight line with this mean and rise has the mean and the first moment of the signal within the step. Where
     measurements are averaged over samples, so is the signal, because the mean force drives the mean motion.
     """
-    table = dict(zip(model.inputs, rows.T, strict=True))
+    table = dict(zip(model.inputs, np.moveaxis(rows, 1, 0), strict=True))
     forces = generalised_force(model.actuators, table, NUMPY)
     table |= dict(zip(FORCE_SIGNALS, forces, strict=True))
-    columns = [np.broadcast_to(np.asarray(values, dtype=float), len(rows)) for values in table.values()]
-    known = _averaged(np.stack(columns, axis=-1), finer, rows_per_step).reshape(len(rows) // finer, finer, -1)
+    known = np.empty((len(rows), len(table), rows.shape[2]))
+    for column, values in enumerate(table.values()):
+        known[:, column] = values
+    if finer == 1:
+        return known
+    parts = _averaged(known, finer, rows_per_step).reshape(len(rows) // finer, finer, *known.shape[1:])
     place = (np.arange(finer) + 0.5) / finer - 0.5
-    rises = 12.0 * np.einsum("f,kfm->km", place, known) / finer
-    return np.asarray(np.column_stack([known.mean(axis=1), rises]))
+    rises = 12.0 * np.einsum("f,kf...->k...", place, parts) / finer
+    return np.concatenate([parts.mean(axis=1), rises], axis=1)
 
 
 def _averaged(values: Array, finer: int, rows_per_step: int) -> Array:

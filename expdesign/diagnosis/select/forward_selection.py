@@ -25,6 +25,8 @@ from expdesign.diagnosis.select.profile_likelihood import profile_estimate
 from expdesign.diagnosis.select.score_tests import ScoreTest
 from expdesign.diagnosis.select.selection import Selection, Step, redundant_step, without_step
 from expdesign.diagnosis.select.selection_round import (
+    best_step,
+    has_rivals,
     listed_causes,
     round_tests,
     same_effects_as_any,
@@ -132,6 +134,13 @@ class _Search:
         """Tests of what is left."""
         return round_tests(base, self.windows, self.rejected, self.rng, self.work)
 
+    def exchanged(self, base: Fit, old: Candidate) -> Step | None:
+        """The best cause beside a fit; None where that can only be the one that was taken out, or there is none."""
+        tests = self.tests(base)
+        if not has_rivals(old, tests):
+            return None
+        return best_step(base, self.windows, tests, self.work, self.validation)
+
     def round(self, base: Fit, *, most: int = 99) -> tuple[Step | None, tuple[ScoreTest, ...]]:
         """One round from a fit, with candidates of at most so many effects."""
         return selection_round(base, self.windows, self.rejected, self.rng, self.work, self.validation, most=most)
@@ -176,7 +185,7 @@ def _exchange(steps: list[Step], search: _Search) -> list[Step] | None:
         if others is None:
             continue
         search.work.rounds_left = len(steps) - 2 - index
-        new, _ = search.round(others[-1].chosen.fit)
+        new = search.exchanged(others[-1].chosen.fit, old.chosen.candidate)
         if new is not None and _gains_more(new.chosen, old.chosen, steps[-1].chosen.fit):
             return [*others, new]
     return None

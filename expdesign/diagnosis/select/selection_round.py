@@ -48,7 +48,7 @@ def selection_round(
         most: effects that a candidate may have.
     """
     tests = round_tests(base, windows, rejected, rng, work, most=most)
-    return _step(base, windows, tests, work, validation), tests
+    return best_step(base, windows, tests, work, validation), tests
 
 
 def round_tests(
@@ -75,6 +75,14 @@ def same_effects_as_any(candidate: Candidate, others: Sequence[Candidate]) -> bo
     return any(candidate.cause == other.cause and set(candidate.free) == set(other.free) for other in others)
 
 
+def has_rivals(candidate: Candidate, tests: Sequence[ScoreTest]) -> bool:
+    """Whether another candidate's statistic is a good share of this one's, so that it may gain more once fitted."""
+    own = [test.statistic for test in tests if same_effects_as_any(test.candidate, [candidate])]
+    others = [test.statistic for test in tests if not same_effects_as_any(test.candidate, [candidate])]
+    least = TUNING.leading_share * max(own, default=0.0) - TUNING.statistic_margin
+    return max(others, default=0.0) > least
+
+
 def open_candidates(base: Fit, windows: Windows) -> list[Candidate]:
     """Every candidate of the catalogue that these data can show and the fit does not have."""
     situation = Situation(ship=base.ship, windows=windows)
@@ -86,9 +94,10 @@ def open_candidates(base: Fit, windows: Windows) -> list[Candidate]:
     ]
 
 
-def _step(
+def best_step(
     base: Fit, windows: Windows, tests: tuple[ScoreTest, ...], work: Work, validation: CrossValidation
 ) -> Step | None:
+    """The best candidate of a round's tests, fitted; None where none is significant."""
     if not work.allows("further causes"):
         return None
     points, far = _starting_points(base, windows, tests)
