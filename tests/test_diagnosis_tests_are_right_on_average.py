@@ -13,6 +13,7 @@ from expdesign.diagnosis.data.noise import Noise, fit_ar_noise, linear_basis, wh
 from expdesign.diagnosis.data.tuning import TUNING
 from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.fit.fit import (
+    FitOptions,
     best_step,
     continuing,
     likeliest,
@@ -21,6 +22,7 @@ from expdesign.diagnosis.fit.fit import (
     within_stated_std,
 )
 from expdesign.diagnosis.fit.gauss_newton import fit
+from expdesign.diagnosis.motion.integration import propagated
 from expdesign.diagnosis.motion.linearisation import disturbance_of, linearise, responses, term_disturbances
 from expdesign.diagnosis.motion.simulation import initial_states, simulate_nearby, simulate_windows
 from expdesign.diagnosis.select.fitted_candidate import fit_candidate
@@ -87,6 +89,38 @@ def test_a_warm_start_changes_no_result():
         little = extended.with_effects({"gain": 1e-3})
         assert simulate_nearby(little, windows, start, warm_start) is not None
         assert simulate_nearby(little, windows, start + 1e6, warm_start) is None
+
+
+def test_gaps_between_steps_are_propagated_as_step_by_step():
+    rng = np.random.default_rng(0)
+    transition, first, missed = rng.normal(size=(2, 9, 3, 3)), rng.normal(size=(2, 3)), rng.normal(size=(2, 9, 3))
+    change = propagated(transition, first, missed)
+    np.testing.assert_allclose(change[:, 0], first)
+    for step in range(9):
+        after = np.einsum("wij,wj->wi", transition[:, step], change[:, step]) + missed[:, step]
+        np.testing.assert_allclose(change[:, step + 1], after)
+
+
+def test_what_is_known_where_a_fit_begins_changes_no_result():
+    """With other effects, and over some of the windows; beside a sensor that is found to be wrong."""
+    record = hidden_record("barge", seed=5, batches=3, samples=120, effects={"gain": -0.2})
+    ship = extended_model(vessel_of("barge"), record)
+    windows = cut_windows(ship.model, record)
+    base = fit_nuisance(ship.with_effects({"gyro": 0.02}), windows, initial_states(windows))
+    keep = np.array([True, False, True])
+    for begun, part, keys in (
+        (base, windows, ("gain",)),
+        (base, windows, ("lag:all", "gain")),
+        (base.selected(keep), windows.selected(keep), ("gain", "current:north")),
+    ):
+        options = FitOptions(noise=base.noise, ar_order=base.noise.order)
+        known, anew = (
+            fit(base.ship.with_effects(dict.fromkeys(keys, 0.0)), part, keys, starts=begun.starts, options=one)
+            for one in (replace(options, warm_start=begun), options)
+        )
+        for key in keys:
+            assert known.value(key) == pytest.approx(anew.value(key), rel=1e-5, abs=1e-7), keys
+        assert known.deviance == pytest.approx(anew.deviance, rel=1e-7)
 
 
 def test_shorter_windows_hold_the_same_data():

@@ -86,4 +86,7 @@ def propagated(transition: Array, first: Array, missed: Array) -> Array:
 def stacked_rates(ship: ExtendedModel, states: Array, exogenous: ExogenousInputs) -> Array:
     """(w, k, n) rates of states (w, k, n)."""
     found = state_rates(ship, tuple(np.moveaxis(states, -1, 0)), exogenous)
-    return np.stack([np.broadcast_to(part, states.shape[:2]) for part in found], axis=-1)
+    result = np.empty(states.shape)
+    for column, part in enumerate(found):
+        result[..., column] = part
+    return result
