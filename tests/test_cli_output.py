@@ -56,6 +56,7 @@ REPLAN = {
     "vessel": None,
     "remaining_s": None,
     "interest": (),
+    "stopped": False,
     "seed": 0,
 }
 COMMANDS = ("run", "score", "durations", "plan", "export", "simulate", "estimate", "replan")
@@ -172,6 +173,7 @@ def workflows(monkeypatch: pytest.MonkeyPatch) -> Workflows:
                 "vessel": Path("v.toml"),
                 "remaining_s": 300.0,
                 "interest": ("Y_v", "N_r"),
+                "stopped": False,
                 **SHARED,
                 "seed": 0,
             },

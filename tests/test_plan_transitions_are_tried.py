@@ -25,7 +25,8 @@ def space(water):
 
 def tried(space, water, runs, *, made_good=True):
     """The space with the transition between two accelerations tried."""
-    trials = TransitionTrials(water=water, primitives=runs, start=np.zeros(3), made_good=made_good)
+    rest = np.zeros(3), np.zeros(len(water.vessel.limits))
+    trials = TransitionTrials(water=water, primitives=runs, start=np.zeros(3), under_way=rest, made_good=made_good)
     return space.planner.with_transitions(space, [("go", "go")], trials)
 
 

@@ -16,9 +16,9 @@ from expdesign.information.expected import TrialPart, expected_covariance
 from expdesign.scenario import load_scenario, load_vessel
 from expdesign.signals import Batch, Commands, Record
 from expdesign.simulation import Environment, Variation, simulate
-from expdesign.vessel import Mounting
+from expdesign.vessel import Mounting, Response
 from expdesign.workflows.steps.known import combined, expected_std, purchases
-from expdesign.workflows.steps.present import present_state, rest_of, weather_for_rest
+from expdesign.workflows.steps.present import _at_end, _standing, present_state, rest_of, weather_for_rest
 from scenario_files import spoil
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
@@ -93,6 +93,48 @@ def test_antenna_and_compass_errors_that_the_vessel_file_states_are_taken_off(tm
     assert state.ship.sensors.position == Mounting(forward_m=5.0, starboard_m=-2.0)
     assert np.abs(antenna - last[:2]).max() < 1e-9
     assert state.pose[2] == pytest.approx(heading)
+
+
+# how it moves there
+
+
+def test_the_rest_begins_with_the_motion_and_the_commands_of_the_last_rows(tmp_path):
+    measured(tmp_path / "a.csv", noise=0.0)
+    commands = wandering()
+    run = simulate(SHIP, commands, pose=np.array([-100.0, -450.0, 1.0]))
+    found = present_state(STORY, [tmp_path / "a.csv"])
+    assert found.under_way is not None
+    assert rest_of(found)[0].under_way is found.under_way
+    assert np.array_equal(found.under_way.inputs, commands.values[-1])
+    bend = np.abs(np.diff(run.velocity[-7:-1], n=2, axis=0)).max(axis=0)  # what no straight line follows
+    assert (np.abs(found.under_way.velocity - run.velocity[-2]) <= 4 * bend + 1e-6).all()
+    assert present_state(STORY, [tmp_path / "a.csv"], stopped=True).under_way is None
+
+
+def test_noise_of_the_last_row_is_averaged_over_seconds():
+    rng, slope = np.random.default_rng(0), 0.01 * np.arange(6)
+    ends = np.array([_at_end(slope + row) for row in rng.standard_normal((4000, 6))])
+    variance = (4 * 6 - 2) / (6 * 7)  # of the end of a straight line through n values: (4 n - 2) / (n (n + 1))
+    assert abs(ends.mean() - slope[-1]) < 4 * np.sqrt(variance / 4000)
+    assert abs(ends.var() / variance - 1) < 4 * np.sqrt(2 / 4000)
+
+
+def test_what_late_actuators_deliver_stands_as_the_rest_begins():
+    slow = [replace(item, responses=(Response(lag_s=3.0),) * 2) for item in SHIP.model.actuators]
+    ship = replace(SHIP, model=replace(SHIP.model, actuators=tuple(slow)))
+    commands = wandering()
+    batch = Batch(
+        name="a",
+        sample_time_s=1.0,
+        input_names=SHIP.model.inputs,
+        inputs=commands.values,
+        velocity=np.zeros((SAMPLES, 3)),
+    )
+    gone = 1 - np.exp(-1 / 3.0)
+    delivered = commands.values[0]
+    for row in commands.values[:-1]:
+        delivered = delivered + gone * (row - delivered)
+    np.testing.assert_allclose(_standing(batch, ship), delivered, atol=1e-9)
 
 
 # how much is left

@@ -152,6 +152,10 @@ def replan(
             help="Parameters to optimise the rest for (criterion D_s), e.g. one that a diagnosis added.",
         ),
     ] = None,
+    stopped: Annotated[
+        bool,
+        typer.Option("--stopped", help="The ship stops at the last position of the data before the rest begins."),
+    ] = False,
     out: Out = None,
     jobs: Jobs = 0,
     scheduler: Scheduler = None,
@@ -161,7 +165,8 @@ def replan(
     """Plan the rest of a trial, from the present position, with a model updated from the data.
 
     Writes what run writes, for the rest; replan.json with what is known and what the rest will add; and
-    vessel-used.toml, the model it is planned with. The ship is assumed to be stopped at the last position of the data.
+    vessel-used.toml, the model it is planned with. The rest begins with the motion and the commands of the last rows
+    of the data, or with the ship stopped there.
 
     Example: expdesign replan scenarios/story.toml --data measured.csv --vessel vessel-extended.toml --remaining 480
     """
@@ -173,6 +178,7 @@ def replan(
         vessel=vessel,
         remaining_s=remaining,
         interest=interest or (),
+        stopped=stopped,
         jobs=jobs,
         scheduler=scheduler,
         cache=not no_cache,

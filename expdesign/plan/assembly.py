@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from expdesign.errors import NoPlan, NoRoom
+from expdesign.errors import InputError, NoPlan, NoRoom
 from expdesign.plan.chart import (
     CHART,
     ClearanceField,
@@ -21,8 +21,8 @@ from expdesign.plan.chart import (
     resolved,
 )
 from expdesign.plan.control import Capability, capability
-from expdesign.plan.feasibility import without_room
-from expdesign.plan.legs import LegWater
+from expdesign.plan.feasibility import without_room, without_way_out
+from expdesign.plan.legs import LegWater, through_water
 from expdesign.plan.local_planner import (
     GoAroundTime,
     LocalPlanner,
@@ -91,6 +91,8 @@ def plan_room(
     """
     planner = local_planner(water, problem.used)
     planner.check_ends(problem.start, problem.goal, water)
+    if (stuck := without_way_out(problem, water, planner)) is not None:
+        raise stuck
     space = search_space(problem, water, planner, strict=strict)
     if _most_trials(problem, planner):
         space = replace(space, tried=known)
@@ -212,17 +214,21 @@ def run_space(problem: PlanProblem, water: LegWater, off_m: Sequence[Array] | No
 def _with_transitions(problem: PlanProblem, water: LegWater, space: SearchSpace, progress: Progress) -> SearchSpace:
     """The space with the transitions optimised that its best plans would use."""
     counts, planner = [problem.repeats[item.name] for item in space.footprints], space.planner
+    begin_mps = 0.0 if problem.under_way is None else float(problem.under_way.velocity[0])
     trials = TransitionTrials(
         water=water,
         primitives={item.name: item for item in problem.used},
         start=problem.start,
+        under_way=(through_water(problem.environment, problem.begin), problem.standing),
         made_good=path_exceeds_displacement(space, counts, problem.start),
         budget=WorkBudget(most_s=PLAN.transitions_s),
     )
     for part in in_phases(progress, *PLAN.fewer_trials ** np.arange(_most_trials(problem, planner))):
         part("trying transitions between runs", 0.0)
         try:
-            placements = place_runs(space, counts, start=problem.start, width=PLAN.transition_beam, orders=0)
+            placements = place_runs(
+                space, counts, start=problem.start, exit_mps=begin_mps, width=PLAN.transition_beam, orders=0
+            )
         except NoPlan:  # the main search keeps more, and says what is impossible
             break
         pairs = pairs_of(placements)
@@ -267,6 +273,30 @@ def dispersions(problem: PlanProblem) -> list[Array]:
 def confidence_of_run(problem: PlanProblem) -> float:
     """Share of cases in which each run keeps to its room."""
     return 1.0 - (1.0 - problem.settings.confidence) / max(1, sum(problem.repeats.values()))
+
+
+def check_start(problem: PlanProblem, ship: Capability) -> None:
+    """Raise InputError where the ship is to begin faster than it can ever be, or turning so."""
+    if problem.under_way is None:
+        return
+    u, v, r = through_water(problem.environment, problem.begin).tolist()
+    most = PLAN.fastest_start * ship.top_speed_mps
+    turn = PLAN.fastest_start * max(ship.spot_rate_radps, ship.yaw_rate_radps, _turn(problem))
+    if np.hypot(u, v) > most:
+        raise InputError(
+            f"start.u_mps and start.v_mps are {np.hypot(u, v):.3g} m/s through the water, expected at most {most:.3g}, "
+            f"{PLAN.fastest_start:g} times the top speed of vessel {problem.vessel.name!r}"
+        )
+    if abs(r) > turn:
+        raise InputError(
+            f"start.r_radps is {r:.3g}, expected at most {turn:.3g} to either side, {PLAN.fastest_start:g} times what "
+            f"vessel {problem.vessel.name!r} turns in its runs and on legs"
+        )
+
+
+def _turn(problem: PlanProblem) -> float:
+    """Largest yaw rate of runs [rad/s]."""
+    return max((float(np.abs(item.trajectory.velocity[:, 2]).max()) for item in problem.used), default=0.0)
 
 
 def check_connected(problem: PlanProblem) -> None:

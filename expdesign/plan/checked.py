@@ -31,6 +31,7 @@ def verified(problem: PlanProblem, water: LegWater, sailed: SailedTrial) -> Veri
         repeats=problem.repeats,
         start=problem.start,
         goal=problem.goal,
+        under_way=problem.under_way,
     )
     if not verification.verified:
         error = NoPlan(

@@ -1,7 +1,8 @@
-"""Whether a run has a place in the water at all, by branch and bound over places and headings.
+"""Whether a run has a place in the water at all, and whether a ship under way gets out of its start.
 
-The tests are those of the search for places, with a slack for the places and headings between those looked at: where
-none passes with the slack, none passes anywhere, and the search would be in vain.
+Places are sought by branch and bound over places and headings. The tests are those of the search for places, with a
+slack for the places and headings between those looked at: where none passes with the slack, none passes anywhere, and
+the search would be in vain.
 """
 
 from __future__ import annotations
@@ -12,10 +13,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from expdesign.errors import NoRoom
-from expdesign.plan.local_planner import RunSpace, moved
+from expdesign.errors import NoPlan, NoRoom
+from expdesign.plan.legs import LegTask, LegWater
+from expdesign.plan.local_planner import LocalPlanner, RunSpace, moved
+from expdesign.plan.problem import PlanProblem
 from expdesign.plan.search import have_room
 from expdesign.plan.tuning import PLAN
+from expdesign.plan.work_budget import WorkBudget
 from expdesign.values import Array
 
 
@@ -124,6 +128,47 @@ def without_room(space: RunSpace, *, strict: bool = False) -> NoRoom | None:
     )
     error.lacking = names
     return error
+
+
+def without_way_out(problem: PlanProblem, water: LegWater, planner: LocalPlanner) -> NoPlan | None:
+    """The refusal where a ship that starts under way was not found to stop anywhere near; None where it can.
+
+    Stops are tried ahead and to both sides, the farthest first; nothing is proved.
+    """
+    if problem.under_way is None:
+        return None
+    rest = np.zeros(len(problem.vessel.limits))
+    for end in _stops(problem):
+        task = LegTask(
+            start=problem.begin,
+            end=problem.at_rest(end),
+            start_inputs=problem.standing,
+            end_inputs=rest,
+            seed=problem.seed,
+            before=problem.standing[None],
+            budget=WorkBudget(most_s=PLAN.leg_s),
+        )
+        if water.holds(end[None]) and planner.leg(task, water) is not None:
+            return None
+    lat, lon = problem.area.frame.to_degrees(problem.start[:2])
+    u, v, r = problem.under_way.velocity.tolist()
+    return NoPlan(
+        f"the ship was not found to come to a stop in safe water from its start near {lat:.5f}, {lon:.5f} at "
+        f"start.u_mps = {u:.3g}, start.v_mps = {v:.3g}, start.r_radps = {r:.3g}",
+        what="start",
+        which="start",
+        place=problem.start[:2],
+        remedy="not tried: a slower start, one farther from the shore, or replan --stopped",
+    )
+
+
+def _stops(problem: PlanProblem) -> Iterator[Array]:
+    """(3,) poses to stop at, the farthest first; headed as the ship would be on an arc that leads there."""
+    course = problem.start[2] + float(np.arctan2(*problem.begin[4:2:-1]))
+    for hulls in PLAN.stop_hulls:
+        for bend in PLAN.stop_bends_rad:
+            step = hulls * problem.vessel.length_m * np.array([np.cos(course + bend), np.sin(course + bend)])
+            yield np.array([*(problem.start[:2] + step), problem.start[2] + 2 * bend])
 
 
 def _size_m(discs: Array) -> float:

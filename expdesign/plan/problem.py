@@ -8,7 +8,7 @@ import numpy as np
 
 from expdesign.dictionary import Primitive
 from expdesign.durations import DurationDesign
-from expdesign.plan.values import PlanSettings
+from expdesign.plan.values import PlanSettings, UnderWay
 from expdesign.sea_area import SeaArea
 from expdesign.simulation import Environment, to_body
 from expdesign.values import Array, seal
@@ -23,9 +23,10 @@ class PlanProblem:
         vessel, area, environment, settings: who, where, in what weather, with which settings.
         primitives: of the dictionary, in the design's order.
         design: gives the number of runs of each.
-        start, goal: (3,) poses; the ship starts and ends at rest through the water.
+        start, goal: (3,) poses; the ship ends at rest through the water.
         seed: of everything drawn.
         expected: whether plans are compared by their expected time, go-arounds included, where the ship has a rule.
+        under_way: how the ship moves at the start; None where it is at rest through the water there.
     """
 
     vessel: Vessel
@@ -38,6 +39,7 @@ class PlanProblem:
     goal: Array
     seed: int = 0
     expected: bool = False
+    under_way: UnderWay | None = None
 
     def __post_init__(self) -> None:
         seal(self, start="3", goal="3")
@@ -62,11 +64,21 @@ class PlanProblem:
         """Speed of the forecast's mean current."""
         return float(np.hypot(*self.environment.current_to))
 
-    def under_way(self, pose: Array, velocity: Array) -> Array:
+    @property
+    def begin(self) -> Array:
+        """(6,) state at the start."""
+        return self.at_rest(self.start) if self.under_way is None else np.r_[self.start, self.under_way.velocity]
+
+    @property
+    def standing(self) -> Array:
+        """(m,) commands standing there."""
+        return np.zeros(len(self.vessel.limits)) if self.under_way is None else self.under_way.inputs
+
+    def moving(self, pose: Array, velocity: Array) -> Array:
         """(6,) state at a pose with a velocity (3,) through the forecast's mean current."""
         u_c, v_c = to_body(self.environment.current_to, pose[2], NUMPY)
         return np.asarray(np.r_[pose, velocity + np.array([u_c, v_c, 0.0])])
 
     def at_rest(self, pose: Array) -> Array:
         """(6,) state at a pose, at rest through the water."""
-        return self.under_way(pose, np.zeros(3))
+        return self.moving(pose, np.zeros(3))

@@ -129,8 +129,8 @@ class _Voyage:
     line: Timeline = field(init=False)
 
     def __post_init__(self) -> None:
-        begin = self.problem.at_rest(self.problem.start)
-        object.__setattr__(self, "line", Timeline(begin=begin, begin_inputs=self._rest))
+        problem = self.problem
+        object.__setattr__(self, "line", Timeline(begin=problem.begin, begin_inputs=problem.standing))
 
     @property
     def sailed(self) -> SailedTrial:
@@ -233,7 +233,7 @@ class _Voyage:
         return next(item for item in self.problem.used if item.name == placement.primitive)
 
     def _entry(self, placement: Placement, primitive: Primitive) -> Array:
-        return self.problem.under_way(placement.pose, primitive.entry_velocity)
+        return self.problem.moving(placement.pose, primitive.entry_velocity)
 
     @property
     def _rest(self) -> Array:

@@ -14,6 +14,7 @@ from expdesign.memory import in_order
 from expdesign.plan.assembly import (
     PlanRoom,
     check_connected,
+    check_start,
     confidence_of_run,
     dispersions,
     footprints,
@@ -80,6 +81,7 @@ def _in_water(
     check_connected(problem)
     draws_for(confidence_of_run(problem))
     ship, refused = ship_on_legs(problem), NoRoom("the chart has no water")
+    check_start(problem, ship)
     for area in waters(problem, ship):
         try:
             return planned(problem, area, ship, progress)
@@ -336,6 +338,7 @@ def _bound_s(problem: PlanProblem, water: LegWater, sailed: SailedTrial) -> floa
         primitives=problem.primitives,
         repeats=problem.repeats,
         ends=(problem.start, problem.goal),
+        under_way=problem.under_way,
         transit_mps=ship.transit_speed_mps,
         yaw_rate_radps=ship.spot_rate_radps + ship.yaw_rate_radps,
     )
@@ -359,4 +362,5 @@ def _plan(
         verification=verification,
         risk=risk,
         lattice=sailed.lattice,
+        standing=sailed.standing,
     )

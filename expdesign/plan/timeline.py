@@ -77,4 +77,4 @@ class Timeline:
         )
         commands = Commands(sample_time_s=sample_time_s, names=names, values=values)
         track = Trajectory(sample_time_s=sample_time_s, pose=states[:, :3], velocity=states[:, 3:])
-        return SailedTrial(commands=commands, trajectory=track, legs=legs)
+        return SailedTrial(commands=commands, trajectory=track, legs=legs, standing=self.begin_inputs)

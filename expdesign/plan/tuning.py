@@ -18,6 +18,9 @@ class Tuning:
         first_tries: poses drawn among these and tried before all others: in wide water one of them has room.
         boxes: of places and headings at most; with more of them it stays open whether the run has a place.
         least_slack_cells: slack in cells of the clearance grid at which that stays open, too.
+        fastest_start: a plan may begin so many times faster than the ship's top speed, and turn so much faster.
+        stop_hulls, stop_bends_rad: distances in hull lengths, and bearings off the course, at which a ship that starts
+            under way is tried to stop.
         lookups: clearances looked up at a time.
         least_confidence: below which none is named as a remedy.
         clearance_shares: of the largest clearance with which every run has a place, tried as remedies.
@@ -58,6 +61,9 @@ class Tuning:
     first_tries: int = 500
     boxes: int = 400_000
     least_slack_cells: float = 3.0
+    fastest_start: float = 1.5
+    stop_hulls: tuple[float, ...] = (16.0, 8.0, 4.0, 2.0)
+    stop_bends_rad: tuple[float, ...] = (0.0, 0.6, -0.6, 1.2, -1.2)
     lookups: int = 200_000
     least_confidence: float = 0.5
     clearance_shares: tuple[float, ...] = (1.0, 0.75, 0.5, 0.0)

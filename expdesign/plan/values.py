@@ -41,6 +41,22 @@ class PlanSettings:
     lattice_spacing_m: float | None = None
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class UnderWay:
+    """The motion with which a plan begins.
+
+    Attributes:
+        velocity: (3,) surge and sway over ground m/s, yaw rate rad/s.
+        inputs: (m,) commands standing, which the actuators deliver.
+    """
+
+    velocity: Array
+    inputs: Array
+
+    def __post_init__(self) -> None:
+        seal(self, velocity="3", inputs="m")
+
+
 @dataclass(frozen=True, kw_only=True)
 class Leg:
     """One stretch of the plan; sample indices point into the plan's commands and trajectory.
@@ -94,12 +110,14 @@ class SailedTrial:
         trajectory: k + 1 samples.
         legs: in time order, without gaps.
         lattice: proof of the lattice planner, or None for other planners.
+        standing: (m,) commands before the first, which the actuators deliver as the trial begins; None for zeros.
     """
 
     commands: Commands
     trajectory: Trajectory
     legs: tuple[Leg, ...]
     lattice: LatticeProof | None = None
+    standing: Array | None = None
 
     @property
     def states(self) -> Array:
@@ -244,6 +262,8 @@ class Plan:
         design_efficiency_placed: as realised, of the runs alone, with the headings in wind and the entries they got.
         risk: what drawn trials of the plan came to; None if not computed.
         lattice: proof of the lattice planner, or None for other planners.
+        standing: (m,) commands before the first, which the actuators deliver as the plan begins; None for a plan that
+            begins at rest with all of them zero.
     """
 
     area: SeaArea
@@ -258,11 +278,18 @@ class Plan:
     design_efficiency_placed: float | None = None
     risk: RiskEstimate | None = None
     lattice: LatticeProof | None = None
+    standing: Array | None = None
 
     @property
     def sailed(self) -> SailedTrial:
         """Commands, motion and legs."""
-        return SailedTrial(commands=self.commands, trajectory=self.trajectory, legs=self.legs, lattice=self.lattice)
+        return SailedTrial(
+            commands=self.commands,
+            trajectory=self.trajectory,
+            legs=self.legs,
+            lattice=self.lattice,
+            standing=self.standing,
+        )
 
     @property
     def sample_leg(self) -> np.ndarray:

@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field
 
 from expdesign.errors import FileError
-from expdesign.plan.values import PlannerName, PlanSettings
+from expdesign.plan.values import PlannerName, PlanSettings, UnderWay
 from expdesign.scenario.berth import berth_problem
 from expdesign.scenario.charts import Latitude, Longitude, load_area
 from expdesign.scenario.design_file import DesignTable, design_settings
@@ -21,6 +21,7 @@ from expdesign.scenario.values import Scenario
 from expdesign.scenario.vessels import EnvironmentTable, build_environment, load_vessel
 from expdesign.sea_area import SeaArea
 from expdesign.values import Array
+from expdesign.vessel import Vessel, column_name
 
 Degrees = Annotated[float, Field(ge=-360, le=360)]
 POSITION_KEYS = ("lat_deg", "lon_deg", "north_m", "east_m")
@@ -51,6 +52,20 @@ class PoseTable(Table):
         default=None, description="the distance east of the area's centre [m], together with north_m"
     )
     heading_deg: Degrees = Field(description="the heading [deg], clockwise from north")
+
+
+class StartTable(PoseTable):
+    """`[start]`."""
+
+    u_mps: Number = Field(default=0.0, description="the speed ahead over ground with which the plan begins [m/s]")
+    v_mps: Number = Field(default=0.0, description="the speed to starboard over ground with which it begins [m/s]")
+    r_radps: Number = Field(default=0.0, description="the yaw rate with which it begins [rad/s], to starboard positive")
+    commands: dict[str, Number] = Field(
+        default_factory=dict,
+        description="the actuator commands that stand as the plan begins, by column as in commands.csv, e.g. "
+        "{ n1_rps = 3.0 }; 0 for the others. Without any key of motion or commands the ship begins at rest through "
+        "the water",
+    )
 
 
 class PlanTable(Table):
@@ -99,7 +114,9 @@ class ScenarioFile(Table):
 
     scenario: ScenarioTable = Field(description="a table [scenario] with vessel, dictionary and area")
     design: DesignTable = Field(description="a table [design] with total_s")
-    start: PoseTable = Field(description="a table [start] with a position and heading_deg")
+    start: StartTable = Field(
+        description="a table [start] with a position and heading_deg, and the motion there if the ship is under way"
+    )
     goal: PoseTable = Field(description="a table [goal] with a position and heading_deg")
     environment: EnvironmentTable = Field(default=EnvironmentTable(), description="the expected current, wind and sea")
     plan: PlanTable = Field(default=PlanTable(), description="the clearance, safety and repositioning legs of the plan")
@@ -164,7 +181,25 @@ def build_scenario(content: Mapping[str, Any], entry: Entry) -> Scenario:
         design=design_settings(file.design, vessel, tuple(spec.name for spec in dictionary), entry.at("design")),
         plan=plan,
         environment=build_environment(file.environment),
+        under_way=_under_way(file.start, vessel, entry.at("start")),
         **poses,
+    )
+
+
+def _under_way(start: StartTable, vessel: Vessel, entry: Entry) -> UnderWay | None:
+    """The motion at the start; None where no key states any."""
+    if not start.model_fields_set & {"u_mps", "v_mps", "r_radps", "commands"}:
+        return None
+    columns = [column_name(name) for name in vessel.model.inputs]
+    for name, value in start.commands.items():
+        if name not in columns:
+            raise entry.at("commands").error(f"has {shown(name)}, expected columns among {', '.join(columns)}")
+        limit = vessel.limits[columns.index(name)]
+        if not limit.low <= value <= limit.high:
+            raise entry.at(f"commands.{name}").error(f"is {value:g}, expected {limit.low:g} to {limit.high:g}")
+    return UnderWay(
+        velocity=np.array([start.u_mps, start.v_mps, start.r_radps]),
+        inputs=np.array([start.commands.get(name, 0.0) for name in columns]),
     )
 
 

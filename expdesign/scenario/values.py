@@ -8,7 +8,7 @@ from pathlib import Path
 
 from expdesign.dictionary.spec import PrimitiveSpec
 from expdesign.growing import GrowSettings
-from expdesign.plan.values import PlanSettings
+from expdesign.plan.values import PlanSettings, UnderWay
 from expdesign.sea_area import SeaArea
 from expdesign.shortest_day import AccuracySettings
 from expdesign.simulation.environment import Environment
@@ -104,8 +104,9 @@ class Scenario:
         dictionary: specifications of the primitives, not yet simulated.
         area: allowed water.
         design, plan: settings.
-        start, goal: (3,) poses in the area's frame [north m, east m, heading rad]; the ship starts and ends at rest.
+        start, goal: (3,) poses in the area's frame [north m, east m, heading rad]; the ship ends at rest.
         environment: forecast.
+        under_way: how the ship moves at the start; None where it is at rest through the water.
     """
 
     name: str
@@ -118,6 +119,7 @@ class Scenario:
     start: Array
     goal: Array
     environment: Environment
+    under_way: UnderWay | None = None
 
     def __post_init__(self) -> None:
         seal(self, start="3", goal="3")

@@ -6,8 +6,9 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from expdesign.conventions import POSE_COLUMNS
+from expdesign.conventions import POSE_COLUMNS, VELOCITY_COLUMNS
 from expdesign.export.files.text import finite, strict_json
+from expdesign.plan.values import UnderWay
 from expdesign.simulation.environment import Environment
 from expdesign.values import Array, seal
 
@@ -40,6 +41,7 @@ class Known:
         remaining_stated: whether the user stated it.
         pose: (3,) of the ship at the end of the data, in the area's frame.
         speed_mps: over ground in the last sample.
+        under_way: how the ship moves as the rest begins; None where it is assumed to be stopped.
         model: origin of the model for the rest.
         environment: current and wind of the rest.
         weather: their origin.
@@ -71,6 +73,7 @@ class Known:
     so_far: Array
     after: Array
     purchases: tuple[Purchase, ...]
+    under_way: UnderWay | None = None
 
     def __post_init__(self) -> None:
         seal(self, pose="3", before="p", now="p", stated="p", so_far="p", after="p")
@@ -89,6 +92,7 @@ def replan_json(known: Known) -> str:
         known.purchases,
         strict=True,
     )
+    moves = known.under_way
     current, wind = known.environment.current_to.tolist(), known.environment.wind_to.tolist()
     return strict_json(
         {
@@ -99,7 +103,7 @@ def replan_json(known: Known) -> str:
             "remaining_stated": known.remaining_stated,
             "start": dict(zip(POSE_COLUMNS, known.pose.tolist(), strict=True)),
             "measured_speed_mps": known.speed_mps,
-            "assumed_speed_mps": 0.0,
+            "begins_with": None if moves is None else dict(zip(VELOCITY_COLUMNS, moves.velocity.tolist(), strict=True)),
             "model": known.model,
             "environment": {
                 "from": known.weather,

@@ -65,6 +65,7 @@ def plan_json(plan: Plan, *, scenario: str, vessel: Vessel, environment: Environ
                 "wind_to": _wind_or_current(environment.wind_to, environment.wind_std_mps, environment.wind_variation),
                 **({} if environment.sea_state is None else {"sea_state": environment.sea_state}),
             },
+            **_standing_entry(plan),
             "legs": [_leg_entry(plan, index, leg) for index, leg in enumerate(plan.legs)],
             "informative_s": plan.seconds("primitive"),
             "reposition_s": plan.seconds("reposition"),
@@ -150,6 +151,13 @@ def _sailed_entry(plan: Plan, index: int) -> dict[str, float | None]:
         "sailed_median_s": leg.median_s,
         "sailed_95_s": leg.most_s,
     }
+
+
+def _standing_entry(plan: Plan) -> dict[str, dict[str, float]]:
+    """Commands that stand before the plan begins; nothing where all are zero."""
+    if plan.standing is None or not plan.standing.any():
+        return {}
+    return {"standing_commands": named([column_name(name) for name in plan.commands.names], plan.standing)}
 
 
 def _leg_entry(plan: Plan, index: int, leg: Leg) -> dict[str, Any]:

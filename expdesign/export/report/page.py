@@ -7,6 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
+import numpy as np
+
 from expdesign.export import words
 from expdesign.export.pages import page_templates
 from expdesign.export.pages.figures import drawn
@@ -32,6 +34,7 @@ from expdesign.export.report.parameters import (
 from expdesign.export.report.procedure import day_sentence, procedure_sentences
 from expdesign.export.report.progress import known_rows, known_sentences
 from expdesign.export.report.trust import chain
+from expdesign.plan.legs import through_water
 from expdesign.plan.values import DayLength, LatticeProof
 
 SUBTRACTION = {
@@ -231,6 +234,15 @@ def _simulated(day: DayLength) -> str:
     return f"median {median}, 95th percentile {most} of simulated trials; "
 
 
+def _ends(content: ReportContent) -> str:
+    """The motion at start and goal."""
+    track = content.plan.trajectory
+    begins = tables.motion(through_water(content.environment, np.r_[track.pose[0], track.velocity[0]]))
+    if begins == "at rest":
+        return "the ship is at rest relative to the water"
+    return f"the ship starts under way, through the water {begins}; at the goal it is at rest relative to the water"
+
+
 def assumptions(content: ReportContent) -> list[tuple[str, str]]:
     """The assumptions behind the numbers: (topic, sentence)."""
     area, environment, vessel, model = content.plan.area, content.environment, content.vessel, content.vessel.model
@@ -252,5 +264,5 @@ def assumptions(content: ReportContent) -> list[tuple[str, str]]:
         ),
         ("Mean subtraction", SUBTRACTION[content.design.problem.mean_subtraction]),
         ("Hull", f"a rectangle of {vessel.length_m:g} m by {vessel.beam_m:g} m that contains the waterline"),
-        ("Start and goal", "the ship is at rest relative to the water"),
+        ("Start and goal", _ends(content)),
     ]

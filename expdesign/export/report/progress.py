@@ -72,9 +72,10 @@ def known_sentences(known: Known | None, frame: LocalFrame) -> list[str]:
     )
     current = words.current(known.environment.current_to, known.environment.current_std_mps)
     wind = words.wind(known.environment.wind_to, known.environment.wind_std_mps)
-    moving = (
-        f"The speed over ground was {words.speed(known.speed_mps)}. The plan assumes that the ship then stops "
-        "relative to the water."
+    moving = f"The speed over ground was {words.speed(known.speed_mps)}. " + (
+        "The plan assumes that the ship then stops relative to the water."
+        if known.under_way is None
+        else "The plan begins there and then, with the motion and the commands of the last rows of the data."
     )
     return [
         f"This plan is for the rest of a trial. Data so far: {words.duration(known.sailed_s)} ({files}). Informative "

@@ -13,6 +13,7 @@ from expdesign.export.report.content import ReportContent, primitive_runs
 from expdesign.information.primitive_information import PrimitiveInformation
 from expdesign.plan.values import Leg, Plan
 from expdesign.shortest_day import ShortestDay
+from expdesign.values import Array
 
 REST_MPS, REST_RADPS = 0.02, 0.0005
 
@@ -99,7 +100,7 @@ def primitive_rows(content: ReportContent) -> list[PrimitiveRow]:
             family=item.primitive.family.replace("_", " "),
             settings=settings_sentence(item),
             lasts=words.duration(item.primitive.duration_s),
-            entry=_entry(item),
+            entry=motion(item.primitive.entry_velocity),
             log_det="singular" if item.log_det_alone is None else words.number(item.log_det_alone, 1),
             excites=excitation_words(item),
             share=words.percent(float(fraction)),
@@ -164,11 +165,12 @@ def setting(name: str, value: float) -> str:
     return f"{title} {words.significant(value * factor)}{gap}{unit}".rstrip()
 
 
-def _entry(item: PrimitiveInformation) -> str:
-    u, v, r = item.primitive.entry_velocity.tolist()
+def motion(velocity: Array) -> str:
+    """A velocity (3,) in words."""
+    u, v, r = velocity.tolist()
     if np.hypot(u, v) < REST_MPS and abs(r) < REST_RADPS:
         return "at rest"
-    parts = [f"{words.speed(u)} ahead"]
+    parts = [f"{words.speed(abs(u))} {'ahead' if u >= 0 else 'astern'}"]
     if abs(v) >= REST_MPS:
         parts.append(f"{words.speed(abs(v))} to {'starboard' if v > 0 else 'port'}")
     if abs(r) >= REST_RADPS:

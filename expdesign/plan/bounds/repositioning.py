@@ -2,7 +2,8 @@
 
 Class of plans: the hull keeps the clearance everywhere; legs go no faster through water than a stated speed and turn no
 faster than a stated rate, or 2 % beyond those at their ends; each run is sailed as simulated with the nominal vessel in
-the forecast's means; the ship starts and ends at rest with its engines stopped, rudders and thrusters at any angle.
+the forecast's means; the ship ends at rest with its engines stopped, rudders and thrusters at any angle, and starts so
+or under way as stated.
 
 In a steady current the least time of a leg along a straight line is that of Zermelo's navigation problem. It grows with
 the length and obeys the triangle inequality, so the fastest path round the islands bends at their corners only and a
@@ -43,7 +44,8 @@ from expdesign.plan.bounds.displacement import Displacement, Headway, differs_by
 from expdesign.plan.bounds.tuning import BOUNDS
 from expdesign.plan.chart import build_visibility_graph, simplified
 from expdesign.plan.control import LegEnd, least_loss, leg_end
-from expdesign.plan.legs import LEGS, leg_speed_mps
+from expdesign.plan.legs import LEGS, leg_speed_mps, through_water
+from expdesign.plan.values import UnderWay
 from expdesign.sea_area import SeaArea
 from expdesign.simulation import Environment
 from expdesign.values import Array
@@ -61,6 +63,7 @@ def reposition_bound_s(
     ends: tuple[Array, Array],
     transit_mps: float,
     yaw_rate_radps: float,
+    under_way: UnderWay | None = None,
 ) -> float:
     """Least repositioning time of any plan of the class that the module describes [s].
 
@@ -71,12 +74,14 @@ def reposition_bound_s(
         ends: start and goal, (3,) or (2,).
         transit_mps, yaw_rate_radps: of legs through water; those whose ends are faster, by `leg_speed_mps`, or turn
             faster go a little beyond.
+        under_way: motion at the start and commands standing there; None for rest.
     """
     runs = [item for item in primitives if repeats.get(item.name, 0)]
     exits = [exit_motion(vessel, item, environment) for item in runs]
     entries = [item.entry_velocity for item in runs]
-    speed_mps = leg_speed_mps(transit_mps, [*entries, *(np.array([most, 0.0]) for _, most, _ in exits)])
-    turns = [*(abs(float(entry[2])) for entry in entries), *(turn for _, _, turn in exits)]
+    begin, standing = _begin(vessel, environment, under_way, ends[0])
+    speed_mps = leg_speed_mps(transit_mps, [begin, *entries, *(np.array([most, 0.0]) for _, most, _ in exits)])
+    turns = [*(abs(float(entry[2])) for entry in (begin, *entries)), *(turn for _, _, turn in exits)]
     yaw_rate_radps = max([yaw_rate_radps, *(LEGS.beyond_ends * turn for turn in turns)])
     headway = Headway(speed_mps=speed_mps, current_to=environment.current_to)
     displacements = {item.name: displacement_of(vessel, item, environment, headway) for item in runs}
@@ -89,7 +94,7 @@ def reposition_bound_s(
         found = time_saved_s(runs, displacements, counts, water, ends, headway, vessel, known_s=path_s)
         if found is not None:
             path_s = max(path_s, found[0] - sum(counts[name] * most_s for name, most_s in found[1].items()))
-    firsts, lasts = _leg_ends(vessel, environment, runs, exits, speed_mps, yaw_rate_radps)
+    firsts, lasts = _leg_ends(vessel, environment, runs, exits, (begin, standing), speed_mps, yaw_rate_radps)
     losses = least_loss(firsts, lasts, vessel)
     lost_m, least_s = (least_losses(losses[..., k], list(counts.values())) for k in (0, 1))
     return float(max(0.0, least_s, path_s + lost_m / (speed_mps + headway.current_mps)))
@@ -144,6 +149,7 @@ def _leg_ends(
     environment: Environment,
     runs: list[Primitive],
     exits: list[tuple[float, float, float]],
+    begin: tuple[Array, Array],
     top_mps: float,
     yaw_rate_radps: float,
 ) -> tuple[list[LegEnd], list[LegEnd]]:
@@ -158,7 +164,15 @@ def _leg_ends(
         replace(end(item.exit_velocity, item.commands.values[-1]), slowest_mps=least, fastest_mps=most)
         for item, (least, most, _) in zip(runs, exits, strict=True)
     ]
-    return [rest, *firsts], [*(end(item.entry_velocity, item.commands.values[0]) for item in runs), rest]
+    start = end(*begin) if begin[0].any() or begin[1].any() else rest
+    return [start, *firsts], [*(end(item.entry_velocity, item.commands.values[0]) for item in runs), rest]
+
+
+def _begin(vessel: Vessel, environment: Environment, under_way: UnderWay | None, start: Array) -> tuple[Array, Array]:
+    """(3,) velocity through water at the start, and (m,) commands standing there."""
+    if under_way is None:
+        return np.zeros(3), np.zeros(len(vessel.limits))
+    return through_water(environment, np.r_[start, under_way.velocity]), under_way.inputs
 
 
 def least_losses(losses: Array, counts: Sequence[int]) -> float:

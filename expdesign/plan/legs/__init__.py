@@ -7,7 +7,15 @@ from expdesign.plan.legs.escape_check import check_ends, escapes
 from expdesign.plan.legs.helm import helm_leg
 from expdesign.plan.legs.recovery import displaced, recover
 from expdesign.plan.legs.tuning import LEGS
-from expdesign.plan.legs.water import LegTask, LegWater, acceptable, last_state, leg_speed_mps, nearest_turns
+from expdesign.plan.legs.water import (
+    LegTask,
+    LegWater,
+    acceptable,
+    last_state,
+    leg_speed_mps,
+    nearest_turns,
+    through_water,
+)
 
 __all__ = [
     "LEGS",
@@ -26,4 +34,5 @@ __all__ = [
     "leg_speed_mps",
     "nearest_turns",
     "recover",
+    "through_water",
 ]

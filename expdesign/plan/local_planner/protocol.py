@@ -274,6 +274,7 @@ class TransitionTrials:
         water: of the plan.
         primitives: the runs by name.
         start: (3,) pose of the plan.
+        under_way: (3,) velocity through water with which it begins, and (m,) commands standing then.
         made_good: whether displacement towards the goal saves time on later legs.
         budget: work budget; transitions that are not tried within it keep the rule for leg times.
         progress: of choosing some transitions, which counts as one of them, and trying them.
@@ -282,6 +283,7 @@ class TransitionTrials:
     water: LegWater
     primitives: Mapping[str, Primitive]
     start: Array
+    under_way: tuple[Array, Array]
     made_good: bool
     budget: WorkBudget = dataclasses.field(default_factory=WorkBudget)
     progress: Progress = silent

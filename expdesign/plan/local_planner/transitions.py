@@ -7,7 +7,7 @@ in open calm water: the leg may end anywhere, and displacement counts as much as
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -15,7 +15,6 @@ import numpy as np
 import shapely
 
 from expdesign.conventions import wrap_angle
-from expdesign.dictionary import Primitive
 from expdesign.memory import in_order
 from expdesign.plan.chart import clearance_field
 from expdesign.plan.control import AgileShip
@@ -54,7 +53,7 @@ def with_transitions(
             break
         trials.progress("trying transitions between runs", (number + 1) / (len(fresh) + 1))
         found, spent_s = next(results)
-        tried[pair] = None if found is None else _tried(space, times, pair, *found)
+        tried[pair] = None if found is None else _tried(space, times, pair, trials, *found)
         trials.budget.spent_s += spent_s
     return replace(space, tried=tried)
 
@@ -65,7 +64,7 @@ def _desired_leg(
     """The task of a transition, and the value of displacement."""
     course, turn = _desired(space, pair, trials.start)
     worth = trials.made_good * np.array([np.cos(course), np.sin(course)]) / times.speed_mps
-    return _task(pair, trials.primitives, water, course, turn), worth
+    return _task(pair, trials, water, course, turn), worth
 
 
 def _optimised(
@@ -75,11 +74,13 @@ def _optimised(
     return free_leg(task, water, ship, worth), task.budget.spent_s
 
 
-def _tried(space: SearchSpace, times: LegTimes, pair: Pair, seconds: float, step: Array) -> TriedTransition:
+def _tried(
+    space: SearchSpace, times: LegTimes, pair: Pair, trials: TransitionTrials, seconds: float, step: Array
+) -> TriedTransition:
     more_s = 0.0
     if np.hypot(*step[:2]) >= LOCAL.near_hulls * space.hull_m:
         before, after = _runs(space, pair)
-        speeds = before.exit_mps if before else 0.0, after.entry_mps if after else 0.0
+        speeds = before.exit_mps if before else float(trials.under_way[0][0]), after.entry_mps if after else 0.0
         more_s = max(0.0, seconds - float(times.step_s(step, *np.array(speeds))))
     return TriedTransition(step=step, seconds=seconds, more_s=more_s)
 
@@ -99,13 +100,13 @@ def _desired(space: SearchSpace, pair: Pair, start: Array) -> tuple[float, float
     return float(wrap_angle(course)), float(wrap_angle(turn))
 
 
-def _task(pair: Pair, primitives: Mapping[str, Primitive], water: LegWater, course: float, turn: float) -> LegTask:
-    rest = np.zeros(len(water.vessel.limits))
-    before, after = primitives.get(pair[0]), primitives.get(pair[1])
-    given = rest[None] if before is None else before.commands.values
+def _task(pair: Pair, trials: TransitionTrials, water: LegWater, course: float, turn: float) -> LegTask:
+    rest, (velocity, standing) = np.zeros(len(water.vessel.limits)), trials.under_way
+    before, after = trials.primitives.get(pair[0]), trials.primitives.get(pair[1])
+    given = standing[None] if before is None else before.commands.values
     away = LOCAL.transition_guess_hulls * water.vessel.length_m
     return LegTask(
-        start=np.r_[np.zeros(3), np.zeros(3) if before is None else before.exit_velocity],
+        start=np.r_[np.zeros(3), velocity if before is None else before.exit_velocity],
         end=np.r_[
             away * np.cos(course), away * np.sin(course), turn, np.zeros(3) if after is None else after.entry_velocity
         ],

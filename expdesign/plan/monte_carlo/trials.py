@@ -102,7 +102,8 @@ def _sail_part(
     vessel, track, legs, commands = water.vessel, sailed.states, sailed.legs, sailed.commands
     helm = Helmsman(vessel=vessel, environment=water.environment, ship=water.ship)
     truths = draw_truths(vessel, water.environment, draws, rng)
-    fleet = Fleet(vessel, water.environment, truths, state=track[0], standing=np.zeros(len(vessel.limits)), rng=rng)
+    standing = np.zeros(len(vessel.limits)) if sailed.standing is None else sailed.standing
+    fleet = Fleet(vessel, water.environment, truths, state=track[0], standing=standing, rng=rng)
     collisions = CollisionCheck(area=water.area, vessel=vessel)
     sailing, unexplained = np.ones(draws, dtype=bool), np.zeros((draws, 3))
     shape = (len(legs), draws)

@@ -13,13 +13,13 @@ import shapely
 
 from expdesign.conventions import wrap_angle
 from expdesign.dictionary import Primitive
-from expdesign.plan.values import Leg, SailedTrial, Verification
+from expdesign.plan.values import Leg, SailedTrial, UnderWay, Verification
 from expdesign.plan.verify.tuning import TUNING
 from expdesign.sea_area import SeaArea
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import Environment, simulate, to_body
 from expdesign.values import Array
-from expdesign.vessel import NUMPY, Vessel
+from expdesign.vessel import IDEAL, NUMPY, Vessel
 from expdesign.vessel.hull import hull_polygons
 
 
@@ -35,6 +35,7 @@ def verify_plan(
     repeats: Mapping[str, int],
     start: Array,
     goal: Array,
+    under_way: UnderWay | None = None,
 ) -> Verification:
     """Re-simulate the commands ten times finer and check motion, hull, limits, speeds, runs, entries and ends.
 
@@ -48,7 +49,8 @@ def verify_plan(
         transit_mps: stated speed of legs through water.
         primitives: the dictionary by name.
         repeats: how often each is to be run.
-        start, goal: (3,) poses where the ship is to begin and end at rest through the water.
+        start, goal: (3,) poses where the ship is to begin, and to end at rest through the water.
+        under_way: motion at the start and commands standing there; None for rest and zeros.
     """
     commands, trajectory, legs = sailed.commands, sailed.trajectory, sailed.legs
     misfit = _legs_problems(commands, legs, primitives)
@@ -62,17 +64,20 @@ def verify_plan(
     )
     clearance = np.minimum(*(hull_clearance(area, track, vessel.hull_b) for track in (trajectory, again)))
     worst = int(np.argmin(clearance))
-    excess, excess_signal = _limit_excess(vessel, commands)
+    standing = np.zeros(len(vessel.limits)) if under_way is None else under_way.inputs
+    excess, excess_signal = _limit_excess(vessel, commands, standing)
+    begin = None if under_way is None else under_way.velocity
     problems = [
         *_motion_problems(vessel, trajectory, again),
-        *_end_problems(vessel, environment, trajectory, start, goal),
-        *_end_problems(vessel, environment, again, start, goal, "re-simulated "),
+        *_end_problems(vessel, environment, trajectory, (start, goal), begin),
+        *_end_problems(vessel, environment, again, (start, goal), begin, "re-simulated "),
         *_if(
             bool(clearance[worst] < clearance_m - 1e-6),
             f"the hull is {clearance[worst]:.2f} m from forbidden water, required {clearance_m:g} m, "
             f"at {worst * commands.sample_time_s:.0f} s, {_place(area, trajectory.pose[worst])}",
         ),
         *_if(excess > 1e-6, f"{excess_signal} by {excess:.2g} of its range"),
+        *_standing_problems(vessel, commands, standing),
         *_engine_problems(vessel, commands),
         *_repeat_problems(legs, repeats),
         *(() if misfit else _speed_problems(environment, trajectory, legs, transit_mps)),
@@ -146,38 +151,57 @@ def _motion_problems(vessel: Vessel, trajectory: Trajectory, again: Trajectory) 
 
 
 def _end_problems(
-    vessel: Vessel, environment: Environment, trajectory: Trajectory, start: Array, goal: Array, which: str = ""
+    vessel: Vessel,
+    environment: Environment,
+    trajectory: Trajectory,
+    ends: tuple[Array, Array],
+    begin: Array | None,
+    which: str = "",
 ) -> list[str]:
-    """Deviations of the plan's ends from start and goal, at rest through the water."""
+    """Deviations of the plan's ends from start and goal, at rest through the water or, at the start, as under way."""
     problems = []
     fastest = np.hypot(*trajectory.velocity[:, :2].T).max(), np.abs(trajectory.velocity[:, 2]).max()
     slow, steady = TUNING.entry_tolerance * np.array(fastest) + 1e-9
-    for name, pose, index in (("start", start, 0), ("goal", goal, -1)):
+    for name, pose, index in zip(("start", "goal"), ends, (0, -1), strict=True):
         place, velocity = trajectory.pose[index], trajectory.velocity[index]
         off_m = float(np.hypot(*(place - pose)[:2]))
         turned = abs(float(wrap_angle(place[2] - pose[2])))
         u_c, v_c = to_body(environment.current_to, place[2], NUMPY)
-        moving, turning = float(np.hypot(velocity[0] - u_c, velocity[1] - v_c)), abs(float(velocity[2]))
+        wanted, words = np.array([u_c, v_c, 0.0]), "through the water and turning at"
+        if name == "start" and begin is not None:
+            wanted, words = begin, "off the speed asked for and turning by"
+        moving, turning = float(np.hypot(*(velocity - wanted)[:2])), abs(float(velocity[2] - wanted[2]))
         if off_m > vessel.length_m / 30 or turned > TUNING.entry_tolerance or moving > slow or turning > steady:
             problems.append(
-                f"the {which}plan is {off_m:.2f} m and {turned:.3f} rad off the {name}, at {moving:.3f} m/s through "
-                f"the water and turning at {turning:.4f} rad/s"
+                f"the {which}plan is {off_m:.2f} m and {turned:.3f} rad off the {name}, at {moving:.3f} m/s {words} "
+                f"{turning:.4f} rad/s"
             )
     return problems
 
 
-def _limit_excess(vessel: Vessel, commands: Commands) -> tuple[float, str]:
-    """The largest violation of a limit or a rate relative to the signal's range, and which; all begin at zero."""
+def _limit_excess(vessel: Vessel, commands: Commands, standing: Array) -> tuple[float, str]:
+    """The largest violation of a limit or a rate relative to the signal's range, and which; (m,) stood before."""
     worst, which = 0.0, ""
-    for name, limit, values in zip(commands.names, vessel.limits, commands.values.T, strict=True):
+    for name, limit, values, before in zip(commands.names, vessel.limits, commands.values.T, standing, strict=True):
         span = limit.high - limit.low if np.isfinite(limit.high - limit.low) else 2 * np.pi
         beyond = max(float((values - limit.high).max()), float((limit.low - values).max()))
-        steps = np.abs(np.diff([np.clip(0.0, limit.low, limit.high), *values]))
+        steps = np.abs(np.diff([np.clip(before, limit.low, limit.high), *values]))
         faster = float(steps.max()) - limit.rate * commands.sample_time_s
         for excess, what in ((beyond, "limit"), (faster, "rate")):
             if excess / span > worst:
                 worst, which = excess / span, f"{name} passes its {what}"
     return worst, which
+
+
+def _standing_problems(vessel: Vessel, commands: Commands, standing: Array) -> list[str]:
+    """Actuators that answer late deliver what stood before the plan; its files do so by a first row that repeats it."""
+    late = np.array([response != IDEAL for response in vessel.responses])
+    changed = np.abs(commands.values[0] - standing) > 1e-9
+    return [
+        f"{name} is commanded {first:.3g} at once, expected {before:.3g} for a sample, as it answers late"
+        for name, first, before, wrong in zip(commands.names, commands.values[0], standing, late & changed, strict=True)
+        if wrong
+    ]
 
 
 def _engine_problems(vessel: Vessel, commands: Commands) -> list[str]:

@@ -7,6 +7,7 @@ import numpy as np
 from expdesign.errors import InputError
 from expdesign.plan.assembly import ship_on_legs
 from expdesign.plan.bounds import Headway, time_to_sail_s
+from expdesign.plan.legs import through_water
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.values import Plan
 from expdesign.shortest_day.accuracy import Accuracy
@@ -64,8 +65,9 @@ def velocity_limits(seen: Array) -> Array:
 
 
 def fastest_mps(problem: PlanProblem) -> float:
-    """Largest speed through water of legs and of the runs of the dictionary."""
-    runs = np.concatenate([item.trajectory.velocity for item in problem.primitives])
+    """Largest speed through water of legs, of the runs of the dictionary, and at the start."""
+    begin = through_water(problem.environment, problem.begin)[None]
+    runs = np.concatenate([begin, *(item.trajectory.velocity for item in problem.primitives)])
     return max(ship_on_legs(problem).transit_speed_mps, float(np.hypot(*runs[:, :2].T).max()))
 
 

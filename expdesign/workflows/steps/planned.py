@@ -59,6 +59,7 @@ def plan_problem(
         start=case.start,
         goal=case.goal,
         seed=seed,
+        under_way=case.under_way,
     )
 
 

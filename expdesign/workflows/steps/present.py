@@ -8,23 +8,26 @@ from pathlib import Path
 
 import numpy as np
 
-from expdesign.conventions import to_n_frame
+from expdesign.conventions import OUTPUTS, to_n_frame
 from expdesign.dictionary import build_primitive
 from expdesign.dictionary.spec import PrimitiveSpec
 from expdesign.errors import Diverged, FileError, InputError, NoAnswer, UnknownName, Unreachable
 from expdesign.information import estimated_parameters
+from expdesign.plan.values import UnderWay
 from expdesign.progress import Progress, silent
 from expdesign.records import Fix, last_fix
 from expdesign.reduction import reduced
 from expdesign.scenario import Scenario, load_scenario, load_vessel
 from expdesign.scenario.berth import berth_problem
-from expdesign.signals import Record
-from expdesign.simulation import Environment
+from expdesign.signals import Batch, Record
+from expdesign.simulation import Environment, delivered_at_samples
 from expdesign.values import Array, seal
-from expdesign.vessel import Vessel
+from expdesign.vessel import IDEAL, Vessel
 from expdesign.workflows.steps.known import updated
 from expdesign.workflows.steps.measured import measured
 
+MOTION_S, MOTION_ROWS = 5.0, 3
+"""Time before the last row whose velocities tell how the ship moves there, and the fewest that must be known."""
 PARTICULARS = ("length_m", "beam_m", "draught_m", "sample_time_s")
 
 
@@ -37,6 +40,7 @@ class PresentState:
         data: files so far.
         record: what they hold.
         pose: (3,) of the ship in the area's frame.
+        under_way: how it moves; None where it has stopped through the water.
         sailed_s: time in the data.
         left_s: informative time left.
         left_stated: whether --remaining gives it.
@@ -55,6 +59,7 @@ class PresentState:
     ship: Vessel
     origin: str
     notes: tuple[str, ...]
+    under_way: UnderWay | None = None
 
     def __post_init__(self) -> None:
         seal(self, pose="3")
@@ -66,6 +71,7 @@ def present_state(
     *,
     vessel: Path | None = None,
     remaining_s: float | None = None,
+    stopped: bool = False,
     progress: Progress = silent,
 ) -> PresentState:
     """Where a trial stands; arguments as of `replan`.
@@ -83,9 +89,10 @@ def present_state(
     left_s = _left(first, sailed_s, remaining_s)
     origin = f"that of {vessel}"
     notes: tuple[str, ...] = ()
+    seen = reduced(record, ship) if vessel is None or not stopped else record
+    under_way = None if stopped else present_motion(seen, record, ship, data[-1])
     if vessel is None:
         fixed, prior_counts = first.design.fixed_parameters, first.design.prior == "parameter_std"
-        seen = reduced(record, ship)
         ship, origin, notes = updated(ship, seen, fixed=fixed, prior_counts=prior_counts, progress=progress)
         notes = (*seen.notes[len(record.notes) :], *notes)
     return PresentState(
@@ -99,6 +106,7 @@ def present_state(
         ship=ship,
         origin=origin,
         notes=notes,
+        under_way=under_way,
     )
 
 
@@ -132,6 +140,56 @@ def present_pose(fix: Fix, ship: Vessel, first: Scenario) -> Array:
         where = f"{lat:.6f}, {lon:.6f}" if np.isfinite([lat, lon]).all() else place
         raise FileError(fix.path, f"row {fix.row}", f"the ship's last position ({where}) {problem}")
     return pose
+
+
+def present_motion(seen: Record, record: Record, ship: Vessel, path: Path) -> UnderWay:
+    """How the ship moves at the last row: the end of a straight line through its velocities in the last seconds.
+
+    Commands that dead times still hold back are taken to be lost.
+
+    Args:
+        seen: the data, velocities reduced to the reference point.
+        record: the same, with commands as inputs.
+        ship: whose actuators deliver them.
+        path: of the last file.
+
+    Raises:
+        FileError: the last seconds hold no velocity.
+    """
+    batch = seen.batches[-1]
+    rows = max(MOTION_ROWS, round(MOTION_S / batch.sample_time_s) + 1)
+    velocity = np.array([_at_end(column[-rows:]) for column in batch.velocity.T])
+    if np.isnan(velocity).any():
+        name = OUTPUTS[int(np.argmax(np.isnan(velocity)))]
+        row = f"row {record.batches[-1].first_row + len(record.batches[-1]) - 1}"
+        raise FileError(
+            path,
+            row,
+            f"the last {MOTION_S:g} s hold no velocity {name}, expected it or the pose in {MOTION_ROWS} rows at least, "
+            "or --stopped for a ship that stops before the rest begins",
+        )
+    return UnderWay(velocity=velocity, inputs=_standing(record.batches[-1], ship))
+
+
+def _at_end(values: Array) -> float:
+    """The end of a straight line through values (k,); nan where too few are known."""
+    rows = np.flatnonzero(np.isfinite(values))
+    if len(rows) < MOTION_ROWS:
+        return np.nan
+    return float(np.polyval(np.polyfit(rows - (len(values) - 1), values[rows], 1), 0.0))
+
+
+def _standing(batch: Batch, ship: Vessel) -> Array:
+    """(m,) commands that would give what the actuators deliver at the last row; zeros where the data give forces."""
+    names, responses = ship.model.inputs, ship.responses
+    if not set(names) <= set(batch.input_names):
+        return np.zeros(len(names))
+    given = batch.inputs[:, [batch.input_names.index(name) for name in names]]
+    delivered = delivered_at_samples(responses, given, sample_time_s=batch.sample_time_s)[-2]
+    prompt = np.array([response == IDEAL for response in responses])
+    settled = delivered - np.array([response.offset for response in responses])
+    limits = np.array([(limit.low, limit.high) for limit in ship.limits]).T
+    return np.asarray(np.clip(np.where(prompt, given[-1], settled), *limits))
 
 
 def _left(first: Scenario, sailed_s: float, stated_s: float | None) -> float:
@@ -202,7 +260,15 @@ def rest_of(state: PresentState, *, interest: Sequence[str] = ()) -> tuple[Scena
         most_s={name: value for name, value in settings.most_s.items() if name in names},
         excluded=tuple(name for name in settings.excluded if name in names),
     )
-    case = replace(first, vessel=state.ship, dictionary=kept, design=design, start=state.pose, environment=weather)
+    case = replace(
+        first,
+        vessel=state.ship,
+        dictionary=kept,
+        design=design,
+        start=state.pose,
+        under_way=state.under_way,
+        environment=weather,
+    )
     return case, notes
 
 

@@ -1,6 +1,6 @@
 """`expdesign replan`: the rest of a trial, from the present position, with a model updated from the data.
 
-The ship is assumed to be stopped through the water at its present place before the rest begins.
+The rest begins with the motion and the commands of the data's last rows, or with the ship stopped there.
 """
 
 from __future__ import annotations
@@ -45,6 +45,7 @@ def replan(
     vessel: Path | None = None,
     remaining_s: float | None = None,
     interest: Sequence[str] = (),
+    stopped: bool = False,
     seed: int = 0,
     jobs: int = 1,
     scheduler: str | None = None,
@@ -60,6 +61,7 @@ def replan(
         vessel: the model to go on with, e.g. an extended one; estimated from the data when None.
         remaining_s: informative time left; the scenario's less the time of the data when None.
         interest: parameters that the rest is to be best for, by criterion D_s; the scenario's criterion when empty.
+        stopped: whether the ship stops at its present place before the rest begins.
         seed: of all chance.
         jobs: processes; 0 for one per core. The results do not depend on it.
         scheduler: address of a Dask scheduler whose workers share the work instead.
@@ -71,7 +73,14 @@ def replan(
         NoAnswer: there is no informative design or no feasible plan.
     """
     progress("reading scenario and data", 0.0)
-    state = present_state(scenario, data, vessel=vessel, remaining_s=remaining_s, progress=within(progress, 0.0, 0.02))
+    state = present_state(
+        scenario,
+        data,
+        vessel=vessel,
+        remaining_s=remaining_s,
+        stopped=stopped,
+        progress=within(progress, 0.0, 0.02),
+    )
     words = command_text(
         "replan",
         [scenario],
@@ -80,6 +89,7 @@ def replan(
             "--vessel": vessel,
             "--remaining": remaining_s,
             "--interest": tuple(interest),
+            "--stopped": stopped,
             "--seed": seed,
         },
     )
@@ -153,6 +163,7 @@ def known_of(state: PresentState, case: Scenario, design: DurationDesign, plan: 
         remaining_stated=state.left_stated,
         pose=state.pose,
         speed_mps=float(np.hypot(*np.nan_to_num(state.record.batches[-1].velocity[-1, :2]))),
+        under_way=state.under_way,
         model=state.origin,
         environment=weather,
         weather=words,
@@ -180,10 +191,17 @@ def _summary(known: Known) -> dict[str, object]:
         "weather": known.weather,
         "current_to_north_mps": float(known.environment.current_to[0]),
         "current_to_east_mps": float(known.environment.current_to[1]),
-        "start": f"{known.pose[0]:.1f} m north, {known.pose[1]:.1f} m east, assumed to be stopped",
+        "start": f"{known.pose[0]:.1f} m north, {known.pose[1]:.1f} m east, {_motion(known)}",
         "new_parameters": list(known.new),
         "notes": [*left, *known.notes],
     }
+
+
+def _motion(known: Known) -> str:
+    if known.under_way is None:
+        return "assumed to be stopped"
+    u, v, r = known.under_way.velocity.tolist()
+    return f"under way at {u:.2f} m/s ahead, {v:.2f} m/s to starboard, {r:.4f} rad/s"
 
 
 def _table(known: Known) -> TextTable:
