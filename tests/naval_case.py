@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import scipy
 
 from expdesign.monitoring.yaw import YawData
-from expdesign.simulation.naval import NOMINAL, Hull, Voyage, sail
+from expdesign.simulation.naval import NOMINAL, Hull, Voyage, sail, sail_many
 
 NOISE = {"r": 0.0025, "sway_acceleration": 0.015, "u": 0.15, "v": 0.15, "phi": 0.025, "moment": 5e4}
 STEP_S = 0.1
 
 
-def low_passed(values: np.ndarray, time_s: float) -> np.ndarray:
+def low_passed(values: np.ndarray, time_s: float, step_s: float = STEP_S) -> np.ndarray:
     """A first-order lag of orders."""
-    keep = float(np.exp(-STEP_S / time_s))
+    keep = float(np.exp(-step_s / time_s))
     return np.asarray(scipy.signal.lfilter([1.0 - keep], [1.0, -keep], values))
 
 
@@ -35,17 +37,22 @@ def rotation(hull: Hull = NOMINAL, *, ahead: float = 0.0) -> Voyage:
     return sail(hull, np.full(len(time_s), np.deg2rad(90.0)), speed, sample_time_s=STEP_S, start=start)
 
 
-def harbour(hull: Hull = NOMINAL, *, seconds: float = 600.0, seed: int = 0) -> Voyage:
+def harbour_orders(seconds: float, seed: int, step_s: float = STEP_S) -> tuple[np.ndarray, np.ndarray]:
     """Pod angles within 35 degrees and 30 to 80 revolutions a second, held for 12 to 40 s, with a lag of 3 s."""
     rng = np.random.default_rng(seed)
-    count = round(seconds / STEP_S)
+    count = round(seconds / step_s)
     angle, speed, row = np.zeros(count), np.zeros(count), 0
     while row < count:
-        held = round(rng.uniform(12.0, 40.0) / STEP_S)
+        held = round(rng.uniform(12.0, 40.0) / step_s)
         angle[row : row + held] = np.deg2rad(rng.uniform(-35.0, 35.0))
         speed[row : row + held] = rng.uniform(30.0, 80.0)
         row += held
-    return sail(hull, low_passed(angle, 3.0), low_passed(speed, 3.0), sample_time_s=STEP_S)
+    return low_passed(angle, 3.0, step_s), low_passed(speed, 3.0, step_s)
+
+
+def harbour(hull: Hull = NOMINAL, *, seconds: float = 600.0, seed: int = 0, step_s: float = STEP_S) -> Voyage:
+    """A voyage by such orders."""
+    return sail(hull, *harbour_orders(seconds, seed, step_s), sample_time_s=step_s)
 
 
 def heavier(*, inertia: float = 1.0, mass: float = 1.0) -> Hull:
@@ -73,3 +80,53 @@ def measured(
         mean = np.lib.stride_tricks.sliding_window_view(drawn, averaged, axis=1).mean(axis=2)
         told[name] = (values + noise * mean)[:, ::every]
     return YawData(sample_time_s=every * voyage.sample_time_s, **told)
+
+
+COLUMNS = {
+    "r": "r_radps", "sway_acceleration": "sway_acceleration_mps2", "u": "u_mps", "v": "v_mps", "phi": "roll_rad",
+    "moment": "actuator_psi_nm",
+}  # fmt: skip
+SHIP = """[vessel]
+name = "naval"
+length_m = 51.5
+beam_m = 8.6
+draught_m = 2.3
+sample_time_s = 0.5
+
+[[actuators]]
+kind = "podded"
+forward_m = -23.5
+speed_min_rps = 0.0
+speed_max_rps = 80.0
+angle_min_rad = -1.6
+angle_max_rad = 1.6
+
+[model]
+structure = "manoeuvring-10"
+form = "continuous"
+
+[model.parameters]
+X_u = -0.01
+X_abs_u_u = -0.005
+X_vr = 1.3
+X_mu = 8e-5
+Y_v = -0.15
+Y_ur = -0.4
+Y_mu = 4e-5
+N_r = -0.5
+N_uv = -0.002
+N_mu = 5e-7
+"""
+
+
+def naval_csvs(paths: Sequence[Path], hull: Hull = NOMINAL, *, seconds: float, seed: int) -> None:
+    """Harbour manoeuvring as measured data at 2 Hz, with the noise of the thesis averaged over 0.5 s."""
+    step_s = 0.5
+    orders = [harbour_orders(seconds, seed + number, step_s) for number in range(len(paths))]
+    angle, speed = (np.stack(rows) for rows in zip(*orders, strict=True))
+    for number, voyage in enumerate(sail_many(hull, angle, speed, sample_time_s=step_s)):
+        data = measured(voyage, count=1, seed=seed + number, noise=(STEP_S / step_s) ** 0.5, averaged=1)
+        table = {"time_s": step_s * np.arange(angle.shape[1]), "n1_rps": speed[number], "a1_rad": angle[number]}
+        table |= {column: getattr(data, name)[0] for name, column in COLUMNS.items()}
+        rows = np.column_stack(list(table.values()))
+        np.savetxt(paths[number], rows, delimiter=",", header=",".join(table), comments="", fmt="%.7g")

@@ -294,6 +294,14 @@ def monitor(
     every: Annotated[
         float, typer.Option("--every-s", metavar="T", help="Seconds of a stream between looks at it.")
     ] = 3600.0,
+    model: Annotated[
+        str,
+        typer.Option(
+            metavar="WHICH",
+            help="Model that is watched: vessel, the vessel file's; yaw-full or yaw-simplified, learnt from the "
+            "reference, with measured surge, sway, roll, side acceleration and moment of the drives as inputs.",
+        ),
+    ] = "vessel",
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on from the state that an earlier watch left in the same folder.")
     ] = False,
@@ -317,5 +325,6 @@ def monitor(
         size=size,
         every_s=every,
         velocity=velocity,
+        model=model,
         resume=resume,
     )

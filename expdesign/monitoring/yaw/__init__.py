@@ -1,10 +1,12 @@
 """Yaw dynamics from operational data: models with measured surge, sway, roll and drive moment as inputs.
 
-    found = estimate_yaw(YAW_MODELS["full"], recorded)
+    found = estimate_yaw(YAW_MODELS["full"], data, start_values(YAW_MODELS["full"], data))
     found.parameters, found.fit
+    ship, notes = learnt_ship(YAW_MODELS["full"], vessel.model, reference, stretch_s=60.0)      to be watched
 
 The model is simulated, yaw rate is its only state; parameters minimise the squared error of the yaw rate (output
-error). All inputs are measured, and their noise is a bias that output error does not remove.
+error). All inputs are measured, and their noise is a bias that output error does not remove; instruments do, which is
+beyond the thesis.
 
 Source: a master's thesis on the estimation of a ship's yaw dynamics in operation, chapters 2 to 6.
 """
@@ -12,19 +14,34 @@ Source: a master's thesis on the estimation of a ship's yaw dynamics in operatio
 from expdesign.monitoring.yaw.budget import excitation_rank, term_budget
 from expdesign.monitoring.yaw.detector import Detector, alarm_samples
 from expdesign.monitoring.yaw.estimate import YawEstimate, estimate_yaw, halves_differ, simulate_yaw
+from expdesign.monitoring.yaw.instruments import estimate_yaw_by_instruments
+from expdesign.monitoring.yaw.learnt import halves_in_words, learnt_ship
 from expdesign.monitoring.yaw.model import NOMINAL, YAW_MODELS, YawData, YawModel
+from expdesign.monitoring.yaw.recorded import needed_columns
+from expdesign.monitoring.yaw.ship import KEY, YawShip, ship_of_changes, yaw_changes, yaw_grams
+from expdesign.monitoring.yaw.start import start_values
 
 __all__ = [
+    "KEY",
     "NOMINAL",
     "YAW_MODELS",
     "Detector",
     "YawData",
     "YawEstimate",
     "YawModel",
+    "YawShip",
     "alarm_samples",
     "estimate_yaw",
+    "estimate_yaw_by_instruments",
     "excitation_rank",
     "halves_differ",
+    "halves_in_words",
+    "learnt_ship",
+    "needed_columns",
+    "ship_of_changes",
     "simulate_yaw",
+    "start_values",
     "term_budget",
+    "yaw_changes",
+    "yaw_grams",
 ]

@@ -15,9 +15,7 @@ RANK_TOLERANCE = 1e-6
 
 def term_budget(model: YawModel, data: YawData, parameters: Mapping[str, float]) -> dict[str, Array]:
     """Parameter -> (n, k) moment of its term [Nm] along the measured motion; the largest name what a voyage tells."""
-    constant, linear, even, odd = np.moveaxis(model.shapes(data), (1, 2), (2, 1))
-    r = data.r[..., None]
-    values = constant + linear * r + (even + odd * r) * np.abs(r)
+    values = model.terms(data)
     return {name: parameters[name] * values[..., place] for place, name in enumerate(model.parameters[1:])}
 
 

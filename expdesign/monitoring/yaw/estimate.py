@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from expdesign.monitoring.yaw.model import YawData, YawModel
 from expdesign.values import Array, seal
@@ -40,11 +41,11 @@ class YawEstimate:
 
 
 def simulate_yaw(model: YawModel, data: YawData, parameters: Array) -> tuple[Array, Array]:
-    """Yaw rate (n, k) from its first measured value, and its sensitivities (n, k, p), by Heun's method.
+    """Yaw rate (n, k) from its first measured value, and its sensitivities (n, k, p), by Runge-Kutta of order four.
 
     Args:
         model: the structure.
-        data: inputs, taken as straight lines between samples.
+        data: inputs; what they multiply is taken as straight lines between samples.
         parameters: (n, p), or (p,) for all voyages.
     """
     n, k = data.r.shape
@@ -56,12 +57,14 @@ def simulate_yaw(model: YawModel, data: YawData, parameters: Array) -> tuple[Arr
         rates[index], sensitivity[index] = r, slope
         if index + 1 == k:
             break
-        first, moved = _acceleration(shapes[:, index], moment[index], theta, r, slope)
-        ahead, there = _acceleration(
-            shapes[:, index + 1], moment[index + 1], theta, r + step * first, slope + step * moved
-        )
-        r = np.clip(r + step / 2 * (first + ahead), -LARGEST_RATE, LARGEST_RATE)
-        slope = slope + step / 2 * (moved + there)
+        begin, end = (shapes[:, index], moment[index]), (shapes[:, index + 1], moment[index + 1])
+        middle = (0.5 * (begin[0] + end[0]), 0.5 * (begin[1] + end[1]))
+        a, A = _acceleration(*begin, theta, r, slope)
+        b, B = _acceleration(*middle, theta, r + step / 2 * a, slope + step / 2 * A)
+        c, C = _acceleration(*middle, theta, r + step / 2 * b, slope + step / 2 * B)
+        d, D = _acceleration(*end, theta, r + step * c, slope + step * C)
+        r = np.clip(r + step / 6 * (a + 2 * b + 2 * c + d), -LARGEST_RATE, LARGEST_RATE)
+        slope = slope + step / 6 * (A + 2 * B + 2 * C + D)
     return rates.T, np.moveaxis(sensitivity, 0, 1)
 
 
@@ -79,7 +82,9 @@ def _acceleration(shapes: Array, moment: Array, theta: Array, r: Array, slope: A
     return acceleration[:, 0], moved / inertia
 
 
-def estimate_yaw(model: YawModel, data: YawData, start: Mapping[str, float]) -> YawEstimate:
+def estimate_yaw(
+    model: YawModel, data: YawData, start: Mapping[str, float], *, groups: NDArray[np.int_] | None = None
+) -> YawEstimate:
     """Parameters with the least squared error of the simulated yaw rate, within bounds of their signs.
 
     Levenberg-Marquardt from a start, for all voyages side by side. The inertia is kept positive, damping negative.
@@ -88,42 +93,64 @@ def estimate_yaw(model: YawModel, data: YawData, start: Mapping[str, float]) -> 
         model: the structure.
         data: of n voyages.
         start: value of every parameter [SI].
+        groups: (n,) number from 0 of the ship that each voyage is of, so that voyages of one share its parameters; by
+            default every voyage is of its own.
+
+    Returns:
+        Of each group.
     """
+    owner = np.arange(len(data.r)) if groups is None else groups
+    pool = np.eye(owner.max() + 1)[:, owner]
     scale = np.array([abs(start[name]) for name in model.parameters])
-    n, p = len(data.r), len(scale)
-    x = np.tile(np.array([start[name] for name in model.parameters]) / scale, (n, 1))
-    low = np.array([0.01 if name == "I_r" else -np.inf for name in model.parameters])
-    high = np.array([-1e-6 if name in model.damping else np.inf for name in model.parameters])
-    damping = np.full(n, 1e-3)
-    rates, slopes = simulate_yaw(model, data, x * scale)
-    error = data.r - rates
-    cost = (error**2).sum(axis=1)
+    p = len(scale)
+    x = np.tile(np.array([start[name] for name in model.parameters]) / scale, (len(pool), 1))
+    low, high = signs(model)
+
+    def tried(x: Array) -> tuple[Array, Array, Array]:
+        rates, slopes = simulate_yaw(model, data, (x * scale)[owner])
+        return data.r - rates, slopes * scale, pool @ ((data.r - rates) ** 2).sum(axis=1)
+
+    error, J, cost = tried(x)
+    damping = np.full(len(pool), 1e-3)
     for _ in range(SEARCH_STEPS):
-        J = slopes * scale
-        A, g = np.einsum("nki,nkj->nij", J, J), np.einsum("nki,nk->ni", J, error)
+        A, g = _pooled(pool, J, J), pool @ np.einsum("nki,nk->ni", J, error)
         lifted = A + (damping[:, None] * (np.einsum("nii->ni", A) + 1e-12))[:, :, None] * np.eye(p)
-        tried = np.clip(x + np.linalg.solve(lifted, g[..., None])[..., 0], low, high)
-        new_rates, new_slopes = simulate_yaw(model, data, tried * scale)
-        new_cost = ((data.r - new_rates) ** 2).sum(axis=1)
+        new = np.clip(x + np.linalg.solve(lifted, g[..., None])[..., 0], low, high)
+        new_error, new_J, new_cost = tried(new)
         better = new_cost < cost
         gain = np.where(better, (cost - new_cost) / np.maximum(cost, 1e-300), 0.0)
-        x = np.where(better[:, None], tried, x)
-        slopes = np.where(better[:, None, None], new_slopes, slopes)
-        error = np.where(better[:, None], data.r - new_rates, error)
-        cost = np.where(better, new_cost, cost)
+        x, cost = np.where(better[:, None], new, x), np.where(better, new_cost, cost)
+        J = np.where(better[owner][:, None, None], new_J, J)
+        error = np.where(better[owner][:, None], new_error, error)
         damping = np.clip(np.where(better, damping / 10.0, damping * 10.0), 1e-9, 1e9)
         if np.all(gain < 1e-9) and np.all(better | (damping > 1e3)):
             break
-    J = slopes * scale
-    A = np.einsum("nki,nkj->nij", J, J)
-    spread = np.linalg.pinv(A, hermitian=True) * (cost / max(data.r.shape[1] - p, 1))[:, None, None]
-    varied = ((data.r - data.r.mean(axis=1, keepdims=True)) ** 2).sum(axis=1)
+    samples = pool.sum(axis=1) * data.r.shape[1]
+    spread = np.linalg.pinv(_pooled(pool, J, J), hermitian=True) * (cost / np.maximum(samples - p, 1))[:, None, None]
     return YawEstimate(
         model=model,
         parameters=x * scale,
         std=np.sqrt(np.einsum("nii->ni", spread)) * scale,
-        fit=100.0 * (1.0 - np.sqrt(cost / np.maximum(varied, 1e-300))),
+        fit=fit_of(data, error, pool),
     )
+
+
+def signs(model: YawModel) -> tuple[Array, Array]:
+    """(p,) lowest and highest parameters in units of their start: inertia is positive, damping negative."""
+    low = [0.01 if name == "I_r" else -np.inf for name in model.parameters]
+    high = [-1e-6 if name in model.damping else np.inf for name in model.parameters]
+    return np.array(low), np.array(high)
+
+
+def fit_of(data: YawData, error: Array, pool: Array) -> Array:
+    """(g,) 100 (1 - |r - r_hat| / |r - mean r|) [%] of groups of voyages, for errors (n, k)."""
+    varied = pool @ ((data.r - data.r.mean(axis=1, keepdims=True)) ** 2).sum(axis=1)
+    return np.asarray(100.0 * (1.0 - np.sqrt(pool @ (error**2).sum(axis=1) / np.maximum(varied, 1e-300))))
+
+
+def _pooled(pool: Array, A: Array, B: Array) -> Array:
+    """(g, p, p) sums of A^T B over the voyages of each group."""
+    return np.asarray(np.einsum("gn,nij->gij", pool, np.swapaxes(A, 1, 2) @ B))
 
 
 def halves_differ(one: YawEstimate, other: YawEstimate, *, factor: float = 3.0) -> Array:

@@ -85,6 +85,12 @@ class YawModel:
         columns = [[factor if power == place else still for place, factor in known] for power in range(4)]
         return np.ascontiguousarray(np.moveaxis(np.array(columns), (1, 2, 3), (3, 2, 1)))
 
+    def terms(self, data: YawData) -> Array:
+        """(n, k, p - 1): what every parameter but the inertia multiplies, along the measured motion."""
+        constant, linear, even, odd = np.moveaxis(self.shapes(data), (1, 2), (2, 1))
+        r = data.r[..., None]
+        return np.asarray(constant + linear * r + (even + odd * r) * np.abs(r))
+
 
 YAW_MODELS: Mapping[str, YawModel] = {
     model.name: model
@@ -94,6 +100,13 @@ YAW_MODELS: Mapping[str, YawModel] = {
         YawModel("simplified", ("I_r", "A", "N_rr", "N_rv", "N_uv")),
     )
 }
+WORDS: Mapping[str, str] = {
+    "I_r": "inertia in yaw", "M_v": "coupling to sway acceleration", "A": "damping and Coriolis moment",
+    "N_rr": "damping by yaw", "N_rv": "damping by yaw and drift", "N_phiur": "moment of roll in turns",
+    "N_uv": "moment of drift", "N_phiuv": "moment of roll and drift", "N_phiuu": "moment of roll at speed",
+    "N_abs_u_r": "damping", "m_xg": "Coriolis moment",
+}  # fmt: skip
+"""Parameters in words."""
 NOMINAL: Mapping[str, float] = {
     "I_r": 62.4e6, "M_v": -1.75142e6, "A": -3.49658e6, "N_rr": -202e6, "N_rv": -15.6e6, "N_phiur": -4.98e6,
     "N_uv": -92e3, "N_phiuv": -0.214e6, "N_phiuu": -8e3, "N_abs_u_r": -4.71e6,

@@ -14,7 +14,7 @@ dynamics in operation. Where its text and tables disagree, the sign that obeys N
 """
 
 from expdesign.simulation.naval.hull import NOMINAL, Hull
-from expdesign.simulation.naval.motion import STATES, Voyage, sail
+from expdesign.simulation.naval.motion import STATES, Voyage, sail, sail_many
 from expdesign.simulation.naval.pods import Pods, pod_force
 
-__all__ = ["NOMINAL", "STATES", "Hull", "Pods", "Voyage", "pod_force", "sail"]
+__all__ = ["NOMINAL", "STATES", "Hull", "Pods", "Voyage", "pod_force", "sail", "sail_many"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -56,21 +57,42 @@ def sail(
         pods: the nominal ones by default.
         start: (6,) first state; at rest by default.
     """
-    drives, inverse = Pods() if pods is None else pods, np.linalg.inv(hull.inertia)
+    begin = None if start is None else start[None]
+    return sail_many(hull, angle[None], speed[None], sample_time_s=sample_time_s, pods=pods, start=begin)[0]
+
+
+def sail_many(
+    hull: Hull,
+    angle: Array,
+    speed: Array,
+    *,
+    sample_time_s: float = 0.1,
+    pods: Pods | None = None,
+    start: Array | None = None,
+) -> tuple[Voyage, ...]:
+    """`sail` n voyages of a ship side by side, which takes little longer than one: orders (n, k), start (n, 6)."""
+    drives, inverse, n = Pods() if pods is None else pods, np.linalg.inv(hull.inertia), len(angle)
 
     def rates(x: Array, order: Array) -> Array:
-        u, v, p, r, phi = x[:5].tolist()
-        push = drives.forces(u, v, p, r, *order.tolist())
+        u, v, p, r, phi = numbers(x[:5])
+        push = drives.forces(u, v, p, r, *numbers(order))
         accelerations = inverse @ np.add(hull.forces(u, v, p, r, phi), push)
-        return np.array([*accelerations, p, r * np.cos(phi)])
+        return np.concatenate([accelerations, [p, r * np.cos(phi)]])
 
-    x = np.zeros(6) if start is None else np.array(start, dtype=float)
-    orders = np.column_stack([angle, speed])
+    def numbers(rows: Array) -> list[Any]:
+        """Of one voyage as plain numbers, which are quicker."""
+        return list(rows.tolist()) if n == 1 else list(rows)
+
+    x = np.zeros((6, n)) if start is None else np.array(start.T, dtype=float)
+    orders = np.stack([angle.T, speed.T], axis=1)  # (k, 2, n)
+    if n == 1:
+        x, orders = x[:, 0], orders[:, :, 0]
     step, change = sample_time_s / SUBSTEPS, np.diff(orders, axis=0, append=orders[-1:]) / SUBSTEPS
-    states, sway, moment = np.empty((len(angle), 6)), np.empty(len(angle)), np.empty(len(angle))
+    states = np.empty((len(orders), *x.shape))
+    sway, moment = np.empty((2, len(orders), *x.shape[1:]))
     for k, order in enumerate(orders):
         states[k], sway[k] = x, rates(x, order)[1]
-        moment[k] = drives.forces(float(x[0]), float(x[1]), float(x[2]), float(x[3]), *order.tolist())[3]
+        moment[k] = drives.forces(*numbers(x[:4]), *numbers(order))[3]
         for part in range(SUBSTEPS):
             begin, middle, end = (order + (part + share) * change[k] for share in (0.0, 0.5, 1.0))
             k1 = rates(x, begin)
@@ -78,4 +100,8 @@ def sail(
             k3 = rates(x + step / 2 * k2, middle)
             k4 = rates(x + step * k3, end)
             x = x + step / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-    return Voyage(sample_time_s=sample_time_s, states=states, sway_acceleration=sway, moment=moment)
+    states, sway, moment = states.reshape(len(orders), 6, n), sway.reshape(-1, n), moment.reshape(-1, n)
+    return tuple(
+        Voyage(sample_time_s=sample_time_s, states=states[..., i], sway_acceleration=sway[:, i], moment=moment[:, i])
+        for i in range(n)
+    )

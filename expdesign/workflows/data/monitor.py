@@ -35,6 +35,7 @@ from expdesign.progress import Progress, silent
 from expdesign.records import STREAM, pieces
 from expdesign.scenario import load_vessel
 from expdesign.workflows.command_text import command_text
+from expdesign.workflows.data.watched_ship import VESSEL, check_model
 from expdesign.workflows.data.watching import HOUR, Asked, Watch, calibrated, limit_of, read_piece, with_piece
 from expdesign.workflows.outcome import Outcome, TextTable
 
@@ -45,7 +46,7 @@ WRITTEN_EVERY_S = 10.0
 """Of a stream that comes faster than it was measured, time between writing its files [s]."""
 USUAL = {
     "--learn-h": 24.0, "--false-alarm-days": 30.0, "--size": TUNING.relative_size, "--every-s": 3600.0,
-    "--velocity": "auto",
+    "--velocity": "auto", "--model": VESSEL,
 }  # fmt: skip
 
 
@@ -60,6 +61,7 @@ def monitor(
     size: float = TUNING.relative_size,
     every_s: float = 3600.0,
     velocity: str = "auto",
+    model: str = VESSEL,
     resume: bool = False,
     progress: Progress = silent,
 ) -> Outcome:
@@ -75,19 +77,22 @@ def monitor(
         size: relative change of parameters, thrust and inertia that matters.
         every_s: of a stream, time between looks at it [s].
         velocity: where velocities come from, as in `estimate`.
+        model: vessel, the vessel file's, or yaw-full or yaw-simplified, learnt from the reference.
         resume: go on from the state in `out`.
         progress: of the command.
     """
     numbers = {"--learn-h": learn_h, "--false-alarm-days": false_alarm_days, "--every-s": every_s}
     _check(data, reference, numbers, size, resume=resume)
+    check_model(model)
     folder = out or Path("runs") / (Path(data[0]).stem if data[0] != STREAM else "monitor")
     asked = Asked(
         vessel=load_vessel(vessel), size=size, learn_s=HOUR * learn_h, false_alarm_days=false_alarm_days,
-        velocity=velocity,
+        velocity=velocity, model=model,
     )  # fmt: skip
     options = {
         "--vessel": vessel, "--reference": tuple(reference), "--learn-h": learn_h, "--velocity": velocity,
-        "--false-alarm-days": false_alarm_days, "--size": size, "--every-s": every_s, "--out": out, "--resume": resume,
+        "--false-alarm-days": false_alarm_days, "--size": size, "--every-s": every_s, "--model": model, "--out": out,
+        "--resume": resume,
     }  # fmt: skip
     command = command_text("monitor", data, options, usual=USUAL)
     now = _resumed(folder / STATE) if resume else _with_reference(Watch(), reference, asked, progress)
@@ -99,7 +104,7 @@ def monitor(
         read = 0
         for piece in pieces(
             source, inputs=asked.vessel.model.inputs, stretch_s=asked.stretch_s, most_rows=rows,
-            before=() if number else left, more_follow=number + 1 == len(data),
+            unread=asked.unread, before=() if number else left, more_follow=number + 1 == len(data),
         ):  # fmt: skip
             now = with_piece(now, piece, asked)
             read += sum(map(len, piece.lines))
@@ -138,7 +143,10 @@ def _check(
 def _with_reference(now: Watch, reference: Sequence[Path], asked: Asked, progress: Progress) -> Watch:
     """Calibrated on files of a reference, if there are some; the times of the data begin anew."""
     for source in reference:
-        for piece in pieces(source, inputs=asked.vessel.model.inputs, stretch_s=asked.stretch_s, most_rows=MOST_ROWS):
+        for piece in pieces(
+            source, inputs=asked.vessel.model.inputs, stretch_s=asked.stretch_s, most_rows=MOST_ROWS,
+            unread=asked.unread,
+        ):  # fmt: skip
             progress(f"reading the reference, {source.name}", 0.0)
             now, parts = read_piece(now, piece, asked)
             now = replace(now, learnt=(*now.learnt, *(part.grams(now) for part in parts)))

@@ -8,8 +8,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from expdesign.diagnosis.model import ExtendedModel
-from expdesign.diagnosis.vessel_file import extended_model
 from expdesign.errors import NotInformative
 from expdesign.export.monitor_page import Moment
 from expdesign.monitoring import (
@@ -21,17 +19,16 @@ from expdesign.monitoring import (
     State,
     calibrate,
     estimates,
-    grams_of,
     joined,
     stretch_length,
     threshold,
     watch,
-    watched_changes,
 )
 from expdesign.records import Piece
 from expdesign.records.file import FIRST_ROW
 from expdesign.signals import Record
 from expdesign.vessel import Vessel
+from expdesign.workflows.data.watched_ship import VESSEL, Ship, grams, ship_and_changes, unread
 from expdesign.workflows.steps.measured import measured
 
 BETWEEN_FILES_S = 3600.0
@@ -86,6 +83,7 @@ class Asked:
         learn_s: length of a reference at the beginning of the data [s].
         false_alarm_days: average time between false alarms [d].
         velocity: where velocities come from, as in `estimate`.
+        model: one of `watched_ship.MODELS`.
     """
 
     vessel: Vessel
@@ -93,6 +91,12 @@ class Asked:
     learn_s: float
     false_alarm_days: float
     velocity: str
+    model: str = VESSEL
+
+    @property
+    def unread(self) -> tuple[str, ...]:
+        """Columns that rows may lack."""
+        return unread(self.model)
 
     @property
     def stretch_s(self) -> float:
@@ -112,11 +116,12 @@ def read_piece(now: Watch, piece: Piece, asked: Asked) -> tuple[Watch, tuple[Rea
     times = piece.time_s + now.offset_s
     with piece.named():
         record = measured([piece.path], asked.vessel, velocity=asked.velocity)
-    ship = extended_model(asked.vessel, record)
-    changes = now.changes or watched_changes(ship, size=asked.size)
+    ship, changes, learnt = ship_and_changes(
+        asked.model, asked.vessel, record, now.changes, size=asked.size, stretch_s=asked.stretch_s
+    )
     begins = [float(times[batch.first_row - FIRST_ROW]) for batch in record.batches]
     told = [text.replace(piece.path.name, piece.source.name) for text in record.notes]
-    notes = tuple({re.sub(r"\d+", "", text): text for text in (*told, *now.notes)}.values())
+    notes = tuple({re.sub(r"\d+", "", text): text for text in (*told, *learnt, *now.notes)}.values())
     now = replace(now, changes=changes, now_s=float(times[-1]), notes=notes)
     return now, (Reading(piece=piece, ship=ship, record=record, begins_s=tuple(begins), stretch_s=asked.stretch_s),)
 
@@ -126,7 +131,7 @@ class Reading:
     """A piece of the data as a record, with the model and the time at which each batch begins."""
 
     piece: Piece
-    ship: ExtendedModel
+    ship: Ship
     record: Record
     begins_s: tuple[float, ...]
     stretch_s: float
@@ -139,7 +144,7 @@ class Reading:
             for change, value in zip(now.changes, shift.tolist(), strict=True)
             if value
         }
-        return grams_of(
+        return grams(
             self.ship.with_effects(effects), self.record, now.changes, begins_s=self.begins_s, stretch_s=self.stretch_s
         )
 
