@@ -46,6 +46,7 @@ MONITOR = {
     "size": 0.1,
     "every_s": 3600.0,
     "velocity": "auto",
+    "model": "vessel",
     "resume": False,
 }
 PLAIN = {"departure": None, "tolerance_m": None, "fine": False, "name": None}
@@ -192,10 +193,10 @@ def workflows(monkeypatch: pytest.MonkeyPatch) -> Workflows:
             ESTIMATE | {"methods": ("iv",), "velocity": "smoothed", "mean": "none", "start": "ls"},
         ),
         (
-            "monitor a.csv b.csv --vessel v.toml --reference c.csv d.csv --size 0.2",
+            "monitor a.csv b.csv --vessel v.toml --reference c.csv d.csv --size 0.2 --model yaw-full",
             "monitor",
             ((Path("a.csv"), Path("b.csv")), None),
-            MONITOR | {"reference": (Path("c.csv"), Path("d.csv")), "size": 0.2},
+            MONITOR | {"reference": (Path("c.csv"), Path("d.csv")), "size": 0.2, "model": "yaw-full"},
         ),
         ("monitor - --vessel v.toml --resume", "monitor", ((Path("-"),), None), MONITOR | {"resume": True}),
     ],
