@@ -144,13 +144,19 @@ def workflows(monkeypatch: pytest.MonkeyPatch) -> Workflows:
             "foresee s.toml",
             "foresee",
             (Path("s.toml"), None),
-            {"plan": None, "jobs": 1, "cache": True, "seed": 0},
+            {"plan": None, "operation": None, "jobs": 1, "cache": True, "seed": 0},
         ),
         (
             "foresee s.toml --plan p.json --out o --jobs 2 --no-cache --seed 3",
             "foresee",
             (Path("s.toml"), Path("o")),
-            {"plan": Path("p.json"), "jobs": 2, "cache": False, "seed": 3},
+            {"plan": Path("p.json"), "operation": None, "jobs": 2, "cache": False, "seed": 3},
+        ),
+        (
+            "foresee s.toml --operation 5",
+            "foresee",
+            (Path("s.toml"), None),
+            {"plan": None, "operation": 5, "jobs": 1, "cache": True, "seed": 0},
         ),
         (
             "simulate p.json --truth v.toml",

@@ -43,6 +43,8 @@ Seed = Annotated[
 ]
 MOST_TRIALS = 100_000
 """Simulated trials of a design, or of a manoeuvre, at most."""
+MOST_VOYAGES = 1000
+"""Simulated voyages of each change in operation, at most."""
 Jobs = Annotated[
     int, typer.Option("--jobs", parser=parse_jobs, metavar="N", help="Number of processes; 0 for one per core.")
 ]

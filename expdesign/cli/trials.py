@@ -10,6 +10,7 @@ import typer
 from expdesign.cli.app import Asked, ask, command
 from expdesign.cli.options import (
     MOST_TRIALS,
+    MOST_VOYAGES,
     Jobs,
     NoCache,
     Out,
@@ -32,6 +33,17 @@ def foresee(
             help="A plan made before, whose whole track is diagnosed. Default: the runs of the design alone.",
         ),
     ] = None,
+    operation: Annotated[
+        int | None,
+        typer.Option(
+            "--operation",
+            metavar="N",
+            min=1,
+            max=MOST_VOYAGES,
+            help="Foresee instead what expdesign monitor would find of the ship in operation, by N simulated voyages "
+            "of each change: inertia, mass, damping, thrust.",
+        ),
+    ] = None,
     out: Out = None,
     jobs: Jobs = 1,
     no_cache: NoCache = False,
@@ -39,12 +51,14 @@ def foresee(
 ) -> Asked:
     """Foresee what a diagnosis of the trial would find: the power of its test of every cause, before sailing.
 
-    Writes foresee.json and foresee.html: also causes that it would not tell apart, and runs that would help.
+    Writes foresee.json and foresee.html: also causes that it would not tell apart, and runs that would help. With
+    --operation: operation.json and operation.html, which changes a watch finds, after how long, and how it names them.
     The causes: expdesign explain causes
 
     Example: expdesign foresee scenarios/helsinki.toml
+    Example: expdesign foresee scenarios/story.toml --operation 10 --jobs 0
     """
-    return ask("foresee", scenario, out, plan=plan, jobs=jobs, cache=not no_cache, seed=seed)
+    return ask("foresee", scenario, out, plan=plan, operation=operation, jobs=jobs, cache=not no_cache, seed=seed)
 
 
 @command("simulate")

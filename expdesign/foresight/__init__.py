@@ -23,6 +23,13 @@ Sources: A. Wald (1943) for the noncentral distribution; C. R. Rao (1948) for sc
 
 from expdesign.foresight.effects import Direction, HiddenEffect
 from expdesign.foresight.foresee import Background, background, foresee
+from expdesign.foresight.operation import (
+    Detectability,
+    HiddenChange,
+    OperationForesight,
+    foresee_operation,
+    interval,
+)
 from expdesign.foresight.power import level_of, needed_noncentrality, power
 from expdesign.foresight.reveal import Wanted, causes_by_runs, told_apart_from, told_apart_with, wanted
 from expdesign.foresight.sizes import (
@@ -45,10 +52,13 @@ __all__ = [
     "AddedRuns",
     "Background",
     "Confusion",
+    "Detectability",
     "Direction",
     "Foreseen",
     "Foresight",
+    "HiddenChange",
     "HiddenEffect",
+    "OperationForesight",
     "Size",
     "StandardTrials",
     "TrialRun",
@@ -58,6 +68,8 @@ __all__ = [
     "default_sizes",
     "design_runs",
     "foresee",
+    "foresee_operation",
+    "interval",
     "level_of",
     "needed_noncentrality",
     "power",

@@ -6,16 +6,22 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from expdesign import __version__
-from expdesign.errors import FileError
+from expdesign.errors import FileError, InputError
 from expdesign.export.foresight_page import (
     HEADER,
+    OPERATION_HEADER,
     ForesightContent,
+    OperationContent,
     foresight_html,
     foresight_json,
     foresight_rows,
+    operation_html,
+    operation_json,
+    operation_rows,
+    operation_sentences,
 )
 from expdesign.export.routes import read_plan
-from expdesign.foresight import Foresight, TrialRun, design_runs
+from expdesign.foresight import Foresight, TrialRun, design_runs, foresee_operation
 from expdesign.foresight import foresee as foresee_trial
 from expdesign.information import PrimitiveInformation
 from expdesign.memory import remembering, user_memory
@@ -38,6 +44,7 @@ def foresee(
     out: Path | None,
     *,
     plan: Path | None = None,
+    operation: int | None = None,
     seed: int = 0,
     jobs: int = 1,
     cache: bool = True,
@@ -49,11 +56,17 @@ def foresee(
         scenario: the scenario file.
         out: folder.
         plan: a plan.json whose track is diagnosed; the runs of the design alone when None.
+        operation: number of simulated voyages of each change, to foresee what a watch over the ship in operation finds
+            instead.
         seed: of sensor noise, weather and the tests' null distribution.
         jobs: processes; 0 for one per core. The results do not depend on it.
         cache: read what is remembered, and remember what is computed. The results do not depend on it.
         progress: of the command.
     """
+    if operation is not None:
+        if plan is not None:
+            raise InputError("--plan and --operation are given, expected one of them")
+        return _operation(scenario, out, operation, seed=seed, jobs=jobs, cache=cache, progress=progress)
     case = loaded(scenario, progress)
     words = command_text("foresee", [scenario], {"--plan": plan, "--seed": seed})
     with remembering(user_memory() if cache else None), workers(jobs, load=None):
@@ -80,6 +93,32 @@ def foresee(
     progress("writing the page", 0.95)
     files = {"foresee.json": foresight_json(content), "foresee.html": foresight_html(content)}
     return written(case, out, files, foresight_summary(content), progress, foresight_tables(found))
+
+
+def _operation(
+    scenario: Path, out: Path | None, voyages: int, *, seed: int, jobs: int, cache: bool, progress: Progress
+) -> Outcome:
+    """What a watch over the scenario's ship in its weather would find."""
+    case = loaded(scenario, progress)
+    with remembering(user_memory() if cache else None), workers(jobs, load=None):
+        found = foresee_operation(
+            case.vessel, case.environment, voyages=voyages, seed=seed, progress=within(progress, 0.02, 0.97)
+        )
+    content = OperationContent(
+        scenario=case.name,
+        vessel=case.vessel.name,
+        found=found,
+        command=command_text("foresee", [scenario], {"--operation": voyages, "--seed": seed}),
+        version=__version__,
+    )
+    files = {"operation.json": operation_json(content), "operation.html": operation_html(content)}
+    summary = {"voyages_without_change": found.nominal, "false_alarms": found.false_alarms}
+    sentences = tuple((text,) for text in operation_sentences(found))
+    tables = (
+        TextTable(title="What a watch in operation would find", header=OPERATION_HEADER, rows=operation_rows(found)),
+        TextTable(title="In words", header=("finding",), rows=sentences),
+    )
+    return written(case, out, files, summary, progress, tables)
 
 
 def _trial(

@@ -1,0 +1,131 @@
+"""What a watch over a ship in operation would find: page, JSON and table."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+
+from expdesign.export import words
+from expdesign.export.files import strict_json
+from expdesign.export.foresight_page.content import NONE
+from expdesign.export.pages import page_templates
+from expdesign.foresight import Detectability, OperationForesight, interval
+
+OPERATION_HEADER = ("change", "by", "found", "95 %", "median delay", "named rightly", "or as likely", "else taken for")
+"""Columns of the table for people."""
+FINDS = 0.5
+"""Share of voyages from which a change counts as found."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class OperationContent:
+    """The values that page and file show.
+
+    Attributes:
+        scenario, vessel: their names.
+        found: what is foreseen.
+        command, version: to reproduce it.
+    """
+
+    scenario: str
+    vessel: str
+    found: OperationForesight
+    command: str
+    version: str
+
+
+def operation_rows(found: OperationForesight) -> tuple[tuple[str, ...], ...]:
+    """One row for each change and size, in the order of `OPERATION_HEADER`."""
+    return tuple(_row(item) for item in found.rows)
+
+
+def _row(item: Detectability) -> tuple[str, ...]:
+    low, high = interval(item.found, item.voyages)
+    return (
+        item.change,
+        f"{100.0 * item.size:g}{words.NB}%",
+        f"{item.found} of {item.voyages}",
+        f"{100 * low:.0f} to {100 * high:.0f} %",
+        words.duration(item.delay_s) if math.isfinite(item.delay_s) else "more than a voyage",
+        f"{item.named} of {item.found}",
+        f"{item.likely} of {item.found}",
+        ", ".join(f"{name} ({count})" for name, count in item.taken_for) or NONE,
+    )
+
+
+def operation_sentences(found: OperationForesight) -> tuple[str, ...]:
+    """What follows, in sentences."""
+    return tuple(_sentences(found))
+
+
+def _sentences(found: OperationForesight) -> Iterator[str]:
+    low, high = interval(found.false_alarms, found.nominal)
+    yield (
+        f"Of {found.nominal} voyages of {words.duration(found.voyage_s)} without a change, {found.false_alarms} raised "
+        f"an alarm (95 % interval of the share: {100 * low:.0f} to {100 * high:.0f} %). The threshold allows one in "
+        f"{found.false_alarm_days:g} days at most."
+    )
+    for change in dict.fromkeys(item.change for item in found.rows):
+        own = sorted((item for item in found.rows if item.change == change), key=lambda item: item.size)
+        first = next((item for item in own if item.found >= FINDS * item.voyages), None)
+        if first is None:
+            yield f"{_named(own[-1])} is not found in half of the voyages."
+            continue
+        yield (
+            f"{_named(first)} is found in {first.found} of {first.voyages} voyages, after "
+            f"{words.duration(first.delay_s)} in half of them."
+        )
+    for item in found.rows:
+        if item.taken_for and item.found - item.named > FINDS * item.found:
+            name, count = item.taken_for[0]
+            yield (
+                f"{_named(item)} is mostly taken for another change: {name} in {count} of {item.found}. In "
+                f"{item.likely} of them the alarm says that the right one explains the data as well."
+            )
+    if found.not_watched:
+        yield f"These sensors and voyages tell nothing of {', '.join(found.not_watched)}."
+
+
+def _named(item: Detectability) -> str:
+    return f"{item.change.capitalize()} by {100.0 * item.size:g} %"
+
+
+def operation_json(content: OperationContent) -> str:
+    """The same with key names in English; a delay of null is longer than a voyage."""
+    found = content.found
+    rows = []
+    for item in found.rows:
+        table = {**asdict(item), "delay_s": item.delay_s if math.isfinite(item.delay_s) else None}
+        table["found_interval"] = interval(item.found, item.voyages)
+        rows.append(table)
+    return strict_json(
+        {
+            "vessel": content.vessel,
+            "sentences": operation_sentences(found),
+            "voyage_s": found.voyage_s,
+            "reference_s": found.reference_s,
+            "voyages_without_change": found.nominal,
+            "false_alarms": found.false_alarms,
+            "false_alarm_days": found.false_alarm_days,
+            "changes": rows,
+            "watched": found.watched,
+            "not_watched": found.not_watched,
+        }
+    )
+
+
+def operation_html(content: OperationContent) -> str:
+    """One HTML page without any outside reference."""
+    return (
+        page_templates("expdesign.export.foresight_page")
+        .get_template("operation.html")
+        .render(
+            content=content,
+            sentences=operation_sentences(content.found),
+            header=OPERATION_HEADER,
+            rows=operation_rows(content.found),
+            lasts=words.duration(content.found.voyage_s),
+            learns=words.duration(content.found.reference_s),
+        )
+    )
