@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from expdesign.monitoring import Grams
+from expdesign.monitoring import KINDS, Grams
 from expdesign.scenario import load_vessel
 from expdesign.signals import Batch, Commands, Record
 from expdesign.simulation import Environment, Variation, draw_weather, measure, simulate
@@ -57,8 +57,9 @@ def grams_from(columns: np.ndarray) -> Grams:
     counts = np.zeros((4, count))
     counts[0] = samples
     return Grams(
-        time_s=STRETCH_S * np.arange(count), products=products, counts=counts, changes=CHANGES, stretch_s=STRETCH_S
-    )
+        time_s=STRETCH_S * np.arange(count), products=products, counts=counts, budget=np.ones((count, CHANGES, 3)),
+        kind=np.arange(count) % len(KINDS), stretch_s=STRETCH_S,
+    )  # fmt: skip
 
 
 def tender(**factors: float) -> Vessel:

@@ -13,9 +13,11 @@ from expdesign.monitoring import (
     Alarm,
     Calibration,
     Grams,
+    Rules,
     State,
     Step,
     calibrate,
+    calls_of,
     restored_calibration,
     restored_state,
     saved,
@@ -36,7 +38,7 @@ def calibration() -> Calibration:
 
 
 def watched(
-    calibration: Calibration, grams: Grams, limit: float, state: State | None = None
+    calibration: Calibration, grams: Grams, limit: float, state: State | None = None, *, port_s: float = np.inf
 ) -> tuple[State, tuple[Alarm, ...], tuple[Step, ...]]:
     """All stretches, the error of the changed ship being linear in its changes."""
     state = State.begun(calibration, time_s=0.0) if state is None else state
@@ -46,7 +48,7 @@ def watched(
         after = np.eye(rest.products.shape[-1])
         after[:CHANGES, -1] = -state.shift
         linearised = replace(rest, products=after.T @ rest.products @ after)
-        state, more, sums, used = watch(calibration, state, linearised, limit=limit)
+        state, more, sums, used = watch(calibration, state, linearised, rules=Rules(limit=limit, port_s=port_s))
         alarms, steps, first = [*alarms, *more], [*steps, *sums], first + used
     return state, tuple(alarms), tuple(steps)
 
@@ -173,3 +175,56 @@ def test_the_threshold_grows_with_the_time_between_false_alarms() -> None:
     assert threshold(10, 1e4) == pytest.approx(np.log(2e5))
     assert threshold(10, 1e6) > threshold(10, 1e4) > threshold(1, 1e4)
     assert TUNING.fewest_stretches > 0
+
+
+HOUR = 3600.0
+SEEDS = range(20, 28)
+CALL = 60
+"""Stretches before a port call."""
+
+
+def with_call(seed: int, load: np.ndarray, later: np.ndarray) -> Grams:
+    """Stretches with a port call of eight hours that changes the load, and a change of the ship afterwards."""
+    columns = drawn_columns(220, seed=seed)
+    columns[CALL:, :, -1] += columns[CALL:, :, :CHANGES] @ load
+    columns[2 * CALL :, :, -1] += columns[2 * CALL :, :, :CHANGES] @ later
+    grams = grams_from(columns)
+    return replace(grams, time_s=grams.time_s + 8 * HOUR * (np.arange(len(grams)) >= CALL))
+
+
+@pytest.fixture(scope="module")
+def loaded(calibration: Calibration) -> Calibration:
+    """A load may change the third and the fourth."""
+    return replace(calibration, load=np.array([0.0, 0.0, 2.0, 2.0]))
+
+
+LOAD, SAME = np.array([0.0, 0.0, 1.5, -0.8]), np.zeros(CHANGES)
+
+
+def test_another_load_after_a_port_call_is_told_and_raises_no_alarm(loaded: Calibration) -> None:
+    limit, far = threshold(CHANGES, 1e5), []
+    for seed in SEEDS:
+        state, alarms, _ = watched(loaded, with_call(seed, LOAD, SAME), limit, port_s=6 * HOUR)
+        assert not alarms
+        (call,) = calls_of(state, loaded)
+        assert call.stay_s == pytest.approx(8 * HOUR)
+        far.append((call.value - LOAD)[2:] / call.std[2:])
+    assert (np.array(far) ** 2).mean() < 1.0 + 3.0 * np.sqrt(2.0 / np.size(far))
+
+
+def test_without_port_calls_another_load_is_a_change_of_the_ship(loaded: Calibration) -> None:
+    limit = threshold(CHANGES, 1e5)
+    assert all(watched(loaded, with_call(seed, LOAD, SAME), limit)[1] for seed in SEEDS)
+
+
+@pytest.mark.parametrize("number", [0, 2])
+def test_a_change_under_way_after_a_port_call_is_an_alarm_even_if_it_is_one_of_load(
+    loaded: Calibration, number: int
+) -> None:
+    later = np.zeros(CHANGES)
+    later[number] = 1.0
+    for seed in SEEDS:
+        _, alarms, _ = watched(loaded, with_call(seed, LOAD, later), threshold(CHANGES, 1e5), port_s=6 * HOUR)
+        assert alarms[0].since_s == pytest.approx(8 * HOUR + 2 * CALL * STRETCH_S, abs=3 * STRETCH_S)
+        assert alarms[-1].settled
+        assert alarms[-1].change == number or number in alarms[-1].as_likely

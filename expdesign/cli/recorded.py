@@ -302,11 +302,21 @@ def monitor(
             "reference, with measured surge, sway, roll, side acceleration and moment of the drives as inputs.",
         ),
     ] = "vessel",
+    port: Annotated[
+        float,
+        typer.Option(
+            "--port-h",
+            metavar="H",
+            help="Hours without way and propulsion, or without data, that count as a port call: the ship may carry "
+            "another load afterwards, which is estimated anew and raises no alarm. inf: its load never changes.",
+        ),
+    ] = 6.0,
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on from the state that an earlier watch left in the same folder.")
     ] = False,
     velocity: Velocity = "auto",
     out: OutByData = None,
+    jobs: Jobs = 0,
 ) -> Asked:
     """Watch a ship in operation: whether it still is the ship of its model, what changed, since when, by how much.
 
@@ -324,7 +334,9 @@ def monitor(
         false_alarm_days=false_alarms,
         size=size,
         every_s=every,
+        port_h=port,
         velocity=velocity,
         model=model,
         resume=resume,
+        jobs=jobs,
     )

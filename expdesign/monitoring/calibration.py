@@ -34,6 +34,7 @@ class Calibration:
         stretches: number of stretches of the reference.
         stretch_s: their length [s].
         misfit_limit: misfit per measured number beyond which a stretch is not judged.
+        load: (m,) standard deviation of what a port call may change of the load, in sizes.
     """
 
     std: Array
@@ -46,9 +47,20 @@ class Calibration:
     stretches: int
     stretch_s: float
     misfit_limit: float
+    load: Array
 
     def __post_init__(self) -> None:
-        seal(self, std="4", baseline="m", baseline_std="m", inflation="m", rate="m", alike="m m")
+        seal(self, std="4", baseline="m", baseline_std="m", inflation="m", rate="m", alike="m m", load="m")
+
+    @property
+    def loads(self) -> NDArray[np.int64]:
+        """(l,) numbers of the changes that a port call may bring."""
+        return np.flatnonzero(self.load)
+
+    @property
+    def nuisance(self) -> Force:
+        """The unmeasured force and the load."""
+        return self.force.with_load(len(self.loads))
 
     @property
     def watched(self) -> NDArray[np.bool_]:
@@ -61,12 +73,16 @@ class Calibration:
         return float(self.inflation[self.watched].max())
 
 
-def calibrate(grams: Grams) -> Calibration:
+def calibrate(grams: Grams, *, load: Array | None = None) -> Calibration:
     """Noise, force and baseline of a reference.
 
     Noise and the variances of a force that is independent from stretch to stretch have the largest likelihood, by
     expectation-maximisation. How the force varies from stretch to stretch follows from a search of the likelihood of
     the filter. Changes have a standard normal prior in units of their sizes.
+
+    Args:
+        grams: of the reference, in which the ship carries one load.
+        load: (m,) standard deviation of what a port call may change, in sizes; None for nothing.
 
     Raises:
         NotInformative: too few stretches.
@@ -102,6 +118,7 @@ def calibrate(grams: Grams) -> Calibration:
         stretches=len(grams),
         stretch_s=grams.stretch_s,
         misfit_limit=middle + TUNING.misfit_deviations * spread,
+        load=np.zeros(m) if load is None else load,
     )
 
 

@@ -20,12 +20,16 @@ class Change:
         size: change that matters, in the effect's unit; CUSUM is tuned to it in both directions.
         unit: of sizes in words: a divisor and what it gives, e.g. (0.01, "%").
         words: e.g. "parameter N_r".
+        whole: value of the effect that is the whole term: of a parameter itself; zero where there is no term.
+        load: standard deviation of what another load changes, in sizes; zero where it changes nothing.
     """
 
     effect: str
     size: float
     unit: tuple[float, str]
     words: str
+    whole: float = 0.0
+    load: float = 0.0
 
     def told(self, value: float, std: float | None = None) -> str:
         """A value in words, e.g. "+12 +- 3 %"."""
@@ -44,17 +48,26 @@ def watched_changes(ship: ExtendedModel, *, size: float = TUNING.relative_size) 
     """
     share = size / TUNING.relative_size
     model = ship.model
+    loads = {kind: std / share for kind, std in TUNING.loads}
+    hull = {name for name, part in zip(model.names, ship.scaled_terms, strict=False) if part.damping}
     values = dict(zip(model.names, model.parameters.tolist(), strict=True))
     changes = [
-        Change(effect=f"theta:{name}", size=size * abs(value), unit=(0.01 * value, "%"), words=f"parameter {name}")
+        Change(
+            effect=f"theta:{name}", size=size * abs(value), unit=(0.01 * value, "%"), words=f"parameter {name}",
+            whole=value, load=loads["hull"] if name in hull else 0.0,
+        )
         for name, value in values.items()
         if value
-    ]
+    ]  # fmt: skip
     changes += [
-        Change(effect=f"inertia:{name}", size=size, unit=(0.01, "%"), words=f"inertia in {EQUATIONS[name]}")
+        Change(
+            effect=f"inertia:{name}", size=size, unit=(0.01, "%"), words=f"inertia in {EQUATIONS[name]}", whole=1.0,
+            load=loads["inertia"],
+        )
         for name in model.outputs
-    ]
-    changes.append(Change(effect="gain", size=size, unit=(0.01, "%"), words="thrust, or force of all actuators"))
+    ]  # fmt: skip
+    words = "thrust, or force of all actuators"
+    changes.append(Change(effect="gain", size=size, unit=(0.01, "%"), words=words, whole=1.0))
     stems = dict.fromkeys(stem(name) for name in model.inputs)
     changes += [
         Change(

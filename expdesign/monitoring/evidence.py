@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from expdesign.diagnosis.data import cut_windows
 from expdesign.diagnosis.fit import effect_disturbances
@@ -26,11 +27,15 @@ from expdesign.diagnosis.motion import (
 )
 from expdesign.monitoring.changes import Change
 from expdesign.monitoring.tuning import TUNING
-from expdesign.signals import Record
+from expdesign.signals import Batch, Record
 from expdesign.values import Array, seal
 
 STARTS = 3
+KINDS = ("steady course", "turning", "changing speed", "turning and changing speed")
+"""Of stretches, by what the ship does in them."""
 CURRENT = ("current:north", "current:east")
+FEWEST_ROWS = 4
+"""Of a batch that is simulated."""
 PER_CURRENT = 1e-3
 """Difference of a current for its sensitivity [m/s]."""
 
@@ -43,18 +48,26 @@ class Grams:
         time_s: (w,) beginning of each stretch, since the data began [s].
         products: (4, w, c, c) of the columns X (m), S (3), F and e, for u, v, r and the rate of the heading.
         counts: (4, w) measured samples.
-        changes: m.
+        budget: (w, m, 3) mean size of what the term of every change adds to the accelerations [m/s2, rad/s2]; of
+            inertia, the acceleration itself; zero for changes that are no term.
+        kind: (w,) number in `KINDS`.
         stretch_s: their length [s].
     """
 
     time_s: Array
     products: Array
     counts: Array
-    changes: int
+    budget: Array
+    kind: NDArray[np.int64]
     stretch_s: float
 
     def __post_init__(self) -> None:
-        seal(self, time_s="w", products="4 w c c", counts="4 w")
+        seal(self, time_s="w", products="4 w c c", counts="4 w", budget="w m 3")
+
+    @property
+    def changes(self) -> int:
+        """Their number m."""
+        return int(self.budget.shape[1])
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -66,6 +79,8 @@ class Grams:
             time_s=self.time_s[stretches],
             products=self.products[:, stretches],
             counts=self.counts[:, stretches],
+            budget=self.budget[stretches],
+            kind=self.kind[stretches],
         )
 
     @property
@@ -77,7 +92,9 @@ class Grams:
 def grams_of(
     ship: ExtendedModel, record: Record, changes: Sequence[Change], *, begins_s: Sequence[float], stretch_s: float
 ) -> Grams:
-    """Inner products of all stretches of a record; those whose simulation diverges or with few samples are left out.
+    """Inner products of all stretches of a record.
+
+    Left out are stretches whose simulation diverges, with few samples, or of a ship that lies still.
 
     Args:
         ship: the model with what its file states.
@@ -89,28 +106,82 @@ def grams_of(
     Raises:
         InputError: batches of different sample times.
     """
-    windows = cut_windows(ship.model, record, longest_s=stretch_s)
+    parts, begins = _whole_stretches(record, begins_s, stretch_s)
+    windows = cut_windows(ship.model, parts, longest_s=stretch_s)
     linear = linearise(simulate_from_measured(ship, windows))
     known = effect_disturbances(linear, [change.effect for change in changes])
-    scale = np.array([change.size for change in changes])
-    moved = responses(linear, [*known, *_forces(linear)])
-    moved[: len(changes)] *= scale[:, None, None, None]
-    columns = np.concatenate([moved[: len(changes)], start_responses(linear), moved[len(changes) :]])
-    error = linear.motion.error
+    columns = _columns(linear, known, changes)
+    error = _compared(linear)
     seen = np.isfinite(error)
     columns = np.where(seen, np.concatenate([columns, np.where(seen, error, 0.0)[None]]), 0.0)
     table = np.moveaxis(columns, (3, 1, 0, 2), (0, 1, 2, 3))  # (4, w, c, s)
-    calm = np.abs(linear.motion.states).max(axis=(1, 2)) < TUNING.largest_speed
-    keep = calm & (seen[..., :STARTS].any(axis=2).sum(axis=1) >= TUNING.fewest_samples)
-    begin_s = np.asarray(begins_s)[windows.batch.astype(int)] + windows.first * windows.step_s
-    products = table[:, keep] @ np.swapaxes(table[:, keep], 2, 3)
+    budget = _budget(linear, known, changes)
+    keep = _usable(linear, seen) & ~_still(linear, budget, changes)
+    begin_s = begins[windows.batch.astype(int)] + windows.first * windows.step_s
     return Grams(
         time_s=begin_s[keep],
-        products=products,
+        products=table[:, keep] @ np.swapaxes(table[:, keep], 2, 3),
         counts=seen.sum(axis=1).T[:, keep],
-        changes=len(changes),
+        budget=budget[keep],
+        kind=stretch_kinds(linear.motion.states[..., 0], linear.motion.states[..., 2], windows.step_s)[keep],
         stretch_s=stretch_s,
     )
+
+
+def _whole_stretches(record: Record, begins_s: Sequence[float], stretch_s: float) -> tuple[Record, Array]:
+    """Every batch as one of whole stretches and one of the rest, and when these begin [s]."""
+    parts, begins = list[Batch](), list[float]()
+    for batch, begin_s in zip(record.batches, begins_s, strict=True):
+        samples = max(1, round(stretch_s / batch.sample_time_s))
+        whole = len(batch) // samples * samples
+        for part in (slice(0, whole), slice(whole, len(batch))):
+            if part.stop - part.start >= FEWEST_ROWS:
+                parts.append(batch.cut(part))
+                begins.append(begin_s + part.start * batch.sample_time_s)
+    return replace(record, batches=tuple(parts)), np.array(begins)
+
+
+def _columns(linear: LinearisedMotion, known: Sequence[Disturbance], changes: Sequence[Change]) -> Array:
+    """(m + 3 + q, w, s, 4) responses to changes of their sizes, to initial velocities and to the force."""
+    moved = responses(linear, [*known, *_forces(linear)])
+    moved[: len(changes)] *= np.array([change.size for change in changes])[:, None, None, None]
+    return np.concatenate([moved[: len(changes)], start_responses(linear), moved[len(changes) :]])
+
+
+def _compared(linear: LinearisedMotion) -> Array:
+    """(w, s, 4) error; the rate of the heading within stretches only, so that each stands alone."""
+    error = linear.motion.error.copy()
+    error[:, [0, -1], STARTS] = np.nan
+    return error
+
+
+def _usable(linear: LinearisedMotion, seen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(w,) stretches with a simulation and with enough samples."""
+    calm = np.abs(linear.motion.states).max(axis=(1, 2)) < TUNING.largest_speed
+    return np.asarray(calm & (seen[..., :STARTS].any(axis=2).sum(axis=1) >= TUNING.fewest_samples))
+
+
+def _budget(linear: LinearisedMotion, known: Sequence[Disturbance], changes: Sequence[Change]) -> Array:
+    """(w, m, 3) of `Grams`."""
+    budget = np.zeros((len(linear.motion.states), len(changes), 3))
+    for place, (one, change) in enumerate(zip(known, changes, strict=True)):
+        if one.force is not None and change.whole:
+            budget[:, place] = abs(change.whole) * np.abs(one.force[..., :3]).mean(axis=1)
+    return budget
+
+
+def _still(linear: LinearisedMotion, budget: Array, changes: Sequence[Change]) -> NDArray[np.bool_]:
+    """(w,) stretches without way and without propulsion: in port or adrift, where the model does not hold."""
+    way = np.hypot(linear.motion.states[..., 0], linear.motion.states[..., 1]).mean(axis=1)
+    push = np.hypot(*np.moveaxis(budget[:, [change.effect for change in changes].index("gain"), :2], -1, 0))
+    return np.asarray((way < TUNING.still_mps) & (push < TUNING.still_mps2))
+
+
+def stretch_kinds(u: Array, r: Array, step_s: float) -> NDArray[np.int64]:
+    """(w,) number in `KINDS` of stretches with surge speeds and yaw rates (w, k)."""
+    turned = np.abs(r).mean(axis=1) * u.shape[1] * step_s
+    gained = np.ptp(u, axis=1) / np.maximum(np.abs(u).max(axis=1), 1e-9)
+    return np.asarray((turned > TUNING.turned_rad) + 2 * (gained > TUNING.gained_share), dtype=np.int64)
 
 
 def joined(parts: Sequence[Grams]) -> Grams:
@@ -119,7 +190,8 @@ def joined(parts: Sequence[Grams]) -> Grams:
         time_s=np.concatenate([part.time_s for part in parts]),
         products=np.concatenate([part.products for part in parts], axis=1),
         counts=np.concatenate([part.counts for part in parts], axis=1),
-        changes=parts[0].changes,
+        budget=np.concatenate([part.budget for part in parts]),
+        kind=np.concatenate([part.kind for part in parts]),
         stretch_s=parts[0].stretch_s,
     )
 

@@ -1,8 +1,8 @@
-"""The unmeasured force from stretch to stretch, by a Kalman filter.
+"""The unmeasured force and the load from stretch to stretch, by a Kalman filter.
 
-Every component, of the current or of an acceleration, is the sum of two Gauss-Markov processes: one that varies within
-minutes and one that varies within hours. A change of the ship is taken for such a force in part; `sensitivity` follows
-by how much.
+Every component of the force, of the current or of an acceleration, is the sum of two Gauss-Markov processes: one that
+varies within minutes and one that varies within hours. The load is what a ship carries: changes of inertia and hull
+that last from port to port. A change of the ship is taken for such a force or load in part.
 
 Source: R. E. Kalman, Journal of Basic Engineering 82 (1960), 35-45; A. S. Willsky and H. L. Jones, IEEE Transactions on
 Automatic Control 21 (1976), 108-112, for the sensitivity of a filter to a jump.
@@ -13,35 +13,45 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from expdesign.monitoring.evidence import Stretches
 from expdesign.values import Array
 
+NO_LOADS = np.array([], dtype=np.int64)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Force:
-    """Covariance of the unmeasured force over time.
+    """Covariance of the unmeasured force over time, and of a load.
 
     Attributes:
-        variance: (..., 2 q) of the quick processes, then of the slow ones.
-        time_s: (..., 2 q) their correlation times [s].
+        variance: (..., 2 q) of the quick processes, then of the slow ones; then (..., l) zeros for the load.
+        time_s: (..., 2 q + l) their correlation times [s]; infinite for the load.
     """
 
     variance: Array
     time_s: Array
 
     def memory(self, gap_s: float) -> Array:
-        """(..., 2 q) autocorrelation over a time."""
+        """(..., 2 q + l) autocorrelation over a time."""
         return np.asarray(np.exp(-gap_s / self.time_s))
+
+    def with_load(self, count: int) -> Force:
+        """With so many components of a load, known to be none."""
+        return Force(
+            variance=np.concatenate([self.variance, np.zeros(count)]),
+            time_s=np.concatenate([self.time_s, np.full(count, np.inf)]),
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Known:
-    """What is known of the force at the beginning of a stretch: normal with this mean and covariance.
+    """What is known of force and load at the beginning of a stretch: normal with this mean and covariance.
 
     Attributes:
-        mean: (..., 2 q).
-        covariance: (..., 2 q, 2 q).
+        mean: (..., n), n = 2 q + l.
+        covariance: (..., n, n).
     """
 
     mean: Array
@@ -61,13 +71,14 @@ class Judged:
     Attributes:
         score: (..., m) of every change, were the filter unaware of it until now.
         information: (..., m, m).
-        by_force: (..., m, 2 q) inner products of the changes' sensitivities with the force's.
-        force_score, force_information: (..., 2 q) and (..., 2 q, 2 q).
-        quadratic: (...) squared prediction error, in standard deviations; log_det: of its covariance, but for terms
-            that do not depend on the force.
-        gain: (..., 2 q, 2 q) covariance of the force after the stretch.
-        towards: (..., 2 q) by which its mean moves.
-        seen: (2 q, m) and (2 q, 2 q), the products of the data alone.
+        by_force: (..., m, n) inner products of the changes' sensitivities with the force's.
+        force_score, force_information: (..., n) and (..., n, n).
+        quadratic: (...) squared prediction error, in standard deviations.
+        grown: (..., n, n) whose determinant is that of the prediction error's covariance, but for a factor that
+            does not depend on the force.
+        gain: (..., n, n) covariance of the force after the stretch.
+        towards: (..., n) by which its mean moves.
+        seen: (n, m) and (n, n), the products of the data alone.
     """
 
     score: Array
@@ -76,24 +87,28 @@ class Judged:
     force_score: Array
     force_information: Array
     quadratic: Array
-    log_det: Array
+    grown: Array
     gain: Array
     towards: Array
     seen: tuple[Array, Array]
 
 
-def judged(products: Array, changes: int, known: Known) -> Judged:
-    """A stretch with products (c, c) of `Stretches`, under one or several (...) states of knowledge."""
-    m, q = changes, len(products) - changes - 1
-    force = np.tile(np.arange(m, m + q), 2)
+def judged(products: Array, changes: int, known: Known, loads: NDArray[np.int64] = NO_LOADS) -> Judged:
+    """A stretch with products (c, c) of `Stretches`, under one or several (...) states of knowledge.
+
+    The load is that of the changes with these numbers (l,), in their sizes.
+    """
+    m = changes
+    force = np.concatenate([np.tile(np.arange(m, len(products) - 1), 2), loads])
     XX, XF, Xe = products[:m, :m], products[:m, force], products[:m, -1]
     FF, Fe, ee = products[np.ix_(force, force)], products[force, -1], products[-1, -1]
-    precision = np.linalg.inv(known.covariance)
-    after = np.asarray(np.linalg.inv(precision + FF), dtype=float)
+    grown = np.eye(len(force)) + known.covariance @ FF
+    after = np.asarray(np.linalg.solve(grown, known.covariance), dtype=float)
+    after = (after + np.swapaxes(after, -1, -2)) / 2.0
     missed = Fe - np.einsum("ij,...j->...i", FF, known.mean)
     towards = np.einsum("...ij,...j->...i", after, missed)
     own = np.einsum("ij,...j->...i", XF, known.mean)
-    rest = np.eye(2 * q) - after @ FF  # what the stretch itself does not tell of the force
+    rest = np.eye(len(force)) - after @ FF  # what the stretch itself does not tell of the force
     error = ee - 2.0 * known.mean @ Fe + np.einsum("...i,ij,...j->...", known.mean, FF, known.mean)
     return Judged(
         score=Xe - own - np.einsum("ij,...j->...i", XF, towards),
@@ -102,7 +117,7 @@ def judged(products: Array, changes: int, known: Known) -> Judged:
         force_score=missed - np.einsum("ij,...j->...i", FF, towards),
         force_information=FF @ rest,
         quadratic=error - np.einsum("...i,...i->...", missed, towards),
-        log_det=np.linalg.slogdet(precision + FF)[1] - np.linalg.slogdet(precision)[1],
+        grown=grown,
         gain=after,
         towards=towards,
         seen=(XF.T, FF),
@@ -129,6 +144,6 @@ def likelihood(stretches: Stretches, force: Force) -> Array:
         if index:
             known = after_gap(known, force, float(stretches.time_s[index] - stretches.time_s[index - 1]))
         one = judged(products, stretches.changes, known)
-        total = total + one.quadratic + one.log_det
+        total = total + one.quadratic + np.linalg.slogdet(one.grown)[1]
         known = after_stretch(known, one)
     return np.asarray(total)

@@ -9,8 +9,8 @@ import numpy as np
 
 from expdesign.monitoring.calibration import Calibration
 from expdesign.monitoring.changes import Change
-from expdesign.monitoring.cusum import Alarm, State, Sums
 from expdesign.monitoring.force import Force, Known
+from expdesign.monitoring.state import Alarm, Budget, Call, Load, State, Sums
 
 
 def saved(value: Any) -> Any:
@@ -42,6 +42,11 @@ def restored_state(table: dict[str, Any]) -> State:
         shift=_array(table["shift"]),
         before=_array(table["before"]),
         whole=Sums(**_arrays(table["whole"])),
+        load=Load(**{**table["load"], "taken": _array(table["load"]["taken"])}),
+        budget=Budget(**_arrays(table["budget"])),
+        calls=tuple(
+            Call(**{**call, "value": _array(call["value"]), "std": _array(call["std"])}) for call in table["calls"]
+        ),
         alarm=None if alarm is None else restored_alarm(alarm),
         pending=None if pending is None else Sums(**_arrays(pending)),
         judged=table["judged"],

@@ -31,6 +31,11 @@ class Tuning:
         relative_size: change of a parameter, a gain or an inertia that matters, as a share.
         angle_rad: misalignment that matters [rad].
         gyro_share: change of the gyro's scale that matters.
+        still_mps, still_mps2: speed and acceleration by propulsion below which a ship lies still [m/s, m/s2].
+        turned_rad, gained_share: change of heading in a stretch that counts as a turn [rad], and of speed, as a share.
+        loads: kinds of effects that a load may change, each with the standard deviation of its change in a port call,
+            in sizes that matter.
+        load_settled: stretches after a port call from which its load is taken for the ship's, and again.
         largest_speed: speed beyond which a simulation has diverged [m/s, rad/s].
     """
 
@@ -56,6 +61,12 @@ class Tuning:
     relative_size: float = 0.1
     angle_rad: float = 0.03
     gyro_share: float = 0.05
+    still_mps: float = 0.3
+    still_mps2: float = 1e-3
+    turned_rad: float = 0.26
+    gained_share: float = 0.15
+    loads: tuple[tuple[str, float], ...] = (("inertia", 2.0), ("hull", 1.0))
+    load_settled: tuple[int, ...] = (2, 6, 20, 60, 240)
     largest_speed: float = 100.0
 
 

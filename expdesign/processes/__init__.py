@@ -1,6 +1,7 @@
 """Independent work, shared among processes of this machine or the workers of a Dask scheduler."""
 
 from expdesign.processes.sharing import (
+    ahead,
     as_finished,
     begin,
     in_order,
@@ -12,6 +13,7 @@ from expdesign.processes.sharing import (
 from expdesign.processes.telling import told_together
 
 __all__ = [
+    "ahead",
     "as_finished",
     "begin",
     "in_order",

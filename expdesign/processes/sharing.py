@@ -7,21 +7,31 @@ from __future__ import annotations
 
 import signal
 import threading
+import time
 import warnings
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from functools import lru_cache
-from itertools import chain
+from itertools import chain, islice
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import cloudpickle
 from joblib import Parallel, delayed, effective_n_jobs, parallel_config
+from joblib.externals.loky import ProcessPoolExecutor
 
 if TYPE_CHECKING:
     from expdesign.processes._dask import Cluster
 
 Result = TypeVar("Result")
+Item = TypeVar("Item")
+
+SLOW_S = 1.0
+"""From which a task was long in coming."""
+ALONE_S = 5.0
+"""Time from which tasks that come one by one are worth other processes."""
 
 _CLUSTER: ContextVar[Cluster | None] = ContextVar("_CLUSTER", default=None)
 """Where `on_cluster` shares the work of a block."""
@@ -136,6 +146,49 @@ def _waited_for(results: Iterator[Any]) -> Iterator[Any]:
     except GeneratorExit:
         list(results)
         raise
+
+
+def ahead(
+    function: Callable[..., Result], shared: tuple[Any, ...], tasks: Iterable[tuple[Item, tuple[Any, ...]]]
+) -> Iterator[tuple[Item, Result]]:
+    """Results of `function(*shared, *task)` for tasks that come one by one, without end perhaps, in their order.
+
+    Where several processes share the work, a few more tasks are asked for before a result is given. Where tasks are
+    long in coming, as from an instrument, every result is given before the next task is asked for.
+
+    Args:
+        function: of a module.
+        shared: arguments that all tasks share.
+        tasks: what each result goes with, and the other arguments.
+    """
+    jobs, source, began_s, asked_s = shared_among(), iter(tasks), time.monotonic(), time.monotonic()
+    for item, task in source:
+        slow = time.monotonic() - asked_s > SLOW_S
+        yield item, function(*shared, *task)
+        asked_s = time.monotonic()
+        if jobs > 1 and not slow and asked_s - began_s > ALONE_S:
+            break
+    else:
+        return
+    executor = ProcessPoolExecutor(max_workers=jobs)
+    try:
+        yield from _results_ahead(executor, cloudpickle.dumps((function, shared)), source, 2 * jobs)
+    finally:
+        executor.shutdown(wait=True)
+
+
+def _results_ahead(
+    executor: ProcessPoolExecutor, both: bytes, source: Iterator[tuple[Item, tuple[Any, ...]]], most: int
+) -> Iterator[tuple[Item, Any]]:
+    work, last = deque[tuple[Item, Future[Any]]](), False
+    while not last:
+        asked_s, taken = time.monotonic(), list(islice(source, 1))
+        last, slow = not taken, time.monotonic() - asked_s > SLOW_S
+        with leaving_interruptions():
+            work.extend((item, executor.submit(done, both, cloudpickle.dumps(task))) for item, task in taken)
+        while work and (last or slow or len(work) > most):
+            item, result = work.popleft()
+            yield item, result.result()
 
 
 @contextmanager

@@ -20,7 +20,7 @@ are ignored and noted. Every error is a `FileError` with the rows concerned.
 from expdesign.records.file import COLUMNS
 from expdesign.records.labels import LABEL_SOURCES, row_labels
 from expdesign.records.load import load_records
-from expdesign.records.pieces import STREAM, Piece, pieces
+from expdesign.records.pieces import STREAM, Piece, Taken, as_file, pieces
 from expdesign.records.pose import VELOCITY_METHODS, Fix, central_difference, last_fix, smoothed_velocity
 
 __all__ = [
@@ -30,6 +30,8 @@ __all__ = [
     "VELOCITY_METHODS",
     "Fix",
     "Piece",
+    "Taken",
+    "as_file",
     "central_difference",
     "last_fix",
     "load_records",

@@ -1,16 +1,18 @@
-"""Pieces of a file that is too long for memory, or of a stream that goes on: whole stretches of rows, as small files.
+"""Pieces of a file that is too long for memory, or of a stream that goes on: whole stretches of rows.
 
-Rows that lack a number in a column that is needed are left out; the gap begins a new batch.
+Rows that lack a number in a column that is needed are left out; the gap begins a new batch. Stretches are counted from
+the beginning of a batch, and a piece ends where one does, so that stretches are the same wherever data are cut.
 """
 
 from __future__ import annotations
 
+import hashlib
 import itertools
 import math
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TextIO
@@ -20,6 +22,7 @@ import numpy as np
 from expdesign.errors import FileError
 from expdesign.input_files import check_ends
 from expdesign.records.file import FIRST_ROW, MISSING, Inputs, Sources, choose_columns
+from expdesign.records.tuning import TUNING
 from expdesign.signals import AUXILIARY
 from expdesign.values import Array
 from expdesign.vessel import column_name
@@ -28,7 +31,30 @@ STREAM = Path("-")
 """Stands for the standard input."""
 CLOCKED_ROWS = 50
 """From which the time between samples is learnt."""
+LINES = 4096
+"""Looked at together."""
 OPTIONAL = ("wind_u_mps", "wind_v_mps", "wind_speed_mps", "wind_angle_rad", "depth_m", "steered", "batch", *AUXILIARY)
+
+
+@dataclass(frozen=True)
+class Taken:
+    """How far a source has been read.
+
+    Attributes:
+        source: its name.
+        begins: digest of its header and first row, by which it is known again.
+        rows: rows after the header.
+        last_s: time of the last of them, in the clock of the source [s].
+    """
+
+    source: str
+    begins: str
+    rows: int
+    last_s: float
+
+    def continues(self, other: Taken) -> bool:
+        """Whether this is the same source, read further; a stream is one however often it is opened."""
+        return self.source == other.source and (self.begins == other.begins or self.source == STREAM.name)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -36,18 +62,21 @@ class Piece:
     """Consecutive rows of a source.
 
     Attributes:
-        path: a file that holds the header and these rows, until the next piece is asked for.
+        text: header and these rows, less columns that some of them lack.
         source: where they come from.
         header: line of names.
         lines: of the rows kept.
         time_s: (k,) their times [s].
         first_row: row of the source that the piece begins in.
         left_out: rows that lack a number.
-        pending: lines left over when the source ended, fewer than a stretch has.
-        last: the source has ended.
+        pending: lines after the last whole stretch, which the next piece begins with.
+        taken: rows of the source that were read, those of `pending` included.
+        again: lines left over from earlier data that are still to come; until there are none, this is no state to go
+            on from.
+        skipped: rows at the beginning of the source that are among those taken before.
     """
 
-    path: Path
+    text: str
     source: Path
     header: str
     lines: tuple[str, ...]
@@ -55,16 +84,23 @@ class Piece:
     first_row: int
     left_out: int
     pending: tuple[str, ...]
-    last: bool
+    taken: Taken
+    again: int
+    skipped: int
 
-    @contextmanager
-    def named(self) -> Iterator[None]:
-        """Errors about the small file are told as errors of the source."""
-        try:
-            yield
-        except FileError as error:
-            place = f" (rows counted in the piece from row {self.first_row} on)" if self.first_row > FIRST_ROW else ""
-            raise FileError(self.source, error.key, f"{error.problem}{place}") from None
+    def problem(self, error: FileError) -> FileError:
+        """An error about the text as a file, told as an error of the source."""
+        place = f" (rows counted in the piece from row {self.first_row} on)" if self.first_row > FIRST_ROW else ""
+        return FileError(self.source, error.key, f"{error.problem}{place}")
+
+
+@contextmanager
+def as_file(text: str) -> Iterator[Path]:
+    """A file of a piece's text."""
+    with TemporaryDirectory(prefix="expdesign-") as folder:
+        path = Path(folder) / "piece.csv"
+        path.write_text(text, encoding="utf-8", errors="surrogateescape")
+        yield path
 
 
 def pieces(
@@ -76,6 +112,7 @@ def pieces(
     unread: Sequence[str] = OPTIONAL,
     before: Sequence[str] = (),
     more_follow: bool = False,
+    taken: Sequence[Taken] = (),
 ) -> Iterator[Piece]:
     """Pieces of a CSV file, or of the standard input for `STREAM`, with whole stretches but at gaps.
 
@@ -86,69 +123,117 @@ def pieces(
         most_rows: of a piece; one that is shorter than a stretch has the rows of one.
         unread: columns that rows may lack.
         before: header and `pending` lines of earlier data, which come first where the header is the same.
-        more_follow: the source goes on later: rows at its end that do not fill a stretch are `pending`.
+        more_follow: the source goes on later: rows at its end that do not fill a stretch are `pending`, and a last
+            line that does not end is not read.
+        taken: of earlier data; rows of this source among them are skipped, of a stream those up to the last time.
 
     Raises:
         FileError: unreadable, without header, or without columns that are needed.
     """
-    with _opened(source) as file, TemporaryDirectory(prefix="expdesign-") as folder:
+    with _opened(source) as file:
         header = file.readline()
         names = tuple(name.strip() for name in header.rstrip("\r\n").split(","))
         if not header.strip():
             raise FileError(source, "", "is empty, expected a header row and one row per sample")
         chosen, _ = choose_columns(source, names, inputs=Inputs(tuple(map(column_name, inputs)), "the vessel"))
         columns = _Columns(chosen, unread)
-        left = list(before[1:]) if before and before[0] == header else []
-        first = [*left, *itertools.islice(file, CLOCKED_ROWS)]
-        steps = np.diff(columns.times([line for line in first if columns.complete(line)]))
-        step_s = float(np.median(steps)) if len(steps) else stretch_s
-        if not step_s > 0:
-            raise FileError(source, chosen["time_s"].header, "does not increase, expected increasing times")
+        lines = iter(file.readline, "")
+        first = list(itertools.islice(lines, CLOCKED_ROWS))
+        step_s = _step_of(source, columns, first) or stretch_s
         stretch = max(1, round(stretch_s / step_s))
-        lines = itertools.chain(first, iter(file.readline, ""))
-        rows = stretch * max(1, most_rows // stretch)
-        yield from _cut(
-            lines, _Cut(source, header, columns, rows, stretch, Path(folder) / "piece.csv", more_follow), -len(left)
-        )
+        how = _Cut(
+            source=source, header=header, columns=columns, rows=stretch * max(1, most_rows // stretch),
+            stretch=stretch, gap_s=TUNING.gap_sample_times * step_s,
+            more_follow=more_follow, begins=(begins := _digest(header, first)), skipped=0,
+        )  # fmt: skip
+        known = next((t for t in taken if t.continues(Taken(source.name, begins, 0, math.nan))), None)
+        every: Iterator[str] = itertools.chain(first, lines)
+        if known is None:
+            rows = 0
+        elif source == STREAM:
+            every, rows = _after(every, columns, known.last_s)
+        else:
+            every, rows = itertools.islice(every, known.rows, None), known.rows
+        left = list(before[1:]) if before and before[0] == header else []
+        how = replace(how, skipped=rows)
+        yield from _cut(itertools.chain(left, every), how, rows - len(left), len(left))
 
 
-@dataclass(frozen=True)
+def _step_of(source: Path, columns: _Columns, first: Sequence[str]) -> float:
+    """Time between samples [s]; zero for a single row."""
+    steps = np.diff(columns.times([line for line in first if columns.complete(line)]))
+    step_s = float(np.median(steps)) if len(steps) else 0.0
+    if len(steps) and not step_s > 0:
+        raise FileError(source, columns.clock.header, "does not increase, expected increasing times")
+    return step_s
+
+
+def _digest(header: str, first: Sequence[str]) -> str:
+    return hashlib.sha256("".join([header, *first[:1]]).encode(errors="surrogateescape")).hexdigest()[:16]
+
+
+def _after(lines: Iterator[str], columns: _Columns, after_s: float) -> tuple[Iterator[str], int]:
+    """Lines of a stream from the first on that is later, and the number before it."""
+    rows = 0
+    for line in lines:
+        if not columns.times([line])[0] <= after_s:
+            return itertools.chain([line], lines), rows
+        rows += 1
+    return iter(()), rows
+
+
+@dataclass(frozen=True, kw_only=True)
 class _Cut:
     source: Path
     header: str
     columns: _Columns
     rows: int
     stretch: int
-    path: Path
+    gap_s: float
     more_follow: bool
+    begins: str
+    skipped: int
 
-    def piece(self, lines: list[str], first_row: int, left_out: int, *, last: bool) -> Piece:
-        whole = len(lines) // self.stretch * self.stretch if self.more_follow else len(lines)
+    def piece(self, lines: list[str], left_out: int, *, rows: int, again: int, last: bool) -> Piece:
+        """Of lines up to a row of the source, as many as there are whole stretches."""
+        times = self.columns.times(lines)
+        whole = self._whole(times) if self.more_follow or not last else len(lines)
         kept = lines[:whole]
         written = self.columns.without_optional(kept) if self.columns.gaps else kept
-        self.path.write_text(self.header + "".join(written), encoding="utf-8", errors="surrogateescape")
         self.columns.gaps = False
         return Piece(
-            path=self.path, source=self.source, header=self.header, lines=tuple(kept), time_s=self.columns.times(kept),
-            first_row=first_row, left_out=left_out, pending=tuple(lines[whole:]), last=last,
+            text=self.header + "".join(written), source=self.source, header=self.header, lines=tuple(kept),
+            time_s=times[:whole],
+            first_row=max(FIRST_ROW, FIRST_ROW + rows - len(lines) - left_out), left_out=left_out,
+            pending=tuple(lines[whole:]), again=again, skipped=self.skipped,
+            taken=Taken(self.source.name, self.begins, rows, float(times[-1]) if len(times) else math.nan),
         )  # fmt: skip
 
+    def _whole(self, times: Array) -> int:
+        """Lines up to the end of the last whole stretch, counted from the last gap."""
+        steps = np.diff(times)
+        gaps = np.flatnonzero(~((steps > 0) & (steps <= self.gap_s))) + 1
+        begin = int(gaps[-1]) if len(gaps) else 0
+        return begin + (len(times) - begin) // self.stretch * self.stretch
 
-def _cut(source: Iterator[str], how: _Cut, offset: int) -> Iterator[Piece]:
-    """Pieces of lines, the first of which is row `FIRST_ROW` + offset."""
+
+def _cut(source: Iterator[str], how: _Cut, rows: int, again: int) -> Iterator[Piece]:
+    """Pieces of lines after so many rows of the source; the first lines were left over from earlier data."""
     lines: list[str] = []
-    first = row = FIRST_ROW + offset
-    left_out = 0
-    for line in source:
-        row += 1
-        if line.strip() and how.columns.complete(line):
-            lines.append(line if line.endswith("\n") else f"{line}\n")
-        elif line.strip():
-            left_out += 1
-        if len(lines) == how.rows:
-            yield how.piece(lines, max(first, FIRST_ROW), left_out, last=False)
-            first, lines, left_out = row, [], 0
-    yield how.piece(lines, max(first, FIRST_ROW), left_out, last=True)
+    left_out, last = 0, False
+    while not last:
+        asked = min(LINES, how.rows - len(lines))
+        block = list(itertools.islice(source, asked))
+        last = len(block) < asked
+        if last and how.more_follow and block and not block[-1].endswith("\n"):
+            block.pop()
+        rows, again = rows + len(block), max(0, again - len(block))
+        kept, missing = how.columns.kept(block)
+        lines, left_out = lines + kept, left_out + missing
+        if last or len(lines) == how.rows:
+            piece = how.piece(lines, left_out, rows=rows, again=again, last=last)
+            yield piece
+            lines, left_out = list(piece.pending), 0
 
 
 class _Columns:
@@ -160,10 +245,19 @@ class _Columns:
         self.clock = chosen["time_s"]
         self.gaps = False
 
+    def kept(self, lines: list[str]) -> tuple[list[str], int]:
+        """The rows that have something in every needed column, each on a whole line, and the number of others."""
+        text = "".join(lines)
+        if _full(f"\n{text}") and text.endswith("\n"):
+            return lines, 0
+        filled = [line if line.endswith("\n") else f"{line}\n" for line in lines if line.strip()]
+        kept = [line for line in filled if self.complete(line)]
+        return kept, len(filled) - len(kept)
+
     def complete(self, line: str) -> bool:
         """Whether a row has something in every needed column; whether it is a number is for the reader to say."""
         bare = line.rstrip("\r\n")
-        if ",," not in bare and not bare.endswith(",") and not bare.startswith(",") and "n" not in bare.lower():
+        if _full(f"\n{bare}\n"):
             return True
         cells = bare.split(",")
         if any(place < len(cells) and cells[place].strip().lower() in MISSING for place in self.needed):
@@ -183,6 +277,14 @@ class _Columns:
     def times(self, lines: Sequence[str]) -> Array:
         """(k,) [s]; nan where a cell is no number, of which the reader complains."""
         return self.clock.factor * np.array([_number(line, self.clock.column) for line in lines])
+
+
+def _full(text: str) -> bool:
+    """Whether no cell of rows, each after a line end, can be empty or a word for nothing."""
+    return not (
+        ",," in text or ", " in text or ",\n" in text or "\n," in text or "\n\n" in text or "\r" in text
+        or "n" in text.lower()
+    )  # fmt: skip
 
 
 def _number(line: str, column: int) -> float:

@@ -4,7 +4,8 @@
 wanders, with a mean of its own in each. The watch is calibrated on eight voyages of 2 hours. False alarms are counted
 over D days of voyages of 12 hours each, at thresholds for one in 6 hours, one in a day and one in 30 days. Each change
 is then made in N voyages of 3 hours, of which the first hour is without it. ``--year`` instead sends a year at 1 Hz
-through the command, as a stream, and prints its time and its peak memory.
+through the command, as a stream, and prints its time and its peak memory. ``--ports`` gives the ship another load in a
+port call of eight hours in N voyages, and takes 5 % of its thrust an hour later.
 """
 
 from __future__ import annotations
@@ -28,6 +29,8 @@ from expdesign.monitoring import (
     Alarm,
     Calibration,
     Change,
+    Grams,
+    Rules,
     State,
     calibrate,
     grams_of,
@@ -84,22 +87,92 @@ CASES: tuple[tuple[str, str, float, Callable[[Vessel], Vessel]], ...] = (
 def watched(
     vessel: Vessel, record: Record, changes: tuple[Change, ...], calibration: Calibration, limit: float
 ) -> tuple[State, list[Alarm]]:
-    """A record watched from its beginning, linearised anew after each change."""
-    ship = extended_model(vessel, record)
-    state, alarms, first = State.begun(calibration, time_s=0.0), list[Alarm](), 0
-    grams = grams_of(ship, record, changes, begins_s=[0.0], stretch_s=TUNING.stretch_s)
-    while first < len(grams):
-        state, more, _, used = watch(calibration, state, grams.part(slice(first, None)), limit=limit)
-        alarms, first = [*alarms, *more], first + used
-        if first < len(grams):
-            effects = {c.effect: c.size * x for c, x in zip(changes, state.shift.tolist(), strict=True) if x}
-            grams = grams_of(ship.with_effects(effects), record, changes, begins_s=[0.0], stretch_s=TUNING.stretch_s)
+    """A record watched from its beginning."""
+    state, alarms = gone_on(
+        State.begun(calibration, time_s=0.0), vessel, record, changes, calibration, Rules(limit=limit), begin_s=0.0
+    )
     return state, alarms if state.alarm is None else [*alarms, state.alarm]
 
 
-def study(trials: int, days: float) -> None:
-    """False alarms, then changes."""
+def gone_on(
+    state: State,
+    vessel: Vessel,
+    record: Record,
+    changes: tuple[Change, ...],
+    calibration: Calibration,
+    rules: Rules,
+    *,
+    begin_s: float,
+) -> tuple[State, list[Alarm]]:
+    """A record watched from a state on, linearised anew after each change, and the alarms in it."""
+    ship, alarms, first = extended_model(vessel, record), list[Alarm](), 0
+
+    def linearised() -> Grams:
+        effects = {c.effect: c.size * x for c, x in zip(changes, state.shift.tolist(), strict=True) if x}
+        changed = ship.with_effects(effects)
+        return grams_of(changed, record, changes, begins_s=[begin_s], stretch_s=TUNING.stretch_s)
+
+    grams = linearised()
+    while first < len(grams):
+        state, more, _, used = watch(calibration, state, grams.part(slice(first, None)), rules=rules)
+        alarms, first = [*alarms, *more], first + used
+        if first < len(grams):
+            grams = linearised()
+    return state, alarms
+
+
+def loaded(vessel: Vessel, inertia: float, hull: float) -> Vessel:
+    """Another load: more inertia, and more damping of the deeper hull."""
+    model = vessel.model
+    values = {
+        term.name: value * (hull if term.name in ("X_u", "X_abs_u_u", "Y_v", "N_r", "N_uv") else 1.0) / inertia
+        for term, value in zip(model.terms, model.parameters.tolist(), strict=True)
+        if term.name not in ("X_vr", "Y_ur")
+    }
+    return replace(vessel, model=model.with_parameters(values))
+
+
+LOADS: tuple[tuple[str, Callable[[Vessel], Vessel]], ...] = (
+    ("the same load", lambda v: v),
+    ("inertia + 12 %", lambda v: loaded(v, 1.12, 1.0)),
+    ("inertia + 25 %", lambda v: loaded(v, 1.25, 1.0)),
+    ("inertia - 20 %", lambda v: loaded(v, 0.8, 1.0)),
+    ("inertia + 15 %, damping + 8 %", lambda v: loaded(v, 1.15, 1.08)),
+)
+
+
+def ports(trials: int) -> None:
+    """Alarms after a port call that brought another load, and after thrust is lost an hour later."""
     vessel = tender()
+    changes, calibration = calibrated(vessel)
+    rules = Rules(limit=threshold(int(calibration.watched.sum()), 30.0 * DAY / TUNING.stretch_s), port_s=6.0 * HOUR)
+    print("| load | trials | alarms | without port calls | thrust - 5 % found | named first |")
+    print("|---|---|---|---|---|---|")
+    for name, with_load in LOADS:
+        rows = [called(vessel, with_load(vessel), seed, changes, calibration, rules) for seed in range(trials)]
+        print(
+            f"| {name} | {trials} | " + " | ".join(str(sum(row[k] for row in rows)) for k in range(4)) + " |",
+            flush=True,
+        )
+
+
+def called(
+    vessel: Vessel, other: Vessel, seed: int, changes: tuple[Change, ...], calibration: Calibration, rules: Rules
+) -> tuple[bool, bool, bool, bool]:
+    """Alarm after a port call, alarm where it is not taken for one, loss of thrust found afterwards, and named."""
+    before = voyage_record(vessel, HOUR, seed=3 * seed + 9000)
+    after = voyage_record(other, HOUR, seed=3 * seed + 9001)
+    weak = voyage_record(weaker(other, 0.95), HOUR, seed=3 * seed + 9002)
+    state, _ = gone_on(State.begun(calibration, time_s=0.0), vessel, before, changes, calibration, rules, begin_s=0.0)
+    plain = gone_on(state, vessel, after, changes, calibration, replace(rules, port_s=np.inf), begin_s=9.0 * HOUR)[1]
+    state, false = gone_on(state, vessel, after, changes, calibration, rules, begin_s=9.0 * HOUR)
+    _, found = gone_on(state, vessel, weak, changes, calibration, rules, begin_s=10.0 * HOUR)
+    effects = [changes[alarm.change].effect for alarm in found]
+    return bool(false), bool(plain), bool(found), bool(found) and effects[-1] == "gain"
+
+
+def calibrated(vessel: Vessel) -> tuple[tuple[Change, ...], Calibration]:
+    """Changes that are watched for, and a calibration on voyages of two hours."""
     references = [voyage_record(vessel, 2 * HOUR, seed=500 + number) for number in range(8)]
     ship = extended_model(vessel, references[0])
     changes = watched_changes(ship)
@@ -107,7 +180,13 @@ def study(trials: int, days: float) -> None:
         grams_of(ship, reference, changes, begins_s=[3.0 * HOUR * number], stretch_s=TUNING.stretch_s)
         for number, reference in enumerate(references)
     ]
-    calibration = calibrate(joined(parts))
+    return changes, calibrate(joined(parts), load=np.array([change.load for change in changes]))
+
+
+def study(trials: int, days: float) -> None:
+    """False alarms, then changes."""
+    vessel = tender()
+    changes, calibration = calibrated(vessel)
     number = int(calibration.watched.sum())
     voyages = max(1, round(days * 2))
     limits = {between: threshold(number, between * DAY / TUNING.stretch_s) for between in (0.25, 1.0, 30.0)}
@@ -206,8 +285,11 @@ if __name__ == "__main__":
     parser.add_argument("--trials", type=int, default=20)
     parser.add_argument("--days", type=float, default=30.0)
     parser.add_argument("--year", type=int, nargs="?", const=365, help="days of it")
+    parser.add_argument("--ports", action="store_true", help="loads that change in port")
     asked = parser.parse_args()
     if asked.year:
         year(asked.year)
+    elif asked.ports:
+        ports(asked.trials)
     else:
         study(asked.trials, asked.days)

@@ -145,16 +145,15 @@ def _newton_over_all_steps(
 
 def initial_states(windows: Windows, states: int = 3) -> Array:
     """(w, n) state at the beginning of every window: a straight line through its first samples, without roll."""
-    count = min(TUNING.start_samples, windows.measured.shape[1])
-    time = np.arange(count, dtype=float)
-    result = np.zeros((len(windows.measured), states))
-    for index, rows in enumerate(windows.measured[:, :count, :3]):
-        for channel in range(3):
-            seen = np.isfinite(rows[:, channel])
-            if seen.sum() >= 3:
-                result[index, channel] = np.polyfit(time[seen], rows[seen, channel], 1)[1]
-            elif seen.any():
-                result[index, channel] = rows[seen, channel].mean()
+    rows = windows.measured[:, : TUNING.start_samples, :3]
+    seen = np.isfinite(rows)
+    count = np.maximum(seen.sum(axis=1), 1)  # (w, 3)
+    time = np.where(seen, np.arange(rows.shape[1], dtype=float)[:, None], 0.0)
+    middle, mean = time.sum(axis=1) / count, np.where(seen, rows, 0.0).sum(axis=1) / count
+    apart = np.where(seen, time - middle[:, None], 0.0)
+    slope = (apart * np.where(seen, rows, 0.0)).sum(axis=1) / np.maximum((apart**2).sum(axis=1), 1e-300)
+    result = np.zeros((len(rows), states))
+    result[:, :3] = np.where(count >= 3, mean - slope * middle, mean)
     return result
 
 

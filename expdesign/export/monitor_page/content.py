@@ -8,13 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.export.files import finite, strict_json
-from expdesign.monitoring import Alarm, Calibration, Change, State
+from expdesign.monitoring import Alarm, Calibration, Call, Change, State, calls_of
 from expdesign.values import Array
 
 ALIKE = 0.95
 """Correlation of scores from which two changes count as not distinguishable."""
 CLEAR, LARGE = 4.0, 0.5
 """Standard errors and sizes by which the ship of the reference differs from its file, that are told."""
+SHOWN_CALLS = 5
+"""Port calls that are told, the latest."""
+CLEAR_LOAD = 2.0
+"""Standard errors from which a change of the load is told."""
 MUCH_LEFT_OUT = 0.05
 HOUR = 3600.0
 
@@ -48,7 +52,7 @@ class MonitorContent:
         false_alarm_days: average time between false alarms that it is for [d].
         alarms: as raised, in order; each again when settled.
         moments: of the watch.
-        left_out_rows: of the data, which lacked a number.
+        left_out_rows: of the data, which lacked a number; unread_rows: in pieces that could not be read.
         notes: on the data.
         command, version: to reproduce it.
     """
@@ -63,6 +67,7 @@ class MonitorContent:
     alarms: tuple[Alarm, ...]
     moments: tuple[Moment, ...]
     left_out_rows: int
+    unread_rows: int
     notes: tuple[str, ...]
     command: str
     version: str
@@ -74,6 +79,11 @@ class MonitorContent:
         if self.state.alarm is not None:
             latest[self.state.alarm.time_s] = self.state.alarm
         return tuple(latest.values())
+
+    @property
+    def calls(self) -> tuple[Call, ...]:
+        """Port calls, with what they changed."""
+        return calls_of(self.state, self.calibration)
 
 
 def hours(time_s: float) -> str:
@@ -117,7 +127,24 @@ def _sentences(content: MonitorContent) -> Iterator[str]:
             f"{100 * state.left_out / total:.0f} % of the data were not judged: their error is beyond what the "
             "reference shows and looks like no change that is watched for. Weather, waves or a sensor may be others."
         )
+    for call in content.calls[-SHOWN_CALLS:]:
+        yield _call(content, call)
+    if content.unread_rows:
+        yield f"{content.unread_rows} rows could not be read and were not judged: see the notes."
     yield from _baseline(content)
+
+
+def _call(content: MonitorContent, call: Call) -> str:
+    clear = np.abs(call.value) > np.maximum(CLEAR_LOAD * call.std, LARGE)
+    text = f"A port call until {hours(call.time_s)} took {hours(call.stay_s)}. "
+    if not clear.any():
+        return text + "The ship carries the same load afterwards, as far as the data tell."
+    parts = [
+        f"{change.words} {change.told(value * change.size, std * change.size)}"
+        for change, value, std, known in zip(content.changes, call.value, call.std, clear, strict=True)
+        if known
+    ]
+    return text + f"The ship carries another load afterwards, which raises no alarm: {', '.join(parts)}."
 
 
 def _alarm(content: MonitorContent, alarm: Alarm) -> str:
@@ -197,6 +224,7 @@ def monitor_json(content: MonitorContent) -> str:
             "judged_h": state.judged * content.calibration.stretch_s / HOUR,
             "not_judged_h": state.left_out * content.calibration.stretch_s / HOUR,
             "rows_without_numbers": content.left_out_rows,
+            "rows_not_read": content.unread_rows,
             "threshold": content.limit,
             "false_alarm_days": content.false_alarm_days,
             "reference": {
@@ -205,6 +233,7 @@ def monitor_json(content: MonitorContent) -> str:
                 "noise_std": [finite(value) for value in c.std.tolist()],
             },
             "alarms": [_alarm_entry(content, alarm) for alarm in content.found],
+            "port_calls": [_call_entry(content, call) for call in content.calls],
             "changes": [
                 {
                     "effect": change.effect,
@@ -220,6 +249,18 @@ def monitor_json(content: MonitorContent) -> str:
             "notes": content.notes,
         }
     )
+
+
+def _call_entry(content: MonitorContent, call: Call) -> dict[str, object]:
+    return {
+        "from_s": call.time_s - call.stay_s,
+        "until_s": call.time_s,
+        "load": {
+            change.effect: {"value": float(value * change.size), "std": float(std * change.size)}
+            for change, value, std in zip(content.changes, call.value, call.std, strict=True)
+            if change.load
+        },
+    }
 
 
 def _alarm_entry(content: MonitorContent, alarm: Alarm) -> dict[str, object]:

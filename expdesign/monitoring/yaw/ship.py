@@ -13,8 +13,9 @@ import numpy as np
 
 from expdesign.errors import InputError
 from expdesign.monitoring.changes import Change
-from expdesign.monitoring.evidence import STARTS, Grams
+from expdesign.monitoring.evidence import STARTS, Grams, stretch_kinds
 from expdesign.monitoring.tuning import TUNING
+from expdesign.monitoring.yaw.budget import term_budget
 from expdesign.monitoring.yaw.estimate import LARGEST_RATE, simulate_yaw
 from expdesign.monitoring.yaw.model import WORDS, YawData, YawModel
 from expdesign.monitoring.yaw.recorded import SAMPLES, voyages
@@ -118,9 +119,20 @@ def yaw_grams(
         time_s=(np.asarray(begins_s)[batch.astype(int)] + first * step_s)[calm],
         products=products,
         counts=counts,
-        changes=len(changes),
+        budget=_budget(ship, data)[calm],
+        kind=stretch_kinds(data.u, data.r, data.sample_time_s)[calm],
         stretch_s=stretch_s,
     )
+
+
+def _budget(ship: YawShip, data: YawData) -> Array:
+    """(n, m, 3) as in `Grams`: the angular acceleration, what every term adds to it, and what the drives add."""
+    inertia, terms = ship.get(f"{KEY}I_r"), term_budget(ship.model, data, ship.parameters)
+    turned = np.gradient(data.r, data.sample_time_s, axis=1)
+    sizes = [turned, *(terms[name] / inertia for name in ship.model.parameters[1:]), data.moment / inertia]
+    budget = np.zeros((len(data.r), len(sizes), 3))
+    budget[..., 2] = np.stack([np.abs(values).mean(axis=1) for values in sizes], axis=-1)
+    return budget
 
 
 def _again(ship: YawShip, data: YawData, *, first: float = 0.0, push: float = 0.0) -> Array:

@@ -7,15 +7,18 @@ from __future__ import annotations
 
 import codecs
 import csv
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import count, islice
 from pathlib import Path
 
+import numpy as np
+
 from expdesign.errors import FileError
 from expdesign.input_files import check_ends
 from expdesign.records.tuning import TUNING
+from expdesign.values import Array
 
 SEPARATORS = {";": "';'", "\t": "tabs", "|": "'|'"}
 SPREADSHEET = b"PK\x03\x04"
@@ -50,6 +53,23 @@ class Cells:
                 yield row, list(zip(*whole, strict=True))
             row += len(rows)
         wrong.check(self.path, rows=row - FIRST_ROW)
+
+    def numbers(self, columns: Sequence[int]) -> Array | None:
+        """(k, n) numbers of some columns; None where cells or rows are not all plain, for `blocks` to tell them."""
+        parts: list[Array] = []
+        with self.path.open(encoding="utf-8-sig") as file:
+            next(file)
+            while lines := list(islice(file, TUNING.block_rows)):
+                if any(map(str.isspace, lines)):
+                    return None
+                try:
+                    rows = np.loadtxt(lines, delimiter=",", comments=None, ndmin=2)
+                except ValueError:
+                    return None
+                if rows.shape != (len(lines), len(self.header)):
+                    return None
+                parts.append(rows[:, columns])
+        return np.concatenate(parts) if parts else None
 
     def text(self, row: int, column: int) -> str:
         """The text of one cell."""

@@ -143,24 +143,38 @@ class _Numbers:
         Raises:
             FileError: one is no number, infinite, or larger than any measurement.
         """
-        source = self.source
         if found := self.wrong or self.underscored:
-            raise _not_a_number(path, source, *found)
+            raise _not_a_number(path, self.source, *found)
         values = np.concatenate(self.parts)
         self.parts.clear()
-        huge = np.abs(values) > TUNING.largest_number
-        if huge.any():
-            rows = rows_in_words(np.flatnonzero(huge) + FIRST_ROW)
-            found_value = "infinite" if np.isinf(values).any() else f"{values[int(np.argmax(huge))]:.6g}"
-            expected = f"expected finite numbers up to {TUNING.largest_number:g}"
-            raise FileError(path, source.header, f"is {found_value} in {rows}, {expected}")
-        if source.factor != 1.0:
-            values *= source.factor
-        return values
+        return _in_units(path, self.source, values)
+
+
+def _in_units(path: Path, source: Source, values: Array) -> Array:
+    """A column in SI units.
+
+    Raises:
+        FileError: a value is infinite, or larger than any measurement.
+    """
+    huge = np.abs(values) > TUNING.largest_number
+    if huge.any():
+        rows = rows_in_words(np.flatnonzero(huge) + FIRST_ROW)
+        found_value = "infinite" if np.isinf(values).any() else f"{values[int(np.argmax(huge))]:.6g}"
+        expected = f"expected finite numbers up to {TUNING.largest_number:g}"
+        raise FileError(path, source.header, f"is {found_value} in {rows}, {expected}")
+    if source.factor != 1.0:
+        values *= source.factor
+    return values
 
 
 def _read_columns(cells: Cells, sources: Sources) -> dict[str, Array]:
     """The chosen columns; the whole file is looked at before the first cell is complained of."""
+    plain = cells.numbers([source.column for source in sources.values()])
+    if plain is not None:
+        return {
+            name: _in_units(cells.path, source, column.copy())
+            for (name, source), column in zip(sources.items(), plain.T, strict=True)
+        }
     taken = {name: _Numbers(source) for name, source in sources.items()}
     for first_row, texts in cells.blocks():
         for column in taken.values():

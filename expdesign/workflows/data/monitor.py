@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,6 @@ from expdesign import __version__
 from expdesign.errors import FileError, InputError, NotInformative
 from expdesign.export import write_files
 from expdesign.export.monitor_page import (
-    Moment,
     MonitorContent,
     monitor_html,
     monitor_json,
@@ -23,30 +22,41 @@ from expdesign.export.monitor_page import (
     sentences,
 )
 from expdesign.export.monitor_page.content import HEADER
-from expdesign.monitoring import (
-    TUNING,
-    restored_alarm,
-    restored_calibration,
-    restored_changes,
-    restored_state,
-    saved,
-)
+from expdesign.monitoring import TUNING, saved
+from expdesign.processes import ahead
 from expdesign.progress import Progress, silent
 from expdesign.records import STREAM, pieces
 from expdesign.scenario import load_vessel
 from expdesign.workflows.command_text import command_text
+from expdesign.workflows.data.restored import restored_watch
 from expdesign.workflows.data.watched_ship import VESSEL, check_model
-from expdesign.workflows.data.watching import HOUR, Asked, Watch, calibrated, limit_of, read_piece, with_piece
+from expdesign.workflows.data.watching import (
+    HOUR,
+    Asked,
+    Learning,
+    Read,
+    Ready,
+    Watch,
+    Watching,
+    after_reading,
+    calibrated,
+    prepared,
+    rules_of,
+    shift_of,
+    with_piece,
+    with_reference,
+)
 from expdesign.workflows.outcome import Outcome, TextTable
+from expdesign.workflows.steps.workers import workers
 
 STATE = "monitor-state.json"
 MOST_ROWS = 20_000
 """Of a piece of a file."""
-WRITTEN_EVERY_S = 10.0
-"""Of a stream that comes faster than it was measured, time between writing its files [s]."""
+WRITTEN_EVERY_S = 20.0
+"""Time between writing files, from which a watch that is ended by force goes on [s]."""
 USUAL = {
     "--learn-h": 24.0, "--false-alarm-days": 30.0, "--size": TUNING.relative_size, "--every-s": 3600.0,
-    "--velocity": "auto", "--model": VESSEL,
+    "--port-h": 6.0, "--velocity": "auto", "--model": VESSEL,
 }  # fmt: skip
 
 
@@ -60,9 +70,11 @@ def monitor(
     false_alarm_days: float = 30.0,
     size: float = TUNING.relative_size,
     every_s: float = 3600.0,
+    port_h: float = 6.0,
     velocity: str = "auto",
     model: str = VESSEL,
     resume: bool = False,
+    jobs: int = 1,
     progress: Progress = silent,
 ) -> Outcome:
     """Watch a ship in operation, into `out` or runs/<first data file>.
@@ -76,52 +88,84 @@ def monitor(
         false_alarm_days: average time between false alarms [d].
         size: relative change of parameters, thrust and inertia that matters.
         every_s: of a stream, time between looks at it [s].
+        port_h: time without way and propulsion, or without data, after which the ship may carry another load [h];
+            infinite for a ship that never does.
         velocity: where velocities come from, as in `estimate`.
         model: vessel, the vessel file's, or yaw-full or yaw-simplified, learnt from the reference.
         resume: go on from the state in `out`.
+        jobs: processes; 0 for one per core. The results do not depend on it.
         progress: of the command.
     """
     numbers = {"--learn-h": learn_h, "--false-alarm-days": false_alarm_days, "--every-s": every_s}
     _check(data, reference, numbers, size, resume=resume)
     check_model(model)
+    if not port_h > 0:
+        raise InputError(f"--port-h is {port_h:g}, expected more than 0; inf for a ship whose load never changes")
     folder = out or Path("runs") / (Path(data[0]).stem if data[0] != STREAM else "monitor")
     asked = Asked(
         vessel=load_vessel(vessel), size=size, learn_s=HOUR * learn_h, false_alarm_days=false_alarm_days,
-        velocity=velocity, model=model,
+        port_s=HOUR * port_h, velocity=velocity, model=model,
     )  # fmt: skip
     options = {
         "--vessel": vessel, "--reference": tuple(reference), "--learn-h": learn_h, "--velocity": velocity,
-        "--false-alarm-days": false_alarm_days, "--size": size, "--every-s": every_s, "--model": model, "--out": out,
-        "--resume": resume,
+        "--false-alarm-days": false_alarm_days, "--size": size, "--every-s": every_s, "--port-h": port_h,
+        "--model": model, "--out": out, "--resume": resume,
     }  # fmt: skip
     command = command_text("monitor", data, options, usual=USUAL)
     now = _resumed(folder / STATE) if resume else _with_reference(Watch(), reference, asked, progress)
-    due = (0, 0.0)  # files of a stream are written at once when there are more alarms
-    left = now.pending
+    work = _Work(asked=asked, folder=folder, command=command)
     for number, source in enumerate(data):
         rows = max(1, round(every_s / asked.vessel.sample_time_s)) if source == STREAM else MOST_ROWS
-        size_bytes = source.stat().st_size if source != STREAM and source.is_file() else 0
-        read = 0
-        for piece in pieces(
-            source, inputs=asked.vessel.model.inputs, stretch_s=asked.stretch_s, most_rows=rows,
-            unread=asked.unread, before=() if number else left, more_follow=number + 1 == len(data),
-        ):  # fmt: skip
-            now = with_piece(now, piece, asked)
-            read += sum(map(len, piece.lines))
-            share = (number + (read / size_bytes if size_bytes else 0.0)) / len(data)
-            progress(f"watching {source.name}, {len(now.alarms)} alarms", min(share, 0.99))
-            if source == STREAM and now.state is not None and (len(now.alarms), time.monotonic()) >= due:
-                write_files(folder, _files(_content(now, asked, command), now))
-                due = (len(now.alarms), time.monotonic() + WRITTEN_EVERY_S)
-    if now.calibration is None or now.state is None:
+        with workers(jobs, load=None):
+            now = _through(now, source, rows, work, more_follow=number + 1 == len(data), progress=progress)
+    if isinstance(now.phase, Learning):
         raise NotInformative(
             f"the data end before the reference does, which takes {learn_h:g} h: give files of a reference "
             "(--reference) or a shorter one (--learn-h)"
         )
-    content = _content(now, asked, command)
+    if isinstance(now.phase, Ready):
+        raise NotInformative("the data hold no stretch under way that can be simulated, so that nothing is judged")
+    content = _content(now.phase, now, asked, command)
     written = write_files(folder, _files(content, now))
     progress("done", 1.0)
     return Outcome(files=written, summary=_summary(content), tables=_tables(content))
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Work:
+    """What is asked for, and where results go."""
+
+    asked: Asked
+    folder: Path
+    command: str
+
+
+def _through(now: Watch, source: Path, rows: int, work: _Work, *, more_follow: bool, progress: Progress) -> Watch:
+    """After a whole source; the state is saved now and then, and at once when there are more alarms."""
+    asked, due, done = work.asked, (0, time.monotonic() + WRITTEN_EVERY_S * (source != STREAM)), 0
+    size_bytes = source.stat().st_size if source != STREAM and source.is_file() else 0
+    cut = pieces(
+        source, inputs=asked.vessel.model.inputs, stretch_s=asked.stretch_s, most_rows=rows, unread=asked.unread,
+        before=now.reading.pending, more_follow=more_follow, taken=now.reading.taken,
+    )  # fmt: skip
+    tasks = ((piece, (piece.text, piece.time_s, now.changes, shift_of(now))) for piece in cut)
+    for piece, read in ahead(prepared, (asked,), tasks):
+        now = with_piece(now, piece, read, asked)
+        done += len(piece.text)
+        alarms = len(now.phase.alarms) if isinstance(now.phase, Watching) else 0
+        progress(f"watching {source.name}, {alarms} alarms", min(done / size_bytes if size_bytes else 0.0, 0.99))
+        if not piece.again and (alarms, time.monotonic()) >= due:
+            _save(now, source, work)
+            due = (alarms, time.monotonic() + WRITTEN_EVERY_S)
+    return now
+
+
+def _save(now: Watch, source: Path, work: _Work) -> None:
+    """Results so far; of a stream that is learnt from, the rows, as they cannot be read again."""
+    if isinstance(now.phase, Watching):
+        write_files(work.folder, _files(_content(now.phase, now, work.asked, work.command), now))
+    elif isinstance(now.phase, Ready) or source == STREAM:
+        write_files(work.folder, {STATE: _state(now)})
 
 
 def _check(
@@ -144,44 +188,58 @@ def _with_reference(now: Watch, reference: Sequence[Path], asked: Asked, progres
     """Calibrated on files of a reference, if there are some; the times of the data begin anew."""
     for source in reference:
         for piece in pieces(
-            source, inputs=asked.vessel.model.inputs, stretch_s=asked.stretch_s, most_rows=MOST_ROWS,
+            source,
+            inputs=asked.vessel.model.inputs,
+            stretch_s=asked.stretch_s,
+            most_rows=MOST_ROWS,
             unread=asked.unread,
-        ):  # fmt: skip
+        ):
             progress(f"reading the reference, {source.name}", 0.0)
-            now, parts = read_piece(now, piece, asked)
-            now = replace(now, learnt=(*now.learnt, *(part.grams(now) for part in parts)))
-    return replace(calibrated(now), now_s=-np.inf, pending=()) if reference else now
+            read = prepared(asked, piece.text, piece.time_s, now.changes, shift_of(now))
+            now = after_reading(now, piece, read)
+            now = with_reference(now, piece, read, asked) if isinstance(read, Read) else now
+    if not reference:
+        return now
+    reading = replace(now.reading, now_s=-np.inf, offset_s=0.0, pending=(), taken=())
+    return replace(calibrated(now), reading=reading)
 
 
-def _content(now: Watch, asked: Asked, command: str) -> MonitorContent:
-    assert now.calibration is not None
-    assert now.state is not None
+def _content(phase: Watching, now: Watch, asked: Asked, command: str) -> MonitorContent:
     return MonitorContent(
         vessel=asked.vessel.name,
         changes=now.changes,
-        calibration=now.calibration,
-        reference_s=now.reference_s,
-        state=now.state,
-        limit=limit_of(now, asked.false_alarm_days),
+        calibration=phase.calibration,
+        reference_s=phase.reference_s,
+        state=phase.state,
+        limit=rules_of(phase.calibration, asked).limit,
         false_alarm_days=asked.false_alarm_days,
-        alarms=now.alarms,
-        moments=now.moments,
-        left_out_rows=now.left_out_rows,
-        notes=now.notes,
+        alarms=phase.alarms,
+        moments=phase.moments,
+        left_out_rows=now.reading.left_out_rows,
+        unread_rows=now.reading.unread_rows,
+        notes=now.reading.notes,
         command=command,
         version=__version__,
     )
 
 
 def _files(content: MonitorContent, now: Watch) -> dict[str, str | bytes]:
+    assert isinstance(now.phase, Watching)
     files: dict[str, str | bytes] = {
-        "monitor.html": monitor_html(content),
-        "monitor.json": monitor_json(content),
-        STATE: json.dumps({**saved(replace(now, learnt=())), "version": __version__}),
-    }
-    if now.changed:
-        files["since-change.csv"] = "".join(now.changed)
+        "monitor.html": monitor_html(content), "monitor.json": monitor_json(content), STATE: _state(now),
+    }  # fmt: skip
+    if now.phase.changed:
+        files["since-change.csv"] = "".join(now.phase.changed)
     return files
+
+
+def _state(now: Watch) -> str:
+    """The watch as a file; one that learns goes on from its rows, as if they had not been read."""
+    if isinstance(now.phase, Learning):
+        lines = (*now.phase.lines, *now.reading.pending[bool(now.phase.lines) :])
+        reading = replace(now.reading, pending=lines, now_s=-np.inf, offset_s=0.0)
+        now = replace(now, phase=Learning(), reading=reading)
+    return json.dumps({**saved(now), "version": __version__})
 
 
 def _resumed(path: Path) -> Watch:
@@ -192,25 +250,9 @@ def _resumed(path: Path) -> Watch:
     """
     try:
         table: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        if table.pop("version") != __version__:
+        if table["version"] != __version__:
             raise ValueError("of another version")
-        moments = [
-            Moment(**{**m, "value": np.array(m["value"], float), "std": np.array(m["std"], float)})
-            for m in table["moments"]
-        ]
-        tuples = {name: tuple(table[name]) for name in ("notes", "changed", "pending")}
-        return Watch(
-            **{
-                **table,
-                **tuples,
-                "changes": restored_changes(table["changes"]),
-                "learnt": (),
-                "calibration": restored_calibration(table["calibration"]),
-                "state": restored_state(table["state"]),
-                "alarms": tuple(map(restored_alarm, table["alarms"])),
-                "moments": tuple(moments),
-            }
-        )
+        return restored_watch(table)
     except FileNotFoundError:
         raise FileError(path, "", "does not exist, expected the state that an earlier watch left") from None
     except (KeyError, TypeError, ValueError, AttributeError):

@@ -69,7 +69,7 @@ def ship_and_changes(
     return ship_of_changes(model, vessel.model, known), tuple(known), ()
 
 
-def grams(
+def ship_grams(
     ship: Ship, record: Record, changes: Sequence[Change], *, begins_s: Sequence[float], stretch_s: float
 ) -> Grams:
     """Inner products of all stretches of a record."""

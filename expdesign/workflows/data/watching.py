@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from expdesign.errors import NotInformative
+from expdesign.errors import FileError, NotInformative
 from expdesign.export.monitor_page import Moment
 from expdesign.monitoring import (
     TUNING,
@@ -16,6 +16,7 @@ from expdesign.monitoring import (
     Calibration,
     Change,
     Grams,
+    Rules,
     State,
     calibrate,
     estimates,
@@ -24,20 +25,111 @@ from expdesign.monitoring import (
     threshold,
     watch,
 )
-from expdesign.records import Piece
+from expdesign.records import STREAM, Piece, Taken, as_file
 from expdesign.records.file import FIRST_ROW
 from expdesign.signals import Record
+from expdesign.values import Array
 from expdesign.vessel import Vessel
-from expdesign.workflows.data.watched_ship import VESSEL, Ship, grams, ship_and_changes, unread
+from expdesign.workflows.data.watched_ship import VESSEL, ship_and_changes, ship_grams, unread
 from expdesign.workflows.steps.measured import measured
 
 BETWEEN_FILES_S = 3600.0
 """From the end of a file to the beginning of the next, where that has times that begin again."""
+FEWEST_LINES = 4
+"""Of a piece that is read."""
 MOST_SAVED_ROWS = 7200
 """Since a change, for a diagnosis."""
 MOST_MOMENTS = 1000
 """Kept for the page."""
+PIECE = "piece.csv"
+"""In notes; the name of a piece as a file."""
 HOUR, DAY = 3600.0, 86_400.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Reading:
+    """How far the data have been read.
+
+    Attributes:
+        now_s: end of the data [s].
+        offset_s: added to the times of the file, where they begin again in each file.
+        left_out_rows: that lacked a number.
+        unread_rows: in pieces that could not be read.
+        notes: on the data.
+        pending: header, and lines that do not fill a stretch.
+        taken: rows of every source.
+    """
+
+    now_s: float = -np.inf
+    offset_s: float = 0.0
+    left_out_rows: int = 0
+    unread_rows: int = 0
+    notes: tuple[str, ...] = ()
+    pending: tuple[str, ...] = ()
+    taken: tuple[Taken, ...] = ()
+
+    def after(self, piece: Piece) -> Reading:
+        """With the rows of a piece."""
+        others = tuple(taken for taken in self.taken if not taken.continues(piece.taken))
+        before = next((taken for taken in self.taken if taken.continues(piece.taken)), piece.taken)
+        last_s = piece.taken.last_s if np.isfinite(piece.taken.last_s) else before.last_s
+        notes = (f"{piece.source.name}: its first {piece.skipped} rows had been watched before",) * bool(piece.skipped)
+        return replace(
+            self.noted(*notes),
+            left_out_rows=self.left_out_rows + piece.left_out,
+            pending=(piece.header, *piece.pending),
+            taken=(*others, replace(piece.taken, last_s=last_s)),
+        )
+
+    def noted(self, *notes: str) -> Reading:
+        """With more notes; of those that differ in numbers alone, the last."""
+        return replace(self, notes=tuple({re.sub(r"\d+", "", text): text for text in (*self.notes, *notes)}.values()))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Learning:
+    """While the reference lasts.
+
+    Attributes:
+        learnt: inner products of the reference so far.
+        lines: its header and rows, of a stream, which cannot be read again.
+    """
+
+    learnt: tuple[Grams, ...] = ()
+    lines: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Ready:
+    """Calibrated, before the first stretch that is judged.
+
+    Attributes:
+        calibration: of the reference.
+        reference_s: its end [s].
+    """
+
+    calibration: Calibration
+    reference_s: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Watching:
+    """After the reference.
+
+    Attributes:
+        calibration: of the reference.
+        reference_s: its end [s].
+        state: after the last stretch.
+        alarms, moments: so far.
+        changed: header and lines since the last alarm's change.
+    """
+
+    calibration: Calibration
+    reference_s: float
+    state: State
+    alarms: tuple[Alarm, ...] = ()
+    moments: tuple[Moment, ...] = ()
+    changed: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -46,31 +138,13 @@ class Watch:
 
     Attributes:
         changes: watched for; none before the first piece.
-        learnt: inner products of the reference so far.
-        calibration: None while the reference lasts.
-        state: of the watch, None before its first piece.
-        reference_s, now_s: end of the reference and of the data [s].
-        alarms, moments: of the watch.
-        left_out_rows: that lacked a number.
-        notes: on the data.
-        offset_s: added to the times of the file, where they begin again in each file.
-        changed: header and lines since the last alarm's change.
-        pending: header, and lines that do not fill a stretch.
+        reading: how far the data have been read.
+        phase: what is known of the ship.
     """
 
     changes: tuple[Change, ...] = ()
-    learnt: tuple[Grams, ...] = ()
-    calibration: Calibration | None = None
-    state: State | None = None
-    reference_s: float = 0.0
-    now_s: float = -np.inf
-    offset_s: float = 0.0
-    alarms: tuple[Alarm, ...] = ()
-    moments: tuple[Moment, ...] = ()
-    left_out_rows: int = 0
-    notes: tuple[str, ...] = ()
-    changed: tuple[str, ...] = ()
-    pending: tuple[str, ...] = ()
+    reading: Reading = Reading()
+    phase: Learning | Ready | Watching = Learning()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,6 +156,7 @@ class Asked:
         size: relative change that matters.
         learn_s: length of a reference at the beginning of the data [s].
         false_alarm_days: average time between false alarms [d].
+        port_s: time in port after which the ship may carry another load [s].
         velocity: where velocities come from, as in `estimate`.
         model: one of `watched_ship.MODELS`.
     """
@@ -90,6 +165,7 @@ class Asked:
     size: float
     learn_s: float
     false_alarm_days: float
+    port_s: float
     velocity: str
     model: str = VESSEL
 
@@ -104,64 +180,138 @@ class Asked:
         return stretch_length(self.vessel.length_m)
 
 
-def read_piece(now: Watch, piece: Piece, asked: Asked) -> tuple[Watch, tuple[Reading, ...]]:
-    """A piece with its inner products, none where it has no rows, and the watch at its end."""
-    now = replace(now, left_out_rows=now.left_out_rows + piece.left_out, pending=(piece.header, *piece.pending))
-    if not piece.lines:
-        return now, ()
-    if not piece.time_s[0] + now.offset_s > now.now_s:
-        note = f"{piece.source.name}: its times begin again; it is taken as an hour after the data before"
-        offset_s = now.now_s + BETWEEN_FILES_S - float(piece.time_s[0])
-        now = replace(now, offset_s=offset_s, notes=(note, *now.notes))
-    times = piece.time_s + now.offset_s
-    with piece.named():
-        record = measured([piece.path], asked.vessel, velocity=asked.velocity)
-    ship, changes, learnt = ship_and_changes(
-        asked.model, asked.vessel, record, now.changes, size=asked.size, stretch_s=asked.stretch_s
-    )
-    begins = [float(times[batch.first_row - FIRST_ROW]) for batch in record.batches]
-    told = [text.replace(piece.path.name, piece.source.name) for text in record.notes]
-    notes = tuple({re.sub(r"\d+", "", text): text for text in (*told, *learnt, *now.notes)}.values())
-    now = replace(now, changes=changes, now_s=float(times[-1]), notes=notes)
-    return now, (Reading(piece=piece, ship=ship, record=record, begins_s=tuple(begins), stretch_s=asked.stretch_s),)
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Reading:
-    """A piece of the data as a record, with the model and the time at which each batch begins."""
+class Read:
+    """A piece of the data as a record.
 
-    piece: Piece
-    ship: Ship
+    Attributes:
+        record: of the piece.
+        begins_s: time at which each batch begins, in the clock of the file [s].
+        grams: inner products, linearised at the ship with some changes; times in the clock of the file.
+        changes: watched for; shift: (m,) by which the ship was changed, in their sizes.
+        notes: on the ship.
+    """
+
     record: Record
     begins_s: tuple[float, ...]
-    stretch_s: float
+    grams: Grams
+    changes: tuple[Change, ...]
+    shift: Array
+    notes: tuple[str, ...]
 
-    def grams(self, now: Watch) -> Grams:
-        """Inner products, linearised at the ship as it is known to have changed."""
-        shift = np.zeros(len(now.changes)) if now.state is None else now.state.shift
-        effects = {
-            change.effect: self.ship.get(change.effect) + change.size * value
-            for change, value in zip(now.changes, shift.tolist(), strict=True)
-            if value
-        }
-        return grams(
-            self.ship.with_effects(effects), self.record, now.changes, begins_s=self.begins_s, stretch_s=self.stretch_s
-        )
+    def at(self, changes: tuple[Change, ...], shift: Array, asked: Asked, *, offset_s: float) -> Grams:
+        """Inner products, linearised at the ship with changes (m,), with times that are later."""
+        same = changes == self.changes and np.array_equal(shift, self.shift)
+        grams = self.grams if same else _linearised(self.record, self.begins_s, changes, shift, asked)[0]
+        return replace(grams, time_s=grams.time_s + offset_s)
 
 
-def with_piece(now: Watch, piece: Piece, asked: Asked) -> Watch:
+@dataclass(frozen=True)
+class Unread:
+    """A piece that could not be read: key of the error, and the problem."""
+
+    key: str
+    problem: str
+
+
+def prepared(asked: Asked, text: str, time_s: Array, changes: tuple[Change, ...], shift: Array) -> Read | Unread | None:
+    """A piece of the data, ready to be judged; None where it has no rows.
+
+    Args:
+        asked: of the command.
+        text: header and rows.
+        time_s: (k,) of the rows [s].
+        changes: watched for; none where they follow from this piece.
+        shift: (m,) by which the ship is known to have changed.
+    """
+    if len(time_s) < FEWEST_LINES:
+        return None
+    try:
+        with as_file(text) as path:
+            record = measured([path], asked.vessel, velocity=asked.velocity)
+    except FileError as error:
+        return Unread(error.key, error.problem)
+    begins = tuple(float(time_s[batch.first_row - FIRST_ROW]) for batch in record.batches)
+    grams, changes, shift, notes = _linearised(record, begins, changes, shift, asked)
+    return Read(record=record, begins_s=begins, grams=grams, changes=changes, shift=shift, notes=notes)
+
+
+def _linearised(
+    record: Record, begins_s: Sequence[float], known: tuple[Change, ...], shift: Array, asked: Asked
+) -> tuple[Grams, tuple[Change, ...], Array, tuple[str, ...]]:
+    """Inner products with the changes and the shift (m,) they are for, and notes on the ship.
+
+    Where no changes are known, those of the ship of this record.
+    """
+    ship, changes, notes = ship_and_changes(
+        asked.model, asked.vessel, record, known, size=asked.size, stretch_s=asked.stretch_s
+    )
+    shift = shift if known else np.zeros(len(changes))
+    effects = {
+        change.effect: ship.get(change.effect) + change.size * value
+        for change, value in zip(changes, shift.tolist(), strict=True)
+        if value
+    }
+    found = ship_grams(ship.with_effects(effects), record, changes, begins_s=begins_s, stretch_s=asked.stretch_s)
+    return found, changes, shift, notes
+
+
+def after_reading(now: Watch, piece: Piece, read: Read | Unread | None) -> Watch:
+    """The watch at the end of a piece, before it is judged.
+
+    Raises:
+        FileError: the first piece of a source could not be read; of a later one that is noted, and the watch goes on.
+    """
+    before, reading = now.reading, now.reading.after(piece)
+    if read is None:
+        return replace(now, reading=reading)
+    reading = _continued(reading, piece)
+    if isinstance(read, Unread):
+        error = piece.problem(FileError(piece.source, read.key, read.problem))
+        if not any(taken.continues(piece.taken) for taken in before.taken):
+            raise error
+        rows = len(piece.lines)
+        reading = replace(reading.noted(f"{rows} rows are not judged: {error}"), unread_rows=reading.unread_rows + rows)
+        return replace(now, reading=reading)
+    told = [text.replace(PIECE, piece.source.name) for text in read.record.notes]
+    reading = replace(reading.noted(*told, *read.notes), now_s=float(piece.time_s[-1]) + reading.offset_s)
+    return replace(now, changes=now.changes or read.changes, reading=reading)
+
+
+def _continued(reading: Reading, piece: Piece) -> Reading:
+    """With times that go on where those of the piece begin again."""
+    if not piece.time_s[0] + reading.offset_s <= reading.now_s:
+        return reading
+    note = f"{piece.source.name}: its times begin again; it is taken as an hour after the data before"
+    offset_s = reading.now_s + BETWEEN_FILES_S - float(piece.time_s[0])
+    return replace(reading.noted(note), offset_s=offset_s)
+
+
+def with_piece(now: Watch, piece: Piece, read: Read | Unread | None, asked: Asked) -> Watch:
     """After one more piece of the data, which may belong to the reference, to the watch, or to both."""
-    now, parts = read_piece(now, piece, asked)
-    for part in parts:
-        if now.calibration is not None:
-            return _watched(now, part, asked)
-        grams = part.grams(now)
-        first = (*now.learnt, grams)[0].time_s
-        inside = int(np.searchsorted(grams.time_s, (first[0] if len(first) else 0.0) + asked.learn_s))
-        now = replace(now, learnt=(*now.learnt, grams.part(slice(0, inside))))
-        if inside < len(grams):
-            return _watched(calibrated(now), part, asked, first_s=float(grams.time_s[inside]))
-    return now
+    now = after_reading(now, piece, read)
+    if not isinstance(read, Read):
+        return now
+    if not isinstance(now.phase, Learning):
+        return _watched(now, piece, read, asked)
+    learning = with_reference(now, piece, read, asked).phase
+    assert isinstance(learning, Learning)
+    *before, grams = learning.learnt
+    first = (*before, grams)[0].time_s
+    inside = int(np.searchsorted(grams.time_s, (first[0] if len(first) else 0.0) + asked.learn_s))
+    now = replace(now, phase=replace(learning, learnt=(*before, grams.part(slice(0, inside)))))
+    if inside == len(grams):
+        return now
+    return _watched(calibrated(now), piece, read, asked, first_s=float(grams.time_s[inside]))
+
+
+def with_reference(now: Watch, piece: Piece, read: Read, asked: Asked) -> Watch:
+    """With a piece that belongs to the reference."""
+    assert isinstance(now.phase, Learning)
+    learning = now.phase
+    grams = read.at(now.changes, np.zeros(len(now.changes)), asked, offset_s=now.reading.offset_s)
+    lines = (*(learning.lines or (piece.header,)), *piece.lines) if piece.source == STREAM else ()
+    return replace(now, phase=Learning(learnt=(*learning.learnt, grams), lines=lines))
 
 
 def calibrated(now: Watch) -> Watch:
@@ -170,9 +320,11 @@ def calibrated(now: Watch) -> Watch:
     Raises:
         NotInformative: it is too short, or tells too little.
     """
-    if not now.learnt:
+    assert isinstance(now.phase, Learning)
+    learnt = now.phase.learnt
+    if not learnt:
         raise NotInformative("the reference has no rows")
-    calibration = calibrate(joined(now.learnt))
+    calibration = calibrate(joined(learnt), load=np.array([change.load for change in now.changes]))
     if not calibration.watched.any():
         best = int(np.argmax(calibration.rate))
         larger = TUNING.known_within / np.sqrt(max(float(calibration.rate[best]) * calibration.stretches, 1e-12))
@@ -181,44 +333,66 @@ def calibrated(now: Watch) -> Watch:
             f"enough to watch for it: take a longer one, or one with more manoeuvres, or watch for larger changes, "
             f"{larger:.2g} times as large at least (--size), for {now.changes[best].words}"
         )
-    end_s = float(now.learnt[-1].time_s[-1]) + calibration.stretch_s
-    return replace(now, calibration=calibration, learnt=(), reference_s=end_s)
+    end_s = max((float(part.time_s[-1]) for part in learnt if len(part)), default=0.0) + calibration.stretch_s
+    return replace(now, phase=Ready(calibration=calibration, reference_s=end_s))
 
 
-def limit_of(now: Watch, days: float) -> float:
-    """The threshold for so many days between false alarms."""
-    assert now.calibration is not None
-    return threshold(int(now.calibration.watched.sum()), days * DAY / now.calibration.stretch_s)
+def rules_of(calibration: Calibration, asked: Asked) -> Rules:
+    """The threshold for so many days between false alarms, and the length of port calls."""
+    limit = threshold(int(calibration.watched.sum()), asked.false_alarm_days * DAY / calibration.stretch_s)
+    return Rules(limit=limit, port_s=asked.port_s)
 
 
-def _watched(now: Watch, read: Reading, asked: Asked, *, first_s: float = -np.inf) -> Watch:
+def _watched(now: Watch, piece: Piece, read: Read, asked: Asked, *, first_s: float = -np.inf) -> Watch:
     """After the stretches of a piece that begin at a time or later were watched."""
-    assert now.calibration is not None
-    limit, hour = limit_of(now, asked.false_alarm_days), round(HOUR / now.calibration.stretch_s)
-    moments, raised = list(now.moments), list[Alarm]()
-    grams = read.grams(now)
-    first = int(np.searchsorted(grams.time_s, first_s))
+    assert not isinstance(now.phase, Learning)
+    calibration, offset_s = now.phase.calibration, now.reading.offset_s
+    grams = read.at(now.changes, shift_of(now), asked, offset_s=offset_s)
+    first, hour = int(np.searchsorted(grams.time_s, first_s)), round(HOUR / calibration.stretch_s)
+    if first == len(grams):
+        return now
+    on = now.phase if isinstance(now.phase, Watching) else _begun(now.phase, float(grams.time_s[first]))
+    raised = list[Alarm]()
     while first < len(grams):
-        state = now.state or State.begun(now.calibration, time_s=float(grams.time_s[first]))
-        part = grams.part(slice(first, first + hour))
-        state, alarms, steps, used = watch(now.calibration, state, part, limit=limit)
-        value, std = estimates(state, now.calibration)
-        statistic = max((step.statistic for step in steps), default=0.0)
-        moments.append(Moment(time_s=state.judged_s, statistic=statistic, value=value, std=std))
-        now = replace(now, state=state, alarms=(*now.alarms, *alarms))
-        raised += [alarm for alarm in alarms if not alarm.settled]
+        before = on.state
+        on, more, used = _hour(on, grams.part(slice(first, first + hour)), rules_of(calibration, asked))
+        raised += more
         first += used
-        if used < len(part):
-            grams = read.grams(now)
-    return replace(now, moments=_fewer(moments), changed=_changed(now, read.piece, raised)[: MOST_SAVED_ROWS + 1])
+        if on.state.shift is not before.shift and first < len(grams):
+            grams = read.at(now.changes, on.state.shift, asked, offset_s=offset_s)
+    changed = _changed(on, piece, raised, offset_s)[: MOST_SAVED_ROWS + 1]
+    return replace(now, phase=replace(on, moments=_fewer(on.moments), changed=changed))
 
 
-def _changed(now: Watch, piece: Piece, raised: Sequence[Alarm]) -> tuple[str, ...]:
+def shift_of(now: Watch) -> Array:
+    """(m,) by which the ship is known to have changed, in sizes."""
+    return now.phase.state.shift if isinstance(now.phase, Watching) else np.zeros(len(now.changes))
+
+
+def _begun(ready: Ready, time_s: float) -> Watching:
+    return Watching(
+        calibration=ready.calibration,
+        reference_s=ready.reference_s,
+        state=State.begun(ready.calibration, time_s=time_s),
+    )
+
+
+def _hour(on: Watching, grams: Grams, rules: Rules) -> tuple[Watching, list[Alarm], int]:
+    """After stretches that make one moment of the page; alarms that were raised, and stretches that were used."""
+    state, alarms, steps, used = watch(on.calibration, on.state, grams, rules=rules)
+    value, std = estimates(state, on.calibration)
+    statistic = max((step.statistic for step in steps), default=0.0)
+    moment = Moment(time_s=state.judged_s, statistic=statistic, value=value, std=std)
+    on = replace(on, state=state, alarms=(*on.alarms, *alarms), moments=(*on.moments, moment))
+    return on, [alarm for alarm in alarms if not alarm.settled], used
+
+
+def _changed(on: Watching, piece: Piece, raised: Sequence[Alarm], offset_s: float) -> tuple[str, ...]:
     """Header and lines since the last alarm's change."""
     if raised:
-        since = piece.time_s + now.offset_s >= raised[-1].since_s
+        since = piece.time_s + offset_s >= raised[-1].since_s
         return (piece.header, *(line for line, late in zip(piece.lines, since, strict=True) if late))
-    return (*now.changed, *piece.lines) if now.changed else ()
+    return (*on.changed, *piece.lines) if on.changed else ()
 
 
 def _fewer(moments: Sequence[Moment]) -> tuple[Moment, ...]:

@@ -1,0 +1,269 @@
+"""What a watch knows between two stretches, the alarms it raises and the rules it keeps."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from expdesign.monitoring.calibration import Calibration
+from expdesign.monitoring.evidence import KINDS
+from expdesign.monitoring.force import Judged, Known
+from expdesign.values import Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class Alarm:
+    """A change that was noticed.
+
+    Attributes:
+        time_s: when the sum passed its threshold [s].
+        since_s: when that sum began, the estimate of when the change happened [s].
+        statistic: the sum, a log-likelihood ratio, when the alarm was raised.
+        change: number of the change that explains the data since then best.
+        value, std: its estimate in sizes, and the standard error.
+        as_likely: numbers of other changes that explain them as well, best first.
+        unexplained: log-likelihood that all changes together gain beyond the best one.
+        named: the change was named, and its size is being refined.
+        settled: its size, too, is as sure as it is going to be, and the watch goes on from the changed ship.
+        judged_s: end of the data that the estimate is from [s].
+    """
+
+    time_s: float
+    since_s: float
+    statistic: float
+    change: int
+    value: float = 0.0
+    std: float = 0.0
+    as_likely: tuple[int, ...] = ()
+    unexplained: float = 0.0
+    named: bool = False
+    settled: bool = False
+    judged_s: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sums:
+    """What was added up since n beginnings.
+
+    Attributes:
+        since_s: (n,) the beginnings [s].
+        taken: (n, f, m) what the filter has taken of each change for the unmeasured force and the load.
+        score, information: (n, m) and (n, m, m).
+        stretches: (n,) that were added.
+    """
+
+    since_s: Array
+    taken: Array
+    score: Array
+    information: Array
+    stretches: Array
+
+    @property
+    def count(self) -> int:
+        """Stretches since the first beginning."""
+        return int(self.stretches[0])
+
+    @classmethod
+    def begun(cls, count: int, changes: int, forces: int, time_s: float) -> Sums:
+        """Nothing yet."""
+        return cls(
+            since_s=np.full(count, time_s),
+            taken=np.zeros((count, forces, changes)),
+            score=np.zeros((count, changes)),
+            information=np.zeros((count, changes, changes)),
+            stretches=np.zeros(count),
+        )
+
+    def one(self, place: int) -> Sums:
+        """Those of one beginning."""
+        return Sums(**{name: values[place : place + 1] for name, values in vars(self).items()})
+
+    def again(self, places: np.ndarray, time_s: float) -> Sums:
+        """The same with some (n,) begun anew."""
+        return self._where(places, Sums.begun(1, self.score.shape[1], self.taken.shape[1], time_s))
+
+    def first(self, places: np.ndarray, one: Judged, time_s: float) -> Sums:
+        """The same with some (n,) begun with a stretch."""
+        begun = Sums(
+            since_s=np.array([time_s]),
+            taken=(one.gain @ one.seen[0])[None],
+            score=one.score[None],
+            information=one.information[None],
+            stretches=np.ones(1),
+        )
+        return self._where(places, begun)
+
+    def _where(self, places: np.ndarray, other: Sums) -> Sums:
+        return Sums(
+            **{
+                name: np.where(places.reshape(-1, *[1] * (values.ndim - 1)), getattr(other, name), values)
+                for name, values in vars(self).items()
+            }
+        )
+
+    def later(self, keep: Array) -> Sums:
+        """After a gap over which the force's autocorrelation is (f,)."""
+        return replace(self, taken=keep[:, None] * self.taken)
+
+    def added(self, one: Judged) -> tuple[Sums, Array, Array]:
+        """With one more stretch; and its scores (n, m) and information (n, m, m)."""
+        score = one.score - np.einsum("nfm,f->nm", self.taken, one.force_score)
+        cross = one.by_force @ self.taken
+        information = (
+            one.information - cross - np.swapaxes(cross, 1, 2)
+            + np.swapaxes(self.taken, 1, 2) @ one.force_information @ self.taken
+        )  # fmt: skip
+        after = Sums(
+            since_s=self.since_s,
+            taken=self.taken + one.gain @ (one.seen[0] - one.seen[1] @ self.taken),
+            score=self.score + score,
+            information=self.information + information,
+            stretches=self.stretches + 1.0,
+        )
+        return after, score, information
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Load:
+    """What the ship carries since a port call, or since the watch began.
+
+    Attributes:
+        since_s: end of the port call [s].
+        stay_s: time in port [s]; zero where the watch began.
+        judged: stretches since then.
+        rounds: how often it was taken for the ship's.
+        taken: (m,) changes that were, in sizes, less what the filter held before the call.
+    """
+
+    since_s: float
+    stay_s: float
+    judged: int
+    rounds: int
+    taken: Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Call:
+    """A port call whose load was estimated.
+
+    Attributes:
+        time_s: its end [s].
+        stay_s: its length [s].
+        value, std: (m,) what it changed, in sizes, and the standard errors.
+    """
+
+    time_s: float
+    stay_s: float
+    value: Array
+    std: Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Budget:
+    """What terms contributed and what was told, by kind of stretch.
+
+    Attributes:
+        stretches: (k,) that were judged, for each of `KINDS`.
+        terms: (k, m, 3) sums of their `Grams.budget`.
+        information: (k, m) sums of the information about every change, in inverse squared sizes.
+    """
+
+    stretches: Array
+    terms: Array
+    information: Array
+
+    @classmethod
+    def begun(cls, changes: int) -> Budget:
+        """Nothing yet."""
+        kinds = len(KINDS)
+        return cls(
+            stretches=np.zeros(kinds), terms=np.zeros((kinds, changes, 3)), information=np.zeros((kinds, changes))
+        )
+
+    def added(self, kind: int, terms: Array, information: Array) -> Budget:
+        """With a stretch."""
+        where = np.arange(len(self.stretches)) == kind
+        return Budget(
+            stretches=self.stretches + where,
+            terms=self.terms + where[:, None, None] * terms,
+            information=self.information + where[:, None] * information,
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class State:
+    """Of a watch, between two stretches.
+
+    Attributes:
+        judged_s: end of the last stretch that was looked at [s].
+        known: of the unmeasured force and the load, then.
+        ratios: (2 m,) sums of log-likelihood ratios, of increases and then of decreases.
+        sums: since they began, 2 m of them.
+        shift: (m,) changes of the ship that were found, in sizes; before: the same before the last alarm.
+        whole: sums since the watch began, or since the last change was settled.
+        load: since the last port call; calls: those before, the latest of them.
+        budget: of the stretches judged.
+        alarm: the alarm that is not yet settled, or None; pending: sums since its change.
+        judged, left_out: stretches that were judged, and those whose error was beyond anything in the reference.
+    """
+
+    judged_s: float
+    known: Known
+    ratios: Array
+    sums: Sums
+    shift: Array
+    before: Array
+    whole: Sums
+    load: Load
+    budget: Budget
+    calls: tuple[Call, ...] = ()
+    alarm: Alarm | None = None
+    pending: Sums | None = None
+    judged: int = 0
+    left_out: int = 0
+
+    @classmethod
+    def begun(cls, calibration: Calibration, *, time_s: float) -> State:
+        """At the beginning of a watch."""
+        m, known = len(calibration.baseline), Known.nothing(calibration.nuisance)
+        return cls(
+            judged_s=time_s,
+            known=known,
+            ratios=np.zeros(2 * m),
+            sums=Sums.begun(2 * m, m, len(known.mean), time_s),
+            shift=np.zeros(m),
+            before=np.zeros(m),
+            whole=Sums.begun(1, m, len(known.mean), time_s),
+            load=Load(since_s=time_s, stay_s=0.0, judged=0, rounds=0, taken=np.zeros(m)),
+            budget=Budget.begun(m),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rules:
+    """When an alarm is raised, and what counts as a port call.
+
+    Attributes:
+        limit: threshold of the sums.
+        port_s: time without a stretch under way from which the ship may carry another load [s].
+    """
+
+    limit: float
+    port_s: float = math.inf
+
+
+@dataclass(frozen=True, kw_only=True)
+class Step:
+    """After a stretch.
+
+    Attributes:
+        time_s: its end [s].
+        statistic: the largest of all sums.
+        change: whose.
+    """
+
+    time_s: float
+    statistic: float
+    change: int
