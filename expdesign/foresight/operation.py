@@ -24,6 +24,7 @@ from expdesign.monitoring import (
     Alarm,
     Calibration,
     Change,
+    Rules,
     State,
     calibrate,
     grams_of,
@@ -227,7 +228,7 @@ def watched_voyage(
     grams = grams_of(ship, record, changes, begins_s=[0.0], stretch_s=stretch_s)
     state, alarms, first = State.begun(calibration, time_s=0.0), list[Alarm](), 0
     while first < len(grams):
-        state, more, _, used = watch(calibration, state, grams.part(slice(first, None)), limit=limit)
+        state, more, _, used = watch(calibration, state, grams.part(slice(first, None)), rules=Rules(limit=limit))
         alarms, first = [*alarms, *more], first + used
         if first < len(grams):
             effects = {
