@@ -27,7 +27,7 @@ from expdesign.plan.assembly import (
 )
 from expdesign.plan.bounds import reposition_bound_s
 from expdesign.plan.chart import reachable
-from expdesign.plan.checked import drawn_risk, verified
+from expdesign.plan.checked import drawn_lateness_s, drawn_risk, verified
 from expdesign.plan.control import Capability
 from expdesign.plan.legs import LegWater
 from expdesign.plan.monte_carlo import (
@@ -146,8 +146,9 @@ class Draft:
         sailed: commands, motion and legs.
         direct_s: time of the shortest path from start to goal at transit speed [s].
         transit_mps: that speed [m/s].
-        going_round_s: expected time of go-arounds before runs that follow others [s].
         made_good_m: (legs,) by how much each run or leg shortens the way to the goal.
+        late_s: (legs,) by how much longer than planned drawn trials take on each, on average, go-arounds included [s];
+            zero where plans are not compared by it.
     """
 
     area: SeaArea
@@ -158,10 +159,10 @@ class Draft:
     direct_s: float
     transit_mps: float
     made_good_m: Array
-    going_round_s: float = 0.0
+    late_s: Array
 
     def __post_init__(self) -> None:
-        seal(self, made_good_m="legs")
+        seal(self, made_good_m="legs", late_s="legs")
 
     def beyond_s(self, kind: str) -> float:
         """Time of the legs of one kind beyond what the way that they make good takes at transit speed [s]."""
@@ -195,10 +196,7 @@ def _drafted(
     ends = [0, *(leg.last for leg in sailed.legs)]
     left_m = room.space.goal_distance.to_goal(sailed.trajectory.pose[ends, :2])
     speed = water.ship.transit_speed_mps
-    go_around, sample_s = room.space.go_around, problem.vessel.sample_time_s
-    legs = [leg for leg in sailed.legs[1:-1] if leg.kind == "reposition"]
-    leg_s = sample_s * np.array([leg.last - leg.first for leg in legs])
-    rounds_s = 0.0 if go_around is None else float(go_around.seconds(leg_s).sum())
+    late_s = drawn_lateness_s(problem, water, sailed) if problem.expected else np.zeros(len(sailed.legs))
     return Draft(
         area=area,
         water=water,
@@ -207,8 +205,8 @@ def _drafted(
         sailed=sailed,
         direct_s=float(left_m[0]) / speed,
         transit_mps=speed,
-        going_round_s=rounds_s,
         made_good_m=-np.diff(left_m),
+        late_s=late_s,
     )
 
 

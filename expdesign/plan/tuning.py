@@ -34,6 +34,8 @@ class Tuning:
         tighter: turning radii tried as remedies, in that of legs.
         faster: repositioning speeds tried as remedies, in the mean current.
         trials_stream: random stream of the drawn trials, apart from other draws of the same seed.
+        lateness_stream, lateness_trials: random stream, and number, of the trials whose time decides which of several
+            days is expected to be the shortest.
         replans: plans made after the first one, each with more room where drawn trials of the one before left the
             water.
         widening: factor on a run's room then; legs get the same share of a hull length more clearance.
@@ -77,6 +79,8 @@ class Tuning:
     tighter: tuple[float, ...] = (0.9, 0.8, 0.7, 0.6, 0.5)
     faster: tuple[float, ...] = (1.05, 1.2, 1.5)
     trials_stream: int = 1
+    lateness_stream: int = 2
+    lateness_trials: int = 100
     replans: int = 2
     widening: float = 1.4
     replan_budgets: float = 2.0

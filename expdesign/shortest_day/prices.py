@@ -79,8 +79,8 @@ class DraftedDay:
 
     @property
     def expected_s(self) -> float:
-        """The same with the expected time of go-arounds [s]."""
-        return self.day_s + self.draft.going_round_s
+        """The same as drawn trials take on average, go-arounds included [s]."""
+        return self.day_s + float(self.draft.late_s.sum())
 
 
 def first_prices(problem: PlanProblem) -> Prices:
@@ -173,7 +173,7 @@ def learnt_prices(problem: PlanProblem, days: Sequence[DraftedDay]) -> Prices:
 
 
 def _legs_s(names: Sequence[str], days: Sequence[DraftedDay], saved_s: Array) -> Array:
-    """(q,) repositioning for each run, beyond the way that it and its leg make good [s].
+    """(q,) repositioning for each run, beyond the way that it and its leg make good, as drawn trials take it [s].
 
     By the legs that led to it so far, and the average leg, which counts as `Tuning.average_legs` of them.
     """
@@ -189,7 +189,7 @@ def _legs_s(names: Sequence[str], days: Sequence[DraftedDay], saved_s: Array) ->
             first = place - 1 if place and not runs[place - 1] else place
             own_s = second * (sailed.legs[place].last - sailed.legs[place].first) - saved_s[run]
             into.append(run)
-            beyond_s.append(float(lost_s[first : place + 1].sum()) - own_s + draft.going_round_s / sum(runs))
+            beyond_s.append(float((lost_s + draft.late_s)[first : place + 1].sum()) - own_s)
     average_s, count = np.mean(beyond_s), np.bincount(into, minlength=len(names))
     sums_s = np.bincount(into, weights=beyond_s, minlength=len(names))
     learnt_s: Array = (TUNING.average_legs * average_s + sums_s) / (TUNING.average_legs + count)

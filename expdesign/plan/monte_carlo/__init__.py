@@ -7,12 +7,13 @@ from expdesign.plan.monte_carlo.risk import (
     violates_chance_constraint,
     worst_leg,
 )
-from expdesign.plan.monte_carlo.trials import Trials
+from expdesign.plan.monte_carlo.trials import Trials, sail_trials
 
 __all__ = [
     "Trials",
     "estimate_risk",
     "failed_chance_constraint",
+    "sail_trials",
     "trials_needed",
     "violates_chance_constraint",
     "worst_leg",
