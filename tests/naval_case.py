@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -37,17 +37,41 @@ def rotation(hull: Hull = NOMINAL, *, ahead: float = 0.0) -> Voyage:
     return sail(hull, np.full(len(time_s), np.deg2rad(90.0)), speed, sample_time_s=STEP_S, start=start)
 
 
-def harbour_orders(seconds: float, seed: int, step_s: float = STEP_S) -> tuple[np.ndarray, np.ndarray]:
-    """Pod angles within 35 degrees and 30 to 80 revolutions a second, held for 12 to 40 s, with a lag of 3 s."""
+@dataclass(frozen=True)
+class Orders:
+    """How a voyage is ordered: angles within a bound, speeds between two, both held for a while, with a lag."""
+
+    angle_deg: float = 35.0
+    speed_rps: tuple[float, float] = (30.0, 80.0)
+    held_s: tuple[float, float] = (12.0, 40.0)
+    lag_s: float = 3.0
+
+
+CALM, BRISK = Orders(), Orders(angle_deg=60.0, speed_rps=(20.0, 80.0), held_s=(5.0, 20.0), lag_s=1.0)
+
+
+def harbour_orders(
+    seconds: float, seed: int, step_s: float = STEP_S, how: Orders = CALM
+) -> tuple[np.ndarray, np.ndarray]:
+    """Pod angles [rad] and speeds [1/s] of a voyage."""
     rng = np.random.default_rng(seed)
     count = round(seconds / step_s)
     angle, speed, row = np.zeros(count), np.zeros(count), 0
     while row < count:
-        held = round(rng.uniform(12.0, 40.0) / step_s)
-        angle[row : row + held] = np.deg2rad(rng.uniform(-35.0, 35.0))
-        speed[row : row + held] = rng.uniform(30.0, 80.0)
+        held = round(rng.uniform(*how.held_s) / step_s)
+        angle[row : row + held] = np.deg2rad(rng.uniform(-how.angle_deg, how.angle_deg))
+        speed[row : row + held] = rng.uniform(*how.speed_rps)
         row += held
-    return low_passed(angle, 3.0, step_s), low_passed(speed, 3.0, step_s)
+    return low_passed(angle, how.lag_s, step_s), low_passed(speed, how.lag_s, step_s)
+
+
+def fleet(
+    hull: Hull, how: Orders, *, count: int, seed: int, seconds: float = 500.0, step_s: float = STEP_S
+) -> tuple[Voyage, ...]:
+    """Voyages with orders of their own, side by side."""
+    rows = [harbour_orders(seconds, seed + number, step_s, how) for number in range(count)]
+    angle, speed = (np.stack(column) for column in zip(*rows, strict=True))
+    return sail_many(hull, angle, speed, sample_time_s=step_s)
 
 
 def harbour(hull: Hull = NOMINAL, *, seconds: float = 600.0, seed: int = 0, step_s: float = STEP_S) -> Voyage:
@@ -80,6 +104,17 @@ def measured(
         mean = np.lib.stride_tricks.sliding_window_view(drawn, averaged, axis=1).mean(axis=2)
         told[name] = (values + noise * mean)[:, ::every]
     return YawData(sample_time_s=every * voyage.sample_time_s, **told)
+
+
+def measured_fleet(voyages: Sequence[Voyage], *, seed: int, averaged: int, every: int = 1) -> YawData:
+    """Each voyage measured once, with noise of its own."""
+    parts = [
+        measured(one, count=1, seed=seed + number, averaged=averaged, every=every) for number, one in enumerate(voyages)
+    ]
+    return YawData(
+        sample_time_s=parts[0].sample_time_s,
+        **{name: np.concatenate([getattr(part, name) for part in parts]) for name in NOISE},
+    )
 
 
 COLUMNS = {

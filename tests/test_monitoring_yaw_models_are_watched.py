@@ -15,8 +15,10 @@ from expdesign.monitoring import calibrate
 from expdesign.monitoring.yaw import (
     NOMINAL,
     YAW_MODELS,
+    Detector,
     YawData,
     YawShip,
+    alarm_samples,
     estimate_yaw,
     estimate_yaw_by_instruments,
     halves_in_words,
@@ -24,10 +26,25 @@ from expdesign.monitoring.yaw import (
     start_values,
     yaw_changes,
     yaw_grams,
+    yaw_rates,
 )
 from expdesign.records import load_records
 from expdesign.scenario import load_vessel
-from naval_case import SHIP, exact, harbour, heavier, measured, naval_csvs, turn
+from expdesign.simulation.naval import NOMINAL as NOMINAL_HULL
+from naval_case import (
+    BRISK,
+    CALM,
+    SHIP,
+    Orders,
+    exact,
+    fleet,
+    harbour,
+    heavier,
+    measured,
+    measured_fleet,
+    naval_csvs,
+    turn,
+)
 
 FULL, SIMPLE = YAW_MODELS["full"], YAW_MODELS["simplified"]
 REFERENCES = 4
@@ -175,3 +192,44 @@ def test_halves_that_disagree_at_equal_fit_raise_the_alarm_of_poor_data() -> Non
     assert "within a factor of three, with fits of 90.0 and 91.0 %" in halves_in_words(twice)
     apart = replace(twice, parameters=same.parameters * np.array([[1.0], [4.0]]))
     assert halves_in_words(apart).startswith("Not informative enough: halves of the reference give I_r")
+
+
+def inertial_difference(how: Orders, *, count: int) -> float:
+    """Yaw rate of a ship with 10 % more moment of inertia less that of the nominal one, root mean square [rad/s]."""
+    nominal, heavy = (
+        fleet(hull, how, count=count, seed=0, seconds=250.0, step_s=0.5)
+        for hull in (NOMINAL_HULL, heavier(inertia=1.1))
+    )
+    apart = [one.column("r") - other.column("r") for one, other in zip(nominal, heavy, strict=True)]
+    return float(np.sqrt(np.mean(np.square(apart))))
+
+
+def test_inertia_moves_the_yaw_rate_by_less_than_the_sum_of_the_thesis_counts() -> None:
+    """Its constant d is 0.0025 rad/s; what inertia does grows with the changes of orders: detection rests on them."""
+    calm, brisk = (inertial_difference(how, count=5) for how in (CALM, BRISK))
+    assert calm < 0.0025 / 8.0
+    assert 1.8 * calm < brisk < 0.0025 / 3.0
+
+
+@pytest.mark.slow
+def test_the_sum_of_the_thesis_finds_more_inertia_where_orders_change_often() -> None:
+    """With its own constants, noise averaged over 7 samples: calm voyages are missed, others found."""
+    constants = Detector(d=0.0025, l=3.5e-5, h=0.018)
+    runs, missed = 20, {}
+    for name, how in (("calm", CALM), ("brisk", BRISK)):
+        learnt = measured_fleet(fleet(NOMINAL_HULL, how, count=2, seed=9000), seed=5000, averaged=7, every=4)
+        priors = estimate_yaw(FULL, learnt, NOMINAL).parameters
+        residuals = []
+        for hull, seed in ((NOMINAL_HULL, 3000), (heavier(inertia=1.1), 4000)):
+            data = measured_fleet(fleet(hull, how, count=runs, seed=0), seed=seed, averaged=7)
+            residuals.append(np.concatenate([data.r - yaw_rates(FULL, data, theta) for theta in priors]))
+        false, found = (np.isfinite(alarm_samples(constants, residual)).mean() for residual in residuals)
+        assert false < 0.3
+        missed[name] = 1.0 - found
+    assert missed["brisk"] < 0.4
+    assert missed["calm"] > 0.6
+
+
+def test_rates_without_sensitivities_are_the_same(departure: YawData) -> None:
+    values = np.array([NOMINAL[name] for name in FULL.parameters])
+    np.testing.assert_allclose(yaw_rates(FULL, departure, values), simulate_yaw(FULL, departure, values)[0], atol=1e-12)

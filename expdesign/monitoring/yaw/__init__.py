@@ -13,7 +13,7 @@ Source: a master's thesis on the estimation of a ship's yaw dynamics in operatio
 
 from expdesign.monitoring.yaw.budget import excitation_rank, term_budget
 from expdesign.monitoring.yaw.detector import Detector, alarm_samples
-from expdesign.monitoring.yaw.estimate import YawEstimate, estimate_yaw, halves_differ, simulate_yaw
+from expdesign.monitoring.yaw.estimate import YawEstimate, estimate_yaw, halves_differ, simulate_yaw, yaw_rates
 from expdesign.monitoring.yaw.instruments import estimate_yaw_by_instruments
 from expdesign.monitoring.yaw.learnt import halves_in_words, learnt_ship
 from expdesign.monitoring.yaw.model import NOMINAL, YAW_MODELS, YawData, YawModel
@@ -44,4 +44,5 @@ __all__ = [
     "term_budget",
     "yaw_changes",
     "yaw_grams",
+    "yaw_rates",
 ]

@@ -82,6 +82,29 @@ def _acceleration(shapes: Array, moment: Array, theta: Array, r: Array, slope: A
     return acceleration[:, 0], moved / inertia
 
 
+def yaw_rates(model: YawModel, data: YawData, parameters: Array) -> Array:
+    """`simulate_yaw` without sensitivities, in a fraction of the time: yaw rates (n, k)."""
+    theta = np.broadcast_to(parameters, (len(data.r), len(model.parameters)))
+    inertia, step = theta[:, 0], data.sample_time_s
+    by = np.einsum("pknj,nj->pkn", model.shapes(data), theta[:, 1:])
+    by[0] += data.moment.T
+    by /= inertia
+    middle = 0.5 * (by[:, :-1] + by[:, 1:])
+
+    def rate(c: Array, r: Array) -> Array:
+        return np.asarray(c[0] + c[1] * r + (c[2] + c[3] * r) * np.abs(r))
+
+    rates = np.empty_like(by[0])
+    rates[0] = r = data.r[:, 0]
+    for index in range(len(rates) - 1):
+        a = rate(by[:, index], r)
+        b = rate(middle[:, index], r + step / 2 * a)
+        c = rate(middle[:, index], r + step / 2 * b)
+        d = rate(by[:, index + 1], r + step * c)
+        rates[index + 1] = r = np.clip(r + step / 6 * (a + 2 * b + 2 * c + d), -LARGEST_RATE, LARGEST_RATE)
+    return np.asarray(rates.T)
+
+
 def estimate_yaw(
     model: YawModel, data: YawData, start: Mapping[str, float], *, groups: NDArray[np.int_] | None = None
 ) -> YawEstimate:
