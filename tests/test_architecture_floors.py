@@ -21,7 +21,7 @@ FLOORS = {
         ("vessel",),
         ("simulation", "records"),
         ("reduction",),
-        ("dictionary", "estimation", "indices"),
+        ("dictionary", "estimation", "indices", "step_trials"),
         ("information", "diagnosis", "assessment"),
         ("durations",),
         ("growing", "rehearsal", "plan", "monitoring"),

@@ -206,6 +206,19 @@ def workflows(monkeypatch: pytest.MonkeyPatch) -> Workflows:
             ((Path("a.csv"), Path("b.csv")), None),
             MONITOR | {"reference": (Path("c.csv"), Path("d.csv")), "size": 0.2, "model": "yaw-full"},
         ),
+        (
+            "identify-steps a.csv b.csv --vessel v.toml --throttle n1 n2 --rudder a1 a2 --test c.csv --seed 3",
+            "identify_steps",
+            ((Path("a.csv"), Path("b.csv")), None),
+            {
+                "vessel": Path("v.toml"),
+                "throttle": ("n1", "n2"),
+                "rudder": ("a1", "a2"),
+                "tests": (Path("c.csv"),),
+                "velocity": "auto",
+                "seed": 3,
+            },
+        ),
         ("monitor - --vessel v.toml --resume", "monitor", ((Path("-"),), None), MONITOR | {"resume": True}),
     ],
 )

@@ -19,7 +19,7 @@ from expdesign.cli.commands import app
 from expdesign.errors import InputError, NoAnswer
 from expdesign.interruptions import interruptions_wait
 
-LISTS = ("--format", "--method", "--fixed", "--test", "--data", "--interest", "--reference")
+LISTS = ("--format", "--method", "--fixed", "--test", "--data", "--interest", "--reference", "--throttle", "--rudder")
 """Options that take several values."""
 FILE_LISTS = ("--test", "--data", "--reference")
 """Those of them whose values are files."""

@@ -207,6 +207,62 @@ def indices(
     )
 
 
+@command("identify-steps")
+def identify_steps(
+    data: DataFiles,
+    vessel: Annotated[
+        Path | None,
+        typer.Option(
+            "--vessel",
+            metavar="VESSEL.toml",
+            help="What is known of the vessel before the trial: its model with parameter_std. The steps update it.",
+        ),
+    ] = None,
+    throttle: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--throttle",
+            metavar="NAME ...",
+            help="Signals whose mean drives the vessel, e.g. n1. Default: all n, else tau_x.",
+        ),
+    ] = None,
+    rudder: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--rudder",
+            metavar="NAME ...",
+            help="Signals whose mean turns it. Default: all rudder, else all a, else tau_psi, else half the difference "
+            "of the first and the last n.",
+        ),
+    ] = None,
+    tests: Annotated[
+        list[Path] | None,
+        typer.Option("--test", metavar="FILE ...", help="Runs held out: simulated, but not used to identify."),
+    ] = None,
+    velocity: Velocity = "auto",
+    out: OutByData = None,
+    seed: Seed = 0,
+) -> Asked:
+    """Identify a model of speed and yaw rate from steps of throttle and rudder, each held until the vessel is steady.
+
+    Writes step-model.json, step-trial.html and, with --vessel, vessel-steps.toml: that vessel with the parameters,
+    covariance and dead times that the steps leave, from which a trial is designed with prior = "parameter_std".
+
+    Example: expdesign identify-steps steps.csv --vessel fast-8m.toml
+    """
+    return ask(
+        "identify_steps",
+        data,
+        out,
+        vessel=vessel,
+        throttle=throttle or (),
+        rudder=rudder or (),
+        tests=tests or (),
+        velocity=velocity,
+        seed=seed,
+    )
+
+
 @command("mine")
 def mine(
     data: DataFiles,

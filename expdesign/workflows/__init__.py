@@ -12,6 +12,7 @@ from expdesign.lazy import load_on_use
 if TYPE_CHECKING:
     from expdesign.workflows.data.diagnose import diagnose
     from expdesign.workflows.data.estimate import estimate
+    from expdesign.workflows.data.identify_steps import identify_steps
     from expdesign.workflows.data.indices import indices
     from expdesign.workflows.data.mine import mine
     from expdesign.workflows.data.monitor import monitor
@@ -45,6 +46,7 @@ __all__ = [
     "explain",
     "export",
     "foresee",
+    "identify_steps",
     "indices",
     "measured",
     "mine",
@@ -67,6 +69,7 @@ if not TYPE_CHECKING:
         {
             "data.diagnose": ("diagnose",),
             "data.estimate": ("estimate",),
+            "data.identify_steps": ("identify_steps",),
             "data.indices": ("indices",),
             "data.mine": ("mine",),
             "data.monitor": ("monitor",),

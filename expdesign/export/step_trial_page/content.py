@@ -1,0 +1,248 @@
+"""A step trial as JSON, tables and sentences."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from expdesign.export.files import finite, strict_json
+from expdesign.step_trials import CHANNELS, NO_BEND, TUNING, StepSample, StepTrial, Surface
+from expdesign.values import Array
+from expdesign.vessel import Vessel
+
+REPEAT_HEADER = ("step", "begins at", "throttle", "rudder", "why")
+STATES = ("speed", "yaw rate")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Validated:
+    """A batch simulated from its first state with its commands alone.
+
+    Attributes:
+        name: of the batch.
+        time_s: (k,).
+        measured, simulated: (k, 2) U and r.
+        fit_percent: (2,).
+    """
+
+    name: str
+    time_s: Array
+    measured: Array
+    simulated: Array
+    fit_percent: Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StepTrialContent:
+    """The values that page and files show.
+
+    Attributes:
+        trial: what was identified.
+        before, nominal: the vessel as its file knew it, and after the steps; None where no file was given.
+        own, tests: simulations of the data, and of data held out.
+        notes: on the data.
+        command, version: to reproduce it.
+    """
+
+    trial: StepTrial
+    before: Vessel | None
+    nominal: Vessel | None
+    own: tuple[Validated, ...]
+    tests: tuple[Validated, ...]
+    notes: tuple[str, ...]
+    command: str
+    version: str
+
+
+def begins_s(content: StepTrialContent, one: StepSample) -> float:
+    """Time of the change of command in its batch [s]."""
+    return one.hold.begin * content.trial.batches[one.hold.batch].sample_time_s
+
+
+def sentences(content: StepTrialContent) -> tuple[str, ...]:
+    """The findings."""
+    return tuple(_sentences(content))
+
+
+def _sentences(content: StepTrialContent) -> Iterator[str]:
+    trial = content.trial
+    asked = sum(one.hold.channel is not None for one in trial.samples)
+    steady = sum(one.plateau is not None for one in trial.samples)
+    yield (
+        f"{len(trial.counted)} of {asked} steps give an inertia; {steady} of {len(trial.holds)} holds were steady and "
+        f"give a damping. Throttle is {trial.controls.words[0]}, rudder {trial.controls.words[1]}"
+        f"{', negative for turns to starboard; the model counts it the other way' if trial.rudder_sign < 0 else ''}."
+    )
+    delays = [
+        f"{name} {value:.2f} \N{PLUS-MINUS SIGN} {std:.2f} s"
+        for name, (value, std) in zip(CHANNELS, trial.delays, strict=True)
+    ]
+    yield f"Dead times: {', '.join(delays)}."
+    fits = [f"U {part.fit_percent[0]:.0f} %, r {part.fit_percent[1]:.0f} % of {part.name}" for part in content.own]
+    yield f"Simulated from its commands alone, the model fits {'; '.join(fits)}, the data that it was made from."
+    if content.tests:
+        fits = [
+            f"U {part.fit_percent[0]:.0f} %, r {part.fit_percent[1]:.0f} % of {part.name}" for part in content.tests
+        ]
+        yield f"It fits {'; '.join(fits)}, which was held out."
+    if trial.repeat:
+        numbers = ", ".join(str(one.hold.number) for one in trial.repeat)
+        yield f"Repeat {'step' if len(trial.repeat) == 1 else 'steps'} {numbers}; the reasons are below."
+    yield from _compared(content)
+    outside = [one for one in trial.samples if one.plateau is not None and not one.plateau.turns]
+    if len(outside) > steady / 2:
+        yield (
+            f"{len(outside)} of {steady} steady holds lasted less than a whole turn: a current would be in their "
+            "speeds. In a current hold each step for a whole turn."
+        )
+
+
+def _compared(content: StepTrialContent) -> Iterator[str]:
+    told = [one for one in content.trial.found if one.p_value < TUNING.significant]
+    for one in told:
+        size = f"{abs(one.difference):.3g} \N{PLUS-MINUS SIGN} {one.std:.1g} of the {one.command}"
+        what = "port and starboard differ" if one.kind == "asymmetry" else "steps up and down end in different states"
+        yield f"{one.kind.capitalize()}: {what} by {size} to either side of the mean (p = {one.p_value:.1g})."
+    if content.trial.found and not told:
+        kinds = sorted({one.kind for one in content.trial.found})
+        yield f"No sign of {' or '.join(kinds)} at the level of {TUNING.significant:g}."
+
+
+def repeat_rows(content: StepTrialContent) -> list[tuple[str, ...]]:
+    """Under `REPEAT_HEADER`."""
+    return [
+        (
+            str(one.hold.number),
+            f"{begins_s(content, one):.0f} s",
+            _to(one, 0),
+            _to(one, 1),
+            "; ".join(one.problems),
+        )
+        for one in content.trial.repeat
+    ]
+
+
+def _to(one: StepSample, channel: int) -> str:
+    after, change = one.hold.commands[channel], one.hold.change[channel]
+    moved = one.hold.changed in (CHANNELS[channel], "both")
+    return f"{after - change:.3g} \N{RIGHTWARDS ARROW} {after:.3g}" if moved else f"{after:.3g}"
+
+
+STEP_HEADER = ("step", "throttle", "rudder", "steady after", "U", "r", "turns", "time constant", "inertia", "remarks")
+
+
+def step_rows(content: StepTrialContent) -> list[tuple[str, ...]]:
+    """Every hold, under `STEP_HEADER`."""
+    return [_step_row(one) for one in content.trial.samples]
+
+
+def _step_row(one: StepSample) -> tuple[str, ...]:
+    part, response = one.plateau, one.response
+    state = (
+        ("", "", "") if part is None else (f"{part.state[0]:.2f} m/s", f"{part.state[1]:.3f} rad/s", str(part.turns))
+    )
+    time = (
+        ""
+        if response is None
+        else f"{response.time_constant_s:.2f} \N{PLUS-MINUS SIGN} {response.time_constant_std_s:.2f} s"
+    )
+    mass = f"{one.inertia:.3g} \N{PLUS-MINUS SIGN} {one.inertia_std:.1g}" if math.isfinite(one.inertia) else ""
+    remarks = "; ".join((*one.problems, *one.remarks))
+    return (
+        str(one.hold.number), _to(one, 0), _to(one, 1), "" if one.steady_s is None else f"{one.steady_s:.0f} s", *state,
+        time, mass, remarks,
+    )  # fmt: skip
+
+
+def nominal_rows(content: StepTrialContent) -> list[tuple[str, ...]]:
+    """Parameter, value before and value after, with standard deviations."""
+    if content.before is None or content.nominal is None:
+        return []
+    before, after = content.before.model, content.nominal.model
+    columns = (before.names, before.parameters, before.parameter_std, after.parameters, after.parameter_std)
+    return [
+        (name, _pair(value, std), _pair(found, left)) for name, value, std, found, left in zip(*columns, strict=True)
+    ]
+
+
+def _pair(value: float, std: float) -> str:
+    return f"{value:.4g} \N{PLUS-MINUS SIGN} {std:.2g}" if std > 0 else f"{value:.4g}, known"
+
+
+def step_model_json(content: StepTrialContent) -> str:
+    """Everything, with units in the names."""
+    trial, model = content.trial, content.trial.model
+    return strict_json(
+        {
+            "remarks": sentences(content),
+            "throttle": list(trial.controls.throttle),
+            "rudder": list(trial.controls.rudder) or "differential",
+            "rudder_sign": trial.rudder_sign,
+            "model": {
+                "equations": "m_U(U, r) dU/dt + sigma_U(U, r) = throttle(t - delay), the same in r with the rudder",
+                "delay_s": dict(zip(CHANNELS, model.delay_s, strict=True)),
+                "delay_std_s": {name: finite(std) for name, (_, std) in zip(CHANNELS, trial.delays, strict=True)},
+                **{f"sigma_{state}": _surface(part) for state, part in zip("Ur", model.damping, strict=True)},
+                **{f"m_{state}": _surface(part) for state, part in zip("Ur", model.inertia, strict=True)},
+                "validity_corners": [{"U_mps": u, "r_radps": r} for u, r in model.region.outline.tolist()],
+            },
+            "steady_state_test": {
+                state: {
+                    "interval_s": test.interval_s,
+                    "l1_per_s": test.rate / test.interval_s,
+                    "l2_l3_per_s": test.variance_rate / test.interval_s,
+                    "steady_below": test.lower,
+                    "transient_above": test.upper,
+                }
+                for state, test in zip("Ur", trial.tests, strict=True)
+            },
+            "steps": [_step(content, one) for one in trial.samples],
+            "comparisons": [vars(one) for one in trial.found],
+            "fit_percent": {
+                part.name: dict(zip("Ur", part.fit_percent.tolist(), strict=True))
+                for part in (*content.own, *content.tests)
+            },
+            "notes": list(content.notes),
+            "command": content.command,
+        }
+    )
+
+
+def _surface(part: Surface) -> dict[str, object]:
+    powers = [
+        {"U": i, "r": j, "coefficient": c} for (i, j), c in zip(part.powers, part.coefficients.tolist(), strict=False)
+    ]
+    bend = None
+    if part.bend != NO_BEND:
+        bend = {"a_spm": part.bend[0], "b_mps": part.bend[1], "coefficient": float(part.coefficients[-1])}
+    return {
+        "terms": powers, "tanh": bend, "method": part.method, "penalty": part.penalty,
+        "held_out_rms": finite(part.held_out), "least_measured": part.least, "most_measured": part.most,
+    }  # fmt: skip
+
+
+def _step(content: StepTrialContent, one: StepSample) -> dict[str, object]:
+    part, response = one.plateau, one.response
+    return {
+        "number": one.hold.number,
+        "batch": content.trial.batches[one.hold.batch].name,
+        "begins_s": begins_s(content, one),
+        "changed": one.hold.changed,
+        "throttle": one.hold.commands[0],
+        "rudder": one.hold.commands[1],
+        "steady_after_s": one.steady_s,
+        "U_mps": None if part is None else float(part.state[0]),
+        "U_std_mps": None if part is None else finite(part.std[0]),
+        "r_radps": None if part is None else float(part.state[1]),
+        "r_std_radps": None if part is None else finite(part.std[1]),
+        "turns": None if part is None else part.turns,
+        "time_constant_s": None if response is None else response.time_constant_s,
+        "time_constant_std_s": None if response is None else finite(response.time_constant_std_s),
+        "damping_ratio": None if response is None else response.damping,
+        "zero_s": None if response is None else response.zero_s,
+        "inertia": finite(one.inertia),
+        "inertia_std": finite(one.inertia_std),
+        "problems": list(one.problems),
+        "remarks": list(one.remarks),
+    }

@@ -1,0 +1,198 @@
+"""A record cut into holds: stretches in which throttle and rudder stand still."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from expdesign.errors import InputError, NotInformative, UnknownName
+from expdesign.signals import Batch
+from expdesign.step_trials.tuning import TUNING
+from expdesign.values import Array, seal
+
+CHANNELS = ("throttle", "rudder")
+"""Commands; the first drives the speed U, the second the yaw rate r."""
+THROTTLES, RUDDERS = ("n", "tau_x"), ("rudder", "a", "tau_psi")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Controls:
+    """Which signals are the two commands.
+
+    Attributes:
+        throttle: signals whose mean drives the vessel.
+        rudder: signals whose mean turns it.
+        differential: half the difference of the first and the last throttle turns it, as with two fixed propellers.
+    """
+
+    throttle: tuple[str, ...]
+    rudder: tuple[str, ...] = ()
+    differential: bool = False
+
+    @property
+    def words(self) -> tuple[str, str]:
+        """Both commands in words."""
+        turns = f"({self.throttle[0]} - {self.throttle[-1]})/2" if self.differential else _mean(self.rudder)
+        return _mean(self.throttle), turns
+
+
+def _mean(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"mean of {', '.join(names)}"
+
+
+def controls_of(names: Sequence[str], throttle: Sequence[str] = (), rudder: Sequence[str] = ()) -> Controls:
+    """The commands among the inputs of a record: those asked for, else by the kinds of actuators.
+
+    Raises:
+        UnknownName: a signal that the record lacks.
+        InputError: no signal drives, or none turns.
+    """
+    for name in (*throttle, *rudder):
+        if name not in names:
+            raise UnknownName("input signal", name, known=names)
+    drives = tuple(throttle) or _first_kind(names, THROTTLES)
+    if not drives:
+        raise InputError(f"the inputs {', '.join(names)} have no throttle, expected n1 or tau_x, or --throttle")
+    turns = tuple(rudder) or _first_kind([name for name in names if name not in drives], RUDDERS)
+    if turns:
+        return Controls(throttle=drives, rudder=turns)
+    if len(drives) > 1:
+        return Controls(throttle=drives, differential=True)
+    raise InputError(f"the inputs {', '.join(names)} have no rudder, expected rudder1, a1, tau_psi or n2, or --rudder")
+
+
+def _first_kind(names: Sequence[str], kinds: Sequence[str]) -> tuple[str, ...]:
+    found = [tuple(name for name in names if name.rstrip("0123456789") == kind) for kind in kinds]
+    return next(filter(None, found), ())
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sailed:
+    """One uninterrupted record of a step trial.
+
+    Attributes:
+        name: of the batch.
+        sample_time_s: time between samples [s].
+        state: (k, 2) speed over ground U [m/s] and yaw rate r [rad/s].
+        sway: (k,) [m/s], nan where it is not known.
+        commands: (k, 2) throttle and rudder, in the units of their signals.
+        inputs: (k, m) all inputs of the record.
+    """
+
+    name: str
+    sample_time_s: float
+    state: Array
+    sway: Array
+    commands: Array
+    inputs: Array
+
+    def __post_init__(self) -> None:
+        seal(self, state="k 2", sway="k", commands="k 2", inputs="k m")
+
+    @property
+    def time_s(self) -> Array:
+        """(k,) from zero [s]."""
+        return np.asarray(np.arange(len(self.state)) * self.sample_time_s, dtype=float)
+
+
+def sailed(batch: Batch, controls: Controls) -> Sailed:
+    """Speed, yaw rate and the two commands of a batch."""
+    u, v, r = batch.velocity.T
+    speed = np.where(np.isfinite(v), np.hypot(u, np.nan_to_num(v)), np.abs(u))
+    column = dict(zip(batch.input_names, batch.inputs.T, strict=True))
+    throttle = np.mean([column[name] for name in controls.throttle], axis=0)
+    if controls.differential:
+        rudder = (column[controls.throttle[0]] - column[controls.throttle[-1]]) / 2
+    else:
+        rudder = np.mean([column[name] for name in controls.rudder], axis=0)
+    return Sailed(
+        name=batch.name,
+        sample_time_s=batch.sample_time_s,
+        state=np.stack([speed, r], axis=1),
+        sway=v,
+        commands=np.stack([throttle, rudder], axis=1),
+        inputs=batch.inputs,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hold:
+    """Commands that stand still.
+
+    Attributes:
+        number: counted through all batches, from 1.
+        batch: index of the batch.
+        begin: sample at which the commands began to change towards these.
+        settled: sample from which on they stand.
+        end: sample after the last.
+        commands: throttle and rudder.
+        changed: what changed before it: "throttle", "rudder", "both", or "" for nothing.
+        first: of its batch.
+        change: signed change of throttle and rudder.
+    """
+
+    number: int
+    batch: int
+    begin: int
+    settled: int
+    end: int
+    commands: tuple[float, float]
+    changed: str
+    change: tuple[float, float]
+    first: bool
+
+    @property
+    def channel(self) -> int | None:
+        """0 for a throttle step, 1 for a rudder step, None for others."""
+        return CHANNELS.index(self.changed) if self.changed in CHANNELS else None
+
+
+def holds_of(batches: Sequence[Sailed]) -> tuple[Hold, ...]:
+    """All holds, in order.
+
+    Raises:
+        NotInformative: there are less than three.
+    """
+    values = np.concatenate([batch.commands for batch in batches])
+    width = np.maximum(TUNING.constant_share * np.ptp(values, axis=0), 1e-9)
+    found: list[Hold] = []
+    for index, batch in enumerate(batches):
+        found += _holds(batch, index, width, first=len(found) + 1)
+    if len(found) < 3:
+        raise NotInformative(
+            f"the commands stand still in {len(found)} stretches of at least {TUNING.least_hold_s:g} s, expected three "
+            "or more: this is no step trial"
+        )
+    return tuple(found)
+
+
+def _holds(batch: Sailed, index: int, width: Array, *, first: int) -> Iterator[Hold]:
+    least = max(TUNING.least_hold_samples, round(TUNING.least_hold_s / batch.sample_time_s))
+    stretches = [part for part in _constant(batch.commands, width) if part[1] - part[0] >= least]
+    before: tuple[int, tuple[float, float]] | None = None
+    for number, (settled, end) in enumerate(stretches, start=first):
+        throttle, rudder = np.median(batch.commands[settled:end], axis=0).tolist()
+        change = (0.0, 0.0) if before is None else (throttle - before[1][0], rudder - before[1][1])
+        yield Hold(
+            number=number, batch=index, begin=settled if before is None else before[0], settled=settled, end=end,
+            commands=(throttle, rudder), changed="" if before is None else _changed(change, width), change=change,
+            first=before is None,
+        )  # fmt: skip
+        before = (end, (throttle, rudder))
+
+
+def _constant(commands: Array, width: Array) -> Iterator[tuple[int, int]]:
+    """Longest stretches within `width` of their first sample, one after the other."""
+    begin, jumps = 0, np.abs(np.diff(commands, axis=0)) > 0
+    moves = np.append(np.flatnonzero(jumps.any(axis=1)) + 1, len(commands)).tolist()
+    for move in moves:
+        if move == len(commands) or (np.abs(commands[move] - commands[begin]) > width).any():
+            yield begin, move
+            begin = move
+
+
+def _changed(change: tuple[float, float], width: Array) -> str:
+    moved = np.abs(change) > width
+    return "both" if moved.all() else next((name for name, yes in zip(CHANNELS, moved, strict=True) if yes), "")

@@ -1,0 +1,134 @@
+"""A step trial from its record to the model: holds, steady states, samples, surfaces."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from expdesign.errors import NotInformative
+from expdesign.progress import Progress, silent, within
+from expdesign.signals import Record
+from expdesign.step_trials.comparisons import Comparison, comparisons
+from expdesign.step_trials.holds import CHANNELS, Controls, Hold, Sailed, holds_of, sailed
+from expdesign.step_trials.model import TwoDofModel
+from expdesign.step_trials.samples import Delays, StepSample, samples_and_delays
+from expdesign.step_trials.steady_holds import calibrated_tests, steady_from
+from expdesign.step_trials.steady_state import RatioTest
+from expdesign.step_trials.surfaces import EVEN, ODD, WITH_BIAS, Surface, fitted_surface, validity_region
+from expdesign.values import Array
+
+LEAST_SAMPLES = 3
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StepTrial:
+    """All that a record of steps gives.
+
+    Attributes:
+        batches, holds: the record.
+        controls: which signals are throttle and rudder.
+        rudder_sign: +1, or -1 where the rudder signal is negative for turns to starboard; the model's is positive.
+        tests: of steady state, for U and r.
+        samples: one for each hold.
+        delays: dead time of throttle and rudder with standard error [s].
+        model: with two degrees of freedom.
+        found: asymmetry and hysteresis.
+        seed: of the calibration.
+    """
+
+    batches: tuple[Sailed, ...]
+    holds: tuple[Hold, ...]
+    controls: Controls
+    rudder_sign: int
+    tests: tuple[RatioTest, RatioTest]
+    samples: tuple[StepSample, ...]
+    delays: Delays
+    model: TwoDofModel
+    found: tuple[Comparison, ...]
+    seed: int
+
+    @property
+    def counted(self) -> tuple[StepSample, ...]:
+        """Samples that give an inertia."""
+        return tuple(one for one in self.samples if one.counts)
+
+    @property
+    def repeat(self) -> tuple[StepSample, ...]:
+        """Steps that gave none and should be repeated."""
+        return tuple(one for one in self.samples if one.problems)
+
+
+def identify_steps(record: Record, controls: Controls, *, seed: int = 0, progress: Progress = silent) -> StepTrial:
+    """Model with two degrees of freedom from a record of steps.
+
+    Raises:
+        NotInformative: the record is no step trial, or has too few steps that count.
+    """
+    batches = tuple(sailed(batch, controls) for batch in record.batches)
+    sign = -1 if sum(float(batch.commands[:, 1] @ batch.state[:, 1]) for batch in batches) < 0 else 1
+    batches = tuple(replace(batch, commands=batch.commands * [1.0, sign]) for batch in batches)
+    holds = holds_of(batches)
+    tests = calibrated_tests(batches, holds, np.random.default_rng(seed))
+    steady = steady_from(batches, holds, tests)
+    samples, delays = samples_and_delays(batches, holds, steady, progress=within(progress, 0.3, 1.0))
+    _check(samples)
+    return StepTrial(
+        batches=batches, holds=holds, controls=controls, rudder_sign=sign, tests=tests, samples=samples, delays=delays,
+        model=_model(samples, delays, batches[0].sample_time_s), found=comparisons(samples), seed=seed,
+    )  # fmt: skip
+
+
+def _check(samples: Sequence[StepSample]) -> None:
+    for channel, name in enumerate(CHANNELS):
+        own = [one for one in samples if one.hold.channel == channel]
+        count = sum(one.counts for one in own)
+        if count < LEAST_SAMPLES:
+            bad = next((one for one in own if one.problems), None)
+            why = f"; step {bad.hold.number}: {bad.problems[0]}" if bad else ""
+            raise NotInformative(
+                f"{count} of {len(own)} steps of the {name} alone give an inertia, expected {LEAST_SAMPLES} or "
+                f"more{why}"
+            )
+
+
+def _model(samples: Sequence[StepSample], delays: Delays, sample_time_s: float) -> TwoDofModel:
+    steady = [(one, one.plateau) for one in samples if one.plateau is not None]
+    states = np.array([part.state for _, part in steady])
+    commands = np.array([one.hold.commands for one, _ in steady])
+    both = np.ptp(np.sign(np.round(commands[:, 1], 6))) > 1
+    visited = np.concatenate([states, *(one.location[None] for one in samples if one.counts)])
+    return TwoDofModel(
+        damping=(
+            fitted_surface(states, commands[:, 0], EVEN),
+            fitted_surface(states, commands[:, 1], WITH_BIAS if both else ODD),
+        ),
+        inertia=(_inertia(samples, 0), _inertia(samples, 1)),
+        delay_s=(delays[0][0], delays[1][0]),
+        region=validity_region(visited),
+        sample_time_s=sample_time_s,
+    )
+
+
+def _inertia(samples: Sequence[StepSample], channel: int) -> Surface:
+    """Weighted by 1/m^2: an error of m changes the acceleration by that share.
+
+    Raises:
+        NotInformative: one is negative.
+    """
+    own = [one for one in samples if one.counts and one.hold.channel == channel]
+    values = np.array([one.inertia for one in own])
+    if (worst := own[int(np.argmin(values))]).inertia <= 0:
+        raise NotInformative(
+            f"step {worst.hold.number}: more {CHANNELS[channel]} gave less "
+            f"{('speed', 'yaw rate')[channel]}, so that its inertia is {worst.inertia:.3g}; expected a vessel that "
+            "answers its commands in one direction (leave that step out of the data)"
+        )
+    states = np.array([one.location for one in own])
+    return fitted_surface(states, values, EVEN, weights=_weights(values), bends=True)
+
+
+def _weights(values: Array) -> Array:
+    weights = np.maximum(np.abs(values), 1e-3 * np.max(np.abs(values))) ** -2.0
+    return np.asarray(weights / weights.mean())

@@ -1,0 +1,358 @@
+"""From the steps to the nominal vessel model with three degrees of freedom, with the covariance that is left.
+
+Two things are compared with the vessel model of parameters theta. At each plateau, the state at which the model is
+steady under the same inputs, found by one Newton step from the measured one, with its errors in U, r and, where it is
+measured, v. For each step, the time constant of the model with that of the response: for the throttle (U+ - U-)/2 over
+the model's acceleration half way, for the rudder that of sway and yaw together by the area between response and
+plateau, T1 + T2 - T3. The sum of squares of both, and of the distance from the vessel file's values in its standard
+deviations, is made least. Errors are enlarged where plateaus or steps disagree with the model by more than they should
+(R. T. Birge, Physical Review 40, 1932).
+
+That an acceleration is zero must not be fitted as it stands: theta = 0 would do so perfectly. A state can be compared.
+
+Steps of U and r say little about sway. Where sway is not measured, it is taken as steady under the sway parameters of
+the vessel file. These keep their values, and their stated errors become errors of the others that depend on them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+import scipy
+
+from expdesign.errors import InputError, NotInformative
+from expdesign.step_trials.holds import Controls
+from expdesign.step_trials.samples import Delays, StepSample
+from expdesign.values import Array
+from expdesign.vessel import Actuator, Vessel, VesselModel
+
+HALVINGS = 24
+DRIFT, MOST_DRIFT = 0.999, 0.99
+"""Sine of the largest drift angle that is sought, and from which there counts as none."""
+MOST_STEPS = 60
+"""Of Gauss and Newton, between two enlargements of errors."""
+NUISANCES = 4
+"""Errors of both dead times, and of both kinds of time constants by their definition."""
+ROUNDS = 4
+"""Of enlarging errors."""
+NUDGE = 1e-4
+"""Of a velocity, for derivatives [m/s, rad/s]."""
+SHORTEST_S = 1e-3
+"""Time constants below this, and negative ones, count as this [s]."""
+LEAST_LOG_STD = 1e-3
+FORM_STD = 0.03
+"""Relative error of what one time constant says about a response of another form; chosen from simulations."""
+LARGEST_ERROR = 1e3
+"""Of a steady state, in standard errors; more means that a model has none near by."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class States:
+    """Motions that are compared with a model; n rows.
+
+    Attributes:
+        state: (n, 2) U and r.
+        sway: (n,) v, nan where it is not known.
+        inputs: (n, m).
+    """
+
+    state: Array
+    sway: Array
+    inputs: Array
+
+    def motion(self, sway: Array) -> Array:
+        """(n, 3) u, v, r."""
+        surge = np.sqrt(np.maximum(self.state[:, 0] ** 2 - sway**2, 0.0))
+        return np.stack([surge, sway, self.state[:, 1]], axis=1)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Evidence:
+    """What the steps say about a model with three degrees of freedom.
+
+    Attributes:
+        steady: the plateaus.
+        steady_std: (n, 3) errors of U, v and r; infinite where v is not known.
+        middle: of the steps that count.
+        output: (k,) 0 where the throttle was stepped, 2 where the rudder was.
+        before: (k, m) inputs before the step.
+        change: (k,) of U or r.
+        time_constant_s: (k,) as measured.
+        log_std: (k,) its relative standard error.
+        delay_std_s: (2,) of the dead times of throttle and rudder; a dead time too long makes all time constants of its
+            command too short by as much.
+    """
+
+    steady: States
+    steady_std: Array
+    middle: States
+    output: Array
+    before: Array
+    change: Array
+    time_constant_s: Array
+    log_std: Array
+    delay_std_s: Array
+
+    def without_sway(self) -> Evidence:
+        """The same, had sway not been measured."""
+        unknown = [replace(part, sway=np.full(len(part.sway), np.nan)) for part in (self.steady, self.middle)]
+        std = self.steady_std * [1.0, np.inf, 1.0]
+        return replace(self, steady=unknown[0], middle=unknown[1], steady_std=std)
+
+
+def nominal_vessel(vessel: Vessel, samples: Sequence[StepSample], delays: Delays, input_names: Sequence[str]) -> Vessel:
+    """The vessel with parameters and covariance from its file and the steps.
+
+    Raises:
+        InputError: the record has other inputs than the vessel, its model has no surge or yaw, or its file states no
+            standard deviations.
+        NotInformative: sway has no steady drift.
+    """
+    model = vessel.model
+    if tuple(input_names) != model.inputs:
+        raise InputError(
+            f"the data give {', '.join(input_names)}, expected the inputs of vessel {vessel.name!r}: "
+            f"{', '.join(model.inputs)}"
+        )
+    if not {"u", "r"} <= set(model.outputs):
+        raise InputError(
+            f"the model of vessel {vessel.name!r} has equations for {', '.join(model.outputs)}, expected u and r"
+        )
+    if not model.parameter_std.any():
+        raise InputError(
+            f"vessel {vessel.name!r} states no [model.parameter_std], so all of its model counts as known: state how "
+            "well each parameter is known before the trial"
+        )
+    value, covariance = posterior(model, evidence(samples, delays))
+    return replace(vessel, model=model.with_parameters(value).with_covariance(model.names, covariance))
+
+
+def evidence(samples: Sequence[StepSample], delays: Delays) -> Evidence:
+    """Of all plateaus and of the steps that count."""
+    plateaus = [one.plateau for one in samples if one.plateau is not None and np.isfinite(one.plateau.std).all()]
+    sway_std = [part.sway_std if math.isfinite(part.sway_std) else math.inf for part in plateaus]
+    std = np.array([[part.std[0], wide, part.std[1]] for part, wide in zip(plateaus, sway_std, strict=True)])
+    steps = [(one, *middle) for one in samples if (middle := _middle(one)) is not None]
+    return Evidence(
+        steady=States(
+            state=np.array([part.state for part in plateaus]),
+            sway=np.array([part.sway for part in plateaus]),
+            inputs=np.array([part.inputs for part in plateaus]),
+        ),
+        steady_std=np.maximum(std, 1e-9),
+        middle=States(
+            state=np.array([one.middle.state for one, *_ in steps if one.middle is not None]),
+            sway=np.array([one.middle.sway for one, *_ in steps if one.middle is not None]),
+            inputs=np.array([one.plateau.inputs for one, *_ in steps if one.plateau is not None]),
+        ),
+        output=np.array([2 * (one.hold.channel or 0) for one, *_ in steps]),
+        before=np.array([one.before.inputs for one, *_ in steps if one.before is not None]),
+        change=np.array([_change(one) for one, *_ in steps]),
+        time_constant_s=np.array([constant for _, constant, _ in steps]),
+        log_std=np.array([max(error, LEAST_LOG_STD) for *_, error in steps]),
+        delay_std_s=np.array([std for _, std in delays]),
+    )
+
+
+def _middle(one: StepSample) -> tuple[float, float] | None:
+    """Time constant of a step that counts [s], and its relative standard error."""
+    if not one.counts or one.response is None or one.middle is None:
+        return None
+    constant = one.response.time_constant_s
+    return constant, one.response.time_constant_std_s / constant
+
+
+def _change(one: StepSample) -> float:
+    assert one.plateau is not None
+    assert one.before is not None
+    return float((one.plateau.state - one.before.state)[one.hold.channel or 0])
+
+
+def posterior(model: VesselModel, known: Evidence) -> tuple[Array, Array]:
+    """(p,) parameters and (p, p) covariance, by Gauss and Newton from the vessel file's values.
+
+    Errors of the two dead times, and of both kinds of time constants by their definition, are estimated beside the
+    parameters. Where sway is not measured its parameters are considered, not estimated: they stay, and their stated
+    errors count in the covariance (S. F. Schmidt, Advances in Control Systems 3, 1966).
+
+    Raises:
+        NotInformative: sway has no steady drift at the vessel file's values.
+    """
+    _check_sway(model, known.steady)
+    free, considered = _free(model, known)
+    root = np.linalg.cholesky(model.parameter_covariance[np.ix_(free, free)])
+    estimated, factor = len(free) - considered + NUISANCES, np.ones(5)
+
+    def parts(z: Array) -> tuple[Array, ...]:
+        theta = model.parameters.copy()
+        theta[free] += root @ z[NUISANCES:]
+        return compared(model, theta, known, known.delay_std_s * z[:2], FORM_STD * z[2:NUISANCES])
+
+    def residuals(z: Array) -> Array:
+        whole = np.append(z, np.zeros(considered)) if len(z) == estimated else z
+        return np.concatenate([*(part / by for part, by in zip(parts(whole), factor, strict=True)), whole])
+
+    z = np.zeros(estimated)
+    if np.isfinite(known.steady.sway).all():
+        begun, _ = posterior(model, known.without_sway())
+        z[NUISANCES:] = np.linalg.solve(root, (begun - model.parameters)[free])
+    for _ in range(ROUNDS):
+        found = scipy.optimize.least_squares(residuals, z, x_scale="jac", max_nfev=MOST_STEPS)
+        z = found.x
+        factor = _factors(parts(np.append(z, np.zeros(considered))), estimated)
+    gain = np.linalg.inv(found.jac.T @ found.jac)
+    slopes = _considered_slopes(residuals, z, considered)
+    shift = np.concatenate([-gain @ found.jac.T @ slopes, np.eye(considered)])
+    left = shift @ shift.T
+    left[:estimated, :estimated] += gain
+    value, covariance = model.parameters.copy(), np.zeros((len(model.names),) * 2)
+    value[free] += root @ np.append(z, np.zeros(considered))[NUISANCES:]
+    covariance[np.ix_(free, free)] = root @ left[NUISANCES:, NUISANCES:] @ root.T
+    return value, covariance
+
+
+def _free(model: VesselModel, known: Evidence) -> tuple[npt.NDArray[np.intp], int]:
+    """Indices of the parameters that are not known, and how many at their end are considered."""
+    uncertain = model.parameter_std > 0
+    unseen = not np.isfinite(known.steady.sway).all()
+    sways = np.array([term.equation == "v" for term in model.terms]) & uncertain & unseen
+    return np.concatenate([np.flatnonzero(uncertain & ~sways), np.flatnonzero(sways)]), int(sways.sum())
+
+
+def _considered_slopes(residuals: Callable[[Array], Array], z: Array, considered: int) -> Array:
+    """(n, considered) change of the residuals with each considered parameter, half a standard deviation each way."""
+    whole = np.append(z, np.zeros(considered))
+    steps = 0.5 * np.eye(len(whole))[len(z) :]
+    columns = [residuals(whole + step) - residuals(whole - step) for step in steps]
+    return np.stack(columns, axis=1) if columns else np.zeros((len(residuals(whole)), 0))
+
+
+def _factors(parts: Sequence[Array], parameters: int) -> Array:
+    """By how much the errors of each part are too small, never less than 1."""
+    count = sum(map(len, parts))
+    freedom = count / max(count - parameters, 1)
+    return np.array([max(1.0, math.sqrt(freedom * np.mean(part**2))) if len(part) else 1.0 for part in parts])
+
+
+def compared(model: VesselModel, theta: Array, known: Evidence, late_s: Array, form: Array) -> tuple[Array, ...]:
+    """Distances in standard errors: of the plateaus in U, v and r, of the steps of throttle and rudder.
+
+    Args:
+        model: the vessel's.
+        theta: (p,) parameters to compare.
+        known: from the steps.
+        late_s: (2,) errors of the dead times of throttle and rudder [s].
+        form: (2,) relative errors of all time constants of throttle and rudder.
+    """
+    errors = _steady_errors(model, theta, known.steady) / known.steady_std
+    errors = LARGEST_ERROR * np.tanh(errors / LARGEST_ERROR)
+    drift = np.isfinite(known.steady_std[:, 1])
+    constants = np.maximum(known.time_constant_s + late_s[known.output // 2], SHORTEST_S)
+    times = (_log_times(model, theta, known) - np.log(constants) - form[known.output // 2]) / known.log_std
+    return errors[:, 0], errors[drift, 1], errors[:, 2], times[known.output == 0], times[known.output == 2]
+
+
+def _log_times(model: VesselModel, theta: Array, known: Evidence) -> Array:
+    """(k,) logarithms of the model's time constants [s]."""
+    motion, inputs = known.middle.motion(_sway(model, theta, known.middle)), known.middle.inputs
+    rates = _rates(model, theta, motion, inputs)
+    half_way = known.change / 2 / np.where(rates[:, 0] == 0, np.inf, rates[:, 0])
+    turning = _turning_times(model, theta, motion, rates, known)
+    return np.log(np.maximum(np.where(known.output == 0, half_way, turning), SHORTEST_S))
+
+
+def _turning_times(model: VesselModel, theta: Array, motion: Array, rates: Array, known: Evidence) -> Array:
+    """(k,) areas between the step response of yaw and its plateau, over the plateau [s].
+
+    For d/dt x = A x + B tau the area is -A^-1 x+, with the plateau x+ = -A^-1 B tau.
+    """
+    states = ["uvr".index(name) for name in model.outputs if name != "u"]
+    rows = range(len(motion))
+    inverse = -np.linalg.pinv(
+        _slopes(model, theta, motion, known.middle.inputs)[np.ix_(rows, states, states)], rcond=1e-9
+    )
+    pushed = rates - _rates(model, theta, motion, known.before)
+    plateau = np.einsum("nij,nj->ni", inverse, pushed[:, states])
+    area, place = np.einsum("nij,nj->ni", inverse, plateau), states.index(2)
+    return np.asarray(area[:, place] / np.where(plateau[:, place] == 0, np.inf, plateau[:, place]))
+
+
+def _steady_errors(model: VesselModel, theta: Array, states: States) -> Array:
+    """(n, 3) U, v, r of the model's steady state less the measured ones, by one Newton step."""
+    motion = states.motion(_sway(model, theta, states))
+    has = ["uvr".index(name) for name in model.outputs]
+    rates = _rates(model, theta, motion, states.inputs)
+    step = np.zeros_like(motion)
+    inverse = np.linalg.pinv(
+        _slopes(model, theta, motion, states.inputs)[np.ix_(range(len(motion)), has, has)], rcond=1e-9
+    )
+    step[:, has] = -np.einsum("nij,nj->ni", inverse, rates[:, has])
+    speed = np.maximum(states.state[:, 0], 1e-6)
+    step[:, 0] = (motion[:, 0] * step[:, 0] + motion[:, 1] * step[:, 1]) / speed
+    return step
+
+
+def _slopes(model: VesselModel, theta: Array, motion: Array, inputs: Array) -> Array:
+    """(n, 3, 3) derivatives of the accelerations by u, v, r."""
+    rates = _rates(model, theta, motion, inputs)
+    return np.stack(
+        [(_rates(model, theta, motion + step, inputs) - rates) / NUDGE for step in NUDGE * np.eye(3)], axis=-1
+    )
+
+
+def _sway(model: VesselModel, theta: Array, states: States) -> Array:
+    """(n,) v, measured or else steady."""
+    if np.isfinite(states.sway).all():
+        return states.sway
+    return np.where(np.isfinite(states.sway), states.sway, steady_sway(model, theta, states))
+
+
+def steady_sway(model: VesselModel, theta: Array, states: States) -> Array:
+    """(n,) v at which sway is steady, by bisection between -U and U; one of these where there is none."""
+    low, high = (side * DRIFT * np.maximum(states.state[:, 0], 1e-6) for side in (-1, 1))
+    if "v" not in model.outputs:
+        return np.zeros(len(low))
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        grows = _rates(model, theta, states.motion(middle), states.inputs)[:, 1] > 0
+        low, high = np.where(grows, middle, low), np.where(grows, high, middle)
+    return np.asarray((low + high) / 2)
+
+
+def _check_sway(model: VesselModel, states: States) -> None:
+    if "v" in model.outputs and not np.isfinite(states.sway).all():
+        drift = np.abs(steady_sway(model, model.parameters, states)) / np.maximum(states.state[:, 0], 1e-6)
+        if np.any(drift > MOST_DRIFT):
+            raise NotInformative(
+                "the sway equation of the vessel file has no steady drift in some of the turns: state more damping "
+                "of sway"
+            )
+
+
+def _rates(model: VesselModel, theta: Array, motion: Array, inputs: Array) -> Array:
+    """(n, 3) accelerations at motions (n, 3)."""
+    columns = tuple(motion.T)
+    rates = model.accelerations(columns, columns[:2], tuple(inputs.T), parameters=theta)
+    return np.stack(np.broadcast_arrays(*rates, columns[0])[:3], axis=1)
+
+
+def with_delays(vessel: Vessel, controls: Controls, delays: Sequence[tuple[float, float] | None]) -> Vessel:
+    """The vessel with dead times of throttle and rudder (value and standard error) in its file."""
+    found: dict[str, tuple[float, float]] = {}
+    for names, delay in zip((controls.throttle, controls.rudder), delays, strict=True):
+        found |= {name: delay for name in names if delay is not None}
+    std = {**vessel.std, **{f"{name}_delay_s": delay[1] for name, delay in found.items() if delay[0] > 0}}
+    actuators = tuple(_delayed(actuator, found) for actuator in vessel.actuators)
+    return replace(vessel, model=replace(vessel.model, actuators=actuators), std=std)
+
+
+def _delayed(actuator: Actuator, delays: dict[str, tuple[float, float]]) -> Actuator:
+    responses = tuple(
+        replace(response, delay_s=delays[name][0]) if name in delays else response
+        for name, response in zip(actuator.signals, actuator.responses, strict=True)
+    )
+    return replace(actuator, responses=responses)

@@ -1,0 +1,342 @@
+"""Damping and inertia from each step, and why a step gives none.
+
+At a plateau sigma(x) = tau. Of a step of one command, with k = change of command / change of state and the time
+constant T of the response, m = k T, at the middle of the transient.
+
+Source: B.-O. H. Eriksen and M. Breivik, Modeling, identification and control of high-speed ASVs: theory and
+experiments, Sensing and Control for Autonomous Vehicles (2017).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from expdesign.progress import Progress, silent, within
+from expdesign.step_trials.holds import CHANNELS, Hold, Sailed
+from expdesign.step_trials.transients import (
+    Response,
+    Transient,
+    fit_first_order,
+    fit_second_order,
+    preference,
+)
+from expdesign.step_trials.tuning import TUNING
+from expdesign.values import Array, seal
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Plateau:
+    """Steady state of a hold.
+
+    Attributes:
+        state, std: (2,) mean of U and r, and their standard errors.
+        sway, sway_std: mean v and its standard error, nan where it is not known.
+        inputs: (m,) all inputs of the record.
+        turns: whole turns over which the mean was taken, which cancel a current to first order; 0 for none.
+        duration_s: time of the mean [s].
+    """
+
+    state: Array
+    std: Array
+    sway: float
+    sway_std: float
+    inputs: Array
+    turns: int
+    duration_s: float
+
+    def __post_init__(self) -> None:
+        seal(self, state="2", std="2", inputs="m")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Middle:
+    """State at half of a transient.
+
+    Attributes:
+        state: (2,) U and r.
+        sway: v, nan where it is not known.
+    """
+
+    state: Array
+    sway: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StepSample:
+    """What one hold gives.
+
+    Attributes:
+        hold: its commands.
+        steady_s: time from the change of command until steady [s], None where it never was.
+        plateau: None where the hold was not steady.
+        before: plateau of the hold before.
+        response: of the state that the command drives: second order where that is preferred.
+        first_order: the same by a first order, for comparison.
+        middle: of the transient.
+        inertia, inertia_std: m in units of command per acceleration.
+        problems: why the step gives no inertia; it should be repeated.
+        remarks: on a step that counts.
+    """
+
+    hold: Hold
+    steady_s: float | None
+    plateau: Plateau | None
+    before: Plateau | None = None
+    response: Response | None = None
+    first_order: Response | None = None
+    middle: Middle | None = None
+    inertia: float = math.nan
+    inertia_std: float = math.nan
+    problems: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def counts(self) -> bool:
+        """Whether it gives an inertia."""
+        return self.response is not None and not self.problems
+
+    @property
+    def location(self) -> Array:
+        """(2,) middle of the transient in U and r."""
+        assert self.before is not None
+        assert self.plateau is not None
+        return np.asarray((self.before.state + self.plateau.state) / 2)
+
+    @property
+    def upward(self) -> bool:
+        """Whether the command that changed became larger in size."""
+        channel = self.hold.channel or 0
+        after = self.hold.commands[channel]
+        return abs(after) > abs(after - self.hold.change[channel])
+
+
+Delays = tuple[tuple[float, float], tuple[float, float]]
+"""Of throttle and rudder, two numbers each: bounds, or value and standard error [s]."""
+
+
+def samples_and_delays(
+    batches: Sequence[Sailed], holds: Sequence[Hold], steady: Sequence[int | None], *, progress: Progress = silent
+) -> tuple[tuple[StepSample, ...], Delays]:
+    """A sample of every hold, and the dead times of both commands.
+
+    A dead time belongs to an actuator, not to a step: it is found in each step first, and all responses are fitted anew
+    with the median of all.
+    """
+    free = (0.0, TUNING.most_delay_s)
+    samples = step_samples(batches, holds, steady, delay_s=(free, free), progress=within(progress, 0.0, 0.5))
+    delays = _delay(samples, 0), _delay(samples, 1)
+    bounds = tuple((value, value) for value, _ in delays)
+    again = within(progress, 0.5, 1.0)
+    fitted = step_samples(batches, holds, steady, delay_s=(bounds[0], bounds[1]), progress=again)
+    return without_outliers(fitted), delays
+
+
+def _delay(samples: Sequence[StepSample], channel: int) -> tuple[float, float]:
+    """Median of the dead times of one command, weighted by their information, and its standard error."""
+    own = [one.first_order for one in samples if one.counts and one.hold.channel == channel]
+    found = np.array([part.delay_s for part in own if part is not None])
+    if not len(found):
+        return 0.0, math.inf
+    weights = np.array([max(part.delay_std_s, 1e-3) ** -2.0 for part in own if part is not None])
+    order = np.argsort(found)
+    share = np.cumsum(weights[order]) / weights.sum()
+    middle = float(found[order][np.searchsorted(share, 0.5)])
+    spread = math.sqrt(float(np.sum(weights * (found - middle) ** 2) / weights.sum()))
+    return middle, 1.2533 * spread * math.sqrt(float(np.sum(weights**2))) / float(weights.sum())
+
+
+def step_samples(
+    batches: Sequence[Sailed],
+    holds: Sequence[Hold],
+    steady: Sequence[int | None],
+    *,
+    delay_s: Delays,
+    progress: Progress = silent,
+) -> tuple[StepSample, ...]:
+    """A sample of every hold, with dead times between bounds."""
+    plateaus = [
+        None if begin is None else plateau(batches[hold.batch], begin, hold.end)
+        for hold, begin in zip(holds, steady, strict=True)
+    ]
+    samples = []
+    for place, (hold, begin) in enumerate(zip(holds, steady, strict=True)):
+        progress(f"fitting the response to step {hold.number} of {len(holds)}", place / len(holds))
+        samples.append(_sample(batches[hold.batch], hold, begin, plateaus[place], plateaus[place - 1], delay_s))
+    return tuple(samples)
+
+
+def plateau(batch: Sailed, begin: int, end: int) -> Plateau:
+    """Mean from a sample to another, over the last whole turns where there are some."""
+    turned = np.abs(np.cumsum(batch.state[begin:end, 1])) * batch.sample_time_s
+    turns = int(turned[-1] // (2 * np.pi))
+    if turns:
+        begin += int(np.argmax(turned >= turned[-1] - 2 * np.pi * turns))
+    part = slice(begin, end)
+    sway = batch.sway[part]
+    known = bool(np.isfinite(sway).all())
+    return Plateau(
+        state=batch.state[part].mean(axis=0),
+        std=np.array([standard_error(column) for column in batch.state[part].T]),
+        sway=float(sway.mean()) if known else math.nan,
+        sway_std=standard_error(sway) if known else math.nan,
+        inputs=np.median(batch.inputs[part], axis=0),
+        turns=turns,
+        duration_s=(end - begin) * batch.sample_time_s,
+    )
+
+
+def standard_error(values: Array) -> float:
+    """Of the mean of correlated values, from the means of blocks."""
+    blocks = min(TUNING.steady_blocks, len(values) // 2)
+    if blocks < 2:
+        return float("inf")
+    size = len(values) // blocks
+    means = values[: blocks * size].reshape(blocks, size).mean(axis=1)
+    return float(means.std(ddof=1) / math.sqrt(blocks))
+
+
+def _sample(
+    batch: Sailed, hold: Hold, begin: int | None, after: Plateau | None, before: Plateau | None, delay_s: Delays
+) -> StepSample:
+    own = StepSample(
+        hold=hold,
+        steady_s=None if begin is None else (begin - hold.begin) * batch.sample_time_s,
+        plateau=after,
+        before=None if hold.first else before,
+    )
+    if after is None:
+        return replace(own, problems=(f"not steady within {(hold.end - hold.begin) * batch.sample_time_s:.0f} s",))
+    if hold.first or not hold.changed:
+        return own
+    if hold.channel is None:
+        return replace(own, remarks=("both commands changed at once",))
+    if before is None:
+        return replace(own, problems=("the vessel was not steady before it",))
+    return _with_response(own, batch, hold, begin or hold.end, delay_s)
+
+
+def _with_response(own: StepSample, batch: Sailed, hold: Hold, steady: int, delay_s: Delays) -> StepSample:
+    assert own.plateau is not None
+    assert own.before is not None
+    assert hold.channel is not None
+    channel, name = hold.channel, ("speed", "yaw rate")[hold.channel]
+    if not np.isfinite([*own.plateau.std, *own.before.std]).all():
+        return replace(own, problems=("the steady part, or that before, is too short for a mean",))
+    size = own.plateau.state[channel] - own.before.state[channel]
+    error = math.hypot(own.plateau.std[channel], own.before.std[channel])
+    if not abs(size) > TUNING.visible_deviations * error:
+        return replace(own, problems=(f"the {name} changed by {abs(size) / error:.1f} standard errors only",))
+    data = Transient(
+        time_s=batch.time_s[: steady + 1 - hold.begin],
+        values=batch.state[hold.begin : steady + 1, channel],
+        before=float(own.before.state[channel]),
+        after=float(own.plateau.state[channel]),
+        before_std=float(own.before.std[channel]),
+        after_std=float(own.plateau.std[channel]),
+    )
+    return _fitted(own, batch, hold, data, delay_s[channel])
+
+
+def _fitted(own: StepSample, batch: Sailed, hold: Hold, data: Transient, delay_s: tuple[float, float]) -> StepSample:
+    assert hold.channel is not None
+    latest = float(data.time_s[-1]) / 3
+    delay_s = min(delay_s[0], latest), min(delay_s[1], latest)
+    first = fit_first_order(data, delay_s=delay_s)
+    response = _preferred(data, first, delay_s) if hold.changed == "rudder" and delay_s[0] == delay_s[1] else first
+    slope = hold.change[hold.channel] / data.size
+    spread = math.hypot(
+        response.time_constant_std_s / response.time_constant_s, data.before_std / data.size, data.after_std / data.size
+    )
+    inertia = slope * response.time_constant_s
+    return replace(
+        own,
+        response=response,
+        first_order=first,
+        middle=_middle(own, batch, hold, response),
+        inertia=inertia,
+        inertia_std=abs(inertia) * spread,
+        problems=tuple(_problems(own, hold, data, response)),
+        remarks=()
+        if response is first
+        else (f"second order, damping {response.damping:.2f}, zero {response.zero_s:.1f} s",),
+    )
+
+
+def _preferred(data: Transient, first: Response, delay_s: tuple[float, float]) -> Response:
+    """First order, or the second order of sway and yaw together where the data clearly want it."""
+    second = fit_second_order(data, first, delay_s=delay_s)
+    return second if preference(first, second) > TUNING.preferred and second.time_constant_s > 0 else first
+
+
+def _problems(own: StepSample, hold: Hold, data: Transient, response: Response) -> list[str]:
+    found = []
+    tail = data.values[-max(3, len(data.values) // 10) :]
+    noise = standard_error(tail) if len(tail) > 3 else response.rms
+    apart = abs(float(tail.mean()) - data.after)
+    if apart > TUNING.misfit * abs(data.size) and apart > 3 * math.hypot(noise, data.after_std):
+        found.append("the plateau does not continue the transient (a current, or no whole turn)")
+    if response.time_constant_s > float(data.time_s[-1]):
+        found.append("the response is slower than the hold is long")
+    if response.time_constant_std_s > response.time_constant_s / 2:
+        found.append("the time constant is known to half its size only")
+    assert hold.channel is not None
+    assert own.plateau is not None
+    return found
+
+
+def _middle(own: StepSample, batch: Sailed, hold: Hold, response: Response) -> Middle:
+    """The state that the command drives as fitted, the others as measured about that time."""
+    assert hold.channel is not None
+    half = hold.begin + round((response.delay_s + response.time_constant_s * math.log(2)) / batch.sample_time_s)
+    about = max(1, round(0.2 * response.time_constant_s / batch.sample_time_s))
+    part = slice(max(hold.begin, half - about), min(hold.end, half + about + 1))
+    state = batch.state[part].mean(axis=0) if part.start < part.stop else own.location
+    state[hold.channel] = own.location[hold.channel]
+    sway = batch.sway[part]
+    return Middle(state=state, sway=float(sway.mean()) if len(sway) else math.nan)
+
+
+def modified_scores(values: Array) -> Array:
+    """(n,) distances from the median in robust standard deviations, 0.6745 (x - median) / MAD.
+
+    Unlike those from mean and standard deviation, which cannot exceed (n - 1)/sqrt(n), they have no bound.
+    """
+    apart = values - np.median(values)
+    spread = float(np.median(np.abs(apart)))
+    return np.asarray(0.6745 * apart / max(spread, 1e-12))
+
+
+def without_outliers(samples: Sequence[StepSample]) -> tuple[StepSample, ...]:
+    """Samples whose inertia is far from the others at one level of the other command are marked, by log(m)."""
+    marked = {
+        place
+        for channel in range(len(CHANNELS))
+        for group in _groups(samples, channel)
+        for place, score in zip(group, modified_scores(_logs(samples, group)).tolist(), strict=True)
+        if abs(score) > TUNING.outlier
+    }
+    return tuple(
+        replace(one, problems=(*one.problems, "its inertia is an outlier among the steps at the same level"))
+        if place in marked
+        else one
+        for place, one in enumerate(samples)
+    )
+
+
+def _logs(samples: Sequence[StepSample], places: Sequence[int]) -> Array:
+    return np.log(np.abs([samples[place].inertia for place in places]))
+
+
+def _groups(samples: Sequence[StepSample], channel: int) -> list[list[int]]:
+    """Places of the samples of one command at one level of the other, where there are enough of them."""
+    levels: dict[float, list[int]] = {}
+    for place, one in enumerate(samples):
+        if one.counts and one.hold.channel == channel:
+            level = one.hold.commands[1 - channel]
+            near = next((key for key in levels if abs(key - level) <= 0.05 * max(abs(key), abs(level), 1e-9)), level)
+            levels.setdefault(near, []).append(place)
+    return [group for group in levels.values() if len(group) >= TUNING.least_group]

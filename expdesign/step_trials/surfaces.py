@@ -1,0 +1,158 @@
+"""Damping and inertia as surfaces over speed and yaw rate, and the region in which they hold.
+
+The bases keep the symmetry of a vessel whose port and starboard sides are alike: the damping of surge and both inertias
+are even in r, the damping of yaw is odd in r but for a constant, the rudder that holds a straight course.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import shapely
+
+from expdesign.step_trials.regression import Fit, Sampled, best_fit, ridge
+from expdesign.values import Array, seal
+
+EVEN = ((0, 0), (1, 0), (2, 0), (0, 2), (3, 0), (1, 2), (4, 0), (2, 2), (0, 4))
+ODD = ((0, 1), (1, 1), (2, 1), (0, 3), (3, 1), (1, 3))
+"""Powers of U and r."""
+WITH_BIAS = ((0, 0), *ODD)
+STEEPNESS = (2.0, 5.0, 10.0)
+"""a of tanh(a (U - b)), times the range of U."""
+BENDS = (0.1, 0.3, 0.5)
+"""b, as a share of the range of U."""
+NO_BEND = (0.0, 0.0)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Surface:
+    """A function of U [m/s] and r [rad/s].
+
+    Attributes:
+        powers: of U and r in each term.
+        coefficients: (p,) of the terms, the last one of tanh(a (U - b)) where there is a bend.
+        bend: a [s/m] and b [m/s]; `NO_BEND` for none.
+        method, penalty: of the regression.
+        held_out: root mean square error of cross-validation.
+        least, most: smallest and largest value measured.
+    """
+
+    powers: tuple[tuple[int, int], ...]
+    coefficients: Array
+    bend: tuple[float, float]
+    method: str
+    penalty: float
+    held_out: float
+    least: float
+    most: float
+
+    def __post_init__(self) -> None:
+        seal(self, coefficients="p")
+
+    def __call__(self, state: Array) -> Array:
+        """(...) value at states (..., 2)."""
+        return np.asarray(_columns(state, self.powers, self.bend) @ self.coefficients)
+
+
+def _columns(state: Array, powers: Sequence[tuple[int, int]], bend: tuple[float, float]) -> Array:
+    u, r = state[..., 0], state[..., 1]
+    columns = [u**i * r**j for i, j in powers]
+    if bend != NO_BEND:
+        columns.append(np.tanh(bend[0] * (u - bend[1])))
+    return np.stack(columns, axis=-1)
+
+
+def fitted_surface(
+    states: Array,
+    values: Array,
+    powers: tuple[tuple[int, int], ...],
+    *,
+    weights: Array | None = None,
+    bends: bool = False,
+) -> Surface:
+    """A surface through values at states (n, 2), by ridge or lasso.
+
+    A basis with more terms than half of the samples is cut to those of lowest degree. Where a bend is allowed its place
+    and steepness are those of the least leave-one-out error, if that is less than without one.
+    """
+    powers = _affordable(powers, states)
+    candidates = [NO_BEND, *(_bends(states[:, 0]) if bends and len(values) > 2 * len(powers) + 4 else [])]
+    weights = np.ones(len(values)) if weights is None else weights
+    sampled = {bend: _sampled(states, values, weights, powers, bend) for bend in candidates}
+    best = min(candidates, key=lambda bend: ridge(sampled[bend]).held_out)
+    fit: Fit = best_fit(sampled[best])
+    return Surface(
+        powers=powers, coefficients=fit.coefficients, bend=best, method=fit.method, penalty=fit.penalty,
+        held_out=fit.held_out, least=float(values.min()), most=float(values.max()),
+    )  # fmt: skip
+
+
+def _sampled(
+    states: Array, values: Array, weights: Array, powers: Sequence[tuple[int, int]], bend: tuple[float, float]
+) -> Sampled:
+    columns = _columns(states, powers, bend)
+    penalised = np.array([*(float(power != (0, 0)) for power in powers), *[1.0] * (bend != NO_BEND)])
+    return Sampled(columns=columns, values=values, weights=weights, penalised=penalised)
+
+
+def _affordable(powers: tuple[tuple[int, int], ...], states: Array) -> tuple[tuple[int, int], ...]:
+    """Terms of lowest degree, at most half as many as there are samples; none in r where r never differs from 0."""
+    turning = np.ptp(np.abs(states[:, 1])) > 1e-3 * max(float(np.max(np.abs(states[:, 1]))), 1e-9)
+    useful = [power for power in powers if turning or not power[1]] or list(powers[:1])
+    return tuple(sorted(useful, key=sum)[: max(1, len(states) // 2)])
+
+
+def _bends(speeds: Array) -> list[tuple[float, float]]:
+    low, width = float(speeds.min()), float(np.ptp(speeds)) or 1.0
+    return [(steep / width, low + place * width) for steep in STEEPNESS for place in BENDS]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ValidityRegion:
+    """Convex hull of the steady states and transients of a trial, in U and |r|, mirrored to both sides.
+
+    Attributes:
+        corners: (k, 2) of the hull, U [m/s] and r [rad/s] divided by `scale`.
+        scale: (2,) largest U and |r|.
+    """
+
+    corners: Array
+    scale: Array
+
+    def __post_init__(self) -> None:
+        seal(self, corners="k 2", scale="2")
+
+    @cached_property
+    def hull(self) -> shapely.Geometry:
+        """In scaled coordinates."""
+        hull = shapely.MultiPoint(self.corners).convex_hull
+        shapely.prepare(hull)
+        return hull
+
+    @property
+    def outline(self) -> Array:
+        """(k, 2) corners in U and r."""
+        return np.asarray(self.corners * self.scale)
+
+    def contains(self, state: Array) -> bool:
+        """Whether a state (2,) lies in it, up to a thousandth of its size."""
+        return bool(shapely.dwithin(self.hull, shapely.Point(state / self.scale), 1e-3))
+
+    def nearest(self, state: Array) -> Array:
+        """The state itself, or the nearest one on the edge."""
+        place = shapely.Point(state / self.scale)
+        if self.hull.intersects(place):
+            return state
+        near = shapely.get_coordinates(shapely.shortest_line(self.hull, place))[0]
+        return np.asarray(near * self.scale)
+
+
+def validity_region(states: Array) -> ValidityRegion:
+    """Of the states (n, 2) that a trial visited."""
+    scale = np.maximum(np.max(np.abs(states), axis=0), 1e-9)
+    mirrored = np.concatenate([states, states * [1.0, -1.0]]) / scale
+    hull = shapely.MultiPoint(mirrored).convex_hull
+    return ValidityRegion(corners=shapely.get_coordinates(hull), scale=scale)

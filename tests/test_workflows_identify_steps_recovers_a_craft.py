@@ -1,0 +1,142 @@
+"""`expdesign identify-steps`: a simulated fast craft in noise and waves, delays unknown, and records that are none."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from expdesign.cli import main
+from expdesign.scenario import load_vessel
+from expdesign.step_trials import controls_of, identify_steps, nominal_vessel
+from step_case import GUESS, INPUTS, STEPS, TRUTH, craft_columns, craft_record, mirrored, write_csv
+
+NAMES = ("time_s", "u_mps", "r_radps", "n1_rps", "rudder1_rad")
+CONTROLS = controls_of(INPUTS)
+
+
+def standard_scores(seed: int, *, with_sway: bool) -> np.ndarray:
+    """Errors of all parameters in their standard deviations."""
+    trial = identify_steps(craft_record(seed, with_sway=with_sway), CONTROLS)
+    found = nominal_vessel(load_vessel(GUESS), trial.samples, trial.delays, INPUTS).model
+    return np.asarray((found.parameters - load_vessel(TRUTH).model.parameters) / found.parameter_std)
+
+
+def identified(folder: Path) -> None:
+    """Results of the command in `out`."""
+    data = write_csv(folder / "steps.csv", craft_columns(1), NAMES)
+    held_out = write_csv(folder / "other.csv", craft_columns(2, steps=STEPS[5:14]), NAMES)
+    words = ["identify-steps", data, "--vessel", GUESS, "--test", held_out, "--out", folder / "out", "--quiet"]
+    assert main(list(map(str, words))) == 0
+
+
+@pytest.fixture
+def results(made_once: Callable[[str, Callable[[Path], object]], tuple[Path, object]]) -> Path:
+    folder, _ = made_once("identify-steps", identified)
+    return folder / "out"
+
+
+def test_the_craft_is_recovered_with_its_delays(results: Path) -> None:
+    found = json.loads((results / "step-model.json").read_text())
+    for command in ("throttle", "rudder"):
+        delay, std = found["model"]["delay_s"][command], found["model"]["delay_std_s"][command]
+        assert delay == pytest.approx(0.55, abs=max(3 * std, 0.15))
+    assert found["fit_percent"]["other.csv"]["U"] > 90
+    assert found["fit_percent"]["other.csv"]["r"] > 75
+    assert sum(not step["problems"] for step in found["steps"]) >= 0.7 * len(found["steps"])
+
+
+def test_the_vessel_file_holds_what_the_steps_tell_and_keeps_what_they_do_not(results: Path) -> None:
+    before, after = load_vessel(GUESS).model, load_vessel(results / "vessel-steps.toml").model
+    truth = load_vessel(TRUTH).model
+    share = dict(zip(after.names, (after.parameter_std / before.parameter_std).tolist(), strict=True))
+    assert max(share[name] for name in ("X_u", "X_abs_u_u", "X_nn")) < 0.2
+    assert min(share[name] for name in ("Y_uv", "Y_ur")) > 0.5  # sway was not measured
+    assert np.abs(after.parameter_correlation_matrix - np.eye(len(after.names))).max() > 0.5
+    places = [after.names.index(name) for name in ("X_u", "X_abs_u_u", "X_nn")]
+    assert after.parameters[places] == pytest.approx(truth.parameters[places], rel=0.15)
+    responses = load_vessel(results / "vessel-steps.toml").responses
+    assert all(0.2 < response.delay_s < 1.0 for response in responses)
+
+
+def test_the_page_and_the_summary_speak_of_the_same_steps(results: Path) -> None:
+    page = (results / "step-trial.html").read_text()
+    found = json.loads((results / "step-model.json").read_text())
+    assert all(remark.split(" \N{PLUS-MINUS SIGN}")[0] in page for remark in found["remarks"][:3])
+    assert "http" not in page.replace("http://www.w3.org", "")
+
+
+def test_a_mirrored_trial_gives_the_same_model() -> None:
+    record = craft_record(3)
+    one, other = (identify_steps(part, CONTROLS) for part in (record, mirrored(record)))
+    assert [a.inertia for a in one.samples] == pytest.approx([b.inertia for b in other.samples], nan_ok=True, rel=1e-6)
+    states = np.array([[3.0, 0.05], [6.0, 0.1]])
+    for a, b in zip(
+        (*one.model.inertia, one.model.damping[0]), (*other.model.inertia, other.model.damping[0]), strict=True
+    ):
+        assert a(states) == pytest.approx(b(states * [1.0, -1.0]), rel=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("with_sway", [False, True])
+def test_stated_errors_hold_over_many_trials(with_sway: bool) -> None:
+    scores = np.array([standard_scores(seed, with_sway=with_sway) for seed in range(20)])
+    inside = (np.abs(scores) < 1.96).mean()
+    assert inside > 0.85  # parameters of one trial err together, as do trials by what a time constant leaves out
+    assert np.abs(np.mean(scores, axis=0)).max() < 2.0
+
+
+@pytest.mark.parametrize(
+    ("rows", "status", "what"),
+    [
+        ("time_s,u_mps,r_radps\n0,1,0\n1,1,0\n2,1,0\n", 2, "names no n1_rps"),
+        ("time_s,u_mps,r_radps,n1_rps\n0,1,0,5\n1,1,0,5\n2,1,0,5\n", 2, "rudder1_rad"),
+    ],
+)
+def test_files_that_are_wrong_are_refused_in_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], rows: str, status: int, what: str
+) -> None:
+    (tmp_path / "bad.csv").write_text(rows)
+    words = ["identify-steps", str(tmp_path / "bad.csv"), "--vessel", str(GUESS), "--out", str(tmp_path / "out"), "-q"]
+    assert main(words) == status
+    told = capsys.readouterr().err
+    assert what in told
+    assert told.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def _told(
+    tmp_path: Path, columns: dict[str, np.ndarray], capsys: pytest.CaptureFixture[str], *more: str
+) -> tuple[int, str]:
+    data = write_csv(tmp_path / "data.csv", columns, list(columns))
+    status = main(["identify-steps", str(data), "--out", str(tmp_path / "out"), "-q", *more])
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+    return status, told
+
+
+def test_records_without_steps_have_no_answer(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rng, time_s = np.random.default_rng(1), np.arange(0.0, 200.0, 0.5)
+    wandering = {
+        "time_s": time_s, "u_mps": 3 + 0.1 * np.sin(time_s), "r_radps": 0.1 * np.cos(time_s),
+        "n1_rps": 5 + rng.standard_normal(len(time_s)), "rudder1_rad": 0.2 * np.sin(time_s / 3),
+    }  # fmt: skip
+    status, told = _told(tmp_path, wandering, capsys)
+    assert (status, "no step trial" in told) == (3, True)
+    still = wandering | {"n1_rps": np.full(len(time_s), 5.0), "rudder1_rad": 0.1 * (time_s // 50 % 2)}
+    status, told = _told(tmp_path, still, capsys)
+    assert (status, "throttle" in told) == (3, True)
+
+
+def test_a_signal_that_is_not_there_and_a_vessel_that_is_known_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    columns = {name: values for name, values in craft_columns(1).items() if name in NAMES}
+    status, told = _told(tmp_path, columns, capsys, "--throttle", "n3")
+    assert (status, "n3" in told) == (2, True)
+    status, told = _told(tmp_path, columns, capsys, "--vessel", str(TRUTH))
+    assert (status, "parameter_std" in told) == (2, True)
