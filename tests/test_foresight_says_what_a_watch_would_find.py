@@ -55,6 +55,7 @@ def test_large_changes_are_found_and_such_as_are_none_are_not(found: OperationFo
         assert item.delay_s < 1800.0
 
 
+@pytest.mark.slow
 def test_the_result_does_not_depend_on_the_number_of_processes(found: OperationForesight) -> None:
     with local_processes(2):
         again = foresee_operation(CASE.vessel, WEATHER, voyages=3, hours=0.5, sizes=(1e-4,), references=2, seed=4)

@@ -137,7 +137,7 @@ def test_stretches_show_the_changes_of_the_ship_that_sailed_them(folder: Path) -
     assert told == pytest.approx(0.2 * 33.7 / 62.4 / 0.1, abs=5.0 * np.hypot(other.baseline_std[0], 0.1))
 
 
-@pytest.mark.parametrize("model", ["yaw-full", "yaw-simplified"])
+@pytest.mark.parametrize("model", ["yaw-full", pytest.param("yaw-simplified", marks=pytest.mark.slow)])
 def test_the_watch_names_more_inertia_and_is_silent_otherwise(folder: Path, model: str) -> None:
     reference = [folder / f"reference-{number}.csv" for number in range(REFERENCES)]
     how = {"vessel": folder / "ship.toml", "reference": reference, "model": model, "size": 0.1}

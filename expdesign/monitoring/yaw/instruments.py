@@ -27,6 +27,8 @@ from expdesign.values import Array
 STEPS = 15
 LARGEST_STEP = 0.5
 """Of a parameter in a step, as a share of its start."""
+SMALLEST_STEP = 1e-4
+"""Below which there is no further one, as a share of the start."""
 SETTLED = 0.02
 """Largest last step, in standard errors."""
 SMOOTHING_S = 2.0
@@ -103,7 +105,7 @@ def estimate_yaw_by_instruments(
         moments = other * errors[0][..., None] + Z * errors[1][..., None]
         inverse = np.linalg.pinv(G)
         last = (inverse @ (pool @ moments.sum(axis=1))[..., None])[..., 0]
-        if np.abs(last).max() < 1e-6:
+        if np.abs(last).max() < SMALLEST_STEP:
             break
         x = np.clip(x + np.clip(last, -LARGEST_STEP, LARGEST_STEP), low, high)
     width = max(1, round(BLOCK_S / halves[0].sample_time_s))
