@@ -97,7 +97,7 @@ def calibrate(grams: Grams, *, load: Array | None = None) -> Calibration:
     m = grams.changes
     std, variance, change = _independent(grams)
     stretches = stretches_of(grams, std)
-    force = _varying(stretches.less(change), variance, grams.stretch_s)
+    force = _spared(_varying(stretches.less(change), variance, grams.stretch_s), grams.time_s)
     score, information = _filtered(stretches, force)
     whole = information.sum(axis=0)
     baseline = np.linalg.solve(whole + np.eye(m), score.sum(axis=0))
@@ -190,6 +190,13 @@ def _varying(stretches: Stretches, variance: Array, stretch_s: float) -> Force:
             break
         best, cost = new, value
     return _force(best, q, stretch_s)
+
+
+def _spared(force: Force, time_s: Array) -> Force:
+    """With more variance of the slow processes, of which a short reference sees few values: of one, nearly nothing."""
+    seen = len(np.unique(np.floor((time_s - time_s[0]) / TUNING.slow_s)))
+    spare = np.repeat([1.0, 1.0 + TUNING.spare / seen], len(force.variance) // 2)
+    return replace(force, variance=spare * force.variance)
 
 
 def _best_step(gains: Array) -> float:

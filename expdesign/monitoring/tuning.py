@@ -26,6 +26,8 @@ class Tuning:
             other changes explain the data as well.
         known_within: a change is watched for where the reference tells its size so many times better than the size.
         quick_s, slow_s: correlation times of the unmeasured force: first guess of the quick one, and the slow one [s].
+        spare: variance of the slow part beside what the reference shows, as a multiple of it and by the number of times
+            `slow_s` that the reference covers.
         searched_stretches: of a reference, from which the variation of the force is learnt.
         search_rounds, search_gain: rounds of that search, and the least gain of twice the log-likelihood in one.
         relative_size: change of a parameter, a gain or an inertia that matters, as a share.
@@ -55,6 +57,7 @@ class Tuning:
     known_within: float = 6.0
     quick_s: float = 300.0
     slow_s: float = 43200.0
+    spare: float = 8.0
     searched_stretches: int = 600
     search_rounds: int = 12
     search_gain: float = 0.5

@@ -214,8 +214,8 @@ def monitor_tables(content: MonitorContent) -> list[tuple[str, ...]]:
     return rows
 
 
-def monitor_json(content: MonitorContent) -> str:
-    """Everything, with units in the names."""
+def monitor_json(content: MonitorContent, budget: list[dict[str, object]]) -> str:
+    """Everything, with units in the names; `budget` has the entries of `budget_entries`."""
     c, state = content.calibration, content.state
     return strict_json(
         {
@@ -245,6 +245,7 @@ def monitor_json(content: MonitorContent) -> str:
                 }
                 for number, change in enumerate(content.changes)
             ],
+            "budget": budget,
             "history": [{"time_s": m.time_s, "statistic": m.statistic} for m in content.moments],
             "notes": content.notes,
         }

@@ -16,6 +16,7 @@ from expdesign.errors import FileError, InputError, NotInformative
 from expdesign.export import write_files
 from expdesign.export.monitor_page import (
     MonitorContent,
+    budget_entries,
     monitor_html,
     monitor_json,
     monitor_tables,
@@ -226,8 +227,10 @@ def _content(phase: Watching, now: Watch, asked: Asked, command: str) -> Monitor
 def _files(content: MonitorContent, now: Watch) -> dict[str, str | bytes]:
     assert isinstance(now.phase, Watching)
     files: dict[str, str | bytes] = {
-        "monitor.html": monitor_html(content), "monitor.json": monitor_json(content), STATE: _state(now),
-    }  # fmt: skip
+        "monitor.html": monitor_html(content),
+        "monitor.json": monitor_json(content, budget_entries(content)),
+        STATE: _state(now),
+    }
     if now.phase.changed:
         files["since-change.csv"] = "".join(now.phase.changed)
     return files
