@@ -23,6 +23,8 @@ SETTINGS = {
     "zigzag_heading": {"speed_mps": 4.0},
     "pull_out": {"speed_mps": 4.0},
     "dieudonne_spiral": {"speed_mps": 4.0},
+    "throttle_steps": {"speed_mps": 4.0, "rise": 1.1},
+    "rudder_steps": {"speed_mps": 4.0},
     "steps": {"speed_mps": 4.0, "helm_rad": 0.3, "hold_s": 10.0, "engine_swing": 0.3},
 }
 

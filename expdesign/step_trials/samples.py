@@ -136,7 +136,10 @@ def samples_and_delays(
 
 
 def _delay(samples: Sequence[StepSample], channel: int) -> tuple[float, float]:
-    """Median of the dead times of one command, weighted by their information, and its standard error."""
+    """Median of the dead times of one command, weighted by their information, and its standard error.
+
+    They are those of first order responses. Where sway makes yaw begin faster than that, they are somewhat too short.
+    """
     own = [one.first_order for one in samples if one.counts and one.hold.channel == channel]
     found = np.array([part.delay_s for part in own if part is not None])
     if not len(found):

@@ -16,7 +16,9 @@ from expdesign.dictionary.families.orders import (
     DIEUDONNE_SPIRAL,
     PULL_OUT,
     RECORDED,
+    RUDDER_STEPS,
     STEPS,
+    THROTTLE_STEPS,
     TURNING_CIRCLE_HELM,
     ZIGZAG_HEADING,
 )
@@ -37,5 +39,7 @@ FAMILIES = (
     PULL_OUT,
     DIEUDONNE_SPIRAL,
     STEPS,
+    THROTTLE_STEPS,
+    RUDDER_STEPS,
     RECORDED,
 )
