@@ -50,6 +50,7 @@ from expdesign.diagnosis.select import (
     SELECTION_TUNING,
     Selection,
     Step,
+    beside_stated_parameters,
     eliminate_backward,
     leading_candidates,
     only_nuisance,
@@ -202,12 +203,44 @@ def _select(
     found = select_forward(begun, windows, initial_states(windows), rng, told, validation)
     as_stated = validation.without(None, ship)
 
-    def cross_validated(found: Selection) -> list[HeldOut]:
-        return _cross_validated(found, as_stated, validation, told.part(VALIDATED * (1 + len(found.steps)), CONCLUDED))
+    def cross_validated(found: Selection) -> tuple[Selection, list[HeldOut]]:
+        progress = told.part(VALIDATED * (1 + len(found.steps)), CONCLUDED)
+        return _as_judged(found, as_stated, validation, windows, progress)
 
     kept, held = eliminate_backward(found, windows, cross_validated, seed)
     rest = with_unlisted_terms(kept, held, windows, validation, seed)
     return _Selected(found=found, kept=rest.kept, as_stated=as_stated, held=rest.held, validation=validation, rest=rest)
+
+
+def _as_judged(
+    found: Selection, as_stated: HeldOut, validation: CrossValidation, windows: Windows, progress: Progress
+) -> tuple[Selection, list[HeldOut]]:
+    """Causes beside uncertain parameters fitted with them, or beside those of the file: what simulates better.
+
+    Errors are those of the model before any cause, then after every step. Parameters re-estimated within their standard
+    deviations may simulate held-out units worse than those of the file, which many other data may have gone into. Then
+    a cause has to improve on the file's parameters, and is fitted beside them: else it would have to make up for the
+    loss.
+    """
+    if _beside_stated(found):
+        return found, judged([as_stated, *(validation.of(step.chosen.fit) for step in found.steps)])
+    held = _cross_validated(found, as_stated, validation, progress)
+    if not found.steps or not found.first.keys or not _mean_fit(as_stated) > _mean_fit(validation.of(found.first)):
+        return found, held
+    known = beside_stated_parameters(found, windows)
+    if known is None or not _mean_fit(validation.of(known.last)) > _mean_fit(validation.of(found.last)):
+        return found, held
+    return known, judged([as_stated, *(validation.of(step.chosen.fit) for step in known.steps)])
+
+
+def _beside_stated(found: Selection) -> bool:
+    """Whether causes are fitted beside the parameters of the file although these are uncertain."""
+    uncertain = (bool(one.ship.model.parameter_std.any()) for one in (found.last, found.first))
+    return tuple(uncertain) == (False, True)
+
+
+def _mean_fit(held: HeldOut) -> float:
+    return float(np.nan_to_num(held.fit, nan=-np.inf).mean())
 
 
 def _cross_validated(

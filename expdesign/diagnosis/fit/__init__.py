@@ -26,7 +26,7 @@ from expdesign.diagnosis.fit.fit import (
     profile_cost,
     within_stated_std,
 )
-from expdesign.diagnosis.fit.gauss_newton import fit
+from expdesign.diagnosis.fit.gauss_newton import fit, fit_beside_stated_parameters
 from expdesign.diagnosis.fit.gram_matrices import gram_matrices, information, marginalised, window_information
 from expdesign.diagnosis.fit.linear_model import (
     build_sensitivities,
@@ -56,6 +56,7 @@ __all__ = [
     "difference_step",
     "effect_disturbances",
     "fit",
+    "fit_beside_stated_parameters",
     "gram_matrices",
     "held_out_gain",
     "information",

@@ -16,14 +16,18 @@ from expdesign.diagnosis.select.tuning import TUNING
 
 
 def eliminate_backward(
-    found: Selection, windows: Windows, cross_validated: Callable[[Selection], list[HeldOut]], seed: int
+    found: Selection,
+    windows: Windows,
+    cross_validated: Callable[[Selection], tuple[Selection, list[HeldOut]]],
+    seed: int,
 ) -> tuple[Selection, list[HeldOut]]:
     """Drop causes without held-out gain, and causes whose size is indistinguishable from zero.
 
     Args:
         found: the selection.
         windows: data.
-        cross_validated: errors on held-out units of the model before any cause, then after every step.
+        cross_validated: the selection, its causes fitted as they are judged, and errors on held-out units of the model
+            before any cause, then after every step.
         seed: of the gains' intervals.
 
     Returns:
@@ -31,7 +35,7 @@ def eliminate_backward(
     """
     reordered: list[Candidate] = []
     while True:
-        held = cross_validated(found)
+        found, held = cross_validated(found)
         improves = improves_held_out(found, held, seed)
         later = _moved_last(found, improves, windows, reordered)
         if later is not None:

@@ -9,7 +9,7 @@ import scipy
 
 from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.data import Windows
-from expdesign.diagnosis.fit import Fit, continuing, fit, log_likelihood_gain
+from expdesign.diagnosis.fit import Fit, continuing, fit, fit_beside_stated_parameters, log_likelihood_gain
 from expdesign.diagnosis.select.fitted_candidate import FittedCandidate
 from expdesign.diagnosis.select.score_tests import ScoreTest
 from expdesign.diagnosis.select.tuning import TUNING
@@ -64,6 +64,19 @@ class Selection:
         return replace(
             self, steps=steps, last=last, last_tests=self.steps[len(steps)].tests if cut else self.last_tests
         )
+
+
+def beside_stated_parameters(found: Selection, windows: Windows) -> Selection | None:
+    """The same causes fitted beside the parameters of the vessel file; None where one of them cannot be fitted."""
+    steps, before = list[Step](), None
+    for step in found.steps:
+        try:
+            known = fit_beside_stated_parameters(step.chosen.fit, windows)
+        except (FloatingPointError, np.linalg.LinAlgError):
+            return None
+        steps.append(replace(step, chosen=replace(step.chosen, fit=known), before=before or step.before))
+        before = known
+    return replace(found, steps=tuple(steps), last=before or found.first)
 
 
 def redundant_step(steps: list[Step], windows: Windows) -> int | None:
