@@ -122,10 +122,9 @@ def diagnose(
     refined = steps or ship.stated_std or within
     final = chosen.kept.last.ship if refined else ship
     last = chosen.kept.last
+    estimated = ((), np.zeros((0, 0))) if chosen.kept.beside_stated else (last.keys, last.covariance)
     extended, not_written = (
-        extend(vessel, final, _standard_errors(chosen.kept), (last.keys, last.covariance))
-        if refined
-        else extend(vessel, final, {})
+        extend(vessel, final, _standard_errors(chosen.kept), estimated) if refined else extend(vessel, final, {})
     )
     before, after = accuracy(ship, record), accuracy(final, record)
     unexplained = _unexplained(chosen, after, windows, seed)
@@ -222,21 +221,22 @@ def _as_judged(
     a cause has to improve on the file's parameters, and is fitted beside them: else it would have to make up for the
     loss.
     """
-    if _beside_stated(found):
-        return found, judged([as_stated, *(validation.of(step.chosen.fit) for step in found.steps)])
+    short = validation.short_windows(found.first.ship)
+    if found.beside_stated:
+        again = beside_stated_parameters(found, windows, short) or found
+        return again, _ahead([as_stated, *(validation.of(step.chosen.fit) for step in again.steps)])
     held = _cross_validated(found, as_stated, validation, progress)
     if not found.steps or not found.first.keys or not _mean_fit(as_stated) > _mean_fit(validation.of(found.first)):
         return found, held
-    known = beside_stated_parameters(found, windows)
+    known = beside_stated_parameters(found, windows, short)
     if known is None or not _mean_fit(validation.of(known.last)) > _mean_fit(validation.of(found.last)):
         return found, held
-    return known, judged([as_stated, *(validation.of(step.chosen.fit) for step in known.steps)])
+    return known, _ahead([as_stated, *(validation.of(step.chosen.fit) for step in known.steps)])
 
 
-def _beside_stated(found: Selection) -> bool:
-    """Whether causes are fitted beside the parameters of the file although these are uncertain."""
-    uncertain = (bool(one.ship.model.parameter_std.any()) for one in (found.last, found.first))
-    return tuple(uncertain) == (False, True)
+def _ahead(held: Sequence[HeldOut]) -> list[HeldOut]:
+    """Errors in short stretches."""
+    return [item.ahead() for item in held if item.ahead is not None]
 
 
 def _mean_fit(held: HeldOut) -> float:
@@ -331,6 +331,7 @@ def _findings(chosen: _Selected, windows: Windows, proposals: Sequence[Proposal]
             chosen.kept.last,
             (chosen.held[index], chosen.held[index + 1]),
             seed,
+            windows,
             would_tell_apart=_discriminating(step, proposals, windows),
         )
         for index, step in enumerate(chosen.kept.steps)
@@ -347,7 +348,10 @@ def _discriminating(step: Step, proposals: Sequence[Proposal], windows: Windows)
 
 
 def _notes_on_selection(chosen: _Selected, unit: str, seed: int) -> tuple[str, ...]:
-    notes = [*note_on_stretches(chosen.held), *notes_on_rejected(chosen.found, chosen.kept, unit)]
+    notes = [
+        *note_on_stretches(chosen.held, beside_stated=chosen.kept.beside_stated),
+        *notes_on_rejected(chosen.found, chosen.kept, unit),
+    ]
     if chosen.kept.first.keys:
         notes += note_on_nuisance(chosen.before, chosen.held[0], seed)
     notes += (*notes_on_found_again(chosen.kept), *note_on_work(chosen.found))

@@ -10,6 +10,9 @@ from expdesign.signals import Record
 from expdesign.values import Array
 from expdesign.vessel import Vessel
 
+VISIBLE = 0.01
+"""Reduction of an error below which no number is given."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Estimate:
@@ -53,6 +56,8 @@ class Finding:
         explanation: a sentence or two.
         likelihood_gain: twice the log likelihood gained.
         keys: effects of the extended model, in the order of the estimates.
+        predicted: where no simulated error falls visibly, the share by which the squared whitened error of predictions
+            of held-out data from one sample to the next falls, if that is certain.
     """
 
     cause: str
@@ -68,6 +73,7 @@ class Finding:
     explanation: str
     likelihood_gain: float
     keys: tuple[str, ...]
+    predicted: ErrorReduction | None = None
 
 
 @dataclass(frozen=True)

@@ -7,16 +7,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from expdesign.diagnosis.causes import CAUSES, UNLISTED_TERM, Cause, Values
-from expdesign.diagnosis.fit import Fit, HeldOut, bootstrap_sums, held_out_gain, on_common_units
+from expdesign.diagnosis.data import Noise, Windows
+from expdesign.diagnosis.fit import Fit, HeldOut, bootstrap_sums, held_out_gain, on_common_units, prediction_gain
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.select import Step
-from expdesign.diagnosis.values import ErrorReduction, Estimate, Finding
+from expdesign.diagnosis.values import VISIBLE, ErrorReduction, Estimate, Finding
 from expdesign.diagnosis.vessel_file import public_name, stated_values
 from expdesign.values import Array
 
 
 def finding_of(
-    step: Step, last: Fit, held: tuple[HeldOut, HeldOut], seed: int, *, would_tell_apart: str | None
+    step: Step, last: Fit, held: tuple[HeldOut, HeldOut], seed: int, windows: Windows, *, would_tell_apart: str | None
 ) -> Finding:
     """A step of the selection as a finding.
 
@@ -25,18 +26,22 @@ def finding_of(
         last: the joint fit of all steps, which the estimates come from.
         held: errors on held-out units without and with the cause.
         seed: of the intervals.
+        windows: all data.
         would_tell_apart: the manoeuvre that distinguishes the cause from its alternatives best.
     """
     chosen, (before, after) = step.chosen, held
     gain, interval = held_out_gain(before, after, seed)
     values = _values(step, last)
+    reductions = error_reductions_of(chosen.fit.ship.model.outputs, before, after, seed)
+    visible = max(reductions, key=lambda item: item.low).share >= VISIBLE
     return Finding(
         cause=chosen.candidate.cause,
         estimates=_estimates(values, chosen.fit.ship),
         p_value=step.p_value,
         fit_before=before.fit,
         fit_after=after.fit,
-        error_reductions=error_reductions_of(chosen.fit.ship.model.outputs, before, after, seed),
+        error_reductions=reductions,
+        predicted=None if visible else _predicted(before, after, windows, chosen.fit.noise),
         gain=gain,
         gain_interval=interval,
         not_distinguishable_from=tuple(other.candidate.cause for other in step.alternatives),
@@ -45,6 +50,12 @@ def finding_of(
         likelihood_gain=chosen.likelihood_gain,
         keys=tuple(values),
     )
+
+
+def _predicted(before: HeldOut, after: HeldOut, windows: Windows, noise: Noise) -> ErrorReduction | None:
+    """Reduction of the squared error of predictions from one sample to the next; None where that is not certain."""
+    share, (low, high) = prediction_gain(before, after, windows, noise)
+    return ErrorReduction(output="all", share=share, low=low, high=high) if low > 0.0 else None
 
 
 def cause_of(name: str) -> Cause:

@@ -9,7 +9,7 @@ import numpy as np
 from expdesign.diagnosis.accuracy import Accuracy
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.fit import AHEAD_S, validation_units
-from expdesign.diagnosis.values import ErrorReduction, Finding, Lead, Unexplained
+from expdesign.diagnosis.values import VISIBLE, ErrorReduction, Finding, Lead, Unexplained
 
 DIVERGED_FIT = -300.0
 """Fit [%] below which the simulation has diverged from the ship; the number then has no meaning."""
@@ -34,8 +34,6 @@ MISSING_EFFECTS = {
     "change_point": "a change of the ship during the trial",
 }
 """Cause -> missing effect of the simulation."""
-VISIBLE = 0.01
-"""Reduction of an error below which no number is given."""
 WORDS = {"u": "surge", "v": "sway", "r": "yaw"}
 MANOEUVRES = {
     "zigzag": "a zig-zag",
@@ -76,7 +74,14 @@ def benefit(item: Finding) -> str:
     if not known:
         return f"gains {item.gain:.1f} points of fit"
     best = max(known, key=lambda reduction: reduction.low)
-    return _reduction(best) if best.share >= VISIBLE else "reduces no error by 1 % or more"
+    if best.share >= VISIBLE:
+        return _reduction(best)
+    return "reduces no error by 1 % or more" if item.predicted is None else _prediction(item.predicted)
+
+
+def _prediction(item: ErrorReduction) -> str:
+    interval = f"({_percent(item.low)} to {_percent(item.high)} %)"
+    return f"takes {_percent(item.share)} % {interval} off the squared error of predictions from sample to sample"
 
 
 def _reduction(best: ErrorReduction, verbs: tuple[str, str] = ("halves", "cuts")) -> str:
@@ -180,7 +185,11 @@ def _benefits(findings: Sequence[Finding], unit: str) -> str:
 
 def _invisible(findings: Sequence[Finding]) -> list[str]:
     """Findings that are significant and yet do not improve the simulation visibly."""
-    small = [item for item in findings if item.error_reductions and not any(map(_is_visible, item.error_reductions))]
+    small = [
+        item
+        for item in findings
+        if item.error_reductions and item.predicted is None and not any(map(_is_visible, item.error_reductions))
+    ]
     if not small:
         return []
     names = "it" if len(findings) == 1 else listed([lacking(item) for item in small])

@@ -26,7 +26,7 @@ from expdesign.diagnosis.fit.fit import (
     profile_cost,
     within_stated_std,
 )
-from expdesign.diagnosis.fit.gauss_newton import fit, fit_beside_stated_parameters
+from expdesign.diagnosis.fit.gauss_newton import fit
 from expdesign.diagnosis.fit.gram_matrices import gram_matrices, information, marginalised, window_information
 from expdesign.diagnosis.fit.linear_model import (
     build_sensitivities,
@@ -34,7 +34,8 @@ from expdesign.diagnosis.fit.linear_model import (
     effect_disturbances,
     sensitivities_to,
 )
-from expdesign.diagnosis.fit.output_error import with_longer_windows
+from expdesign.diagnosis.fit.output_error import fit_beside_stated_parameters, with_longer_windows
+from expdesign.diagnosis.fit.prediction import prediction_gain
 from expdesign.diagnosis.fit.tuning import TUNING
 from expdesign.diagnosis.fit.unmeasured_force import unmeasured_force_share
 
@@ -66,6 +67,7 @@ __all__ = [
     "log_likelihood_gain",
     "marginalised",
     "on_common_units",
+    "prediction_gain",
     "profile_cost",
     "sensitivities_to",
     "unmeasured_force_share",

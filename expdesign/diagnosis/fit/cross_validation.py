@@ -45,6 +45,7 @@ class HeldOut:
         unconverged: folds that kept the effects fitted to all units.
         ahead: of the same units in stretches of `Tuning.ahead_s`, fitted and simulated when it is called.
         in_stretches: whether these are such errors.
+        models: (mask of windows, model fitted without them) of every fold; None where it could not be fitted.
     """
 
     squared_error: Array
@@ -52,6 +53,7 @@ class HeldOut:
     unconverged: int = 0
     ahead: Callable[[], HeldOut] | None = None
     in_stretches: bool = False
+    models: tuple[tuple[NDArray[np.bool_], ExtendedModel | None], ...] = ()
 
     @property
     def fit(self) -> Array:
@@ -78,6 +80,10 @@ class CrossValidation:
         self._windows, self._record = windows, record
         self._known: dict[int, tuple[Fit, HeldOut]] = {}
 
+    def short_windows(self, ship: ExtendedModel) -> Windows:
+        """The data in stretches of `Tuning.ahead_s`."""
+        return _stretches(self._windows, validation_units(self._windows), ship, self._record)[0]
+
     def of(self, found: Fit, progress: Progress = silent) -> HeldOut:
         """Of a model whose effects are fitted."""
         if id(found) not in self._known:
@@ -102,11 +108,22 @@ def cross_validate(
         record: the same data, which stretches are cut from where units are batches; else they are parts of windows.
     """
     unit = validation_units(windows)
-    whole = _of_folds(_Folds(found=found, ship=ship, windows=windows, unit=unit, fitted=_fitted, near=True), progress)
+    whole = _of_folds(
+        _Folds(found=found, ship=ship, windows=windows, unit=unit, part=unit, fitted=_fitted, near=True), progress
+    )
     short, of_short = _stretches(windows, unit, ship, record)
     fitted = partial(_fitted_ahead, unit, of_short)
-    ahead = _Folds(found=found, ship=ship, windows=short, unit=of_short, fitted=fitted, near=False)
-    return replace(whole, ahead=cache(lambda: replace(_of_folds(ahead, silent), in_stretches=True)))
+    ahead = _Folds(
+        found=found,
+        ship=ship,
+        windows=short,
+        unit=of_short,
+        part=np.arange(float(len(of_short))),
+        fitted=fitted,
+        near=False,
+    )
+    in_stretches = cache(lambda: replace(_of_folds(ahead, silent), in_stretches=True, models=whole.models))
+    return replace(whole, ahead=in_stretches)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -118,6 +135,7 @@ class _Folds:
         ship: the model.
         windows: that it is simulated in.
         unit: (w,) of each of them.
+        part: (w,) what errors are summed over: units, or stretches of them.
         fitted: the model fitted to some of the windows, by a mask (w,).
         near: the windows are those of the fit, so that its motion speeds up the simulation.
     """
@@ -126,34 +144,37 @@ class _Folds:
     ship: ExtendedModel
     windows: Windows
     unit: Array
+    part: Array
     fitted: Callable[[Fit, Windows, NDArray[np.bool_]], ExtendedModel | None]
     near: bool
 
 
 def _of_folds(given: _Folds, progress: Progress) -> HeldOut:
     found, windows = given.found, given.windows
-    names = np.unique(given.unit)
+    names, parts = np.unique(given.unit), np.unique(given.part)
     folds = [names[index :: TUNING.folds] for index in range(min(TUNING.folds, len(names)))]
     columns = [OUTPUTS.index(name) for name in given.ship.model.outputs]
-    error = np.zeros((len(names), len(columns)))
+    error = np.zeros((len(parts), len(columns)))
     deviation, unconverged = np.zeros_like(error), 0
+    tested: list[tuple[NDArray[np.bool_], ExtendedModel | None]] = []
     kept_out = [np.isin(given.unit, fold) for fold in folds]
     refitted = [test for test in kept_out if found is not None and not test.all()]
     models = in_order(given.fitted, (found, windows), [(~test,) for test in refitted])
-    for number, (fold, test) in enumerate(zip(folds, kept_out, strict=True)):
+    for number, test in enumerate(kept_out):
         progress("measuring the gain on held-out runs", number / len(folds))
         model = given.ship if found is None or test.all() else next(models)
+        tested.append((test, model))
         if model is None:
             for total in (error, deviation):
-                total[np.isin(names, fold)] = np.nan
+                total[np.isin(parts, given.part[test])] = np.nan
             continue
         unconverged += found is not None and model.effects == found.ship.effects
         part = windows.selected(test)
         near = found.linear.selected(test) if found is not None and given.near else None
         sums = squared_sums(simulate_from_measured(model, part, near).error[..., columns], part.measured[..., columns])
         for total, more in zip((error, deviation), sums, strict=True):
-            np.add.at(total, np.searchsorted(names, given.unit[test]), more)
-    return HeldOut(squared_error=error, squared_deviation=deviation, unconverged=unconverged)
+            np.add.at(total, np.searchsorted(parts, given.part[test]), more)
+    return HeldOut(squared_error=error, squared_deviation=deviation, unconverged=unconverged, models=tuple(tested))
 
 
 def judged(held: Sequence[HeldOut], *, first: int = 1) -> list[HeldOut]:

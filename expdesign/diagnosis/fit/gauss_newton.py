@@ -11,7 +11,6 @@ from expdesign.diagnosis.fit.fit import (
     Fit,
     FitOptions,
     best_step,
-    continuing,
     deviations_of,
     lowest_steps,
     prior_precision,
@@ -32,24 +31,6 @@ from expdesign.diagnosis.motion import (
     simulate_windows,
 )
 from expdesign.values import Array
-
-
-def fit_beside_stated_parameters(found: Fit, windows: Windows) -> Fit:
-    """The free effects of a fit to all windows beside the parameters of the vessel file, as these stand in it.
-
-    Standard errors remain those beside parameters that may differ.
-
-    Raises:
-        FloatingPointError: the simulation diverges at the start of the fit.
-    """
-    free = found.free_keys
-    parameters = {key for key in found.keys if key.startswith("theta:") and key not in free}
-    model = found.ship.model
-    known = replace(model, parameter_std=np.zeros(len(model.parameters)))
-    ship = replace(found.ship.without_effects(parameters), model=known)
-    again = fit(ship, windows, free, starts=found.starts, options=continuing(found))
-    rows = [found.keys.index(key) for key in again.keys]
-    return replace(again, covariance=found.covariance[np.ix_(rows, rows)])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -45,7 +45,7 @@ class GramMatrices:
 
 def gram_matrices(found: Sensitivities, noise: Noise) -> GramMatrices:
     """Whiten, leave out samples that are not measured, project the initial states out."""
-    e, seen = _whitened_error(found.error, noise)
+    e, seen = whitened_error(found.error, noise)
     n, c = len(found.starts), len(found.values)
     rows = np.empty((4, n + c + 1, *e.shape[:2]))
     whitened(found.starts, noise, out=rows[:, :n])
@@ -67,7 +67,7 @@ def gram_matrices(found: Sensitivities, noise: Noise) -> GramMatrices:
     )
 
 
-def _whitened_error(error: Array, noise: Noise) -> tuple[Array, NDArray[np.bool_]]:
+def whitened_error(error: Array, noise: Noise) -> tuple[Array, NDArray[np.bool_]]:
     """(w, s, 4) whitened error, zero where nothing is measured, and whether it is measured."""
     rows = whitened(error, noise)
     seen = np.isfinite(rows)

@@ -33,6 +33,7 @@ class Tuning:
         least_fit: of simulations of whole held-out units [%]; where one is worse, the stretches count.
         force_spacing_s: between the knots of a force that nobody measured [s].
         force_penalties: sizes of such a force that are tried, as ridge penalties.
+        block_s: length of the blocks that predictions are compared in [s].
         bootstrap_draws: of units, for intervals.
     """
 
@@ -59,6 +60,7 @@ class Tuning:
     least_fit: float = 0.0
     force_spacing_s: float = 60.0
     force_penalties: tuple[float, ...] = (1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0, 1e3, 1e4)
+    block_s: float = 60.0
     bootstrap_draws: int = 1000
 
 

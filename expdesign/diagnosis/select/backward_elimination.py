@@ -9,8 +9,8 @@ from itertools import pairwise
 import numpy as np
 
 from expdesign.diagnosis.causes import Candidate
-from expdesign.diagnosis.data import Windows
-from expdesign.diagnosis.fit import HeldOut, cluster_robust, held_out_gain, on_common_units
+from expdesign.diagnosis.data import Noise, Windows
+from expdesign.diagnosis.fit import HeldOut, cluster_robust, held_out_gain, on_common_units, prediction_gain
 from expdesign.diagnosis.select.selection import Selection, Step, least_significant_step, without_step
 from expdesign.diagnosis.select.tuning import TUNING
 
@@ -36,7 +36,7 @@ def eliminate_backward(
     reordered: list[Candidate] = []
     while True:
         found, held = cross_validated(found)
-        improves = improves_held_out(found, held, seed)
+        improves = improves_held_out(found, held, seed, windows)
         later = _moved_last(found, improves, windows, reordered)
         if later is not None:
             found = later
@@ -80,7 +80,9 @@ def before_first_without_gain(found: Selection, improves: Sequence[bool]) -> Sel
     return found.with_steps(found.steps[: int(np.argmin([*improves, False]))])
 
 
-def improves_held_out(found: Selection, held: Sequence[HeldOut], seed: int) -> list[bool]:
+def improves_held_out(
+    found: Selection, held: Sequence[HeldOut], seed: int, windows: Windows | None = None
+) -> list[bool]:
     """Which causes improve the simulation of held-out data.
 
     The test of the first cause is more sensitive than a simulated fit. So the first cause stays, unless it makes the
@@ -89,19 +91,42 @@ def improves_held_out(found: Selection, held: Sequence[HeldOut], seed: int) -> l
     error is explained, small differences between model and ship become significant. A small gain counts if its
     interval excludes zero. Uncertain parameters are estimated in any case, so as a cause they need no gain. A cause
     that imitates others may make no output worse by more than it gains on average. Where whole
-    simulations lead away, the interval of a later cause must exclude zero. What takes less than
-    `Tuning.least_reduction` off every error is a remark, whatever its p-value.
+    simulations lead away, the interval of a later cause must exclude zero, and so must that of any cause beside the
+    parameters of the file, as tests are beside the likeliest ones. What takes less than
+    `Tuning.least_reduction` off every error is a remark, whatever its p-value. What does not show in simulations may
+    show in predictions from one sample to the next, where it does not make simulations worse for certain.
+
+    Args:
+        found: the selection.
+        held: errors on held-out units of the model before any cause, then after every step.
+        seed: of the gains' intervals.
+        windows: all data; None where there are no predictions of them.
     """
     gains = [held_out_gain(one, other, seed) for one, other in pairwise(held)]
-    return [
+    simulated = [
         _matters(*held[index : index + 2])
         and (not step.chosen.candidate.imitates or _least_change(*held[index : index + 2]) >= -gain)
         and _improves(
-            index == 0 or only_nuisance(step, found), _least_change(*held[index : index + 2]) >= 0.0, gain, interval
+            not found.beside_stated and (index == 0 or only_nuisance(step, found)),
+            _least_change(*held[index : index + 2]) >= 0.0,
+            gain,
+            interval,
         )
-        and (index == 0 or not held[0].in_stretches or interval[0] > 0.0)
+        and ((index == 0 and not found.beside_stated) or not held[0].in_stretches or interval[0] > 0.0)
         for index, (step, (gain, interval)) in enumerate(zip(found.steps, gains, strict=True))
     ]
+    if windows is None:
+        return simulated
+    return [
+        shown or (gain[1][1] >= 0.0 and predicts_better(*pair, windows, step.chosen.fit.noise))
+        for shown, gain, pair, step in zip(simulated, gains, pairwise(held), found.steps, strict=True)
+    ]
+
+
+def predicts_better(before: HeldOut, after: HeldOut, windows: Windows, noise: Noise) -> bool:
+    """Whether predictions of held-out data from one sample to the next are better by enough, and for certain."""
+    share, (low, _) = prediction_gain(before, after, windows, noise)
+    return share >= TUNING.least_predicted and low > 0.0
 
 
 def _matters(before: HeldOut, after: HeldOut) -> bool:

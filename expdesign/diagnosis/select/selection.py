@@ -49,6 +49,7 @@ class Selection:
         last: the joint fit of all causes.
         last_tests: score tests of the round that found nothing more.
         untried: what the limit of work left out.
+        beside_stated: causes are fitted beside the parameters of the vessel file, although these are uncertain.
     """
 
     steps: tuple[Step, ...]
@@ -56,6 +57,7 @@ class Selection:
     last: Fit
     last_tests: tuple[ScoreTest, ...]
     untried: tuple[str, ...] = ()
+    beside_stated: bool = False
 
     def with_steps(self, steps: tuple[Step, ...]) -> Selection:
         """The selection with other steps; where these are its first ones, the next round's tests become the last."""
@@ -66,17 +68,17 @@ class Selection:
         )
 
 
-def beside_stated_parameters(found: Selection, windows: Windows) -> Selection | None:
-    """The same causes fitted beside the parameters of the vessel file; None where one of them cannot be fitted."""
+def beside_stated_parameters(found: Selection, windows: Windows, short: Windows) -> Selection | None:
+    """The same causes beside the parameters of the vessel file, by windows and by `short` ones; None if that fails."""
     steps, before = list[Step](), None
     for step in found.steps:
         try:
-            known = fit_beside_stated_parameters(step.chosen.fit, windows)
+            known = fit_beside_stated_parameters(step.chosen.fit, windows, short)
         except (FloatingPointError, np.linalg.LinAlgError):
             return None
         steps.append(replace(step, chosen=replace(step.chosen, fit=known), before=before or step.before))
         before = known
-    return replace(found, steps=tuple(steps), last=before or found.first)
+    return replace(found, steps=tuple(steps), last=before or found.first, beside_stated=True)
 
 
 def redundant_step(steps: list[Step], windows: Windows) -> int | None:
