@@ -39,6 +39,7 @@ from expdesign.diagnosis.fit import (
     HeldOut,
     held_out_gain,
     judged,
+    leads_away,
     unmeasured_force_share,
     with_longer_windows,
     within_stated_std,
@@ -219,14 +220,15 @@ def _as_judged(
     Errors are those of the model before any cause, then after every step. Parameters re-estimated within their standard
     deviations may simulate held-out units worse than those of the file, which many other data may have gone into. Then
     a cause has to improve on the file's parameters, and is fitted beside them: else it would have to make up for the
-    loss.
+    loss. A file with which the simulation leads away is no such file.
     """
     short = validation.short_windows(found.first.ship)
     if found.beside_stated:
         again = beside_stated_parameters(found, windows, short) or found
         return again, _ahead([as_stated, *(validation.of(step.chosen.fit) for step in again.steps)])
     held = _cross_validated(found, as_stated, validation, progress)
-    if not found.steps or not found.first.keys or not _mean_fit(as_stated) > _mean_fit(validation.of(found.first)):
+    uncertain = found.steps and found.first.keys and not leads_away(as_stated)
+    if not uncertain or not _mean_fit(as_stated) > _mean_fit(validation.of(found.first)):
         return found, held
     known = beside_stated_parameters(found, windows, short)
     if known is None or not _mean_fit(validation.of(known.last)) > _mean_fit(validation.of(found.last)):
