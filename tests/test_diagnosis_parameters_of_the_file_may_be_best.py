@@ -1,0 +1,66 @@
+"""Parameters re-estimated from few runs may simulate worse than those of the file: causes are judged beside the best."""
+
+import numpy as np
+import pytest
+
+from diagnosis_case import hidden_record, vessel_of
+from expdesign.diagnosis import diagnose
+from expdesign.diagnosis.data.windows import cut_windows
+from expdesign.diagnosis.fit.cross_validation import HeldOut
+from expdesign.diagnosis.fit.prediction import prediction_gain
+from expdesign.diagnosis.motion.simulation import initial_states
+from expdesign.diagnosis.select.forward_selection import fit_nuisance
+from expdesign.diagnosis.vessel_file.reading import extended_model
+
+BIAS_RAD = 0.08
+
+
+def test_a_fault_is_found_beside_parameters_that_the_file_knows_better():
+    """The file has the true parameters, stated to 10 %, and three runs of 150 s tell them worse than that."""
+    beside = 0
+    for seed in (1, 2, 3):
+        record = hidden_record("coaster", seed=seed, batches=3, samples=150, faults={"heading_bias": BIAS_RAD})
+        vessel = vessel_of("coaster", relative_std=0.1)
+        found = diagnose(vessel, record)
+        assert [item.cause for item in found.findings] == ["heading_bias"]
+        (estimate,) = found.findings[0].estimates
+        assert abs(estimate.value - BIAS_RAD) < 3.5 * estimate.std
+        assert found.findings[0].gain_interval[0] > 0.0
+        if any("worse than those of the vessel file" in note for note in found.notes):
+            beside += 1
+            np.testing.assert_array_equal(found.extended.model.parameters, vessel.model.parameters)
+            np.testing.assert_array_equal(found.extended.model.parameter_std, vessel.model.parameter_std)
+    assert beside >= 2
+
+
+def held_out(ship, windows):
+    lost = np.ones((3, 3))
+    masks = [np.arange(len(windows.batch)) == index for index in range(3)]
+    return HeldOut(squared_error=lost, squared_deviation=lost, models=tuple((mask, ship) for mask in masks))
+
+
+def test_predictions_gain_by_the_true_model_and_lose_as_much_without_it():
+    record = hidden_record("barge", seed=2, batches=3, samples=300, effects={"gain": -0.2})
+    ship = extended_model(vessel_of("barge"), record)
+    windows = cut_windows(ship.model, record)
+    true = ship.with_effects({"gain": -0.2})
+    noise = fit_nuisance(true, windows, initial_states(windows)).noise
+    without, right = (held_out(one, windows) for one in (ship, true))
+    gain, (low, high) = prediction_gain(without, right, windows, noise)
+    assert 0.02 < low < gain < high < 1.0
+    loss, _ = prediction_gain(right, without, windows, noise)
+    assert (1.0 - gain) * (1.0 - loss) == pytest.approx(1.0)
+    assert prediction_gain(right, right, windows, noise) == (0.0, (0.0, 0.0))
+
+
+def test_small_effects_that_are_not_there_gain_no_predictions():
+    """Effects of a size that noise has gain less than is asked for."""
+    record = hidden_record("barge", seed=2, batches=3, samples=300)
+    ship = extended_model(vessel_of("barge"), record)
+    windows = cut_windows(ship.model, record)
+    noise = fit_nuisance(ship, windows, initial_states(windows)).noise
+    for effects in ({"gain": 0.005}, {"heading_bias": 0.002}, {"late:r": 0.02}):
+        gain, _ = prediction_gain(
+            held_out(ship, windows), held_out(ship.with_effects(effects), windows), windows, noise
+        )
+        assert gain < 0.02
