@@ -1,4 +1,4 @@
-"""Parameters re-estimated from few runs may simulate worse than those of the file: causes are judged beside the best."""
+"""Parameters re-estimated from few runs may simulate worse than those of the file; causes stand beside the better."""
 
 import numpy as np
 import pytest

@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.data import Noise, Windows
 from expdesign.diagnosis.fit.cross_validation import HeldOut
 from expdesign.diagnosis.fit.gram_matrices import GramMatrices, current_prior, gram_matrices, whitened_error
@@ -50,7 +51,7 @@ def _current(grams: GramMatrices, found: Sensitivities, noise: Noise) -> Array:
 
 
 def _squares(held_out: NDArray[np.bool_], ship: ExtendedModel | None, windows: Windows, noise: Noise) -> Array:
-    """(blocks,) squared whitened error of some windows, summed over channels and blocks of time; infinite if lost."""
+    """(blocks,) squared whitened error of u, v, r in some windows, summed over blocks of time; infinite if lost."""
     if ship is None:
         return np.zeros(0)
     motion = simulate_from_measured(ship, windows.selected(held_out))
@@ -63,7 +64,8 @@ def _squares(held_out: NDArray[np.bool_], ship: ExtendedModel | None, windows: W
     current = _current(grams, found, noise) if moving else grams.Xe
     by_current = np.einsum("wc,cwsn->wsn", current, found.values)
     by_start = np.einsum("wn,nwsk->wsk", grams.initial_state_steps(current), found.starts)
-    errors, seen = whitened_error(found.error - by_current - by_start, noise)
+    whole = whitened_error(found.error - by_current - by_start, noise)
+    errors, seen = (part[..., : len(OUTPUTS)] for part in whole)
     count = -(-errors.shape[1] // size)
     sums = [(part**2).sum(axis=(1, 2)) for part in np.array_split(errors, count, axis=1)]
     measured = [part.any(axis=(1, 2)) for part in np.array_split(seen, count, axis=1)]

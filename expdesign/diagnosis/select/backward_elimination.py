@@ -93,8 +93,8 @@ def improves_held_out(
     that imitates others may make no output worse by more than it gains on average. Where whole
     simulations lead away, the interval of a later cause must exclude zero, and so must that of any cause beside the
     parameters of the file, as tests are beside the likeliest ones. What takes less than
-    `Tuning.least_reduction` off every error is a remark, whatever its p-value. What does not show in simulations may
-    show in predictions from one sample to the next, where it does not make simulations worse for certain.
+    `Tuning.least_reduction` off every error is a remark, whatever its p-value. A first cause that does not show in
+    simulations may show in predictions from one sample to the next, if it makes simulations no worse for certain.
 
     Args:
         found: the selection.
@@ -117,10 +117,10 @@ def improves_held_out(
     ]
     if windows is None:
         return simulated
-    return [
-        shown or (gain[1][1] >= 0.0 and predicts_better(*pair, windows, step.chosen.fit.noise))
-        for shown, gain, pair, step in zip(simulated, gains, pairwise(held), found.steps, strict=True)
-    ]
+    _, (_, high) = gains[0] if gains else (0.0, (0.0, -np.inf))
+    if high >= 0.0 and not simulated[0]:
+        simulated[0] = predicts_better(held[0], held[1], windows, found.steps[0].chosen.fit.noise)
+    return simulated
 
 
 def predicts_better(before: HeldOut, after: HeldOut, windows: Windows, noise: Noise) -> bool:

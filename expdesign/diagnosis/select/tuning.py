@@ -53,7 +53,7 @@ class Tuning:
         clear_gain_points: gain that suffices even where its interval, of few runs perhaps, includes zero [points].
         leads: candidates that are named where a simulation explains little and no cause is certain.
         least_reduction: share by which the error of some output must fall on held-out data for a cause to be a finding.
-        least_predicted: share of the squared error of predictions that a cause may take away instead.
+        least_predicted: share of the squared error of predictions that a first cause may take away instead.
         most_loss_points: loss at the lower end of the interval that the first cause may risk, if some output is
             simulated worse with it [points].
     """
@@ -99,7 +99,7 @@ class Tuning:
     clear_gain_points: float = 1.0
     leads: int = 3
     least_reduction: float = 0.01
-    least_predicted: float = 0.02
+    least_predicted: float = 0.05
     most_loss_points: float = 0.5
 
 
