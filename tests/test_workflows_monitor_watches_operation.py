@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import signal
 import subprocess
 import sys
@@ -16,7 +17,7 @@ import pytest
 from expdesign.cli import main
 from expdesign.scenario import load_vessel
 from expdesign.vessel import Vessel
-from monitoring_case import TENDER, tender, voyage_csv
+from monitoring_case import ROOT, TENDER, tender, voyage_csv
 
 HOUR = 3600
 
@@ -189,6 +190,22 @@ def test_a_stream_is_watched_as_its_file_is(
     stream = monitored(tmp_path / "stream", "-", "--reference", voyages["reference"], "--every-s", 600)
     assert [alarm["effect"] for alarm in stream["alarms"]] == [alarm["effect"] for alarm in whole["alarms"]]
     assert stream["judged_h"] == whole["judged_h"]
+
+
+def test_the_example_of_the_readme_finds_the_change(
+    voyages: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (line,) = re.findall(r"bin/expdesign (monitor .*)", (ROOT / "README.md").read_text())
+    for name, path in (
+        ("voyage.csv", voyages["changed"]),
+        ("known.csv", voyages["reference"]),
+        ("ship.toml", TENDER),
+    ):
+        (tmp_path / name).write_bytes(path.read_bytes())
+    monkeypatch.chdir(tmp_path)
+    assert main(line.split()) == 0
+    (alarm,) = json.loads((tmp_path / "runs" / "voyage" / "monitor.json").read_text())["alarms"]
+    assert alarm["effect"] == "theta:N_r"
 
 
 def test_gaps_and_rows_without_numbers_are_left_out(voyages: dict[str, Path], tmp_path: Path) -> None:

@@ -368,7 +368,12 @@ def monitor(
         ),
     ] = 6.0,
     resume: Annotated[
-        bool, typer.Option("--resume", help="Go on from the state that an earlier watch left in the same folder.")
+        bool,
+        typer.Option(
+            "--resume",
+            help="Go on from the state that an earlier watch left in the same folder, however it ended. Rows that it "
+            "had read are skipped: give the same file, grown or not, the next one, or the stream from before its end.",
+        ),
     ] = False,
     velocity: Velocity = "auto",
     out: OutByData = None,
