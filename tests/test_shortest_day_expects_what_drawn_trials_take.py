@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,14 +11,19 @@ import pytest
 import shapely
 
 from expdesign.plan import PlanSettings
+from expdesign.plan.control import capability
 from expdesign.plan.monte_carlo import sail_trials
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import draft_trial
 from expdesign.plan.tuning import PLAN
+from expdesign.scenario import load_scenario
 from expdesign.shortest_day.prices import DraftedDay, _legs_s
 from expdesign.shortest_day.tuning import TUNING
 from expdesign.simulation import Environment
+from expdesign.workflows.steps.day import with_leg_speed
 from plan_case import acceleration, area, ship
+
+SCENARIOS = Path(__file__).parents[1] / "scenarios"
 
 
 @pytest.fixture(scope="module")
@@ -56,3 +62,12 @@ def test_a_run_costs_what_trials_lose_on_the_leg_to_it(drafted):
     before, after = (_legs_s(("go",), [day], np.array([45.0])) for day in (drafted, slow))
     assert before[0] > TUNING.least_leg_s
     assert after - before == pytest.approx(100.0 / 2)  # over both runs
+
+
+def test_legs_are_faster_than_usual_only_where_no_speed_is_stated():
+    case = load_scenario(SCENARIOS / "story.toml")
+    usual = capability(case.vessel, case.plan)
+    faster = capability(case.vessel, with_leg_speed(case))
+    assert usual.transit_speed_mps < faster.transit_speed_mps < faster.top_speed_mps == usual.top_speed_mps
+    stated = replace(case, plan=replace(case.plan, transit_speed_mps=1.0))
+    assert with_leg_speed(stated).transit_speed_mps == 1.0
