@@ -76,7 +76,7 @@ def identify_steps(record: Record, controls: Controls, *, seed: int = 0, progres
     _check(samples)
     return StepTrial(
         batches=batches, holds=holds, controls=controls, rudder_sign=sign, tests=tests, samples=samples, delays=delays,
-        model=_model(samples, delays, batches[0].sample_time_s), found=comparisons(samples), seed=seed,
+        model=_model(samples, delays), found=comparisons(samples), seed=seed,
     )  # fmt: skip
 
 
@@ -93,7 +93,7 @@ def _check(samples: Sequence[StepSample]) -> None:
             )
 
 
-def _model(samples: Sequence[StepSample], delays: Delays, sample_time_s: float) -> TwoDofModel:
+def _model(samples: Sequence[StepSample], delays: Delays) -> TwoDofModel:
     steady = [(one, one.plateau) for one in samples if one.plateau is not None]
     states = np.array([part.state for _, part in steady])
     commands = np.array([one.hold.commands for one, _ in steady])
@@ -107,7 +107,6 @@ def _model(samples: Sequence[StepSample], delays: Delays, sample_time_s: float) 
         inertia=(_inertia(samples, 0), _inertia(samples, 1)),
         delay_s=(delays[0][0], delays[1][0]),
         region=validity_region(visited),
-        sample_time_s=sample_time_s,
     )
 
 

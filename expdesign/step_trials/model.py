@@ -26,14 +26,12 @@ class TwoDofModel:
         inertia: m_U and m_r [unit of throttle per m/s2, unit of rudder per rad/s2].
         delay_s: dead times of throttle and rudder [s].
         region: where the model holds; outside, surfaces keep their value at its edge and damping grows.
-        sample_time_s: longest time step of a simulation [s].
     """
 
     damping: tuple[Surface, Surface]
     inertia: tuple[Surface, Surface]
     delay_s: tuple[float, float]
     region: ValidityRegion
-    sample_time_s: float
 
     def rates(self, state: Array, commands: Array) -> Array:
         """(2,) dU/dt [m/s2] and dr/dt [rad/s2] at a state (2,) under delayed commands (2,).
