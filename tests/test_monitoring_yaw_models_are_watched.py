@@ -103,6 +103,13 @@ def test_voyages_of_one_ship_share_its_parameters(departure: YawData) -> None:
         assert shared.of(name)[0] == pytest.approx(NOMINAL[name], rel=0.02)
 
 
+def test_without_noise_instruments_and_output_error_agree(departure: YawData) -> None:
+    crossed, plain = (f(FULL, departure, NOMINAL) for f in (estimate_yaw_by_instruments, estimate_yaw))
+    for name in ("I_r", "A", "N_rr", "N_rv", "N_uv"):
+        assert crossed.of(name)[0] == pytest.approx(plain.of(name)[0], rel=0.05)
+
+
+@pytest.mark.slow
 def test_instruments_take_away_the_bias_that_noisy_inputs_leave() -> None:
     voyage = harbour(seconds=500.0, seed=1, step_s=0.5)
     data = measured(voyage, count=40, seed=3, noise=5.0**-0.5, averaged=1)
@@ -197,7 +204,7 @@ def test_halves_that_disagree_at_equal_fit_raise_the_alarm_of_poor_data() -> Non
 def inertial_difference(how: Orders, *, count: int) -> float:
     """Yaw rate of a ship with 10 % more moment of inertia less that of the nominal one, root mean square [rad/s]."""
     nominal, heavy = (
-        fleet(hull, how, count=count, seed=0, seconds=250.0, step_s=0.5)
+        fleet(hull, how, count=count, seed=0, seconds=150.0, step_s=0.5)
         for hull in (NOMINAL_HULL, heavier(inertia=1.1))
     )
     apart = [one.column("r") - other.column("r") for one, other in zip(nominal, heavy, strict=True)]
