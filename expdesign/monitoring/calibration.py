@@ -92,7 +92,7 @@ def calibrate(grams: Grams, *, load: Array | None = None) -> Calibration:
     if len(grams) < TUNING.fewest_stretches:
         raise NotInformative(
             f"the reference has {len(grams)} stretches of {grams.stretch_s:g} s with a usable simulation, expected at "
-            f"least {TUNING.fewest_stretches}"
+            f"least {TUNING.fewest_stretches}, {TUNING.fewest_stretches * grams.stretch_s / 3600.0:.1f} h"
         )
     m = grams.changes
     std, variance, change = _independent(grams)

@@ -29,19 +29,17 @@ from expdesign.progress import Progress, silent
 from expdesign.records import STREAM, pieces
 from expdesign.scenario import load_vessel
 from expdesign.workflows.command_text import command_text
+from expdesign.workflows.data.prepared import Asked, Read, prepared
 from expdesign.workflows.data.restored import restored_watch
 from expdesign.workflows.data.watched_ship import VESSEL, check_model
 from expdesign.workflows.data.watching import (
     HOUR,
-    Asked,
     Learning,
-    Read,
     Ready,
     Watch,
     Watching,
     after_reading,
     calibrated,
-    prepared,
     rules_of,
     shift_of,
     with_piece,
