@@ -21,8 +21,9 @@ less often than its test accepts them.
 Sources: A. Wald (1943) for the noncentral distribution; C. R. Rao (1948) for score tests.
 """
 
+from expdesign.foresight.background import Background, background
 from expdesign.foresight.effects import Direction, HiddenEffect
-from expdesign.foresight.foresee import Background, background, foresee
+from expdesign.foresight.foresee import foresee
 from expdesign.foresight.operation import (
     Detectability,
     HiddenChange,

@@ -24,8 +24,9 @@ from expdesign.diagnosis.select import SELECTION_TUNING
 from expdesign.dictionary import Primitive
 from expdesign.errors import NoAnswer
 from expdesign.foresight.added import information_of_runs
+from expdesign.foresight.background import UNSEEN, Background, background
 from expdesign.foresight.effects import HiddenEffect, described, hidden_effects
-from expdesign.foresight.foresee import ENDLESS, UNSEEN, Background, background, effect_name, sizes_of
+from expdesign.foresight.foresee import ENDLESS, effect_name, sizes_of
 from expdesign.foresight.information import allowed_by_prior, beside_nuisance
 from expdesign.foresight.power import freedom_of, level_of, needed_noncentrality
 from expdesign.foresight.trial import design_runs
