@@ -1,8 +1,10 @@
 """All commands: importing the modules registers them, in the order in which `--help` lists them."""
 
-from expdesign.cli import planning, recorded, trials  # isort: split
+from expdesign.cli import planning, recorded  # isort: split
+
+from expdesign.cli import operation, trials  # isort: split
 
 from expdesign.cli import explaining
 from expdesign.cli.app import app
 
-__all__ = ["app", "explaining", "planning", "recorded", "trials"]
+__all__ = ["app", "explaining", "operation", "planning", "recorded", "trials"]

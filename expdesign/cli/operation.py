@@ -1,0 +1,97 @@
+"""The command on a ship in operation."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from expdesign.cli.app import Asked, ask, command
+from expdesign.cli.options import Jobs, OutByData, Velocity
+
+
+@command("monitor")
+def monitor(
+    data: Annotated[
+        list[Path],
+        typer.Argument(metavar="DATA.csv ...", help="Records of operation in the order of time; - reads a stream."),
+    ],
+    vessel: Annotated[Path, typer.Option("--vessel", metavar="VESSEL.toml", help="The model of the ship.")],
+    reference: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--reference",
+            metavar="FILE ...",
+            help="Records of a time in which the ship was as known, in weather as usual.",
+        ),
+    ] = None,
+    learn: Annotated[
+        float,
+        typer.Option("--learn-h", metavar="H", help="Hours of the data that are the reference, where none is given."),
+    ] = 24.0,
+    false_alarms: Annotated[
+        float, typer.Option("--false-alarm-days", metavar="D", help="Days between false alarms, on average.")
+    ] = 30.0,
+    size: Annotated[
+        float,
+        typer.Option(
+            "--size",
+            metavar="S",
+            help="Relative change of parameters, thrust and inertia that matters; of angles and gyro in proportion.",
+        ),
+    ] = 0.1,
+    every: Annotated[
+        float, typer.Option("--every-s", metavar="T", help="Seconds of a stream between looks at it.")
+    ] = 3600.0,
+    model: Annotated[
+        str,
+        typer.Option(
+            metavar="WHICH",
+            help="Model that is watched: vessel, the vessel file's; yaw-full or yaw-simplified, learnt from the "
+            "reference, with measured surge, sway, roll, side acceleration and moment of the drives as inputs.",
+        ),
+    ] = "vessel",
+    port: Annotated[
+        float,
+        typer.Option(
+            "--port-h",
+            metavar="H",
+            help="Hours without way and propulsion, or without data, that count as a port call: the ship may carry "
+            "another load afterwards, which is estimated anew and raises no alarm. inf: its load never changes.",
+        ),
+    ] = 6.0,
+    resume: Annotated[
+        bool,
+        typer.Option(
+            "--resume",
+            help="Go on from the state that an earlier watch left in the same folder, however it ended. Rows that it "
+            "had read are skipped: give the same file, grown or not, the next one, or the stream from before its end.",
+        ),
+    ] = False,
+    velocity: Velocity = "auto",
+    out: OutByData = None,
+    jobs: Jobs = 0,
+) -> Asked:
+    """Watch a ship in operation: whether it still is the ship of its model, what changed, since when, by how much.
+
+    Writes monitor.json, monitor.html, monitor-state.json and, after an alarm, since-change.csv for diagnose.
+
+    Example: expdesign monitor voyage.csv --vessel ship.toml --learn-h 6
+    """
+    return ask(
+        "monitor",
+        data,
+        out,
+        vessel=vessel,
+        reference=reference or (),
+        learn_h=learn,
+        false_alarm_days=false_alarms,
+        size=size,
+        every_s=every,
+        port_h=port,
+        velocity=velocity,
+        model=model,
+        resume=resume,
+        jobs=jobs,
+    )
