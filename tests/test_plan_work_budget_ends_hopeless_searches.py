@@ -53,7 +53,10 @@ def test_transitions_are_left_to_the_rule_when_there_is_nothing_left_to_spend(wa
     space, spent = space_of(water, go, np.array([0.0, 300.0, 0.0])), WorkBudget(most_s=1.0)
     spent.optimised(iterations=100, samples=100)
     assert spent.exhausted
-    trials = TransitionTrials(water=water, primitives={"go": go}, start=np.zeros(3), made_good=True, budget=spent)
+    rest = np.zeros(3), np.zeros(len(water.vessel.limits))
+    trials = TransitionTrials(
+        water=water, primitives={"go": go}, start=np.zeros(3), under_way=rest, made_good=True, budget=spent
+    )
     found = space.planner.with_transitions(space, [("go", "go")], trials)
     assert found.tried == space.tried
 

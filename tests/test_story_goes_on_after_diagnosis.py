@@ -188,7 +188,7 @@ def test_the_report_says_where_the_trial_stands(story):
     page = (folder / "second/report.html").read_text(encoding="utf-8")
     for words in (
         "What is known, and what the rest of the trial adds",
-        "assumes that the ship then stops",
+        "begins there and then, with the motion and the commands of the last rows",
         f"<b>{MISSING}</b> (new)",
     ):
         assert words in page

@@ -9,12 +9,14 @@ from numpy.typing import NDArray
 
 from expdesign.errors import NotInformative
 from expdesign.monitoring.evidence import STARTS, Grams, Stretches, stretches_of
-from expdesign.monitoring.force import Force, Known, after_gap, after_stretch, judged, likelihood
+from expdesign.monitoring.force import Force, Known, after_gap, after_stretch, judged, likelihood, surprise
 from expdesign.monitoring.tuning import TUNING
 from expdesign.values import Array, seal
 
 LEAST_VARIANCE = 1e-14
 """Of a force that is none."""
+LEAST_SURPRISE = 0.1
+"""Of a stretch on average, where the reference shows no force."""
 STEPS = np.array([-4.0, -2.0, -1.0, 1.0, 2.0])
 """By which logarithms of variances and times are changed in a round of the search, to base two."""
 
@@ -34,6 +36,7 @@ class Calibration:
         stretches: number of stretches of the reference.
         stretch_s: their length [s].
         misfit_limit: misfit per measured number beyond which a stretch is not judged.
+        surprise: of a stretch on average, see `force.surprise`: how well the weather is predicted.
         load: (m,) standard deviation of what a port call may change of the load, in sizes.
     """
 
@@ -47,6 +50,7 @@ class Calibration:
     stretches: int
     stretch_s: float
     misfit_limit: float
+    surprise: float
     load: Array
 
     def __post_init__(self) -> None:
@@ -104,7 +108,7 @@ def calibrate(grams: Grams, *, load: Array | None = None) -> Calibration:
     after = stretches.less(baseline)
     inflation = _inflation(*_filtered(after, force))
     own = np.sqrt(np.maximum(np.diag(whole), 1e-300))
-    misfit = _misfits(after, force)
+    misfit, surprises = _misfits(after, force)
     middle = float(np.median(misfit))
     spread = 1.4826 * float(np.median(np.abs(misfit - middle)))
     return Calibration(
@@ -118,6 +122,7 @@ def calibrate(grams: Grams, *, load: Array | None = None) -> Calibration:
         stretches=len(grams),
         stretch_s=grams.stretch_s,
         misfit_limit=middle + TUNING.misfit_deviations * spread,
+        surprise=max(float(surprises.mean()), LEAST_SURPRISE),
         load=np.zeros(m) if load is None else load,
     )
 
@@ -230,16 +235,17 @@ def _filtered(stretches: Stretches, force: Force) -> tuple[Array, Array]:
     return scores, known_of
 
 
-def _misfits(stretches: Stretches, force: Force) -> Array:
-    """(w,) `misfit_of` every stretch of a reference."""
-    known, found = Known.nothing(force), np.empty(len(stretches))
+def _misfits(stretches: Stretches, force: Force) -> tuple[Array, Array]:
+    """(w,) `misfit_of` every stretch of a reference, and (w,) `surprise`."""
+    known, found, surprises = Known.nothing(force), np.empty(len(stretches)), np.empty(len(stretches))
     for index, products in enumerate(stretches.products):
         if index:
             known = after_gap(known, force, float(stretches.time_s[index] - stretches.time_s[index - 1]))
         one = judged(products, stretches.changes, known)
         found[index] = misfit_of(float(one.quadratic), one.score, one.information, float(stretches.counts[index]))
+        surprises[index] = surprise(products, stretches.changes, known, one)
         known = after_stretch(known, one)
-    return found
+    return found, surprises
 
 
 def _inflation(score: Array, information: Array) -> Array:

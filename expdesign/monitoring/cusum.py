@@ -17,10 +17,11 @@ import numpy as np
 
 from expdesign.monitoring.calibration import Calibration, misfit_of
 from expdesign.monitoring.evidence import Grams, stretches_of
-from expdesign.monitoring.force import Force, Judged, after_gap, after_stretch, judged
+from expdesign.monitoring.force import Force, Judged, after_gap, after_stretch, judged, surprise
 from expdesign.monitoring.load import called, with_load
 from expdesign.monitoring.settling import raised, settling
 from expdesign.monitoring.state import Alarm, Rules, State, Step
+from expdesign.monitoring.tuning import TUNING
 from expdesign.values import Array
 
 
@@ -59,38 +60,82 @@ def watch(
         if begin_s - state.judged_s >= rules.port_s:
             state = called(state, calibration, begin_s)
         state = _waited(state, nuisance, begin_s + calibration.stretch_s)
-        one = judged(_less(products, calibration.baseline), stretches.changes, state.known, loads=calibration.loads)
+        own, loads = _less(products, calibration.baseline), calibration.loads
+        one = judged(own, stretches.changes, state.known, loads=loads)
         if misfit_of(float(one.quadratic), one.score, one.information, count) > calibration.misfit_limit:
             state = replace(state, left_out=state.left_out + 1)
             continue
-        state = _counted(state, one, int(grams.kind[index]), grams.budget[index])
+        surprised = surprise(own, stretches.changes, state.known, one, loads) / calibration.surprise
+        before = state.weather
+        state = _counted(state, one, surprised, int(grams.kind[index]), grams.budget[index])
         if state.alarm is not None:
             state = settling(state, state.alarm, one, calibration)
             if state.alarm is not None and state.alarm.settled:
                 alarms.append(state.alarm)
-                state = replace(state, alarm=None, pending=None)
+                state = replace(state, alarm=None, pending=None, weather=1.0)
         else:
-            state, step = _summed(state, one, calibration)
+            state, step = _summed(state, one, surprised, before, calibration)
             steps.append(step)
-            if step.statistic > rules.limit:
-                state, alarm = raised(state, step, calibration)
-                alarms.append(alarm)
-            else:
-                state = with_load(state, calibration)
+            state, alarm = _noticed(state, step, calibration, rules.limit, len(own) - 1 - stretches.changes)
+            alarms += [] if alarm is None else [alarm]
         if state.shift is not ship:
             return state, tuple(alarms), tuple(steps), index + 1
     return state, tuple(alarms), tuple(steps), len(grams)
 
 
-def _counted(state: State, one: Judged, kind: int, terms: Array) -> State:
-    """With a stretch in what is added up over all that are judged."""
+def _counted(state: State, one: Judged, surprised: float, kind: int, terms: Array) -> State:
+    """With a stretch in what is added up over all that the filter takes.
+
+    It is not judged where the weather is beyond the reference, unless a change that was noticed explains it.
+    """
+    weather = state.weather + (surprised - state.weather) / TUNING.weather_stretches
+    beyond = weather > TUNING.weather_limit and state.alarm is None
     return replace(
         state,
-        judged=state.judged + 1,
+        judged=state.judged + (not beyond),
+        left_out=state.left_out + beyond,
+        beyond=state.beyond + 1 if beyond else 0,
+        weather=weather,
         whole=state.whole.added(one)[0],
         load=replace(state.load, judged=state.load.judged + 1),
         budget=state.budget.added(kind, terms, np.diag(one.information)),
     )
+
+
+def _noticed(
+    state: State, step: Step, calibration: Calibration, limit: float, forces: int
+) -> tuple[State, Alarm | None]:
+    """With an alarm where a sum has passed the limit, unless weather explains it; all sums then begin anew."""
+    if step.statistic <= limit or _doubtful(state):
+        return with_load(state, calibration), None
+    if not _by_weather(state, calibration, forces):
+        state, alarm = raised(state, step, calibration)
+        explained = min(state.beyond, state.sums.one(int(np.argmax(state.ratios))).count)
+        return replace(state, judged=state.judged + explained, left_out=state.left_out - explained, beyond=0), alarm
+    every = np.ones(len(state.ratios), dtype=bool)
+    return replace(
+        state, ratios=np.zeros(len(every)), sums=state.sums.again(every, state.judged_s, state.weather)
+    ), None
+
+
+def _doubtful(state: State) -> bool:
+    """Whether the largest sum has too few stretches to tell a change of the ship from unusual weather."""
+    sums = state.sums.one(int(np.argmax(state.ratios)))
+    return sums.count < TUNING.told_apart[int(sums.weather[0] > TUNING.weather_limit)]
+
+
+def _by_weather(state: State, calibration: Calibration, forces: int) -> bool:
+    """Whether no change that lasts explains how far the force has been from its prediction since the largest sum began.
+
+    Of large changes, whose effects are not linear, most of it is explained, and the rest may still be large.
+    """
+    sums = state.sums.one(int(np.argmax(state.ratios)))
+    score, information = sums.score[0], sums.information[0]
+    inner = information + np.eye(len(score)) / TUNING.largest_size**2
+    surprised = float(sums.surprise[0])
+    left = surprised - float(score @ np.linalg.solve(inner, score)) / calibration.surprise
+    freedom = sums.count - float(np.trace(np.linalg.solve(inner, information))) / forces
+    return freedom > 1.0 and left > max(TUNING.weather_limit * freedom, TUNING.unexplained_share * surprised)
 
 
 def _less(products: Array, change: Array) -> Array:
@@ -114,12 +159,12 @@ def _waited(state: State, nuisance: Force, until_s: float) -> State:
     )
 
 
-def _summed(state: State, one: Judged, calibration: Calibration) -> tuple[State, Step]:
+def _summed(state: State, one: Judged, surprised: float, before: float, calibration: Calibration) -> tuple[State, Step]:
     """With a stretch added to all sums, or as the first of a sum where that is larger; those below zero begin anew.
 
     The filter takes up a change in part, so that a sum which began too early hardly grows when the ship does change.
     """
-    sums, score, information = state.sums.added(one)
+    sums, score, information = state.sums.added(one, surprised)
     m = score.shape[1]
     own, number = np.arange(2 * m), np.arange(2 * m) % m
     sign, inflation = np.repeat([1.0, -1.0], m), np.tile(calibration.inflation, 2)
@@ -132,6 +177,7 @@ def _summed(state: State, one: Judged, calibration: Calibration) -> tuple[State,
     place = int(np.argmax(ratios))
     step = Step(time_s=state.judged_s, statistic=float(ratios[place]), change=place % m)
     if (late & ~ended).any():
-        sums = sums.first(late & ~ended, one, state.judged_s - calibration.stretch_s)
+        begin_s = state.judged_s - calibration.stretch_s
+        sums = sums.first(late & ~ended, one, begin_s, surprised, before)
     known = after_stretch(state.known, one)
-    return replace(state, known=known, ratios=ratios, sums=sums.again(ended, state.judged_s)), step
+    return replace(state, known=known, ratios=ratios, sums=sums.again(ended, state.judged_s, state.weather)), step

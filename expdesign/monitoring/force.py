@@ -124,6 +124,26 @@ def judged(products: Array, changes: int, known: Known, loads: NDArray[np.int64]
     )
 
 
+def surprise(products: Array, changes: int, known: Known, one: Judged, loads: NDArray[np.int64] = NO_LOADS) -> float:
+    """Squared error of the force that was predicted for a stretch, in its standard deviations.
+
+    Zero where force and load are as the filter expected, on average one per component. It is what the prediction of the
+    data misses beyond a free force in the stretch.
+
+    Args:
+        products: (c, c) of the stretch.
+        changes: m, as for `judged`; loads: too.
+        known: before the stretch.
+        one: the stretch under that.
+    """
+    own = slice(changes, len(products) - 1)
+    columns = np.concatenate([np.tile(np.arange(changes, len(products) - 1), 2), loads])
+    missed = products[columns, -1] - products[np.ix_(columns, columns)] @ known.mean
+    free = products[own, -1] - products[own, columns] @ known.mean
+    squared = free @ np.linalg.lstsq(products[own, own], free, rcond=1e-12)[0]
+    return float(squared - missed @ one.towards)
+
+
 def after_gap(known: Known, force: Force, gap_s: float) -> Known:
     """Later, without data."""
     keep = force.memory(gap_s)

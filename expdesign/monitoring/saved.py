@@ -27,7 +27,7 @@ def saved(value: Any) -> Any:
 def restored_calibration(table: dict[str, Any]) -> Calibration:
     """From `saved`."""
     arrays = {name: _array(values) for name, values in table.items() if isinstance(values, list)}
-    rest = {name: table[name] for name in ("stretches", "stretch_s", "misfit_limit")}
+    rest = {name: table[name] for name in ("stretches", "stretch_s", "misfit_limit", "surprise")}
     return Calibration(force=Force(**_arrays(table["force"])), **arrays, **rest)
 
 
@@ -51,6 +51,8 @@ def restored_state(table: dict[str, Any]) -> State:
         pending=None if pending is None else Sums(**_arrays(pending)),
         judged=table["judged"],
         left_out=table["left_out"],
+        beyond=table["beyond"],
+        weather=table["weather"],
     )
 
 

@@ -52,6 +52,8 @@ class Sums:
         taken: (n, f, m) what the filter has taken of each change for the unmeasured force and the load.
         score, information: (n, m) and (n, m, m).
         stretches: (n,) that were added.
+        surprise: (n,) sums of `force.surprise`, in that of a stretch of the reference.
+        weather: (n,) `State.weather` as they began.
     """
 
     since_s: Array
@@ -59,6 +61,8 @@ class Sums:
     score: Array
     information: Array
     stretches: Array
+    surprise: Array
+    weather: Array
 
     @property
     def count(self) -> int:
@@ -66,7 +70,7 @@ class Sums:
         return int(self.stretches[0])
 
     @classmethod
-    def begun(cls, count: int, changes: int, forces: int, time_s: float) -> Sums:
+    def begun(cls, count: int, changes: int, forces: int, time_s: float, weather: float = 1.0) -> Sums:
         """Nothing yet."""
         return cls(
             since_s=np.full(count, time_s),
@@ -74,17 +78,19 @@ class Sums:
             score=np.zeros((count, changes)),
             information=np.zeros((count, changes, changes)),
             stretches=np.zeros(count),
+            surprise=np.zeros(count),
+            weather=np.full(count, weather),
         )
 
     def one(self, place: int) -> Sums:
         """Those of one beginning."""
         return Sums(**{name: values[place : place + 1] for name, values in vars(self).items()})
 
-    def again(self, places: np.ndarray, time_s: float) -> Sums:
+    def again(self, places: np.ndarray, time_s: float, weather: float = 1.0) -> Sums:
         """The same with some (n,) begun anew."""
-        return self._where(places, Sums.begun(1, self.score.shape[1], self.taken.shape[1], time_s))
+        return self._where(places, Sums.begun(1, self.score.shape[1], self.taken.shape[1], time_s, weather))
 
-    def first(self, places: np.ndarray, one: Judged, time_s: float) -> Sums:
+    def first(self, places: np.ndarray, one: Judged, time_s: float, surprise: float, weather: float) -> Sums:
         """The same with some (n,) begun with a stretch."""
         begun = Sums(
             since_s=np.array([time_s]),
@@ -92,6 +98,8 @@ class Sums:
             score=one.score[None],
             information=one.information[None],
             stretches=np.ones(1),
+            surprise=np.array([surprise]),
+            weather=np.array([weather]),
         )
         return self._where(places, begun)
 
@@ -107,7 +115,7 @@ class Sums:
         """After a gap over which the force's autocorrelation is (f,)."""
         return replace(self, taken=keep[:, None] * self.taken)
 
-    def added(self, one: Judged) -> tuple[Sums, Array, Array]:
+    def added(self, one: Judged, surprise: float = 0.0) -> tuple[Sums, Array, Array]:
         """With one more stretch; and its scores (n, m) and information (n, m, m)."""
         score = one.score - np.einsum("nfm,f->nm", self.taken, one.force_score)
         cross = one.by_force @ self.taken
@@ -121,6 +129,8 @@ class Sums:
             score=self.score + score,
             information=self.information + information,
             stretches=self.stretches + 1.0,
+            surprise=self.surprise + surprise,
+            weather=self.weather,
         )
         return after, score, information
 
@@ -206,7 +216,9 @@ class State:
         load: since the last port call; calls: those before, the latest of them.
         budget: of the stretches judged.
         alarm: the alarm that is not yet settled, or None; pending: sums since its change.
-        judged, left_out: stretches that were judged, and those whose error was beyond anything in the reference.
+        judged, left_out: stretches that were judged, and those whose error or weather was beyond the reference.
+        beyond: the latest of those left out for their weather; a change that is noticed may explain them yet.
+        weather: of late, the `surprise` of stretches in that of the reference.
     """
 
     judged_s: float
@@ -223,6 +235,8 @@ class State:
     pending: Sums | None = None
     judged: int = 0
     left_out: int = 0
+    beyond: int = 0
+    weather: float = 1.0
 
     @classmethod
     def begun(cls, calibration: Calibration, *, time_s: float) -> State:

@@ -18,6 +18,11 @@ class Tuning:
         block_counts: blocks into which the reference is cut to measure how scores of neighbouring stretches hang
             together; the largest inflation counts.
         misfit_deviations: standard deviations of the reference's misfit beyond which a stretch is not judged.
+        weather_stretches: over which the surprise of the force is averaged.
+        weather_limit: surprise of a stretch, in that of the reference, beyond which the weather is unlike it.
+        told_apart: stretches of a sum from which weather beyond the reference is told from a change of the ship, and
+            the same where the sum began in such weather.
+        unexplained_share: of the surprise, that the effects of large changes leave as they are not linear.
         settling_stretches: fewest from which the size of a change is told.
         refined: change of the size, in sizes that matter, below which it is refined no further.
         largest_size: of changes that are told from errors unlike the reference's, in sizes that matter.
@@ -50,6 +55,10 @@ class Tuning:
     misfit_deviations: float = 6.0
     largest_size: float = 10.0
     as_likely: float = 3.0
+    weather_stretches: float = 30.0
+    weather_limit: float = 1.7
+    told_apart: tuple[int, int] = (7, 20)
+    unexplained_share: float = 0.1
     settling_stretches: int = 20
     refined: float = 0.2
     settled: float = 60.0

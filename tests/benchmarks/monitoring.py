@@ -5,7 +5,8 @@ wanders, with a mean of its own in each. The watch is calibrated on eight voyage
 over D days of voyages of 12 hours each, at thresholds for one in 6 hours, one in a day and one in 30 days. Each change
 is then made in N voyages of 3 hours, of which the first hour is without it. ``--year`` instead sends a year at 1 Hz
 through the command, as a stream, and prints its time and its peak memory. ``--ports`` gives the ship another load in a
-port call of eight hours in N voyages, and takes 5 % of its thrust an hour later.
+port call of eight hours in N voyages, and takes 5 % of its thrust an hour later. ``--weather`` sails N voyages of 6
+hours in each of several weathers, most of them beyond the reference, in which time should not be judged.
 """
 
 from __future__ import annotations
@@ -171,6 +172,34 @@ def called(
     return bool(false), bool(plain), bool(found), bool(found) and effects[-1] == "gain"
 
 
+WEATHERS: tuple[tuple[str, dict[str, float]], ...] = (
+    ("as in the reference", {}),
+    ("currents twice as strong", {"stronger": 2.0}),
+    ("currents five times as strong", {"stronger": 5.0}),
+    ("currents ten times as strong", {"stronger": 10.0}),
+    ("swell of 0.05 m/s in sway", {"swell_mps": 0.05}),
+    ("swell of 0.2 m/s in sway", {"swell_mps": 0.2}),
+    ("swell of 0.5 m/s in sway", {"swell_mps": 0.5}),
+)
+
+
+def weathers(trials: int) -> None:
+    """Voyages with a false alarm, and time that is not judged, at one false alarm in 30 days."""
+    vessel = tender()
+    changes, calibration = calibrated(vessel)
+    limit = threshold(int(calibration.watched.sum()), 30.0 * DAY / TUNING.stretch_s)
+    print("| weather | voyages of 6 h | with a false alarm | not judged |")
+    print("|---|---|---|---|")
+    for name, weather in WEATHERS:
+        rows = [
+            watched(vessel, voyage_record(vessel, 6 * HOUR, seed=7000 + seed, **weather), changes, calibration, limit)
+            for seed in range(trials)
+        ]
+        alarms = sum(bool(found) for _, found in rows)
+        left, judged = (sum(getattr(state, key) for state, _ in rows) for key in ("left_out", "judged"))
+        print(f"| {name} | {trials} | {alarms} | {100.0 * left / (left + judged):.0f} % |", flush=True)
+
+
 def calibrated(vessel: Vessel) -> tuple[tuple[Change, ...], Calibration]:
     """Changes that are watched for, and a calibration on voyages of two hours."""
     references = [voyage_record(vessel, 2 * HOUR, seed=500 + number) for number in range(8)]
@@ -286,8 +315,11 @@ if __name__ == "__main__":
     parser.add_argument("--days", type=float, default=30.0)
     parser.add_argument("--year", type=int, nargs="?", const=365, help="days of it")
     parser.add_argument("--ports", action="store_true", help="loads that change in port")
+    parser.add_argument("--weather", action="store_true", help="weathers beyond the reference")
     asked = parser.parse_args()
-    if asked.year:
+    if asked.weather:
+        weathers(asked.trials)
+    elif asked.year:
         year(asked.year)
     elif asked.ports:
         ports(asked.trials)
