@@ -25,7 +25,7 @@ from expdesign.monitoring import (
     watch,
 )
 from expdesign.monitoring.evidence import stretches_of
-from expdesign.monitoring.force import Force, Known, after_gap, after_stretch, judged, likelihood
+from expdesign.monitoring.force import Force, Known, after_gap, after_stretch, judged, likelihood, surprise
 from monitoring_case import CHANGES, FORCES, STARTS, STRETCH_S, drawn_columns, drawn_grams, grams_from
 
 NOISE = np.array([1.0, np.inf, np.inf, np.inf])
@@ -170,6 +170,25 @@ def test_stretches_unlike_the_reference_are_not_judged(calibration: Calibration)
     state, alarms, _ = watched(calibration, grams_from(columns), limit)
     assert state.left_out == 30
     assert not alarms
+
+
+def test_stronger_weather_is_not_judged_and_is_no_change(calibration: Calibration) -> None:
+    limit = threshold(CHANGES, 1e4)
+    for quick, unlike in ((0.3, False), (3.0, True)):
+        ends = [watched(calibration, drawn_grams(300, seed=80 + seed, quick=quick), limit) for seed in range(12)]
+        left, judged_count = (sum(getattr(state, name) for state, *_ in ends) for name in ("left_out", "judged"))
+        assert (left > 9 * judged_count) if unlike else (judged_count > 9 * left)
+        assert sum(bool(alarms) for _, alarms, _ in ends) <= 1
+
+
+def test_what_a_force_surprises_by_is_one_on_average_per_component(calibration: Calibration) -> None:
+    stretches, known, found = stretches_of(drawn_grams(2000, seed=5), NOISE), Known.nothing(FORCE), list[float]()
+    for products in stretches.products:
+        known = after_gap(known, FORCE, STRETCH_S)
+        one = judged(products, CHANGES, known)
+        found.append(surprise(products, CHANGES, known, one))
+        known = after_stretch(known, one)
+    assert abs(np.mean(found) / FORCES - 1.0) < 3.0 * np.std(found) / FORCES / np.sqrt(len(found))
 
 
 def test_the_threshold_grows_with_the_time_between_false_alarms() -> None:
