@@ -110,7 +110,7 @@ def _noticed(
         return with_load(state, calibration), None
     if not _by_weather(state, calibration, forces):
         state, alarm = raised(state, step, calibration)
-        explained = min(state.beyond, state.sums.one(int(np.argmax(state.ratios))).count)
+        explained = min(state.beyond, state.largest.count)
         return replace(state, judged=state.judged + explained, left_out=state.left_out - explained, beyond=0), alarm
     every = np.ones(len(state.ratios), dtype=bool)
     return replace(
@@ -120,7 +120,7 @@ def _noticed(
 
 def _doubtful(state: State) -> bool:
     """Whether the largest sum has too few stretches to tell a change of the ship from unusual weather."""
-    sums = state.sums.one(int(np.argmax(state.ratios)))
+    sums = state.largest
     return sums.count < TUNING.told_apart[int(sums.weather[0] > TUNING.weather_limit)]
 
 
@@ -129,7 +129,7 @@ def _by_weather(state: State, calibration: Calibration, forces: int) -> bool:
 
     Of large changes, whose effects are not linear, most of it is explained, and the rest may still be large.
     """
-    sums = state.sums.one(int(np.argmax(state.ratios)))
+    sums = state.largest
     score, information = sums.score[0], sums.information[0]
     inner = information + np.eye(len(score)) / TUNING.largest_size**2
     surprised = float(sums.surprise[0])

@@ -16,7 +16,7 @@ from expdesign.values import Array
 
 def raised(state: State, step: Step, calibration: Calibration) -> tuple[State, Alarm]:
     """With an alarm of the largest sum."""
-    pending = state.sums.one(int(np.argmax(state.ratios)))
+    pending = state.largest
     alarm = Alarm(
         time_s=state.judged_s, since_s=float(pending.since_s[0]), statistic=step.statistic, change=step.change
     )

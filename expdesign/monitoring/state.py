@@ -238,6 +238,11 @@ class State:
     beyond: int = 0
     weather: float = 1.0
 
+    @property
+    def largest(self) -> Sums:
+        """The largest sum."""
+        return self.sums.one(int(np.argmax(self.ratios)))
+
     @classmethod
     def begun(cls, calibration: Calibration, *, time_s: float) -> State:
         """At the beginning of a watch."""
