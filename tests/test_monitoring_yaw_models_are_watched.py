@@ -237,6 +237,13 @@ def test_the_sum_of_the_thesis_finds_more_inertia_where_orders_change_often() ->
     assert missed["calm"] > 0.6
 
 
-def test_rates_without_sensitivities_are_the_same(departure: YawData) -> None:
+def test_sensitivities_are_the_differences_of_yaw_rates(departure: YawData) -> None:
     values = np.array([NOMINAL[name] for name in FULL.parameters])
-    np.testing.assert_allclose(yaw_rates(FULL, departure, values), simulate_yaw(FULL, departure, values)[0], atol=1e-12)
+    rates, sensitivities = simulate_yaw(FULL, departure, values)
+    np.testing.assert_allclose(yaw_rates(FULL, departure, values), rates, atol=1e-12)
+    for index, step in enumerate(1e-5 * values):
+        moved = np.zeros_like(values)
+        moved[index] = step
+        higher, lower = (yaw_rates(FULL, departure, values + sign * moved) for sign in (1.0, -1.0))
+        own = sensitivities[..., index]
+        np.testing.assert_allclose((higher - lower) / (2.0 * step), own, atol=1e-5 * np.abs(own).max())

@@ -43,66 +43,76 @@ class YawEstimate:
 def simulate_yaw(model: YawModel, data: YawData, parameters: Array) -> tuple[Array, Array]:
     """Yaw rate (n, k) from its first measured value, and its sensitivities (n, k, p), by Runge-Kutta of order four.
 
+    The sensitivities are the exact derivatives of the Runge-Kutta steps: along the yaw rate they follow a linear
+    recursion, whose coefficients are found for all samples at once.
+
     Args:
         model: the structure.
         data: inputs; what they multiply is taken as straight lines between samples.
         parameters: (n, p), or (p,) for all voyages.
     """
-    n, k = data.r.shape
-    theta = np.broadcast_to(parameters, (n, len(model.parameters)))
-    shapes, moment, step = model.shapes(data), np.ascontiguousarray(data.moment.T), data.sample_time_s
-    r, slope = data.r[:, 0].copy(), np.zeros(theta.shape)
-    rates, sensitivity = np.empty((k, n)), np.empty((k, *theta.shape))
-    for index in range(k):
-        rates[index], sensitivity[index] = r, slope
-        if index + 1 == k:
-            break
-        begin, end = (shapes[:, index], moment[index]), (shapes[:, index + 1], moment[index + 1])
-        middle = (0.5 * (begin[0] + end[0]), 0.5 * (begin[1] + end[1]))
-        a, A = _acceleration(*begin, theta, r, slope)
-        b, B = _acceleration(*middle, theta, r + step / 2 * a, slope + step / 2 * A)
-        c, C = _acceleration(*middle, theta, r + step / 2 * b, slope + step / 2 * B)
-        d, D = _acceleration(*end, theta, r + step * c, slope + step * C)
-        r = np.clip(r + step / 6 * (a + 2 * b + 2 * c + d), -LARGEST_RATE, LARGEST_RATE)
-        slope = slope + step / 6 * (A + 2 * B + 2 * C + D)
+    theta = np.broadcast_to(parameters, (len(data.r), len(model.parameters)))
+    shapes = model.shapes(data)
+    by = _coefficients(shapes, data, theta)
+    rates = _integrated(by, data)
+    by_rate, by_parameters = _step_derivatives(shapes, by, theta[:, 0], rates, data.sample_time_s)
+    sensitivity = np.zeros((*rates.shape, theta.shape[1]))
+    for index in range(len(rates) - 1):
+        sensitivity[index + 1] = by_rate[index] * sensitivity[index] + by_parameters[index]
     return rates.T, np.moveaxis(sensitivity, 0, 1)
 
 
-def _acceleration(shapes: Array, moment: Array, theta: Array, r: Array, slope: Array) -> tuple[Array, Array]:
-    """(n,) dr/dt and (n, p) its derivative by the parameters along the motion."""
-    size, inertia = np.abs(r)[:, None], theta[:, :1]
-    constant, linear, even, odd = shapes
-    values = constant + linear * r[:, None] + (even + odd * r[:, None]) * size
-    by_rate = linear + even * np.sign(r)[:, None] + 2.0 * odd * size
-    own = theta[:, 1:]
-    acceleration = ((own * values).sum(axis=1) + moment)[:, None] / inertia
-    moved = (own * by_rate).sum(axis=1)[:, None] * slope
-    moved[:, :1] -= acceleration
-    moved[:, 1:] += values
-    return acceleration[:, 0], moved / inertia
-
-
 def yaw_rates(model: YawModel, data: YawData, parameters: Array) -> Array:
-    """`simulate_yaw` without sensitivities, in a fraction of the time: yaw rates (n, k)."""
+    """`simulate_yaw` without sensitivities: yaw rates (n, k)."""
     theta = np.broadcast_to(parameters, (len(data.r), len(model.parameters)))
-    inertia, step = theta[:, 0], data.sample_time_s
-    by = np.einsum("pknj,nj->pkn", model.shapes(data), theta[:, 1:])
+    return np.asarray(_integrated(_coefficients(model.shapes(data), data, theta), data).T)
+
+
+def _coefficients(shapes: Array, data: YawData, theta: Array) -> Array:
+    """(4, k, n) of 1, r, |r| and r|r| in dr/dt."""
+    by = np.einsum("pknj,nj->pkn", shapes, theta[:, 1:])
     by[0] += data.moment.T
-    by /= inertia
-    middle = 0.5 * (by[:, :-1] + by[:, 1:])
+    return np.asarray(by / theta[:, 0])
 
-    def rate(c: Array, r: Array) -> Array:
-        return np.asarray(c[0] + c[1] * r + (c[2] + c[3] * r) * np.abs(r))
 
+def _rate(c: Array, r: Array) -> Array:
+    return np.asarray(c[0] + c[1] * r + (c[2] + c[3] * r) * np.abs(r))
+
+
+def _integrated(by: Array, data: YawData) -> Array:
+    """(k, n) yaw rates from their first measured values."""
+    middle, step = _middle(by), data.sample_time_s
     rates = np.empty_like(by[0])
     rates[0] = r = data.r[:, 0]
     for index in range(len(rates) - 1):
-        a = rate(by[:, index], r)
-        b = rate(middle[:, index], r + step / 2 * a)
-        c = rate(middle[:, index], r + step / 2 * b)
-        d = rate(by[:, index + 1], r + step * c)
+        a = _rate(by[:, index], r)
+        b = _rate(middle[:, index], r + step / 2 * a)
+        c = _rate(middle[:, index], r + step / 2 * b)
+        d = _rate(by[:, index + 1], r + step * c)
         rates[index + 1] = r = np.clip(r + step / 6 * (a + 2 * b + 2 * c + d), -LARGEST_RATE, LARGEST_RATE)
-    return np.asarray(rates.T)
+    return rates
+
+
+def _middle(values: Array) -> Array:
+    return np.asarray(0.5 * (values[:, :-1] + values[:, 1:]))
+
+
+def _step_derivatives(shapes: Array, by: Array, inertia: Array, rates: Array, step: float) -> tuple[Array, Array]:
+    """Of the yaw rate after each step: (k - 1, n, 1) by that before, (k - 1, n, p) by the parameters."""
+    begin, middle, end = (shapes[:, :-1], by[:, :-1]), (_middle(shapes), _middle(by)), (shapes[:, 1:], by[:, 1:])
+    own = np.zeros((*rates[:-1].shape, shapes.shape[-1] + 2))
+    own[..., 0] = 1.0
+    r, by_all, total = rates[:-1], own, np.zeros_like(own)
+    stages = ((begin, 1.0, step / 2), (middle, 2.0, step / 2), (middle, 2.0, step), (end, 1.0, 0.0))
+    for (shape, c), weight, ahead in stages:
+        rate, size = _rate(c, r), np.abs(r)
+        slope = (c[1] + c[2] * np.sign(r) + 2.0 * c[3] * size)[..., None] * by_all
+        slope[..., 1] -= rate / inertia
+        slope[..., 2:] += _rate(shape, r[..., None]) / inertia[:, None]
+        total += weight * slope
+        r, by_all = rates[:-1] + ahead * rate, own + ahead * slope
+    by_all = own + step / 6 * total
+    return by_all[..., :1], by_all[..., 1:]
 
 
 def estimate_yaw(
