@@ -82,7 +82,7 @@ def _rate(c: Array, r: Array) -> Array:
 def _integrated(by: Array, data: YawData) -> Array:
     """(k, n) yaw rates from their first measured values."""
     middle, step = _middle(by), data.sample_time_s
-    rates = np.empty_like(by[0])
+    rates: Array = np.empty_like(by[0])
     rates[0] = r = data.r[:, 0]
     for index in range(len(rates) - 1):
         a = _rate(by[:, index], r)
