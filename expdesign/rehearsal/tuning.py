@@ -11,7 +11,7 @@ class Tuning:
 
     Attributes:
         chunk_trials: trials in one chunk; each chunk has its own random stream.
-        single_trials: the same where every trial is simulated on its own: processes share smaller chunks more evenly.
+        single_trials: the same of random runs, simulated trial by trial: processes share smaller chunks more evenly.
         singular: least singular value of scaled equations, as a share of the largest, that still gives an estimate.
         degenerate_share: simulation errors above this share of the motion make a model degenerate.
     """

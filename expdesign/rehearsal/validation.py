@@ -36,7 +36,7 @@ from expdesign.progress import Progress, silent
 from expdesign.reduction import at_reference_point, with_delivered_inputs
 from expdesign.rehearsal.tuning import TUNING
 from expdesign.signals import Batch, Record
-from expdesign.simulation import CALM, Environment, simulate_ensemble
+from expdesign.simulation import CALM, Environment, mean_weather, simulate_ensemble
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
@@ -186,17 +186,11 @@ def validate(
 
 def _tasks(rehearsal: Rehearsal) -> Iterator[tuple[str, str, int, int]]:
     """(key, design, chunk number, trials in it)."""
-    for name in rehearsal.designs:
-        most = TUNING.chunk_trials if _at_once(rehearsal, name) else TUNING.single_trials
+    for name, runs in rehearsal.designs.items():
+        most = TUNING.single_trials if runs is None else TUNING.chunk_trials
         for number, first in enumerate(range(0, rehearsal.trials, most)):
             last = min(first + most, rehearsal.trials)
             yield f"{name}/{first}-{last}", name, number, last - first
-
-
-def _at_once(rehearsal: Rehearsal, design: str) -> bool:
-    """Whether all trials of a chunk are simulated at once: the same runs in the same mean weather."""
-    weather = rehearsal.environment
-    return rehearsal.designs[design] is not None and not (weather.current_std_mps or weather.wind_std_mps)
 
 
 def _chunk(rehearsal: Rehearsal, key: str, design: str, number: int, trials: int) -> tuple[str, Array]:
@@ -207,15 +201,12 @@ def estimates_of(rehearsal: Rehearsal, design: str, number: int, trials: int) ->
     """(trials, 2 p) estimates and stated standard deviations of one chunk of a design; nan where there is none."""
     order = sorted(rehearsal.designs).index(design)
     rng = np.random.default_rng([rehearsal.seed, order, number])
-    runs, weather = rehearsal.designs[design], rehearsal.environment
-    if runs is not None and _at_once(rehearsal, design):
-        return np.array([_estimated(rehearsal, item) for item in _sailed(rehearsal, runs, weather, trials, rng)])
-    rows = []
-    for _ in range(trials):
-        counts = _random_runs(rehearsal, rng) if runs is None else runs
-        (record,) = _sailed(rehearsal, counts, _drawn(weather, rng), 1, rng)
-        rows.append(_estimated(rehearsal, record))
-    return np.array(rows)
+    runs = rehearsal.designs[design]
+    if runs is None:
+        records = [_sailed(rehearsal, _random_runs(rehearsal, rng), 1, rng)[0] for _ in range(trials)]
+    else:
+        records = _sailed(rehearsal, runs, trials, rng)
+    return np.array([_estimated(rehearsal, record) for record in records])
 
 
 def _random_runs(rehearsal: Rehearsal, rng: np.random.Generator) -> tuple[int, ...]:
@@ -228,21 +219,9 @@ def _random_runs(rehearsal: Rehearsal, rng: np.random.Generator) -> tuple[int, .
     return tuple(counts)
 
 
-def _drawn(weather: Environment, rng: np.random.Generator) -> Environment:
-    """The weather of one trial: its own means, the same variation."""
-    return replace(
-        weather,
-        current_to=weather.current_to + weather.current_std_mps * rng.standard_normal(2),
-        wind_to=weather.wind_to + weather.wind_std_mps * rng.standard_normal(2),
-        current_std_mps=0.0,
-        wind_std_mps=0.0,
-    )
-
-
-def _sailed(
-    rehearsal: Rehearsal, runs: Sequence[int], weather: Environment, trials: int, rng: np.random.Generator
-) -> list[Record]:
+def _sailed(rehearsal: Rehearsal, runs: Sequence[int], trials: int, rng: np.random.Generator) -> list[Record]:
     """Data of every trial, one batch for each whole run, reduced by what is stated of the nominal ship."""
+    weather = mean_weather(rehearsal.environment, trials, rng)
     batches: list[tuple[Batch, ...]] = []
     for primitive, count in zip(rehearsal.primitives, runs, strict=True):
         for repeat in range(count):
@@ -250,7 +229,8 @@ def _sailed(
                 rehearsal.truth,
                 np.concatenate([primitive.commands.values, primitive.commands.values[-1:]]),
                 runs=trials,
-                environment=weather,
+                environment=rehearsal.environment,
+                weather=weather,
                 rng=rng,
                 pose=(0.0, 0.0, heading_rad(len(batches))),
                 velocity=primitive.entry_velocity,

@@ -9,7 +9,7 @@ from expdesign.simulation.actuation import (
     past_deadband,
     sample_map,
 )
-from expdesign.simulation.ensemble import Ensemble, simulate_ensemble
+from expdesign.simulation.ensemble import Ensemble, mean_weather, simulate_ensemble
 from expdesign.simulation.environment import (
     CALM,
     STEADY,
@@ -44,6 +44,7 @@ __all__ = [
     "draw_weather",
     "euler_step",
     "integrate_motion",
+    "mean_weather",
     "measure",
     "motion_rates",
     "past_deadband",

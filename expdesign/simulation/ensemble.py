@@ -87,6 +87,7 @@ def simulate_ensemble(
     velocity: Array | tuple[float, ...] = (0.0, 0.0, 0.0),
     parameters: Array | None = None,
     standing: Array | None = None,
+    weather: Array | None = None,
     integrator: str = "euler",
     substeps: int = 1,
     engine: str = "numpy",
@@ -97,11 +98,13 @@ def simulate_ensemble(
         vessel: model, sample time and sensors.
         inputs: (k, runs, m) commands in the model's order, or (k, m) for all runs alike.
         runs: number of runs.
-        environment: forecast; every run draws its own means around it and its own variation.
+        environment: forecast; every run draws its own means around it, where they are not given, and its own
+            variation.
         rng: source of all random numbers.
         pose, velocity: start, (3,) or (runs, 3).
         parameters: (runs, p) in the model's own form, or None for the model's.
         standing: (m,) commands that stood before the first sample; None for those of the first sample.
+        weather: (4, runs) mean current and wind of each run to north and east [m/s], as by `mean_weather`.
         integrator: "euler", the map of discrete parameters (with one substep), or "rk4".
         substeps: integrator steps per sample; current and wind are held over a sample.
         engine: "numpy", or "numba" for compiled loops where numba is installed; the random numbers are the same, the
@@ -124,7 +127,8 @@ def simulate_ensemble(
         standing=standing,
     )
     marching = partial(march, program, step=step, step_s=vessel.sample_time_s / substeps, substeps=substeps)
-    draw = partial(_stretches, vessel, environment, rng=rng, engine=engine)
+    means = mean_weather(environment, runs, rng) if weather is None else weather
+    draw = partial(_stretches, vessel, environment, means, rng=rng, engine=engine)
     states, seen = _sailed(vessel, program, given, _start(vessel, pose, velocity, runs), marching=marching, draw=draw)
     return Ensemble(
         sample_time_s=vessel.sample_time_s,
@@ -187,14 +191,14 @@ def _start(vessel: Vessel, pose: Any, velocity: Any, runs: int) -> Array:
 
 
 def _stretches(
-    vessel: Vessel, environment: Environment, noise: Array, *, rng: np.random.Generator, engine: str
+    vessel: Vessel, environment: Environment, mean: Array, noise: Array, *, rng: np.random.Generator, engine: str
 ) -> Iterator[tuple[slice, Array]]:
     """Stretch after stretch of samples with its sea (k, 4, n); fills in the sensor noise (all samples, 8, n).
 
     A thread draws the numbers of the next stretch meanwhile; only it uses the generator, in order.
     """
-    samples, _, runs = noise.shape
-    mean, spread = _means(environment, runs, rng), noise_std(vessel.sensors)
+    samples = len(noise)
+    spread = noise_std(vessel.sensors)
     parts = [slice(first, min(first + STRETCH, samples)) for first in range(0, samples, STRETCH)]
     variations = (environment.current_variation, environment.wind_variation)
     before: list[Array | None] = [None, None]
@@ -224,8 +228,8 @@ def _drawn(rng: np.random.Generator, spread: Array, noise: Array, engine: str, p
     return drawn[:, :4]
 
 
-def _means(environment: Environment, runs: int, rng: np.random.Generator) -> Array:
-    """(4, n) current and wind that each run has on average."""
+def mean_weather(environment: Environment, runs: int, rng: np.random.Generator) -> Array:
+    """(4, runs) mean current and wind of each run to north and east [m/s], drawn around a forecast."""
     mean = np.concatenate([environment.current_to, environment.wind_to])[:, None]
     spread = np.repeat([environment.current_std_mps, environment.wind_std_mps], 2)[:, None]
     return mean + spread * rng.standard_normal((4, runs)) if spread.any() else np.tile(mean, runs)
