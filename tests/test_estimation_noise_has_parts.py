@@ -32,17 +32,20 @@ def explicit(index: int, heading: np.ndarray) -> np.ndarray:
     return np.exp(-lag / part.memory) * (np.cos(np.subtract.outer(heading, heading)) if part.turning else 1.0)
 
 
-@pytest.mark.parametrize("gaps", [False, True])
+@pytest.mark.parametrize(("samples", "gaps"), [(60, False), (60, True), (59, False)])
 @pytest.mark.parametrize("index", range(PARTS))
-def test_expected_periodograms_and_products_are_those_of_the_covariance_matrix(index: int, gaps: bool) -> None:
+def test_expected_periodograms_and_products_are_those_of_the_covariance_matrix(
+    index: int, samples: int, gaps: bool
+) -> None:
+    """Also for a prime number of samples, whose periodograms are padded."""
     rng = np.random.default_rng(41)
-    places = np.sort(rng.choice(60, 45, replace=False)) if gaps else np.arange(60)
+    places = np.sort(rng.choice(samples, 45, replace=False)) if gaps else np.arange(samples)
     places = places - places[0]
     count = int(places[-1]) + 1
     heading = np.cumsum(rng.normal(scale=0.2, size=count))
     (part,) = stretches(np.zeros(len(places), dtype=np.int64), places, heading[places])
     there = np.isin(np.arange(count), places)
-    waves = np.exp(-2j * np.pi * np.outer(np.arange(count // 2 + 1), np.arange(count)) / count) * there
+    waves = np.exp(-2j * np.pi * np.outer(np.arange(part.padded // 2 + 1), np.arange(count)) / part.padded) * there
     G, W = explicit(index, heading), rng.normal(size=(count, 3))
     spectrum = np.einsum("fi,ij,fj->f", waves, G, waves.conj()).real / len(places)
     np.testing.assert_allclose(expected_periodogram(part, SLOW)[index], spectrum, atol=1e-9)

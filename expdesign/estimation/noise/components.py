@@ -141,7 +141,7 @@ def _less(expected: Sequence[Array], parts: Sequence[Stretch], slow: tuple[Slow,
     if not p:
         return list(expected)
     wide = [part.spread(by.W[part.rows]) for part in parts]
-    spectra = [np.fft.rfft(part.spread(by.Phi[part.rows]), axis=0) for part in parts]
+    spectra = [np.fft.rfft(part.spread(by.Phi[part.rows]), part.padded, axis=0) for part in parts]
     result = [np.array(shape) for shape in expected]
     for index in range(2 + len(slow)):
         turned = [filtered(index, slow, W, part.turn) for W, part in zip(wide, parts, strict=True)]
@@ -149,7 +149,7 @@ def _less(expected: Sequence[Array], parts: Sequence[Stretch], slow: tuple[Slow,
         for number, part in enumerate(parts):
             Phi = spectra[number]
             there = turned[number] if len(part.places) == part.samples else _where(turned[number], part.places)
-            mixed = 0.5 * Phi @ C - np.fft.rfft(there, axis=0)
+            mixed = 0.5 * Phi @ C - np.fft.rfft(there, part.padded, axis=0)
             result[number][index] += 2.0 * (Phi.conj() * mixed).real.sum(axis=1) / len(part.places)
     left = [np.maximum(new, TUNING.least_left * old) for new, old in zip(result, expected, strict=True)]
     return [np.where(np.abs(shape) > TUNING.rounding, shape, 0.0) for shape in left]
@@ -333,8 +333,8 @@ def _periodograms(eps: Array, parts: Sequence[Stretch], expected: Sequence[Array
     found = []
     for part, shapes in zip(parts, expected, strict=True):
         own = eps[part.rows]
-        ordinates = np.abs(np.fft.rfft(part.spread(own))) ** 2 / len(part.places)
-        frequency = 2 * np.pi * np.arange(len(ordinates)) / part.samples
+        ordinates = np.abs(np.fft.rfft(part.spread(own), part.padded)) ** 2 / len(part.places)
+        frequency = 2 * np.pi * np.arange(len(ordinates)) / part.padded
         first = int(abs(own.sum()) <= 1e-9 * np.sqrt(len(own)) * np.linalg.norm(own))
         found.append((frequency[first:], ordinates[first:], shapes[:, first:]))
     frequency, ordinates, shapes = (np.concatenate(items, axis=-1) for items in zip(*found, strict=True))
@@ -343,10 +343,10 @@ def _periodograms(eps: Array, parts: Sequence[Stretch], expected: Sequence[Array
 
 def _expected(part: Stretch, slow: Sequence[Slow]) -> Array:
     """(2 + m, f) expected periodogram of every part of the noise with unit variance, at the samples of a stretch."""
-    count = part.samples
+    count = part.padded
     lags = np.arange(count)
-    straight = _pairs(part.spread(np.ones(len(part.places))))
-    turning = straight if part.turn is None else _pairs(part.turn.real) + _pairs(part.turn.imag)
+    straight = _pairs(part.spread(np.ones(len(part.places))), count)
+    turning = straight if part.turn is None else _pairs(part.turn.real, count) + _pairs(part.turn.imag, count)
     covariances = np.zeros((2 + len(slow), count))
     covariances[:2, 0] = 1.0, 2.0
     covariances[1, 1:2] = -1.0
@@ -358,9 +358,8 @@ def _expected(part: Stretch, slow: Sequence[Slow]) -> Array:
     return np.asarray(np.fft.rfft(covariances, axis=1).real)
 
 
-def _pairs(weights: Array) -> Array:
-    """(t,) sum of products of weights (t,) so many samples apart."""
-    count = len(weights)
+def _pairs(weights: Array, count: int) -> Array:
+    """(count,) sum of products of weights (t,) so many samples apart, t not above the count."""
     return np.asarray(np.fft.irfft(np.abs(np.fft.rfft(weights, 2 * count)) ** 2, 2 * count)[:count])
 
 

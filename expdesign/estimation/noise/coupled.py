@@ -196,7 +196,7 @@ class _Spectra:
 
 def _spectra(eps: Array, A: Array, parts: Sequence[Stretch], left: Iterable[Sequence[Array]]) -> _Spectra:
     count, n = eps.shape
-    frequency = np.concatenate([2 * np.pi * np.arange(part.samples // 2 + 1) / part.samples for part in parts])
+    frequency = np.concatenate([2 * np.pi * np.arange(part.padded // 2 + 1) / part.padded for part in parts])
     cross = np.concatenate([_cross_periodograms(eps, part) for part in parts], axis=2)
     shapes = np.array([np.concatenate(own, axis=1) for own in left])
     sensed = np.einsum("kaj,kbj->jab", A, A) / count + np.einsum("ja,jb->jab", np.eye(n), np.eye(n))
@@ -225,5 +225,5 @@ def _spectra(eps: Array, A: Array, parts: Sequence[Stretch], left: Iterable[Sequ
 
 def _cross_periodograms(eps: Array, part: Stretch) -> Array:
     """(n, n, f) of the outputs of a stretch."""
-    lines = np.fft.rfft(part.spread(eps[part.rows]), axis=0).T
+    lines = np.fft.rfft(part.spread(eps[part.rows]), part.padded, axis=0).T
     return np.asarray(lines[:, None] * lines[None].conj() / len(part.places))

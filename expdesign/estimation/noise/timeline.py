@@ -7,6 +7,7 @@ from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from expdesign.estimation.regression import Integers, batch_slices
@@ -36,6 +37,11 @@ class Stretch:
     def samples(self) -> int:
         """From the first to the last, those left out included."""
         return int(self.places[-1]) + 1
+
+    @property
+    def padded(self) -> int:
+        """Samples with zeros behind, up to a product of small primes: transforms of others may take 20 times longer."""
+        return int(scipy.fft.next_fast_len(self.samples))
 
     def spread(self, rows: Array) -> Array:
         """(t, ...) from (k, ...), zero where a sample was left out."""
