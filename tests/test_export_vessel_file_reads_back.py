@@ -22,7 +22,7 @@ def same(a: Vessel, b: Vessel) -> bool:
         for field in fields(a.model)
         if field.name in ("parameters", "parameter_std")
     )
-    names = ("terms", "form", "sample_time_s", "actuators")
+    names = ("terms", "form", "sample_time_s", "actuators", "parameter_range")
     rest = all(getattr(a.model, name) == getattr(b.model, name) for name in names)
     weather = all(
         np.array_equal(getattr(a.environment, field.name), getattr(b.environment, field.name))

@@ -120,6 +120,19 @@ VESSEL_CASES = [
         "model.parameter_correlation",
         "contradicts itself: no parameters have such correlations",
     ),
+    (
+        "[sensors]",
+        "[model.parameter_min]\nX_u = 0.5\n[model.parameter_max]\nX_u = 0.0\n[sensors]",
+        "model.parameter_max.X_u",
+        "is 0, expected more than parameter_min = 0.5",
+    ),
+    ("[sensors]", "[model.parameter_max]\nZ = 0\n[sensors]", "model.parameter_max", "'Z' is not a parameter"),
+    (
+        "[sensors]",
+        "[model.parameter_max]\nX_mu = 0\n[sensors]",
+        "model.parameters.X_mu",
+        "is 0.01, known, expected -inf to 0 as stated",
+    ),
     ("velocity_mps = 0.01", "velocity_mps = -1", "sensors.velocity_mps", "is -1, expected at least 0"),
     ("velocity_mps = 0.01", "speed_mps = 0.01", "sensors.speed_mps", "is not a known key, did you mean"),
 ]

@@ -15,6 +15,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from expdesign.conventions import OUTPUTS
 from expdesign.errors import InputError, UnknownName
@@ -24,6 +25,11 @@ from expdesign.vessel.expressions import NUMPY, Expression, Operators, Signals, 
 from expdesign.vessel.inertia import Inertia
 from expdesign.vessel.roll import Roll
 from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS, SHOAL, Term
+
+FEWEST_DRAWN = 1000
+SHARE_DRAWN = 2500
+LEAST_KEPT = 1e-3
+"""Share of drawn vessels within the stated range below which the range contradicts the prior."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -41,6 +47,8 @@ class VesselModel:
         actuators: they turn commands into generalised forces.
         roll: a mode that oscillates beside what the terms say, or None.
         inertia: coupled inertia of sway and yaw; None where neither accelerates the other.
+        parameter_range: least and most value of parameters by name, on which the prior is conditioned: the signs of
+            damping and thrust of a vessel that is known to be stable, for example.
     """
 
     terms: tuple[Term, ...]
@@ -52,6 +60,7 @@ class VesselModel:
     roll: Roll | None = None
     inertia: Inertia | None = None
     parameter_correlation: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    parameter_range: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     expressions: tuple[Expression, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -154,6 +163,37 @@ class VesselModel:
         )
 
     def drawn_parameters(self, count: int, rng: np.random.Generator) -> Array:
+        """(count, p) parameters drawn from the normal prior, conditioned on `parameter_range`.
+
+        Raises:
+            InputError: hardly any vessel of the prior is within the range.
+        """
+        if not self.parameter_range:
+            return self._normal_parameters(count, rng)
+        kept: list[Array] = []
+        tried = 0
+        while (missing := count - sum(map(len, kept))) > 0:
+            drawn = self._normal_parameters(max(2 * missing, FEWEST_DRAWN), rng)
+            tried += len(drawn)
+            kept.append(drawn[self._in_range(drawn)])
+            if sum(map(len, kept)) < LEAST_KEPT * tried:
+                raise InputError(
+                    f"of the vessels drawn from model.parameter_std fewer than {LEAST_KEPT:.1%} are within "
+                    "model.parameter_min and model.parameter_max: state less uncertainty, or values inside"
+                )
+        return np.concatenate(kept)[:count]
+
+    def share_in_range(self) -> float:
+        """The share of the normal prior that is within `parameter_range`, of as many draws as tell it to 1 %."""
+        drawn = self._normal_parameters(SHARE_DRAWN, np.random.default_rng(0))
+        return float(self._in_range(drawn).mean())
+
+    def _in_range(self, drawn: Array) -> npt.NDArray[np.bool_]:
+        """(n,) whether parameters (n, p) are within the range."""
+        low, high = np.array([self.parameter_range.get(name, (-np.inf, np.inf)) for name in self.names]).T
+        return np.asarray(((low <= drawn) & (drawn <= high)).all(axis=1))
+
+    def _normal_parameters(self, count: int, rng: np.random.Generator) -> Array:
         """(count, p) parameters drawn from the normal prior."""
         drawn = rng.standard_normal((count, len(self.terms)))
         if not self.parameter_correlation:

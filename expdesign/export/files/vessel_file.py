@@ -120,6 +120,10 @@ def _model(model: VesselModel) -> Iterator[str]:
     if known:
         yield from ("", *_table("[model.parameter_std]", known))
     yield from _correlation(model)
+    for key, side in (("parameter_min", 0), ("parameter_max", 1)):
+        stated = {name: ends[side] for name, ends in model.parameter_range.items() if math.isfinite(ends[side])}
+        if stated:
+            yield from ("", *_table(f"[model.{key}]", stated))
     if model.roll is not None:
         known = {key: value for key, value in vars(model.roll).items() if key != "heel_rad_per_mps2" or value}
         yield from ("", *_table("[model.roll]", known))

@@ -14,6 +14,7 @@ from expdesign.indices import Condition, Conditions, admissibility
 from expdesign.plan.values import RiskEstimate
 from expdesign.sea_area import SeaArea
 from expdesign.values import Array
+from expdesign.vessel import VesselModel
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +50,24 @@ def checks(content: ReportContent) -> list[Check]:
             passed=None,
         ),
     ]
-    return rows if plan.risk is None else [*rows, *_risk_checks(plan.risk, 1.0 - content.confidence)]
+    if plan.risk is None:
+        return rows
+    return [*rows, *_risk_checks(plan.risk, 1.0 - content.confidence), *_conditioned_prior(content.vessel.model)]
+
+
+def _conditioned_prior(model: VesselModel) -> list[Check]:
+    """Which vessels the Monte Carlo trials were drawn from, where the file states what is known to hold."""
+    if not model.parameter_range:
+        return []
+    share = words.percent(model.share_in_range())
+    return [
+        Check(
+            what="Simulated vessels, drawn from the standard deviations in the vessel file",
+            found=f"{share} of the drawn ones keep to its parameter_min and parameter_max; the others were drawn again",
+            required="",
+            passed=None,
+        )
+    ]
 
 
 def _risk_checks(risk: RiskEstimate, allowed: float) -> list[Check]:

@@ -160,7 +160,8 @@ def _radius(apart: Array, confidence: float, name: str) -> Array:
     if not np.isfinite(factor):
         raise NoPlan(
             f"{name!r} is unstable for {np.mean(~stable):.1%} of the vessels drawn from model.parameter_std, while "
-            f"plan.confidence, shared out over the runs, allows each {1.0 - confidence:.2%}",
+            f"plan.confidence, shared out over the runs, allows each {1.0 - confidence:.2%}; model.parameter_min and "
+            "model.parameter_max state what is known to hold, as damping below 0",
             what="unstable",
             which=name,
         )

@@ -181,6 +181,7 @@ def _model(table: ModelTable, actuators: tuple[Actuator, ...], sample_time_s: fl
         roll=None if table.roll is None else Roll(**table.roll.model_dump()),
         inertia=_inertia(table, entry.at("inertia")),
         parameter_correlation=_correlation(table, names, entry.at("parameter_correlation")),
+        parameter_range=_range(table, names, entry),
     )
     if np.linalg.eigvalsh(model.parameter_correlation_matrix)[0] < -CORRELATION_ROUNDING:
         raise entry.at("parameter_correlation").error("contradicts itself: no parameters have such correlations")
@@ -192,6 +193,21 @@ def _inertia(table: ModelTable, entry: Entry) -> Inertia | None:
         return None if table.inertia is None else Inertia(**table.inertia.model_dump())
     except InputError as error:
         raise entry.error(f"has no inverse: {error}") from None
+
+
+def _range(table: ModelTable, names: list[str], entry: Entry) -> dict[str, tuple[float, float]]:
+    """Least and most value of the parameters that have one."""
+    least, most = table.parameter_min, table.parameter_max
+    _check_names(least, names, entry.at("parameter_min"))
+    _check_names(most, names, entry.at("parameter_max"))
+    found = {name: (least.get(name, -math.inf), most.get(name, math.inf)) for name in {**least, **most}}
+    for name, (low, high) in found.items():
+        if not low < high:
+            raise entry.at("parameter_max").at(name).error(f"is {high:g}, expected more than parameter_min = {low:g}")
+        value, std = table.parameters[name], table.parameter_std.get(name, 0.0)
+        if not std and not low <= value <= high:
+            raise entry.at("parameters").at(name).error(f"is {value:g}, known, expected {low:g} to {high:g} as stated")
+    return found
 
 
 def _correlation(table: ModelTable, names: list[str], entry: Entry) -> dict[tuple[str, str], float]:

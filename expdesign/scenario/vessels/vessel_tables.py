@@ -186,6 +186,16 @@ class ModelTable(Table):
         description="the correlation of the errors of two parameters, by the names of both, each pair once, e.g. "
         "Y_v = { X_u = 0.3 }; 0 when not given",
     )
+    parameter_min: dict[str, Number] = Field(
+        default={},
+        description="the least value that a parameter is known to have, whatever its standard deviation: vessels drawn "
+        "with less are drawn again. 0 for thrust that drives ahead; any when not given",
+    )
+    parameter_max: dict[str, Number] = Field(
+        default={},
+        description="the most value that a parameter is known to have, likewise: 0 for damping, without which drawn "
+        "vessels run away; any when not given",
+    )
     terms: list[TermTable] = Field(default=[], description="the tables [[model.terms]] of structure 'custom'")
     roll: RollTable | None = Field(
         default=None, description="a table [model.roll]; simulations follow it, estimates and plans do not"

@@ -1,0 +1,58 @@
+"""Vessels drawn from a prior keep to the least and most values that are known to hold."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy
+
+from design_case import spec
+from expdesign.dictionary import build_primitive
+from expdesign.errors import InputError
+from expdesign.plan.runs.dispersion import dispersion_m
+from expdesign.scenario import load_vessel
+from expdesign.simulation import CALM
+from expdesign.vessel import VesselModel
+from step_case import GUESS
+
+
+def one_uncertain(std: float, **ends: tuple[float, float]) -> VesselModel:
+    """The fast craft's model with the surge damping alone uncertain."""
+    model = load_vessel(GUESS).model
+    stds = np.array([std if name == "X_u" else 0.0 for name in model.names])
+    return replace(model, parameter_std=stds, parameter_range=ends)
+
+
+def test_draws_are_of_the_truncated_normal_distribution() -> None:
+    model, count = one_uncertain(0.06, X_u=(-np.inf, 0.0)), 20_000
+    drawn = model.drawn_parameters(count, np.random.default_rng(1))[:, model.names.index("X_u")]
+    mean = model.parameters[model.names.index("X_u")]
+    truncated = scipy.stats.truncnorm(-np.inf, -mean / 0.06, loc=mean, scale=0.06)
+    assert len(drawn) == count
+    assert scipy.stats.kstest(drawn, truncated.cdf).pvalue > 0.001
+    share = scipy.stats.norm.cdf(-mean / 0.06)
+    assert model.share_in_range() == pytest.approx(share, abs=4 * np.sqrt(share * (1 - share) / 2500))
+
+
+def test_a_prior_without_range_is_drawn_as_before() -> None:
+    model = replace(load_vessel(GUESS).model, parameter_range={})
+    normal = np.random.default_rng(2).standard_normal((5, len(model.names)))
+    drawn = model.drawn_parameters(5, np.random.default_rng(2))
+    assert drawn == pytest.approx(model.parameters + model.parameter_std * normal)
+    assert model.share_in_range() == 1.0
+
+
+def test_a_range_that_contradicts_the_prior_is_refused() -> None:
+    with pytest.raises(InputError, match="state less uncertainty, or values inside"):
+        one_uncertain(0.01, X_u=(0.0, 1.0)).drawn_parameters(10, np.random.default_rng(0))
+
+
+def test_no_fast_craft_of_its_prior_runs_away() -> None:
+    vessel = load_vessel(GUESS)
+    run = build_primitive(vessel, spec("rudder_steps", duration_s=60.0, speed_mps=5.0, steps=1.0, helm_rad=0.35))
+    room_m = dispersion_m(
+        vessel, run, CALM, centres_m=np.zeros(1), confidence=0.999, rng=np.random.default_rng(3), draws=2000
+    )
+    assert np.isfinite(room_m).all()
