@@ -82,7 +82,7 @@ def orders(samples: int, rng: np.random.Generator) -> np.ndarray:
 
 
 def voyage(
-    vessel: Vessel, samples: int, *, seed: int, stronger: float = 1.0, swell_mps: float = 0.0
+    vessel: Vessel, samples: int, *, seed: int, stronger: float = 1.0, since: int = 0, swell_mps: float = 0.0
 ) -> dict[str, np.ndarray]:
     """Measured columns of a voyage in a current that wanders about a mean of its own.
 
@@ -91,15 +91,17 @@ def voyage(
         samples: of one second.
         seed: of everything drawn.
         stronger: factor on the current and its wandering.
+        since: sample from which this factor holds; before, the current is that of the reference.
         swell_mps: amplitude of sway in a swell of 8 s, in which yaw goes with a tenth of it in rad/s [m/s].
     """
     rng = np.random.default_rng(seed)
     weather = Environment(
-        current_to=0.1 * stronger * rng.standard_normal(2),
-        current_variation=Variation(std_mps=0.03 * stronger, correlation_s=300.0),
+        current_to=0.1 * rng.standard_normal(2), current_variation=Variation(std_mps=0.03, correlation_s=300.0)
     )
     commands = Commands(sample_time_s=1.0, names=vessel.model.inputs, values=orders(samples, rng))
     series = draw_weather(weather, samples, sample_time_s=1.0, rng=rng)
+    factor = np.where(np.arange(samples) < since, 1.0, stronger)
+    series = replace(series, current_to=factor[:, None] * series.current_to)
     track = simulate(vessel, commands, velocity=(3.0, 0.0, 0.0), environment=series)
     told = dict(measure(vessel, commands, track, environment=series, rng=rng))
     phase = 2.0 * np.pi * told["time_s"] / 8.0
@@ -118,9 +120,11 @@ def voyage_csv(path: Path, vessel: Vessel, samples: int, *, seed: int, begin_s: 
     return path
 
 
-def voyage_record(vessel: Vessel, samples: int, *, seed: int, stronger: float = 1.0, swell_mps: float = 0.0) -> Record:
+def voyage_record(
+    vessel: Vessel, samples: int, *, seed: int, stronger: float = 1.0, since: int = 0, swell_mps: float = 0.0
+) -> Record:
     """The same as a record of one batch."""
-    told = voyage(vessel, samples, seed=seed, stronger=stronger, swell_mps=swell_mps)
+    told = voyage(vessel, samples, seed=seed, stronger=stronger, since=since, swell_mps=swell_mps)
     batch = Batch(
         name="voyage",
         sample_time_s=1.0,

@@ -20,6 +20,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -172,11 +173,13 @@ def called(
     return bool(false), bool(plain), bool(found), bool(found) and effects[-1] == "gain"
 
 
-WEATHERS: tuple[tuple[str, dict[str, float]], ...] = (
+WEATHERS: tuple[tuple[str, dict[str, Any]], ...] = (
     ("as in the reference", {}),
     ("currents twice as strong", {"stronger": 2.0}),
     ("currents five times as strong", {"stronger": 5.0}),
     ("currents ten times as strong", {"stronger": 10.0}),
+    ("twice as strong at once after 3 h", {"stronger": 2.0, "since": 3 * HOUR}),
+    ("five times as strong at once after 3 h", {"stronger": 5.0, "since": 3 * HOUR}),
     ("swell of 0.05 m/s in sway", {"swell_mps": 0.05}),
     ("swell of 0.2 m/s in sway", {"swell_mps": 0.2}),
     ("swell of 0.5 m/s in sway", {"swell_mps": 0.5}),
