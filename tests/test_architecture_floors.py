@@ -30,7 +30,14 @@ FLOORS = {
         ("workflows",),
         ("cli", "__main__"),
     ),
-    "records": (("tuning",), ("file",), ("pose",), ("remarks",), ("load", "labels", "pieces")),
+    "records": (("tuning",), ("file",), ("pose",), ("remarks",), ("load", "labels", "levels", "pieces")),
+    "step_trials": (
+        ("tuning",),
+        ("holds", "regression", "steady_state", "transients"),
+        ("samples", "steady_holds", "surfaces"),
+        ("comparisons", "model", "nominal", "live"),
+        ("identify",),
+    ),
     "estimation": (
         ("fit", "tuning"),
         ("regression",),

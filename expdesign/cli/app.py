@@ -37,17 +37,21 @@ class Asked:
     Attributes:
         workflow: name in `expdesign.workflows`.
         arguments, options: of the function, without progress.
+        tells: whether the function also takes `tell`, for lines that are printed while it works.
     """
 
     workflow: str
     arguments: tuple[object, ...]
     options: Mapping[str, object]
+    tells: bool = False
 
 
-def ask(workflow: str, *arguments: object, **options: object) -> Asked:
+def ask(workflow: str, *arguments: object, tells: bool = False, **options: object) -> Asked:
     """Arguments of a command; lists become tuples."""
     fixed = {name: tuple(value) if isinstance(value, list) else value for name, value in options.items()}
-    return Asked(workflow, tuple(tuple(value) if isinstance(value, list) else value for value in arguments), fixed)
+    return Asked(
+        workflow, tuple(tuple(value) if isinstance(value, list) else value for value in arguments), fixed, tells
+    )
 
 
 def command(name: str) -> Callable[[Callable[..., Asked]], Callable[..., Asked]]:
@@ -61,8 +65,9 @@ def command(name: str) -> Callable[[Callable[..., Asked]], Callable[..., Asked]]
                 from expdesign import workflows
 
                 work = getattr(workflows, asked.workflow)
+            lines = {"tell": _untold if quiet or json else _tell} if asked.tells else {}
             with shown_progress(quiet=quiet) as progress:
-                outcome = work(*asked.arguments, progress=progress, **asked.options)
+                outcome = work(*asked.arguments, progress=progress, **lines, **asked.options)
             if json:
                 typer.echo(as_json(name, outcome))
             elif not quiet:
@@ -81,6 +86,15 @@ def command(name: str) -> Callable[[Callable[..., Asked]], Callable[..., Asked]]
         return asking
 
     return register
+
+
+def _tell(line: str) -> None:
+    """At once, for whoever reads the output as it comes."""
+    typer.echo(line)  # flushes
+
+
+def _untold(line: str) -> None:
+    """Say nothing."""
 
 
 def _show_version(asked: bool) -> None:

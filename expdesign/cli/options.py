@@ -80,3 +80,20 @@ Mean = Annotated[
         "where an input never changes.",
     ),
 ]
+Throttle = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--throttle",
+        metavar="NAME ...",
+        help="Signals whose mean drives the vessel, e.g. n1. Default: all n, else tau_x.",
+    ),
+]
+Rudder = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--rudder",
+        metavar="NAME ...",
+        help="Signals whose mean turns it. Default: all rudder, else all a, else tau_psi, else half the difference "
+        "of the first and the last n.",
+    ),
+]

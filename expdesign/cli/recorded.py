@@ -8,7 +8,18 @@ from typing import Annotated
 import typer
 
 from expdesign.cli.app import Asked, ask, command
-from expdesign.cli.options import DataFiles, Fixed, Jobs, Mean, OutByData, OutByVessel, Seed, Velocity
+from expdesign.cli.options import (
+    DataFiles,
+    Fixed,
+    Jobs,
+    Mean,
+    OutByData,
+    OutByVessel,
+    Rudder,
+    Seed,
+    Throttle,
+    Velocity,
+)
 
 
 @command("estimate")
@@ -218,23 +229,8 @@ def identify_steps(
             help="What is known of the vessel before the trial: its model with parameter_std. The steps update it.",
         ),
     ] = None,
-    throttle: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--throttle",
-            metavar="NAME ...",
-            help="Signals whose mean drives the vessel, e.g. n1. Default: all n, else tau_x.",
-        ),
-    ] = None,
-    rudder: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--rudder",
-            metavar="NAME ...",
-            help="Signals whose mean turns it. Default: all rudder, else all a, else tau_psi, else half the difference "
-            "of the first and the last n.",
-        ),
-    ] = None,
+    throttle: Throttle = None,
+    rudder: Rudder = None,
     tests: Annotated[
         list[Path] | None,
         typer.Option("--test", metavar="FILE ...", help="Runs held out: simulated, but not used to identify."),
@@ -259,6 +255,64 @@ def identify_steps(
         rudder=rudder or (),
         tests=tests or (),
         velocity=velocity,
+        seed=seed,
+    )
+
+
+@command("watch-steps")
+def watch_steps(
+    data: Annotated[
+        Path, typer.Argument(metavar="DATA.csv", help="Record of a step trial; - reads a stream, row by row.")
+    ],
+    steps: Annotated[
+        Path,
+        typer.Option(
+            "--steps",
+            metavar="FILE",
+            help="What is to be sailed: a CSV with one row for each hold and a column for every input (n1_rps, "
+            "rudder1_rad); a plan's commands.csv; or a dictionary with families of steps (.toml).",
+        ),
+    ],
+    vessel: Annotated[
+        Path,
+        typer.Option(
+            "--vessel", metavar="VESSEL.toml", help="The guess before the trial: inputs, and how fast it answers."
+        ),
+    ],
+    throttle: Throttle = None,
+    rudder: Rudder = None,
+    learn: Annotated[
+        float, typer.Option("--learn-s", metavar="T", help="Seconds of the first hold, from which the noise is learnt.")
+    ] = 120.0,
+    resume: Annotated[
+        bool,
+        typer.Option(
+            "--resume",
+            help="Go on from the state that an earlier watch left in the same folder, however it ended. Rows that it "
+            "had read are skipped: give the same file, grown or not, the next one, or the stream from before its end.",
+        ),
+    ] = False,
+    out: OutByData = None,
+    seed: Seed = 0,
+) -> Asked:
+    """Tell during a step trial when the vessel is steady and which step is next; list what is left to sail.
+
+    One line for each event, at once. Bad steps are named and put to the end. Writes steps-to-do.csv, a list of steps
+    for --steps, watch-steps.json and watch-steps-state.json for --resume.
+
+    Example: expdesign watch-steps - --steps steps.csv --vessel fast-8m.toml
+    """
+    return ask(
+        "watch_steps",
+        data,
+        out,
+        tells=True,
+        steps=steps,
+        vessel=vessel,
+        throttle=throttle or (),
+        rudder=rudder or (),
+        learn_s=learn,
+        resume=resume,
         seed=seed,
     )
 

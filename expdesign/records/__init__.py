@@ -19,6 +19,7 @@ are ignored and noted. Every error is a `FileError` with the rows concerned.
 
 from expdesign.records.file import COLUMNS
 from expdesign.records.labels import LABEL_SOURCES, row_labels
+from expdesign.records.levels import Levels, read_levels
 from expdesign.records.load import load_records
 from expdesign.records.pieces import STREAM, Piece, Taken, as_file, pieces
 from expdesign.records.pose import VELOCITY_METHODS, Fix, central_difference, last_fix, smoothed_velocity
@@ -29,6 +30,7 @@ __all__ = [
     "STREAM",
     "VELOCITY_METHODS",
     "Fix",
+    "Levels",
     "Piece",
     "Taken",
     "as_file",
@@ -36,6 +38,7 @@ __all__ = [
     "last_fix",
     "load_records",
     "pieces",
+    "read_levels",
     "row_labels",
     "smoothed_velocity",
 ]

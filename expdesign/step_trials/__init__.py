@@ -9,7 +9,7 @@ experiments, in Sensing and Control for Autonomous Vehicles (2017); S. Cao and R
 """
 
 from expdesign.step_trials.comparisons import Comparison
-from expdesign.step_trials.holds import CHANNELS, Controls, Hold, Sailed, controls_of, sailed
+from expdesign.step_trials.holds import CHANNELS, Controls, Hold, Sailed, controls_of, levels_of, sailed
 from expdesign.step_trials.identify import StepTrial, identify_steps
 from expdesign.step_trials.model import TwoDofModel, fit_percent
 from expdesign.step_trials.nominal import nominal_vessel, with_delays
@@ -33,6 +33,7 @@ __all__ = [
     "controls_of",
     "fit_percent",
     "identify_steps",
+    "levels_of",
     "nominal_vessel",
     "sailed",
     "with_delays",

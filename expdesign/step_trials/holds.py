@@ -97,22 +97,27 @@ class Sailed:
         return np.asarray(np.arange(len(self.state)) * self.sample_time_s, dtype=float)
 
 
-def sailed(batch: Batch, controls: Controls) -> Sailed:
-    """Speed, yaw rate and the two commands of a batch."""
-    u, v, r = batch.velocity.T
-    speed = np.where(np.isfinite(v), np.hypot(u, np.nan_to_num(v)), np.abs(u))
-    column = dict(zip(batch.input_names, batch.inputs.T, strict=True))
+def commands_of(controls: Controls, names: Sequence[str], inputs: Array) -> Array:
+    """(k, 2) throttle and rudder of inputs (k, m)."""
+    column = dict(zip(names, inputs.T, strict=True))
     throttle = np.mean([column[name] for name in controls.throttle], axis=0)
     if controls.differential:
         rudder = (column[controls.throttle[0]] - column[controls.throttle[-1]]) / 2
     else:
         rudder = np.mean([column[name] for name in controls.rudder], axis=0)
+    return np.stack([throttle, rudder], axis=1)
+
+
+def sailed(batch: Batch, controls: Controls) -> Sailed:
+    """Speed, yaw rate and the two commands of a batch."""
+    u, v, r = batch.velocity.T
+    speed = np.where(np.isfinite(v), np.hypot(u, np.nan_to_num(v)), np.abs(u))
     return Sailed(
         name=batch.name,
         sample_time_s=batch.sample_time_s,
         state=np.stack([speed, r], axis=1),
         sway=v,
-        commands=np.stack([throttle, rudder], axis=1),
+        commands=commands_of(controls, batch.input_names, batch.inputs),
         inputs=batch.inputs,
     )
 
@@ -183,6 +188,14 @@ def _holds(batch: Sailed, index: int, width: Array, *, first: int) -> Iterator[H
         before = (end, (throttle, rudder))
 
 
+def levels_of(values: Array, sample_time_s: float) -> Array:
+    """(n, m) commands that stand still in turn, of commands (k, m) at every sample."""
+    width = np.maximum(TUNING.constant_share * np.ptp(values, axis=0), 1e-9)
+    least = max(TUNING.least_hold_samples, round(TUNING.least_hold_s / sample_time_s))
+    parts = [part for part in _constant(values, width) if part[1] - part[0] >= least]
+    return np.array([np.median(values[begin:end], axis=0) for begin, end in parts]).reshape(len(parts), values.shape[1])
+
+
 def _constant(commands: Array, width: Array) -> Iterator[tuple[int, int]]:
     """Longest stretches within `width` of their first sample, one after the other."""
     begin, jumps = 0, np.abs(np.diff(commands, axis=0)) > 0
@@ -194,5 +207,10 @@ def _constant(commands: Array, width: Array) -> Iterator[tuple[int, int]]:
 
 
 def _changed(change: tuple[float, float], width: Array) -> str:
-    moved = np.abs(change) > width
-    return "both" if moved.all() else next((name for name, yes in zip(CHANNELS, moved, strict=True) if yes), "")
+    throttle, rudder = (np.abs(change) > width).tolist()
+    return changed_words((throttle, rudder))
+
+
+def changed_words(moved: tuple[bool, bool]) -> str:
+    """What changed: "throttle", "rudder", "both", or "" for nothing."""
+    return "both" if all(moved) else next((name for name, yes in zip(CHANNELS, moved, strict=True) if yes), "")

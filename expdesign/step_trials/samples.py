@@ -168,7 +168,7 @@ def step_samples(
     samples = []
     for place, (hold, begin) in enumerate(zip(holds, steady, strict=True)):
         progress(f"fitting the response to step {hold.number} of {len(holds)}", place / len(holds))
-        samples.append(_sample(batches[hold.batch], hold, begin, plateaus[place], plateaus[place - 1], delay_s))
+        samples.append(step_sample(batches[hold.batch], hold, begin, plateaus[place], plateaus[place - 1], delay_s))
     return tuple(samples)
 
 
@@ -202,9 +202,18 @@ def standard_error(values: Array) -> float:
     return float(means.std(ddof=1) / math.sqrt(blocks))
 
 
-def _sample(
+def step_sample(
     batch: Sailed, hold: Hold, begin: int | None, after: Plateau | None, before: Plateau | None, delay_s: Delays
 ) -> StepSample:
+    """What one hold gives.
+
+    Args:
+        batch: in which it is.
+        hold: its commands.
+        begin: sample from which on it is steady, None where it never is.
+        after, before: plateaus of this hold and of the one before.
+        delay_s: bounds of both dead times.
+    """
     own = StepSample(
         hold=hold,
         steady_s=None if begin is None else (begin - hold.begin) * batch.sample_time_s,

@@ -31,6 +31,12 @@ class Tuning:
         folds: of cross-validation where there is no closed form.
         significant: p-value below which asymmetry and hysteresis are reported as found.
         least_inertia_share: of the smallest measured inertia, below which a surface is cut off.
+        longest_hold_constants: expected time constants after which a hold that is not steady is given up.
+        settling_share: beginning of the first hold that is not learnt from.
+        least_plateau_s: time that a steady state is held, for its mean.
+        longest_turn_s: a whole turn is made where it takes no longer, which takes a current out of the mean.
+        most_attempts: at one step of a trial that is being sailed.
+        gap_sample_times: interval, in sample times, from which a trial that is being sailed has a gap.
         substep_share: of the shortest time constant, one step of the simulated model.
     """
 
@@ -57,6 +63,12 @@ class Tuning:
     folds: int = 10
     significant: float = 0.01
     least_inertia_share: float = 0.5
+    longest_hold_constants: float = 15.0
+    settling_share: float = 1 / 3
+    least_plateau_s: float = 10.0
+    longest_turn_s: float = 60.0
+    most_attempts: int = 3
+    gap_sample_times: float = 1.5
     substep_share: float = 0.2
 
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from expdesign.workflows.data.indices import indices
     from expdesign.workflows.data.mine import mine
     from expdesign.workflows.data.monitor import monitor
+    from expdesign.workflows.data.watch_steps import watch_steps
     from expdesign.workflows.explanations.explain import explain
     from expdesign.workflows.outcome import Outcome, TextTable
     from expdesign.workflows.planning.check_routes import check_routes
@@ -60,6 +61,7 @@ __all__ = [
     "scored",
     "simulate",
     "validate_design",
+    "watch_steps",
     "whatif",
 ]
 
@@ -73,6 +75,7 @@ if not TYPE_CHECKING:
             "data.indices": ("indices",),
             "data.mine": ("mine",),
             "data.monitor": ("monitor",),
+            "data.watch_steps": ("watch_steps",),
             "explanations.explain": ("explain",),
             "outcome": ("Outcome", "TextTable"),
             "planning.check_routes": ("check_routes",),

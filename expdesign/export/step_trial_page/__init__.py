@@ -9,15 +9,31 @@ from expdesign.export.step_trial_page.content import (
     sentences,
     step_model_json,
 )
+from expdesign.export.step_trial_page.live import (
+    TO_DO_HEADER,
+    LiveContent,
+    live_json,
+    live_sentences,
+    to_do_csv,
+    to_do_table,
+    told,
+)
 from expdesign.export.step_trial_page.page import step_trial_html
 
 __all__ = [
     "REPEAT_HEADER",
+    "TO_DO_HEADER",
+    "LiveContent",
     "StepTrialContent",
     "Validated",
+    "live_json",
+    "live_sentences",
     "nominal_rows",
     "repeat_rows",
     "sentences",
     "step_model_json",
     "step_trial_html",
+    "to_do_csv",
+    "to_do_table",
+    "told",
 ]

@@ -1,0 +1,24 @@
+"""Step trials while they are sailed: when a step is over, which is next, and which must be sailed again."""
+
+from expdesign.step_trials.live.expected import expected_constants
+from expdesign.step_trials.live.saved import restored_state
+from expdesign.step_trials.live.step_list import Inputs, Listed, StepList, in_sequence, step_list
+from expdesign.step_trials.live.values import Event, Finished, Row, State
+from expdesign.step_trials.live.watch import Setup, after_row, beginning
+
+__all__ = [
+    "Event",
+    "Finished",
+    "Inputs",
+    "Listed",
+    "Row",
+    "Setup",
+    "State",
+    "StepList",
+    "after_row",
+    "beginning",
+    "expected_constants",
+    "in_sequence",
+    "restored_state",
+    "step_list",
+]

@@ -1,0 +1,127 @@
+"""A list of steps: what is to be sailed, what is left of it, and in which order the crew sets the commands."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from expdesign.errors import InputError
+from expdesign.step_trials.holds import Controls, commands_of
+from expdesign.step_trials.tuning import TUNING
+from expdesign.values import Array
+
+Inputs = tuple[float, ...]
+"""One value for each input signal of the vessel."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Listed:
+    """One step: a change from steady commands to others.
+
+    Attributes:
+        number: in the list, from 1.
+        before, after: commands on both sides.
+        attempts: that failed.
+        why: what was wrong with the last of them.
+    """
+
+    number: int
+    before: Inputs
+    after: Inputs
+    attempts: int = 0
+    why: str = ""
+
+    def failed(self, why: str) -> Listed:
+        """The same after an attempt that failed."""
+        return replace(self, attempts=self.attempts + 1, why=why)
+
+
+@dataclass(frozen=True, kw_only=True)
+class StepList:
+    """Steps to sail.
+
+    Attributes:
+        controls: which inputs are throttle and rudder.
+        names: input signals.
+        start: commands of the first hold, in which the noise is learnt.
+        steps: in the order of the list.
+        width: of each input, within which commands count as equal.
+    """
+
+    controls: Controls
+    names: tuple[str, ...]
+    start: Inputs
+    steps: tuple[Listed, ...]
+    width: Inputs
+
+    def same(self, one: Sequence[float], other: Sequence[float]) -> bool:
+        """Whether commands are equal within the width."""
+        return all(abs(a - b) <= width for a, b, width in zip(one, other, self.width, strict=True))
+
+    def commands(self, inputs: Inputs) -> tuple[float, float]:
+        """Throttle and rudder."""
+        throttle, rudder = commands_of(self.controls, self.names, np.array([inputs]))[0].tolist()
+        return throttle, rudder
+
+    def moved(self, one: Inputs, other: Inputs) -> tuple[bool, bool]:
+        """Whether throttle and rudder differ."""
+        levels = np.array([self.start, *(step.after for step in self.steps)])
+        width = TUNING.constant_share * np.ptp(commands_of(self.controls, self.names, levels), axis=0)
+        throttle, rudder = (np.abs(np.subtract(self.commands(one), self.commands(other))) > width + 1e-9).tolist()
+        return throttle, rudder
+
+    def level(self, inputs: Inputs) -> Inputs | None:
+        """The commands of the list that these are, or None."""
+        levels = (self.start, *(step.after for step in self.steps))
+        return next((level for level in levels if self.same(level, inputs)), None)
+
+    def sailed(self, left: Sequence[Listed], before: Inputs | None, after: Inputs) -> Listed | None:
+        """The first of the steps left that a change of commands is."""
+        if before is None:
+            return None
+        return next((step for step in left if self.same(step.before, before) and self.same(step.after, after)), None)
+
+
+def step_list(
+    names: Sequence[str], levels: Array, controls: Controls, *, numbers: Sequence[int | None] | None = None
+) -> StepList:
+    """Steps between levels (k, m) of all inputs, one after the other; levels that repeat the one before are left out.
+
+    Args:
+        names: input signals.
+        levels: of the commands.
+        controls: throttle and rudder among them.
+        numbers: of the steps that lead to each level, None for levels that are only gone to; counted where not given.
+
+    Raises:
+        InputError: less than two levels differ.
+    """
+    if len(levels) < 2:
+        raise InputError(f"the list of steps holds {len(levels)} levels of the commands, expected two or more")
+    width = np.maximum(TUNING.constant_share * np.ptp(levels, axis=0), 1e-9)
+    kept = [0, *(k for k in range(1, len(levels)) if (np.abs(levels[k] - levels[k - 1]) > width).any())]
+    if len(kept) < 2:
+        raise InputError("the list of steps never changes a command, expected two or more different rows")
+    rows = [tuple(map(float, levels[k])) for k in kept]
+    counted = list(range(len(kept))) if numbers is None else [numbers[k] for k in kept]
+    steps = [
+        Listed(number=number, before=before, after=after)
+        for number, before, after in zip(counted[1:], rows, rows[1:], strict=False)
+        if number is not None
+    ]
+    return StepList(
+        controls=controls, names=tuple(names), start=rows[0], steps=tuple(steps), width=tuple(map(float, width))
+    )
+
+
+def in_sequence(left: Sequence[Listed], at: Inputs | None, steps: StepList) -> list[tuple[Inputs, Listed | None]]:
+    """Commands to set one after the other, and the step that each is; None for those only gone to before a step."""
+    found: list[tuple[Inputs, Listed | None]] = []
+    for step in left:
+        if at is None or not steps.same(at, step.before):
+            found.append((step.before, None))
+        found.append((step.after, step))
+        at = step.after
+    return found

@@ -1,0 +1,134 @@
+"""What a step trial that is being sailed consists of, from row to row."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from expdesign.step_trials.live.step_list import Inputs, Listed
+from expdesign.step_trials.samples import Plateau
+from expdesign.step_trials.steady_state import RatioTest, Watched
+
+LEARNT, BEGUN, STEADY, OVER, BAD, LEFT_OUT, GAP, UNLISTED, DONE = (
+    "learnt", "begun", "steady", "over", "bad", "left out", "gap", "unlisted", "done",
+)  # fmt: skip
+"""Kinds of events."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """One sample.
+
+    Attributes:
+        time_s: of the source [s].
+        motion: u, v, r over ground [m/s, m/s, rad/s]; v is nan where it is not measured.
+        inputs: commands.
+    """
+
+    time_s: float
+    motion: tuple[float, float, float]
+    inputs: Inputs
+
+
+@dataclass(frozen=True, kw_only=True)
+class Held:
+    """Commands that stand, or move towards where they will stand.
+
+    Attributes:
+        rows: since the commands began to change.
+        stands: first row from which on they have not moved.
+        inputs: commands, None while it is not clear where they will stand.
+        changed: which of throttle and rudder moved.
+        step: of the list that this is, None for commands only gone to.
+        steady: row from which on the vessel is steady, None before.
+        hold_s: time that it should stay so [s].
+        over: whether it has been judged.
+        gap_s: longest gap in its rows [s].
+    """
+
+    rows: tuple[Row, ...]
+    stands: int = 0
+    inputs: Inputs | None = None
+    changed: tuple[bool, bool] = (False, False)
+    step: Listed | None = None
+    steady: int | None = None
+    hold_s: float = 0.0
+    over: bool = False
+    gap_s: float = 0.0
+
+    @property
+    def elapsed_s(self) -> float:
+        """Time since the commands began to change [s]."""
+        return self.rows[-1].time_s - self.rows[0].time_s
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finished:
+    """A step that counts.
+
+    Attributes:
+        number: in the list.
+        begins_s: time at which the commands changed [s].
+        steady_s: time until steady [s].
+        state, state_std: U [m/s] and r [rad/s] of the plateau, and their standard errors.
+    """
+
+    number: int
+    begins_s: float
+    steady_s: float
+    state: tuple[float, float]
+    state_std: tuple[float, float]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class State:
+    """Everything that goes on from row to row.
+
+    Attributes:
+        left: steps to sail, in order; those to repeat are at the end.
+        finished: steps that count.
+        left_out: steps that failed too often.
+        sample_time_s: 0 before it is known [s].
+        tests: of steady state for U and r, None before the noise is learnt.
+        watched: states of both.
+        held: the present commands, None before the first row.
+        before: steady state under the commands before, and these; None where there was none.
+        skipped: rows whose time did not increase.
+    """
+
+    left: tuple[Listed, ...]
+    finished: tuple[Finished, ...] = ()
+    left_out: tuple[Listed, ...] = ()
+    sample_time_s: float = 0.0
+    tests: tuple[RatioTest, RatioTest] | None = None
+    watched: tuple[Watched, ...] = ()
+    held: Held | None = None
+    before: tuple[Inputs, Plateau] | None = None
+    skipped: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Event:
+    """Something to tell the crew.
+
+    Attributes:
+        time_s: of the row [s].
+        kind: one of the above.
+        step: that it is about.
+        inputs: commands that it is about.
+        why: what is wrong.
+        seconds: time until steady, to hold, or of a gap [s].
+        whole_turn: whether that is the time of a whole turn.
+        state: U and r, where it is steady.
+        following: commands to set now, and the step that they are, None for commands only gone to before a step; None
+            where nothing is to be set.
+    """
+
+    time_s: float
+    kind: str
+    step: Listed | None = None
+    inputs: Inputs = ()
+    why: str = ""
+    seconds: float = 0.0
+    whole_turn: bool = False
+    state: tuple[float, float] | None = None
+    following: tuple[Inputs, Listed | None] | None = None

@@ -1,0 +1,289 @@
+"""A step trial that is being sailed, row by row: when a step is over, what comes next, what must be repeated.
+
+Values in, values out: the same rows give the same events, whether they come from a file or one by one from a stream.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from expdesign.errors import NotInformative
+from expdesign.step_trials.live import values
+from expdesign.step_trials.live.judged import judged, plateau_of
+from expdesign.step_trials.live.step_list import Inputs, Listed, StepList, in_sequence
+from expdesign.step_trials.live.values import Event, Finished, Held, Row, State
+from expdesign.step_trials.steady_holds import LEAST_MEMORY_SAMPLES, given_up, unseen_after_s
+from expdesign.step_trials.steady_state import STEADY, advanced, begun, calibrated, stepped
+from expdesign.step_trials.tuning import TUNING
+
+Told = tuple[State, tuple[Event, ...]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Setup:
+    """What does not change while a trial is sailed.
+
+    Attributes:
+        steps: the list.
+        constants_s: expected time constants of U and r [s].
+        learn_s: time of the first hold from which the noise is learnt [s].
+        seed: of the calibration.
+    """
+
+    steps: StepList
+    constants_s: tuple[float, float]
+    learn_s: float
+    seed: int = 0
+
+    @property
+    def longest_s(self) -> float:
+        """Time after which a hold that is not steady is given up [s]."""
+        return TUNING.longest_hold_constants * max(self.constants_s)
+
+
+def beginning(setup: Setup) -> State:
+    """Before the first row."""
+    return State(left=setup.steps.steps)
+
+
+def after_row(state: State, row: Row, setup: Setup) -> Told:
+    """State after one more row, and what it gives to tell."""
+    if not state.left:
+        return state, ()
+    if state.held is not None and row.time_s <= state.held.rows[-1].time_s:
+        return replace(state, skipped=state.skipped + 1), ()
+    if state.tests is None:
+        return _learning(state, row, setup)
+    assert state.held is not None
+    state, events = _with_row(state, state.held, row, setup)
+    state, more = _settled(state, setup)
+    state, steady = _judged(state, setup)
+    return state, (*events, *more, *steady)
+
+
+def _learning(state: State, row: Row, setup: Setup) -> Told:
+    """Rows of the first commands until there are enough for the thresholds."""
+    held, steps = state.held, setup.steps
+    there = steps.same(row.inputs, steps.start)
+    if held is None or not there or not steps.same(held.rows[-1].inputs, steps.start) or _gap_s(held, row):
+        told = Event(time_s=row.time_s, kind=values.UNLISTED, inputs=row.inputs, following=(steps.start, None))
+        new = held is None or steps.same(held.rows[-1].inputs, steps.start)
+        return replace(state, held=Held(rows=(row,))), (told,) if new and not there else ()
+    held = replace(held, rows=(*held.rows, row))
+    state = replace(state, held=held)
+    return _calibrated(state, held, setup) if held.elapsed_s >= setup.learn_s else (state, ())
+
+
+def _gap_s(held: Held, row: Row) -> float:
+    """Length of a gap before a row [s], zero where there is none; judged by the intervals so far."""
+    step_s = row.time_s - held.rows[-1].time_s
+    usual_s = held.elapsed_s / (len(held.rows) - 1) if len(held.rows) > 2 else math.inf
+    return step_s if step_s > TUNING.gap_sample_times * usual_s else 0.0
+
+
+def _calibrated(state: State, held: Held, setup: Setup) -> Told:
+    step_s = held.elapsed_s / (len(held.rows) - 1)
+    settling = int(len(held.rows) * TUNING.settling_share)
+    speed = _states(held.rows[settling:])
+    rng = np.random.default_rng(setup.seed)
+    memories = [max(TUNING.memory_share * constant, LEAST_MEMORY_SAMPLES * step_s) for constant in setup.constants_s]
+    try:
+        tests = tuple(
+            calibrated([column], sample_time_s=step_s, memory_s=memory, rng=rng)
+            for column, memory in zip(speed.T, memories, strict=True)
+        )
+    except NotInformative:
+        raise NotInformative(
+            f"{setup.learn_s:g} s of the first hold are too short to learn the noise from: give a longer --learn-s"
+        ) from None
+    watched = tuple(begun(test, float(value)) for test, value in zip(tests, speed[0], strict=True))
+    held = replace(held, inputs=setup.steps.start)
+    state = replace(state, tests=(tests[0], tests[1]), watched=watched, sample_time_s=step_s, held=held)
+    steady = None
+    for place, sample in enumerate(speed):
+        state = _watching(state, sample)
+        steady = place if steady is None and all(part.mode == STEADY for part in state.watched) else steady
+    learnt = Event(time_s=held.rows[-1].time_s, kind=values.LEARNT, inputs=setup.steps.start, seconds=step_s)
+    if steady is not None:
+        held = replace(held, steady=settling + steady, hold_s=TUNING.least_plateau_s)
+    state, events = _judged(replace(state, held=held), setup)
+    return state, (learnt, *events)
+
+
+def _states(rows: tuple[Row, ...]) -> np.ndarray:
+    """(k, 2) U and r."""
+    u, v, r = np.array([row.motion for row in rows]).T
+    return np.stack([np.hypot(u, np.nan_to_num(v)), r], axis=1)
+
+
+def _watching(state: State, sample: np.ndarray) -> State:
+    assert state.tests is not None
+    watched = tuple(
+        advanced(part, test, value)
+        for part, test, value in zip(state.watched, state.tests, sample.tolist(), strict=True)
+    )
+    return replace(state, watched=watched)
+
+
+def _with_row(state: State, held: Held, row: Row, setup: Setup) -> Told:
+    """With a row, and, where the commands leave where they stood, a new hold."""
+    assert state.tests is not None
+    events: tuple[Event, ...] = ()
+    if held.inputs is not None and not setup.steps.same(held.inputs, row.inputs):
+        state, events = _ended(state, held, row, setup)
+        moved = setup.steps.moved(held.inputs, row.inputs)
+        watched = tuple(stepped(part, responds=responds) for part, responds in zip(state.watched, moved, strict=True))
+        state, held = replace(state, watched=watched), Held(rows=(row,), changed=moved)
+    else:
+        gap_s, held = _gap_s(held, row), replace(held, rows=(*held.rows, row))
+        if gap_s and not held.over:
+            held, state = replace(held, gap_s=max(gap_s, held.gap_s), steady=None), _again(state, row)
+            events = (Event(time_s=row.time_s, kind=values.GAP, step=held.step, seconds=gap_s),)
+    state = _watching(state, _states((row,))[0])
+    assert state.tests is not None
+    if held.elapsed_s >= unseen_after_s(state.tests):
+        state = replace(state, watched=tuple(map(given_up, state.watched)))
+    return replace(state, held=held), events
+
+
+def _again(state: State, row: Row) -> State:
+    """Tests that begin anew after a gap."""
+    assert state.tests is not None
+    first = _states((row,))[0].tolist()
+    return replace(state, watched=tuple(begun(test, value) for test, value in zip(state.tests, first, strict=True)))
+
+
+def _ended(state: State, held: Held, row: Row, setup: Setup) -> Told:
+    """After the last row of a hold; one that was left before its time is judged by what it has."""
+    assert held.inputs is not None
+    events: tuple[Event, ...] = ()
+    if not held.over and held.steady is not None:
+        state, events = _over(state, held, setup, quiet=True)
+    elif not held.over:
+        state, events = _failed(state, held, "the commands changed before it was steady", row.time_s, setup, quiet=True)
+    steady = None if held.steady is None else plateau_of(held, state.sample_time_s, setup.steps)
+    return replace(state, before=None if steady is None else (held.inputs, steady)), events
+
+
+def _settled(state: State, setup: Setup) -> Told:
+    """Commands that have stood for long enough, and the step that they are."""
+    held, steps = state.held, setup.steps
+    assert held is not None
+    if held.inputs is not None:
+        return state, ()
+    now = held.rows[-1]
+    if not steps.same(held.rows[held.stands].inputs, now.inputs):
+        held = replace(held, stands=len(held.rows) - 1)
+    stood = held.rows[held.stands :]
+    if stood[-1].time_s - stood[0].time_s < TUNING.least_hold_s or len(stood) < TUNING.least_hold_samples:
+        return replace(state, held=held), ()
+    inputs = steps.level(now.inputs) or now.inputs
+    before = state.before
+    changed = held.changed if before is None else steps.moved(before[0], inputs)
+    step = steps.sailed(state.left, before[0] if before else None, inputs)
+    held = replace(held, inputs=inputs, step=step, changed=changed)
+    state = replace(state, held=held)
+    listed = step is not None or inputs in {commands for commands, _ in in_sequence(state.left, None, steps)}
+    kind = values.BEGUN if listed else values.UNLISTED
+    following = None if listed else _following(state, setup)
+    return state, (Event(time_s=now.time_s, kind=kind, step=step, inputs=inputs, following=following),)
+
+
+def _judged(state: State, setup: Setup) -> Told:
+    """What follows from the tests: steady, over, or never steady."""
+    held = state.held
+    assert held is not None
+    if held.inputs is None or held.over:
+        return state, ()
+    now = held.rows[-1].time_s
+    if held.steady is not None:
+        return _over(state, held, setup) if _held_long_enough(held) else (state, ())
+    if all(part.mode == STEADY for part in state.watched):
+        turn_s = 2 * math.pi / max(abs(state.watched[1].mean), 1e-9)
+        hold_s = turn_s if turn_s <= TUNING.longest_turn_s else TUNING.least_plateau_s
+        state = replace(state, held=replace(held, steady=len(held.rows) - 1, hold_s=hold_s))
+        told = Event(
+            time_s=now, kind=values.STEADY, step=held.step, inputs=held.inputs, seconds=hold_s,
+            whole_turn=turn_s <= TUNING.longest_turn_s,
+            state=(state.watched[0].mean, state.watched[1].mean),
+        )  # fmt: skip
+        return state, (told,)
+    if held.elapsed_s > setup.longest_s:
+        state = replace(state, held=replace(held, over=True))
+        return _failed(state, replace(held, over=True), f"not steady within {setup.longest_s:.0f} s", now, setup)
+    return state, ()
+
+
+def _held_long_enough(held: Held) -> bool:
+    """Whether the time to hold is over; a whole turn must have been turned, or half as much time again passed."""
+    assert held.steady is not None
+    rows = held.rows[held.steady :]
+    passed = rows[-1].time_s - rows[0].time_s
+    if held.hold_s <= TUNING.least_plateau_s or passed < 0.9 * held.hold_s:
+        return passed >= held.hold_s
+    rates = np.array([row.motion[2] for row in rows])
+    turned = abs(float(np.sum(rates))) * passed / (len(rows) - 1)
+    return turned >= 2 * math.pi or passed >= 1.5 * held.hold_s
+
+
+def _over(state: State, held: Held, setup: Setup, *, quiet: bool = False) -> Told:
+    """A hold that was steady: its step counts, or is bad; `quiet` as in `_failed`."""
+    held = replace(held, over=True)
+    state = replace(state, held=held)
+    now = held.rows[-1].time_s
+    assert held.steady is not None
+    plateau, why = judged(held, state.before, state.sample_time_s, setup.steps)
+    if why:
+        return _failed(state, held, why, now, setup, quiet=quiet)
+    u, r = plateau.state.tolist()
+    if held.step is not None:
+        std = plateau.std.tolist()
+        done = Finished(
+            number=held.step.number, begins_s=held.rows[0].time_s,
+            steady_s=held.rows[held.steady].time_s - held.rows[0].time_s, state=(u, r), state_std=(std[0], std[1]),
+        )  # fmt: skip
+        left = tuple(step for step in state.left if step != held.step)
+        state = replace(state, left=left, finished=(*state.finished, done))
+    over = Event(
+        time_s=now, kind=values.OVER, step=held.step, inputs=held.inputs or (), state=(u, r),
+        following=None if quiet else _following(state, setup),
+    )  # fmt: skip
+    return state, (over, *_end(state, now))
+
+
+def _end(state: State, now: float) -> tuple[Event, ...]:
+    return () if state.left else (Event(time_s=now, kind=values.DONE),)
+
+
+def _failed(state: State, held: Held, why: str, now: float, setup: Setup, *, quiet: bool = False) -> Told:
+    """A step that does not count: to the end of the list, or left out after too many attempts.
+
+    Args:
+        state: with `held`.
+        held: what failed.
+        why: in words.
+        now: time [s].
+        setup: of the trial.
+        quiet: the next commands stand already, so that none are told.
+    """
+    step = held.step
+    if step is not None:
+        again = step.failed(why)
+        rest = tuple(other for other in state.left if other != step)
+        if again.attempts < TUNING.most_attempts:
+            state = replace(state, left=(*rest, again))
+        else:
+            state = replace(state, left=rest, left_out=(*state.left_out, again))
+    kind = values.LEFT_OUT if step is not None and step.attempts + 1 >= TUNING.most_attempts else values.BAD
+    following = None if quiet else _following(state, setup)
+    told = Event(time_s=now, kind=kind, step=step, inputs=held.inputs or (), why=why, following=following)
+    return state, (told, *_end(state, now))
+
+
+def _following(state: State, setup: Setup) -> tuple[Inputs, Listed | None] | None:
+    """Commands to set next, and the step that they are."""
+    at = state.held.inputs if state.held is not None else None
+    return next(iter(in_sequence(state.left, at, setup.steps)), None)
