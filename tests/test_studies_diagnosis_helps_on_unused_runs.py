@@ -9,13 +9,14 @@ from sample_files import outside
 
 
 def test_averages_keep_means_and_are_cut_to_whole_samples() -> None:
+    """What is measured is averaged around an instant, inputs from there to the next one."""
     rows = np.arange(23.0)[:, None] * [1.0, 2.0, 3.0]
     batch = Batch(name="run", sample_time_s=0.1, input_names=("n1",), inputs=rows[:, :1], velocity=rows, pose=rows)
     found = averaged_over(batch, 5, 2.1)
-    assert len(found) == 4
+    assert len(found) == 3
     assert found.sample_time_s == pytest.approx(0.5)
-    np.testing.assert_allclose(found.velocity.mean(axis=0), rows[:20].mean(axis=0))
-    np.testing.assert_allclose(found.inputs[0], rows[:5, :1].mean(axis=0))
+    np.testing.assert_allclose(found.velocity.mean(axis=0), rows[2:17].mean(axis=0))
+    np.testing.assert_allclose(found.inputs[0], rows[5:10, :1].mean(axis=0))
 
 
 @pytest.mark.outside

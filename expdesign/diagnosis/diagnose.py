@@ -116,7 +116,7 @@ def diagnose(
     concluding("looking for manoeuvres that distinguish causes", 0.0)
     proposals = proposals or standard_proposals(windows, ship.model.inputs, windows.sample_s)
     findings = _findings(chosen, windows, proposals, seed)
-    order = sorted(range(len(findings)), key=lambda index: -findings[index].gain)
+    order = sorted(range(len(findings)), key=lambda index: -findings[index].certain_reduction)
     steps = [chosen.kept.steps[index] for index in order]
     ranked = tuple(findings[index] for index in order)
     within = () if findings else _gains_within_std(chosen, ship, seed)
@@ -228,10 +228,10 @@ def _as_judged(
         return again, _ahead([as_stated, *(validation.of(step.chosen.fit) for step in again.steps)])
     held = _cross_validated(found, as_stated, validation, progress)
     uncertain = found.steps and found.first.keys and not leads_away(as_stated)
-    if not uncertain or not _mean_fit(as_stated) > _mean_fit(validation.of(found.first)):
+    if not uncertain or not as_stated.mean_fit > validation.of(found.first).mean_fit:
         return found, held
     known = beside_stated_parameters(found, windows, short)
-    if known is None or not _mean_fit(validation.of(known.last)) > _mean_fit(validation.of(found.last)):
+    if known is None or not validation.of(known.last).mean_fit > validation.of(found.last).mean_fit:
         return found, held
     return known, _ahead([as_stated, *(validation.of(step.chosen.fit) for step in known.steps)])
 
@@ -239,10 +239,6 @@ def _as_judged(
 def _ahead(held: Sequence[HeldOut]) -> list[HeldOut]:
     """Errors in short stretches."""
     return [item.ahead() for item in held if item.ahead is not None]
-
-
-def _mean_fit(held: HeldOut) -> float:
-    return float(np.nan_to_num(held.fit, nan=-np.inf).mean())
 
 
 def _cross_validated(

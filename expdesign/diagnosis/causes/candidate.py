@@ -21,7 +21,7 @@ class Candidate:
         positive: its size cannot be below zero, so that only a positive one counts as a sign of it.
         grid: effect whose value is found by trying these once the candidate is singled out, as the likelihood has
             corners in it.
-        drags: effects that slow the ship down, so that a fit with a positive one is against physics.
+        bounds: weighted sums of effects that physics keeps from being positive.
         imitates: its numbers imitate many causes; one with fewer numbers that explains nearly as much comes first.
     """
 
@@ -31,8 +31,12 @@ class Candidate:
     finite: bool = False
     positive: bool = False
     grid: tuple[str, tuple[float, ...]] | None = None
-    drags: tuple[str, ...] = ()
+    bounds: tuple[Mapping[str, float], ...] = ()
     imitates: bool = False
+
+    def is_possible(self, value: Callable[[str], float]) -> bool:
+        """Whether effects with these values keep all bounds."""
+        return all(sum(weight * value(key) for key, weight in bound.items()) <= 0.0 for bound in self.bounds)
 
     @property
     def size(self) -> int:

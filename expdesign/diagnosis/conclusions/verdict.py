@@ -112,7 +112,7 @@ def verdict(
     """The whole diagnosis in one sentence.
 
     Args:
-        findings: by gain.
+        findings: by what they reduce for certain.
         before: accuracy of the model in use.
         unit: what gains are measured on.
         unexplained: what remains, if that is much.

@@ -60,6 +60,11 @@ class HeldOut:
         """(n,) [%] over all units that could be fitted."""
         return _fit_percent(np.nansum(self.squared_error, axis=0), np.nansum(self.squared_deviation, axis=0))
 
+    @property
+    def mean_fit(self) -> float:
+        """Over outputs [%]; minus infinity where one has none."""
+        return float(np.nan_to_num(self.fit, nan=-np.inf).mean())
+
 
 def _fit_percent(squared_error: Array, squared_deviation: Array) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):

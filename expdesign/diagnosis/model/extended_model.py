@@ -46,7 +46,7 @@ class ExtendedModel:
     Attributes:
         model: driven by the recorded inputs.
         library: terms that the model lacks, by name.
-        draught_m: of the ship [m].
+        draught_m, length_m: of the ship [m].
         derived: those of u, v, r that the data derive from the pose, by its sensors.
         shoalest: largest draught over depth in the data, 0 where no depth is known.
         effects: key -> value; others are zero.
@@ -56,6 +56,7 @@ class ExtendedModel:
     model: VesselModel
     library: Mapping[str, Term]
     draught_m: float
+    length_m: float
     derived: tuple[str, ...] = ()
     max_draught_over_depth: float = 0.0
     effects: Effects = field(default_factory=dict)

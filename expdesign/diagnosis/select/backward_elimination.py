@@ -90,10 +90,10 @@ def improves_held_out(
     the intervals of few runs wide.) Later causes need a gain, because no model of a real ship is exact: once a large
     error is explained, small differences between model and ship become significant. A small gain counts if its
     interval excludes zero. Uncertain parameters are estimated in any case, so as a cause they need no gain. A cause
-    that imitates others may make no output worse by more than it gains on average. Where whole
-    simulations lead away, the interval of a later cause must exclude zero, and so must that of any cause beside the
-    parameters of the file, as tests are beside the likeliest ones. What takes less than
-    `Tuning.least_reduction` off every error is a remark, whatever its p-value. A first cause that does not show in
+    that imitates others may make no output worse by more than it gains on average. Where whole simulations lead away,
+    the interval of a later cause must exclude zero, and so must that of any cause beside the parameters of the file, as
+    tests are beside the likeliest ones. What takes less than `Tuning.least_reduction` off every error is a remark,
+    whatever its p-value, and so is what is impossible (`Candidate.bounds`). A first cause that does not show in
     simulations may show in predictions from one sample to the next, if it makes simulations no worse for certain.
 
     Args:
@@ -104,7 +104,8 @@ def improves_held_out(
     """
     gains = [held_out_gain(one, other, seed) for one, other in pairwise(held)]
     simulated = [
-        _matters(*held[index : index + 2])
+        step.chosen.candidate.is_possible(found.last.value)
+        and _matters(*held[index : index + 2])
         and (not step.chosen.candidate.imitates or _least_change(*held[index : index + 2]) >= -gain)
         and _improves(
             not found.beside_stated and (index == 0 or only_nuisance(step, found)),

@@ -100,6 +100,22 @@ def fit_to_convergence(base: Fit, windows: Windows, rough: FittedCandidate) -> F
     return replace(rough, fit=found).with_gain(log_likelihood_gain(base, found))
 
 
+def with_noise_begun_anew(base: Fit, windows: Windows, chosen: FittedCandidate) -> FittedCandidate:
+    """The same candidate with the noise estimated from white noise on, where that is likelier.
+
+    Noise that was estimated without an effect holds some of it for slow noise. A fit that continues from there may stay
+    where the effect is too small.
+    """
+    found = chosen.fit
+    try:
+        anew = fit(found.ship, windows, found.free_keys, starts=found.starts)
+    except (FloatingPointError, np.linalg.LinAlgError):
+        return chosen
+    if likeliest([found, anew]) is found:
+        return chosen
+    return replace(chosen, fit=anew).with_gain(log_likelihood_gain(base, anew))
+
+
 def ranked_by_gain(base: Fit, fitted: Sequence[FittedCandidate]) -> list[FittedCandidate]:
     """Candidates by penalised gain, all under the noise of the likeliest."""
     noise = likeliest([base, *(item.fit for item in fitted)]).noise

@@ -14,9 +14,11 @@ from expdesign.diagnosis.fit import (
     CrossValidation,
     Fit,
     FitOptions,
+    HeldOut,
     fit,
     held_out_gain,
     judged,
+    leads_away,
     log_likelihood_gain,
 )
 from expdesign.diagnosis.model import ExtendedModel
@@ -51,9 +53,10 @@ def select_forward(
     A cause that approximated another one becomes redundant once that one is found. The selection then returns to the
     step where it was added and continues without it, so that no later finding depends on it. Many parameters at once
     explain nearly any data. So before such a block is added, causes with fewer effects are tried one after the other.
-    At the end, causes are compared once more with their best replacement, where another one beside them improves the
-    simulation of held-out data too. The search ends where a cause after the first improves nothing on held-out data: no
-    model of a real ship is exact, and tests always find more.
+    Many numbers may also make a right cause redundant that simulates held-out data better; then they are taken out
+    themselves. At the end, causes are compared once more with their best replacement, where another one beside them
+    improves the simulation of held-out data too. The search ends where a cause after the first improves nothing on
+    held-out data: no model of a real ship is exact, and tests always find more.
     """
     base = first = fit_nuisance(ship, windows, starts)
     steps: list[Step] = []
@@ -83,9 +86,8 @@ def select_forward(
         steps += _smaller_causes(step, search) if _is_block(step.chosen) else [step]
         del steps[TUNING.most_findings :]
         base = steps[-1].chosen.fit
-        redundant = redundant_step(steps, windows) if len(rejected) < TUNING.most_rejected else None
+        redundant = _to_reject(steps, search) if len(rejected) < TUNING.most_rejected else None
         if redundant is not None:
-            redundant = to_take_out(steps, redundant)
             rejected.append(steps[redundant].chosen.candidate)
             base = steps[redundant].before
             del steps[redundant:]
@@ -120,6 +122,28 @@ def to_take_out(steps: Sequence[Step], redundant: int) -> int:
     return len(steps) - 1 if simple.likelihood_gain >= TUNING.nearly_as_much * both else redundant
 
 
+def _to_reject(steps: list[Step], search: _Search) -> int | None:
+    """The step to take out: one that is redundant, or the last one; None where all are needed."""
+    last = len(steps) - 1
+    if last and leads_away(search.held(steps[last])) and not leads_away(search.held(steps[last - 1])):
+        return last
+    redundant = redundant_step(steps, search.windows)
+    if redundant is None:
+        return None
+    redundant = to_take_out(steps, redundant)
+    return last if redundant < last and _leaves_worse(steps, redundant, search) else redundant
+
+
+def _leaves_worse(steps: list[Step], redundant: int, search: _Search) -> bool:
+    """Whether the others without a redundant step simulate held-out data clearly worse than those without the last."""
+    others = without_step(steps, redundant, search.windows)
+    if others is None:
+        return False
+    held = judged([search.held(item[-1]) for item in (steps[:-1], others)], first=0)
+    without_last, without_redundant = (item.mean_fit for item in held)
+    return without_last > without_redundant + TUNING.clear_gain_points
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Search:
     """The arguments that all rounds of a stage share."""
@@ -129,6 +153,10 @@ class _Search:
     rng: np.random.Generator
     work: Work
     validation: CrossValidation
+
+    def held(self, step: Step) -> HeldOut:
+        """Errors on held-out data of the model with a step and those before it."""
+        return self.validation.of(step.chosen.fit)
 
     def tests(self, base: Fit) -> tuple[ScoreTest, ...]:
         """Tests of what is left."""

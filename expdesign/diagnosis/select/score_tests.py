@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -84,12 +85,13 @@ def score_tests(
         z = root.T @ (scores.s[index] / size)
         step = (root @ z) / size
         against = candidate.positive and step[0] < 0.0
+        impossible = not candidate.is_possible(partial(_stepped, base, candidate, step))
         beyond = _p_value(float(z @ z), len(index), positive=candidate.positive)
         tests.append(
             ScoreTest(
                 candidate=candidate,
-                statistic=0.0 if against else float(z @ z),
-                p_value=1.0 - beyond if against else beyond,
+                statistic=0.0 if against or impossible else float(z @ z),
+                p_value=1.0 if impossible else 1.0 - beyond if against else beyond,
                 step=step,
             )
         )
@@ -98,6 +100,11 @@ def score_tests(
         multiplicity = _effective_tests(scores.A, roots, [item.candidate for item in tests], rng)
         tests = [replace(item, multiplicity=number) for item, number in zip(tests, multiplicity, strict=True)]
     return tuple(sorted(tests, key=lambda item: item.p_value * item.multiplicity))
+
+
+def _stepped(base: Fit, candidate: Candidate, step: Array, key: str) -> float:
+    """Value of an effect after the linear estimate."""
+    return base.ship.get(key) + float(step[[*candidate.free].index(key)])
 
 
 def _scores(base: Fit, candidates: Sequence[Candidate]) -> _Scores:

@@ -15,6 +15,7 @@ from expdesign.diagnosis.select.fitted_candidate import (
     fit_candidate,
     fit_to_convergence,
     ranked_by_gain,
+    with_noise_begun_anew,
 )
 from expdesign.diagnosis.select.profile_likelihood import with_profile_estimate
 from expdesign.diagnosis.select.score_tests import ScoreTest, score_tests
@@ -112,9 +113,9 @@ def best_step(
         if candidate is not None:
             work.spend(candidate.fit.simulations, work_of_simulation(candidate.fit.ship))
             rough.append(candidate)
-    physical = [item for item in rough if all(item.fit.value(key) <= 0.0 for key in item.candidate.drags)]
-    fitted = _significant(base, windows, ranked_by_gain(base, physical), work)
-    accepted = [item for item in fitted if item.p_value <= TUNING.accepted_p_value]
+    possible = [item for item in rough if _is_possible(item)]
+    fitted = _significant(base, windows, ranked_by_gain(base, possible), work)
+    accepted = [item for item in fitted if item.p_value <= TUNING.accepted_p_value and _is_possible(item)]
     if not accepted:
         return None
     first = simplest(accepted)
@@ -123,7 +124,7 @@ def best_step(
     worse = set() if first.candidate.imitates else {one.cause for one in outranked}
     others = [item for item in fitted if item.candidate.cause not in worse]
     return Step(
-        chosen=with_profile_estimate(chosen, base),
+        chosen=with_profile_estimate(with_noise_begun_anew(base, windows, chosen), base),
         p_value=chosen.p_value,
         alternatives=_alternatives(chosen, others),
         before=base,
@@ -132,32 +133,45 @@ def best_step(
     )
 
 
+def _is_possible(item: FittedCandidate) -> bool:
+    return item.candidate.is_possible(item.fit.value)
+
+
 def _best_on_held_out(
     first: FittedCandidate, accepted: Sequence[FittedCandidate], validation: CrossValidation
 ) -> FittedCandidate:
     """The best candidate, or one with fewer numbers that simulates data held out of the fit better.
 
-    One that imitates many causes has to be clearly better itself; else it remains among the alternatives. Many numbers
-    explain errors of the model's structure in the data that they are fitted to, and in no others. Where
-    the simulation of whole units leads away from the ship, likelihoods tell little, and the best candidates of all
-    other causes are compared.
+    One that imitates many causes has to be clearly better itself; else it remains among the alternatives. So does one
+    that others with fewer numbers are about as likely as. Many numbers explain errors of the model's structure in the
+    data that they are fitted to, and in no others. Where the simulation of whole units leads away from the ship,
+    likelihoods tell little, and the best candidates of all other causes are compared.
     """
     astray = leads_away(validation.of(first.fit))
-    rivals = _rivals(first, accepted, most_numbers=99 if astray else first.numbers - 1)
+    rivals = _rivals(first, accepted, any_number=astray)
     if not rivals:
         return first
     held = judged([validation.of(item.fit) for item in (first, *rivals)], first=0)
-    means = [float(np.nan_to_num(item.fit, nan=-np.inf).mean()) for item in held]
-    best = 1 + int(np.argmax(means[1:]))
-    least = means[0] + (-1.0 if first.candidate.imitates and not astray else 1.0) * TUNING.clear_gain_points
-    return rivals[best - 1] if means[best] > least else first
+    own, *others = (item.mean_fit for item in held)
+    better: list[tuple[float, FittedCandidate]] = []
+    for mean, rival in zip(others, rivals, strict=True):
+        simpler = rival.numbers < first.numbers and (first.candidate.imitates or _is_about_as_likely(rival, first))
+        margin = -1.0 if simpler and not astray else 1.0
+        if mean > own + margin * TUNING.clear_gain_points:
+            better.append((mean, rival))
+    return max(better, key=lambda pair: pair[0])[1] if better else first
 
 
-def _rivals(first: FittedCandidate, accepted: Sequence[FittedCandidate], *, most_numbers: int) -> list[FittedCandidate]:
-    """The best candidate of each other cause that has so many numbers at most."""
+def _is_about_as_likely(rival: FittedCandidate, first: FittedCandidate) -> bool:
+    return rival.likelihood_gain > TUNING.about_as_likely * first.likelihood_gain
+
+
+def _rivals(first: FittedCandidate, accepted: Sequence[FittedCandidate], *, any_number: bool) -> list[FittedCandidate]:
+    """The best candidate of each other cause with fewer numbers, or as many if it is about as likely."""
     found: dict[str, FittedCandidate] = {}
     for item in accepted:
-        if item.numbers <= most_numbers and item.candidate.cause != first.candidate.cause:
+        most = first.numbers if _is_about_as_likely(item, first) else first.numbers - 1
+        if (any_number or item.numbers <= most) and item.candidate.cause != first.candidate.cause:
             found.setdefault(item.candidate.cause, item)
     return [*found.values()][: TUNING.rivals]
 
@@ -227,7 +241,9 @@ def _starting_points(base: Fit, windows: Windows, tests: tuple[ScoreTest, ...]) 
     short_tests = None if short_fit is None else score_tests(short_fit, [item.candidate for item in tests])
     if short_fit is None or short_tests is None or _explained_share(short_tests, short_fit) < TUNING.large_share:
         return [starting_point(base, test) for test in shortlist], False
-    certain = [*shortlist[: TUNING.certain], *_hidden_by_random_current(base, tests)]
+    causes = [*dict.fromkeys(item.candidate.cause for item in shortlist)][: TUNING.certain]
+    best = [next(item for item in shortlist if item.candidate.cause == cause) for cause in causes]
+    certain = [*best, *_hidden_by_random_current(base, tests)]
     listed = {id(item.candidate) for item in certain}
     multiplicity = {id(item.candidate): item.multiplicity for item in tests}
     others = [

@@ -29,9 +29,11 @@ class Tuning:
         rivals: candidates with fewer numbers that are compared with the best on held-out data, at most.
         nearly_as_much: share of the gain of a candidate that imitates many causes which one with fewer numbers needs to
             come first.
+        about_as_likely: share of the gain of a candidate from which on another is compared with it on held-out data;
+            one with fewer numbers comes first unless it is clearly worse there.
         nuisance_steps: Gauss-Newton steps of the fit before anything is tested, at most.
         large_share: share of the remainder above which an effect counts as large and is fitted in short windows too.
-        certain: best candidates that are always fitted in long windows.
+        certain: causes whose best candidates are always fitted in long windows.
         short_s, middle_s: length of short windows, and of those between short and long ones [s].
         fewest_samples: of a short window.
         short_steps: Gauss-Newton steps in short windows.
@@ -73,6 +75,7 @@ class Tuning:
     simple_share: float = 0.3
     rivals: int = 3
     nearly_as_much: float = 0.7
+    about_as_likely: float = 0.85
     nuisance_steps: int = 12
     large_share: float = 0.15
     certain: int = 2

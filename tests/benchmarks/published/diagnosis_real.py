@@ -79,14 +79,16 @@ class Tried:
 def averaged_over(batch: Batch, every: int, longest_s: float) -> Batch:
     """A batch with means over so many samples in place of single ones, cut to a length.
 
-    Headings are continuous in a batch, so means are right for them too.
+    What is measured is averaged around an instant, inputs from there to the next one. Headings are continuous in a
+    batch, so means are right for them too.
     """
-    count = min(len(batch), int(longest_s / batch.sample_time_s)) // every
+    count = min(len(batch), int(longest_s / batch.sample_time_s)) // every - 1
 
-    def means(values: Array | None) -> Array | None:
-        return None if values is None else values[: count * every].reshape(count, every, -1).mean(axis=1)
+    def means(values: Array | None, begin: int = every // 2) -> Array | None:
+        rows = slice(begin, begin + count * every)
+        return None if values is None else values[rows].reshape(count, every, -1).mean(axis=1)
 
-    inputs, velocity = means(batch.inputs), means(batch.velocity)
+    inputs, velocity = means(batch.inputs, every), means(batch.velocity)
     assert inputs is not None  # a batch has both
     assert velocity is not None
     return Batch(
@@ -285,12 +287,12 @@ def counted(chosen: argparse.Namespace) -> Iterator[str]:
     """The studies that count."""
     with shared_work(chosen):
         if chosen.study == "triples":
-            tasks: Iterator[tuple[Any, ...]] = ((number, chosen.seed) for number in range(chosen.trials))
+            tasks: Iterator[tuple[Any, ...]] = ((number, chosen.seed) for number in range(chosen.first, chosen.trials))
             work = as_finished(triple, (chosen.data,), tasks)
         else:
             places = [at for at, item in enumerate(FAULTS) if chosen.fault in (None, item.name)]
             case = POND if chosen.ship == POND.folder else TANK
-            tasks = ((case, at, number, chosen.seed) for number in range(chosen.trials) for at in places)
+            tasks = ((case, at, number, chosen.seed) for number in range(chosen.first, chosen.trials) for at in places)
             work = as_finished(fault, (chosen.data,), tasks)
         rows = []
         for row in work:
@@ -312,7 +314,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--seed", type=int, default=0, help="of all chance")
     parser.add_argument("--study", choices=("groups", "triples", "faults"), default="groups")
-    parser.add_argument("--trials", type=int, default=20, help="triples of runs")
+    parser.add_argument("--trials", type=int, default=20, help="triples of runs, counted from 0")
+    parser.add_argument("--first", type=int, default=0, help="number of the first triple")
     parser.add_argument("--fault", choices=[item.name for item in FAULTS], help="only this one")
     parser.add_argument("--log", type=Path, help="file to add a line of JSON for each trial to")
     add_sharing(parser)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Set
 
 import numpy as np
 
@@ -13,8 +14,14 @@ from expdesign.diagnosis.model import ExtendedModel, own_air_terms
 
 ASSUMED_MPS, SECTORS, FINER = 10.0, 8, 7
 """Of a wind that is not measured: assumed speed, number of directions tried, and steps within each sector."""
-DRAGS = ("term:W_abs_u_u", "term:W_abs_v_v")
-"""Air pushes where it blows; the sign of its yaw moment depends on the superstructure."""
+AHEAD, ASIDE, TURNING = "term:W_abs_u_u", "term:W_abs_v_v", "term:W_uv"
+MOST_AHEAD = 2.0
+"""Drag coefficient ahead over the one aside, at most: no ship shows the air more of her front than of her side, and her
+inertia ahead is at least half of that aside."""
+MOST_TURNING = 16.0
+"""Coefficient of the yaw moment over that of the side force, times the length, at most: the side force acts somewhere
+along the hull, half a length from amidships at most, and inertia aside over that in yaw is at most 32 over the square
+of the length (radius of gyration of a quarter of the length, twice the mass aside)."""
 SPEEDS_MPS = (3.0, 8.0)
 DIRECTIONS = ((1.0, 0.0), (0.7, 0.7), (0.0, 1.0), (-0.7, 0.7), (-1.0, 0.0), (-0.7, -0.7), (0.0, -1.0), (0.7, -0.7))
 
@@ -62,11 +69,22 @@ def _of_unknown_wind(situation: Situation, terms: list[str]) -> list[Candidate]:
             free=free,
             fixed={"wind:speed": ASSUMED_MPS, "wind:toward": float(turn)},
             grid=("wind:toward", tuple((turn + around).tolist())),
-            drags=tuple(key for key in free if key in DRAGS),
+            bounds=_bounds(set(free), situation.ship.length_m),
             imitates=True,
         )
         for turn in turns
     ]
+
+
+def _bounds(free: Set[str], length_m: float) -> tuple[Mapping[str, float], ...]:
+    """What is possible of drag: air pushes where it blows, no more ahead than aside, and somewhere along the hull."""
+    bounds: tuple[Mapping[str, float], ...] = (
+        {AHEAD: 1.0},
+        {ASIDE: 1.0},
+        {AHEAD: -1.0, ASIDE: MOST_AHEAD},
+        *({TURNING: sign * length_m, ASIDE: MOST_TURNING} for sign in (1.0, -1.0)),
+    )
+    return tuple(bound for bound in bounds if set(bound) <= free)
 
 
 def _explain(values: Values, _ship: ExtendedModel) -> str:
