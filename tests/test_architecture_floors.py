@@ -22,7 +22,7 @@ FLOORS = {
         ("simulation", "records"),
         ("reduction",),
         ("dictionary", "estimation", "indices", "step_trials"),
-        ("information", "diagnosis", "assessment"),
+        ("information", "diagnosis", "assessment", "roll"),
         ("durations",),
         ("growing", "rehearsal", "plan", "monitoring"),
         ("shortest_day", "foresight"),

@@ -1,0 +1,95 @@
+"""Roll and loading: parameters of a ship's roll from gyro, accelerometer and rudder at several loads.
+
+Frames and signs: b-frame, x to the bow, y to starboard, z down; roll is positive with the starboard side down. Places
+of masses and sensors are z [m] from a body origin, so that what lies above it is negative. The accelerometer reads
+a_s to port, gravity in it: a_s = z_s phi'' + g phi - v' - U r. The rudder may have any sign and unit. Parameters are
+vectors of nine numbers in the order of `PARAMETERS`, with `UNITS`.
+
+    runs -> low_pass, prepared -> estimate_roll -> null_space
+
+Source: doctoral thesis on grey-box identification of ship roll with few sensors (closed-loop instrumental variables,
+several load conditions), chapters 4 to 6.
+"""
+
+from expdesign.roll.closed_loop import ClosedLoop, closed_loop, simulated
+from expdesign.roll.estimate import METHODS, RollEstimate, RollProblem, estimate_roll
+from expdesign.roll.loads import (
+    G_MPS2,
+    NOMINAL,
+    Body,
+    Load,
+    axis_inertia,
+    first_moment,
+    lumped_centre,
+    sensed_inertia,
+)
+from expdesign.roll.model import (
+    COEFFICIENTS,
+    MEANINGS,
+    PARAMETERS,
+    UNITS,
+    Coefficients,
+    coefficients,
+    continuous,
+    discrete,
+    named,
+    parameters,
+    relative_sensitivity,
+    roll_frequency,
+    stiffness,
+)
+from expdesign.roll.null_space import Cure, Direction, NullSpace, null_space
+from expdesign.roll.pendulum import load_from, own_parameters, pendulum_system
+from expdesign.roll.prepare import LowPass, low_pass, prepared
+from expdesign.roll.runs import SIGNALS, Case, Run
+from expdesign.roll.tuning import TUNING
+from expdesign.roll.waves import Jonswap, encounter, froude_factor, shaping_filter
+
+__all__ = [
+    "COEFFICIENTS",
+    "G_MPS2",
+    "MEANINGS",
+    "METHODS",
+    "NOMINAL",
+    "PARAMETERS",
+    "SIGNALS",
+    "TUNING",
+    "UNITS",
+    "Body",
+    "Case",
+    "ClosedLoop",
+    "Coefficients",
+    "Cure",
+    "Direction",
+    "Jonswap",
+    "Load",
+    "LowPass",
+    "NullSpace",
+    "RollEstimate",
+    "RollProblem",
+    "Run",
+    "axis_inertia",
+    "closed_loop",
+    "coefficients",
+    "continuous",
+    "discrete",
+    "encounter",
+    "estimate_roll",
+    "first_moment",
+    "froude_factor",
+    "load_from",
+    "low_pass",
+    "lumped_centre",
+    "named",
+    "null_space",
+    "own_parameters",
+    "parameters",
+    "pendulum_system",
+    "prepared",
+    "relative_sensitivity",
+    "roll_frequency",
+    "sensed_inertia",
+    "shaping_filter",
+    "simulated",
+    "stiffness",
+]

@@ -1,0 +1,294 @@
+"""Joint estimate of roll parameters over load cases: closed-loop instrumental variables, or least squares.
+
+    min over theta of  sum over cases of  || Q' (y - X c(theta, load)) ||^2 / sigma^2
+
+Q is an orthonormal basis of the instruments, c the sampled coefficients; equation and instruments are whitened by an
+autoregression of the case's residuals. With white residuals these weights are the efficient ones, and the inverse of
+the curvature is the covariance; the covariance that is reported counts what colour and changing variance are left.
+
+Source: doctoral thesis on grey-box identification of roll with few sensors, approach 5.3 and algorithm 5.1; L. P.
+Hansen, Econometrica 50 (1982), 1029-1054, for weights and covariance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+
+from expdesign.errors import InputError, NotInformative
+from expdesign.estimation.noise import automatic_lags, long_run_covariance
+from expdesign.roll.closed_loop import closed_loop
+from expdesign.roll.instruments import black_box_signals, loop_signals
+from expdesign.roll.loads import Body
+from expdesign.roll.model import PARAMETERS, coefficients, discrete, named, relative_sensitivity
+from expdesign.roll.regression import WHITE, Rows, build_rows, instrument_columns, noise_model
+from expdesign.roll.runs import Case
+from expdesign.roll.tuning import TUNING
+from expdesign.values import Array, seal
+
+METHODS = ("iv", "ls")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RollProblem:
+    """What is sought, from what.
+
+    Attributes:
+        body: what is known of the ship.
+        cases: prepared, of one sample time.
+        free: names of the parameters that are estimated; others keep their start values.
+        start: (9,) where the search begins.
+        scale: (9,) a typical size of each parameter, positive.
+    """
+
+    body: Body
+    cases: tuple[Case, ...]
+    free: tuple[str, ...]
+    start: Array
+    scale: Array
+
+    def __post_init__(self) -> None:
+        seal(self, start="9", scale="9")
+        if not self.cases:
+            raise InputError("no load case is given, expected one or more")
+        if len({run.step_s for case in self.cases for run in case.runs}) > 1:
+            raise InputError("the load cases differ in sample time, expected one for all")
+        if not self.free or not set(self.free) <= set(PARAMETERS):
+            raise InputError(f"free is {self.free}, expected some of {', '.join(PARAMETERS)}")
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Least and largest parameters (9,): many times their typical size; an inertia is positive."""
+        low, high = -TUNING.farthest * self.scale, TUNING.farthest * self.scale
+        place = PARAMETERS.index("A_x")
+        low[place] = self.scale[place] / TUNING.farthest**2
+        return np.minimum(low, self.start), np.maximum(high, self.start)
+
+    @property
+    def step_s(self) -> float:
+        """Time between samples [s]."""
+        return self.cases[0].runs[0].step_s
+
+    @property
+    def places(self) -> list[int]:
+        """Of the free parameters among all."""
+        return [PARAMETERS.index(name) for name in self.free]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RollEstimate:
+    """The estimate.
+
+    Attributes:
+        problem: that it answers.
+        method: "iv" or "ls".
+        theta: (9,) parameters.
+        covariance: (p, p) of the free ones, for the held ones as they are.
+        held: free parameters that kept their start values because the equations leave directions open.
+        sensed: (q, p) change of the weighted residuals, in their own standard deviations, by the free parameters.
+        rounds: (r, 9) parameters after each round of instruments and noise models.
+        settled: whether the last round changed little.
+        residual_std: (c,) of each case, whitened [rad/s].
+        surprise: least sum of squares over its expected value, 1 for a model that fits; nan where nothing is left over.
+    """
+
+    problem: RollProblem
+    method: str
+    theta: Array
+    covariance: Array
+    held: tuple[str, ...]
+    sensed: Array
+    rounds: Array
+    settled: bool
+    residual_std: Array
+    surprise: float
+
+    def __post_init__(self) -> None:
+        seal(self, theta="9", covariance="p p", sensed="q p", rounds="r 9", residual_std="c")
+
+    @property
+    def std(self) -> dict[str, float]:
+        """Standard deviations of the free parameters by name."""
+        return dict(zip(self.problem.free, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
+
+    @property
+    def values(self) -> dict[str, float]:
+        """All parameters by name."""
+        return named(self.theta)
+
+
+@dataclass(frozen=True, eq=False)
+class _Weighted:
+    """A case's equations after projection on the instruments: residual = top - slope c, in standard deviations."""
+
+    rows: Rows
+    basis: Array
+    top: Array
+    slope: Array
+
+
+def estimate_roll(problem: RollProblem, *, method: str = "iv") -> RollEstimate:
+    """The estimate by instruments from the rudder, or by least squares.
+
+    Raises:
+        NotInformative: there are fewer equations than free parameters, or the rudder does not move the ship.
+    """
+    if method not in METHODS:
+        raise InputError(f"method is {method!r}, expected one of {', '.join(METHODS)}")
+    held = _held(problem)
+    begun = [black_box_signals(case.runs) for case in problem.cases]
+    theta, history, settled = np.array(problem.start), [], False
+    signals, weighted = begun, _weighted(problem, begun, None, method)
+    while True:
+        before, (theta, sensed, left) = theta, _solved(problem, weighted, theta, held)
+        history.append(theta)
+        settled = len(history) > 1 and _little(problem, theta - before, sensed)
+        if settled or len(history) == TUNING.most_rounds:
+            break
+        signals = _signals(problem, theta, begun)
+        weighted = _weighted(problem, signals, theta, method)
+    return RollEstimate(
+        problem=problem,
+        method=method,
+        theta=theta,
+        covariance=_covariance(problem, weighted, theta, sensed, held),
+        held=held,
+        sensed=sensed,
+        rounds=np.array(history),
+        settled=settled,
+        residual_std=np.array([_deviation(part.rows, _sampled(problem, theta)[i]) for i, part in enumerate(weighted)]),
+        surprise=_surprise(left, len(problem.free) - len(held)),
+    )
+
+
+def _surprise(left: Array, fitted: int) -> float:
+    return float(left @ left) / (len(left) - fitted) if len(left) > fitted else float("nan")
+
+
+def _held(problem: RollProblem) -> tuple[str, ...]:
+    """Free parameters without which the rest has a rank as large, those first that other trials tell."""
+    generic = np.where(np.abs(problem.start) > 0.01 * problem.scale, problem.start, problem.scale)
+    loads, kept = [case.load for case in problem.cases], list(problem.free)
+
+    def rank(names: list[str]) -> int:
+        sensitivity = relative_sensitivity(generic, problem.body, loads, names)
+        return int(np.linalg.matrix_rank(sensitivity, tol=TUNING.unseen * np.linalg.norm(sensitivity)))
+
+    most = rank(kept)
+    for name in ("k", "z_f", "K_vd", *PARAMETERS):
+        others = [other for other in kept if other != name]
+        if len(kept) > most and name in kept and rank(others) == most:
+            kept = others
+    return tuple(name for name in problem.free if name not in kept)
+
+
+def _sampled(problem: RollProblem, theta: Array) -> list[Array]:
+    """Sampled coefficients (5,) of each case."""
+    return [discrete(theta, problem.body, case.load, problem.step_s).values for case in problem.cases]
+
+
+def _signals(problem: RollProblem, theta: Array, begun: Sequence[list[Array]]) -> list[list[Array]]:
+    """Simulated signals of each case; black boxes where the model is unstable or its loop has no gain."""
+    result = []
+    for case, first in zip(problem.cases, begun, strict=True):
+        values = coefficients(theta, problem.body, case.load).values
+        z_s = problem.body.sensor(float(theta[PARAMETERS.index("z_f")]))
+        loop = closed_loop(values, z_s) if values[2] else None
+        result.append(loop_signals(case.runs, loop, first) if loop is not None and loop.stable else first)
+    return result
+
+
+def _weighted(
+    problem: RollProblem, signals: Sequence[list[Array]], theta: Array | None, method: str
+) -> list[_Weighted]:
+    """Equations of each case; before there are parameters, without noise models and with equal weights."""
+    result = []
+    for place, case in enumerate(problem.cases):
+        instruments = None if method == "ls" else [instrument_columns(run) for run in signals[place]]
+        rows, deviation = build_rows(case.runs, instruments, WHITE), 1.0
+        if theta is not None:
+            values = _sampled(problem, theta)[place]
+            if method == "iv":
+                own = [rows.residuals(values)[rows.run == run] for run in np.unique(rows.run)]
+                rows = build_rows(case.runs, instruments, noise_model(own, values[:2], TUNING.noise_order))
+            deviation = _deviation(rows, values)
+        result.append(_projected(rows, max(deviation, 1e-12)))
+    return result
+
+
+def _projected(rows: Rows, deviation: float) -> _Weighted:
+    Q, R, _ = scipy.linalg.qr(
+        rows.Z / np.maximum(np.linalg.norm(rows.Z, axis=0), 1e-300), mode="economic", pivoting=True
+    )
+    basis = Q[:, np.abs(np.diag(R)) > 1e-9]
+    return _Weighted(rows, basis / deviation, basis.T @ rows.y / deviation, basis.T @ rows.X / deviation)
+
+
+def _deviation(rows: Rows, values: Array) -> float:
+    return float(np.std(rows.residuals(values)))
+
+
+def _solved(
+    problem: RollProblem, weighted: Sequence[_Weighted], theta: Array, held: Sequence[str]
+) -> tuple[Array, Array, Array]:
+    """Parameters (9,), derivatives (q, p) of the weighted residuals by the free ones, and these residuals (q,)."""
+    places = [PARAMETERS.index(name) for name in problem.free if name not in held]
+    equations = sum(len(part.top) for part in weighted)
+    if equations < len(places):
+        raise NotInformative(
+            f"the data give {equations} equations for {len(places)} roll parameters, expected a rudder that moves the "
+            "ship, and more load cases or fewer parameters"
+        )
+
+    def full(values: Array) -> Array:
+        result = np.array(theta)
+        result[places] = values
+        return result
+
+    low, high = problem.bounds
+    found = scipy.optimize.least_squares(
+        lambda values: _residuals(problem, weighted, full(values)), np.clip(theta, low, high)[places],
+        lambda values: _slopes(problem, weighted, full(values))[:, places], bounds=(low[places], high[places]),
+        x_scale=problem.scale[places], xtol=1e-12, ftol=1e-12, gtol=1e-12,
+    )  # fmt: skip
+    return full(found.x), _slopes(problem, weighted, full(found.x))[:, problem.places], np.asarray(found.fun)
+
+
+def _residuals(problem: RollProblem, weighted: Sequence[_Weighted], theta: Array) -> Array:
+    return np.concatenate(
+        [part.top - part.slope @ c for part, c in zip(weighted, _sampled(problem, theta), strict=True)]
+    )
+
+
+def _slopes(problem: RollProblem, weighted: Sequence[_Weighted], theta: Array) -> Array:
+    """(q, 9) derivatives of the residuals."""
+    by = [discrete(theta, problem.body, case.load, problem.step_s).jacobian for case in problem.cases]
+    return -np.concatenate([part.slope @ rows for part, rows in zip(weighted, by, strict=True)])
+
+
+def _little(problem: RollProblem, change: Array, sensed: Array) -> bool:
+    """Whether a change of the parameters moves no weighted residual by more than a small part of its deviation."""
+    return bool(np.linalg.norm(sensed @ change[problem.places]) <= TUNING.settled * np.sqrt(len(problem.free)))
+
+
+def _covariance(
+    problem: RollProblem, weighted: Sequence[_Weighted], theta: Array, sensed: Array, held: Sequence[str]
+) -> Array:
+    """(p, p) with scores that may depend on each other; zero for what is held."""
+    scale = problem.scale[problem.places] * [name not in held for name in problem.free]
+    inverse = np.linalg.pinv(sensed * scale, rcond=1e-12)
+    first, middle = 0, np.zeros((len(scale),) * 2)
+    for part, values in zip(weighted, _sampled(problem, theta), strict=True):
+        last = first + len(part.top)
+        scores = (part.basis @ inverse[:, first:last].T) * part.rows.residuals(values)[:, None]
+        middle += _long_run(scores, part.rows)
+        first = last
+    return np.asarray(middle * np.outer(scale, scale))
+
+
+def _long_run(scores: Array, rows: Rows) -> Array:
+    run, step = rows.run.astype(int), rows.step.astype(int)
+    return long_run_covariance(scores, run, step, lags=automatic_lags(scores, run, step))

@@ -1,0 +1,196 @@
+"""What load cases cannot tell apart: directions of parameters with units, and what would cure them.
+
+Two questions are kept apart. The equations may leave a direction open whatever the data are: then all coefficients of
+all cases stay as they are along it. Or the data may show a direction too faintly. The relative sensitivity
+
+    S = d log coefficients / d log parameters
+
+of all cases together answers the first: its singular values do not depend on units. The estimate's own information, in
+relative changes, answers the second: 1 over a singular value is the relative standard deviation along it.
+
+With z_s counted from the body origin, three cases (none, known, unknown load) have rank 8 of 9: by the known load,
+(A2_c - A2_n) / (S1_c - S1_n) = z_c - z_s is known already, so that it gives one equation and not two.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from expdesign.roll.estimate import RollEstimate, RollProblem
+from expdesign.roll.loads import Body, Load
+from expdesign.roll.model import PARAMETERS, UNITS, named, relative_sensitivity
+from expdesign.roll.tuning import TUNING
+from expdesign.values import Array, seal
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Direction:
+    """A combination of parameters.
+
+    Attributes:
+        change: parameter -> change in its own unit, scaled so that the one that changes most by its size changes by a
+            tenth; those that hardly change are left out.
+        size: singular value; for what data show, the relative standard deviation along it is 1 / size.
+    """
+
+    change: dict[str, float]
+    size: float
+
+    def __str__(self) -> str:
+        return ", ".join(f"{name} {value:+.3g} {UNITS[name]}" for name, value in self.change.items())
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cure:
+    """Something more that could be known, measured or loaded.
+
+    Attributes:
+        what: in words.
+        smallest: singular value of the relative sensitivity with it.
+        rank: of the parameters with it.
+    """
+
+    what: str
+    smallest: float
+    rank: int
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class NullSpace:
+    """The report.
+
+    Attributes:
+        free: parameters.
+        singular_values: (p,) of the relative sensitivity, falling.
+        rank: how many of them are not rounding.
+        open: directions that the equations leave open, along which the parameters in `RollEstimate.held` were held.
+        faint: directions that these data show too faintly.
+        cures: the best first; none where nothing is open or faint.
+    """
+
+    free: tuple[str, ...]
+    singular_values: Array
+    rank: int
+    open: tuple[Direction, ...]
+    faint: tuple[Direction, ...]
+    cures: tuple[Cure, ...]
+
+    def __post_init__(self) -> None:
+        seal(self, singular_values="p")
+
+    @property
+    def undetermined(self) -> tuple[str, ...]:
+        """Parameters that change along an open direction."""
+        return tuple(name for name in self.free if any(name in one.change for one in self.open))
+
+
+def null_space(estimate: RollEstimate) -> NullSpace:
+    """The report on an estimate."""
+    problem, theta = estimate.problem, _sizes(estimate)
+    loads = [case.load for case in problem.cases]
+    sensitivity = relative_sensitivity(theta, problem.body, loads, problem.free)
+    sizes, rows = _singular(sensitivity)
+    rank = _rank(sizes)
+    open_ = tuple(_direction(problem, theta, row, 0.0) for row in rows[rank:])
+    faint = _faint(problem, theta, estimate.sensed, rows[rank:])
+    cures = _cures(problem, theta, loads) if open_ or faint else ()
+    return NullSpace(
+        free=problem.free, singular_values=sizes, rank=rank, open=open_, faint=faint,
+        cures=tuple(sorted(cures, key=lambda cure: (-cure.rank, -cure.smallest))),
+    )  # fmt: skip
+
+
+def _sizes(estimate: RollEstimate) -> Array:
+    """Parameters (9,), those near zero at a hundredth of their typical size."""
+    least = 0.01 * estimate.problem.scale
+    theta = np.array(estimate.theta)
+    small = np.abs(theta) < least
+    small &= np.isin(PARAMETERS, estimate.problem.free)
+    theta[small] = least[small]
+    return theta
+
+
+def _singular(matrix: Array) -> tuple[Array, Array]:
+    """Singular values, one for each column, and right singular vectors in rows."""
+    _, sizes, rows = np.linalg.svd(matrix, full_matrices=True)
+    return np.concatenate([sizes, np.zeros(matrix.shape[1] - len(sizes))]), rows
+
+
+def _rank(sizes: Array) -> int:
+    return int(np.sum(sizes > TUNING.unseen * sizes[0]))
+
+
+def _direction(problem: RollProblem, theta: Array, relative: Array, size: float) -> Direction:
+    """From relative changes (p,)."""
+    values = theta[problem.places]
+    largest = int(np.argmax(np.abs(relative)))
+    moved = relative / relative[largest] * 0.1
+    if moved[0] * values[0] < 0:
+        moved = -moved
+    named_ = {
+        name: float(change * value)
+        for name, change, value in zip(problem.free, moved, values, strict=True)
+        if abs(change) > TUNING.small_share * 0.1
+    }
+    return Direction(change=named_, size=size)
+
+
+def _faint(problem: RollProblem, theta: Array, sensed: Array, open_rows: Array) -> tuple[Direction, ...]:
+    """Directions across the open ones, along which the data leave a relative standard deviation of 1 or more."""
+    relative = sensed * theta[problem.places]
+    across = relative - relative @ open_rows.T @ open_rows
+    sizes, rows = _singular(across)
+    kept = len(problem.free) - len(open_rows)
+    return tuple(
+        _direction(problem, theta, row, float(size))
+        for size, row in zip(sizes[:kept], rows[:kept], strict=True)
+        if size < 1.0 / TUNING.faint_std
+    )
+
+
+def _cures(problem: RollProblem, theta: Array, loads: Sequence[Load | None]) -> list[Cure]:
+    """What one more piece of knowledge, another sensor, or one more load would do."""
+    body, free = problem.body, problem.free
+    result = []
+    for name in free:
+        others = [other for other in free if other != name]
+        if others:
+            result.append(_cure(f"know {name}", theta, body, loads, others, known=1))
+    if not body.sensor_from_axis:
+        fixed = replace(body, z_s=body.sensor(named(theta)["z_f"]), sensor_from_axis=True)
+        text = "measure how far the accelerometer is from the rotation axis"
+        result.append(_cure(text, theta, fixed, loads, free))
+    for load, text in _further_loads(problem, loads):
+        result.append(_cure(text, theta, body, [*loads, load], free))
+    return result
+
+
+def _cure(
+    what: str, theta: Array, body: Body, loads: Sequence[Load | None], free: Sequence[str], known: int = 0
+) -> Cure:
+    sizes, _ = _singular(relative_sensitivity(theta, body, loads, free))
+    return Cure(what=what, smallest=float(sizes[-1]), rank=_rank(sizes) + known)
+
+
+def _further_loads(problem: RollProblem, loads: Sequence[Load | None]) -> list[tuple[Load, str]]:
+    """One more known load: where there was one, near the rotation axis, and as far below it."""
+    known = [load for load in loads if load is not None and load.mass_kg > 0]
+    mass = max((load.mass_kg for load in known), default=0.02 * problem.body.mass_kg)
+    axis, top = problem.body.z_g, min((load.z_m for load in known), default=problem.body.z_s)
+    places = {
+        "at the same height" if known else "high up": top,
+        "at half that height": (top + axis) / 2,
+        "near the centre of mass": axis,
+        "as far below it": 2 * axis - top,
+    }
+    return [
+        (
+            Load(mass_kg=factor * mass, z_m=place),
+            f"a run with a known load of {factor * mass:.3g} kg {words}, {-place:.3g} m above the body origin",
+        )
+        for words, place in places.items()
+        for factor in (1.0, 2.0)
+    ]

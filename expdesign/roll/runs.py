@@ -1,0 +1,43 @@
+"""Runs at one load each, and their preparation: low-pass filter, fewer samples, differences."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from expdesign.roll.loads import Load
+from expdesign.values import Array, seal
+
+SIGNALS = ("roll rate", "accelerometer", "yaw rate", "rudder")
+"""Columns of a run."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Run:
+    """One uninterrupted record.
+
+    Attributes:
+        step_s: time between samples [s].
+        signals: (k, 4) roll rate [rad/s], positive to starboard; reading of the accelerometer to port, gravity in it
+            [m/s2]; yaw rate [rad/s], positive to starboard; rudder, of any sign and unit.
+    """
+
+    step_s: float
+    signals: Array
+
+    def __post_init__(self) -> None:
+        seal(self, signals="k 4")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Case:
+    """Runs at one load.
+
+    Attributes:
+        name: for reports.
+        load: on board; None for the unknown one.
+        runs: at least one, all with one time between samples.
+    """
+
+    name: str
+    load: Load | None
+    runs: tuple[Run, ...]

@@ -1,0 +1,57 @@
+"""The tuning constants of roll identification, in one place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tuning:
+    """Constants that were chosen, not derived.
+
+    Attributes:
+        samples_per_period: of roll, at least; fewer bias the bilinear map by a share of about (pi / samples)^2 / 3.
+        passed_gain: least gain of the low-pass filter at the roll frequency.
+        cutoff_share: of the rate after thinning out, at which the low-pass filter before it leaves half.
+        taps_per_period: length of that filter, in periods of its cut-off, to each side.
+        least_samples_per_period: of roll in the data.
+        least_samples: in a run, beside those that are left out.
+        black_box: orders (past outputs, inputs) of the models from rudder to each signal.
+        side_black_box: of the model from rudder to side acceleration.
+        largest_pole: of these models; larger ones are moved inside.
+        lags: of each simulated signal among the instruments.
+        rudder_lags: of the rudder's difference.
+        noise_order: of the autoregression in the noise model of a case.
+        noise_ratios: of the noise of roll rates to that of other signals, as they enter the equation, that are tried.
+        left_out_samples: at the beginning of a run, where lags reach before it.
+        farthest: typical sizes from zero, beyond which no parameter is sought.
+        most_rounds: of instruments and noise models.
+        settled: change in a round, in standard deviations of each parameter, that ends them.
+        unseen: relative sensitivity below which the equations themselves leave a direction open.
+        faint_std: relative standard deviation along a direction from which data are said not to tell it.
+        small_share: of a direction's largest relative change, below which a parameter is not named.
+    """
+
+    samples_per_period: float = 80.0
+    passed_gain: float = 0.9
+    cutoff_share: float = 0.4
+    taps_per_period: float = 2.0
+    least_samples_per_period: float = 10.0
+    least_samples: int = 100
+    black_box: tuple[int, int] = (4, 5)
+    side_black_box: tuple[int, int] = (3, 4)
+    largest_pole: float = 0.999
+    lags: int = 4
+    rudder_lags: int = 2
+    noise_order: int = 12
+    noise_ratios: tuple[float, ...] = (0.0, *(10.0**power for power in range(-4, 5)), 1e6)
+    left_out_samples: int = 50
+    farthest: float = 10.0
+    most_rounds: int = 12
+    settled: float = 0.02
+    unseen: float = 1e-9
+    faint_std: float = 1.0
+    small_share: float = 0.02
+
+
+TUNING = Tuning()

@@ -1,0 +1,155 @@
+"""Linear truths of roll, simulated exactly between samples: a pendulum on a cart, and a ship in sway, roll and yaw."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy
+
+from expdesign.roll import NOMINAL, Body, Load, Run, axis_inertia, first_moment, named, parameters, stiffness
+from expdesign.values import Array
+
+PENDULUM = Body(mass_kg=22.04, z_g=-0.018, z_s=-0.218)
+PENDULUM_TRUTH = parameters(k=10.39, A_x=0.1385, d=0.1067, m=0.2, z_m=-0.274)
+"""Of the simulated pendulum in the thesis (table 4.3)."""
+MODEL_SHIP = Body(mass_kg=22.04, z_g=0.0073, z_s=-0.23)
+MODEL_SHIP_TRUTH = parameters(
+    k=9.0, A_x=0.157, d=0.267, K_r=-2.0, K_vd=0.95, K_delta=-0.45, z_f=-0.0294, m=0.4, z_m=-0.268
+)
+"""Near the estimates of the thesis's model ship (its tables of chapter 6)."""
+SERVO_S = 0.1
+"""Lag of the rudder behind its orders."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sea:
+    """Noise: white on each sensor, and a narrow-band roll moment.
+
+    Attributes:
+        roll_rate, sensed, yaw_rate: standard deviations of the sensors [rad/s, m/s2, rad/s].
+        moment: of the roll moment [N m].
+        frequency_hz, damping: of the filter that shapes the moment.
+    """
+
+    roll_rate: float = 0.0
+    sensed: float = 0.0
+    yaw_rate: float = 0.0
+    moment: float = 0.0
+    frequency_hz: float = 1.0
+    damping: float = 0.1
+
+
+def switching(count: int, hold: int, rng: np.random.Generator, *, levels: tuple[float, ...] = (-1.0, 1.0)) -> Array:
+    """A rudder (k,) that takes one of the levels at random for so many samples each."""
+    return np.repeat(rng.choice(levels, size=count // hold + 1), hold)[:count]
+
+
+def shaped(count: int, sea: Sea, step_s: float, rng: np.random.Generator) -> Array:
+    """The roll moment (k,)."""
+    if not sea.moment:
+        return np.zeros(count)
+    w = 2.0 * np.pi * sea.frequency_hz
+    above, below = scipy.signal.bilinear([1.0, 0.0], [1.0, 2.0 * sea.damping * w, w * w], fs=1.0 / step_s)
+    drawn = scipy.signal.lfilter(above, below, rng.standard_normal(count + 4000))[4000:]
+    return np.asarray(sea.moment * drawn / drawn.std())
+
+
+def pendulum_run(
+    load: Load, rudder: Array, sea: Sea, rng: np.random.Generator, *, step_s: float = 0.01, lag_s: float = 0.2
+) -> Run:
+    """The pendulum under a_y = rudder / (lag p + 1)."""
+    values, body = named(PENDULUM_TRUTH), PENDULUM
+    inertia, moment = axis_inertia(values["A_x"], body, load), first_moment(body, load)
+    right = stiffness(PENDULUM_TRUTH, body, load)
+    A = np.array([[0.0, 1.0, 0.0], [-right / inertia, -values["d"] / inertia, moment / inertia], [0, 0, -1.0 / lag_s]])
+    B = np.array([[0.0, 0.0], [0.0, 1.0 / inertia], [1.0 / lag_s, 0.0]])
+    sensed = body.z_s * A[1] + [9.81, 0.0, -1.0], body.z_s * B[1]
+    C, D = np.array([[0, 1.0, 0], sensed[0], [0, 0, 0]]), np.array([[0, 0], sensed[1], [0, 0]])
+    return _measured((A, B, C, D), rudder, sea, step_s, rng)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hull:
+    """Sway and yaw of the ship, per unit of v [m/s], r [rad/s], roll [rad] and rudder [rad]."""
+
+    speed: float = 0.8
+    sway_mass: float = 39.0
+    sway: tuple[float, float, float, float] = (-25.0, -14.0, 0.0, 5.0)
+    yaw_inertia: float = 1.5
+    yaw: tuple[float, float, float, float] = (-2.0, -2.0, 0.3, -2.0)
+    sway_by_roll_acceleration: float = 0.3
+
+
+def ship_system(theta: Array, body: Body, load: Load, hull: Hull = Hull()) -> tuple[Array, Array, Array, Array]:
+    """Matrices of the ship with states (roll, v, roll rate, r), inputs (rudder, roll moment), outputs as in `Run`."""
+    values = named(theta)
+    z_f, U = values["z_f"], hull.speed
+    moment = first_moment(body, load, z_f)
+    K_ur = values["K_vd"] + values["K_r"] / U
+    mass = np.diag([1.0, hull.sway_mass + load.mass_kg, axis_inertia(values["A_x"], body, load, z_f), hull.yaw_inertia])
+    mass[1, 2], mass[2, 1] = -moment - hull.sway_by_roll_acceleration, -moment - values["K_vd"]
+    (sv, sr, sphi, sd), (nv, nr, nphi, nd) = hull.sway, hull.yaw
+    F = np.array(
+        [[0, 0, 1.0, 0], [sphi, sv, 0, sr], [-stiffness(theta, body, load), 0, -values["d"], (K_ur + moment) * U],
+         [nphi, nv, 0, nr]]
+    )  # fmt: skip
+    A, B = (
+        np.linalg.solve(mass, F),
+        np.linalg.solve(mass, np.array([[0, 0], [sd, 0], [values["K_delta"], 1.0], [nd, 0]])),
+    )
+    z_s = body.sensor(z_f)
+    C = np.array([[0, 0, 1.0, 0], z_s * A[2] + [9.81, 0, 0, 0] - A[1] - [0, 0, 0, U], [0, 0, 0, 1.0]])
+    return A, B, C, np.array([[0, 0], z_s * B[2] - B[1], [0, 0]])
+
+
+def ship_run(
+    load: Load, rudder: Array, sea: Sea, rng: np.random.Generator, *, step_s: float = 0.02,
+    theta: Array = MODEL_SHIP_TRUTH, body: Body = MODEL_SHIP, hull: Hull = Hull(),
+) -> Run:  # fmt: skip
+    """A free run of the ship."""
+    return _measured(ship_system(theta, body, load, hull), rudder, sea, step_s, rng)
+
+
+def unknown_load(theta: Array = MODEL_SHIP_TRUTH) -> Load:
+    """What the estimate is to find."""
+    values = named(theta)
+    return Load(mass_kg=values["m"], z_m=values["z_m"])
+
+
+def quiet(sea: Sea) -> Sea:
+    """The same without sensor noise."""
+    return replace(sea, roll_rate=0.0, sensed=0.0, yaw_rate=0.0)
+
+
+def _measured(
+    system: tuple[Array, Array, Array, Array], orders: Array, sea: Sea, step_s: float, rng: np.random.Generator
+) -> Run:
+    moment = shaped(len(orders), sea, step_s, rng)
+    outputs = held_response(_steered(system), np.column_stack([orders, moment]), step_s)
+    noise = np.array([sea.roll_rate, sea.sensed, sea.yaw_rate, 0.0]) * rng.standard_normal((len(orders), 4))
+    return Run(step_s=step_s, signals=outputs + noise)
+
+
+def _steered(system: tuple[Array, Array, Array, Array], lag_s: float = SERVO_S) -> tuple[Array, Array, Array, Array]:
+    """With a rudder that follows its orders with a lag; its angle is the last output."""
+    A, B, C, D = system
+    n, turn, steady = len(A), 1.0 / lag_s, np.zeros((1, 2))
+    A = np.block([[A, B[:, :1]], [np.zeros((1, n)), -turn]])
+    C = np.block([[C, D[:, :1]], [np.zeros((1, n)), 1.0]])
+    B, D = (np.vstack([np.column_stack([0.0 * x[:, 0], x[:, 1]]), steady]) for x in (B, D))
+    B[-1, 0] = turn
+    return A, B, C, D
+
+
+def held_response(system: tuple[Array, Array, Array, Array], inputs: Array, step_s: float) -> Array:
+    """Outputs (k, n) at the samples, inputs (k, m) held between them."""
+    A, B, C, D, _ = scipy.signal.cont2discrete(system, step_s)
+    poles, modes = np.linalg.eig(A)
+    driven = np.linalg.solve(modes, B.astype(complex)) @ inputs.T
+    states = np.zeros_like(driven)
+    for place, pole in enumerate(poles):
+        states[place, 1:] = scipy.signal.lfilter([1.0], [1.0, -pole], driven[place])[:-1]
+    return np.asarray((C @ (modes @ states)).real.T + inputs @ D.T)
+
+
+CALIBRATION = Load(mass_kg=0.2, z_m=-0.256)
+CASES = (NOMINAL, CALIBRATION, None)

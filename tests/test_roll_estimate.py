@@ -1,0 +1,242 @@
+"""Roll parameters and an unknown load come from gyro, accelerometer and rudder at several loads."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from expdesign.errors import InputError, NotInformative
+from expdesign.roll import (
+    NOMINAL,
+    PARAMETERS,
+    Body,
+    Case,
+    Load,
+    RollEstimate,
+    RollProblem,
+    Run,
+    axis_inertia,
+    estimate_roll,
+    low_pass,
+    null_space,
+    parameters,
+    prepared,
+    relative_sensitivity,
+    roll_frequency,
+    stiffness,
+)
+from expdesign.values import Array
+from roll_truths import (
+    MODEL_SHIP,
+    MODEL_SHIP_TRUTH,
+    PENDULUM,
+    PENDULUM_TRUTH,
+    Sea,
+    pendulum_run,
+    ship_run,
+    switching,
+    unknown_load,
+)
+
+ROUGH = parameters(k=9, A_x=0.5, d=0.1, K_r=-0.4, K_vd=1, K_delta=-0.4, z_f=-0.018, m=0.1, z_m=-0.2)
+SIZES = np.array([10, 0.2, 0.3, 2, 1, 0.5, 0.03, 0.3, 0.3])
+LITTLE = Sea(roll_rate=0.002, sensed=0.005, yaw_rate=0.002, moment=0.01, frequency_hz=0.8, damping=0.3)
+THEIR_LOADS = [NOMINAL, Load(mass_kg=0.2, z_m=-0.256), None]
+WITHOUT_K = tuple(name for name in PARAMETERS if name != "k")
+
+
+def ship_cases(loads: Sequence[Load | None], sea: Sea, *, seed: int, samples: int = 4000) -> tuple[Case, ...]:
+    rng = np.random.default_rng(seed)
+    return tuple(
+        Case(
+            name=f"case {number}",
+            load=load,
+            runs=(
+                ship_run(
+                    load or unknown_load(), switching(samples, 150, rng, levels=(-0.6, 0.0, 0.6)), sea, rng, step_s=0.01
+                ),
+            ),
+        )
+        for number, load in enumerate(loads)
+    )
+
+
+def ship_problem(cases: tuple[Case, ...], *, free: tuple[str, ...] = WITHOUT_K, k: float = 9.0) -> RollProblem:
+    start = ROUGH.copy()
+    start[0] = k
+    return RollProblem(body=MODEL_SHIP, cases=cases, free=free, start=start, scale=SIZES)
+
+
+@cache
+def three_cases(seed: int = 1) -> tuple[Case, ...]:
+    return ship_cases(THEIR_LOADS, LITTLE, seed=seed)
+
+
+@cache
+def all_nine() -> RollEstimate:
+    return estimate_roll(ship_problem(three_cases(), free=PARAMETERS))
+
+
+def test_data_almost_without_noise_give_the_truth() -> None:
+    calm = Sea(roll_rate=1e-5, sensed=1e-5, yaw_rate=1e-5)
+    found = estimate_roll(ship_problem(ship_cases(THEIR_LOADS, calm, seed=3)))
+    assert found.theta == pytest.approx(MODEL_SHIP_TRUTH, rel=0.02)
+
+
+def test_an_unknown_load_is_found_where_k_is_known() -> None:
+    found = estimate_roll(ship_problem(three_cases()))
+    assert found.settled
+    for name, std in found.std.items():
+        assert abs(found.values[name] - MODEL_SHIP_TRUTH[PARAMETERS.index(name)]) < 4.0 * std, name
+    assert found.std["m"] < 0.25 * 0.4
+    assert 0.4 < found.surprise < 2.0
+
+
+def test_three_load_cases_leave_exactly_one_direction_open() -> None:
+    report = null_space(all_nine())
+    assert report.rank == 8
+    assert len(report.open) == 1
+    assert report.singular_values[-1] < 1e-12 < 1e-3 < report.singular_values[-2]
+    assert set(report.undetermined) == set(PARAMETERS) - {"m", "z_m"}
+    assert all_nine().held == ("k",)
+
+
+def test_the_open_direction_is_the_one_of_the_thesis_case() -> None:
+    """Changes for each N m/rad of k, worked out by hand from the family of equal transfer functions."""
+    theta = parameters(k=9.0067, A_x=0.1566, d=0.2668, K_r=-1.9911, K_vd=0.9408, K_delta=-0.4433, z_f=-0.0293, m=0.369,
+                       z_m=-0.2426)  # fmt: skip
+    found = null_space(replace(all_nine(), theta=theta, problem=replace(all_nine().problem, cases=three_cases())))
+    change = found.open[0].change
+    wanted = {"A_x": -0.0037, "d": 0.004, "K_r": -0.030, "K_vd": 0.1026, "K_delta": -0.007, "z_f": -0.0043}
+    for name, value in wanted.items():
+        assert change[name] / change["k"] == pytest.approx(value, abs=0.0006 if abs(value) > 1e-3 else 1e-4), name
+    assert "m" not in change  # it moves by less than 3e-4 kg
+
+
+def test_cures_of_the_open_direction_have_the_singular_values_worked_out_for_the_thesis() -> None:
+    theta = parameters(k=9.0067, A_x=0.1566, d=0.2668, K_r=-1.9911, K_vd=0.9408, K_delta=-0.4433, z_f=-0.0293, m=0.369,
+                       z_m=-0.2426)  # fmt: skip
+
+    def least(body: Body, *more: Load) -> float:
+        sensitivity = relative_sensitivity(theta, body, [*THEIR_LOADS, *more], PARAMETERS)
+        return float(np.linalg.svd(sensitivity, compute_uv=False)[-1])
+
+    fixed = replace(MODEL_SHIP, z_s=MODEL_SHIP.z_s - 0.0293, sensor_from_axis=True)
+    assert least(fixed) == pytest.approx(5.3e-3, rel=0.02)
+    assert least(MODEL_SHIP, Load(mass_kg=0.4, z_m=-0.268)) == pytest.approx(3.4e-4, rel=0.02)
+    assert least(MODEL_SHIP, Load(mass_kg=0.6, z_m=-0.280)) == pytest.approx(6.2e-4, rel=0.02)
+    assert least(MODEL_SHIP, Load(mass_kg=0.4, z_m=-0.05)) == pytest.approx(1.0e-2, rel=0.02)
+    assert least(MODEL_SHIP, Load(mass_kg=2.0, z_m=0.10)) == pytest.approx(3.2e-2, rel=0.02)
+    assert least(MODEL_SHIP, Load(mass_kg=0.4, z_m=-0.256)) < 1e-12
+
+
+def test_cures_name_knowledge_sensor_and_load_and_a_second_load_at_the_same_height_cures_nothing() -> None:
+    cures = {cure.what: cure.rank for cure in null_space(all_nine()).cures}
+    assert cures["know k"] == 9
+    assert cures["know z_m"] == 8
+    assert cures["measure how far the accelerometer is from the rotation axis"] == 9
+    assert [rank for what, rank in cures.items() if "at the same height" in what] == [8, 8]
+    assert [rank for what, rank in cures.items() if "near the centre of mass" in what] == [9, 9]
+
+
+def test_k_stays_where_the_search_began_and_the_mass_does_not_care() -> None:
+    found = [estimate_roll(ship_problem(three_cases(), free=PARAMETERS, k=k)).values for k in (8.0, 9.0, 10.0)]
+    assert [one["k"] for one in found] == [8.0, 9.0, 10.0]
+    masses = [one["m"] for one in found]
+    assert np.ptp(masses) < 0.01 * np.mean(masses)
+    assert np.ptp([one["z_m"] for one in found]) < 1e-3
+
+
+def test_a_second_known_load_at_another_height_determines_all_nine() -> None:
+    loads = [*THEIR_LOADS, Load(mass_kg=4.0, z_m=0.1)]
+    report = null_space(estimate_roll(ship_problem(ship_cases(loads, LITTLE, seed=5), free=PARAMETERS)))
+    assert report.rank == 9
+    assert not report.open
+
+
+def test_one_and_two_load_cases_have_rank_five_and_seven() -> None:
+    for loads, rank in ((THEIR_LOADS[:1], 5), ([NOMINAL, None], 7)):
+        found = relative_sensitivity(MODEL_SHIP_TRUTH, MODEL_SHIP, loads, PARAMETERS)
+        assert np.linalg.matrix_rank(found, tol=1e-9) == rank
+
+
+def test_five_parameters_come_from_one_load_case() -> None:
+    free = ("k", "A_x", "d", "K_r", "K_delta")
+    start = np.where(np.isin(PARAMETERS, free), ROUGH, MODEL_SHIP_TRUTH)
+    problem = RollProblem(body=MODEL_SHIP, cases=three_cases()[:1], free=free, start=start, scale=SIZES)
+    found = estimate_roll(problem)
+    assert not null_space(found).open
+    for name, std in found.std.items():
+        assert abs(found.values[name] - MODEL_SHIP_TRUTH[PARAMETERS.index(name)]) < 4.0 * std, name
+
+
+def pendulum_problem(free: tuple[str, ...], cases: tuple[Case, ...], theta: Array = PENDULUM_TRUTH) -> RollProblem:
+    start = np.where(np.isin(PARAMETERS, free), np.where(ROUGH == 0, theta, ROUGH), theta)
+    return RollProblem(body=PENDULUM, cases=cases, free=free, start=start, scale=SIZES)
+
+
+def pendulum_case(load: Load | None, sea: Sea, rng: np.random.Generator, samples: int = 6000) -> Case:
+    orders = switching(samples, 200, rng)
+    run = pendulum_run(load or Load(mass_kg=0.2, z_m=-0.274), orders, sea, rng)
+    return Case(name="pendulum", load=load, runs=(run,))
+
+
+def test_three_parameters_of_a_pendulum_come_from_one_data_set() -> None:
+    case = pendulum_case(NOMINAL, Sea(roll_rate=0.01, sensed=0.01), np.random.default_rng(2))
+    found = estimate_roll(pendulum_problem(("k", "A_x", "d"), (case,)))
+    for name, std in found.std.items():
+        assert abs(found.values[name] - PENDULUM_TRUTH[PARAMETERS.index(name)]) < 4.0 * std, name
+
+
+def test_least_squares_is_sure_of_wrong_values_under_a_roll_moment_and_instruments_are_not() -> None:
+    """Bias in standard errors that each method tells, of inertia and damping."""
+    rng, sea = np.random.default_rng(4), Sea(moment=0.1, frequency_hz=1.0, damping=0.1)
+    case = pendulum_case(NOMINAL, sea, rng, samples=12_000)
+    found = {method: estimate_roll(pendulum_problem(("A_x", "d"), (case,)), method=method) for method in ("ls", "iv")}
+    off = {
+        method: [
+            abs(one.values[name] - PENDULUM_TRUTH[PARAMETERS.index(name)]) / one.std[name] for name in ("A_x", "d")
+        ]
+        for method, one in found.items()
+    }
+    assert min(off["ls"]) > 5.0
+    assert max(off["iv"]) < 4.0
+    assert found["ls"].values["A_x"] > 1.1 * 0.1385
+
+
+def test_the_filter_passes_the_roll_mode_and_says_so() -> None:
+    cases, roll_hz = three_cases(), roll_frequency(MODEL_SHIP_TRUTH, MODEL_SHIP, NOMINAL)
+    assert low_pass(cases, roll_hz=roll_hz).every == 1
+    fast = tuple(
+        replace(case, runs=tuple(Run(step_s=0.002, signals=run.signals.repeat(5, axis=0)) for run in case.runs))
+        for case in cases
+    )
+    filter_ = low_pass(fast, roll_hz=roll_hz)
+    assert filter_.every > 1
+    assert filter_.passed > 0.99
+    assert filter_.bandwidth_hz > 3.0
+    assert filter_.samples_per_period >= 80.0
+    assert prepared(fast, filter_)[0].runs[0].step_s == pytest.approx(0.002 * filter_.every)
+
+
+def test_a_filter_that_takes_the_roll_mode_is_refused() -> None:
+    with pytest.raises(InputError, match=r"the low-pass filter of 0\.5 Hz leaves .* % of the roll at 0\.7 Hz"):
+        low_pass(three_cases(), roll_hz=0.7, cutoff_hz=0.5)
+
+
+def test_the_roll_frequency_is_that_of_the_ship() -> None:
+    for load in THEIR_LOADS:
+        inertia = axis_inertia(0.157, MODEL_SHIP, load or unknown_load(), -0.0294)
+        wanted = np.sqrt(stiffness(MODEL_SHIP_TRUTH, MODEL_SHIP, load) / inertia) / (2 * np.pi)
+        assert roll_frequency(MODEL_SHIP_TRUTH, MODEL_SHIP, load) == pytest.approx(wanted)
+
+
+def test_data_that_tell_nothing_are_refused() -> None:
+    rng = np.random.default_rng(1)
+    drifting = Case(
+        name="no rudder", load=NOMINAL, runs=(Run(step_s=0.01, signals=rng.standard_normal((1000, 4)) * [1, 1, 1, 0]),)
+    )
+    with pytest.raises(NotInformative, match="expected a rudder that moves the ship"):
+        estimate_roll(ship_problem((drifting,), free=("k", "A_x", "d")))
