@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import shapely
 
+from expdesign import workflows
 from expdesign.errors import FileError, InputError, NoPlan
 from expdesign.plan import PlanSettings
 from expdesign.plan.assembly import ship_on_legs
@@ -22,11 +23,13 @@ from expdesign.simulation import Environment, simulate, to_body
 from expdesign.vessel import NUMPY, Response, column_name
 from plan_case import acceleration, area, ship
 from scenario_files import spoil, write_scenario
+from short_examples import copied
 
 ROOM = 600.0
 TURNING = UnderWay(velocity=np.array([0.8, 0.1, 0.03]), inputs=np.array([4.0, 0.2, 4.0, -0.1]))
 ASTERN = UnderWay(velocity=np.array([-0.4, -0.2, -0.05]), inputs=np.array([-3.0, 0.0, 2.0, 3.0]))
 FAST = UnderWay(velocity=np.array([1.5, 0.0, 0.0]), inputs=np.array([15.0, 0.0, 15.0, 0.0]))
+ACCURACY = '[design.accuracy]\nas = "durations"\n'
 CURRENT = Environment(current_to=np.array([0.1, -0.2]))
 
 
@@ -147,3 +150,20 @@ def test_a_scenario_says_how_it_begins(tmp_path):
     spoil(path, f"{columns[0]} = 9e9", "n9_rps = 1.0")
     with pytest.raises(FileError, match=f"has 'n9_rps', expected columns among {columns[0]}"):
         load_scenario(path)
+
+
+@pytest.mark.parametrize(
+    ("motion", "key", "not_begun"),
+    [
+        ("u_mps = 9.0", "start.u_mps and start.v_mps are 9", "simulating the dictionary"),
+        ("r_radps = 3.0", "start.r_radps is 3", "simulating candidates"),
+    ],
+)
+def test_motion_that_the_ship_cannot_have_is_refused_before_the_work_that_does_not_need_it(
+    motion, key, not_begun, tmp_path
+):
+    path = copied(tmp_path, "story", {"[start]\n": f"[start]\n{motion}\n", "[plan]\n": f"{ACCURACY}[plan]\n"})
+    told = list[str]()
+    with pytest.raises(InputError, match=key):
+        workflows.run(path, None, cache=False, progress=lambda activity, _: told.append(activity))
+    assert not_begun not in told

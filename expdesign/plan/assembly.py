@@ -41,7 +41,9 @@ from expdesign.plan.tuning import PLAN
 from expdesign.plan.work_budget import WorkBudget
 from expdesign.progress import Progress, in_phases
 from expdesign.sea_area import SeaArea
+from expdesign.simulation import Environment
 from expdesign.values import Array
+from expdesign.vessel import Vessel
 from expdesign.vessel.hull import covering_discs
 
 Tried = Mapping[Pair, TriedTransition | None]
@@ -279,24 +281,31 @@ def check_start(problem: PlanProblem, ship: Capability) -> None:
     """Raise InputError where the ship is to begin faster than it can ever be, or turning so."""
     if problem.under_way is None:
         return
-    u, v, r = through_water(problem.environment, problem.begin).tolist()
-    most = PLAN.fastest_start * ship.top_speed_mps
+    check_start_speed(problem.vessel, problem.environment, ship, problem.begin)
     turn = PLAN.fastest_start * max(ship.spot_rate_radps, ship.yaw_rate_radps, _turn(problem))
-    if np.hypot(u, v) > most:
-        raise InputError(
-            f"start.u_mps and start.v_mps are {np.hypot(u, v):.3g} m/s through the water, expected at most {most:.3g}, "
-            f"{PLAN.fastest_start:g} times the top speed of vessel {problem.vessel.name!r}"
-        )
-    if abs(r) > turn:
+    if abs(r := float(problem.under_way.velocity[2])) > turn:
         raise InputError(
             f"start.r_radps is {r:.3g}, expected at most {turn:.3g} to either side, {PLAN.fastest_start:g} times what "
             f"vessel {problem.vessel.name!r} turns in its runs and on legs"
         )
 
 
+def check_start_speed(vessel: Vessel, environment: Environment, ship: Capability, begin: Array) -> None:
+    """Raise InputError where a state (6,) to begin with is faster through water than the ship can ever be."""
+    speed_mps, most_mps = (
+        float(np.hypot(*through_water(environment, begin)[:2])),
+        PLAN.fastest_start * ship.top_speed_mps,
+    )
+    if speed_mps > most_mps:
+        raise InputError(
+            f"start.u_mps and start.v_mps are {speed_mps:.3g} m/s through the water, expected at most {most_mps:.3g}, "
+            f"{PLAN.fastest_start:g} times the top speed of vessel {vessel.name!r}"
+        )
+
+
 def _turn(problem: PlanProblem) -> float:
-    """Largest yaw rate of runs [rad/s]."""
-    return max((float(np.abs(item.trajectory.velocity[:, 2]).max()) for item in problem.used), default=0.0)
+    """Largest yaw rate of the dictionary's runs [rad/s], whichever of them a design takes."""
+    return max((float(np.abs(item.trajectory.velocity[:, 2]).max()) for item in problem.primitives), default=0.0)
 
 
 def check_connected(problem: PlanProblem) -> None:

@@ -16,6 +16,7 @@ from expdesign.export.files import dictionary_files, finite
 from expdesign.growing import GrowSettings
 from expdesign.information import PrimitiveInformation
 from expdesign.memory import recalled
+from expdesign.plan.assembly import check_start, ship_on_legs
 from expdesign.plan.control import capability
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.values import Plan, PlanSettings
@@ -86,6 +87,7 @@ def planned_day(
     case, accuracy = replace(case, plan=with_leg_speed(case)), stated_accuracy(asked, design, case.vessel)
     searching, planning = in_phases(progress, *WORK)
     problem = plan_problem(case, information, design, seed=seed)
+    check_start(problem, ship_on_legs(problem))
     if asked.day_s is not None:
         check_way_fits(problem, asked.day_s)
     added = _added(case, problem, accuracy, seed, searching)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from expdesign.durations import DurationDesign
-from expdesign.errors import InputError
+from expdesign.errors import InputError, NoPlan
 from expdesign.export import (
     commands_csv,
     plan_json,
@@ -13,6 +15,8 @@ from expdesign.export import (
 )
 from expdesign.information import PrimitiveInformation
 from expdesign.memory import recalled
+from expdesign.plan.assembly import check_start_speed
+from expdesign.plan.control import capability
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import plan_trial
 from expdesign.plan.tuning import PLAN
@@ -64,7 +68,7 @@ def plan_problem(
 
 
 def check_plannable(case: Scenario) -> None:
-    """Raise InputError for a vessel that plans cannot be made for."""
+    """Raise InputError for a vessel that plans cannot be made for, or that is to begin faster than it can ever be."""
     if case.vessel.model.roll is not None:
         raise InputError(
             f"vessel {case.vessel.name!r} has a roll mode, [model.roll], which plans do not follow; expected a vessel "
@@ -72,6 +76,13 @@ def check_plannable(case: Scenario) -> None:
         )
     if case.vessel.model.inertia is not None:
         raise InputError(NOT_SUPPORTED.format(what="a plan"))
+    if case.under_way is None:
+        return
+    try:
+        ship = capability(case.vessel, case.plan, current_mps=float(np.hypot(*case.environment.current_to)))
+    except NoPlan:  # the planner says why, and what would help
+        return
+    check_start_speed(case.vessel, case.environment, ship, np.r_[case.start, case.under_way.velocity])
 
 
 def plan_files(case: Scenario, plan: Plan) -> dict[str, str | bytes]:
