@@ -25,6 +25,7 @@ SETTINGS = {
     "dieudonne_spiral": {"speed_mps": 4.0},
     "throttle_steps": {"speed_mps": 4.0, "rise": 1.1},
     "rudder_steps": {"speed_mps": 4.0},
+    "helm_and_engine_waves": {"speed_mps": 4.0, "helm_rad": 0.1, "helm_period_s": 30.0, "engine_period_s": 50.0},
     "steps": {"speed_mps": 4.0, "helm_rad": 0.3, "hold_s": 10.0, "engine_swing": 0.3},
 }
 

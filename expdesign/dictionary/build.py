@@ -122,9 +122,8 @@ def excitation(vessel: Vessel, spec: PrimitiveSpec) -> Excitation:
         InputError, SpeedOutOfReach, Unreachable: as in `build_primitive`.
     """
     kind = family(spec.family)
-    count = round(spec.settings["duration_s"] / vessel.sample_time_s)
-    if count < 2:
-        length_s = spec.settings["duration_s"]
+    length_s = spec.settings["duration_s"]
+    if (length_s or kind.orders is None) and round(length_s / vessel.sample_time_s) < 2:
         raise InputError(f"duration_s is {length_s:g}, expected at least two samples of {vessel.sample_time_s:g} s")
     if kind.orders is not None:
         desired = desired_commands(vessel, spec)

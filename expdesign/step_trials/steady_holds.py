@@ -93,6 +93,8 @@ def steady_from(
 
 
 def _steady_in(batch: Sailed, holds: Sequence[Hold], tests: tuple[RatioTest, RatioTest]) -> list[int | None]:
+    if not holds:
+        return []
     found: list[int | None] = []
     states = tuple(begun(test, float(value)) for test, value in zip(tests, batch.state[holds[0].settled], strict=True))
     for hold in holds:

@@ -16,12 +16,11 @@ from expdesign.dictionary.families.orders import (
     DIEUDONNE_SPIRAL,
     PULL_OUT,
     RECORDED,
-    RUDDER_STEPS,
     STEPS,
-    THROTTLE_STEPS,
     TURNING_CIRCLE_HELM,
     ZIGZAG_HEADING,
 )
+from expdesign.dictionary.families.step_trials import HELM_AND_ENGINE_WAVES, RUDDER_STEPS, THROTTLE_STEPS
 
 FAMILIES = (
     ACCELERATION,
@@ -41,5 +40,6 @@ FAMILIES = (
     STEPS,
     THROTTLE_STEPS,
     RUDDER_STEPS,
+    HELM_AND_ENGINE_WAVES,
     RECORDED,
 )

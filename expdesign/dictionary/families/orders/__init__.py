@@ -4,9 +4,7 @@ from expdesign.dictionary.families.orders.crash_stop import CRASH_STOP
 from expdesign.dictionary.families.orders.dieudonne_spiral import DIEUDONNE_SPIRAL
 from expdesign.dictionary.families.orders.pull_out import PULL_OUT
 from expdesign.dictionary.families.orders.recorded import RECORDED
-from expdesign.dictionary.families.orders.rudder_steps import RUDDER_STEPS
 from expdesign.dictionary.families.orders.steps import STEPS
-from expdesign.dictionary.families.orders.throttle_steps import THROTTLE_STEPS
 from expdesign.dictionary.families.orders.turning_circle_helm import TURNING_CIRCLE_HELM
 from expdesign.dictionary.families.orders.zigzag_heading import ZIGZAG_HEADING
 
@@ -15,9 +13,7 @@ __all__ = [
     "DIEUDONNE_SPIRAL",
     "PULL_OUT",
     "RECORDED",
-    "RUDDER_STEPS",
     "STEPS",
-    "THROTTLE_STEPS",
     "TURNING_CIRCLE_HELM",
     "ZIGZAG_HEADING",
 ]

@@ -9,32 +9,37 @@ experiments, in Sensing and Control for Autonomous Vehicles (2017).
 
 from __future__ import annotations
 
-import numpy as np
-
-from expdesign.dictionary.families.orders.orders import APPROACH, DURATION, helm_setting, ordered, run_times
-from expdesign.dictionary.families.orders.staircase import STEPS_SETTING, staircase
+from expdesign.dictionary.families.orders.orders import APPROACH, helm_setting
+from expdesign.dictionary.families.step_trials.staircase import (
+    STAIR_DURATION,
+    STAIRCASE_SETTINGS,
+    Level,
+    eased,
+    rises,
+    staircase,
+)
 from expdesign.dictionary.spec import Excitation, Family, PrimitiveSpec, Setting
 from expdesign.simulation.helm import steady_ahead
 from expdesign.vessel import Vessel
 
 
 def _orders(vessel: Vessel, request: PrimitiveSpec) -> Excitation:
-    settings, time_s = request.settings, run_times(vessel, request)
-    approach = steady_ahead(vessel, settings["speed_mps"])
-    speeds = settings["speed_mps"] * np.linspace(1.0, settings["rise"], round(settings["steps"]) + 1)
-    drives = np.array([steady_ahead(vessel, speed).drive for speed in speeds.tolist()])
-    return ordered(approach, staircase(drives, time_s, settings["duration_s"]), settings["helm_rad"] + 0.0 * time_s)
+    settings = request.settings
+    speeds = settings["speed_mps"] * (1.0 + (settings["rise"] - 1.0) * rises(request))
+    approaches = [steady_ahead(vessel, speed) for speed in speeds.tolist()]
+    levels = [Level(approach=one, helm_rad=eased(request, one.drive, settings["helm_rad"])) for one in approaches]
+    return staircase(request, steady_ahead(vessel, settings["speed_mps"]), levels)
 
 
 THROTTLE_STEPS = Family(
     name="throttle_steps",
-    summary="engine order in steps up to the highest speed and down again, each held for the same time; helm held",
+    summary="engine order in steps up to the highest speed and down again, each held until steady; helm held",
     settings=(
-        DURATION,
+        STAIR_DURATION,
         APPROACH,
         helm_setting("helm held throughout, positive to starboard", default=0.0),
         Setting(name="rise", meaning="highest steady speed over the approach speed", default=1.5, low=1.01, high=50),
-        STEPS_SETTING,
+        *STAIRCASE_SETTINGS,
     ),
     orders=_orders,
 )
