@@ -82,8 +82,7 @@ def _monomials(forces: Array) -> Array:
 
 def _quadratic(rows: Array, G: Array) -> Array:
     """(b, 16) rows (4, b, k) by G by rows."""
-    products = [[np.einsum("bk,bk->b", one @ G, other) for other in rows] for one in rows]
-    return np.asarray(np.array(products).reshape(16, -1).T)
+    return np.asarray(np.einsum("ibk,jbk->bij", rows @ G, rows).reshape(-1, 16))
 
 
 @dataclass(frozen=True, eq=False)
