@@ -25,6 +25,8 @@ from expdesign.foresight import (
     with_effect,
 )
 from expdesign.foresight.effects import disturbance_at
+from expdesign.foresight.information import SimulatedUnits
+from expdesign.foresight.power import share_shown
 from expdesign.scenario import load_scenario
 from expdesign.vessel import Vessel
 
@@ -131,6 +133,36 @@ def test_a_lag_and_a_dead_time_are_not_told_apart_but_a_current_and_a_gyro_are(f
     for item in foreseen.values():
         if item.sized:
             assert item.named <= item.power + 4 * np.sqrt(item.power * (1 - item.power) / 2000) + 1e-9
+
+
+def test_held_out_runs_show_most_of_what_is_certain_and_never_more_than_the_test_accepts(foreseen):
+    sized = [item for item in foreseen.values() if item.sized]
+    assert all(0.0 <= item.found <= item.power for item in sized)
+    assert foreseen["north/east_mps"].found == foreseen["north/east_mps"].power  # far more than any noise
+    assert foreseen["heading_bias_rad"].found == foreseen["heading_bias_rad"].power
+    assert foreseen["inertia_factor_r"].found < 0.9 * foreseen["inertia_factor_r"].power
+
+
+def simulated(effect: float, count: int = 6, *, noise: float = 1.0) -> SimulatedUnits:
+    """Units of 100 white samples of each output, and one effect that acts evenly on all of them."""
+    one, samples = np.ones((count, 1, 1)), 100.0
+    return SimulatedUnits(
+        information=3.0 * samples * effect**2 * one, samples=np.full(count, 3.0 * samples),
+        products=samples * effect**2 * np.ones((count, 3, 1, 1)), with_error=np.zeros((count, 3, 1)),
+        squared_error=samples * noise**2 * np.ones((count, 3)), squared_deviation=1e4 * np.ones((count, 3)),
+        precision=np.zeros((0, 0)),
+    )  # fmt: skip
+
+
+def test_held_out_runs_show_an_effect_as_large_as_the_noise_and_not_one_lost_in_it():
+    """An effect of the noise's own size halves squared errors; one of a hundredth of it takes nothing off them."""
+
+    def share(units: SimulatedUnits) -> float:
+        return share_shown(units, np.array([0]), np.ones(1), 0.0, np.random.default_rng(0))
+
+    assert share(simulated(1.0)) == 1.0
+    assert share(simulated(0.1, noise=1.0)) < 0.3
+    assert share(simulated(0.1, noise=0.1)) == 1.0  # simulations as accurate as the effect is large
 
 
 def shares_found(case, known, found, wanted: float, trials: int) -> tuple[float, float]:

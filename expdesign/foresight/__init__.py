@@ -15,8 +15,8 @@ nothing of an effect, a default counts (`sizes.default_sizes`).
 
 Effects act as a whole along the nominal path, and the motion answers linearly. The true ship is the nominal one with
 parameters as wrong as their standard deviations say. Sizes with the wanted power are in proportion. A diagnosis also
-asks that a cause improves the simulation of held-out runs, which is not foreseen: with few runs it finds weak causes
-less often than its test accepts them.
+asks that a cause improves the simulation or the prediction of held-out runs. How often it does where the test accepts
+it is drawn: effects are estimated without each fold of the runs, by the information of the others.
 
 Sources: A. Wald (1943) for the noncentral distribution; C. R. Rao (1948) for score tests.
 """

@@ -21,7 +21,13 @@ from expdesign.dictionary import Primitive
 from expdesign.foresight.added import Offers, information_of_runs, of_one_manoeuvre, together
 from expdesign.foresight.background import UNSEEN, Background, background
 from expdesign.foresight.effects import Direction, HiddenEffect, described, disturbance_at, hidden_effects, joined
-from expdesign.foresight.information import allowed_by_prior, batch_information, beside_nuisance
+from expdesign.foresight.information import (
+    SimulatedUnits,
+    allowed_by_prior,
+    batch_information,
+    beside_nuisance,
+    simulated_units,
+)
 from expdesign.foresight.power import (
     Rivals,
     freedom_of,
@@ -32,6 +38,7 @@ from expdesign.foresight.power import (
     power,
     price_of,
     rivals_of,
+    share_shown,
 )
 from expdesign.foresight.sizes import Size, default_sizes, sizes_that_matter, standard_trials
 from expdesign.foresight.trial import TrialRun
@@ -195,8 +202,10 @@ def _foreseen(
     rng: np.random.Generator,
 ) -> tuple[Foreseen, ...]:
     rivals = rivals_of(known.tests, joint.rows, joint.beside, rng)
+    own_rows = [disturbance_at(known.base.linear, *pair) for pair in zip(joint.directions, joint.sizes, strict=True)]
+    units = simulated_units(known.base, known.windows, own_rows)
     return tuple(
-        _one(effect, own, index, joint.beside, rivals, known)
+        _one(effect, own, index, joint.beside, rivals, known, units)
         for effect, own, index in zip(hidden, sizes, joint.blocks, strict=True)
     )
 
@@ -271,6 +280,7 @@ def _one(
     A: Array,
     rivals: Rivals,
     known: Background,
+    units: SimulatedUnits,
 ) -> Foreseen:
     mixture = worst_mixture(A[np.ix_(index, index)])
     noncentrality = float(mixture @ A[np.ix_(index, index)] @ mixture)
@@ -280,6 +290,8 @@ def _one(
     place = int(np.argmax(np.abs(mixture)))
     name, factor, unit = described(effect.directions[place], known.base.ship)
     found = power(noncentrality, freedom, level) if known_size else np.array(math.nan)
+    limit = float(chi2.isf(level, freedom))
+    shown = share_shown(units, index, mixture, limit, np.random.default_rng(0)) if known_size else math.nan
     change = factor * (sizes[place].value if len(sizes) == 1 else _length(sizes, mixture))
     least = math.sqrt(needed_noncentrality(TUNING.wanted_power, freedom, level) / max(noncentrality, 1e-300))
     shift, drawn = mixture @ A[index], rivals.noise[:, index] @ mixture
@@ -295,6 +307,7 @@ def _one(
         freedom=freedom,
         level=level,
         power=float(found),
+        found=float(found) * shown,
         named=named if known_size else math.nan,
         least_change=change * least if known_size and noncentrality > 0 else math.inf,
         confusions=confusions if known_size else (),

@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from expdesign.diagnosis.data import Noise
-from expdesign.diagnosis.fit import build_sensitivities, effect_disturbances, gram_matrices, marginalised
-from expdesign.diagnosis.motion import Disturbance, LinearisedMotion
+from expdesign.diagnosis.accuracy import squared_sums
+from expdesign.diagnosis.data import Noise, Windows
+from expdesign.diagnosis.fit import (
+    Fit,
+    build_sensitivities,
+    effect_disturbances,
+    gram_matrices,
+    marginalised,
+    validation_units,
+)
+from expdesign.diagnosis.motion import Disturbance, LinearisedMotion, simulate_from_measured
 from expdesign.values import Array
 
 
@@ -26,13 +34,19 @@ def batch_information(
         disturbances: m effects as they are.
         noise: of the remainder.
     """
+    return unit_information(linear, keys, disturbances, noise, linear.motion.windows.batch)
+
+
+def unit_information(
+    linear: LinearisedMotion, keys: Sequence[str], disturbances: Sequence[Disturbance], noise: Noise, unit: Array
+) -> Array:
+    """The same of every unit of the data, given the unit (w,) that each window belongs to."""
     own = effect_disturbances(linear, keys)
     found = build_sensitivities(linear, [*own, *disturbances], random_current=noise.current_std_mps > 0)
     grams = gram_matrices(found, noise)
-    batch = linear.motion.windows.batch
     rows = []
-    for name in np.unique(batch):
-        kept = batch == name
+    for name in np.unique(unit):
+        kept = unit == name
         part = replace(
             grams,
             XX=grams.XX[kept],
@@ -43,6 +57,49 @@ def batch_information(
         )
         rows.append(marginalised(part, found, noise).A)
     return np.stack(rows)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SimulatedUnits:
+    """How simulated errors of u, v, r over k units of the data change with c nuisance effects and m others.
+
+    Attributes:
+        information: (k, c + m, c + m) of each unit, whitened.
+        samples: (k,) measured numbers.
+        products: (k, 3, c + m, c + m) inner products of the sensitivities; with_error: (k, 3, c + m) with the error
+            where nothing is hidden; squared_error, squared_deviation: (k, 3).
+        precision: (c, c) prior precision of the nuisance.
+    """
+
+    information: Array
+    samples: Array
+    products: Array
+    with_error: Array
+    squared_error: Array
+    squared_deviation: Array
+    precision: Array
+
+
+def simulated_units(base: Fit, windows: Windows, disturbances: Sequence[Disturbance]) -> SimulatedUnits:
+    """Of a trial with nothing hidden, with the units by which a diagnosis cross-validates."""
+    unit = validation_units(windows)
+    own = effect_disturbances(base.linear, base.keys)
+    values = build_sensitivities(base.linear, [*own, *disturbances], random_current=False).values[..., :3]
+    measured = windows.measured[..., :3]
+    error = simulate_from_measured(base.ship, windows).error[..., :3]
+    seen = np.isfinite(error)
+    values, error = np.where(seen, values, 0.0), np.where(seen, error, 0.0)
+    member = (unit == np.unique(unit)[:, None]).astype(float)
+    lost, deviation = squared_sums(error, measured)
+    return SimulatedUnits(
+        information=unit_information(base.linear, base.keys, disturbances, base.noise, unit),
+        samples=member @ np.isfinite(windows.measured).sum(axis=(1, 2)),
+        products=np.stack([np.einsum("cwso,dwso->ocd", *[values[:, row > 0]] * 2, optimize=True) for row in member]),
+        with_error=np.einsum("kw,cwso,wso->koc", member, values, error, optimize=True),
+        squared_error=member @ lost,
+        squared_deviation=member @ deviation,
+        precision=base.precision,
+    )
 
 
 def allowed_by_prior(whole: Array, precision: Array, least: float) -> bool:

@@ -16,7 +16,9 @@ import scipy
 from numpy.typing import NDArray
 
 from expdesign.diagnosis.causes import Candidate
-from expdesign.diagnosis.select import SELECTION_TUNING, ScoreTest
+from expdesign.diagnosis.fit import FOLDS, HeldOut, held_out_gain
+from expdesign.diagnosis.select import SELECTION_TUNING, ScoreTest, simulates_better
+from expdesign.foresight.information import SimulatedUnits, beside_nuisance
 from expdesign.foresight.tuning import TUNING
 from expdesign.values import Array
 
@@ -137,6 +139,79 @@ def gains(rivals: Rivals, shift: Array) -> Array:
     """
     squares = (rivals.white + shift @ rivals.whitening) ** 2
     return np.asarray(np.add.reduceat(squares, rivals.parts, axis=1))
+
+
+def share_shown(
+    units: SimulatedUnits, rows: NDArray[np.int64], mixture: Array, limit: float, rng: np.random.Generator
+) -> float:
+    """Share of trials with an accepted test in which held-out units show the effect too, as a diagnosis asks for.
+
+    Nuisance and scores are drawn. Effects are estimated without each fold of the units, and the errors of simulating
+    these follow from the sensitivities. Where the test accepts nothing, trials with the largest statistics count.
+
+    Args:
+        units: of the trial.
+        rows: of the effect's d numbers among the m.
+        mixture: (d,) of them that is hidden.
+        limit: of the statistic, from which on the test accepts.
+        rng: of the draws.
+    """
+    c = len(units.precision)
+    kept = np.concatenate([np.arange(c), c + rows])
+    A = units.information[:, kept[:, None], kept]
+    count, prior, every = len(A), np.zeros((len(kept), len(kept))), A.sum(axis=0)
+    prior[:c, :c] = units.precision
+    root, whole = _root(A), beside_nuisance(every, units.precision)
+    spread = np.linalg.pinv(_root(units.precision).T)
+    drawn: list[tuple[float, tuple[Array, Array, Array]]] = []
+    for _ in range(TUNING.held_out_draws):
+        truth = np.concatenate([spread @ rng.standard_normal(c), mixture])
+        noise = np.einsum("kij,kj->ki", root, rng.standard_normal((count, len(kept))))
+        score = A @ truth + noise
+        total = score.sum(axis=0)
+        left = total[c:] - every[c:, :c] @ np.linalg.lstsq((every + prior)[:c, :c], total[:c], rcond=None)[0]
+        statistic = float(left @ np.linalg.lstsq(whole, left, rcond=None)[0])
+        drawn.append((statistic, (truth, noise, score)))
+    drawn.sort(key=lambda item: -item[0])
+    accepted = [item for item in drawn if item[0] > limit] or drawn[: max(1, len(drawn) // 4)]
+    return float(np.mean([_is_shown(units, kept, trial, prior, A) for _, trial in accepted]))
+
+
+def _is_shown(
+    units: SimulatedUnits, kept: NDArray[np.int64], trial: tuple[Array, Array, Array], prior: Array, A: Array
+) -> bool:
+    """Whether held-out units show the effect in a drawn trial: its truth, scores' noise and scores."""
+    truth, noise, score = trial
+    c, count = len(units.precision), len(A)
+    left: dict[bool, tuple[Array, Array]] = {}
+    for fitted in (False, True):
+        free = slice(len(kept) if fitted else c)
+        off = np.tile(truth, (count, 1))
+        for fold in range(min(FOLDS, count)):
+            test = np.arange(count) % FOLDS == fold
+            own = A[~test].sum(axis=0) + prior
+            off[test, free] -= np.linalg.lstsq(own[free, free], score[~test].sum(axis=0)[free], rcond=None)[0]
+        squared = (
+            units.squared_error
+            + 2.0 * np.einsum("koc,kc->ko", units.with_error[..., kept], off)
+            + np.einsum("kc,kocd,kd->ko", off, units.products[:, :, kept[:, None], kept], off)
+        )
+        whitened = units.samples + 2.0 * (noise * off).sum(axis=1) + np.einsum("kc,kcd,kd->k", off, A, off)
+        left[fitted] = np.maximum(squared, 0.0), whitened
+    before, after = (
+        HeldOut(squared_error=left[fitted][0], squared_deviation=units.squared_deviation) for fitted in (False, True)
+    )
+    gained = held_out_gain(before, after, 0)
+    if simulates_better(before, after, gained):
+        return True
+    predicted = 1.0 - left[True][1].sum() / left[False][1].sum()
+    return gained[1][1] >= 0.0 and predicted >= SELECTION_TUNING.least_predicted
+
+
+def _root(A: Array) -> Array:
+    """(..., n, n) whose product with its transpose is A."""
+    values, vectors = np.linalg.eigh(A)
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0))[..., None, :])
 
 
 def imitation(rivals: Rivals, shift: Array, own: float) -> Array:

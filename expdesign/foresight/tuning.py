@@ -19,6 +19,7 @@ class Tuning:
         wanted_power: of a cause that counts as revealed.
         told_apart: probability below which two causes count as not told apart.
         draws: of score vectors, for the probability that one cause comes before another.
+        held_out_draws: of trials, for the share in which held-out runs show what the test accepts.
         most_added_s: longest time of added runs [s].
         most_added_runs: of one manoeuvre.
         headings: of every manoeuvre that may be added.
@@ -33,6 +34,7 @@ class Tuning:
     wanted_power: float = 0.9
     told_apart: float = 0.5
     draws: int = 2000
+    held_out_draws: int = 60
     most_added_s: float = 14400.0
     most_added_runs: int = 200
     headings: int = 2

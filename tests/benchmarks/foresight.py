@@ -62,8 +62,11 @@ def main() -> None:
     known = background(vessel, runs, case.environment)
     stated = known.base.ship.without_effects({*known.base.keys})
     first = {item.name: item for item in foresee(vessel, runs, case.environment).effects if item.cause != "thrust_gain"}
-    print("| effect | size | power | accepted by its test | found | foreseen to be first | named first |")
-    print("|---|---|---|---|---|---|---|")
+    print(
+        "| effect | size | power | accepted by its test | foreseen to be found | found | foreseen to be first "
+        "| named first |"
+    )
+    print("|---|---|---|---|---|---|---|---|")
     for name in asked.effects:
         for wanted in asked.powers:
             item = first[name]
@@ -84,7 +87,7 @@ def main() -> None:
             found_share, named = ("-", "-") if asked.test_only else (f"{share:.2f}" for share in whole)
             print(
                 f"| {item.cause}: {name} | {size:.3g} {item.unit} | {at.power:.2f} | {accepted:.2f} | "
-                f"{found_share} | {at.named:.2f} | {named} |",
+                f"{at.found:.2f} | {found_share} | {at.named:.2f} | {named} |",
                 flush=True,
             )
 

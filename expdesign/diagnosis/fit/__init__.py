@@ -40,10 +40,12 @@ from expdesign.diagnosis.fit.tuning import TUNING
 from expdesign.diagnosis.fit.unmeasured_force import unmeasured_force_share
 
 AHEAD_S = TUNING.ahead_s
+FOLDS = TUNING.folds
 """Length of the stretches that held-out data are also simulated in [s]."""
 
 __all__ = [
     "AHEAD_S",
+    "FOLDS",
     "CrossValidation",
     "Fit",
     "FitOptions",

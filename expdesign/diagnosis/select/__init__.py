@@ -1,6 +1,6 @@
 """Which causes explain the data: score tests, forward selection, backward elimination, profile likelihood."""
 
-from expdesign.diagnosis.select.backward_elimination import eliminate_backward, only_nuisance
+from expdesign.diagnosis.select.backward_elimination import eliminate_backward, only_nuisance, simulates_better
 from expdesign.diagnosis.select.candidate_disturbances import candidate_disturbances
 from expdesign.diagnosis.select.fitted_candidate import FittedCandidate
 from expdesign.diagnosis.select.forward_selection import fit_nuisance, select_forward
@@ -25,5 +25,6 @@ __all__ = [
     "redundant_step",
     "score_tests",
     "select_forward",
+    "simulates_better",
     "without_step",
 ]

@@ -105,13 +105,12 @@ def improves_held_out(
     gains = [held_out_gain(one, other, seed) for one, other in pairwise(held)]
     simulated = [
         step.chosen.candidate.is_possible(found.last.value)
-        and _matters(*held[index : index + 2])
-        and (not step.chosen.candidate.imitates or _least_change(*held[index : index + 2]) >= -gain)
-        and _improves(
-            not found.beside_stated and (index == 0 or only_nuisance(step, found)),
-            _least_change(*held[index : index + 2]) >= 0.0,
-            gain,
-            interval,
+        and simulates_better(
+            held[index],
+            held[index + 1],
+            (gain, interval),
+            certain=not found.beside_stated and (index == 0 or only_nuisance(step, found)),
+            imitates=step.chosen.candidate.imitates,
         )
         and ((index == 0 and not found.beside_stated) or not held[0].in_stretches or interval[0] > 0.0)
         for index, (step, (gain, interval)) in enumerate(zip(found.steps, gains, strict=True))
@@ -122,6 +121,27 @@ def improves_held_out(
     if high >= 0.0 and not simulated[0]:
         simulated[0] = predicts_better(held[0], held[1], windows, found.steps[0].chosen.fit.noise)
     return simulated
+
+
+def simulates_better(
+    before: HeldOut,
+    after: HeldOut,
+    gained: tuple[float, tuple[float, float]],
+    *,
+    certain: bool = True,
+    imitates: bool = False,
+) -> bool:
+    """Whether a cause improves simulations of held-out data by enough: by `improves_held_out`'s rules for one cause.
+
+    Args:
+        before: errors without it; after: with it.
+        gained: mean gain of fit [points] and its interval.
+        certain: a more sensitive test has found it, as of a first cause.
+        imitates: it may imitate many others.
+    """
+    (gain, interval), least = gained, _least_change(before, after)
+    possible = _matters(before, after) and (not imitates or least >= -gain)
+    return possible and _improves(certain, least >= 0.0, gain, interval)
 
 
 def predicts_better(before: HeldOut, after: HeldOut, windows: Windows, noise: Noise) -> bool:

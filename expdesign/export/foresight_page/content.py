@@ -18,6 +18,7 @@ HEADER = (
     "least visible as",
     "a size that matters",
     "power",
+    "found",
     "named",
     "90 % from",
     "90 % with",
@@ -60,6 +61,7 @@ def effect_row(item: Foreseen) -> tuple[str, ...]:
         item.name,
         size_text(item.name, item.change, item.unit),
         words.percent(item.power) if item.sized else NONE,
+        words.percent(item.found) if item.sized else NONE,
         words.percent(item.named) if item.sized else NONE,
         size_text(item.name, item.least_change, item.unit),
         remedy(item),
@@ -89,15 +91,15 @@ def conclusions(found: Foresight) -> tuple[str, ...]:
 
 def _sentences(found: Foresight) -> Iterator[str]:
     least = [item for item in found.weakest if item.sized]
-    seen = [item for item in least if not item.needs_runs]
+    seen = [item for item in least if item.found >= found.wanted_power]
     yield (
         f"A diagnosis of this trial would find {len(seen)} of {len(least)} causes with a probability of at least "
         f"{100 * found.wanted_power:g} %, wherever they act and at the smallest size that matters."
     )
-    missed = sorted((item for item in least if item.needs_runs), key=lambda item: item.power)
+    missed = sorted((item for item in least if item.found < found.wanted_power), key=lambda item: item.found)
     if missed:
         listed = ", ".join(
-            f"{item.cause} as {item.name} ({words.percent(item.power)})" for item in missed[:MOST_LISTED]
+            f"{item.cause} as {item.name} ({words.percent(item.found)})" for item in missed[:MOST_LISTED]
         )
         rest = f" and {len(missed) - MOST_LISTED} more" if len(missed) > MOST_LISTED else ""
         yield f"It would probably miss {listed}{rest}."
@@ -111,7 +113,8 @@ def _sentences(found: Foresight) -> Iterator[str]:
     if pairs:
         yield "It would find, but not tell apart: " + ", ".join(f"{one} from {other}" for one, other in pairs) + "."
     if found.together is not None:
-        yield f"With {runs_text(found.together)} more it would also find what runs of this dictionary can show."
+        more = runs_text(found.together)
+        yield f"With {more} more, its tests would also accept what runs of this dictionary can show."
     if found.unseen:
         yield "Not seen at all: " + ", ".join(f"{cause} ({why})" for cause, why in found.unseen) + "."
 
@@ -168,6 +171,7 @@ def effect_entry(item: Foreseen) -> dict[str, object]:
         "freedom": item.freedom,
         "level": item.level,
         "power": finite(item.power),
+        "found": finite(item.found),
         "named": finite(item.named),
         "size_for_wanted_power": finite(item.least_change),
         "mistaken_for": [

@@ -42,8 +42,17 @@ def foresight_html(content: ForesightContent) -> str:
 
 
 def _every(item: Foreseen) -> tuple[str, ...]:
-    cause, name, size, power, _, least, *_ = effect_row(item)
-    return cause, name, size, power, item.rule, words.significant(item.noncentrality) if item.sized else NONE, least
+    cause, name, size, power, found, _, least, *_ = effect_row(item)
+    return (
+        cause,
+        name,
+        size,
+        power,
+        found,
+        item.rule,
+        words.significant(item.noncentrality) if item.sized else NONE,
+        least,
+    )
 
 
 def _pairs(found: Foresight) -> list[tuple[str, ...]]:
