@@ -13,7 +13,7 @@ from expdesign.dictionary.families.step_trials.hold_times import SETTLED, hold_t
 from expdesign.dictionary.families.step_trials.staircase import steady_turn
 from expdesign.errors import InputError
 from expdesign.scenario import load_vessel
-from expdesign.simulation import steady_ahead
+from expdesign.simulation import Environment, simulate, steady_ahead
 from expdesign.vessel import Vessel
 from step_case import GUESS
 
@@ -27,7 +27,7 @@ def certain() -> Vessel:
 
 
 def rudder(**settings: float) -> PrimitiveSpec:
-    return spec("rudder_steps", speed_mps=5.0, steps=2.0, **{"helm_rad": 0.4, **settings})
+    return spec("rudder_steps", **{"speed_mps": 5.0, "steps": 2.0, "helm_rad": 0.4, **settings})
 
 
 def levels(run: Primitive, name: str) -> list[float]:
@@ -141,3 +141,22 @@ def test_waves_swing_about_the_approach() -> None:
         build_primitive(
             ship, spec("helm_and_engine_waves", duration_s=100.0, speed_mps=5.0, **{**waves, "engine_swing": 0.5})
         )
+
+
+def test_the_circle_that_a_level_ends_with_averages_a_current_out_and_a_part_of_one_does_not() -> None:
+    ship, current_mps = certain(), 0.4
+    run = build_primitive(ship, rudder(least_helm_rad=0.2, speed_mps=3.0))
+    sea = Environment(current_to=np.array([current_mps, 0.0]))
+    over_ground = np.hypot(
+        *simulate(ship, run.commands, velocity=run.entry_velocity, environment=sea).velocity[:, :2].T
+    )
+    through_water = np.hypot(*run.trajectory.velocity[:, :2].T)
+    helm = run.commands.column("rudder1")
+    end = int(np.flatnonzero(helm == helm.max())[-1])
+    speed, rate = through_water[end], abs(run.trajectory.velocity[end, 2])
+    circle, part = (round(share * 2 * np.pi / rate / ship.sample_time_s) for share in (1.0, 0.25))
+    left_mps = over_ground[end - circle : end].mean() - speed
+    assert abs(left_mps) < 1.5 * current_mps**2 / (4 * speed) + current_mps / circle
+    assert max(abs(over_ground[end - part - lag : end - lag].mean() - speed) for lag in range(0, circle, 5)) > 0.8 * (
+        current_mps * np.sin(np.pi / 4) / (np.pi / 4)
+    )
