@@ -33,7 +33,7 @@ FLOORS = {
     "records": (("tuning",), ("file",), ("pose",), ("remarks",), ("load", "labels", "levels", "pieces")),
     "step_trials": (
         ("tuning",),
-        ("holds", "regression", "steady_state", "transients"),
+        ("holds", "regression", "steady_state", "responses"),
         ("samples", "steady_holds", "surfaces"),
         ("comparisons", "model", "nominal", "live"),
         ("identify",),

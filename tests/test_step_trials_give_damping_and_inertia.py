@@ -7,9 +7,7 @@ import pytest
 
 from expdesign.step_trials.holds import Sailed
 from expdesign.step_trials.regression import Sampled, lasso, ridge
-from expdesign.step_trials.samples import modified_scores, plateau
-from expdesign.step_trials.surfaces import EVEN, ODD, fitted_surface, validity_region
-from expdesign.step_trials.transients import (
+from expdesign.step_trials.responses import (
     Transient,
     first_order,
     fit_first_order,
@@ -17,6 +15,8 @@ from expdesign.step_trials.transients import (
     preference,
     second_order,
 )
+from expdesign.step_trials.samples import modified_scores, plateau
+from expdesign.step_trials.surfaces import EVEN, ODD, fitted_surface, validity_region
 
 FINE_S = 0.02
 

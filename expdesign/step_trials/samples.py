@@ -17,12 +17,13 @@ import numpy as np
 
 from expdesign.progress import Progress, silent, within
 from expdesign.step_trials.holds import CHANNELS, Hold, Sailed
-from expdesign.step_trials.transients import (
+from expdesign.step_trials.responses import (
     Response,
     Transient,
     fit_first_order,
     fit_second_order,
     preference,
+    shared_delay,
 )
 from expdesign.step_trials.tuning import TUNING
 from expdesign.values import Array, seal
@@ -74,6 +75,7 @@ class StepSample:
         steady_s: time from the change of command until steady [s], None where it never was.
         plateau: None where the hold was not steady.
         before: plateau of the hold before.
+        transient: data of the state that the command drives.
         response: of the state that the command drives: second order where that is preferred.
         first_order: the same by a first order, for comparison.
         middle: of the transient.
@@ -86,6 +88,7 @@ class StepSample:
     steady_s: float | None
     plateau: Plateau | None
     before: Plateau | None = None
+    transient: Transient | None = None
     response: Response | None = None
     first_order: Response | None = None
     middle: Middle | None = None
@@ -124,11 +127,11 @@ def samples_and_delays(
     """A sample of every hold, and the dead times of both commands.
 
     A dead time belongs to an actuator, not to a step: it is found in each step first, and all responses are fitted anew
-    with the median of all.
+    with that of all. Throttle responses are of first order; rudder responses share a shape of second order.
     """
     free = (0.0, TUNING.most_delay_s)
     samples = step_samples(batches, holds, steady, delay_s=(free, free), progress=within(progress, 0.0, 0.5))
-    delays = _delay(samples, 0), _delay(samples, 1)
+    delays = _delay(samples, 0), _rudder_delay(samples)
     bounds = tuple((value, value) for value, _ in delays)
     again = within(progress, 0.5, 1.0)
     fitted = step_samples(batches, holds, steady, delay_s=(bounds[0], bounds[1]), progress=again)
@@ -136,10 +139,7 @@ def samples_and_delays(
 
 
 def _delay(samples: Sequence[StepSample], channel: int) -> tuple[float, float]:
-    """Median of the dead times of one command, weighted by their information, and its standard error.
-
-    They are those of first order responses. Where sway makes yaw begin faster than that, they are somewhat too short.
-    """
+    """Median of the dead times of first order responses, weighted by their information, and its standard error."""
     own = [one.first_order for one in samples if one.counts and one.hold.channel == channel]
     found = np.array([part.delay_s for part in own if part is not None])
     if not len(found):
@@ -150,6 +150,14 @@ def _delay(samples: Sequence[StepSample], channel: int) -> tuple[float, float]:
     middle = float(found[order][np.searchsorted(share, 0.5)])
     spread = math.sqrt(float(np.sum(weights * (found - middle) ** 2) / weights.sum()))
     return middle, 1.2533 * spread * math.sqrt(float(np.sum(weights**2))) / float(weights.sum())
+
+
+def _rudder_delay(samples: Sequence[StepSample]) -> tuple[float, float]:
+    """Of responses of one shape, where there are enough of them."""
+    steps = [one.transient for one in samples if one.counts and one.hold.channel == 1 and one.transient is not None]
+    if len(steps) < TUNING.least_group:
+        return _delay(samples, 1)
+    return shared_delay(steps, most_s=TUNING.most_delay_s)
 
 
 def step_samples(
@@ -266,6 +274,7 @@ def _fitted(own: StepSample, batch: Sailed, hold: Hold, data: Transient, delay_s
     inertia = slope * response.time_constant_s
     return replace(
         own,
+        transient=data,
         response=response,
         first_order=first,
         middle=_middle(own, batch, hold, response),

@@ -8,6 +8,7 @@ import numpy as np
 
 from expdesign.errors import NotInformative
 from expdesign.step_trials.holds import Hold, Sailed
+from expdesign.step_trials.responses import Transient, fit_first_order
 from expdesign.step_trials.steady_state import (
     STEADY,
     RatioTest,
@@ -17,7 +18,6 @@ from expdesign.step_trials.steady_state import (
     calibrated,
     stepped,
 )
-from expdesign.step_trials.transients import Transient, fit_first_order
 from expdesign.step_trials.tuning import TUNING
 from expdesign.values import Array
 

@@ -18,6 +18,9 @@ PAIRS = (
 INSTEAD = (("lat_deg", "north_m"), ("lon_deg", "north_m"))
 """A column that is not used when the other one is there."""
 
+MOST_NAMED = 8
+"""Unknown columns, in a message."""
+
 Sources = dict[str, Source]
 
 
@@ -87,8 +90,10 @@ def _wanted(path: Path, header: tuple[str, ...], used: Sources, inputs: Inputs |
     if inputs is None:
         if there:
             return there
-        expected = "tau_x tau_y tau_psi, or n1_rps a1_rad rudder1_rad ..."
-        raise FileError(path, "row 1", f"names no inputs, expected {expected}")
+        expected = "tau_x tau_y tau_psi (in any unit, also throttle or PWM), or n1_rps a1_rad rudder1_rad ..."
+        unknown = [name for column, name in enumerate(header) if name and meaning(name, column) is None]
+        found = f"; unknown are {', '.join(unknown[:MOST_NAMED])}" if unknown else ""
+        raise FileError(path, "row 1", f"names no inputs, expected {expected}{found}")
     meanings = [meaning(name, column) for column, name in enumerate(header)]
     unitless = {name for known in meanings if isinstance(known, Unitless) for name in known.names}
     missing = [name for name in inputs.columns if name not in used and name not in unitless]
