@@ -47,10 +47,11 @@ class Commands:
 
 AUXILIARY = (
     "roll_rad", "roll_rate_radps", "sway_acceleration_mps2", "lateral_acceleration_mps2", "actuator_x_n",
-    "actuator_y_n", "actuator_psi_nm",
+    "actuator_y_n", "actuator_psi_nm", "imu_lateral_mps2",
 )  # fmt: skip
 """Measured beside what every model needs: roll, positive to starboard, its rate, dv/dt, the acceleration to starboard
-of the origin without gravity, dv/dt + u r, and the force and moment of all actuators on the hull."""
+of the origin without gravity, dv/dt + u r, the force and moment of all actuators on the hull, and the reading of an
+accelerometer along the starboard axis, with gravity in it."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -113,7 +114,7 @@ class Batch:
         steered: (k,) 1 where the inputs follow the ship's motion, 0 where they were set beforehand; None where the
             data do not say.
         planned: (k, p) what the first p inputs were planned to be, whatever the ship did; None where unknown.
-        auxiliary: (k, 7) of `AUXILIARY`, as measured, nan where a column is not; None where none is.
+        auxiliary: (k, 8) of `AUXILIARY`, as measured, nan where a column is not; None where none is.
     """
 
     name: str
@@ -137,7 +138,7 @@ class Batch:
     def __post_init__(self) -> None:
         shapes = {
             "inputs": "k m", "velocity": "k 3", "pose": "k 3", "wind": "k 2", "depth_m": "k", "interpolated": "k 3",
-            "delivered": "k s m", "steered": "k", "planned": "k p", "auxiliary": "k 7",
+            "delivered": "k s m", "steered": "k", "planned": "k p", "auxiliary": "k 8",
         }  # fmt: skip
         seal(self, **{name: shape for name, shape in shapes.items() if getattr(self, name) is not None})
         if self.inputs.shape[1] != len(self.input_names):

@@ -135,7 +135,7 @@ def test_cures_of_the_open_direction_have_the_singular_values_worked_out_for_the
 def test_cures_name_knowledge_sensor_and_load_and_a_second_load_at_the_same_height_cures_nothing() -> None:
     cures = {cure.what: cure.rank for cure in null_space(all_nine()).cures}
     assert cures["know k"] == 9
-    assert cures["know z_m"] == 8
+    assert not {"know m", "know z_m"} & set(cures)
     assert cures["measure how far the accelerometer is from the rotation axis"] == 9
     assert [rank for what, rank in cures.items() if "at the same height" in what] == [8, 8]
     assert [rank for what, rank in cures.items() if "near the centre of mass" in what] == [9, 9]

@@ -11,10 +11,12 @@ from expdesign.cli.app import Asked, ask, command
 from expdesign.cli.options import (
     MOST_TRIALS,
     MOST_VOYAGES,
+    DataFiles,
     Jobs,
     NoCache,
     Out,
     OutBesidePlan,
+    OutByData,
     PlanFile,
     ScenarioFile,
     Scheduler,
@@ -198,3 +200,34 @@ def replan(
         cache=not no_cache,
         seed=seed,
     )
+
+
+@command("roll")
+def roll(
+    data: DataFiles,
+    loads: Annotated[
+        Path,
+        typer.Option("--loads", metavar="LOADS.toml", help="Load of each data file; see expdesign explain loads."),
+    ],
+    rudder: Annotated[
+        list[str] | None,
+        typer.Option("--rudder", metavar="NAME ...", help="Signals whose mean steers. Default: rudders, else all a."),
+    ] = None,
+    method: Annotated[
+        str,
+        typer.Option(metavar="HOW", help="iv, instruments from the rudder; ls, least squares, for comparison only."),
+    ] = "iv",
+    lowpass: Annotated[
+        float | None,
+        typer.Option("--lowpass-hz", metavar="F", help="Low-pass filter, which must pass roll. Default: as needed."),
+    ] = None,
+    out: OutByData = None,
+) -> Asked:
+    """Estimate roll inertia, damping, stiffness and an unknown load from runs at one or more loads.
+
+    Reads roll_rate_radps, imu_lateral_mps2, r_radps and the rudder. Writes roll.json and roll.html: parameters with
+    intervals, what the loads cannot tell apart, and what would.
+
+    Example: expdesign roll nominal.csv calibration.csv loaded.csv --loads loads.toml
+    """
+    return ask("roll", data, out, loads=loads, rudder=rudder or (), method=method, lowpass_hz=lowpass)

@@ -12,7 +12,7 @@ several load conditions), chapters 4 to 6.
 """
 
 from expdesign.roll.closed_loop import ClosedLoop, closed_loop, simulated
-from expdesign.roll.estimate import METHODS, RollEstimate, RollProblem, estimate_roll
+from expdesign.roll.estimate import METHODS, RollEstimate, RollProblem, build_problem, estimate_roll
 from expdesign.roll.loads import (
     G_MPS2,
     NOMINAL,
@@ -69,6 +69,7 @@ __all__ = [
     "RollProblem",
     "Run",
     "axis_inertia",
+    "build_problem",
     "closed_loop",
     "coefficients",
     "continuous",

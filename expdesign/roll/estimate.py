@@ -12,7 +12,7 @@ Hansen, Econometrica 50 (1982), 1029-1054, for weights and covariance.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,8 +22,8 @@ from expdesign.errors import InputError, NotInformative
 from expdesign.estimation.noise import automatic_lags, long_run_covariance
 from expdesign.roll.closed_loop import closed_loop
 from expdesign.roll.instruments import black_box_signals, loop_signals
-from expdesign.roll.loads import Body
-from expdesign.roll.model import PARAMETERS, coefficients, discrete, named, relative_sensitivity
+from expdesign.roll.loads import G_MPS2, NOMINAL, Body, first_moment
+from expdesign.roll.model import PARAMETERS, coefficients, discrete, named, parameters, relative_sensitivity
 from expdesign.roll.regression import WHITE, Rows, build_rows, instrument_columns, noise_model
 from expdesign.roll.runs import Case
 from expdesign.roll.tuning import TUNING
@@ -76,6 +76,46 @@ class RollProblem:
     def places(self) -> list[int]:
         """Of the free parameters among all."""
         return [PARAMETERS.index(name) for name in self.free]
+
+
+def build_problem(
+    body: Body,
+    cases: tuple[Case, ...],
+    *,
+    beam_m: float,
+    roll_hz: float,
+    known: Mapping[str, float],
+    start: Mapping[str, float],
+) -> RollProblem:
+    """A problem that begins with what a ship of this beam and roll frequency usually has.
+
+    Args:
+        body, cases: what is known.
+        beam_m: of the ship, whose radius of gyration is taken as 0.35 of it.
+        roll_hz: frequency of roll, roughly.
+        known: parameters that are not estimated.
+        start: of some that are.
+
+    Raises:
+        InputError: known leaves nothing to estimate.
+    """
+    inertia = body.mass_kg * (0.35 * beam_m) ** 2
+    turn, moment = 2.0 * np.pi * roll_hz, first_moment(body, NOMINAL)
+    righting = (inertia + body.mass_kg * body.z_g**2) * turn**2
+    stated = [case.load for case in cases if case.load is not None and case.load.mass_kg > 0]
+    mass = max((load.mass_kg for load in stated), default=0.02 * body.mass_kg)
+    place = min((load.z_m for load in stated), default=body.z_g - 0.5 * beam_m)
+    k, size = righting - G_MPS2 * moment, 0.3 * beam_m
+    scale = parameters(
+        k=max(righting, abs(k)), A_x=inertia, d=0.2 * righting / turn, K_r=2.0 * righting / turn,
+        K_vd=0.15 * body.mass_kg * beam_m, K_delta=0.1 * righting, z_f=0.1 * beam_m, m=mass, z_m=max(size, abs(place)),
+    )  # fmt: skip
+    begin = parameters(k=k, A_x=inertia, d=0.2 * righting / turn, m=mass, z_m=place)
+    for name, value in {**start, **known}.items():
+        begin[PARAMETERS.index(name)] = value
+    sought = PARAMETERS if any(case.load is None for case in cases) else PARAMETERS[:-2]
+    free = tuple(name for name in sought if name not in known)
+    return RollProblem(body=body, cases=cases, free=free, start=begin, scale=np.maximum(scale, 0.1 * np.abs(begin)))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -67,6 +67,8 @@ class NullSpace:
         singular_values: (p,) of the relative sensitivity, falling.
         rank: how many of them are not rounding.
         open: directions that the equations leave open, along which the parameters in `RollEstimate.held` were held.
+        undetermined: parameters that an open direction moves by more than their standard deviation while the one that
+            it moves most changes by a few times its size.
         faint: directions that these data show too faintly.
         cures: the best first; none where nothing is open or faint.
     """
@@ -75,16 +77,12 @@ class NullSpace:
     singular_values: Array
     rank: int
     open: tuple[Direction, ...]
+    undetermined: tuple[str, ...]
     faint: tuple[Direction, ...]
     cures: tuple[Cure, ...]
 
     def __post_init__(self) -> None:
         seal(self, singular_values="p")
-
-    @property
-    def undetermined(self) -> tuple[str, ...]:
-        """Parameters that change along an open direction."""
-        return tuple(name for name in self.free if any(name in one.change for one in self.open))
 
 
 def null_space(estimate: RollEstimate) -> NullSpace:
@@ -99,6 +97,7 @@ def null_space(estimate: RollEstimate) -> NullSpace:
     cures = _cures(problem, theta, loads) if open_ or faint else ()
     return NullSpace(
         free=problem.free, singular_values=sizes, rank=rank, open=open_, faint=faint,
+        undetermined=_undetermined(estimate, theta, rows[rank:]),
         cures=tuple(sorted(cures, key=lambda cure: (-cure.rank, -cure.smallest))),
     )  # fmt: skip
 
@@ -138,6 +137,12 @@ def _direction(problem: RollProblem, theta: Array, relative: Array, size: float)
     return Direction(change=named_, size=size)
 
 
+def _undetermined(estimate: RollEstimate, theta: Array, open_rows: Array) -> tuple[str, ...]:
+    moves = np.abs(open_rows / np.abs(open_rows).max(axis=1, keepdims=True)) * np.abs(theta[estimate.problem.places])
+    moves *= TUNING.open_sizes
+    return tuple(name for name, move in zip(estimate.std, moves.T, strict=True) if (move > estimate.std[name]).any())
+
+
 def _faint(problem: RollProblem, theta: Array, sensed: Array, open_rows: Array) -> tuple[Direction, ...]:
     """Directions across the open ones, along which the data leave a relative standard deviation of 1 or more."""
     relative = sensed * theta[problem.places]
@@ -157,7 +162,7 @@ def _cures(problem: RollProblem, theta: Array, loads: Sequence[Load | None]) -> 
     result = []
     for name in free:
         others = [other for other in free if other != name]
-        if others:
+        if others and name not in ("m", "z_m"):
             result.append(_cure(f"know {name}", theta, body, loads, others, known=1))
     if not body.sensor_from_axis:
         fixed = replace(body, z_s=body.sensor(named(theta)["z_f"]), sensor_from_axis=True)

@@ -28,6 +28,7 @@ class Tuning:
         most_rounds: of instruments and noise models.
         settled: change in a round, in standard deviations of each parameter, that ends them.
         unseen: relative sensitivity below which the equations themselves leave a direction open.
+        open_sizes: change along an open direction that is counted with, in sizes of the parameter that it moves most.
         faint_std: relative standard deviation along a direction from which data are said not to tell it.
         small_share: of a direction's largest relative change, below which a parameter is not named.
     """
@@ -50,8 +51,9 @@ class Tuning:
     most_rounds: int = 12
     settled: float = 0.02
     unseen: float = 1e-9
+    open_sizes: float = 5.0
     faint_std: float = 1.0
-    small_share: float = 0.02
+    small_share: float = 0.01
 
 
 TUNING = Tuning()

@@ -9,6 +9,7 @@ a list count from 1, as in ``actuators[2].speed_max_rps``), the value found and 
 from expdesign.scenario.charts import load_area
 from expdesign.scenario.dictionaries import load_dictionary
 from expdesign.scenario.durations_file import load_repeats
+from expdesign.scenario.loads_file import LoadCases, load_cases
 from expdesign.scenario.scenario_file import load_scenario
 from expdesign.scenario.values import DesignSettings, Scenario
 from expdesign.scenario.variant_file import Variant, load_variant
@@ -16,9 +17,11 @@ from expdesign.scenario.vessels import load_vessel
 
 __all__ = [
     "DesignSettings",
+    "LoadCases",
     "Scenario",
     "Variant",
     "load_area",
+    "load_cases",
     "load_dictionary",
     "load_repeats",
     "load_scenario",

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from expdesign.workflows.steps.scored import scored
     from expdesign.workflows.trials.foresee import foresee
     from expdesign.workflows.trials.replan import replan
+    from expdesign.workflows.trials.roll import roll
     from expdesign.workflows.trials.simulate import simulate
     from expdesign.workflows.trials.validate import validate_design
 
@@ -56,6 +57,7 @@ __all__ = [
     "plan_problem",
     "planned",
     "replan",
+    "roll",
     "run",
     "score",
     "scored",
@@ -91,6 +93,7 @@ if not TYPE_CHECKING:
             "steps.scored": ("scored",),
             "trials.foresee": ("foresee",),
             "trials.replan": ("replan",),
+            "trials.roll": ("roll",),
             "trials.simulate": ("simulate",),
             "trials.validate": ("validate_design",),
         },

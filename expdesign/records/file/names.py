@@ -84,6 +84,13 @@ QUANTITIES = (
         "derivative plus u r; yaw models of expdesign monitor read one of them",
     ),
     Quantity(
+        "imu_lateral",
+        ACCELERATION,
+        "imu_lateral_mps2",
+        "reading of an accelerometer along the ship's starboard axis, with gravity in it, so that it is negative where "
+        "the starboard side is down; expdesign roll reads it",
+    ),
+    Quantity(
         "actuator_x|actuator_y",
         FORCE,
         "actuator_x_n, actuator_y_n",

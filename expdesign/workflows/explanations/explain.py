@@ -16,6 +16,7 @@ TOPICS: dict[str, tuple[str, Callable[[], Topic]]] = {
     "dictionary": ("keys of a dictionary file", files.dictionary_topic),
     "families": ("manoeuvre families and their settings", plug_ins.families_topic),
     "area": ("keys of an area file: chart, bounds, depth, no-go zones", files.area_topic),
+    "loads": ("keys of a file of load cases, which expdesign roll reads", files.loads_topic),
     "data": ("columns of measured data", plug_ins.data_topic),
     "structures": ("built-in model structures and their parameters", plug_ins.structures_topic),
     "criteria": ("design criteria", plug_ins.criteria_topic),

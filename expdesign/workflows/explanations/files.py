@@ -9,6 +9,7 @@ from itertools import groupby
 from expdesign.scenario.charts.area_tables import AreaTable
 from expdesign.scenario.dictionaries.dictionary_file import DictionaryTable, PrimitiveTable
 from expdesign.scenario.keys import Key, keys_of
+from expdesign.scenario.loads_file import LoadsFile
 from expdesign.scenario.scenario_file import ScenarioFile
 from expdesign.scenario.tables import Table
 from expdesign.scenario.vessels.vessel_tables import ACTUATOR_TABLES, ActuatorTable, VesselTable
@@ -30,6 +31,11 @@ AREAS = (
     "seamark:type: an object class of S-57, as OpenSeaMap writes it, or a word in English, French, German, Swedish, "
     "Norwegian, Danish, Finnish or Dutch. A property depth_m, depth or VALSOU states their least depth [m]; without "
     "one they count as at the surface. Results name every layer that is not used; danger_layers in [chart] adds others."
+)
+LOADS = (
+    "One table [[load]] for each data file of expdesign roll, in their order; one without keys is the ship alone, one "
+    "with unknown = true has the load that is sought. Heights are upward from one origin in the ship, which may be "
+    "anywhere."
 )
 REFUSED = (
     "A plan that is refused ends with exit status 3 and leaves a draft, refused.html and refused.json: what stands in "
@@ -55,6 +61,11 @@ def vessel_topic() -> Topic:
     ]
     kinds = [_kind(names, table) for table, names in _kinds().items()]
     return Topic(name="vessel", title="Vessel files", text=VESSELS, sections=(*sections[:2], *kinds, *sections[2:]))
+
+
+def loads_topic() -> Topic:
+    """Keys of a file of load cases."""
+    return Topic(name="loads", title="Files of load cases", text=LOADS, sections=_by_table(LoadsFile))
 
 
 def dictionary_topic() -> Topic:

@@ -1,0 +1,23 @@
+"""Results of roll identification: JSON, sentences, tables and a page."""
+
+from expdesign.export.roll_page.content import (
+    CURE_HEADER,
+    PARAMETER_HEADER,
+    RollContent,
+    cure_rows,
+    parameter_rows,
+    roll_json,
+    roll_sentences,
+)
+from expdesign.export.roll_page.page import roll_html
+
+__all__ = [
+    "CURE_HEADER",
+    "PARAMETER_HEADER",
+    "RollContent",
+    "cure_rows",
+    "parameter_rows",
+    "roll_html",
+    "roll_json",
+    "roll_sentences",
+]

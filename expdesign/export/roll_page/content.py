@@ -1,0 +1,166 @@
+"""Roll identification as JSON, tables and sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from expdesign.export.files import finite, strict_json
+from expdesign.roll import MEANINGS, UNITS, Direction, LowPass, NullSpace, RollEstimate, roll_frequency, stiffness
+
+PARAMETER_HEADER = ("parameter", "meaning", "estimate", "95 % interval", "unit")
+CURE_HEADER = ("what more", "directions left open", "smallest relative sensitivity")
+NORMAL = 1.96
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RollContent:
+    """The values that page and files show.
+
+    Attributes:
+        estimate: the parameters.
+        report: what is not told apart.
+        filter: that the data passed.
+        notes: on the data.
+        command, version: to reproduce it.
+    """
+
+    estimate: RollEstimate
+    report: NullSpace
+    filter: LowPass
+    notes: tuple[str, ...]
+    command: str
+    version: str
+
+
+def parameter_rows(content: RollContent) -> list[tuple[str, ...]]:
+    """One for each parameter that is estimated or given."""
+    return [
+        (name, MEANINGS[name], f"{value:.4g}", _interval(content, name), UNITS[name])
+        for name, value in content.estimate.values.items()
+        if name in content.estimate.problem.free or value
+    ]
+
+
+def _interval(content: RollContent, name: str) -> str:
+    estimate = content.estimate
+    if name not in estimate.problem.free:
+        return "given"
+    if name in estimate.held:
+        return "held: not determined"
+    low, high = interval(content, name)
+    only = f" for {' and '.join(estimate.held)} as held" if name in content.report.undetermined else ""
+    return f"{low:.4g} to {high:.4g}{only}"
+
+
+def interval(content: RollContent, name: str) -> tuple[float, float]:
+    """95 % interval of a free parameter, for held parameters as they are."""
+    value, std = content.estimate.values[name], content.estimate.std[name]
+    return value - NORMAL * std, value + NORMAL * std
+
+
+def cure_rows(content: RollContent) -> list[tuple[str, ...]]:
+    """What would tell apart what is not, the best first."""
+    count = len(content.report.free)
+    return [(one.what, str(count - one.rank), f"{one.smallest:.1e}") for one in content.report.cures]
+
+
+def roll_sentences(content: RollContent) -> tuple[str, ...]:
+    """The findings."""
+    return tuple(_sentences(content))
+
+
+def _sentences(content: RollContent) -> Iterator[str]:
+    estimate, report, body = content.estimate, content.report, content.estimate.problem.body
+    if "m" in estimate.problem.free:
+        low, high = interval(content, "m")
+        yield f"The unknown load is {estimate.values['m']:.4g} kg, 95 % interval {low:.4g} to {high:.4g} kg."
+    for case in estimate.problem.cases:
+        right = stiffness(estimate.theta, body, case.load)
+        hertz = roll_frequency(estimate.theta, body, case.load)
+        upright = f"a roll period of {1.0 / hertz:.3g} s" if hertz else "which does not keep her upright"
+        if_so = f", if {' and '.join(estimate.held)} is right" if estimate.held else ""
+        yield f"{case.name}: righting moment {right:.4g} N m/rad, {upright}{if_so}."
+    yield from _open(content)
+    for one in report.faint:
+        yield f"The data hardly show the combination {one}: its relative standard deviation is {1.0 / one.size:.2g}."
+    yield _filtered(content)
+    if not estimate.settled:
+        yield "Instruments and noise models did not settle; expected longer runs, or a better start under [start]."
+    if estimate.surprise > 3.0:
+        yield (
+            f"Residuals follow the rudder {estimate.surprise:.2g} times as much as noise would: the model misses "
+            "something, and intervals may be too short."
+        )
+    if estimate.method == "ls":
+        yield "Least squares is biased where waves or sensors disturb, and its intervals do not say so; use iv."
+
+
+def _open(content: RollContent) -> Iterator[str]:
+    report, held = content.report, content.estimate.held
+    if not report.open:
+        yield f"The load cases determine all {len(report.free)} parameters (rank {report.rank})."
+        return
+    yield (
+        f"The load cases determine {report.rank} of {len(report.free)} parameters, whatever the data are. "
+        f"{', '.join(held)} {'was' if len(held) == 1 else 'were'} held at the start value."
+    )
+    for one in report.open:
+        yield f"Nothing changes if together: {one}."
+
+
+def _filtered(content: RollContent) -> str:
+    used = content.filter
+    if len(used.taps) == 1:
+        return f"No filter; {used.samples_per_period:.0f} samples in a period of roll."
+    return (
+        f"The low-pass filter has a bandwidth of {used.bandwidth_hz:.3g} Hz and passes {100 * used.passed:.1f} % of "
+        f"roll at {used.roll_hz:.3g} Hz; {used.samples_per_period:.0f} samples in its period."
+    )
+
+
+def roll_json(content: RollContent) -> str:
+    """All results as JSON."""
+    estimate, report = content.estimate, content.report
+    return strict_json(
+        {
+            "command": content.command,
+            "version": content.version,
+            "method": estimate.method,
+            "parameters": {name: _parameter(content, name) for name in estimate.values},
+            "null_space": {
+                "free": list(report.free),
+                "rank": report.rank,
+                "singular_values": report.singular_values.tolist(),
+                "open": [one.change for one in report.open],
+                "faint": [_told(one) for one in report.faint],
+                "cures": [vars(one) for one in report.cures],
+            },
+            "filter": {
+                "bandwidth_hz": content.filter.bandwidth_hz,
+                "roll_hz": content.filter.roll_hz,
+                "passed": content.filter.passed,
+                "sample_time_s": content.filter.step_s,
+            },
+            "settled": estimate.settled,
+            "surprise": finite(estimate.surprise),
+            "remarks": list(roll_sentences(content)),
+            "notes": list(content.notes),
+        }
+    )
+
+
+def _told(one: Direction) -> dict[str, object]:
+    return {"change": one.change, "relative_std": 1.0 / one.size}
+
+
+def _parameter(content: RollContent, name: str) -> dict[str, object]:
+    estimate = content.estimate
+    free = name in estimate.problem.free
+    std = estimate.std[name] if free and name not in estimate.held else None
+    return {
+        "value": estimate.values[name],
+        "unit": UNITS[name],
+        "std": std,
+        "determined": free and name not in content.report.undetermined,
+    }

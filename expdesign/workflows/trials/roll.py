@@ -1,0 +1,165 @@
+"""`expdesign roll`: roll parameters and an unknown load from runs at one or more loads."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from expdesign import __version__
+from expdesign.errors import InputError, UnknownName
+from expdesign.export import write_files
+from expdesign.export.roll_page import (
+    CURE_HEADER,
+    PARAMETER_HEADER,
+    RollContent,
+    cure_rows,
+    parameter_rows,
+    roll_html,
+    roll_json,
+    roll_sentences,
+)
+from expdesign.progress import Progress, silent
+from expdesign.records import load_records
+from expdesign.roll import (
+    TUNING,
+    Case,
+    LowPass,
+    RollEstimate,
+    Run,
+    build_problem,
+    estimate_roll,
+    low_pass,
+    null_space,
+    prepared,
+    roll_frequency,
+)
+from expdesign.scenario import LoadCases, load_cases
+from expdesign.signals import AUXILIARY, Batch
+from expdesign.workflows.command_text import command_text
+from expdesign.workflows.outcome import Outcome, TextTable
+
+NEEDED = ("roll_rate_radps", "imu_lateral_mps2")
+
+
+def roll(
+    data: Sequence[Path],
+    out: Path | None,
+    *,
+    loads: Path,
+    rudder: Sequence[str] = (),
+    method: str = "iv",
+    lowpass_hz: float | None = None,
+    progress: Progress = silent,
+) -> Outcome:
+    """Parameters, intervals and what is not told apart, into `out` or runs/<first data file>.
+
+    Args:
+        data: CSV files, one for each load.
+        out: folder, or None.
+        loads: file of load cases.
+        rudder: signals whose mean steers; found by their kinds when empty.
+        method: "iv" or "ls".
+        lowpass_hz: of the filter; None for one that thinning out needs.
+        progress: of the command.
+
+    Raises:
+        InputError: arguments or files that are wrong.
+        NoAnswer: the data tell too little.
+    """
+    progress("reading the data", 0.0)
+    known = load_cases(loads)
+    if len(known.loads) != len(data):
+        raise InputError(
+            f"{loads}: load: has {len(known.loads)} load cases for {len(data)} data files, expected one each"
+        )
+    cases, notes = _cases(data, known, rudder)
+    filter_ = low_pass(cases, roll_hz=1.0 / known.period_s, cutoff_hz=lowpass_hz)
+    problem = build_problem(
+        known.body, prepared(cases, filter_), beam_m=known.beam_m, roll_hz=1.0 / known.period_s, known=known.known,
+        start=known.start,
+    )  # fmt: skip
+    progress("estimating", 0.3)
+    estimate = estimate_roll(problem, method=method)
+    _check_passed(estimate, filter_)
+    options = {"--loads": loads, "--rudder": tuple(rudder), "--method": method, "--lowpass-hz": lowpass_hz}
+    content = RollContent(
+        estimate=estimate, report=null_space(estimate), filter=filter_, notes=notes,
+        command=command_text("roll", data, options, usual={"--method": "iv"}), version=__version__,
+    )  # fmt: skip
+    progress("drawing the page", 0.9)
+    files = {"roll.json": roll_json(content), "roll.html": roll_html(content)}
+    written = write_files(out or Path("runs") / data[0].stem, files)
+    progress("done", 1.0)
+    return Outcome(files=written, summary=_summary(content), tables=_tables(content))
+
+
+def _cases(data: Sequence[Path], known: LoadCases, rudder: Sequence[str]) -> tuple[tuple[Case, ...], tuple[str, ...]]:
+    """One case for each file, and notes on them."""
+    cases: list[Case] = []
+    notes: list[str] = []
+    step_s = None
+    for path, load in zip(data, known.loads, strict=True):
+        record = load_records([path], outputs=("r",), sample_time_s=step_s)
+        step_s = record.batches[0].sample_time_s
+        runs = tuple(_run(path, batch, rudder) for batch in record.batches)
+        cases.append(Case(name=path.stem, load=load, runs=runs))
+        notes += record.notes
+    return tuple(cases), tuple(notes)
+
+
+def _run(path: Path, batch: Batch, rudder: Sequence[str]) -> Run:
+    """Signals of a batch; the accelerometer counts to port in the room of roll."""
+    for name in NEEDED:
+        if not batch.measures(name):
+            raise InputError(f"{path}: {name}: is missing, expected it beside r_radps and the rudder")
+    assert batch.auxiliary is not None
+    roll_rate, sensed = (batch.auxiliary[:, AUXILIARY.index(name)] for name in NEEDED)
+    steering = [batch.inputs[:, batch.input_names.index(name)] for name in _rudders(batch.input_names, rudder)]
+    return Run(
+        step_s=batch.sample_time_s,
+        signals=np.column_stack([roll_rate, -sensed, batch.velocity[:, 2], np.mean(steering, axis=0)]),
+    )
+
+
+def _rudders(names: Sequence[str], asked: Sequence[str]) -> tuple[str, ...]:
+    for name in asked:
+        if name not in names:
+            raise UnknownName("rudder signal", name, known=names)
+    found = [tuple(asked), *(tuple(n for n in names if n.rstrip("0123456789") == kind) for kind in ("rudder", "a"))]
+    chosen = next(filter(None, found), ())
+    if not chosen:
+        raise InputError(f"the inputs {', '.join(names)} have no rudder, expected rudder1 or a1, or --rudder")
+    return chosen
+
+
+def _check_passed(estimate: RollEstimate, used: LowPass) -> None:
+    """Raise where the filter takes from the roll that was found."""
+    for case in estimate.problem.cases:
+        found = roll_frequency(estimate.theta, estimate.problem.body, case.load)
+        if used.gain(found) < TUNING.passed_gain:
+            raise InputError(
+                f"the low-pass filter leaves {100 * used.gain(found):.0f} % of the roll that was found, {found:.3g} Hz "
+                f"in {case.name}, expected {100 * TUNING.passed_gain:.0f} % or more; set --lowpass-hz {4 * found:.2g}, "
+                "or period_s to what it is"
+            )
+
+
+def _summary(content: RollContent) -> dict[str, object]:
+    estimate = content.estimate
+    return {
+        "parameters": estimate.values,
+        "std": {name: std for name, std in estimate.std.items() if name not in estimate.held},
+        "held": list(estimate.held),
+        "rank": content.report.rank,
+        "free": len(content.report.free),
+        "remarks": list(roll_sentences(content)),
+    }
+
+
+def _tables(content: RollContent) -> tuple[TextTable, ...]:
+    found = TextTable(title="Roll", header=("finding",), rows=tuple((text,) for text in roll_sentences(content)))
+    values = TextTable(title="Parameters", header=PARAMETER_HEADER, rows=tuple(parameter_rows(content)))
+    cures = TextTable(title="What would tell apart what is not", header=CURE_HEADER, rows=tuple(cure_rows(content)))
+    return (found, values, cures) if cures.rows else (found, values)

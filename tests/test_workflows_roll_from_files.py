@@ -1,0 +1,125 @@
+"""`expdesign roll`: from CSV files at several loads to parameters, null space, JSON and page."""
+
+import json
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from expdesign.errors import FileError, InputError, UnknownName
+from expdesign.roll import NOMINAL, PARAMETERS, Load, Run
+from expdesign.workflows import roll
+from roll_truths import CALIBRATION, MODEL_SHIP_TRUTH, Sea, ship_run, switching, unknown_load
+
+SHIP = """
+[ship]
+mass_kg = 22.04
+mass_height_m = -0.0073
+sensor_height_m = 0.23
+beam_m = 0.3
+period_s = 1.3
+"""
+KNOWN = "\n[[load]]\nmass_kg = 0.2\nheight_m = 0.256\n"
+UNKNOWN = "\n[[load]]\nunknown = true\n"
+K_KNOWN = "\n[known]\nk = 9.0\n"
+SEA = Sea(roll_rate=0.002, sensed=0.005, yaw_rate=0.002, moment=0.01, frequency_hz=0.8, damping=0.3)
+
+
+@cache
+def measured(load: Load, seed: int) -> Run:
+    rng = np.random.default_rng(seed)
+    return ship_run(load, switching(4000, 150, rng, levels=(-0.6, 0.0, 0.6)), SEA, rng, step_s=0.01)
+
+
+def csv(path: Path, load: Load, seed: int, *, without: str = "") -> Path:
+    run = measured(load, seed)
+    columns = {
+        "time_s": np.arange(len(run.signals)) * run.step_s,
+        "roll_rate_radps": run.signals[:, 0],
+        "imu_lateral_mps2": -run.signals[:, 1],
+        "r_radps": run.signals[:, 2],
+        "rudder1_rad": run.signals[:, 3],
+    }
+    kept = [name for name in columns if name != without]
+    table = np.column_stack([columns[name] for name in kept])
+    np.savetxt(path, table, delimiter=",", header=",".join(kept), comments="", fmt="%.9g")
+    return path
+
+
+def three(folder: Path) -> list[Path]:
+    loads = {"nominal": NOMINAL, "calibration": CALIBRATION, "loaded": unknown_load()}
+    return [csv(folder / f"{name}.csv", load, seed) for seed, (name, load) in enumerate(loads.items(), start=1)]
+
+
+def stated(folder: Path, text: str) -> Path:
+    path = folder / "loads.toml"
+    path.write_text(SHIP + text)
+    return path
+
+
+def truth(name: str) -> float:
+    return float(MODEL_SHIP_TRUTH[PARAMETERS.index(name)])
+
+
+def test_three_files_give_the_load_and_say_what_they_do_not_tell(tmp_path: Path) -> None:
+    loads = stated(tmp_path, "\n[[load]]\n" + KNOWN + UNKNOWN)
+    outcome = roll(three(tmp_path), tmp_path / "out", loads=loads)
+    assert {path.name for path in outcome.files} == {"roll.json", "roll.html"}
+    found = json.loads((tmp_path / "out" / "roll.json").read_text())
+    mass = found["parameters"]["m"]
+    assert abs(mass["value"] - truth("m")) < 4 * mass["std"] < 0.4
+    assert found["null_space"]["rank"] == 8
+    assert found["parameters"]["k"]["std"] is None
+    assert not found["parameters"]["k"]["determined"]
+    page = (tmp_path / "out" / "roll.html").read_text()
+    assert "The load cases determine 8 of 9 parameters, whatever the data are. k was held at the start value." in page
+    assert "measure how far the accelerometer is from the rotation axis" in page
+
+
+def test_with_k_known_all_else_is_found(tmp_path: Path) -> None:
+    loads = stated(tmp_path, "\n[[load]]\n" + KNOWN + UNKNOWN + K_KNOWN)
+    found = roll(three(tmp_path), tmp_path / "out", loads=loads).summary
+    assert (found["rank"], found["free"], found["held"]) == (8, 8, [])
+    values, stds = found["parameters"], found["std"]
+    assert isinstance(values, dict)
+    assert isinstance(stds, dict)
+    for name, std in stds.items():
+        assert abs(values[name] - truth(name)) < 4 * std, name
+
+
+def test_one_file_gives_five_parameters_and_two_give_seven(tmp_path: Path) -> None:
+    text = f"\n[known]\nK_vd = {truth('K_vd')}\nz_f = {truth('z_f')}\n"
+    files = three(tmp_path)
+    one = roll(files[:1], tmp_path / "one", loads=stated(tmp_path, "\n[[load]]\n" + text)).summary
+    assert (one["rank"], one["free"]) == (5, 5)
+    two = roll([files[0], files[2]], tmp_path / "two", loads=stated(tmp_path, "\n[[load]]\n" + UNKNOWN + text)).summary
+    assert (two["rank"], two["free"]) == (7, 7)
+    for found in (one, two):
+        values, stds = found["parameters"], found["std"]
+        assert isinstance(values, dict)
+        assert isinstance(stds, dict)
+        for name, std in stds.items():
+            assert abs(values[name] - truth(name)) < 4 * std, name
+
+
+def test_wrong_inputs_are_one_line_and_leave_nothing(tmp_path: Path) -> None:
+    files, out = three(tmp_path), tmp_path / "out"
+    with pytest.raises(InputError, match=r"load: has 1 load cases for 3 data files, expected one each"):
+        roll(files, out, loads=stated(tmp_path, "\n[[load]]\n"))
+    with pytest.raises(FileError, match=r"load\[1\]: is unknown = true and states a load"):
+        roll(files[:1], out, loads=stated(tmp_path, "\n[[load]]\nunknown = true\nmass_kg = 1.0\n"))
+    with pytest.raises(FileError, match=r"known: is 'K_v', "):
+        roll(files[:1], out, loads=stated(tmp_path, "\n[[load]]\n\n[known]\nK_v = 1.0\n"))
+    path = tmp_path / "flat.toml"
+    path.write_text(SHIP.replace("beam_m = 0.3", "beam_m = 0.0") + "\n[[load]]\n")
+    with pytest.raises(FileError, match=r"ship\.beam_m: is 0, expected more than 0"):
+        roll(files[:1], out, loads=path)
+    bare = csv(tmp_path / "bare.csv", NOMINAL, 1, without="imu_lateral_mps2")
+    with pytest.raises(InputError, match=r"bare\.csv: imu_lateral_mps2: is missing"):
+        roll([bare], out, loads=stated(tmp_path, "\n[[load]]\n"))
+    with pytest.raises(UnknownName, match="unknown rudder signal 'rudder2'"):
+        roll(files[:1], out, loads=stated(tmp_path, "\n[[load]]\n"), rudder=["rudder2"])
+    with pytest.raises(InputError, match=r"the low-pass filter of 0\.4 Hz leaves"):
+        roll(files[:1], out, loads=stated(tmp_path, "\n[[load]]\n"), lowpass_hz=0.4)
+    assert not out.exists()
