@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from expdesign.export.files import finite, strict_json
 from expdesign.step_trials import CHANNELS, NO_BEND, TUNING, StepSample, StepTrial, Surface
 from expdesign.values import Array
-from expdesign.vessel import Vessel
+from expdesign.vessel import Vessel, column_name
 
 REPEAT_HEADER = ("step", "begins at", "throttle", "rudder", "why")
 STATES = ("speed", "yaw rate")
@@ -63,6 +63,18 @@ def begins_s(content: StepTrialContent, one: StepSample) -> float:
 def sentences(content: StepTrialContent) -> tuple[str, ...]:
     """The findings."""
     return tuple(_sentences(content))
+
+
+def command_units(content: StepTrialContent) -> tuple[str, str]:
+    """Units of throttle and rudder, "" for forces in the unit of a model."""
+    controls = content.trial.controls
+    signals = controls.throttle[0], (controls.rudder or controls.throttle)[0]
+    return unit_of(signals[0]), unit_of(signals[1])
+
+
+def unit_of(signal: str) -> str:
+    """Unit of an input: n1 -> rps."""
+    return column_name(signal).removeprefix(signal).removeprefix("_")
 
 
 def _sentences(content: StepTrialContent) -> Iterator[str]:
@@ -129,7 +141,18 @@ def _to(one: StepSample, channel: int) -> str:
     return f"{after - change:.3g} \N{RIGHTWARDS ARROW} {after:.3g}" if moved else f"{after:.3g}"
 
 
-STEP_HEADER = ("step", "throttle", "rudder", "steady after", "U", "r", "turns", "time constant", "inertia", "remarks")
+STEP_HEADER = (
+    "step",
+    "throttle",
+    "rudder",
+    "steady after",
+    "U [m/s]",
+    "r [rad/s]",
+    "turns",
+    "time constant",
+    "inertia",
+    "remarks",
+)
 
 
 def step_rows(content: StepTrialContent) -> list[tuple[str, ...]]:
@@ -139,9 +162,7 @@ def step_rows(content: StepTrialContent) -> list[tuple[str, ...]]:
 
 def _step_row(one: StepSample) -> tuple[str, ...]:
     part, response = one.plateau, one.response
-    state = (
-        ("", "", "") if part is None else (f"{part.state[0]:.2f} m/s", f"{part.state[1]:.3f} rad/s", str(part.turns))
-    )
+    state = ("", "", "") if part is None else (f"{part.state[0]:.2f}", f"{part.state[1]:.3f}", str(part.turns))
     time = (
         ""
         if response is None

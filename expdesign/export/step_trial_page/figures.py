@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from expdesign.export.pages.figures import BLUE, GREY, VERMILION, light_grid, new_figure, svg
-from expdesign.export.step_trial_page.content import StepTrialContent, Validated
+from expdesign.export.step_trial_page.content import StepTrialContent, Validated, command_units
 from expdesign.step_trials import StepSample, Surface
 from expdesign.values import Array
 
@@ -41,11 +41,14 @@ def surface_figure(content: StepTrialContent) -> str:
     trial, model = content.trial, content.trial.model
     steady = [(one, one.plateau) for one in trial.samples if one.plateau is not None]
     states = np.array([part.state for _, part in steady])
-    for channel, name in enumerate(("throttle", "rudder")):
+    for channel, (name, unit) in enumerate(zip(("throttle", "rudder"), command_units(content), strict=True)):
         given = np.array([one.hold.commands[channel] for one, _ in steady])
         _against(axes[0, channel], states, given, model.damping[channel], f"damping = steady {name}", channel)
         own = [one for one in trial.samples if one.hold.channel == channel]
         _inertia(axes[1, channel], own, model.inertia[channel], f"inertia to {name}")
+        if unit:
+            axes[0, channel].set_ylabel(f"{name} [{unit}]")
+            axes[1, channel].set_ylabel(f"[{unit} per {('m/s²', 'rad/s²')[channel]}]")
     return svg(figure, key="surfaces", label="Damping and inertia, measured and by the model")
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from expdesign.export.files.text import csv_text, strict_json
+from expdesign.export.step_trial_page.content import unit_of
 from expdesign.step_trials.live import Event, Inputs, Listed, State, StepList, in_sequence
 from expdesign.vessel import column_name
 
@@ -71,7 +72,7 @@ def inputs_text(inputs: Inputs, steps: StepList) -> str:
 
 
 def _input_text(name: str, value: float) -> str:
-    unit = column_name(name).removeprefix(name).removeprefix("_")
+    unit = unit_of(name)
     degrees = f" ({math.degrees(value):.1f} deg)" if unit == "rad" else ""
     return f"{name} = {value:.4g} {unit}".rstrip() + degrees
 

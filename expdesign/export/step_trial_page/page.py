@@ -32,7 +32,7 @@ def step_trial_html(content: StepTrialContent) -> str:
             sentences=sentences(content),
             repeat_header=[name.capitalize() for name in REPEAT_HEADER],
             repeat_rows=repeat_rows(content),
-            step_header=[name if len(name) == 1 else name.capitalize() for name in STEP_HEADER],
+            step_header=[name if name[1] == " " else name.capitalize() for name in STEP_HEADER],
             step_rows=step_rows(content),
             nominal_rows=nominal_rows(content),
             figures=figures,
