@@ -39,8 +39,8 @@ class Tuning:
     taps_per_period: float = 2.0
     least_samples_per_period: float = 10.0
     least_samples: int = 100
-    black_box: tuple[int, int] = (4, 5)
-    side_black_box: tuple[int, int] = (3, 4)
+    black_box: tuple[int, int] = (24, 25)
+    side_black_box: tuple[int, int] = (16, 17)
     largest_pole: float = 0.999
     lags: int = 4
     rudder_lags: int = 2

@@ -1,0 +1,140 @@
+"""Roll and loads in simulated data: `python tests/benchmarks/published/roll.py STUDY [--runs N] [--seed N]`.
+
+moment: least squares and instruments on a pendulum under a narrow-band roll moment, without sensor noise.
+pendulum: the pendulum's own parameters and its load from noisy sensors, in two stages and jointly.
+ship: nine parameters less a known k from three load cases of a model ship, how often 95 % intervals hold the truth, and
+    the error of the mass by instruments and by least squares.
+
+Parameters are those of the thesis where it states them; excitation, sensor noise of the ship and her sway and yaw are
+ours, as the thesis does not state them.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterable
+
+import numpy as np
+
+from expdesign.roll import NOMINAL, PARAMETERS, Case, Load, RollEstimate, RollProblem, build_problem, estimate_roll
+from expdesign.values import Array
+from roll_truths import (
+    CASES,
+    MODEL_SHIP,
+    MODEL_SHIP_TRUTH,
+    PENDULUM,
+    PENDULUM_TRUTH,
+    Sea,
+    pendulum_run,
+    ship_run,
+    switching,
+    unknown_load,
+)
+
+LOAD = Load(mass_kg=0.2, z_m=-0.274)
+OWN, LOADED = ("A_x", "d"), ("m", "z_m")
+SHIP_SEA = Sea(roll_rate=0.005, sensed=0.01, yaw_rate=0.005, moment=0.02, frequency_hz=0.8, damping=0.3)
+
+
+def truth(theta: Array, name: str) -> float:
+    """A parameter by name."""
+    return float(theta[PARAMETERS.index(name)])
+
+
+def pendulum_problem(cases: tuple[Case, ...], free: Iterable[str], theta: Array) -> RollProblem:
+    """The pendulum with all but some parameters as in theta, and a rough start."""
+    known = {name: truth(theta, name) for name in PARAMETERS if name not in free}
+    return build_problem(PENDULUM, cases, beam_m=0.3, roll_hz=1.0, known=known, start={"m": 0.1, "z_m": -0.2})
+
+
+def pendulum_case(load: Load | None, sea: Sea, samples: int, rng: np.random.Generator) -> Case:
+    """A run of a pendulum whose cart goes back and forth every 2 s at random."""
+    run = pendulum_run(load or LOAD, switching(samples, 200, rng), sea, rng)
+    return Case(name="pendulum", load=load, runs=(run,))
+
+
+def moment(runs: int, seed: int) -> None:
+    """Inertia and damping with k known, 5 minutes at 100 Hz."""
+    for rms in (0.0, 0.1, 0.3, 1.0):
+        sea = Sea(moment=rms, frequency_hz=1.0, damping=0.1)
+        found: dict[str, list[RollEstimate]] = {"ls": [], "iv": []}
+        for number in range(runs):
+            case = pendulum_case(NOMINAL, sea, 30_000, np.random.default_rng([seed, number]))
+            for method, rows in found.items():
+                rows.append(estimate_roll(pendulum_problem((case,), OWN, PENDULUM_TRUTH), method=method))
+        for method, rows in found.items():
+            cells = [_cell(rows, name, truth(PENDULUM_TRUTH, name)) for name in OWN]
+            print(f"| {rms} | {method} | {' | '.join(cells)} |")
+
+
+def pendulum(runs: int, seed: int) -> None:
+    """Sensors with standard deviations of 0.01 each, 5 minutes for each load."""
+    sea = Sea(roll_rate=0.01, sensed=0.01)
+    found: dict[str, list[RollEstimate]] = {}
+    for number in range(runs):
+        rng = np.random.default_rng([seed, number])
+        both = pendulum_case(NOMINAL, sea, 30_000, rng), pendulum_case(None, sea, 30_000, rng)
+        for method in ("ls", "iv"):
+            first = estimate_roll(pendulum_problem(both[:1], OWN, PENDULUM_TRUTH), method=method)
+            second = estimate_roll(pendulum_problem(both[1:], LOADED, first.theta), method=method)
+            joint = estimate_roll(pendulum_problem(both, (*OWN, *LOADED), PENDULUM_TRUTH), method=method)
+            for stage, one in (("stages: own", first), ("stages: load", second), ("jointly", joint)):
+                found.setdefault(f"{stage} | {method}", []).append(one)
+    for what, rows in found.items():
+        cells = [
+            _cell(rows, name, truth(PENDULUM_TRUTH, name)) if name in rows[0].problem.free else ""
+            for name in (*OWN, *LOADED)
+        ]
+        print(f"| {what} | {' | '.join(cells)} |")
+
+
+def ship(runs: int, seed: int) -> None:
+    """A minute at 100 Hz for each of no load, a known one and an unknown one."""
+    found: dict[str, list[RollEstimate]] = {"iv": [], "ls": []}
+    for number in range(runs):
+        rng = np.random.default_rng([seed, number])
+        cases = tuple(
+            Case(
+                name="ship",
+                load=load,
+                runs=(
+                    ship_run(
+                        load or unknown_load(), switching(6000, 150, rng, levels=(-0.6, 0.0, 0.6)), SHIP_SEA, rng,
+                        step_s=0.01,
+                    ),
+                ),
+            )
+            for load in CASES
+        )  # fmt: skip
+        problem = build_problem(MODEL_SHIP, cases, beam_m=0.3, roll_hz=0.75, known={"k": 9.0}, start={})
+        for method, rows in found.items():
+            rows.append(estimate_roll(problem, method=method))
+    for method, rows in found.items():
+        errors = [abs(one.values["m"] - 0.4) / 0.4 for one in rows]
+        print(f"{method}: median error of the mass {100 * np.median(errors):.1f} %")
+        for name in rows[0].problem.free:
+            print(f"| {method} | {name} | {_cell(rows, name, truth(MODEL_SHIP_TRUTH, name))} |")
+        held = [
+            [abs(one.values[name] - truth(MODEL_SHIP_TRUTH, name)) < 1.96 * one.std[name] for name in one.problem.free]
+            for one in rows
+        ]
+        print(f"{method}: {100 * np.mean(held):.1f} % of all intervals hold the truth")
+
+
+def _cell(rows: list[RollEstimate], name: str, wanted: float) -> str:
+    """Median, robust standard deviation, median of those told, and share of 95 % intervals that hold."""
+    values, told = np.array([[one.values[name], one.std[name]] for one in rows]).T
+    spread = np.subtract(*np.percentile(values, [75, 25])) / 1.349
+    held = 100 * np.mean(np.abs(values - wanted) < 1.96 * told)
+    return f"{np.median(values):.4f} ± {spread:.4f} ({np.median(told):.4f}, {held:.0f} %)"
+
+
+STUDIES = {"moment": moment, "pendulum": pendulum, "ship": ship}
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("study", choices=STUDIES)
+    parser.add_argument("--runs", type=int, default=20)
+    parser.add_argument("--seed", type=int, default=0)
+    asked = parser.parse_args()
+    STUDIES[asked.study](asked.runs, asked.seed)
