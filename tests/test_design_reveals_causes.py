@@ -73,7 +73,7 @@ def test_a_cause_that_cannot_be_revealed_is_refused_with_the_best_probability(tm
 @pytest.mark.parametrize(
     ("line", "said"),
     [
-        ('reveal = ["gyro_scal"]', "did you mean 'gyro_scale'? (known: parameters, current, wind, missing_term:"),
+        ('reveal = ["gyro_scal"]', "design.reveal[1]: is 'gyro_scal', did you mean 'gyro_scale'?"),
         ('reveal = ["change_point"]', "design.reveal[1]: is 'change_point'"),
         ('tell_apart = [["current"]]', "design.tell_apart[1]: has 1 names, expected two causes"),
         ('tell_apart = [["current", "current"]]', "is 'current' again"),

@@ -22,6 +22,8 @@ from expdesign.input_files import check_ends
 
 LARGEST = 1e12
 """Largest accepted number, far beyond any length, time or speed of a trial."""
+MOST_NAMED = 240
+"""Characters of all known names that are still listed beside the nearest one."""
 
 Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 Positive = Annotated[float, Field(gt=0, le=LARGEST)]
@@ -264,10 +266,12 @@ def _description(model: type[Table], place: tuple[str | int, ...]) -> str:
 
 
 def offer(name: str, known: tuple[str, ...]) -> str:
-    """The nearest known name, if one is near, and all of them."""
+    """The nearest known name, if one is near, and all of them where these still make one line."""
     near = nearest(name, known)
     names = ", ".join(known)
-    return f"did you mean {near!r}? (known: {names})" if near else f"expected one of {names}"
+    if near is None:
+        return f"expected one of {names}"
+    return f"did you mean {near!r}?" + (f" (known: {names})" if len(names) <= MOST_NAMED else "")
 
 
 def _one_line(text: str) -> str:

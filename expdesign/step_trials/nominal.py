@@ -177,7 +177,7 @@ def posterior(model: VesselModel, known: Evidence) -> tuple[Array, Array]:
 
     Errors of the two dead times, and of both kinds of time constants by their definition, are estimated beside the
     parameters. Where sway is not measured its parameters are considered, not estimated: they stay, and their stated
-    errors count in the covariance (S. F. Schmidt, Advances in Control Systems 3, 1966).
+    errors count as errors of the data, in weights and covariance (S. F. Schmidt, Advances in Control Systems 3, 1966).
 
     Raises:
         NotInformative: sway has no steady drift at the vessel file's values.
@@ -185,32 +185,37 @@ def posterior(model: VesselModel, known: Evidence) -> tuple[Array, Array]:
     _check_sway(model, known.steady)
     free, considered = _free(model, known)
     root = np.linalg.cholesky(model.parameter_covariance[np.ix_(free, free)])
-    estimated, factor = len(free) - considered + NUISANCES, np.ones(5)
+    estimated = len(free) - considered + NUISANCES
 
     def parts(z: Array) -> tuple[Array, ...]:
         theta = model.parameters.copy()
         theta[free] += root @ z[NUISANCES:]
         return compared(model, theta, known, known.delay_std_s * z[:2], FORM_STD * z[2:NUISANCES])
 
-    def residuals(z: Array) -> Array:
-        whole = np.append(z, np.zeros(considered)) if len(z) == estimated else z
-        return np.concatenate([*(part / by for part, by in zip(parts(whole), factor, strict=True)), whole])
+    def with_considered(z: Array) -> Array:
+        return np.append(z, np.zeros(considered))
 
     z = np.zeros(estimated)
     if np.isfinite(known.steady.sway).all():
         begun, _ = posterior(model, known.without_sway())
         z[NUISANCES:] = np.linalg.solve(root, (begun - model.parameters)[free])
+    enlarged, slopes = np.ones(5), _considered_slopes(parts, with_considered(z), considered)
     for _ in range(ROUNDS):
-        found = scipy.optimize.least_squares(residuals, z, x_scale="jac", max_nfev=MOST_STEPS)
+        white = _whitening(np.repeat(enlarged, list(map(len, parts(with_considered(z))))), slopes)
+        found = scipy.optimize.least_squares(
+            lambda z, white=white: np.append(white @ np.concatenate(parts(with_considered(z))), z),
+            z, x_scale="jac", max_nfev=MOST_STEPS,
+        )  # fmt: skip
         z = found.x
-        factor = _factors(parts(np.append(z, np.zeros(considered))), estimated)
+        slopes = _considered_slopes(parts, with_considered(z), considered)
+        enlarged = _enlarged(parts(with_considered(z)), estimated)
     gain = np.linalg.inv(found.jac.T @ found.jac)
-    slopes = _considered_slopes(residuals, z, considered)
-    shift = np.concatenate([-gain @ found.jac.T @ slopes, np.eye(considered)])
-    left = shift @ shift.T
-    left[:estimated, :estimated] += gain
+    left = np.eye(estimated + considered)
+    left[:estimated, :estimated] = gain
+    left[:estimated, estimated:] = -gain @ found.jac[: len(white)].T @ white @ slopes
+    left[estimated:, :estimated] = left[:estimated, estimated:].T
     value, covariance = model.parameters.copy(), np.zeros((len(model.names),) * 2)
-    value[free] += root @ np.append(z, np.zeros(considered))[NUISANCES:]
+    value[free] += root @ with_considered(z)[NUISANCES:]
     covariance[np.ix_(free, free)] = root @ left[NUISANCES:, NUISANCES:] @ root.T
     return value, covariance
 
@@ -223,16 +228,24 @@ def _free(model: VesselModel, known: Evidence) -> tuple[npt.NDArray[np.intp], in
     return np.concatenate([np.flatnonzero(uncertain & ~sways), np.flatnonzero(sways)]), int(sways.sum())
 
 
-def _considered_slopes(residuals: Callable[[Array], Array], z: Array, considered: int) -> Array:
-    """(n, considered) change of the residuals with each considered parameter, half a standard deviation each way."""
-    whole = np.append(z, np.zeros(considered))
-    steps = 0.5 * np.eye(len(whole))[len(z) :]
-    columns = [residuals(whole + step) - residuals(whole - step) for step in steps]
-    return np.stack(columns, axis=1) if columns else np.zeros((len(residuals(whole)), 0))
+def _considered_slopes(parts: Callable[[Array], Sequence[Array]], z: Array, considered: int) -> Array:
+    """(n, considered) change of all distances with each considered parameter, half a standard deviation each way."""
+    steps = 0.5 * np.eye(len(z))[len(z) - considered :]
+    columns = [np.concatenate(parts(z + step)) - np.concatenate(parts(z - step)) for step in steps]
+    return np.stack(columns, axis=1) if columns else np.zeros((sum(map(len, parts(z))), 0))
 
 
-def _factors(parts: Sequence[Array], parameters: int) -> Array:
-    """By how much the errors of each part are too small, never less than 1."""
+def _whitening(errors: Array, slopes: Array) -> Array:
+    """(n, n) what gives distances unit covariance, for errors (n,) of their own and unit ones along slopes (n, c)."""
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(np.diag(errors**2) + slopes @ slopes.T)))
+
+
+def _enlarged(parts: Sequence[Array], parameters: int) -> Array:
+    """By how much the errors of each part are too small, never less than 1.
+
+    What considered parameters add is not taken off: it is far from linear in them, and parameters would come out
+    several standard deviations wrong.
+    """
     count = sum(map(len, parts))
     freedom = count / max(count - parameters, 1)
     return np.array([max(1.0, math.sqrt(freedom * np.mean(part**2))) if len(part) else 1.0 for part in parts])
