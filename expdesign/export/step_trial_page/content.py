@@ -138,7 +138,12 @@ def repeat_rows(content: StepTrialContent) -> list[tuple[str, ...]]:
 def _to(one: StepSample, channel: int) -> str:
     after, change = one.hold.commands[channel], one.hold.change[channel]
     moved = one.hold.changed in (CHANNELS[channel], "both")
-    return f"{after - change:.3g} \N{RIGHTWARDS ARROW} {after:.3g}" if moved else f"{after:.3g}"
+    return f"{_order(after - change)} \N{RIGHTWARDS ARROW} {_order(after)}" if moved else _order(after)
+
+
+def _order(value: float) -> str:
+    """A command without the rounding errors of its computation."""
+    return f"{round(value, 6) + 0.0:.3g}"
 
 
 STEP_HEADER = (
