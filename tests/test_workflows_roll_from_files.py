@@ -72,6 +72,7 @@ def test_three_files_give_the_load_and_say_what_they_do_not_tell(tmp_path: Path)
     assert found["null_space"]["rank"] == 8
     assert found["parameters"]["k"]["std"] is None
     assert not found["parameters"]["k"]["determined"]
+    assert (found["intervals_trusted"], found["reached_bounds"]) == (True, [])
     page = (tmp_path / "out" / "roll.html").read_text()
     assert "The load cases determine 8 of 9 parameters, whatever the data are. k was held at the start value." in page
     assert "measure how far the accelerometer is from the rotation axis" in page
@@ -86,6 +87,19 @@ def test_with_k_known_all_else_is_found(tmp_path: Path) -> None:
     assert isinstance(stds, dict)
     for name, std in stds.items():
         assert abs(values[name] - truth(name)) < 4 * std, name
+
+
+def test_a_parameter_at_a_bound_of_the_search_is_named_on_page_and_in_file(tmp_path: Path) -> None:
+    far = K_KNOWN.replace("9.0", "40.0")
+    loads = stated(tmp_path, "\n[[load]]\n" + KNOWN + UNKNOWN + far)
+    roll(three(tmp_path), tmp_path / "out", loads=loads, method="ls")
+    found = json.loads((tmp_path / "out" / "roll.json").read_text())
+    page = (tmp_path / "out" / "roll.html").read_text()
+    assert found["reached_bounds"]
+    for name in found["reached_bounds"]:
+        assert f"{name} stands at a bound of the search, {found['parameters'][name]['value']:.4g} " in page
+    assert not found["intervals_trusted"]
+    assert "The 95 % intervals are not to be trusted" in page
 
 
 def test_one_file_gives_five_parameters_and_two_give_seven(tmp_path: Path) -> None:
@@ -111,6 +125,13 @@ def test_wrong_inputs_are_one_line_and_leave_nothing(tmp_path: Path) -> None:
         roll(files[:1], out, loads=stated(tmp_path, "\n[[load]]\nunknown = true\nmass_kg = 1.0\n"))
     with pytest.raises(FileError, match=r"known: is 'K_v', "):
         roll(files[:1], out, loads=stated(tmp_path, "\n[[load]]\n\n[known]\nK_v = 1.0\n"))
+    both = "\n[known]\nk = 9.0\n\n[start]\nk = 8.0\n"
+    with pytest.raises(FileError, match=r"start\.k: is also under \[known\], expected it under one of"):
+        roll(files[:1], out, loads=stated(tmp_path, "\n[[load]]\n" + both))
+    with pytest.raises(InputError, match=r"nominal\.csv: is given more than once, expected each data file once"):
+        roll([files[0], files[0]], out, loads=stated(tmp_path, "\n[[load]]\n" + KNOWN))
+    with pytest.raises(FileError, match=r"is not valid TOML: .*overwrite"):
+        roll(files[:1], out, loads=stated(tmp_path, "\n[[load]]\n\n[known]\nk = 9.0\nk = 8.0\n"))
     path = tmp_path / "flat.toml"
     path.write_text(SHIP.replace("beam_m = 0.3", "beam_m = 0.0") + "\n[[load]]\n")
     with pytest.raises(FileError, match=r"ship\.beam_m: is 0, expected more than 0"):

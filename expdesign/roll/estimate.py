@@ -159,6 +159,19 @@ class RollEstimate:
         """All parameters by name."""
         return named(self.theta)
 
+    @property
+    def reached(self) -> tuple[str, ...]:
+        """Free parameters that stand at a bound of the search, where no interval holds."""
+        low, high = self.problem.bounds
+        near = TUNING.at_bound * (high - low)
+        at = (self.theta <= low + near) | (self.theta >= high - near)
+        return tuple(name for name in self.problem.free if name not in self.held and at[PARAMETERS.index(name)])
+
+    @property
+    def trusted(self) -> bool:
+        """Whether intervals may be believed: rounds settled, no bound was reached, residuals are free of the rudder."""
+        return self.settled and not self.reached and not self.surprise > TUNING.most_surprise
+
 
 @dataclass(frozen=True, eq=False)
 class _Weighted:

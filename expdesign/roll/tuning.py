@@ -25,8 +25,10 @@ class Tuning:
         noise_ratios: of the noise of roll rates to that of other signals, as they enter the equation, that are tried.
         left_out_samples: at the beginning of a run, where lags reach before it.
         farthest: typical sizes from zero, beyond which no parameter is sought.
+        at_bound: share of the range of the search, within which of its end a parameter stands at the bound.
         most_rounds: of instruments and noise models.
         settled: change in a round, in standard deviations of each parameter, that ends them.
+        most_surprise: least sum of squares over its expected value, beyond which intervals are not to be trusted.
         unseen: relative sensitivity below which the equations themselves leave a direction open.
         open_sizes: change along an open direction that is counted with, in sizes of the parameter that it moves most.
         faint_std: relative standard deviation along a direction from which data are said not to tell it.
@@ -48,8 +50,10 @@ class Tuning:
     noise_ratios: tuple[float, ...] = (0.0, *(10.0**power for power in range(-4, 5)), 1e6)
     left_out_samples: int = 50
     farthest: float = 10.0
+    at_bound: float = 1e-4
     most_rounds: int = 12
     settled: float = 0.02
+    most_surprise: float = 3.0
     unseen: float = 1e-9
     open_sizes: float = 5.0
     faint_std: float = 1.0

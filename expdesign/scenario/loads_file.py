@@ -81,6 +81,9 @@ def load_cases(path: Path | str) -> LoadCases:
     entry = Entry(Path(path))
     file = check_table(LoadsFile, read_toml(entry.path), entry)
     ship = file.ship
+    for name in file.start:
+        if name in file.known:
+            raise entry.at("start").at(name).error("is also under [known], expected it under one of them")
     return LoadCases(
         body=Body(
             mass_kg=ship.mass_kg, z_g=-ship.mass_height_m, z_s=-ship.sensor_height_m,

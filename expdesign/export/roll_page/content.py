@@ -6,7 +6,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from expdesign.export.files import finite, strict_json
-from expdesign.roll import MEANINGS, UNITS, Direction, LowPass, NullSpace, RollEstimate, roll_frequency, stiffness
+from expdesign.roll import (
+    MEANINGS,
+    TUNING,
+    UNITS,
+    Direction,
+    LowPass,
+    NullSpace,
+    RollEstimate,
+    roll_frequency,
+    stiffness,
+)
 
 PARAMETER_HEADER = ("parameter", "meaning", "estimate", "95 % interval", "unit")
 CURE_HEADER = ("what more", "directions left open", "smallest relative sensitivity")
@@ -87,11 +97,18 @@ def _sentences(content: RollContent) -> Iterator[str]:
     yield _filtered(content)
     if not estimate.settled:
         yield "Instruments and noise models did not settle; expected longer runs, or a better start under [start]."
-    if estimate.surprise > 3.0:
+    if estimate.surprise > TUNING.most_surprise:
         yield (
             f"Residuals follow the rudder {estimate.surprise:.2g} times as much as noise would: the model misses "
-            "something, and intervals may be too short."
+            "something, or a strong roll moment of waves hides what the rudder does."
         )
+    for name in estimate.reached:
+        yield (
+            f"{name} stands at a bound of the search, {estimate.values[name]:.4g} {UNITS[name]}: it is no estimate; "
+            "give it under [known], or a better start under [start]."
+        )
+    if not estimate.trusted:
+        yield "The 95 % intervals are not to be trusted, for what is said above; they may be far too short."
     if estimate.method == "ls":
         yield "Least squares is biased where waves or sensors disturb, and its intervals do not say so; use iv."
 
@@ -144,6 +161,8 @@ def roll_json(content: RollContent) -> str:
             },
             "settled": estimate.settled,
             "surprise": finite(estimate.surprise),
+            "reached_bounds": list(estimate.reached),
+            "intervals_trusted": estimate.trusted,
             "remarks": list(roll_sentences(content)),
             "notes": list(content.notes),
         }

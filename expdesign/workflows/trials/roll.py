@@ -74,6 +74,9 @@ def roll(
         raise InputError(
             f"{loads}: load: has {len(known.loads)} load cases for {len(data)} data files, expected one each"
         )
+    for path in data:
+        if sum(path.resolve() == other.resolve() for other in data) > 1:
+            raise InputError(f"{path}: is given more than once, expected each data file once")
     cases, notes = _cases(data, known, rudder)
     filter_ = low_pass(cases, roll_hz=1.0 / known.period_s, cutoff_hz=lowpass_hz)
     problem = build_problem(

@@ -12,12 +12,17 @@ ours, as the thesis does not state them.
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Iterable
+from pathlib import Path
 
 import numpy as np
 
 from expdesign.roll import NOMINAL, PARAMETERS, Case, Load, RollEstimate, RollProblem, build_problem, estimate_roll
 from expdesign.values import Array
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
 from roll_truths import (
     CASES,
     MODEL_SHIP,
@@ -64,7 +69,7 @@ def moment(runs: int, seed: int) -> None:
                 rows.append(estimate_roll(pendulum_problem((case,), OWN, PENDULUM_TRUTH), method=method))
         for method, rows in found.items():
             cells = [_cell(rows, name, truth(PENDULUM_TRUTH, name)) for name in OWN]
-            print(f"| {rms} | {method} | {' | '.join(cells)} |")
+            print(f"| {rms} | {method} | {' | '.join(cells)} | {_trusted(rows)} |")
 
 
 def pendulum(runs: int, seed: int) -> None:
@@ -127,6 +132,17 @@ def _cell(rows: list[RollEstimate], name: str, wanted: float) -> str:
     spread = np.subtract(*np.percentile(values, [75, 25])) / 1.349
     held = 100 * np.mean(np.abs(values - wanted) < 1.96 * told)
     return f"{np.median(values):.4f} ± {spread:.4f} ({np.median(told):.4f}, {held:.0f} %)"
+
+
+def _trusted(rows: list[RollEstimate]) -> str:
+    """How many estimates say that their intervals may be trusted, and the share of these intervals that hold."""
+    kept = [one for one in rows if one.trusted]
+    held = [
+        abs(one.values[name] - truth(PENDULUM_TRUTH, name)) < 1.96 * one.std[name]
+        for one in kept
+        for name in one.problem.free
+    ]
+    return f"{len(kept)} of {len(rows)}" + (f", {100 * np.mean(held):.0f} %" if held else "")
 
 
 STUDIES = {"moment": moment, "pendulum": pendulum, "ship": ship}
