@@ -13,7 +13,7 @@ from expdesign.durations import bordered, build_durations, solve_durations
 from expdesign.errors import InputError, UnknownName
 from expdesign.growing.loop import grow_dictionary, motion_limits
 from expdesign.growing.optimal_design import optimum, sensitivity
-from expdesign.growing.search import violation
+from expdesign.growing.search import Measure, Worth, pool_of, refined, violation
 from expdesign.growing.space import family_spaces
 from expdesign.growing.values import GrowSettings, Growth
 from expdesign.information import MEAN_SUBTRACTIONS, score_primitives
@@ -113,6 +113,25 @@ def test_the_same_seed_grows_the_same_and_another_seed_looks_elsewhere():
     )
     assert first == again
     assert first != other
+
+
+def test_a_familys_candidates_and_steps_do_not_depend_on_the_others_that_are_searched():
+    ship, limits = vessel("model-ship"), np.array([(0.0, 0.8), (-0.1, 0.1), (-0.2, 0.2)])
+    names, few = ship.model.names, ("zigzag", "multisine")
+    measure = Measure(vessel=ship, names=names, environment=CALM, mean_subtraction="complete", limits=limits)
+    worth = Worth(gradient=np.eye(len(names) + 3))  # bordered by the means of three equations
+
+    def searched(families: tuple[str, ...], run_s: float = 12.5) -> dict[str, np.ndarray]:
+        spaces = family_spaces(ship, tuple(family(name) for name in families), limits, run_s)
+        archives = pool_of(spaces, measure, pool=8, seed=1)
+        archives = refined(archives, worth, measure, np.random.default_rng(1))
+        return {archive.space.family.name: archive.points for archive in archives}
+
+    alone, among = searched(few), searched(("turning_circle", "multisine", "acceleration", "zigzag"))
+    for name in few:
+        assert len(alone[name]) > 8
+        np.testing.assert_array_equal(alone[name], among[name])
+    assert not np.array_equal(alone["zigzag"][:8], searched(few, run_s=25.0)["zigzag"][:8])
 
 
 def test_what_is_left_is_the_largest_sensitivity_of_all_that_was_looked_at():

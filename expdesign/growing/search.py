@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from zlib import crc32
 
 import numpy as np
 
@@ -205,9 +206,9 @@ def pool_of(spaces: Sequence[FamilySpace], measure: Measure, *, pool: int, seed:
     from scipy.stats import qmc  # slow to import
 
     points = []
-    for number, space in enumerate(spaces):
+    for space in spaces:
         count = max(TUNING.fewest_closed_loop, pool // TUNING.closed_loop_share) if space.family.closed_loop else pool
-        sobol = qmc.Sobol(len(space.axes), rng=np.random.default_rng([seed, number]))
+        sobol = qmc.Sobol(len(space.axes), rng=_stream(seed, space))
         points.append(sobol.random_base2(int(np.ceil(np.log2(count)))))
     return _measured(spaces, points, measure)
 
@@ -223,7 +224,8 @@ def refined(
     spaces, grown = [archive.space for archive in archives], tuple(archives)
     for generation, stride in enumerate(TUNING.strides):
         progress("searching for runs that add more information", generation / len(TUNING.strides))
-        points = [_steps(archive, worth, stride, rng) for archive in grown]
+        seed = int(rng.integers(2**32))
+        points = [_steps(archive, worth, stride, _stream(seed, archive.space)) for archive in grown]
         more = _measured(spaces, points, measure)
         grown = tuple(archive.with_more(other) for archive, other in zip(grown, more, strict=True))
     return grown
@@ -233,6 +235,11 @@ def best_of(archives: Sequence[Archive], worth: Worth) -> Candidate | None:
     """The candidate within limits that is worth most, if any is within them."""
     found = [best for archive in archives if (best := archive.best(worth)) is not None]
     return max(found, key=lambda candidate: candidate.merit, default=None)
+
+
+def _stream(seed: int, space: FamilySpace) -> np.random.Generator:
+    """Random numbers of a family and duration, the same whichever others are searched."""
+    return np.random.default_rng([seed, crc32(f"{space.family.name} {float(space.run_s)}".encode())])
 
 
 def _steps(archive: Archive, worth: Worth, stride: float, rng: np.random.Generator) -> Array:
