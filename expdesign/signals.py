@@ -62,7 +62,7 @@ class Trajectory:
         sample_time_s: time between samples [s].
         pose: (k, 3) n-frame [north m, east m, heading rad]; heading is continuous, not wrapped.
         velocity: (k, 3) b-frame [u m/s, v m/s, r rad/s], over ground.
-        auxiliary: (k, 4) the first four of `AUXILIARY`; None where the simulation does not give them.
+        auxiliary: (k, 8) of `AUXILIARY`, nan in columns that the simulation does not give; None where it gives none.
     """
 
     sample_time_s: float
@@ -71,7 +71,7 @@ class Trajectory:
     auxiliary: Array | None = None
 
     def __post_init__(self) -> None:
-        seal(self, pose="k 3", velocity="k 3", **({} if self.auxiliary is None else {"auxiliary": "k 4"}))
+        seal(self, pose="k 3", velocity="k 3", **({} if self.auxiliary is None else {"auxiliary": "k 8"}))
 
     def __len__(self) -> int:
         return len(self.pose)

@@ -42,7 +42,7 @@ def test_a_ship_that_rolls_is_measured_rolling_and_accelerating() -> None:
     commands = turning(ship, 400)
     track = simulate(ship, commands, velocity=(3.0, 0.0, 0.0))
     assert track.auxiliary is not None
-    roll, rate, sway, side = track.auxiliary.T
+    roll, rate, sway, side = track.auxiliary[:, :4].T
     u, v, r = track.velocity.T
     assert r[-1] > 0  # to starboard, so it heels to port
     assert roll[-1] == pytest.approx(-0.15 * side[-1] / (1.0 + 0.05), rel=1e-3)  # what roll itself adds rolls no ship

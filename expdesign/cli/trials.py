@@ -209,6 +209,10 @@ def roll(
         Path,
         typer.Option("--loads", metavar="LOADS.toml", help="Load of each data file; see expdesign explain loads."),
     ],
+    vessel: Annotated[
+        Path | None,
+        typer.Option("--vessel", metavar="VESSEL.toml", help="Ship with [roll], in place of [ship] in LOADS.toml."),
+    ] = None,
     rudder: Annotated[
         list[str] | None,
         typer.Option("--rudder", metavar="NAME ...", help="Signals whose mean steers. Default: rudders, else all a."),
@@ -226,8 +230,9 @@ def roll(
     """Estimate roll inertia, damping, stiffness and an unknown load from runs at one or more loads.
 
     Reads roll_rate_radps, imu_lateral_mps2, r_radps and the rudder. Writes roll.json and roll.html: parameters with
-    intervals, what the loads cannot tell apart, and what would.
+    intervals, what the loads cannot tell apart, and what would; with --vessel also vessel-roll.toml, the ship with the
+    estimate, which simulate and roll-plan take.
 
     Example: expdesign roll nominal.csv calibration.csv loaded.csv --loads loads.toml
     """
-    return ask("roll", data, out, loads=loads, rudder=rudder or (), method=method, lowpass_hz=lowpass)
+    return ask("roll", data, out, loads=loads, vessel=vessel, rudder=rudder or (), method=method, lowpass_hz=lowpass)

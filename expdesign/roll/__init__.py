@@ -13,16 +13,7 @@ several load conditions), chapters 4 to 6.
 
 from expdesign.roll.closed_loop import ClosedLoop, closed_loop, simulated
 from expdesign.roll.estimate import METHODS, RollEstimate, RollProblem, build_problem, estimate_roll
-from expdesign.roll.loads import (
-    G_MPS2,
-    NOMINAL,
-    Body,
-    Load,
-    axis_inertia,
-    first_moment,
-    lumped_centre,
-    sensed_inertia,
-)
+from expdesign.roll.fitted import fitted_pendulum
 from expdesign.roll.model import (
     COEFFICIENTS,
     MEANINGS,
@@ -44,6 +35,16 @@ from expdesign.roll.prepare import LowPass, low_pass, prepared
 from expdesign.roll.runs import SIGNALS, Case, Run
 from expdesign.roll.tuning import TUNING
 from expdesign.roll.waves import Jonswap, encounter, froude_factor, shaping_filter
+from expdesign.vessel.masses import (
+    G_MPS2,
+    NOMINAL,
+    Body,
+    Load,
+    axis_inertia,
+    first_moment,
+    lumped_centre,
+    sensed_inertia,
+)
 
 __all__ = [
     "COEFFICIENTS",
@@ -77,6 +78,7 @@ __all__ = [
     "encounter",
     "estimate_roll",
     "first_moment",
+    "fitted_pendulum",
     "froude_factor",
     "load_from",
     "low_pass",

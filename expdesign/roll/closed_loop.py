@@ -19,8 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from expdesign.roll.loads import G_MPS2
 from expdesign.values import Array, seal
+from expdesign.vessel.masses import G_MPS2
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -22,12 +22,12 @@ from expdesign.errors import InputError, NotInformative
 from expdesign.estimation.noise import automatic_lags, long_run_covariance
 from expdesign.roll.closed_loop import closed_loop
 from expdesign.roll.instruments import black_box_signals, loop_signals
-from expdesign.roll.loads import G_MPS2, NOMINAL, Body, first_moment
 from expdesign.roll.model import PARAMETERS, coefficients, discrete, named, parameters, relative_sensitivity
 from expdesign.roll.regression import WHITE, Rows, build_rows, instrument_columns, noise_model
 from expdesign.roll.runs import Case
 from expdesign.roll.tuning import TUNING
 from expdesign.values import Array, seal
+from expdesign.vessel.masses import G_MPS2, NOMINAL, Body, first_moment
 
 METHODS = ("iv", "ls")
 

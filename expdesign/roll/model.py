@@ -23,8 +23,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.errors import UnknownName
-from expdesign.roll.loads import G_MPS2, Body, Load
 from expdesign.values import Array, seal
+from expdesign.vessel.masses import G_MPS2, Body, Load
 
 UNITS = {
     "k": "N m/rad", "A_x": "kg m2", "d": "N m s/rad", "K_r": "N m s/rad", "K_vd": "kg m", "K_delta": "N m/rad",

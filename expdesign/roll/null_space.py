@@ -20,10 +20,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from expdesign.roll.estimate import RollEstimate, RollProblem
-from expdesign.roll.loads import Body, Load
 from expdesign.roll.model import PARAMETERS, UNITS, named, relative_sensitivity
 from expdesign.roll.tuning import TUNING
 from expdesign.values import Array, seal
+from expdesign.vessel.masses import Body, Load
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from expdesign.roll.loads import G_MPS2, Body, Load, axis_inertia, first_moment
 from expdesign.roll.model import named
 from expdesign.values import Array
+from expdesign.vessel.masses import G_MPS2, Body, Load, axis_inertia, first_moment
 
 System = tuple[Array, Array, Array, Array]
 

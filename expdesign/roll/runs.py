@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from expdesign.roll.loads import Load
 from expdesign.values import Array, seal
+from expdesign.vessel.masses import Load
 
 SIGNALS = ("roll rate", "accelerometer", "yaw rate", "rudder")
 """Columns of a run."""

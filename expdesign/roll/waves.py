@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.errors import InputError
-from expdesign.roll.loads import G_MPS2
 from expdesign.values import Array
+from expdesign.vessel.masses import G_MPS2
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,8 +10,10 @@ from typing import ClassVar
 
 from pydantic import Field
 
-from expdesign.roll import MEANINGS, NOMINAL, PARAMETERS, UNITS, Body, Load
-from expdesign.scenario.tables import Entry, NonNegative, Number, Positive, Table, check_table, read_toml
+from expdesign.roll import MEANINGS, PARAMETERS, UNITS, Body, Load
+from expdesign.scenario.tables import Entry, Number, Positive, Table, check_table, read_toml
+from expdesign.scenario.vessels.pendulum_table import LoadTable
+from expdesign.vessel import Vessel
 
 
 class ShipTable(Table):
@@ -28,12 +31,9 @@ class ShipTable(Table):
     period_s: Positive = Field(description="her roll period [s], roughly; a filter must pass it")
 
 
-class LoadTable(Table):
+class CaseTable(LoadTable):
     """`[[load]]`."""
 
-    mass_kg: NonNegative = Field(default=0.0, description="the mass of the known load [kg]")
-    height_m: Number = Field(default=0.0, description="the height of its centre above the origin [m]")
-    inertia_kgm2: NonNegative = Field(default=0.0, description="its inertia about its own centre [kg m2]")
     unknown: bool = Field(default=False, description="whether this load is the one that is sought")
 
 
@@ -42,8 +42,10 @@ class LoadsFile(Table):
 
     topic: ClassVar[str] = "loads"
 
-    ship: ShipTable = Field(description="a table [ship]")
-    load: list[LoadTable] = Field(min_length=1, description="tables [[load]], one for each data file in their order")
+    ship: ShipTable | None = Field(
+        default=None, description="a table [ship]; left out where a vessel file with [roll] says the same"
+    )
+    load: list[CaseTable] = Field(min_length=1, description="tables [[load]], one for each data file in their order")
     known: dict[str, Number] = Field(
         default_factory=dict,
         description=f"a table [known] of parameters not to estimate: {', '.join(PARAMETERS)}",
@@ -72,35 +74,51 @@ class LoadCases:
     start: Mapping[str, float]
 
 
-def load_cases(path: Path | str) -> LoadCases:
+def load_cases(path: Path | str, vessel: Vessel | None = None) -> LoadCases:
     """Read a file of load cases.
+
+    Args:
+        path: of it.
+        vessel: whose [roll], if it has one, is in place of the file's [ship], and where the search begins.
 
     Raises:
         FileError: unreadable, or something in it is wrong, missing or unknown.
     """
     entry = Entry(Path(path))
     file = check_table(LoadsFile, read_toml(entry.path), entry)
-    ship = file.ship
     for name in file.start:
         if name in file.known:
             raise entry.at("start").at(name).error("is also under [known], expected it under one of them")
+    known, start = _named(file.known, entry.at("known")), _named(file.start, entry.at("start"))
+    loads = tuple(_load(table, entry.at("load").item(number)) for number, table in enumerate(file.load, start=1))
+    if vessel is None or vessel.pendulum is None:
+        if file.ship is None:
+            raise entry.at("ship").error("is missing, expected this table, or --vessel with a file that has [roll]")
+        return LoadCases(
+            body=_body(file.ship), loads=loads, beam_m=file.ship.beam_m, period_s=file.ship.period_s, known=known,
+            start=start,
+        )  # fmt: skip
+    if file.ship is not None:
+        raise entry.at("ship").error(f"is given, and [roll] of vessel {vessel.name!r} too, expected one of them")
+    if not math.isfinite(vessel.pendulum.period_s):
+        raise entry.error(f"vessel {vessel.name!r} does not stay upright by her [roll], expected one that does")
+    begin = {name: value for name, value in vessel.pendulum.parameters.items() if name not in known}
     return LoadCases(
-        body=Body(
-            mass_kg=ship.mass_kg, z_g=-ship.mass_height_m, z_s=-ship.sensor_height_m,
-            sensor_from_axis=ship.sensor_above_axis,
-        ),
-        loads=tuple(_load(table, entry.at("load").item(number)) for number, table in enumerate(file.load, start=1)),
-        beam_m=ship.beam_m,
-        period_s=ship.period_s,
-        known=_named(file.known, entry.at("known")),
-        start=_named(file.start, entry.at("start")),
+        body=vessel.pendulum.body, loads=loads, beam_m=vessel.beam_m, period_s=vessel.pendulum.period_s, known=known,
+        start={**begin, **start},
     )  # fmt: skip
 
 
-def _load(table: LoadTable, entry: Entry) -> Load | None:
+def _body(ship: ShipTable) -> Body:
+    return Body(
+        mass_kg=ship.mass_kg, z_g=-ship.mass_height_m, z_s=-ship.sensor_height_m,
+        sensor_from_axis=ship.sensor_above_axis,
+    )  # fmt: skip
+
+
+def _load(table: CaseTable, entry: Entry) -> Load | None:
     if not table.unknown:
-        same = Load(mass_kg=table.mass_kg, z_m=-table.height_m, inertia_kgm2=table.inertia_kgm2)
-        return same if table.mass_kg else NOMINAL
+        return table.load
     if table.mass_kg or table.height_m or table.inertia_kgm2:
         raise entry.error("is unknown = true and states a load, expected one of them")
     return None

@@ -21,6 +21,7 @@ from expdesign.simulation.environment import (
 )
 from expdesign.simulation.helm import Approach, Helm, service_speed, steady_ahead
 from expdesign.simulation.motion import euler_step, motion_rates, relative_velocity, rk4_step, to_body
+from expdesign.simulation.rolling import steering_signals
 from expdesign.simulation.run import integrate_motion, simulate, simulate_many
 from expdesign.simulation.sensors import measure
 from expdesign.simulation.standard_trials import Conduct, pull_out, stopping, turning_circle, zigzag
@@ -57,6 +58,7 @@ __all__ = [
     "simulate_ensemble",
     "simulate_many",
     "steady_ahead",
+    "steering_signals",
     "stopping",
     "to_body",
     "turning_circle",

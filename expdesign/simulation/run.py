@@ -10,8 +10,9 @@ from expdesign.errors import Diverged, InputError
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation.actuation import deliver
 from expdesign.simulation.environment import CALM, Environment, WeatherSeries, weather_rows
-from expdesign.simulation.motion import begun, motion_rates, rk4_step
+from expdesign.simulation.motion import begun, rk4_step
 from expdesign.simulation.program import STATES, RatesProgram, march
+from expdesign.simulation.rolling import rolled
 from expdesign.values import Array
 from expdesign.vessel import Vessel, VesselModel
 
@@ -72,22 +73,8 @@ def simulate(
         sample_time_s=commands.sample_time_s,
         pose=states[:, :3],
         velocity=states[:, 3:STATES],
-        auxiliary=_auxiliary(vessel.model, states, given[:, 0], sea),
+        auxiliary=rolled(vessel, states, given, sea, commands.sample_time_s),
     )
-
-
-def _auxiliary(model: VesselModel, states: Array, inputs: Array, sea: Array) -> Array | None:
-    """(k + 1, 4) roll, its rate, and accelerations in sway and to starboard; None without a roll mode in radians.
-
-    The accelerations are those just after the inputs of a sample, of the last one's at the end.
-    """
-    if model.roll is None or not model.roll.heel_rad_per_mps2:
-        return None
-    held, flow = (np.concatenate([x, x[-1:]]) for x in (inputs, np.broadcast_to(sea, (len(inputs), 4))))
-    state, drive, weather = (tuple(np.moveaxis(x, -1, 0)) for x in (states, held, flow))
-    rates = motion_rates(model, state, drive, current_to=weather[:2], wind_to=weather[2:])
-    heel = model.roll.heel_rad_per_mps2 * states[:, STATES:]
-    return np.column_stack([heel, rates[4], rates[4] + state[3] * state[5]])
 
 
 def integrate_motion(

@@ -158,7 +158,7 @@ def measure(
 
     Returns:
         Column name -> (k,). Wind is the relative wind in the b-frame, the air's velocity past the ship taken as
-        (u_q, v_q) = velocity - wind. Ships with a roll mode in radians have columns of roll and acceleration, too.
+        (u_q, v_q) = velocity - wind. Ships that roll in radians have columns of roll and acceleration, too.
     """
     count = len(commands)
     states = np.concatenate([trajectory.pose[:count], trajectory.velocity[:count]], axis=1)
@@ -186,6 +186,13 @@ def _auxiliary(sensors: Sensors, trajectory: Trajectory, count: int, rng: np.ran
     """Roll and accelerations, where the simulation gives them; drawn last, so that other noise is as without them."""
     if trajectory.auxiliary is None:
         return {}
-    std = np.array([sensors.roll_rad, sensors.roll_rate_radps, sensors.acceleration_mps2, sensors.acceleration_mps2])
-    told = trajectory.auxiliary[:count] + std * rng.standard_normal((count, len(std)))
-    return dict(zip(AUXILIARY, told.T, strict=False))
+    given = np.isfinite(trajectory.auxiliary[0])
+    told, noise = trajectory.auxiliary[:count, given], _auxiliary_std(sensors)[given]
+    told = told + noise * rng.standard_normal(told.shape)
+    return dict(zip(np.array(AUXILIARY)[given].tolist(), told.T, strict=True))
+
+
+def _auxiliary_std(sensors: Sensors) -> Array:
+    """(8,) standard deviations of `AUXILIARY`; forces of actuators have none."""
+    noise = {"roll_rad": sensors.roll_rad, "roll_rate_radps": sensors.roll_rate_radps}
+    return np.array([noise.get(name, sensors.acceleration_mps2 * name.endswith("_mps2")) for name in AUXILIARY])

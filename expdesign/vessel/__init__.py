@@ -23,8 +23,9 @@ from expdesign.vessel.inverse import (
     required_force,
     within_limits,
 )
+from expdesign.vessel.masses import NOMINAL, Body, Load
 from expdesign.vessel.model import VesselModel
-from expdesign.vessel.roll import Roll
+from expdesign.vessel.roll import NOT_ACTING_BACK, ROLL_PARAMETERS, Roll, RollPendulum
 from expdesign.vessel.sensors import CENTRAL, SENSORS, Mounting, Sensors
 from expdesign.vessel.structures import STRUCTURES, TERMS, Term, structure_terms
 from expdesign.vessel.vessel import Vessel, std_keys
@@ -34,8 +35,11 @@ __all__ = [
     "CENTRAL",
     "IDEAL",
     "KINDS",
+    "NOMINAL",
+    "NOT_ACTING_BACK",
     "NOT_SUPPORTED",
     "NUMPY",
+    "ROLL_PARAMETERS",
     "SCALAR",
     "SENSORS",
     "STEADY",
@@ -43,13 +47,16 @@ __all__ = [
     "TERMS",
     "Actuator",
     "Allocator",
+    "Body",
     "Environment",
     "Inertia",
     "Limit",
+    "Load",
     "Mounting",
     "Operators",
     "Response",
     "Roll",
+    "RollPendulum",
     "Sensors",
     "Term",
     "Variation",

@@ -1,4 +1,6 @@
-"""Roll that is not measured: one lightly damped mode, driven by the side acceleration, that pushes sway and yaw.
+"""Roll of a vessel, in one of two ways: a mode that acts back on sway and yaw, or a pendulum that does not.
+
+`Roll`, [model.roll], is roll that is not measured: one lightly damped mode, driven by the side acceleration.
 
     phi'' + 2 zeta w0 phi' + w0^2 phi = w0^2 a_y       w0 = 2 pi / period
     dv/dt = Y(u, v, r, ...) + Y_phi phi                a_y = Y(u, v, r, ...) + u r
@@ -8,17 +10,28 @@ Y and N are the model's terms. Roll is counted in the side acceleration a_y [m/s
 without roll do not determine its angle; with the angle phi_0 that 1 m/s^2 holds, Y_phi / phi_0 is per radian. At rest
 and on a straight course roll is zero.
 
+`RollPendulum`, [roll], has masses, places and loads of a ship whose path is that of the model's terms alone:
+
+    A1 phi'' = -(k + g S1) phi - d phi' + (K_vd + S1) a_y + K_r r + K_delta delta          a_y = dv/dt + u r
+    A1 = A_x + I_m + M (z_g + z_f)^2 + m (z_m + z_f)^2          S1 = M (z_g + z_f) + m (z_m + z_f)
+
+with masses M of the ship and m of a load, at z [m] down from a body origin, and the rotation axis z_f above it. An
+accelerometer reads a_s = z_s phi'' + g phi - a_y to port. K_r and K_delta hold for one speed.
+
 Source: K. Son and K. Nomoto, Journal of the Society of Naval Architects of Japan 150 (1981), 232-244; T. Perez and
-M. Blanke, Mathematical Ship Modelling for Control Applications (2002), for the linear roll mode and its coupling terms.
+M. Blanke, Mathematical Ship Modelling for Control Applications (2002), for the linear roll mode and its coupling terms;
+doctoral thesis on grey-box identification of ship roll with few sensors, (4.7), (5.8)-(5.21), for the pendulum.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 from expdesign.errors import InputError
+from expdesign.vessel.masses import G_MPS2, NOMINAL, Body, Load, axis_inertia, first_moment
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,3 +91,68 @@ NOT_FOLLOWED = (
     "the vessel's model has a roll mode, [model.roll], which this calculation does not support; expected a vessel "
     "file without it"
 )
+
+
+ROLL_PARAMETERS = ("k", "A_x", "d", "K_r", "K_vd", "K_delta", "z_f")
+"""Of a pendulum; see `roll.MEANINGS` and `roll.UNITS`."""
+NOT_ACTING_BACK = "roll, [roll] of the vessel file, is left out here: it does not act back on the ship's path"
+
+
+@dataclass(frozen=True, kw_only=True)
+class RollPendulum:
+    """The pendulum, with what is known of its parameters.
+
+    Attributes:
+        body: mass and places of the ship without load.
+        load: on board.
+        parameters: value of each of `ROLL_PARAMETERS`.
+        parameter_std: standard deviations; 0, for known, where there is none.
+        parameter_correlation: of pairs of them, by their names; 0 where there is none.
+    """
+
+    body: Body
+    load: Load = NOMINAL
+    parameters: Mapping[str, float] = field(hash=False)
+    parameter_std: Mapping[str, float] = field(default_factory=dict, hash=False)
+    parameter_correlation: Mapping[tuple[str, str], float] = field(default_factory=dict, hash=False)
+
+    def __post_init__(self) -> None:
+        if set(self.parameters) != set(ROLL_PARAMETERS):
+            raise InputError(f"roll.parameters are {', '.join(self.parameters)}, expected {', '.join(ROLL_PARAMETERS)}")
+        if not self.inertia_kgm2 > 0:
+            raise InputError(f"roll has an inertia of {self.inertia_kgm2:g} kg m2, expected more than 0")
+
+    @property
+    def inertia_kgm2(self) -> float:
+        """A1, about the rotation axis."""
+        return axis_inertia(self.parameters["A_x"], self.body, self.load, self.parameters["z_f"])
+
+    @property
+    def moment_kgm(self) -> float:
+        """S1, of the masses about the rotation axis."""
+        return first_moment(self.body, self.load, self.parameters["z_f"])
+
+    @property
+    def righting_nm(self) -> float:
+        """k + g S1 [N m/rad]; negative for a ship that does not stay upright."""
+        return self.parameters["k"] + G_MPS2 * self.moment_kgm
+
+    @property
+    def metacentric_height_m(self) -> float:
+        """Righting moment per angle over the weight of ship and load."""
+        return self.righting_nm / (G_MPS2 * (self.body.mass_kg + self.load.mass_kg))
+
+    @property
+    def period_s(self) -> float:
+        """Of undamped roll; infinite for a ship that does not stay upright."""
+        return 2.0 * math.pi * math.sqrt(self.inertia_kgm2 / self.righting_nm) if self.righting_nm > 0 else math.inf
+
+    def acceleration(self, roll: Any, rate: Any, side: Any, yaw_rate: Any, rudder: Any) -> Any:
+        """phi'' [rad/s2] from roll [rad], its rate, a_y [m/s2] to starboard, yaw rate and rudder [rad]."""
+        of = self.parameters
+        push = (of["K_vd"] + self.moment_kgm) * side + of["K_r"] * yaw_rate + of["K_delta"] * rudder
+        return (push - self.righting_nm * roll - of["d"] * rate) / self.inertia_kgm2
+
+    def reading(self, roll: Any, acceleration: Any, side: Any) -> Any:
+        """a_s [m/s2] of the accelerometer, to port and with gravity in it, at small angles."""
+        return self.body.sensor(self.parameters["z_f"]) * acceleration + G_MPS2 * roll - side

@@ -12,6 +12,7 @@ from expdesign.values import Array
 from expdesign.vessel.actuators import Actuator, Limit, Response
 from expdesign.vessel.environment import CALM, Environment
 from expdesign.vessel.model import VesselModel
+from expdesign.vessel.roll import RollPendulum
 from expdesign.vessel.sensors import EXACT, FAULTS, Sensors
 
 
@@ -32,6 +33,7 @@ class Vessel:
         model: structure, parameters, actuators.
         sensors: what they add to the truth.
         environment: weather that came with the model, e.g. from a diagnosis; calm when nothing is known.
+        pendulum: roll that the motion drives and that does not act back on it; None without [roll].
         std: standard deviations of what actuators and sensors state, by `std_keys`; known exactly where there is none.
     """
 
@@ -43,6 +45,7 @@ class Vessel:
     model: VesselModel
     sensors: Sensors = EXACT
     environment: Environment = CALM
+    pendulum: RollPendulum | None = None
     std: Mapping[str, float] = field(default_factory=dict, hash=False)
 
     def __post_init__(self) -> None:
@@ -50,6 +53,8 @@ class Vessel:
             value = getattr(self, name)
             if not 0 < value < np.inf:
                 raise InputError(f"vessel.{name} is {value:g}, expected more than 0")
+        if self.pendulum is not None and self.model.roll is not None:
+            raise InputError("the vessel has roll twice, expected one of [roll] and [model.roll]")
         for name in self.std:
             if name not in std_keys(self.actuators):
                 raise UnknownName("standard deviation", name, known=std_keys(self.actuators))

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from expdesign.vessel import NOT_ACTING_BACK, Vessel
+
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
@@ -35,3 +37,8 @@ class TextTable:
     title: str
     header: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
+
+
+def note_on_roll(vessel: Vessel) -> dict[str, object]:
+    """An entry of a summary, where the vessel file has roll that the command leaves out."""
+    return {} if vessel.pendulum is None else {"note_on_roll": NOT_ACTING_BACK}

@@ -16,6 +16,7 @@ from expdesign.vessel import (
     STRUCTURES,
     Actuator,
     Environment,
+    RollPendulum,
     Sensors,
     Variation,
     Vessel,
@@ -52,6 +53,8 @@ def vessel_toml(vessel: Vessel, *, comments: Sequence[str] = ()) -> str:
         lines += ["", *_table("[sensors]", _sensors(vessel.sensors))]
     if vessel.std:
         lines += ["", *_table("[std]", vessel.std)]
+    if vessel.pendulum is not None:
+        lines += _pendulum(vessel.pendulum)
     lines += _environment(vessel.environment)
     return "\n".join(lines) + "\n"
 
@@ -132,19 +135,43 @@ def _model(model: VesselModel) -> Iterator[str]:
         yield from ("", *_table("[model.inertia]", stated))
 
 
+def _pendulum(pendulum: RollPendulum) -> Iterator[str]:
+    body, load = pendulum.body, pendulum.load
+    heights: dict[str, str | float] = {
+        "mass_kg": body.mass_kg, "mass_height_m": -body.z_g, "sensor_height_m": -body.z_s,
+    }  # fmt: skip
+    yield from ("", *_table("[roll]", heights))
+    if body.sensor_from_axis:
+        yield "sensor_above_axis = true"
+    yield from ("", *_table("[roll.parameters]", pendulum.parameters))
+    if pendulum.parameter_std:
+        yield from ("", *_table("[roll.parameter_std]", pendulum.parameter_std))
+    given = pendulum.parameter_correlation
+    if given:
+        rows = {one: {other: value for (name, other), value in given.items() if name == one} for one, _ in given}
+        yield from ("", "[roll.parameter_correlation]", *(_pairs(name, pairs) for name, pairs in rows.items()))
+    if load.mass_kg:
+        stated = {"mass_kg": load.mass_kg, "height_m": -load.z_m, "inertia_kgm2": load.inertia_kgm2}
+        yield from ("", *_table("[roll.load]", stated))
+
+
 def _correlation(model: VesselModel) -> Iterator[str]:
     """Correlations of parameters with standard deviations, a line for each parameter with those before it."""
     correlation, known = model.parameter_correlation_matrix, model.parameter_std > 0
     rows = []
     for place, name in enumerate(model.names):
-        pairs = [
-            f"{_key(model.names[other])} = {value:.9g}"
+        pairs = {
+            model.names[other]: value
             for other, value in enumerate(correlation[place, :place].tolist())
             if value and known[place] and known[other]
-        ]
-        rows += [f"{_key(name)} = {{ {', '.join(pairs)} }}"] * bool(pairs)
+        }
+        rows += [_pairs(name, pairs)] * bool(pairs)
     if rows:
         yield from ("", "[model.parameter_correlation]", *rows)
+
+
+def _pairs(name: str, pairs: Mapping[str, float]) -> str:
+    return f"{_key(name)} = {{ {', '.join(f'{_key(other)} = {value:.9g}' for other, value in pairs.items())} }}"
 
 
 def _table(head: str, entries: Mapping[str, str | float]) -> list[str]:

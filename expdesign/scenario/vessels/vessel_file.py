@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,9 @@ import numpy as np
 
 from expdesign.errors import InputError
 from expdesign.scenario.tables import Entry, check_table, offer, read_toml, shown
+from expdesign.scenario.vessels.correlations import check_names, checked_correlation
 from expdesign.scenario.vessels.environment_table import build_environment
+from expdesign.scenario.vessels.pendulum_table import build_pendulum
 from expdesign.scenario.vessels.vessel_tables import (
     ACTUATOR_TABLES,
     SAME_AS,
@@ -34,6 +36,7 @@ from expdesign.vessel import (
     Mounting,
     Response,
     Roll,
+    RollPendulum,
     Sensors,
     Term,
     Vessel,
@@ -69,8 +72,19 @@ def load_vessel(path: Path | str) -> Vessel:
         model=model,
         sensors=_sensors(file.sensors),
         environment=CALM if file.environment is None else build_environment(file.environment),
+        pendulum=_pendulum(file, model, entry),
         std=_std(file.std, actuators, entry.at("std")),
     )
+
+
+def _pendulum(file: VesselTable, model: VesselModel, entry: Entry) -> RollPendulum | None:
+    if file.roll is None:
+        return None
+    if model.roll is not None:
+        raise entry.at("roll").error("is given beside [model.roll], expected one of them")
+    if "v" not in model.outputs:
+        raise entry.at("roll").error("needs terms of v, whose acceleration drives it")
+    return build_pendulum(file.roll, entry.at("roll"))
 
 
 def _std(given: Mapping[str, float], actuators: Sequence[Actuator], entry: Entry) -> dict[str, float]:
@@ -161,8 +175,8 @@ def _model(table: ModelTable, actuators: tuple[Actuator, ...], sample_time_s: fl
     except InputError as error:
         raise entry.at("terms").error(str(error)) from None
     names = [term.name for term in terms]
-    _check_names(table.parameters, names, entry.at("parameters"))
-    _check_names(table.parameter_std, names, entry.at("parameter_std"))
+    check_names(table.parameters, names, entry.at("parameters"))
+    check_names(table.parameter_std, names, entry.at("parameter_std"))
     missing = [name for name in names if name not in table.parameters]
     if missing:
         found = f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing"
@@ -180,7 +194,9 @@ def _model(table: ModelTable, actuators: tuple[Actuator, ...], sample_time_s: fl
         actuators=actuators,
         roll=None if table.roll is None else Roll(**table.roll.model_dump()),
         inertia=_inertia(table, entry.at("inertia")),
-        parameter_correlation=_correlation(table, names, entry.at("parameter_correlation")),
+        parameter_correlation=checked_correlation(
+            table.parameter_correlation, names, entry.at("parameter_correlation")
+        ),
         parameter_range=_range(table, names, entry),
     )
     if np.linalg.eigvalsh(model.parameter_correlation_matrix)[0] < -CORRELATION_ROUNDING:
@@ -198,8 +214,8 @@ def _inertia(table: ModelTable, entry: Entry) -> Inertia | None:
 def _range(table: ModelTable, names: list[str], entry: Entry) -> dict[str, tuple[float, float]]:
     """Least and most value of the parameters that have one."""
     least, most = table.parameter_min, table.parameter_max
-    _check_names(least, names, entry.at("parameter_min"))
-    _check_names(most, names, entry.at("parameter_max"))
+    check_names(least, names, entry.at("parameter_min"))
+    check_names(most, names, entry.at("parameter_max"))
     found = {name: (least.get(name, -math.inf), most.get(name, math.inf)) for name in {**least, **most}}
     for name, (low, high) in found.items():
         if not low < high:
@@ -207,21 +223,6 @@ def _range(table: ModelTable, names: list[str], entry: Entry) -> dict[str, tuple
         value, std = table.parameters[name], table.parameter_std.get(name, 0.0)
         if not std and not low <= value <= high:
             raise entry.at("parameters").at(name).error(f"is {value:g}, known, expected {low:g} to {high:g} as stated")
-    return found
-
-
-def _correlation(table: ModelTable, names: list[str], entry: Entry) -> dict[tuple[str, str], float]:
-    """Correlations of pairs of parameters."""
-    _check_names(table.parameter_correlation, names, entry)
-    found: dict[tuple[str, str], float] = {}
-    for one, row in table.parameter_correlation.items():
-        _check_names(row, names, entry.at(one))
-        for other, value in row.items():
-            if one == other or (other, one) in found:
-                raise entry.at(one).at(other).error("is given already, expected each pair of parameters once")
-            if not -1.0 <= value <= 1.0:
-                raise entry.at(one).at(other).error(f"is {value:g}, expected -1 to 1")
-            found[one, other] = value
     return found
 
 
@@ -238,10 +239,3 @@ def _check_terms(terms: list[TermTable], actuators: tuple[Actuator, ...], entry:
             parse_expression(term.expression, signals=signals)
         except InputError as error:
             raise entry.item(index).at("expression").error(str(error)) from None
-
-
-def _check_names(given: Iterable[str], names: list[str], entry: Entry) -> None:
-    for name in given:
-        if name not in names:
-            problem = f"{shown(name)} is not a parameter of the structure, {offer(name, tuple(names))}"
-            raise entry.error(problem)

@@ -9,6 +9,7 @@ from pydantic import Field
 
 from expdesign.scenario.tables import NonNegative, Number, Positive, Table, Text
 from expdesign.scenario.vessels.environment_table import EnvironmentTable
+from expdesign.scenario.vessels.pendulum_table import PendulumTable
 from expdesign.vessel import STRUCTURES
 
 TwoTurns = Annotated[float, Field(ge=-4 * math.pi, le=4 * math.pi)]
@@ -292,6 +293,11 @@ class VesselTable(Table):
         default={},
         description="the standard deviations of what [sensors] and [[actuators]] state, by the key of the sensor, or "
         "by signal and quantity: heading_bias_rad, n1_lag_s, a1_delay_s, rudder1_offset; 0, for known, when not given",
+    )
+    roll: PendulumTable | None = Field(
+        default=None,
+        description="a table [roll]: roll as a pendulum that does not act back on the path. simulate measures it, "
+        "expdesign roll and roll-plan read it; all else leaves it out",
     )
     environment: EnvironmentTable | None = Field(
         default=None, description="the weather that simulations of this vessel meet and a diagnosis found"

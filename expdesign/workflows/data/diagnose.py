@@ -23,7 +23,7 @@ from expdesign.values import Array
 from expdesign.vessel import NUMPY, Vessel, VesselModel, direct_terms, generalised_force
 from expdesign.vessel.structures import FORCE_SIGNALS, SHOAL
 from expdesign.workflows.command_text import command_text
-from expdesign.workflows.outcome import Outcome, TextTable
+from expdesign.workflows.outcome import Outcome, TextTable, note_on_roll
 from expdesign.workflows.steps.measured import measured
 from expdesign.workflows.steps.workers import workers
 
@@ -82,7 +82,7 @@ def diagnose(
     }
     written = write_files(out or Path("runs") / data[0].stem, files)
     progress("done", 1.0)
-    return Outcome(files=written, summary=_summary(found), tables=_tables(found))
+    return Outcome(files=written, summary={**_summary(found), **note_on_roll(ship)}, tables=_tables(found))
 
 
 def _proposals(scenario: Path, model: VesselModel) -> tuple[Proposal, ...]:

@@ -27,7 +27,7 @@ from expdesign.export.estimate_page import EstimateContent, estimate_html
 from expdesign.progress import Progress, silent, within
 from expdesign.scenario import load_vessel
 from expdesign.workflows.command_text import command_text
-from expdesign.workflows.outcome import Outcome, TextTable
+from expdesign.workflows.outcome import Outcome, TextTable, note_on_roll
 from expdesign.workflows.steps.measured import reduced_data
 from expdesign.workflows.steps.workers import workers
 
@@ -120,7 +120,9 @@ def estimate(
     }
     written = write_files(out or Path("runs") / data[0].stem, files)
     progress("done", 1.0)
-    return Outcome(files=written, summary=_estimate_summary(found), tables=_estimate_tables(found))
+    return Outcome(
+        files=written, summary={**_estimate_summary(found), **note_on_roll(ship)}, tables=_estimate_tables(found)
+    )
 
 
 def _estimate_summary(found: Assessment) -> dict[str, object]:

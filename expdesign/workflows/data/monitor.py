@@ -45,7 +45,7 @@ from expdesign.workflows.data.watching import (
     with_piece,
     with_reference,
 )
-from expdesign.workflows.outcome import Outcome, TextTable
+from expdesign.workflows.outcome import Outcome, TextTable, note_on_roll
 from expdesign.workflows.steps.workers import workers
 
 STATE = "monitor-state.json"
@@ -127,7 +127,7 @@ def monitor(
     content = _content(now.phase, now, asked, command)
     written = write_files(folder, _files(content, now))
     progress("done", 1.0)
-    return Outcome(files=written, summary=_summary(content), tables=_tables(content))
+    return Outcome(files=written, summary={**_summary(content), **note_on_roll(asked.vessel)}, tables=_tables(content))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,7 +11,7 @@ from expdesign.errors import FileError, NoPlan
 from expdesign.export import write_files
 from expdesign.progress import Progress
 from expdesign.scenario import Scenario, load_scenario
-from expdesign.workflows.outcome import Outcome, TextTable
+from expdesign.workflows.outcome import Outcome, TextTable, note_on_roll
 
 DRAFT = ("refused.json", "refused.html")
 """Names of the files of a draft; no results have them."""
@@ -39,7 +39,9 @@ def written(
     left = _undeleted(folder) if PLAN in files else ()
     note = {"note_on_earlier_draft": f"cannot be deleted, is of no use: {', '.join(left)}"} if left else {}
     progress("done", 1.0)
-    return Outcome(files=paths, summary={"scenario": case.name, **summary, **note}, tables=tables)
+    return Outcome(
+        files=paths, summary={"scenario": case.name, **summary, **note, **note_on_roll(case.vessel)}, tables=tables
+    )
 
 
 def _undeleted(folder: Path) -> tuple[str, ...]:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from expdesign import __version__
 from expdesign.errors import InputError, UnknownName
-from expdesign.export import write_files
+from expdesign.export import vessel_toml, write_files
 from expdesign.export.roll_page import (
     CURE_HEADER,
     PARAMETER_HEADER,
@@ -30,13 +31,16 @@ from expdesign.roll import (
     Run,
     build_problem,
     estimate_roll,
+    fitted_pendulum,
     low_pass,
     null_space,
     prepared,
     roll_frequency,
 )
-from expdesign.scenario import LoadCases, load_cases
+from expdesign.scenario import LoadCases, load_cases, load_vessel
 from expdesign.signals import AUXILIARY, Batch
+from expdesign.simulation import steering_signals
+from expdesign.vessel import Vessel
 from expdesign.workflows.command_text import command_text
 from expdesign.workflows.outcome import Outcome, TextTable
 
@@ -48,6 +52,7 @@ def roll(
     out: Path | None,
     *,
     loads: Path,
+    vessel: Path | None = None,
     rudder: Sequence[str] = (),
     method: str = "iv",
     lowpass_hz: float | None = None,
@@ -59,6 +64,8 @@ def roll(
         data: CSV files, one for each load.
         out: folder, or None.
         loads: file of load cases.
+        vessel: file of the ship: her [roll] says what is known of masses and places and where the search begins, and
+            vessel-roll.toml is the same ship with the estimate.
         rudder: signals whose mean steers; found by their kinds when empty.
         method: "iv" or "ls".
         lowpass_hz: of the filter; None for one that thinning out needs.
@@ -69,7 +76,8 @@ def roll(
         NoAnswer: the data tell too little.
     """
     progress("reading the data", 0.0)
-    known = load_cases(loads)
+    ship = None if vessel is None else load_vessel(vessel)
+    known = load_cases(loads, ship)
     if len(known.loads) != len(data):
         raise InputError(
             f"{loads}: load: has {len(known.loads)} load cases for {len(data)} data files, expected one each"
@@ -86,16 +94,31 @@ def roll(
     progress("estimating", 0.3)
     estimate = estimate_roll(problem, method=method)
     _check_passed(estimate, filter_)
-    options = {"--loads": loads, "--rudder": tuple(rudder), "--method": method, "--lowpass-hz": lowpass_hz}
+    options = {
+        "--loads": loads,
+        "--vessel": vessel,
+        "--rudder": tuple(rudder),
+        "--method": method,
+        "--lowpass-hz": lowpass_hz,
+    }
     content = RollContent(
         estimate=estimate, report=null_space(estimate), filter=filter_, notes=notes,
         command=command_text("roll", data, options, usual={"--method": "iv"}), version=__version__,
     )  # fmt: skip
     progress("drawing the page", 0.9)
     files = {"roll.json": roll_json(content), "roll.html": roll_html(content)}
+    if ship is not None:
+        files["vessel-roll.toml"] = _fitted(ship, content)
     written = write_files(out or Path("runs") / data[0].stem, files)
     progress("done", 1.0)
     return Outcome(files=written, summary=_summary(content), tables=_tables(content))
+
+
+def _fitted(ship: Vessel, content: RollContent) -> str:
+    """The vessel file of the ship with the estimate."""
+    found = replace(ship, pendulum=fitted_pendulum(content.estimate))
+    head = ("[roll] is the estimate, of the ship without load, by:", f"    {content.command}", *roll_sentences(content))
+    return vessel_toml(found, comments=head)
 
 
 def _cases(data: Sequence[Path], known: LoadCases, rudder: Sequence[str]) -> tuple[tuple[Case, ...], tuple[str, ...]]:
@@ -126,12 +149,11 @@ def _run(path: Path, batch: Batch, rudder: Sequence[str]) -> Run:
     )
 
 
-def _rudders(names: Sequence[str], asked: Sequence[str]) -> tuple[str, ...]:
+def _rudders(names: tuple[str, ...], asked: Sequence[str]) -> tuple[str, ...]:
     for name in asked:
         if name not in names:
             raise UnknownName("rudder signal", name, known=names)
-    found = [tuple(asked), *(tuple(n for n in names if n.rstrip("0123456789") == kind) for kind in ("rudder", "a"))]
-    chosen = next(filter(None, found), ())
+    chosen = tuple(asked) or steering_signals(names)
     if not chosen:
         raise InputError(f"the inputs {', '.join(names)} have no rudder, expected rudder1 or a1, or --rudder")
     return chosen

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from expdesign.errors import InputError
 
 G_MPS2 = 9.81
-"""Gravity, as everywhere in this room [m/s2]."""
+"""Gravity, as everywhere in calculations of roll [m/s2]."""
 
 
 @dataclass(frozen=True, kw_only=True)

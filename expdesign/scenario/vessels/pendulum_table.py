@@ -1,0 +1,114 @@
+"""`[roll]` of a vessel file: roll as a pendulum, from masses, heights and parameters, or what a yard states of her."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from pydantic import Field
+
+from expdesign.errors import InputError
+from expdesign.scenario.tables import Entry, NonNegative, Number, Positive, Table
+from expdesign.scenario.vessels.correlations import checked_correlation
+from expdesign.vessel import NOMINAL, ROLL_PARAMETERS, Body, Load, RollPendulum
+from expdesign.vessel.masses import G_MPS2
+
+STATED = {"k": "metacentric_height_m", "A_x": "period_s", "d": "damping_ratio"}
+"""Parameter -> key that may stand for it."""
+
+
+class LoadTable(Table):
+    """A load."""
+
+    mass_kg: NonNegative = Field(default=0.0, description="the mass of the known load [kg]")
+    height_m: Number = Field(default=0.0, description="the height of its centre above the origin [m]")
+    inertia_kgm2: NonNegative = Field(default=0.0, description="its inertia about its own centre [kg m2]")
+
+    @property
+    def load(self) -> Load:
+        """On board."""
+        there = Load(mass_kg=self.mass_kg, z_m=-self.height_m, inertia_kgm2=self.inertia_kgm2)
+        return there if self.mass_kg else NOMINAL
+
+
+class PendulumTable(Table):
+    """`[roll]`: a pendulum that the motion drives, and that does not act back on it."""
+
+    mass_kg: Positive = Field(description="the mass of the ship without load [kg]")
+    mass_height_m: Number = Field(description="the height of her centre of mass above the origin [m]")
+    sensor_height_m: Number = Field(
+        description="the height of the accelerometer [m] above the origin, or above the rotation axis"
+    )
+    sensor_above_axis: bool = Field(
+        default=False, description="whether sensor_height_m is counted from the rotation axis, which has been located"
+    )
+    metacentric_height_m: Positive | None = Field(
+        default=None, description="the metacentric height of the ship without load [m], in place of parameters.k"
+    )
+    period_s: Positive | None = Field(
+        default=None, description="her roll period without load [s], in place of parameters.A_x"
+    )
+    damping_ratio: NonNegative | None = Field(
+        default=None, description="her damping ratio in roll without load, in place of parameters.d"
+    )
+    parameters: dict[str, Number] = Field(
+        default={}, description=f"a table [roll.parameters]: {', '.join(ROLL_PARAMETERS)}; see expdesign roll"
+    )
+    parameter_std: dict[str, NonNegative] = Field(
+        default={}, description="the standard deviation of each parameter; 0, for known, when not given"
+    )
+    parameter_correlation: dict[str, dict[str, Number]] = Field(
+        default={}, description="the correlation of the errors of two parameters, each pair once; 0 when not given"
+    )
+    load: LoadTable = Field(default=LoadTable(), description="a table [roll.load]: what lies on board")
+
+
+def build_pendulum(table: PendulumTable, entry: Entry) -> RollPendulum:
+    """The pendulum of a table.
+
+    Raises:
+        FileError: a parameter is missing, unknown or stated twice, or no pendulum is like that.
+    """
+    for key in ("parameters", "parameter_std"):
+        for name in getattr(table, key):
+            if name not in ROLL_PARAMETERS:
+                raise entry.at(key).unknown(name, ROLL_PARAMETERS)
+    for name, key in STATED.items():
+        if (name in table.parameters) == (getattr(table, key) is not None):
+            both = "both are given" if name in table.parameters else "neither is given"
+            raise entry.error(f"{key} and parameters.{name}: {both}, expected one of them")
+    body = Body(
+        mass_kg=table.mass_kg, z_g=-table.mass_height_m, z_s=-table.sensor_height_m,
+        sensor_from_axis=table.sensor_above_axis,
+    )  # fmt: skip
+    try:
+        return RollPendulum(
+            body=body, load=table.load.load, parameters=_parameters(table, body),
+            parameter_std=dict(table.parameter_std),
+            parameter_correlation=checked_correlation(
+                table.parameter_correlation, ROLL_PARAMETERS, entry.at("parameter_correlation")
+            ),
+        )  # fmt: skip
+    except InputError as error:
+        raise entry.error(str(error)) from None
+
+
+def _parameters(table: PendulumTable, body: Body) -> Mapping[str, float]:
+    """All of them, those that the yard's numbers stand for from the ship without load."""
+    given = dict.fromkeys(ROLL_PARAMETERS, 0.0) | table.parameters
+    z_g = body.z_g + given["z_f"]
+    if table.metacentric_height_m is not None:
+        given["k"] = body.mass_kg * G_MPS2 * (table.metacentric_height_m - z_g)
+    righting = given["k"] + G_MPS2 * body.mass_kg * z_g
+    if not righting > 0 and (table.period_s is not None or table.damping_ratio is not None):
+        raise InputError(
+            f"has a righting moment of {righting:.4g} N m/rad without load, expected more than 0 for a ship with a "
+            "roll period or damping ratio"
+        )
+    if table.period_s is not None:
+        given["A_x"] = righting * (table.period_s / (2.0 * math.pi)) ** 2 - body.mass_kg * z_g**2
+    if not given["A_x"] > 0:
+        raise InputError(f"has a roll inertia A_x of {given['A_x']:.4g} kg m2, expected more than 0: a longer period_s")
+    if table.damping_ratio is not None:
+        given["d"] = 2.0 * table.damping_ratio * math.sqrt(righting * (given["A_x"] + body.mass_kg * z_g**2))
+    return given
