@@ -36,9 +36,9 @@ def slow(ship: Vessel) -> Vessel:
 
 
 def rolling(ship: Vessel) -> Vessel:
-    """The same with a roll mode."""
+    """The same with a roll mode, in place of a pendulum."""
     roll = Roll(period_s=9.0, damping_ratio=0.05, Y_phi=0.1, N_phi=0.001)
-    return replace(ship, model=replace(ship.model, roll=roll))
+    return replace(ship, model=replace(ship.model, roll=roll), pendulum=None)
 
 
 def commands_of(ship: Vessel, samples: int = SAMPLES) -> Commands:
