@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +14,10 @@ import pytest
 from expdesign.cli import main
 from expdesign.monitoring import saved
 from expdesign.records import read_levels
-from expdesign.step_trials import controls_of
+from expdesign.step_trials import controls_of, levels_of
 from expdesign.step_trials.live import Row, State, after_row, beginning, restored_state, step_list
+from expdesign.workflows.data.step_trials.listed import listed_steps
+from export_case import plan, plan_files
 from live_case import SHORT, Crew, list_csv, plateau_of, rows_csv, watch_setup
 from step_case import GUESS, INPUTS
 
@@ -165,3 +168,27 @@ def test_lists_and_data_that_do_not_fit_are_refused_in_one_line(
     told = capsys.readouterr().err
     assert what in told
     assert told.count("\n") == 1
+
+
+def test_runs_of_a_plan_are_a_list_of_steps_and_ways_to_their_first_commands_are_none(tmp_path: Path) -> None:
+    for name, text in plan_files().items():
+        (tmp_path / name).write_text(text)
+    names = ("tau_x", "tau_y", "tau_psi")
+    steps = listed_steps(tmp_path / "plan.json", names, controls_of(names), None)
+    runs = [leg for leg in plan().legs if leg.kind == "primitive"]
+    levels = [levels_of(plan().commands.values[leg.first : leg.last], 1.0) for leg in runs]
+    assert len(steps.steps) == sum(len(values) - 1 for values, _ in levels if len(values))
+    assert steps.start == tuple(levels[0][0][0])
+    assert steps.first_s == levels[0][1][0]
+    ends = [tuple(values[-1]) for values, _ in levels if len(values)]
+    begins = [tuple(values[0]) for values, _ in levels if len(values)]
+    between = set(zip(ends, begins[1:], strict=False))
+    assert not between & {(step.before, step.after) for step in steps.steps}
+
+
+def test_a_list_holds_its_own_changes_of_command_and_no_others() -> None:
+    steps = step_list(INPUTS, np.array(SHORT), controls_of(INPUTS))
+    assert all(steps.holds(np.array(one), np.array(other)) for one, other in pairwise(SHORT))
+    assert steps.holds(np.array([4.01, 0.1]), np.array([8.0, 0.101]))
+    assert not steps.holds(np.array([12.0, 0.1]), np.array([4.0, 0.1]))
+    assert not steps.holds(np.array([8.0, 0.3]), np.array([12.0, 0.3]))

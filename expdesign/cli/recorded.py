@@ -235,6 +235,14 @@ def identify_steps(
         list[Path] | None,
         typer.Option("--test", metavar="FILE ...", help="Runs held out: simulated, but not used to identify."),
     ] = None,
+    steps: Annotated[
+        Path | None,
+        typer.Option(
+            "--steps",
+            metavar="FILE",
+            help="What was to be sailed, as in watch-steps, e.g. plan.json: only these steps are asked to be repeated.",
+        ),
+    ] = None,
     velocity: Velocity = "auto",
     out: OutByData = None,
     seed: Seed = 0,
@@ -254,6 +262,7 @@ def identify_steps(
         throttle=throttle or (),
         rudder=rudder or (),
         tests=tests or (),
+        steps=steps,
         velocity=velocity,
         seed=seed,
     )
@@ -270,7 +279,7 @@ def watch_steps(
             "--steps",
             metavar="FILE",
             help="What is to be sailed: a CSV with one row for each hold and a column for every input (n1_rps, "
-            "rudder1_rad); a plan's commands.csv; or a dictionary with families of steps (.toml).",
+            "rudder1_rad); the plan.json of a trial; or a dictionary with families of steps (.toml).",
         ),
     ],
     vessel: Annotated[
@@ -282,8 +291,14 @@ def watch_steps(
     throttle: Throttle = None,
     rudder: Rudder = None,
     learn: Annotated[
-        float, typer.Option("--learn-s", metavar="T", help="Seconds of the first hold, from which the noise is learnt.")
-    ] = 120.0,
+        float | None,
+        typer.Option(
+            "--learn-s",
+            metavar="T",
+            help="Seconds of the first hold, from which the noise is learnt. Default: 120, or 80 % of the hold where "
+            "it is planned to be shorter.",
+        ),
+    ] = None,
     resume: Annotated[
         bool,
         typer.Option(

@@ -188,12 +188,14 @@ def _holds(batch: Sailed, index: int, width: Array, *, first: int) -> Iterator[H
         before = (end, (throttle, rudder))
 
 
-def levels_of(values: Array, sample_time_s: float) -> Array:
-    """(n, m) commands that stand still in turn, of commands (k, m) at every sample."""
+def levels_of(values: Array, sample_time_s: float) -> tuple[Array, Array]:
+    """(n, m) commands that stand still in turn, of commands (k, m) at every sample, and (n,) for how long [s]."""
     width = np.maximum(TUNING.constant_share * np.ptp(values, axis=0), 1e-9)
     least = max(TUNING.least_hold_samples, round(TUNING.least_hold_s / sample_time_s))
     parts = [part for part in _constant(values, width) if part[1] - part[0] >= least]
-    return np.array([np.median(values[begin:end], axis=0) for begin, end in parts]).reshape(len(parts), values.shape[1])
+    levels = np.array([np.median(values[begin:end], axis=0) for begin, end in parts])
+    lengths = np.array([(end - begin) * sample_time_s for begin, end in parts])
+    return levels.reshape(len(parts), values.shape[1]), lengths
 
 
 def _constant(commands: Array, width: Array) -> Iterator[tuple[int, int]]:

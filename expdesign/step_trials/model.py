@@ -39,15 +39,16 @@ class TwoDofModel:
         Outside the region the state is drawn to its edge with the time constant m / k there, so that nothing runs away.
         """
         inside = self.region.nearest(state)
-        mass = np.array([self._mass(channel, inside) for channel in range(2)])
-        sigma = np.array([float(surface(inside)) for surface in self.damping])
+        u, r = inside.tolist()
+        mass = np.array([self._mass(channel, u, r) for channel in range(2)])
+        sigma = np.array([surface.at(u, r) for surface in self.damping])
         beyond = state - inside
         slope = np.array([surface.most - surface.least for surface in self.damping]) / self.region.scale
         return np.asarray((commands - sigma - slope * beyond) / mass)
 
-    def _mass(self, channel: int, state: Array) -> float:
+    def _mass(self, channel: int, u: float, r: float) -> float:
         surface = self.inertia[channel]
-        return float(np.clip(surface(state), TUNING.least_inertia_share * surface.least, surface.most))
+        return min(max(surface.at(u, r), TUNING.least_inertia_share * surface.least), surface.most)
 
     @property
     def quickest_s(self) -> float:

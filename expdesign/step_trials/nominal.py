@@ -172,12 +172,17 @@ def _change(one: StepSample) -> float:
     return float((one.plateau.state - one.before.state)[one.hold.channel or 0])
 
 
-def posterior(model: VesselModel, known: Evidence) -> tuple[Array, Array]:
+def posterior(model: VesselModel, known: Evidence, *, rounds: int = ROUNDS) -> tuple[Array, Array]:
     """(p,) parameters and (p, p) covariance, by Gauss and Newton from the vessel file's values.
 
     Errors of the two dead times, and of both kinds of time constants by their definition, are estimated beside the
     parameters. Where sway is not measured its parameters are considered, not estimated: they stay, and their stated
     errors count as errors of the data, in weights and covariance (S. F. Schmidt, Advances in Control Systems 3, 1966).
+
+    Args:
+        model: the vessel's, with what is known before.
+        known: from the steps.
+        rounds: of weights and parameters in turn.
 
     Raises:
         NotInformative: sway has no steady drift at the vessel file's values.
@@ -197,10 +202,10 @@ def posterior(model: VesselModel, known: Evidence) -> tuple[Array, Array]:
 
     z = np.zeros(estimated)
     if np.isfinite(known.steady.sway).all():
-        begun, _ = posterior(model, known.without_sway())
+        begun, _ = posterior(model, known.without_sway(), rounds=1)
         z[NUISANCES:] = np.linalg.solve(root, (begun - model.parameters)[free])
     enlarged, slopes = np.ones(5), _considered_slopes(parts, with_considered(z), considered)
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         white = _whitening(np.repeat(enlarged, list(map(len, parts(with_considered(z))))), slopes)
         found = scipy.optimize.least_squares(
             lambda z, white=white: np.append(white @ np.concatenate(parts(with_considered(z))), z),

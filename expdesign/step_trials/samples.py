@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from expdesign.progress import Progress, silent, within
+from expdesign.progress import Progress, silent
 from expdesign.step_trials.holds import CHANNELS, Hold, Sailed
 from expdesign.step_trials.responses import (
     Response,
@@ -23,7 +23,6 @@ from expdesign.step_trials.responses import (
     fit_first_order,
     fit_second_order,
     preference,
-    shared_delay,
 )
 from expdesign.step_trials.tuning import TUNING
 from expdesign.values import Array, seal
@@ -119,45 +118,6 @@ class StepSample:
 
 Delays = tuple[tuple[float, float], tuple[float, float]]
 """Of throttle and rudder, two numbers each: bounds, or value and standard error [s]."""
-
-
-def samples_and_delays(
-    batches: Sequence[Sailed], holds: Sequence[Hold], steady: Sequence[int | None], *, progress: Progress = silent
-) -> tuple[tuple[StepSample, ...], Delays]:
-    """A sample of every hold, and the dead times of both commands.
-
-    A dead time belongs to an actuator, not to a step: it is found in each step first, and all responses are fitted anew
-    with that of all. Throttle responses are of first order; rudder responses share a shape of second order.
-    """
-    free = (0.0, TUNING.most_delay_s)
-    samples = step_samples(batches, holds, steady, delay_s=(free, free), progress=within(progress, 0.0, 0.5))
-    delays = _delay(samples, 0), _rudder_delay(samples)
-    bounds = tuple((value, value) for value, _ in delays)
-    again = within(progress, 0.5, 1.0)
-    fitted = step_samples(batches, holds, steady, delay_s=(bounds[0], bounds[1]), progress=again)
-    return without_outliers(fitted), delays
-
-
-def _delay(samples: Sequence[StepSample], channel: int) -> tuple[float, float]:
-    """Median of the dead times of first order responses, weighted by their information, and its standard error."""
-    own = [one.first_order for one in samples if one.counts and one.hold.channel == channel]
-    found = np.array([part.delay_s for part in own if part is not None])
-    if not len(found):
-        return 0.0, math.inf
-    weights = np.array([max(part.delay_std_s, 1e-3) ** -2.0 for part in own if part is not None])
-    order = np.argsort(found)
-    share = np.cumsum(weights[order]) / weights.sum()
-    middle = float(found[order][np.searchsorted(share, 0.5)])
-    spread = math.sqrt(float(np.sum(weights * (found - middle) ** 2) / weights.sum()))
-    return middle, 1.2533 * spread * math.sqrt(float(np.sum(weights**2))) / float(weights.sum())
-
-
-def _rudder_delay(samples: Sequence[StepSample]) -> tuple[float, float]:
-    """Of responses of one shape, where there are enough of them."""
-    steps = [one.transient for one in samples if one.counts and one.hold.channel == 1 and one.transient is not None]
-    if len(steps) < TUNING.least_group:
-        return _delay(samples, 1)
-    return shared_delay(steps, most_s=TUNING.most_delay_s)
 
 
 def step_samples(

@@ -6,6 +6,7 @@ are even in r, the damping of yaw is odd in r but for a constant, the rudder tha
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -55,6 +56,16 @@ class Surface:
     def __call__(self, state: Array) -> Array:
         """(...) value at states (..., 2)."""
         return np.asarray(_columns(state, self.powers, self.bend) @ self.coefficients)
+
+    def at(self, u: float, r: float) -> float:
+        """Value at one state, quicker than for an array."""
+        value = sum(c * u**i * r**j for c, (i, j) in zip(self._numbers, self.powers, strict=False))
+        bent = self._numbers[-1] * math.tanh(self.bend[0] * (u - self.bend[1])) if self.bend != NO_BEND else 0.0
+        return value + bent
+
+    @cached_property
+    def _numbers(self) -> list[float]:
+        return [float(one) for one in self.coefficients]
 
 
 def _columns(state: Array, powers: Sequence[tuple[int, int]], bend: tuple[float, float]) -> Array:
@@ -143,9 +154,10 @@ class ValidityRegion:
 
     def nearest(self, state: Array) -> Array:
         """The state itself, or the nearest one on the edge."""
-        place = shapely.Point(state / self.scale)
-        if self.hull.intersects(place):
+        u, r = (state / self.scale).tolist()
+        if shapely.intersects_xy(self.hull, u, r):
             return state
+        place = shapely.Point(u, r)
         near = shapely.get_coordinates(shapely.shortest_line(self.hull, place))[0]
         return np.asarray(near * self.scale)
 

@@ -25,6 +25,8 @@ class Tuning:
         outlier: modified z-score from which a value is an outlier (B. Iglewicz and D. Hoaglin, 1993).
         least_group: samples of one command level among which outliers are sought.
         most_delay_s: dead times are sought up to this.
+        entry_constants, least_entry_samples: beginning of a response to the rudder, from which its dead time is found,
+            in time constants, and the least of it.
         preferred: decrease of Akaike's criterion from which a second order response is preferred.
         steady_blocks: of a plateau, whose means give its standard error.
         penalties: of ridge and lasso that cross-validation compares, on columns of unit size.
@@ -57,6 +59,8 @@ class Tuning:
     outlier: float = 3.5
     least_group: int = 5
     most_delay_s: float = 3.0
+    entry_constants: float = 2.0
+    least_entry_samples: int = 10
     preferred: float = 10.0
     steady_blocks: int = 8
     penalties: tuple[float, ...] = (1e-8, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)

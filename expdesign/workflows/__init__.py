@@ -12,11 +12,11 @@ from expdesign.lazy import load_on_use
 if TYPE_CHECKING:
     from expdesign.workflows.data.diagnose import diagnose
     from expdesign.workflows.data.estimate import estimate
-    from expdesign.workflows.data.identify_steps import identify_steps
     from expdesign.workflows.data.indices import indices
     from expdesign.workflows.data.mine import mine
     from expdesign.workflows.data.monitor import monitor
-    from expdesign.workflows.data.watch_steps import watch_steps
+    from expdesign.workflows.data.step_trials.identify_steps import identify_steps
+    from expdesign.workflows.data.step_trials.watch_steps import watch_steps
     from expdesign.workflows.explanations.explain import explain
     from expdesign.workflows.outcome import Outcome, TextTable
     from expdesign.workflows.planning.check_routes import check_routes
@@ -73,11 +73,11 @@ if not TYPE_CHECKING:
         {
             "data.diagnose": ("diagnose",),
             "data.estimate": ("estimate",),
-            "data.identify_steps": ("identify_steps",),
+            "data.step_trials.identify_steps": ("identify_steps",),
             "data.indices": ("indices",),
             "data.mine": ("mine",),
             "data.monitor": ("monitor",),
-            "data.watch_steps": ("watch_steps",),
+            "data.step_trials.watch_steps": ("watch_steps",),
             "explanations.explain": ("explain",),
             "outcome": ("Outcome", "TextTable"),
             "planning.check_routes": ("check_routes",),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from expdesign.durations import CRITERIA, limits_kept
+from expdesign.durations import CRITERIA, DurationDesign, limits_kept
 from expdesign.export import words
 from expdesign.export.report.content import ReportContent
 from expdesign.export.report.tables import shown_names
@@ -64,6 +64,14 @@ def criterion_sentence(content: ReportContent) -> str:
     }[problem.robust]
     prior = " Prior knowledge is included." if problem.prior.any() else ""
     return f"Criterion {problem.aim.criterion} minimises the {title}{about}{models}.{prior}"
+
+
+def equal_time_sentence(design: DurationDesign) -> str:
+    """What equal time on every primitive reaches; more than the optimum only where the limits rule it out."""
+    reached = words.percent(design.efficiency_uniform)
+    if design.efficiency_uniform > 1.0:
+        return f"Equal time for every manoeuvre is not allowed by the limits of the scenario; it would reach {reached}."
+    return f"Equal time for every manoeuvre would reach {reached}."
 
 
 def certificate(content: ReportContent) -> str:

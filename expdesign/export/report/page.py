@@ -73,6 +73,7 @@ def report_html(content: ReportContent) -> str:
         facts=facts(content),
         certificate=criteria.certificate(content),
         criterion=criteria.criterion_sentence(content),
+        equal_time=criteria.equal_time_sentence(content.design),
         comparison=criteria.comparison(content),
         limits=criteria.limit_rows(content),
         assumptions=assumptions(content),
@@ -178,8 +179,8 @@ def _design_sentence(content: ReportContent) -> str:
         return f"{tables.minutes_sentence(content.day)} {tables.found_sentence(content.day)}"
     text = (
         f"The durations are the best for estimating {words.counted(len(content.parameters), 'model parameter')}. "
-        f"Rounded to whole runs they reach {words.percent(design.efficiency_repeats)} of the optimum. Equal time for "
-        f"every manoeuvre would reach {words.percent(design.efficiency_uniform)}."
+        f"Rounded to whole runs they reach {words.percent(design.efficiency_repeats)} of the optimum. "
+        f"{criteria.equal_time_sentence(design)}"
     )
     if realised is None:
         return text

@@ -8,6 +8,7 @@ from expdesign.export.step_trial_page.content import (
     repeat_rows,
     sentences,
     step_model_json,
+    to_repeat,
 )
 from expdesign.export.step_trial_page.live import (
     TO_DO_HEADER,
@@ -35,5 +36,6 @@ __all__ = [
     "step_trial_html",
     "to_do_csv",
     "to_do_table",
+    "to_repeat",
     "told",
 ]

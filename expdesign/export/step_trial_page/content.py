@@ -6,8 +6,11 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import numpy as np
+
 from expdesign.export.files import finite, strict_json
 from expdesign.step_trials import CHANNELS, NO_BEND, TUNING, StepSample, StepTrial, Surface
+from expdesign.step_trials.live import StepList
 from expdesign.values import Array
 from expdesign.vessel import Vessel, column_name
 
@@ -39,6 +42,7 @@ class StepTrialContent:
 
     Attributes:
         trial: what was identified.
+        listed: steps that were to be sailed; None where every step of the record was.
         before, nominal: the vessel as its file knew it, and after the steps; None where no file was given.
         own, tests: simulations of the data, and of data held out.
         notes: on the data.
@@ -46,6 +50,7 @@ class StepTrialContent:
     """
 
     trial: StepTrial
+    listed: StepList | None
     before: Vessel | None
     nominal: Vessel | None
     own: tuple[Validated, ...]
@@ -58,6 +63,19 @@ class StepTrialContent:
 def begins_s(content: StepTrialContent, one: StepSample) -> float:
     """Time of the change of command in its batch [s]."""
     return one.hold.begin * content.trial.batches[one.hold.batch].sample_time_s
+
+
+def to_repeat(content: StepTrialContent) -> tuple[StepSample, ...]:
+    """Steps that give no inertia, of those that were to be sailed."""
+    trial, listed = content.trial, content.listed
+    if listed is None:
+        return trial.repeat
+    sign = np.array([1.0, trial.rudder_sign])
+    return tuple(
+        one
+        for one in trial.repeat
+        if listed.holds(sign * np.subtract(one.hold.commands, one.hold.change), sign * one.hold.commands)
+    )
 
 
 def sentences(content: StepTrialContent) -> tuple[str, ...]:
@@ -98,9 +116,11 @@ def _sentences(content: StepTrialContent) -> Iterator[str]:
             f"U {part.fit_percent[0]:.0f} %, r {part.fit_percent[1]:.0f} % of {part.name}" for part in content.tests
         ]
         yield f"It fits {'; '.join(fits)}, which was held out."
-    if trial.repeat:
-        numbers = ", ".join(str(one.hold.number) for one in trial.repeat)
-        yield f"Repeat {'step' if len(trial.repeat) == 1 else 'steps'} {numbers}; the reasons are below."
+    if again := to_repeat(content):
+        numbers = ", ".join(str(one.hold.number) for one in again)
+        yield f"Repeat {'step' if len(again) == 1 else 'steps'} {numbers}; the reasons are below."
+        if content.listed is None:
+            yield "With --steps PLAN.json, only steps of its runs are asked to be repeated, not changes between them."
     yield from _compared(content)
     outside = [one for one in trial.samples if one.plateau is not None and not one.plateau.turns]
     if len(outside) > steady / 2:
@@ -131,7 +151,7 @@ def repeat_rows(content: StepTrialContent) -> list[tuple[str, ...]]:
             _to(one, 1),
             "; ".join(one.problems),
         )
-        for one in content.trial.repeat
+        for one in to_repeat(content)
     ]
 
 

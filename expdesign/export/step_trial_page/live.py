@@ -74,7 +74,7 @@ def inputs_text(inputs: Inputs, steps: StepList) -> str:
 def _input_text(name: str, value: float) -> str:
     unit = unit_of(name)
     degrees = f" ({math.degrees(value):.1f} deg)" if unit == "rad" else ""
-    return f"{name} = {value:.4g} {unit}".rstrip() + degrees
+    return f"{name} = {round(value, 9) + 0.0:.4g} {unit}".rstrip() + degrees
 
 
 def to_do_rows(content: LiveContent) -> Iterator[tuple[Inputs, Listed | None]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -48,6 +49,7 @@ class StepList:
         start: commands of the first hold, in which the noise is learnt.
         steps: in the order of the list.
         width: of each input, within which commands count as equal.
+        first_s: time planned for the first hold [s]; infinite where none is.
     """
 
     controls: Controls
@@ -55,6 +57,7 @@ class StepList:
     start: Inputs
     steps: tuple[Listed, ...]
     width: Inputs
+    first_s: float = math.inf
 
     def same(self, one: Sequence[float], other: Sequence[float]) -> bool:
         """Whether commands are equal within the width."""
@@ -67,15 +70,29 @@ class StepList:
 
     def moved(self, one: Inputs, other: Inputs) -> tuple[bool, bool]:
         """Whether throttle and rudder differ."""
-        levels = np.array([self.start, *(step.after for step in self.steps)])
-        width = TUNING.constant_share * np.ptp(commands_of(self.controls, self.names, levels), axis=0)
-        throttle, rudder = (np.abs(np.subtract(self.commands(one), self.commands(other))) > width + 1e-9).tolist()
+        apart = np.abs(np.subtract(self.commands(one), self.commands(other)))
+        throttle, rudder = (apart > self._width()).tolist()
         return throttle, rudder
 
     def level(self, inputs: Inputs) -> Inputs | None:
         """The commands of the list that these are, or None."""
         levels = (self.start, *(step.after for step in self.steps))
         return next((level for level in levels if self.same(level, inputs)), None)
+
+    def holds(self, before: Array, after: Array) -> bool:
+        """Whether one of the steps changes throttle and rudder (2,) so, within the width."""
+        width = self._width()
+        return any(
+            (np.abs(np.subtract(self.commands(step.before), before)) <= width).all()
+            and (np.abs(np.subtract(self.commands(step.after), after)) <= width).all()
+            for step in self.steps
+        )
+
+    def _width(self) -> Array:
+        """(2,) of throttle and rudder."""
+        levels = np.array([self.start, *(step.after for step in self.steps)])
+        ranges = np.ptp(commands_of(self.controls, self.names, levels), axis=0)
+        return np.asarray(TUNING.constant_share * ranges + 1e-9)
 
     def sailed(self, left: Sequence[Listed], before: Inputs | None, after: Inputs) -> Listed | None:
         """The first of the steps left that a change of commands is."""
@@ -85,7 +102,12 @@ class StepList:
 
 
 def step_list(
-    names: Sequence[str], levels: Array, controls: Controls, *, numbers: Sequence[int | None] | None = None
+    names: Sequence[str],
+    levels: Array,
+    controls: Controls,
+    *,
+    numbers: Sequence[int | None] | None = None,
+    first_s: float = math.inf,
 ) -> StepList:
     """Steps between levels (k, m) of all inputs, one after the other; levels that repeat the one before are left out.
 
@@ -94,6 +116,7 @@ def step_list(
         levels: of the commands.
         controls: throttle and rudder among them.
         numbers: of the steps that lead to each level, None for levels that are only gone to; counted where not given.
+        first_s: time planned for the first hold [s]; infinite where none is.
 
     Raises:
         InputError: less than two levels differ.
@@ -112,8 +135,9 @@ def step_list(
         if number is not None
     ]
     return StepList(
-        controls=controls, names=tuple(names), start=rows[0], steps=tuple(steps), width=tuple(map(float, width))
-    )
+        controls=controls, names=tuple(names), start=rows[0], steps=tuple(steps), width=tuple(map(float, width)),
+        first_s=first_s,
+    )  # fmt: skip
 
 
 def in_sequence(left: Sequence[Listed], at: Inputs | None, steps: StepList) -> list[tuple[Inputs, Listed | None]]:

@@ -22,7 +22,7 @@ SHAPE = (math.log(1.5), math.log(0.6))
 SHAPE_STD = (0.4, 0.5)
 """Logarithms of zeta and of T3/T0 of hulls, and their standard deviations; most hulls lie within two of these."""
 MOST_STEPS, TOLERANCE = 6, 1e-5
-WIDTH_S, POINTS, FINE = 0.4, 9, 801
+WIDTH_S, POINTS, FINE = 0.8, 17, 801
 """Of the grid of dead times, to both sides of those of first order responses, and of that between its points."""
 OWN = 3
 """Parameters of each step: logarithm of T0, errors of both plateaus in their standard errors."""

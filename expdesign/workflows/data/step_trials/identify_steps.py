@@ -18,6 +18,7 @@ from expdesign.export.step_trial_page import (
     sentences,
     step_model_json,
     step_trial_html,
+    to_repeat,
 )
 from expdesign.progress import Progress, silent, within
 from expdesign.records import load_records
@@ -36,6 +37,7 @@ from expdesign.step_trials import (
 from expdesign.step_trials import identify_steps as identified
 from expdesign.vessel import Vessel
 from expdesign.workflows.command_text import command_text
+from expdesign.workflows.data.step_trials.listed import listed_steps
 from expdesign.workflows.outcome import Outcome, TextTable
 from expdesign.workflows.steps.measured import data_files
 
@@ -51,6 +53,7 @@ def identify_steps(
     throttle: Sequence[str] = (),
     rudder: Sequence[str] = (),
     tests: Sequence[Path] = (),
+    steps: Path | None = None,
     velocity: str = "auto",
     seed: int = 0,
     progress: Progress = silent,
@@ -63,6 +66,7 @@ def identify_steps(
         vessel: what was known before, which the steps update; None for the model of two degrees of freedom alone.
         throttle, rudder: names of signals; found by their kinds when empty.
         tests: files that are simulated only.
+        steps: list of those that were to be sailed, see `listed_steps`; others are not asked to be repeated.
         velocity: source of the velocities, as in `estimate`.
         seed: of the calibration of the test for steady state.
         progress: of the command.
@@ -79,17 +83,19 @@ def identify_steps(
     record = _record(data, ship, velocity)
     names = record.batches[0].input_names
     controls = controls_of(names, throttle, rudder)
+    listed = None if steps is None else listed_steps(steps, names, controls, ship)
     apart = _record(tests, ship, velocity).batches if tests else ()
     progress("finding steady states and fitting responses", 0.1)
     trial = identified(record, controls, seed=seed, progress=within(progress, 0.1, 0.7))
     content = StepTrialContent(
         trial=trial,
+        listed=listed,
         before=ship,
         nominal=None if ship is None else _nominal(ship, trial, names),
         own=tuple(_validated(trial, batch) for batch in trial.batches),
         tests=tuple(_validated(trial, _turned(sailed(batch, controls), trial)) for batch in apart),
         notes=record.notes,
-        command=_command(data, vessel, throttle, rudder, tests, velocity, seed),
+        command=_command(data, vessel, throttle, rudder, tests, steps, velocity, seed),
         version=__version__,
     )
     progress("drawing the page", 0.9)
@@ -136,11 +142,11 @@ def _validated(trial: StepTrial, batch: Sailed) -> Validated:
 
 def _command(
     data: Sequence[Path], vessel: Path | None, throttle: Sequence[str], rudder: Sequence[str], tests: Sequence[Path],
-    velocity: str, seed: int,
+    steps: Path | None, velocity: str, seed: int,
 ) -> str:  # fmt: skip
     options = {
         "--vessel": vessel, "--throttle": tuple(throttle), "--rudder": tuple(rudder), "--test": tuple(tests),
-        "--velocity": velocity, "--seed": seed,
+        "--steps": steps, "--velocity": velocity, "--seed": seed,
     }  # fmt: skip
     return command_text("identify-steps", data, options, usual={"--velocity": "auto", "--seed": 0})
 
@@ -161,7 +167,7 @@ def _summary(content: StepTrialContent) -> dict[str, object]:
         "rudder": controls.words[1],
         "holds": len(trial.holds),
         "steps_that_count": len(trial.counted),
-        "steps_to_repeat": [one.hold.number for one in trial.repeat],
+        "steps_to_repeat": [one.hold.number for one in to_repeat(content)],
         "delay_throttle_s": trial.delays[0][0],
         "delay_rudder_s": trial.delays[1][0],
         "fit": {
@@ -175,7 +181,7 @@ def _tables(content: StepTrialContent) -> tuple[TextTable, ...]:
     tables = [
         TextTable(title="The step trial", header=("finding",), rows=tuple((text,) for text in sentences(content)))
     ]
-    if content.trial.repeat:
+    if to_repeat(content):
         tables.append(TextTable(title="Steps to repeat", header=REPEAT_HEADER, rows=tuple(repeat_rows(content))))
     if content.nominal is not None:
         header = ("parameter", "before", "after the steps")

@@ -10,10 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from expdesign import __version__
-from expdesign.dictionary import build_dictionary
 from expdesign.errors import FileError, InputError, NotInformative
 from expdesign.export import write_files
 from expdesign.export.step_trial_page import (
@@ -27,10 +24,10 @@ from expdesign.export.step_trial_page import (
 )
 from expdesign.monitoring import saved
 from expdesign.progress import Progress, silent
-from expdesign.records import STREAM, Piece, Taken, pieces, read_levels
+from expdesign.records import STREAM, Piece, Taken, pieces
 from expdesign.records.file import Inputs, choose_columns
-from expdesign.scenario import load_dictionary, load_vessel
-from expdesign.step_trials import controls_of, levels_of
+from expdesign.scenario import load_vessel
+from expdesign.step_trials import controls_of
 from expdesign.step_trials.live import (
     Row,
     Setup,
@@ -40,17 +37,18 @@ from expdesign.step_trials.live import (
     beginning,
     expected_constants,
     restored_state,
-    step_list,
 )
-from expdesign.vessel import Vessel, column_name
+from expdesign.vessel import column_name
 from expdesign.workflows.command_text import command_text
+from expdesign.workflows.data.step_trials.listed import listed_steps
 from expdesign.workflows.outcome import Outcome, TextTable
 
 STATE = "watch-steps-state.json"
 TO_DO = "steps-to-do.csv"
+LEARN_S, LEARN_SHARE = 120.0, 0.8
+"""Time of the first hold from which the noise is learnt [s], and its largest share of the planned one."""
 WRITTEN_EVERY_S = 20.0
 """Time between writing the state where nothing happens [s]."""
-STEP_FAMILIES = ("throttle_steps", "rudder_steps")
 READ = ("u_mps", "r_radps")
 
 
@@ -92,7 +90,7 @@ def watch_steps(
     vessel: Path,
     throttle: Sequence[str] = (),
     rudder: Sequence[str] = (),
-    learn_s: float = 120.0,
+    learn_s: float | None = None,
     resume: bool = False,
     seed: int = 0,
     tell: Callable[[str], None] = _nothing,
@@ -103,10 +101,11 @@ def watch_steps(
     Args:
         data: CSV file, or `STREAM` for the standard input.
         out: folder, or None.
-        steps: CSV of commands, one row for each hold, or a plan's commands.csv; or a dictionary with families of steps.
+        steps: a list of steps, see `listed_steps`.
         vessel: guessed before the trial, for its inputs and how fast it answers.
         throttle, rudder: names of signals; found by their kinds when empty.
-        learn_s: of the first hold, from which the noise is learnt [s].
+        learn_s: of the first hold, from which the noise is learnt [s]; None for 120, or most of it where it is planned
+            to be shorter.
         resume: go on from the state in `out`.
         seed: of the calibration of the test for steady state.
         tell: takes each line as it is known.
@@ -116,16 +115,18 @@ def watch_steps(
         InputError: arguments or files that are wrong.
         NotInformative: the data hold no step of the list.
     """
-    if not 0 < learn_s < math.inf:
+    if learn_s is not None and not 0 < learn_s < math.inf:
         raise InputError(f"--learn-s is {learn_s:g}, expected more than 0")
     ship = load_vessel(vessel)
-    wanted = _listed(steps, ship, throttle, rudder)
-    setup = Setup(steps=wanted, constants_s=expected_constants(ship, wanted), learn_s=learn_s, seed=seed)
+    controls = controls_of(ship.model.inputs, throttle, rudder)
+    wanted = listed_steps(steps, ship.model.inputs, controls, ship)
+    learnt_s = min(LEARN_S, LEARN_SHARE * wanted.first_s) if learn_s is None else learn_s
+    setup = Setup(steps=wanted, constants_s=expected_constants(ship, wanted), learn_s=learnt_s, seed=seed)
     options = {
         "--steps": steps, "--vessel": vessel, "--throttle": tuple(throttle), "--rudder": tuple(rudder),
         "--learn-s": learn_s, "--out": out, "--resume": resume, "--seed": seed,
     }  # fmt: skip
-    command = command_text("watch-steps", [data], options, usual={"--learn-s": 120.0, "--seed": 0})
+    command = command_text("watch-steps", [data], options, usual={"--learn-s": None, "--seed": 0})
     folder = out or Path("runs") / ("watch-steps" if data == STREAM else data.stem)
     work = _Work(setup=setup, folder=folder, command=command)
     now = _resumed(folder / STATE, wanted) if resume else _Watch(state=beginning(setup))
@@ -135,27 +136,6 @@ def watch_steps(
     written = write_files(folder, _files(now, work))
     progress("done", 1.0)
     return Outcome(files=written, summary=_summary(content), tables=_tables(content))
-
-
-def _listed(path: Path, ship: Vessel, throttle: Sequence[str], rudder: Sequence[str]) -> StepList:
-    """The steps of a file."""
-    names = ship.model.inputs
-    controls = controls_of(names, throttle, rudder)
-    numbers = None
-    if path.suffix == ".toml":
-        runs = [run for run in build_dictionary(ship, load_dictionary(path)) if run.family in STEP_FAMILIES]
-        if not runs:
-            raise FileError(path, "primitives", f"has no family of steps, expected {' or '.join(STEP_FAMILIES)}")
-        levels = np.concatenate([levels_of(run.commands.values, ship.sample_time_s) for run in runs])
-    else:
-        read = read_levels(path, inputs=names)
-        numbers, levels = read.numbers, read.values
-        if read.time_s is not None:
-            levels = levels_of(read.values, float(np.median(np.diff(read.time_s))) if len(levels) > 1 else 1.0)
-    try:
-        return step_list(names, levels, controls, numbers=numbers)
-    except InputError as error:
-        raise FileError(path, "", str(error)) from None
 
 
 def _through(now: _Watch, data: Path, work: _Work, tell: Callable[[str], None], progress: Progress) -> _Watch:

@@ -1,0 +1,86 @@
+"""Dead times of throttle and rudder, from the responses to all of their steps."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from expdesign.progress import Progress, silent, within
+from expdesign.step_trials.holds import Hold, Sailed
+from expdesign.step_trials.responses import Transient, shared_delay
+from expdesign.step_trials.samples import Delays, StepSample, step_samples, without_outliers
+from expdesign.step_trials.tuning import TUNING
+
+SPEED_DEGREE = 3
+"""Of the polynomial in time that the speed follows during a response."""
+
+
+def samples_and_delays(
+    batches: Sequence[Sailed], holds: Sequence[Hold], steady: Sequence[int | None], *, progress: Progress = silent
+) -> tuple[tuple[StepSample, ...], Delays]:
+    """A sample of every hold, and the dead times of both commands.
+
+    A dead time belongs to an actuator, not to a step: it is found in each step first, and all responses are fitted anew
+    with that of all. Throttle responses are of first order; rudder responses share a shape of second order.
+    """
+    free = (0.0, TUNING.most_delay_s)
+    samples = step_samples(batches, holds, steady, delay_s=(free, free), progress=within(progress, 0.0, 0.5))
+    delays = _delay(samples, 0), _rudder_delay(batches, samples)
+    bounds = tuple((value, value) for value, _ in delays)
+    again = within(progress, 0.5, 1.0)
+    fitted = step_samples(batches, holds, steady, delay_s=(bounds[0], bounds[1]), progress=again)
+    return without_outliers(fitted), delays
+
+
+def _delay(samples: Sequence[StepSample], channel: int) -> tuple[float, float]:
+    """Median of the dead times of first order responses, weighted by their information, and its standard error."""
+    own = [one.first_order for one in samples if one.counts and one.hold.channel == channel]
+    found = np.array([part.delay_s for part in own if part is not None])
+    if not len(found):
+        return 0.0, math.inf
+    weights = np.array([max(part.delay_std_s, 1e-3) ** -2.0 for part in own if part is not None])
+    order = np.argsort(found)
+    share = np.cumsum(weights[order]) / weights.sum()
+    middle = float(found[order][np.searchsorted(share, 0.5)])
+    spread = math.sqrt(float(np.sum(weights * (found - middle) ** 2) / weights.sum()))
+    return middle, 1.2533 * spread * math.sqrt(float(np.sum(weights**2))) / float(weights.sum())
+
+
+def _rudder_delay(batches: Sequence[Sailed], samples: Sequence[StepSample]) -> tuple[float, float]:
+    """Of responses of one shape, where there are enough of them."""
+    own = [one for one in samples if one.counts and one.hold.channel == 1]
+    if len(own) < TUNING.least_group:
+        return _delay(samples, 1)
+    return shared_delay([turn_entry(batches[one.hold.batch], one) for one in own], most_s=TUNING.most_delay_s)
+
+
+def turn_entry(batch: Sailed, step: StepSample) -> Transient:
+    """Beginning of the response of the yaw rate to a rudder step, as if the speed stayed that before it.
+
+    A turn takes speed off long after the yaw rate began to follow, and with it yaw rate. The curvature r/U changes
+    little then: the yaw rate is scaled by the ratio of the speeds, the end is left out, and the plateau is uncertain by
+    as much as the loss of speed changes it. A vessel that loses more than half its speed, or has none, is not scaled.
+    """
+    data, before, after = step.transient, step.before, step.plateau
+    assert data is not None
+    assert before is not None
+    assert after is not None
+    assert step.first_order is not None
+    until = max(TUNING.least_entry_samples, int(np.searchsorted(
+        data.time_s, TUNING.entry_constants * step.first_order.time_constant_s
+    )))  # fmt: skip
+    speed = batch.state[step.hold.begin : step.hold.begin + len(data.time_s), 0]
+    speed = np.polynomial.Polynomial.fit(data.time_s, speed, SPEED_DEGREE)(data.time_s)
+    first, last = float(before.state[0]), float(after.state[0])
+    if min(first, last, float(speed.min())) < 0.5 * max(first, last, float(speed.max())):
+        return replace(data, time_s=data.time_s[:until], values=data.values[:until])
+    return replace(
+        data,
+        time_s=data.time_s[:until],
+        values=(data.values * first / speed)[:until],
+        after=data.after * first / last,
+        after_std=math.hypot(data.after_std, data.after * (1 - last / first)),
+    )
