@@ -35,7 +35,7 @@ FLOORS = {
         ("tuning",),
         ("holds", "regression", "steady_state", "responses"),
         ("samples", "steady_holds", "surfaces"),
-        ("comparisons", "model", "nominal", "live"),
+        ("comparisons", "dead_times", "model", "nominal", "live"),
         ("identify",),
     ),
     "estimation": (

@@ -215,6 +215,7 @@ def workflows(monkeypatch: pytest.MonkeyPatch) -> Workflows:
                 "throttle": ("n1", "n2"),
                 "rudder": ("a1", "a2"),
                 "tests": (Path("c.csv"),),
+                "steps": None,
                 "velocity": "auto",
                 "seed": 3,
             },
